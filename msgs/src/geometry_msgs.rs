@@ -1,0 +1,103 @@
+//! Vectors, rotations and poses.
+
+use crate::std_msgs::Header;
+
+ros_message! {
+    "geometry_msgs/msg/Vector3", "../std/geometry_msgs/msg/Vector3.msg", Message;
+    /// A vector.
+    #[derive(Copy, Default)]
+    pub struct Vector3 {
+        /// First component.
+        pub x: f64,
+        /// Second component.
+        pub y: f64,
+        /// Third component.
+        pub z: f64,
+    }
+}
+
+ros_message! {
+    "geometry_msgs/msg/Point", "../std/geometry_msgs/msg/Point.msg", Message;
+    /// A position, m.
+    #[derive(Copy, Default)]
+    pub struct Point {
+        /// First component.
+        pub x: f64,
+        /// Second component.
+        pub y: f64,
+        /// Third component.
+        pub z: f64,
+    }
+}
+
+ros_message! {
+    "geometry_msgs/msg/Quaternion", "../std/geometry_msgs/msg/Quaternion.msg", Message;
+    /// A rotation as a unit quaternion. The default is the identity, as in ROS.
+    #[derive(Copy)]
+    pub struct Quaternion {
+        /// First vector component.
+        pub x: f64,
+        /// Second vector component.
+        pub y: f64,
+        /// Third vector component.
+        pub z: f64,
+        /// Scalar part.
+        pub w: f64,
+    }
+}
+
+impl Default for Quaternion {
+    fn default() -> Self {
+        Self { x: 0.0, y: 0.0, z: 0.0, w: 1.0 }
+    }
+}
+
+ros_message! {
+    "geometry_msgs/msg/Pose", "../std/geometry_msgs/msg/Pose.msg", Message;
+    /// Position and orientation.
+    #[derive(Copy, Default)]
+    pub struct Pose {
+        /// Position, m.
+        pub position: Point,
+        /// Orientation.
+        pub orientation: Quaternion,
+    }
+}
+
+ros_message! {
+    "geometry_msgs/msg/PoseStamped", "../std/geometry_msgs/msg/PoseStamped.msg", Message;
+    /// A pose with its time and frame.
+    #[derive(Default)]
+    pub struct PoseStamped {
+        /// Time and frame.
+        pub header: Header,
+        /// The pose in that frame.
+        pub pose: Pose,
+    }
+}
+
+ros_message! {
+    "geometry_msgs/msg/Transform", "../std/geometry_msgs/msg/Transform.msg", Message;
+    /// Takes points from one frame into another.
+    #[derive(Copy, Default)]
+    pub struct Transform {
+        /// Applied second, m.
+        pub translation: Vector3,
+        /// Applied first.
+        pub rotation: Quaternion,
+    }
+}
+
+ros_message! {
+    "geometry_msgs/msg/TransformStamped", "../std/geometry_msgs/msg/TransformStamped.msg", Message;
+    /// parent_from_child at one time.
+    #[derive(Default)]
+    pub struct TransformStamped {
+        /// Time, and the parent frame.
+        pub header: Header,
+        /// The child frame.
+        pub child_frame_id: String,
+        /// parent_from_child.
+        pub transform: Transform,
+    }
+}

@@ -1,0 +1,28 @@
+//! Sensors.
+
+use crate::geometry_msgs::{Quaternion, Vector3};
+use crate::std_msgs::Header;
+
+ros_message! {
+    "sensor_msgs/msg/Imu", "../std/sensor_msgs/msg/Imu.msg", Message;
+    /// One sample of an inertial measurement unit, in sensor axes (REP-145).
+    ///
+    /// Covariances: row major 3x3. All zeros: unknown; element 0 = -1: the quantity is not reported.
+    #[derive(Default)]
+    pub struct Imu {
+        /// Time, and the sensor's frame.
+        pub header: Header,
+        /// World from sensor.
+        pub orientation: Quaternion,
+        /// rad2.
+        pub orientation_covariance: [f64; 9],
+        /// Of the sensor against the world, rad/s.
+        pub angular_velocity: Vector3,
+        /// (rad/s)2.
+        pub angular_velocity_covariance: [f64; 9],
+        /// Specific force, m/s2: +g upwards at rest.
+        pub linear_acceleration: Vector3,
+        /// (m/s2)2.
+        pub linear_acceleration_covariance: [f64; 9],
+    }
+}

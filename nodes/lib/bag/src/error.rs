@@ -1,0 +1,159 @@
+//! What can go wrong with a bag.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use cromosim_spatial::Stamp;
+use thiserror::Error;
+
+/// Everything that this crate returns as an error. Each message names the file and the place, and a remedy where there is one.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum BagError {
+    /// The operating system refused.
+    #[error("{}: cannot {action}: {source}", path.display())]
+    Io {
+        /// The file or directory.
+        path: PathBuf,
+        /// What was attempted.
+        action: &'static str,
+        /// Why not.
+        source: io::Error,
+    },
+    /// A recording stopped because it could not be written; what was written before is kept.
+    #[error("{}: cannot write: {source}; what was recorded before is kept: mend it with `cromosim bag recover {}`", path.display(), path.display())]
+    RecordingStopped {
+        /// The bag, as the user named it.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// Not an MCAP file at all.
+    #[error("{}: not an MCAP file: it does not start with the MCAP magic bytes", path.display())]
+    NotMcap {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file ends too early: a recorder was killed, or the file was cut.
+    #[error("{}, byte {at} of {size}: the bag is cut off here; mend it with `cromosim bag recover {}`", path.display(), path.display())]
+    Unfinished {
+        /// The file.
+        path: PathBuf,
+        /// Where the first incomplete record starts.
+        at: u64,
+        /// Length of the file, bytes.
+        size: u64,
+    },
+    /// The file holds what no MCAP writer writes.
+    #[error("{}, byte {at}: {reason}; what is whole can be saved with `cromosim bag recover {}`", path.display(), path.display())]
+    Corrupt {
+        /// The file.
+        path: PathBuf,
+        /// Start of the record.
+        at: u64,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A bag directory without its table of contents.
+    #[error("{}: no metadata.yaml in this directory; where it holds .mcap files, `cromosim bag recover {}` makes it anew", path.display(), path.display())]
+    NoMetadata {
+        /// The directory.
+        path: PathBuf,
+    },
+    /// A `metadata.yaml` that does not say what it must.
+    #[error("{}: {reason}", path.display())]
+    Metadata {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A bag of a kind that this crate does not read.
+    #[error("{}: {what} is not supported, only MCAP bags without file compression", path.display())]
+    Unsupported {
+        /// The bag.
+        path: PathBuf,
+        /// What it uses.
+        what: String,
+    },
+    /// No such topic.
+    #[error("{}: no topic {topic}; it holds {}", path.display(), list(known))]
+    UnknownTopic {
+        /// The bag.
+        path: PathBuf,
+        /// The topic asked for.
+        topic: String,
+        /// The topics that there are.
+        known: Vec<String>,
+    },
+    /// A topic of another type than asked for, or written before.
+    #[error("topic {topic}: expected {expected}, found {found}")]
+    WrongType {
+        /// The topic.
+        topic: String,
+        /// The type asked for.
+        expected: String,
+        /// The type it has.
+        found: String,
+    },
+    /// A message that does not decode.
+    #[error("topic {topic}, message at {} ns: {reason}", log_time.nanos)]
+    Decode {
+        /// Its topic.
+        topic: String,
+        /// When it was logged.
+        log_time: Stamp,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A message that cannot be encoded.
+    #[error("topic {topic}: cannot encode {type_name}: {reason}")]
+    Encode {
+        /// Its topic.
+        topic: String,
+        /// Its type.
+        type_name: &'static str,
+        /// Why not.
+        reason: String,
+    },
+    /// MCAP holds no time before the epoch.
+    #[error("{topic}: time {nanos} ns lies before the epoch, which a bag cannot hold")]
+    BeforeEpoch {
+        /// The topic or attachment.
+        topic: String,
+        /// The time.
+        nanos: i64,
+    },
+    /// The output is there already.
+    #[error("{}: is there already; name another one, or move it away", path.display())]
+    Exists {
+        /// The output.
+        path: PathBuf,
+    },
+    /// MCAP's own limits (65535 topics) were passed.
+    #[error("{}: cannot write: {reason}", path.display())]
+    Refused {
+        /// The bag.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+}
+
+fn list(names: &[String]) -> String {
+    if names.is_empty() { "no topics".to_owned() } else { names.join(", ") }
+}
+
+/// Makes an [`io::Error`] into a [`BagError::Io`].
+pub(crate) fn io_error(path: &Path, action: &'static str) -> impl FnOnce(io::Error) -> BagError {
+    let path = path.to_owned();
+    move |source| BagError::Io { path, action, source }
+}
+
+/// What the MCAP writer says, with the operating system's reason in front where there is one.
+pub(crate) fn write_error(path: &Path, error: mcap::McapError) -> BagError {
+    match error {
+        mcap::McapError::Io(source) => BagError::Io { path: path.to_owned(), action: "write", source },
+        other => BagError::Refused { path: path.to_owned(), reason: other.to_string() },
+    }
+}

@@ -1,0 +1,35 @@
+//! Bags: recordings of ROS 2 messages as rosbag2 lays them out in MCAP files.
+//!
+//! - [`BagWriter`] writes a file or a directory; [`StreamWriter`] writes into anything.
+//! - [`BagReader`] lists and reads them, in order of log time.
+//! - [`recover`] mends what a killed recorder left behind.
+//! - [`write_imu_csv`] exports an IMU's samples.
+//!
+//! Message payloads are plain CDR after a four-byte header (OMG DDSI-RTPS 2.5, 10); schemas are `ros2msg` text. The same calls give the same
+//! bytes: times come from the caller, and compression uses one thread.
+
+pub mod cdr;
+mod chunk;
+mod contents;
+mod csv;
+mod error;
+mod metadata;
+mod qos;
+mod reader;
+mod recover;
+mod stream;
+mod summary;
+mod topic;
+mod walk;
+mod writer;
+
+pub use csv::write_imu_csv;
+pub use error::BagError;
+pub use qos::{QosProfile, QosTime};
+pub use reader::{BagReader, Message, Messages, Selection};
+pub use recover::{Damage, Recovery, recover};
+pub use stream::{Compression, StreamWriter, TopicId};
+pub use summary::{BagSummary, CountedTopic};
+pub use topic::Topic;
+pub use walk::Attachment;
+pub use writer::{BagOptions, BagWriter};
