@@ -1,0 +1,204 @@
+//! What can go wrong with a motion.
+
+use std::io;
+use std::path::PathBuf;
+
+use cromosim_body::BodyError;
+
+/// An error of this crate: one line that names the file, the place and what to do.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MotionError {
+    /// The file cannot be opened or read.
+    #[error("{}: cannot read: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        source: io::Error,
+    },
+    /// The file is larger than any motion.
+    #[error("{}: {bytes} bytes, more than the {limit} that are read; cut the file into parts", path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Its size.
+        bytes: u64,
+        /// The largest allowed.
+        limit: u64,
+    },
+    /// The content is no known motion format.
+    #[error("{}: not a motion file: expected BVH (first word HIERARCHY), found {found}", path.display())]
+    UnknownFormat {
+        /// The file.
+        path: PathBuf,
+        /// How the content begins.
+        found: String,
+    },
+    /// Something else was expected at a line of the file.
+    #[error("{name}, line {line}: expected {expected}, found {found}")]
+    Syntax {
+        /// The file.
+        name: String,
+        /// 1-based.
+        line: usize,
+        /// What fits.
+        expected: String,
+        /// What stands there.
+        found: String,
+    },
+    /// A frame has the wrong number of values.
+    #[error("{name}, line {line}: expected {expected} channels, found {found}")]
+    ChannelCount {
+        /// The file.
+        name: String,
+        /// 1-based.
+        line: usize,
+        /// As declared by the skeleton.
+        expected: usize,
+        /// On this line.
+        found: usize,
+    },
+    /// The file holds another number of frames than it declares.
+    #[error("{name}, line {line}: expected {expected} frames (as line {declared_at} says), found {found}")]
+    FrameCount {
+        /// The file.
+        name: String,
+        /// Where the frames end (too few) or go on (too many); 1-based.
+        line: usize,
+        /// The declared number.
+        expected: usize,
+        /// The number that is there.
+        found: usize,
+        /// The line of `Frames:`.
+        declared_at: usize,
+    },
+    /// A value is NaN, infinite or absurdly large.
+    #[error("{name}, line {line}: value {column} is {found}, expected a finite number below {limit:e} in size")]
+    Value {
+        /// The file.
+        name: String,
+        /// 1-based.
+        line: usize,
+        /// 1-based position among the line's numbers.
+        column: usize,
+        /// The text.
+        found: String,
+        /// The largest allowed.
+        limit: f64,
+    },
+    /// The skeleton is larger than any skeleton.
+    #[error("{name}, line {line}: more than {limit} {what}; this is no human skeleton")]
+    Limit {
+        /// The file.
+        name: String,
+        /// 1-based.
+        line: usize,
+        /// Joints or levels.
+        what: &'static str,
+        /// The largest allowed.
+        limit: usize,
+    },
+    /// No skeleton map fits the joint names.
+    #[error(
+        "{name}: no skeleton map fits: nearest is {nearest} ({found} of {total} joints), not found: {}; write a map and name it by skeleton_map",
+        missing.join(", ")
+    )]
+    UnknownSkeleton {
+        /// The file.
+        name: String,
+        /// The map that fits best.
+        nearest: String,
+        /// How many of its joints are in the file.
+        found: usize,
+        /// How many joints it names.
+        total: usize,
+        /// Its indispensable joints that are not in the file.
+        missing: Vec<String>,
+    },
+    /// The chosen skeleton map does not fit.
+    #[error("{name}: skeleton map {map} does not fit, not found: {}; choose another skeleton_map or leave it out", missing.join(", "))]
+    MissingJoints {
+        /// The file.
+        name: String,
+        /// The map.
+        map: String,
+        /// Joints of the map that are not in the file.
+        missing: Vec<String>,
+    },
+    /// A skeleton map's name is neither embedded nor a file.
+    #[error("skeleton map {given} is neither a file nor one of {}", known.join(", "))]
+    UnknownMap {
+        /// What was given.
+        given: String,
+        /// The embedded maps.
+        known: Vec<String>,
+    },
+    /// A skeleton map cannot be parsed.
+    #[error("{origin}: not a skeleton map: {source}")]
+    MapSyntax {
+        /// The map's file.
+        origin: String,
+        /// The reason, with its line.
+        source: serde_norway::Error,
+    },
+    /// A skeleton map contradicts itself.
+    #[error("{origin}: key {key}: {problem}")]
+    MapContent {
+        /// The map's file.
+        origin: String,
+        /// The key.
+        key: String,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// No rest pose can be told from the file.
+    #[error("{name}: no rest pose found: {problem}; set rest to zero_pose or to a frame that shows a T-pose, or give rest_axes in a map")]
+    RestPose {
+        /// The file.
+        name: String,
+        /// What was tried and why it failed.
+        problem: String,
+    },
+    /// The up axis cannot be told from the file.
+    #[error("{name}: up axis unclear (mean direction from feet to head {mean:?}); set up_axis")]
+    UpAxis {
+        /// The file.
+        name: String,
+        /// In the file's axes.
+        mean: [f64; 3],
+    },
+    /// The unit of length cannot be told from the file.
+    #[error("{name}: the skeleton is {height_units:.3} units tall, which is a human in no usual unit; set unit_scale_m (metres per unit)")]
+    Unit {
+        /// The file.
+        name: String,
+        /// Estimated height in the file's units.
+        height_units: f64,
+    },
+    /// A setting is out of its range.
+    #[error("{name}: {setting} is {value}, expected {expected}")]
+    Setting {
+        /// The file.
+        name: String,
+        /// The setting.
+        setting: &'static str,
+        /// What was given.
+        value: f64,
+        /// What fits.
+        expected: String,
+    },
+    /// A motion's parts do not fit each other.
+    #[error("{name}: frame {frame}: {what} is not finite")]
+    NotFinite {
+        /// The motion.
+        name: String,
+        /// 0-based.
+        frame: usize,
+        /// Which quantity.
+        what: &'static str,
+    },
+    /// The body refuses.
+    #[error(transparent)]
+    Body(#[from] BodyError),
+}

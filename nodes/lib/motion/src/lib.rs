@@ -1,0 +1,33 @@
+//! Motion files and the embedded walk, all in SMPL's joints.
+//!
+//! [`read_motion`] takes a file, finds out what it is by its content and retargets it: a [`SmplMotion`] in a world with z up, feet on z = 0,
+//! with shape coefficients fitted to the source's bones. [`embedded_walk`] is a motion without a file. The [`RetargetReport`] says how a
+//! source was understood.
+//!
+//! ```
+//! let walk = cromosim_motion::embedded_walk();
+//! assert_eq!(walk.duration_s().round(), 10.0);
+//! let halfway = walk.pose_at(5.0).expect("it has frames");
+//! assert!(halfway.root_position.z > 0.5);
+//! ```
+
+mod axes;
+mod bvh;
+mod error;
+mod motion;
+mod options;
+mod read;
+mod report;
+mod retarget;
+mod skeleton_map;
+mod walk;
+
+pub use bvh::{BvhClip, BvhJoint, Channel, MAX_JOINTS, MAX_VALUE, SkeletonPose, parse_bvh};
+pub use error::MotionError;
+pub use motion::SmplMotion;
+pub use options::{MotionOptions, RestChoice, UpAxis};
+pub use read::{read_motion, read_motion_for};
+pub use report::RetargetReport;
+pub use retarget::retarget;
+pub use skeleton_map::{FeetAtRest, Sides, SkeletonMap};
+pub use walk::embedded_walk;

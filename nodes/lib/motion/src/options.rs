@@ -1,0 +1,87 @@
+//! Settings of reading and retargeting.
+
+use std::path::Path;
+
+use nalgebra::Vector3;
+use serde::Deserialize;
+
+use crate::{MotionError, SkeletonMap};
+
+/// The direction that points up in the source.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum UpAxis {
+    /// Found from where the head is over the feet.
+    #[default]
+    Detect,
+    /// x is up.
+    X,
+    /// y is up, as in most BVH files.
+    Y,
+    /// z is up.
+    Z,
+}
+
+impl UpAxis {
+    /// The direction in the file's axes; `None` for `Detect`.
+    pub fn direction(self) -> Option<Vector3<f64>> {
+        match self {
+            Self::Detect => None,
+            Self::X => Some(Vector3::x()),
+            Self::Y => Some(Vector3::y()),
+            Self::Z => Some(Vector3::z()),
+        }
+    }
+}
+
+/// The pose of the source that is compared with SMPL's T-pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RestChoice {
+    /// The zero pose where it is a standing human, else what the map says, else a T-pose in the first frame.
+    #[default]
+    Detect,
+    /// All channels zero.
+    ZeroPose,
+    /// The map's `rest_axes`.
+    Map,
+    /// This frame, 0-based, which must show a T-pose or an A-pose.
+    Frame(usize),
+}
+
+/// How to read a motion file; every field has a default.
+#[derive(Clone, Debug, PartialEq, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct MotionOptions {
+    /// An embedded skeleton map's name or a YAML file; found by the joints' names where absent.
+    pub skeleton_map: Option<String>,
+    /// The source's up axis.
+    pub up_axis: UpAxis,
+    /// Metres per unit of the source; found by the skeleton's height where absent.
+    pub unit_scale_m: Option<f64>,
+    /// The source's rest pose.
+    pub rest: RestChoice,
+    /// Keeps a leading T-pose and the frames that blend it into the motion.
+    pub keep_lead_in: bool,
+    /// Where to begin, s after the first frame that is kept.
+    pub start_s: f64,
+    /// How much to take, s; all where absent.
+    pub duration_s: Option<f64>,
+}
+
+impl MotionOptions {
+    /// The chosen map, from its file if it is no embedded one; `None` where it is to be detected.
+    pub(crate) fn map(&self) -> Result<Option<SkeletonMap>, MotionError> {
+        let Some(given) = &self.skeleton_map else { return Ok(None) };
+        let embedded = SkeletonMap::embedded()?;
+        if let Some(map) = embedded.iter().find(|map| map.name() == given) {
+            return Ok(Some(map.clone()));
+        }
+        let path = Path::new(given);
+        if !path.exists() {
+            return Err(MotionError::UnknownMap { given: given.clone(), known: embedded.into_iter().map(|map| map.name).collect() });
+        }
+        let yaml = std::fs::read_to_string(path).map_err(|source| MotionError::Read { path: path.to_owned(), source })?;
+        SkeletonMap::from_yaml(&yaml, given).map(Some)
+    }
+}
