@@ -1,0 +1,45 @@
+//! The body that is part of the program; made for it by `scripts/build.py`.
+
+use std::io::Cursor;
+use std::path::Path;
+use std::sync::{Arc, OnceLock};
+
+use crate::model::Gender;
+use crate::npz::NpzReader;
+use crate::posedirs::{Constants, generated_pose_blocks};
+use crate::read::read_without_posedirs;
+use crate::site::embedded_sites;
+use crate::{BodyError, BodyModel, JOINT_COUNT};
+
+static ARRAYS: &[u8] = include_bytes!("../assets/body-without-posedirs.npz");
+static POSEDIRS: &str = include_str!("../assets/posedirs.json");
+/// triangle, barycentrics, joint and point of each named site.
+pub(crate) static SITES: &str = include_str!("../assets/sites.json");
+
+impl BodyModel {
+    /// The body of this project: an adult of 1.70 m and 70 kg in SMPL's structure with 6954 vertices and 10 betas, each one standard
+    /// deviation: stature, mass, leg to trunk ratio, shoulder breadth, hip breadth, arm length, belly, muscle, sex dimorphism,
+    /// extremity size. They are not SMPL's betas: fit them to bone lengths instead of taking them from a motion file.
+    ///
+    /// The first call unpacks it and makes its pose corrections; later calls share it.
+    pub fn embedded() -> Arc<Self> {
+        static BODY: OnceLock<Arc<BodyModel>> = OnceLock::new();
+        // A broken asset is a fault of the build and not of any input: a test loads it.
+        BODY.get_or_init(|| Arc::new(load().expect("the embedded body is sound"))).clone()
+    }
+}
+
+fn load() -> Result<BodyModel, BodyError> {
+    let path = Path::new("cromosim_neutral");
+    let mut npz = NpzReader::new(Cursor::new(ARRAYS), path)?;
+    let mut raw = read_without_posedirs(&mut npz, path)?;
+    raw.gender = Some(Gender::Neutral);
+    // The exact joints that the constants were made with; J_regressor gives them back within 0.02 mm.
+    let missing = || BodyError::MissingKey { path: path.to_owned(), key: "J".to_owned() };
+    let joints = npz.floats("J", &[Some(JOINT_COUNT), Some(3)], "(24, 3)")?.ok_or_else(missing)?;
+    let constants: Constants = serde_json::from_str(POSEDIRS).expect("the embedded constants are sound");
+    raw.pose_blocks = generated_pose_blocks(&constants, &raw, &joints.values);
+    let mut body = BodyModel::from_raw(raw)?;
+    body.sites = embedded_sites(&body)?;
+    Ok(body)
+}

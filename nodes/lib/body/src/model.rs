@@ -1,0 +1,238 @@
+//! A body's arrays, checked once: every index and every size is right from here on.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use crate::site::NamedSite;
+use crate::skin::SkinTables;
+use crate::{BodyError, JOINT_COUNT, Joint};
+
+/// The group of people a body model was made from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Gender {
+    /// Women and men together.
+    #[default]
+    Neutral,
+    /// Women.
+    Female,
+    /// Men.
+    Male,
+}
+
+impl Gender {
+    /// SMPL's word: `neutral`, `female`, `male`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Neutral => "neutral",
+            Self::Female => "female",
+            Self::Male => "male",
+        }
+    }
+
+    /// From SMPL's word or its first letter, in any case.
+    pub fn from_name(name: &str) -> Option<Self> {
+        match name.to_ascii_lowercase().as_str() {
+            "neutral" | "n" => Some(Self::Neutral),
+            "female" | "f" => Some(Self::Female),
+            "male" | "m" => Some(Self::Male),
+            _ => None,
+        }
+    }
+}
+
+impl fmt::Display for Gender {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(self.name())
+    }
+}
+
+/// What one joint's rotation adds to one vertex: `coefficients[9 * axis + 3 * row + column]` times (R - I)[row, column].
+///
+/// f32: corrections are centimetres, so that rounding stays under a nanometre.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct PoseBlock {
+    /// The joint, 1 to 23.
+    pub joint: u8,
+    /// Metres.
+    pub coefficients: [f32; 27],
+}
+
+/// A body before it has a shape: SMPL (Loper et al. 2015) with V vertices, 24 joints and B shape coefficients.
+#[derive(Debug)]
+pub struct BodyModel {
+    pub(crate) id: String,
+    pub(crate) gender: Option<Gender>,
+    /// (V, 3), m.
+    pub(crate) template: Vec<Vector3<f64>>,
+    pub(crate) beta_count: usize,
+    /// (V, 3, B), m.
+    pub(crate) shape_directions: Vec<f64>,
+    /// Of each vertex, the blocks that are not zero.
+    pub(crate) pose_blocks: Rows<PoseBlock>,
+    /// Of each joint, vertices and their weights.
+    pub(crate) regressor: Rows<(u32, f64)>,
+    /// Of each vertex, joints and their weights.
+    pub(crate) skin_weights: Rows<(u8, f64)>,
+    pub(crate) faces: Vec<[u32; 3]>,
+    pub(crate) sites: Vec<NamedSite>,
+    pub(crate) skin_tables: SkinTables,
+}
+
+/// Rows of different lengths in one allocation.
+#[derive(Debug, Clone)]
+pub(crate) struct Rows<T> {
+    ends: Vec<u32>,
+    items: Vec<T>,
+}
+
+impl<T> Rows<T> {
+    pub fn new(rows: impl IntoIterator<Item = impl IntoIterator<Item = T>>) -> Self {
+        let (mut ends, mut items) = (Vec::new(), Vec::new());
+        for row in rows {
+            items.extend(row);
+            ends.push(items.len() as u32);
+        }
+        Self { ends, items }
+    }
+
+    pub fn row(&self, index: usize) -> &[T] {
+        let start = if index == 0 { 0 } else { self.ends[index - 1] as usize };
+        &self.items[start..self.ends[index] as usize]
+    }
+
+    pub fn rows(&self) -> impl Iterator<Item = &[T]> {
+        (0..self.ends.len()).map(|index| self.row(index))
+    }
+}
+
+/// The dense arrays of a body file, shapes checked by the reader and values not yet.
+pub(crate) struct RawModel {
+    /// Names the file in errors.
+    pub path: PathBuf,
+    pub id: String,
+    pub gender: Option<Gender>,
+    /// (V, 3).
+    pub template: Vec<f64>,
+    /// (V, 3, B).
+    pub shape_directions: Vec<f64>,
+    pub beta_count: usize,
+    pub pose_blocks: Rows<PoseBlock>,
+    /// (24, V).
+    pub regressor: Vec<f64>,
+    /// (V, 24).
+    pub weights: Vec<f64>,
+    /// Row 0 of kintree_table.
+    pub parents: Vec<i64>,
+    /// (F, 3).
+    pub faces: Vec<i64>,
+}
+
+impl BodyModel {
+    /// Checks what shapes alone do not tell, and brings the arrays into the order in which they are used.
+    pub(crate) fn from_raw(raw: RawModel) -> Result<Self, BodyError> {
+        let vertex_count = raw.template.len() / 3;
+        check_skeleton(&raw.path, &raw.parents)?;
+        check_sums(&raw.path, "weights", &raw.weights, JOINT_COUNT)?;
+        check_sums(&raw.path, "J_regressor", &raw.regressor, vertex_count)?;
+        let faces = checked_faces(&raw.path, &raw.faces, vertex_count)?;
+        let template: Vec<_> = raw.template.as_chunks().0.iter().map(|&point: &[f64; 3]| Vector3::from(point)).collect();
+        let nonzero = |&(_, weight): &(usize, f64)| weight != 0.0;
+        let weights = raw.weights.chunks_exact(JOINT_COUNT);
+        let skin_weights =
+            Rows::new(weights.map(|row| row.iter().copied().enumerate().filter(nonzero).map(|(joint, weight)| (joint as u8, weight))));
+        let regressor = raw.regressor.chunks_exact(vertex_count);
+        let regressor =
+            Rows::new(regressor.map(|row| row.iter().copied().enumerate().filter(nonzero).map(|(vertex, weight)| (vertex as u32, weight))));
+        let skin_tables = SkinTables::new(&raw.pose_blocks, &skin_weights, vertex_count);
+        Ok(Self {
+            id: raw.id,
+            gender: raw.gender,
+            template,
+            beta_count: raw.beta_count,
+            shape_directions: raw.shape_directions,
+            pose_blocks: raw.pose_blocks,
+            regressor,
+            skin_weights,
+            faces,
+            sites: Vec::new(),
+            skin_tables,
+        })
+    }
+
+    /// Names the body: `cromosim_neutral` for the embedded one, else the file's stem.
+    pub fn id(&self) -> &str {
+        &self.id
+    }
+
+    /// Whom the body was made from, where the file says so.
+    pub fn gender(&self) -> Option<Gender> {
+        self.gender
+    }
+
+    /// The triangles, counter-clockwise seen from outside; every index is below [`Self::vertex_count`].
+    pub fn faces(&self) -> &[[u32; 3]] {
+        &self.faces
+    }
+
+    /// Number of vertices V.
+    pub fn vertex_count(&self) -> usize {
+        self.template.len()
+    }
+
+    /// Number of shape coefficients B.
+    pub fn beta_count(&self) -> usize {
+        self.beta_count
+    }
+
+    /// The rest mesh of the mean shape, (V, 3), m, model frame.
+    pub fn template(&self) -> &[Vector3<f64>] {
+        &self.template
+    }
+
+    /// Rest joints are linear in betas: J(beta) = J(0) + sum_b beta_b D_b. These are J(0) and the D_b, (24, 3) each, m: what a fit of
+    /// betas to bone lengths needs.
+    pub fn joint_shape_directions(&self) -> ([Vector3<f64>; JOINT_COUNT], Vec<[Vector3<f64>; JOINT_COUNT]>) {
+        let at = |value: &dyn Fn(usize) -> Vector3<f64>| -> [Vector3<f64>; JOINT_COUNT] {
+            std::array::from_fn(|joint| self.regressor.row(joint).iter().map(|&(vertex, weight)| value(vertex as usize) * weight).sum())
+        };
+        let direction =
+            |vertex: usize, beta: usize| Vector3::from_fn(|axis, _| self.shape_directions[(3 * vertex + axis) * self.beta_count + beta]);
+        let mean = at(&|vertex| self.template[vertex]);
+        (mean, (0..self.beta_count).map(|beta| at(&|vertex| direction(vertex, beta))).collect())
+    }
+}
+
+fn check_skeleton(path: &Path, parents: &[i64]) -> Result<(), BodyError> {
+    for (joint, &found) in Joint::ALL.iter().zip(parents) {
+        let (suits, expected) = match joint.parent() {
+            Some(parent) => (found == parent.index() as i64, parent.index() as i64),
+            None => (found == -1 || found == i64::from(u32::MAX) || found == i64::MAX, -1),
+        };
+        if !suits {
+            return Err(BodyError::Skeleton { path: path.to_owned(), joint: joint.index(), found, expected });
+        }
+    }
+    Ok(())
+}
+
+/// Rows of `width` must sum to one within 1e-3: float32 files are within 1e-6, and a body whose weights do not would tear apart.
+fn check_sums(path: &Path, key: &str, values: &[f64], width: usize) -> Result<(), BodyError> {
+    for (row, values) in values.chunks_exact(width).enumerate() {
+        let sum: f64 = values.iter().sum();
+        if (sum - 1.0).abs() > 1e-3 {
+            return Err(BodyError::WeightSum { path: path.to_owned(), key: key.to_owned(), row, sum });
+        }
+    }
+    Ok(())
+}
+
+fn checked_faces(path: &Path, faces: &[i64], vertex_count: usize) -> Result<Vec<[u32; 3]>, BodyError> {
+    if let Some(corner) = faces.iter().position(|&vertex| vertex < 0 || vertex >= vertex_count as i64) {
+        return Err(BodyError::TriangleVertex { path: path.to_owned(), triangle: corner / 3, vertex: faces[corner], vertex_count });
+    }
+    Ok(faces.as_chunks().0.iter().map(|corners: &[i64; 3]| corners.map(|vertex| vertex as u32)).collect())
+}
