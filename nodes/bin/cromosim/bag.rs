@@ -1,0 +1,69 @@
+//! `cromosim bag`: mend bags, export from them.
+
+use std::fs::File;
+use std::io::{BufWriter, Write, stdout};
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use clap::Subcommand;
+use cromosim_bag::{BagReader, recover, write_imu_csv};
+
+/// Commands on bags.
+#[derive(Subcommand)]
+pub enum Command {
+    /// Mend a bag whose recorder was killed, or a file that was cut: everything up to the damage is kept
+    Recover {
+        /// The unfinished .mcap file or rosbag2 directory; it is left as it is
+        bag: PathBuf,
+        /// The mended copy; default: the name with `_recovered`
+        #[arg(long)]
+        out: Option<PathBuf>,
+    },
+    /// Write the samples of an Imu topic as CSV: stamp, orientation, angular velocity (rad/s), specific force (m/s2)
+    Csv {
+        /// A .mcap file or a rosbag2 directory
+        bag: PathBuf,
+        /// The topic, as /imu/left_wrist/data_raw
+        topic: String,
+        /// Where to; default: standard output
+        #[arg(long)]
+        out: Option<PathBuf>,
+    },
+}
+
+/// Runs the command.
+pub fn run(command: &Command) -> anyhow::Result<()> {
+    match command {
+        Command::Recover { bag, out } => {
+            let out = out.clone().unwrap_or_else(|| recovered_name(bag));
+            let recovery = recover(bag, &out)?;
+            println!("{}: {} messages kept, {} bytes lost", out.display(), recovery.messages_kept(), recovery.bytes_lost);
+            for damage in &recovery.damages {
+                println!("  {}, byte {}: {}", damage.path.display(), damage.at, damage.reason);
+            }
+        }
+        Command::Csv { bag, topic, out } => {
+            let reader = BagReader::open(bag)?;
+            match out {
+                Some(path) => {
+                    let file = File::create(path).with_context(|| format!("{}: cannot be written", path.display()))?;
+                    let mut file = BufWriter::new(file);
+                    let rows = write_imu_csv(&reader, topic, &mut file, path)?;
+                    file.flush().with_context(|| format!("{}: cannot be written", path.display()))?;
+                    eprintln!("{}: {rows} rows", path.display());
+                }
+                None => drop(write_imu_csv(&reader, topic, stdout().lock(), Path::new("standard output"))?),
+            }
+        }
+    }
+    Ok(())
+}
+
+/// `walk.mcap` -> `walk_recovered.mcap`; `bag` -> `bag_recovered`.
+fn recovered_name(bag: &Path) -> PathBuf {
+    let stem = bag.file_stem().unwrap_or_default().to_string_lossy();
+    match bag.extension() {
+        Some(ending) if !bag.is_dir() => bag.with_file_name(format!("{stem}_recovered.{}", ending.to_string_lossy())),
+        _ => bag.with_file_name(format!("{stem}_recovered")),
+    }
+}

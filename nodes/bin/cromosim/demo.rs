@@ -1,0 +1,255 @@
+//! The main job: a motion through all five nodes, each in a process of its own, over DDS on this machine.
+
+use std::fs::{self, File};
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, Receiver};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, bail};
+use clap::Args;
+
+use crate::{progress, summary};
+
+/// What is left behind by a node that does not end when asked to.
+const PATIENCE: Duration = Duration::from_secs(15);
+/// Messages still under way once the last pose is out: the scheme's delay and the writers' queues.
+const DRAIN: Duration = Duration::from_millis(1500);
+const READY: &str = "ready";
+
+/// Arguments of `cromosim demo`.
+#[derive(Args)]
+pub struct Arguments {
+    /// Play this file (BVH) from its beginning to its end rather than 10 s of the embedded walk
+    #[arg(long, value_name = "FILE")]
+    motion: Option<PathBuf>,
+    /// Stop after so many seconds of the motion
+    #[arg(long, value_name = "SECONDS")]
+    duration: Option<f64>,
+    /// Sensor placements (YAML) rather than left_wrist, right_ankle, pelvis, sternum and head
+    #[arg(long, value_name = "FILE")]
+    placements: Option<PathBuf>,
+    /// Where the bag, the Rerun recording and the logs go
+    #[arg(long, value_name = "DIR", default_value = "cromosim-demo")]
+    out: PathBuf,
+    /// Seed of the sensor noise
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Wait until so many more subscriptions than the demo's own listen to every IMU
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    listeners: u32,
+    /// Leave the viewer out: no .rrd
+    #[arg(long)]
+    no_viewer: bool,
+}
+
+/// A node in its own process; ended, at the latest, when this is dropped.
+struct NodeProcess {
+    name: &'static str,
+    child: Child,
+    log: PathBuf,
+    ready: Receiver<()>,
+}
+
+impl NodeProcess {
+    fn start(name: &'static str, parameters: &[(&str, String)], logs: &Path) -> anyhow::Result<Self> {
+        let log = logs.join(format!("{name}.log"));
+        let file = File::create(&log).with_context(|| format!("{}: cannot be written", log.display()))?;
+        let mut command = Command::new(std::env::current_exe().context("the path of this program is unknown")?);
+        command.args(["node", name, "--ros-args"]);
+        for (key, value) in parameters {
+            command.arg("-p").arg(format!("{key}:={value}"));
+        }
+        let mut child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(file).spawn().with_context(|| format!("{name} cannot be started"))?;
+        let (sender, ready) = mpsc::channel();
+        if let Some(out) = child.stdout.take() {
+            // Reads to the end, so that the node never blocks on a full pipe.
+            std::thread::spawn(move || {
+                for line in BufReader::new(out).lines().map_while(Result::ok) {
+                    if line == READY {
+                        let _ = sender.send(());
+                    }
+                }
+            });
+        }
+        Ok(Self { name, child, log, ready })
+    }
+
+    /// Waits until the node has said that its topics are connected.
+    fn wait_ready(&mut self, stop: &AtomicBool) -> anyhow::Result<()> {
+        let until = Instant::now() + PATIENCE;
+        loop {
+            match self.ready.recv_timeout(Duration::from_millis(50)) {
+                Ok(()) => return Ok(()),
+                Err(mpsc::RecvTimeoutError::Timeout) if Instant::now() < until => {}
+                Err(_) => bail!("{} is not ready after {PATIENCE:?}: {}", self.name, self.last_words()),
+            }
+            if self.child.try_wait()?.is_some() {
+                bail!("{} ended early: {}", self.name, self.last_words());
+            }
+            if stop.load(Ordering::Relaxed) {
+                bail!("interrupted before the motion began");
+            }
+        }
+    }
+
+    /// The last line of the node's log.
+    fn last_words(&self) -> String {
+        let text = fs::read_to_string(&self.log).unwrap_or_default();
+        let last = text.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or("it said nothing").to_owned();
+        format!("{last} (log: {})", self.log.display())
+    }
+
+    /// SIGINT, as a user's Ctrl-C: the node closes its files.
+    fn interrupt(&self) {
+        let pid = self.child.id().to_string();
+        let _ = Command::new("kill").args(["-INT", &pid]).status();
+    }
+
+    fn finish(&mut self) -> anyhow::Result<()> {
+        let until = Instant::now() + PATIENCE;
+        while Instant::now() < until {
+            if let Some(status) = self.child.try_wait()? {
+                return if status.success() { Ok(()) } else { bail!("{} failed: {}", self.name, self.last_words()) };
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        bail!("{} did not end within {PATIENCE:?} and was killed: {}", self.name, self.last_words())
+    }
+}
+
+impl Drop for NodeProcess {
+    fn drop(&mut self) {
+        if matches!(self.child.try_wait(), Ok(None)) {
+            let _ = self.child.kill();
+            let _ = self.child.wait();
+        }
+    }
+}
+
+/// Where the demo leaves what it made.
+struct Places {
+    bag: PathBuf,
+    recording: PathBuf,
+    logs: PathBuf,
+}
+
+impl Places {
+    /// Clears what an earlier demo left, and nothing else.
+    fn prepare(out: &Path) -> anyhow::Result<Self> {
+        let places = Self { bag: out.join("bag"), recording: out.join("demo.rrd"), logs: out.join("logs") };
+        for folder in [&places.bag, &places.logs] {
+            if folder.exists() {
+                fs::remove_dir_all(folder).with_context(|| format!("{}: cannot be replaced", folder.display()))?;
+            }
+        }
+        if places.recording.exists() {
+            fs::remove_file(&places.recording).with_context(|| format!("{}: cannot be replaced", places.recording.display()))?;
+        }
+        fs::create_dir_all(&places.logs).with_context(|| format!("{}: cannot be made", places.logs.display()))?;
+        Ok(places)
+    }
+}
+
+/// Runs the demo and prints what it made.
+pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let duration = arguments.check()?;
+    let places = Places::prepare(&arguments.out)?;
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        signal_hook::flag::register(signal, stop.clone())?;
+    }
+
+    // Listeners first, so that nobody misses the beginning.
+    let mut nodes = arguments.listeners(&places)?;
+    for node in &mut nodes {
+        node.wait_ready(&stop)?;
+    }
+    let mut replay = NodeProcess::start("replay", &arguments.replay_parameters(), &places.logs)?;
+    let outcome = play(&mut replay, duration, &stop);
+    std::thread::sleep(DRAIN);
+    // Upstream first: whoever records closes last.
+    nodes.reverse();
+    for node in &mut nodes {
+        node.interrupt();
+        node.finish()?;
+    }
+    outcome?;
+    summary::print(&places.bag, (!arguments.no_viewer).then_some(&*places.recording))
+}
+
+fn play(replay: &mut NodeProcess, duration: f64, stop: &AtomicBool) -> anyhow::Result<()> {
+    replay.wait_ready(stop)?;
+    let bar = progress::bar((duration * 10.0).ceil() as u64, "playing, 0.1 s");
+    let begun = Instant::now();
+    while replay.child.try_wait()?.is_none() {
+        if stop.load(Ordering::Relaxed) {
+            replay.interrupt();
+            break;
+        }
+        bar.set_position((begun.elapsed().as_secs_f64() * 10.0) as u64);
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    bar.finish_and_clear();
+    replay.finish()
+}
+
+impl Arguments {
+    /// Seconds that the demo will play. Finds what is wrong with the input before any process starts.
+    fn check(&self) -> anyhow::Result<f64> {
+        if let Some(seconds) = self.duration
+            && !(seconds.is_finite() && seconds > 0.0)
+        {
+            bail!("--duration {seconds}: expected a positive number of seconds");
+        }
+        let motion = match &self.motion {
+            Some(path) => cromosim_motion::read_motion(path, &Default::default())?,
+            None => cromosim_motion::embedded_walk(),
+        };
+        if let Some(path) = &self.placements {
+            cromosim_imu::PlacementSet::read(path)?;
+        }
+        let whole = motion.duration_s();
+        Ok(self.duration.map_or(whole, |seconds| seconds.min(whole)))
+    }
+
+    fn listeners(&self, places: &Places) -> anyhow::Result<Vec<NodeProcess>> {
+        let viewers = i64::from(!self.no_viewer);
+        let path = |path: &Path| -> anyhow::Result<String> { Ok(quoted(&std::path::absolute(path)?.display().to_string())) };
+        let mut nodes = vec![NodeProcess::start(
+            "recorder",
+            &[("bag_path", path(&places.bag)?), ("seed", self.seed.to_string())],
+            &places.logs,
+        )?];
+        if !self.no_viewer {
+            nodes.push(NodeProcess::start("viewer", &[("recording", path(&places.recording)?)], &places.logs)?);
+        }
+        let mut imu = vec![("seed", self.seed.to_string()), ("ready_subscriptions", (1 + viewers + i64::from(self.listeners)).to_string())];
+        if let Some(file) = &self.placements {
+            imu.push(("placements", path(file)?));
+        }
+        nodes.push(NodeProcess::start("virtual_imu", &imu, &places.logs)?);
+        nodes.push(NodeProcess::start("smpl_state", &[("ready_subscriptions", (2 + viewers).to_string())], &places.logs)?);
+        Ok(nodes)
+    }
+
+    fn replay_parameters(&self) -> Vec<(&'static str, String)> {
+        let mut parameters = vec![("ready_subscriptions", "2".to_owned())];
+        if let Some(motion) = &self.motion {
+            let motion = std::path::absolute(motion).unwrap_or_else(|_| motion.clone());
+            parameters.push(("motion", quoted(&motion.display().to_string())));
+        }
+        if let Some(seconds) = self.duration {
+            parameters.push(("duration_seconds", format!("{seconds:?}")));
+        }
+        parameters
+    }
+}
+
+/// A YAML string, whatever stands in the path.
+fn quoted(text: &str) -> String {
+    format!("'{}'", text.replace('\'', "''"))
+}

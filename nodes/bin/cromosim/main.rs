@@ -1,0 +1,94 @@
+//! `cromosim`: virtual IMUs from body motion. The command line over the libraries and nodes.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{CommandFactory, Parser, Subcommand};
+use clap_complete::Shell;
+
+mod bag;
+mod body;
+mod demo;
+mod inspect;
+mod node;
+mod progress;
+mod reference;
+mod simulate;
+mod summary;
+
+/// Virtual IMUs from body motion: ROS 2 nodes in Rust, offline simulation, bags and pictures.
+#[derive(Parser)]
+#[command(name = "cromosim", version, propagate_version = true, max_term_width = 120)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Play a motion through the five nodes over DDS on this machine; leaves a bag and a Rerun recording
+    Demo(demo::Arguments),
+    /// Simulate IMUs from motion files, or again from a recording's reference; offline, on all cores
+    Simulate(simulate::Arguments),
+    /// Say what is in a motion, body or bag file
+    Inspect(inspect::Arguments),
+    /// Work on bags: mend an unfinished one, export IMU topics as CSV
+    Bag {
+        #[command(subcommand)]
+        command: bag::Command,
+    },
+    /// Work on bodies: export the model or a mesh
+    Body {
+        #[command(subcommand)]
+        command: body::Command,
+    },
+    /// Run one node in this process: replay, smpl_state, virtual_imu, recorder or viewer
+    Node(node::Arguments),
+    /// Print a shell's completion script
+    Completion {
+        /// The shell
+        shell: Shell,
+        /// Write to this file rather than to standard output
+        #[arg(long)]
+        out: Option<PathBuf>,
+    },
+}
+
+fn completion(shell: Shell, out: Option<PathBuf>) -> anyhow::Result<()> {
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut Cli::command(), "cromosim", &mut script);
+    match out {
+        Some(path) => std::fs::write(&path, script).map_err(|error| anyhow::anyhow!("{}: cannot be written: {error}", path.display())),
+        None => std::io::Write::write_all(&mut std::io::stdout(), &script).map_err(Into::into),
+    }
+}
+
+fn main() -> ExitCode {
+    let result = match Cli::parse().command {
+        Command::Demo(arguments) => demo::run(&arguments),
+        Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::Inspect(arguments) => inspect::run(&arguments),
+        Command::Bag { command } => bag::run(&command),
+        Command::Body { command } => body::run(&command),
+        Command::Node(arguments) => node::run(&arguments),
+        Command::Completion { shell, out } => completion(shell, out),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {}", one_line(&error));
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// The chain of causes on one line; a cause that its effect already quotes is not said twice.
+fn one_line(error: &anyhow::Error) -> String {
+    let mut line = error.to_string();
+    for cause in error.chain().skip(1).map(ToString::to_string) {
+        if !line.contains(&cause) {
+            line = format!("{line}: {cause}");
+        }
+    }
+    line.split_whitespace().collect::<Vec<_>>().join(" ")
+}

@@ -1,0 +1,41 @@
+//! Parameters of the node.
+
+use cromosim_ros::node_config;
+
+node_config! {
+    /// ROS parameters of `replay`.
+    pub struct Config {
+        /// Motion file (BVH) to play; empty, with no bag either: the embedded walk.
+        pub motion: String = String::new(),
+        /// Recording to play: everything in it, with its times; a .mcap file or a rosbag2 directory.
+        pub bag: String = String::new(),
+        /// Topics of the bag to play; empty: all.
+        pub topics: Vec<String> = Vec::new(),
+        /// Speed factor, positive.
+        pub rate: f64 = 1.0,
+        /// Begin again at the end. Between two rounds lies a second of silence.
+        pub r#loop: bool = false,
+        /// Begin so many seconds after the beginning.
+        pub start_seconds: f64 = 0.0,
+        /// Play so many seconds; 0: to the end.
+        pub duration_seconds: f64 = 0.0,
+        /// Publish /clock so often, Hz, and stamp messages with the recording's time; 0: no /clock, and stamps are those of now.
+        pub clock_rate_hz: f64 = 0.0,
+        /// Wait for `~/resume` before the first message.
+        pub start_paused: bool = false,
+        /// The up axis of the motion file: auto, y or z.
+        pub up_axis: String = "auto".to_owned(),
+        /// Metres of one unit of the motion file; 0: found out from the skeleton's size.
+        pub unit_m: f64 = 0.0,
+        /// A skeleton map of one's own (YAML); empty: the one that fits the file's joint names.
+        pub skeleton_map: String = String::new(),
+        /// Tells several people apart.
+        pub body_id: String = "0".to_owned(),
+        /// Frame of the root pose.
+        pub frame_id: String = "world".to_owned(),
+        /// The node is ready, and begins, when `smpl/pose` has so many subscriptions.
+        pub ready_subscriptions: i64 = 0,
+        /// Begin after so many seconds even where subscriptions are missing.
+        pub ready_timeout_seconds: f64 = 10.0,
+    }
+}

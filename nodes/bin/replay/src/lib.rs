@@ -1,0 +1,134 @@
+//! The node `replay`: plays a motion file as `smpl/pose`, or a bag with all its topics, with `/clock` and rosbag2's playback services.
+
+mod config;
+mod outlet;
+mod player;
+mod services;
+mod source;
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use cromosim_ros::{Bell, ClockPublisher, Node, Periodic, prepare};
+use cromosim_spatial::Stamp;
+
+pub use config::Config;
+pub use player::Player;
+pub use source::{Item, MotionSource, Source};
+
+use outlet::Outlet;
+use services::Remote;
+
+const ABOUT: &str = "replay: plays a motion file as smpl/pose, or a bag with everything in it";
+/// Silence between two rounds of a loop: longer than any gap that a node bridges.
+/// From ready to the first message, ns.
+const LEAD: i64 = 20_000_000;
+const PAUSE_BETWEEN_ROUNDS: i64 = 1_000_000_000;
+
+/// Runs the node with these arguments until the end of what it plays, or until it is interrupted.
+///
+/// # Errors
+/// What is wrong with the arguments or the file; what DDS refuses.
+pub fn run(arguments: &[String]) -> anyhow::Result<()> {
+    let Some(prepared) = prepare("replay", ABOUT, arguments, check)? else { return Ok(()) };
+    let source = Source::open(&prepared.config)?;
+    let (node, config) = prepared.start()?;
+    log::info!("{}", source.describe());
+    let outlet = Outlet::new(&node, &source)?;
+    let clock = if config.clock_rate_hz > 0.0 { Some(node.clock_publisher()?) } else { None };
+    let connected = |count| outlet.wait_for_subscriptions(count, Duration::from_secs_f64(config.ready_timeout_seconds));
+    if !connected(usize::try_from(config.ready_subscriptions).unwrap_or(0)) {
+        log::warn!("begins without the {} subscriptions it waited for", config.ready_subscriptions);
+    }
+    println!("ready");
+    let bell = Bell::new();
+    node.shutdown().ring_at_request(&bell);
+    // A moment of lead, so that the first message is not late already.
+    let player = Player::new(system_nanos() + LEAD, source.begins(), config.rate, config.start_paused);
+    let remote = Remote::new(player, &bell);
+    let _services = remote.serve(&node)?;
+    let ended = Playback { node: &node, config: &config, source, outlet: &outlet, clock, remote: &remote, bell: &bell }.play();
+    outlet.wait_until_received(Duration::from_secs(2));
+    ended
+}
+
+fn check(config: &Config) -> anyhow::Result<()> {
+    anyhow::ensure!(config.rate.is_finite() && config.rate > 0.0, "parameter 'rate': expected a positive factor, found {}", config.rate);
+    let not_negative = [
+        ("start_seconds", config.start_seconds),
+        ("duration_seconds", config.duration_seconds),
+        ("clock_rate_hz", config.clock_rate_hz),
+        ("unit_m", config.unit_m),
+        ("ready_timeout_seconds", config.ready_timeout_seconds),
+    ];
+    for (name, value) in not_negative {
+        anyhow::ensure!(value.is_finite() && value >= 0.0, "parameter '{name}': expected 0 or more, found {value}");
+    }
+    // Opened here too, so that --check-config finds what is wrong with the file.
+    Source::open(config).map(drop)
+}
+
+fn system_nanos() -> i64 {
+    cromosim_ros::Clock::system_now().nanos
+}
+
+struct Playback<'a> {
+    node: &'a Node,
+    config: &'a Config,
+    source: Source,
+    outlet: &'a Outlet,
+    clock: Option<ClockPublisher>,
+    remote: &'a Remote,
+    bell: &'a Arc<Bell>,
+}
+
+impl Playback<'_> {
+    fn play(&mut self) -> anyhow::Result<()> {
+        let mut ticks = Periodic::new(self.config.clock_rate_hz);
+        while !self.node.shutdown().is_requested() {
+            if let Some(recorded) = self.remote.take_seek() {
+                self.source.seek(recorded)?;
+            }
+            if let (Some(clock), true) = (&self.clock, ticks.is_due()) {
+                clock.publish(Stamp::from_nanos(self.remote.player().recorded_at(system_nanos())))?;
+            }
+            let Some(due) = self.source.due() else {
+                if !self.config.r#loop {
+                    return Ok(());
+                }
+                self.begin_again()?;
+                continue;
+            };
+            let burst = self.remote.take_burst();
+            let wall = self.remote.player().wall_of(due);
+            match wall {
+                Some(wall) if wall <= system_nanos() => self.publish(due, wall)?,
+                _ if burst => self.publish(due, system_nanos())?,
+                _ => self.sleep(wall, &ticks),
+            }
+        }
+        Ok(())
+    }
+
+    /// Publishes what is due. Live stamps are the times it was due at, not when the scheduler let it through: derivatives see jitter.
+    fn publish(&mut self, due: i64, wall: i64) -> anyhow::Result<()> {
+        let stamp = Stamp::from_nanos(if self.clock.is_some() { due } else { wall });
+        if let Some(item) = self.source.take(stamp)? {
+            self.outlet.publish(&item);
+        }
+        Ok(())
+    }
+
+    fn begin_again(&mut self) -> anyhow::Result<()> {
+        let begins = self.source.begins();
+        self.source.seek(begins)?;
+        self.remote.player().seek(system_nanos() + PAUSE_BETWEEN_ROUNDS, begins);
+        Ok(())
+    }
+
+    fn sleep(&self, wall: Option<i64>, ticks: &Periodic) {
+        let until_due = wall.map(|wall| Duration::from_nanos(u64::try_from(wall - system_nanos()).unwrap_or(0)));
+        let shortest = [until_due, ticks.left()].into_iter().flatten().min();
+        self.bell.wait(shortest);
+    }
+}

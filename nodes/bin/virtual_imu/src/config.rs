@@ -1,0 +1,40 @@
+//! Parameters of the node.
+
+use cromosim_ros::node_config;
+
+node_config! {
+    /// ROS parameters of `virtual_imu`.
+    pub struct Config {
+        /// Sensor placements (YAML); empty: left_wrist, right_ankle, pelvis, sternum and head.
+        pub placements: String = String::new(),
+        /// Body model as npz; empty: the embedded body.
+        pub body: String = String::new(),
+        /// Scheme of the derivatives for every placement; empty: the one that each placement names.
+        pub scheme: String = String::new(),
+        /// Messages per second for every placement, Hz; 0: the rate that each placement names.
+        pub rate_hz: f64 = 0.0,
+        /// Rate of the states, Hz; 0: found out from the first ones. It sets the schemes' delay.
+        pub state_rate_hz: f64 = 0.0,
+        /// Add the device's noise and bias.
+        pub noise: bool = true,
+        /// Seed of the noise.
+        pub seed: i64 = 0,
+        /// Put before every frame but the world's, with a slash; as for smpl_state.
+        pub prefix: String = String::new(),
+        /// Publish the site's pose of every state as `reference/NAME` too.
+        pub publish_reference: bool = false,
+        /// Silence of the states after which the schemes begin anew, s.
+        pub gap_seconds: f64 = 0.25,
+        /// How often /diagnostics is published, Hz; 0: never.
+        pub diagnostics_rate_hz: f64 = 1.0,
+        /// The node is ready when every `imu/NAME/data_raw` has so many subscriptions.
+        pub ready_subscriptions: i64 = 0,
+    }
+}
+
+impl Config {
+    /// The name of a frame of this body.
+    pub fn frame(&self, name: &str) -> String {
+        if self.prefix.is_empty() { name.to_owned() } else { format!("{}/{name}", self.prefix) }
+    }
+}

@@ -1,0 +1,137 @@
+//! The node `virtual_imu`: `smpl/state` in; `imu/NAME/data_raw` and `imu/NAME/data` of every placement out, with their frames.
+
+mod config;
+mod node;
+
+use std::path::Path;
+use std::str::FromStr;
+use std::time::Duration;
+
+use anyhow::Context;
+use cromosim_body::BodyModel;
+use cromosim_imu::{Placement, PlacementSet, Scheme};
+use cromosim_msgs::builtin_interfaces::Time;
+use cromosim_msgs::cromosim_msgs::SmplState;
+use cromosim_msgs::diagnostic_msgs::DiagnosticArray;
+use cromosim_msgs::geometry_msgs::PoseStamped;
+use cromosim_msgs::sensor_msgs::Imu;
+use cromosim_msgs::std_msgs;
+use cromosim_msgs::tf2_msgs::TFMessage;
+use cromosim_ros::{Node, Publisher, Qos, RosError, prepare};
+
+pub use config::Config;
+pub use node::{Reading, Refusal, Step, VirtualImuNode, imu_message};
+
+const ABOUT: &str = "virtual_imu: what IMUs on the body would measure, one sensor_msgs/Imu publisher for each placement";
+
+/// What the node publishes.
+struct Publishers {
+    raw: Vec<Publisher<Imu>>,
+    full: Vec<Publisher<Imu>>,
+    references: Vec<Publisher<PoseStamped>>,
+    frames: Publisher<TFMessage>,
+    diagnostics: Publisher<DiagnosticArray>,
+    // Kept for late subscriptions.
+    _static_frames: Publisher<TFMessage>,
+    _placements: Publisher<std_msgs::String>,
+}
+
+impl Publishers {
+    fn new(node: &Node, logic: &VirtualImuNode, config: &Config, placements: &PlacementSet) -> Result<Self, RosError> {
+        let topics = |ending: &str| logic.placements().iter().map(move |placement| format!("imu/{}/{ending}", placement.name())).collect::<Vec<_>>();
+        let imu = |ending| topics(ending).iter().map(|topic| node.publisher::<Imu>(topic, Qos::reliable())).collect::<Result<Vec<_>, _>>();
+        let reference = |placement: &Placement| node.publisher::<PoseStamped>(&format!("reference/{}", placement.name()), Qos::reliable());
+        let referenced = if config.publish_reference { logic.placements() } else { &[] };
+        let static_frames = node.publisher::<TFMessage>("/tf_static", Qos::tf_static())?;
+        static_frames.publish(&logic.static_frames(Time::from_nanos(node.now().nanos)))?;
+        let described = node.publisher::<std_msgs::String>("virtual_imu/placements", Qos::tf_static())?;
+        described.publish(&std_msgs::String { data: placements.to_yaml() })?;
+        Ok(Self {
+            raw: imu("data_raw")?,
+            full: imu("data")?,
+            references: referenced.iter().map(reference).collect::<Result<_, _>>()?,
+            frames: node.publisher("/tf", Qos::tf())?,
+            diagnostics: node.publisher("/diagnostics", Qos::reliable())?,
+            _static_frames: static_frames,
+            _placements: described,
+        })
+    }
+
+    fn publish(&self, step: &Step) {
+        for reading in &step.readings {
+            report(self.raw[reading.placement].publish(&reading.raw));
+            report(self.full[reading.placement].publish(&reading.full));
+        }
+        if !step.frames.transforms.is_empty() {
+            report(self.frames.publish(&step.frames));
+        }
+        for (publisher, reference) in self.references.iter().zip(&step.references) {
+            report(publisher.publish(reference));
+        }
+    }
+}
+
+/// Runs the node with these arguments until it is interrupted.
+///
+/// # Errors
+/// What is wrong with the arguments, placements, devices or the body file; what DDS refuses.
+pub fn run(arguments: &[String]) -> anyhow::Result<()> {
+    let Some(prepared) = prepare("virtual_imu", ABOUT, arguments, |config: &Config| logic(config).map(drop))? else { return Ok(()) };
+    let (mut logic, placements) = logic(&prepared.config)?;
+    let (node, config) = prepared.start()?;
+    let states = node.subscription::<SmplState>("smpl/state", Qos::reliable().depth(100))?;
+    let publishers = Publishers::new(&node, &logic, &config, &placements)?;
+    let watched: Vec<_> = publishers.raw.iter().map(|publisher| &**publisher).collect();
+    cromosim_ros::announce_ready(&node, &watched, config.ready_subscriptions);
+
+    let mut schedule = cromosim_ros::Periodic::new(config.diagnostics_rate_hz);
+    let name = node.name().to_string();
+    while !node.shutdown().is_requested() {
+        match states.recv_timeout(schedule.left().unwrap_or(Duration::from_secs(1))) {
+            Ok(Some(state)) => match logic.step(&state.message) {
+                Ok(step) => publishers.publish(&step),
+                Err(refusal) => log::warn!("a state is left out: {refusal}"),
+            },
+            Ok(None) => {}
+            Err(error) => log::warn!("{error}"),
+        }
+        if schedule.is_due() {
+            report(publishers.diagnostics.publish(&logic.diagnostics(Time::from_nanos(node.now().nanos), &name)));
+        }
+    }
+    Ok(())
+}
+
+/// The placements of a configuration, with what it says for all of them.
+///
+/// # Errors
+/// What is wrong with the file or a parameter.
+pub fn placements(config: &Config) -> anyhow::Result<PlacementSet> {
+    let read = if config.placements.is_empty() { PlacementSet::demo() } else { PlacementSet::read(Path::new(&config.placements))? };
+    let rate_hz = config.rate_hz;
+    anyhow::ensure!(rate_hz.is_finite() && rate_hz >= 0.0, "parameter 'rate_hz': expected a positive rate, or 0 for that of each placement, found {rate_hz}");
+    let scheme = if config.scheme.is_empty() { None } else { Some(Scheme::from_str(&config.scheme).context("parameter 'scheme'")?) };
+    Ok(read.map(|placement| {
+        let rate_hz = if rate_hz > 0.0 { rate_hz } else { placement.rate_hz() };
+        let scheme = scheme.unwrap_or(placement.scheme());
+        placement.with_rate_hz(rate_hz).with_scheme(scheme)
+    }))
+}
+
+fn logic(config: &Config) -> anyhow::Result<(VirtualImuNode, PlacementSet)> {
+    for (name, value) in [("state_rate_hz", config.state_rate_hz), ("diagnostics_rate_hz", config.diagnostics_rate_hz)] {
+        anyhow::ensure!(value.is_finite() && value >= 0.0, "parameter '{name}': expected 0 or more, found {value}");
+    }
+    anyhow::ensure!(config.gap_seconds > 0.0, "parameter 'gap_seconds': expected more than 0, found {}", config.gap_seconds);
+    let placements = placements(config)?;
+    let model = if config.body.is_empty() { BodyModel::embedded() } else { BodyModel::read_npz(Path::new(&config.body))? };
+    let folder = Path::new(&config.placements).parent().unwrap_or(Path::new("."));
+    Ok((VirtualImuNode::new(config.clone(), model, &placements, folder)?, placements))
+}
+
+/// A message that does not get out is worth a line, and no more: the next one may.
+fn report(sent: Result<(), RosError>) {
+    if let Err(error) = sent {
+        log::warn!("{error}");
+    }
+}

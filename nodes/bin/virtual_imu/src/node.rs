@@ -1,0 +1,298 @@
+//! From the states of a body to the messages of its virtual IMUs.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use cromosim_body::{BodyError, BodyModel, BodyPose, Joint, ShapedBody};
+use cromosim_imu::{Covariances, Device, Follow, ImuError, ImuSample, MountedSites, NoiseSource, Placement, PlacementSet, StreamOptions, StreamingImu};
+use cromosim_msgs::builtin_interfaces::Time;
+use cromosim_msgs::cromosim_msgs::SmplState;
+use cromosim_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue};
+use cromosim_msgs::geometry_msgs::{PoseStamped, TransformStamped};
+use cromosim_msgs::sensor_msgs::Imu;
+use cromosim_msgs::std_msgs::Header;
+use cromosim_msgs::tf2_msgs::TFMessage;
+use cromosim_msgs::NotABody;
+use cromosim_spatial::Stamp;
+use nalgebra::{Isometry3, UnitQuaternion};
+
+use crate::config::Config;
+
+/// States that are looked at before the rate of the states is known.
+const RATE_STATES: usize = 13;
+
+/// One sample of one placement, in both forms of REP-145.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reading {
+    /// Number of the placement.
+    pub placement: usize,
+    /// For `imu/NAME/data_raw`: without orientation.
+    pub raw: Imu,
+    /// For `imu/NAME/data`: with orientation.
+    pub full: Imu,
+}
+
+/// What one state leads to.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Step {
+    /// The samples that it released.
+    pub readings: Vec<Reading>,
+    /// For `/tf`: the frames of sensors that follow the skin.
+    pub frames: TFMessage,
+    /// For `reference/NAME`, in the order of the placements.
+    pub references: Vec<PoseStamped>,
+}
+
+/// Why a state was left out.
+#[derive(Debug, thiserror::Error)]
+pub enum Refusal {
+    /// The state is no body.
+    #[error(transparent)]
+    State(#[from] NotABody),
+    /// The shape does not suit the body.
+    #[error(transparent)]
+    Body(#[from] BodyError),
+    /// A frame cannot be used.
+    #[error(transparent)]
+    Imu(#[from] ImuError),
+}
+
+/// One placement's way from frames to messages.
+struct Channel {
+    stream: Option<StreamingImu>,
+    noise: Option<NoiseSource>,
+    covariances: Covariances,
+    frame_id: String,
+}
+
+/// The node: a function of the states so far.
+pub struct VirtualImuNode {
+    config: Config,
+    model: Arc<BodyModel>,
+    placements: Vec<Placement>,
+    devices: Vec<Device>,
+    channels: Vec<Channel>,
+    betas: Vec<f64>,
+    shaped: ShapedBody,
+    sites: MountedSites,
+    /// States that wait until their rate is known.
+    early: Vec<(Stamp, BodyPose)>,
+    last: Option<Stamp>,
+    counts: Counts,
+}
+
+#[derive(Default)]
+struct Counts {
+    states: u64,
+    refused: u64,
+    readings: u64,
+    restarts: u64,
+    last_refusal: String,
+}
+
+impl VirtualImuNode {
+    /// A node for these placements; device files are found relative to `device_folder`.
+    ///
+    /// # Errors
+    /// Sites that the body does not have, devices that are not there.
+    pub fn new(config: Config, model: Arc<BodyModel>, placements: &PlacementSet, device_folder: &Path) -> Result<Self, Refusal> {
+        let resolve = |placement: &Placement| Device::resolve(placement.device(), device_folder);
+        let placements: Vec<Placement> = placements.placements().to_vec();
+        let devices = placements.iter().map(resolve).collect::<Result<Vec<_>, _>>()?;
+        let shaped = ShapedBody::new(model.clone(), &[])?;
+        let sites = MountedSites::new(&shaped, &placements)?;
+        let mut node = Self {
+            config,
+            model,
+            placements,
+            devices,
+            channels: Vec::new(),
+            betas: Vec::new(),
+            shaped,
+            sites,
+            early: Vec::new(),
+            last: None,
+            counts: Counts::default(),
+        };
+        node.channels = node.fresh_channels()?;
+        Ok(node)
+    }
+
+    fn fresh_channels(&self) -> Result<Vec<Channel>, ImuError> {
+        let channel = |(placement, device): (&Placement, &Device)| {
+            let rate_hz = placement.rate_hz();
+            let noise = if self.config.noise { Some(NoiseSource::new(device, rate_hz, self.config.seed as u64, placement.name())?) } else { None };
+            let covariances = Covariances::of(device, rate_hz);
+            Ok(Channel { stream: None, noise, covariances, frame_id: self.config.frame(&format!("{}_imu", placement.name())) })
+        };
+        self.placements.iter().zip(&self.devices).map(channel).collect()
+    }
+
+    /// The placements, in the order of [`Reading::placement`].
+    pub fn placements(&self) -> &[Placement] {
+        &self.placements
+    }
+
+    /// Delay of each placement's scheme, s; none before the rate of the states is known.
+    pub fn delays_seconds(&self) -> Vec<Option<f64>> {
+        self.channels.iter().map(|channel| channel.stream.as_ref().map(StreamingImu::delay_seconds)).collect()
+    }
+
+    /// The messages that follow from one state.
+    ///
+    /// # Errors
+    /// [`Refusal`]; the state is then left out, and the node goes on with the next.
+    pub fn step(&mut self, state: &SmplState) -> Result<Step, Refusal> {
+        let result = self.try_step(state);
+        match &result {
+            Ok(step) => {
+                self.counts.states += 1;
+                self.counts.readings += step.readings.len() as u64;
+            }
+            Err(refusal) => {
+                self.counts.refused += 1;
+                self.counts.last_refusal = refusal.to_string();
+            }
+        }
+        result
+    }
+
+    fn try_step(&mut self, state: &SmplState) -> Result<Step, Refusal> {
+        let (root_position, local_rotations) = state.root_and_rotations()?;
+        let body = BodyPose { root_position, local_rotations };
+        let stamp = Stamp::from_nanos(state.header.stamp.nanos());
+        self.watch_time(stamp);
+        if state.betas != self.betas {
+            self.shaped = ShapedBody::new(self.model.clone(), &state.betas)?;
+            self.sites = MountedSites::new(&self.shaped, &self.placements)?;
+            self.betas.clone_from(&state.betas);
+        }
+        let mut step = self.frames_of(state, &body);
+        self.last = Some(stamp);
+        if self.channels.iter().all(|channel| channel.stream.is_some()) {
+            self.push(stamp, &body, &mut step.readings)?;
+            return Ok(step);
+        }
+        self.early.push((stamp, body));
+        if self.config.state_rate_hz > 0.0 || self.early.len() >= RATE_STATES {
+            let rate_hz = if self.config.state_rate_hz > 0.0 { self.config.state_rate_hz } else { median_rate(&self.early) };
+            self.open_streams(rate_hz)?;
+            for (stamp, body) in std::mem::take(&mut self.early) {
+                self.push(stamp, &body, &mut step.readings)?;
+            }
+        }
+        Ok(step)
+    }
+
+    fn open_streams(&mut self, state_rate_hz: f64) -> Result<(), ImuError> {
+        for (channel, placement) in self.channels.iter_mut().zip(&self.placements) {
+            let options = StreamOptions { longest_gap: self.config.gap_seconds, ..StreamOptions::resampled(state_rate_hz, placement.rate_hz()) };
+            let stream = StreamingImu::new(placement.scheme(), options)?;
+            log::info!("{}: {} at {} Hz, delay {:.4} s", placement.name(), placement.scheme(), placement.rate_hz(), stream.delay_seconds());
+            channel.stream = Some(stream);
+        }
+        Ok(())
+    }
+
+    fn push(&mut self, stamp: Stamp, body: &BodyPose, readings: &mut Vec<Reading>) -> Result<(), ImuError> {
+        for (placement, (channel, frame)) in self.channels.iter_mut().zip(self.sites.frames(body)).enumerate() {
+            let Some(stream) = &mut channel.stream else { continue };
+            for ideal in stream.push(frame.at(stamp))? {
+                let sample = channel.noise.as_mut().map_or(ideal, |noise| noise.apply(&ideal));
+                let raw = imu_message(&sample, &channel.frame_id, &channel.covariances.without_orientation(), false);
+                let full = imu_message(&sample, &channel.frame_id, &channel.covariances, true);
+                readings.push(Reading { placement, raw, full });
+            }
+        }
+        Ok(())
+    }
+
+    /// A source that starts over (a loop, a seek) starts the schemes over too.
+    fn watch_time(&mut self, stamp: Stamp) {
+        if self.last.is_some_and(|last| stamp < last) {
+            self.counts.restarts += 1;
+            self.early.clear();
+            for stream in self.channels.iter_mut().filter_map(|channel| channel.stream.as_mut()) {
+                stream.reset();
+            }
+        }
+    }
+
+    fn frames_of(&self, state: &SmplState, body: &BodyPose) -> Step {
+        let mut step = Step::default();
+        let follows_skin = |placement: &Placement| placement.follow() == Follow::Skin;
+        if !self.config.publish_reference && !self.placements.iter().any(follows_skin) {
+            return step;
+        }
+        let segments = self.shaped.world_from_segments(body);
+        for ((placement, site), frame) in self.placements.iter().zip(self.sites.sites()).zip(self.sites.frames(body)) {
+            if follows_skin(placement) {
+                let segment_from_sensor = segments[site.joint().index()].inverse() * frame.world_from_sensor;
+                step.frames.transforms.push(self.edge(state.header.stamp, site.joint(), placement, segment_from_sensor));
+            }
+            if self.config.publish_reference {
+                step.references.push(PoseStamped { header: state.header.clone(), pose: frame.world_from_sensor.into() });
+            }
+        }
+        step
+    }
+
+    /// For `/tf_static`: the frames of sensors that follow their segment.
+    pub fn static_frames(&self, stamp: Time) -> TFMessage {
+        let rigid = self.placements.iter().zip(self.sites.sites()).filter(|(placement, _)| placement.follow() == Follow::Segment);
+        TFMessage { transforms: rigid.map(|(placement, site)| self.edge(stamp, site.joint(), placement, site.segment_from_sensor())).collect() }
+    }
+
+    fn edge(&self, stamp: Time, joint: Joint, placement: &Placement, segment_from_sensor: Isometry3<f64>) -> TransformStamped {
+        TransformStamped {
+            header: Header { stamp, frame_id: self.config.frame(joint.name()) },
+            child_frame_id: self.config.frame(&format!("{}_imu", placement.name())),
+            transform: segment_from_sensor.into(),
+        }
+    }
+
+    /// For `/diagnostics`.
+    pub fn diagnostics(&self, stamp: Time, node_name: &str) -> DiagnosticArray {
+        let counts = &self.counts;
+        let (level, message) = match (counts.states, counts.refused) {
+            (0, 0) => (DiagnosticStatus::WARN, "no state has come yet".to_owned()),
+            (_, 0) => (DiagnosticStatus::OK, "states arrive".to_owned()),
+            _ => (DiagnosticStatus::WARN, format!("states were left out; the last one: {}", counts.last_refusal)),
+        };
+        let value = |key: String, value: String| KeyValue { key, value };
+        let mut values = vec![
+            value("states".to_owned(), counts.states.to_string()),
+            value("states left out".to_owned(), counts.refused.to_string()),
+            value("readings".to_owned(), counts.readings.to_string()),
+            value("restarts of the source's time".to_owned(), counts.restarts.to_string()),
+        ];
+        for (placement, delay) in self.placements.iter().zip(self.delays_seconds()) {
+            let delay = delay.map_or_else(|| "not yet known".to_owned(), |seconds| format!("{seconds:.4}"));
+            values.push(value(format!("{}: delay of {}, s", placement.name(), placement.scheme()), delay));
+        }
+        let status =
+            DiagnosticStatus { level, name: format!("{node_name}: virtual IMUs"), message, hardware_id: self.model.id().to_owned(), values };
+        DiagnosticArray { header: Header { stamp, frame_id: String::new() }, status: vec![status] }
+    }
+}
+
+/// The message of a sample; the orientation is left at identity where it is not reported.
+pub fn imu_message(sample: &ImuSample, frame_id: &str, covariances: &Covariances, oriented: bool) -> Imu {
+    let orientation = if oriented { sample.world_from_sensor } else { UnitQuaternion::identity() };
+    Imu {
+        header: Header::new(sample.stamp.nanos, frame_id),
+        orientation: orientation.into(),
+        orientation_covariance: covariances.orientation,
+        angular_velocity: sample.angular_velocity.into(),
+        angular_velocity_covariance: covariances.angular_velocity,
+        linear_acceleration: sample.specific_force.into(),
+        linear_acceleration_covariance: covariances.linear_acceleration,
+    }
+}
+
+/// Rate of states by the median of their intervals, Hz.
+fn median_rate(states: &[(Stamp, BodyPose)]) -> f64 {
+    let mut intervals: Vec<f64> = states.windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
+    intervals.sort_unstable_by(f64::total_cmp);
+    intervals.get(intervals.len() / 2).map_or(f64::NAN, |interval| interval.recip())
+}

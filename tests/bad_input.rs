@@ -1,0 +1,122 @@
+//! Bad input: one line that names file and place, exit code 2, and nothing half-written.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+
+use common::{TINY_BVH, cromosim_in, succeed};
+
+/// Runs the command, which must fail as the rules say; `expected` are parts of its one line.
+fn refuses(folder: &Path, arguments: &[&str], expected: &[&str]) {
+    let before = listing(folder);
+    let output = cromosim_in(folder, arguments);
+    let error = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {error}");
+    assert_eq!(error.trim_end().lines().count(), 1, "{arguments:?} says more than a line: {error}");
+    for part in expected {
+        assert!(error.contains(part), "{arguments:?}: '{part}' is not in: {error}");
+    }
+    assert!(!error.contains("panicked"), "{error}");
+    assert_eq!(listing(folder), before, "{arguments:?} left something behind");
+}
+
+fn listing(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn motion_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let truncated = &TINY_BVH[..TINY_BVH.len() - 30];
+    let cases = [
+        ("truncated.bvh", truncated.to_owned(), vec!["truncated.bvh", "line"]),
+        ("cut_header.bvh", TINY_BVH[..120].to_owned(), vec!["cut_header.bvh", "line"]),
+        ("nan.bvh", TINY_BVH.replace("0 90 0 0 0 0 0 0 0\n0", "0 90 0 nan 0 0 0 0 0\n0"), vec!["nan.bvh", "line 19"]),
+        ("channels.bvh", TINY_BVH.replace("0 90 0 0 0 0 0 0 0\n0", "0 90 0 0 0 0 0 0\n0"), vec!["channels.bvh", "line 19", "9", "8"]),
+        ("no_frames.bvh", TINY_BVH.replace("Frames: 2", "Frames: 0"), vec!["no_frames.bvh", "line 17"]),
+        ("backwards.bvh", TINY_BVH.replace("Frame Time: 0.01", "Frame Time: -0.01"), vec!["backwards.bvh", "line 18"]),
+        ("no_body.bvh", TINY_BVH.to_owned(), vec!["no_body.bvh"]),
+        ("text.bvh", "what is this".to_owned(), vec!["text.bvh"]),
+        ("empty.bvh", String::new(), vec!["empty.bvh"]),
+    ];
+    for (name, content, _) in &cases {
+        fs::write(folder.path().join(name), content).unwrap();
+    }
+    for (name, _, expected) in &cases {
+        refuses(folder.path(), &["simulate", name, "--out", "out.mcap"], expected);
+        refuses(folder.path(), &["inspect", name], expected);
+        refuses(folder.path(), &["node", "replay", "--check-config", "--ros-args", "-p", &format!("motion:={name}")], expected);
+    }
+    refuses(folder.path(), &["simulate", "missing.bvh", "--out", "out.mcap"], &["missing.bvh"]);
+    refuses(folder.path(), &["demo", "--motion", "nan.bvh"], &["nan.bvh", "line 19"]);
+    fs::create_dir(folder.path().join("folder.bvh")).unwrap();
+    refuses(folder.path(), &["simulate", "folder.bvh", "--out", "out.mcap"], &["folder.bvh"]);
+}
+
+#[test]
+fn placements_and_settings() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |fields: &str| format!("schema: cromosim/placements/1\nplacements:\n  wrist: {{{fields}}}\n");
+    let cases = [
+        ("site.yaml", file("site: left_toe_ring, rate_hz: 100"), vec!["left_toe_ring", "wrist"]),
+        ("mount.yaml", file("site: left_watch, rate_hz: 100, mount: {matrix: [[1, 0, 0], [0, 1, 0], [0, 0, 2]]}"), vec!["mount.yaml", "wrist", "mount"]),
+        ("rate.yaml", file("site: left_watch, rate_hz: -5"), vec!["rate.yaml", "wrist", "rate_hz"]),
+        ("unknown.yaml", file("site: left_watch, rate_hz: 100, colour: red"), vec!["unknown.yaml", "wrist", "colour"]),
+        ("yaml.yaml", "placements: [".to_owned(), vec!["yaml.yaml"]),
+    ];
+    for (name, content, expected) in &cases {
+        fs::write(folder.path().join(name), content).unwrap();
+        refuses(folder.path(), &["simulate", "--placements", name, "--out", "out.mcap"], expected);
+        refuses(folder.path(), &["node", "virtual_imu", "--check-config", "--ros-args", "-p", &format!("placements:={name}")], expected);
+    }
+    refuses(folder.path(), &["simulate", "--rate", "-5", "--out", "out.mcap"], &["--rate", "-5"]);
+    refuses(folder.path(), &["simulate", "--scheme", "guess", "--out", "out.mcap"], &["guess", "spline"]);
+    refuses(folder.path(), &["simulate", "--body", "nobody.npz", "--out", "out.mcap"], &["nobody.npz"]);
+    refuses(folder.path(), &["simulate", "--out", "missing/out.mcap"], &["missing"]);
+}
+
+#[test]
+fn parameters_of_nodes() {
+    let folder = tempfile::tempdir().unwrap();
+    let node = |name: &'static str, parameter: &'static str| vec!["node", name, "--check-config", "--ros-args", "-p", parameter];
+    refuses(folder.path(), &node("virtual_imu", "rate:=50.0"), &["unknown parameter 'rate'"]);
+    refuses(folder.path(), &node("virtual_imu", "rate_hz:=-5.0"), &["rate_hz", "-5"]);
+    refuses(folder.path(), &node("virtual_imu", "scheme:=guess"), &["scheme", "guess"]);
+    refuses(folder.path(), &node("replay", "rate:=0.0"), &["rate", "0"]);
+    refuses(folder.path(), &node("replay", "bag:=missing.mcap"), &["missing.mcap"]);
+    refuses(folder.path(), &node("recorder", "compression:=zip"), &["compression", "zip"]);
+    refuses(folder.path(), &node("recorder", "bag_path:=."), &[".", "bag_path"]);
+    refuses(folder.path(), &node("smpl_state", "smoothing_cutoff_hz:=fast"), &["smoothing_cutoff_hz", "number"]);
+    refuses(folder.path(), &["node", "smpl_state", "--check-config", "--ros-args", "--params-file", "missing.yaml"], &["missing.yaml"]);
+    fs::write(folder.path().join("p.yaml"), "smpl_state:\n  ros__parameters:\n    prefix: alice\n    hight: 3\n").unwrap();
+    refuses(folder.path(), &["node", "smpl_state", "--check-config", "--ros-args", "--params-file", "p.yaml"], &["p.yaml", "line 4", "hight"]);
+    refuses(folder.path(), &["node", "nobody"], &["nobody", "replay"]);
+    refuses(folder.path(), &["node", "replay", "--speed", "3"], &["--speed", "--help"]);
+}
+
+#[test]
+fn bags() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    succeed(folder.path(), &["simulate", "--out", "walk.mcap"]);
+    let whole = fs::read(path("walk.mcap")).unwrap();
+    fs::write(path("cut.mcap"), &whole[..whole.len() * 2 / 3]).unwrap();
+    fs::write(path("text.mcap"), "not a bag").unwrap();
+    for command in [["inspect", "cut.mcap"].as_slice(), &["simulate", "--reference", "cut.mcap", "--out", "out.mcap"]] {
+        refuses(folder.path(), command, &["cut.mcap", "bag recover"]);
+    }
+    refuses(folder.path(), &["node", "replay", "--check-config", "--ros-args", "-p", "bag:=cut.mcap"], &["cut.mcap", "bag recover"]);
+    refuses(folder.path(), &["simulate", "--reference", "text.mcap", "--out", "out.mcap"], &["text.mcap"]);
+    refuses(folder.path(), &["bag", "csv", "walk.mcap", "/imu/nose/data"], &["/imu/nose/data", "/imu/head/data"]);
+    refuses(folder.path(), &["simulate", "--out", "walk.mcap"], &["walk.mcap"]);
+    assert_eq!(fs::read(path("walk.mcap")).unwrap(), whole, "an existing bag is not touched");
+
+    let said = succeed(folder.path(), &["bag", "recover", "cut.mcap"]);
+    assert!(said.contains("cut_recovered.mcap"), "{said}");
+    let said = succeed(folder.path(), &["inspect", "cut_recovered.mcap"]);
+    assert!(said.contains("/imu/left_wrist/data_raw"), "{said}");
+}

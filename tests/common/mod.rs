@@ -1,0 +1,78 @@
+//! What the tests of the whole suite share.
+#![allow(dead_code)]
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// The command line program under test.
+pub const CROMOSIM: &str = env!("CARGO_BIN_EXE_cromosim");
+
+/// Runs `cromosim` in a folder and waits.
+pub fn cromosim_in(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(CROMOSIM).args(arguments).current_dir(folder).output().expect("cromosim starts")
+}
+
+/// Runs `cromosim`, which must succeed; gives its standard output.
+pub fn succeed(folder: &Path, arguments: &[&str]) -> String {
+    let output = cromosim_in(folder, arguments);
+    assert!(output.status.success(), "cromosim {arguments:?} failed: {}", text(&output));
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// Both outputs.
+pub fn text(output: &Output) -> String {
+    format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr))
+}
+
+/// The repository.
+pub fn root() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Says that a test cannot run here; with CROMOSIM_REQUIRE_ALL=1 that is a failure.
+pub fn skipped(why: &str) {
+    eprintln!("skipped: {why}");
+    assert!(std::env::var_os("CROMOSIM_REQUIRE_ALL").is_none_or(|value| value != "1"), "skipped, but CROMOSIM_REQUIRE_ALL=1: {why}");
+}
+
+/// The shared third-party data, where they are.
+pub fn shared_data() -> Option<PathBuf> {
+    let path = std::env::var_os("CROMOSIM_DATA").map_or_else(|| root().join("../shared/data"), PathBuf::from);
+    if path.is_dir() {
+        return Some(path);
+    }
+    skipped(&format!("no shared data at {} (CROMOSIM_DATA names another place)", path.display()));
+    None
+}
+
+/// A Python with the packages of tests/interop/requirements.txt.
+pub fn python() -> Option<PathBuf> {
+    let python = std::env::var_os("CROMOSIM_PYTHON").map(PathBuf::from);
+    if python.is_none() {
+        skipped("CROMOSIM_PYTHON names no Python with tests/interop/requirements.txt (.ci/run makes one)");
+    }
+    python
+}
+
+/// A real motion in a minimal BVH: a hip, a chain of two limbs; enough for readers, too little for a body.
+pub const TINY_BVH: &str = "HIERARCHY
+ROOT Hips
+{
+  OFFSET 0 0 0
+  CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+  JOINT Chest
+  {
+    OFFSET 0 10 0
+    CHANNELS 3 Zrotation Xrotation Yrotation
+    End Site
+    {
+      OFFSET 0 10 0
+    }
+  }
+}
+MOTION
+Frames: 2
+Frame Time: 0.01
+0 90 0 0 0 0 0 0 0
+0 90 0 0 0 0 0 0 0
+";
