@@ -1,0 +1,170 @@
+//! Devices: what a real sensor adds to the ideal reading.
+
+use std::path::Path;
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use crate::ImuError;
+
+const SCHEMA: &str = "cromosim/device/1";
+
+/// The embedded devices by name.
+pub const EMBEDDED_DEVICES: [(&str, &str); 3] = [
+    ("ideal", include_str!("../../../../config/devices/ideal.yaml")),
+    ("consumer_mems", include_str!("../../../../config/devices/consumer_mems.yaml")),
+    ("precision_mems", include_str!("../../../../config/devices/precision_mems.yaml")),
+];
+
+/// White noise and constant errors of a device, with values as a data sheet has them.
+///
+/// ```yaml
+/// schema: cromosim/device/1
+/// declared_noise: {accel_density: 0.00157, gyro_density: 0.000122}
+/// effects:
+///   - {effect: accel_bias, bias: [0.05, -0.03, 0.08]}
+///   - {effect: gyro_bias, bias: [0.004, -0.006, 0.003]}
+/// ```
+/// Densities are one-sided, (m/s2)/sqrt(Hz) and (rad/s)/sqrt(Hz); the list has the form of an effects file's.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Device {
+    accel_density: f64,
+    gyro_density: f64,
+    orientation_stddev: f64,
+    effects: Vec<DeviceEffect>,
+}
+
+/// One constant error.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "effect", rename_all = "snake_case", deny_unknown_fields)]
+pub enum DeviceEffect {
+    /// Added to the specific force.
+    AccelBias {
+        /// m/s2, sensor axes.
+        bias: [f64; 3],
+    },
+    /// Added to the angular velocity.
+    GyroBias {
+        /// rad/s, sensor axes.
+        bias: [f64; 3],
+    },
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawDevice {
+    schema: String,
+    declared_noise: RawNoise,
+    #[serde(default)]
+    effects: Vec<DeviceEffect>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawNoise {
+    accel_density: f64,
+    gyro_density: f64,
+    #[serde(default)]
+    orientation_stddev: f64,
+}
+
+impl Device {
+    /// A device without error.
+    pub fn ideal() -> Self {
+        Self { accel_density: 0.0, gyro_density: 0.0, orientation_stddev: 0.0, effects: Vec::new() }
+    }
+
+    /// A device with white noise alone: densities in (m/s2)/sqrt(Hz) and (rad/s)/sqrt(Hz), at least 0.
+    pub fn white(accel_density: f64, gyro_density: f64) -> Self {
+        Self { accel_density, gyro_density, ..Self::ideal() }
+    }
+
+    /// Parses a file's text; `file` names it in errors.
+    ///
+    /// # Errors
+    /// [`ImuError::Yaml`], [`ImuError::Schema`], [`ImuError::DeviceNumber`].
+    pub fn parse(text: &str, file: &str) -> Result<Self, ImuError> {
+        let raw: RawDevice = serde_norway::from_str(text).map_err(|source| ImuError::Yaml { file: file.to_owned(), source })?;
+        if raw.schema != SCHEMA {
+            return Err(ImuError::Schema { file: file.to_owned(), expected: SCHEMA, found: raw.schema });
+        }
+        let RawNoise { accel_density, gyro_density, orientation_stddev } = raw.declared_noise;
+        let fields = [("accel_density", accel_density), ("gyro_density", gyro_density), ("orientation_stddev", orientation_stddev)];
+        if let Some((field, value)) = fields.into_iter().find(|(_, value)| !(*value >= 0.0 && value.is_finite())) {
+            return Err(ImuError::DeviceNumber { file: file.to_owned(), field, value });
+        }
+        let device = Self { accel_density, gyro_density, orientation_stddev, effects: raw.effects };
+        match device.accel_bias().iter().chain(device.gyro_bias().iter()).find(|b| !b.is_finite()) {
+            Some(&value) => Err(ImuError::DeviceNumber { file: file.to_owned(), field: "bias", value }),
+            None => Ok(device),
+        }
+    }
+
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// As [`Device::parse`], and [`ImuError::Unreadable`].
+    pub fn read(path: &Path) -> Result<Self, ImuError> {
+        let text = std::fs::read_to_string(path).map_err(|source| ImuError::Unreadable { file: path.to_owned(), source })?;
+        Self::parse(&text, &path.display().to_string())
+    }
+
+    /// The embedded device of a name.
+    ///
+    /// # Errors
+    /// [`ImuError::UnknownDevice`] with the names there are.
+    pub fn embedded(name: &str) -> Result<Self, ImuError> {
+        match EMBEDDED_DEVICES.iter().find(|(known, _)| *known == name) {
+            Some((_, text)) => Self::parse(text, &format!("{name}.yaml")),
+            None => {
+                let known = EMBEDDED_DEVICES.map(|(known, _)| known).join(", ");
+                Err(ImuError::UnknownDevice { name: name.to_owned(), known })
+            }
+        }
+    }
+
+    /// What a placement's `device` means: a name that ends in .yaml or .yml is a file, relative to `folder`; any other an embedded device;
+    /// `None` a device without error.
+    ///
+    /// # Errors
+    /// As [`Device::read`] and [`Device::embedded`].
+    pub fn resolve(name: Option<&str>, folder: &Path) -> Result<Self, ImuError> {
+        match name {
+            None => Ok(Self::ideal()),
+            Some(file) if file.ends_with(".yaml") || file.ends_with(".yml") => Self::read(&folder.join(file)),
+            Some(name) => Self::embedded(name),
+        }
+    }
+
+    /// White noise of the accelerometer, (m/s2)/sqrt(Hz).
+    pub fn accel_density(&self) -> f64 {
+        self.accel_density
+    }
+
+    /// White noise of the gyroscope, (rad/s)/sqrt(Hz).
+    pub fn gyro_density(&self) -> f64 {
+        self.gyro_density
+    }
+
+    /// Standard deviation of the reported orientation about each axis, rad; 0 where it is exact and its covariance unknown.
+    pub fn orientation_stddev(&self) -> f64 {
+        self.orientation_stddev
+    }
+
+    /// The constant errors, in the order in which they act.
+    pub fn effects(&self) -> &[DeviceEffect] {
+        &self.effects
+    }
+
+    /// Sum of the accelerometer's biases, m/s2, sensor axes.
+    pub fn accel_bias(&self) -> Vector3<f64> {
+        let of = |effect: &DeviceEffect| if let DeviceEffect::AccelBias { bias } = effect { (*bias).into() } else { Vector3::zeros() };
+        self.effects.iter().map(of).sum()
+    }
+
+    /// Sum of the gyroscope's biases, rad/s, sensor axes.
+    pub fn gyro_bias(&self) -> Vector3<f64> {
+        let of = |effect: &DeviceEffect| if let DeviceEffect::GyroBias { bias } = effect { (*bias).into() } else { Vector3::zeros() };
+        self.effects.iter().map(of).sum()
+    }
+}

@@ -1,0 +1,153 @@
+//! What can go wrong.
+
+use std::path::PathBuf;
+
+use cromosim_body::BodyError;
+use cromosim_spatial::{SpatialError, Stamp};
+use thiserror::Error;
+
+/// Errors of this crate.
+#[derive(Debug, Error)]
+pub enum ImuError {
+    /// A file that cannot be read.
+    #[error("{}: {source}", file.display())]
+    Unreadable {
+        /// The file.
+        file: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A file that is not YAML, or has wrong or unknown fields.
+    #[error("{file}: {source}")]
+    Yaml {
+        /// The file's name.
+        file: String,
+        /// Why, with line and column.
+        source: serde_norway::Error,
+    },
+    /// A file of another kind or version.
+    #[error("{file}: schema: expected `{expected}`, found `{found}`")]
+    Schema {
+        /// The file's name.
+        file: String,
+        /// The schema that is read here.
+        expected: &'static str,
+        /// The schema the file names.
+        found: String,
+    },
+    /// A placement that makes no sense.
+    #[error("{file}: placement `{placement}`: {field}: {problem}")]
+    Placement {
+        /// The file's name.
+        file: String,
+        /// The placement's name, or its number in the list where it has none.
+        placement: String,
+        /// The field.
+        field: &'static str,
+        /// What is wrong with it.
+        problem: PlacementProblem,
+    },
+    /// A site that the body does not have.
+    #[error("placement `{placement}`: {source}")]
+    Site {
+        /// The placement's name.
+        placement: String,
+        /// Why.
+        source: BodyError,
+    },
+    /// A triangle without area cannot carry a sensor.
+    #[error("placement `{placement}`: triangle {triangle} has no area; choose a neighbour")]
+    FlatTriangle {
+        /// The placement's name.
+        placement: String,
+        /// The triangle.
+        triangle: u32,
+    },
+    /// An unknown scheme.
+    #[error("unknown scheme `{name}`; known are richardson, normal_tracking, triangle, spline, second_difference")]
+    UnknownScheme {
+        /// The name given.
+        name: String,
+    },
+    /// A device that is neither embedded nor a file.
+    #[error("unknown device `{name}`; known are {known}, or give the path of a .yaml file")]
+    UnknownDevice {
+        /// The name given.
+        name: String,
+        /// The embedded devices.
+        known: String,
+    },
+    /// A device's number that makes no sense.
+    #[error("{file}: {field}: {value} is not a finite number of at least zero")]
+    DeviceNumber {
+        /// The file's name.
+        file: String,
+        /// The field.
+        field: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// Frames that cannot be differentiated.
+    #[error("trajectory: {0}")]
+    Trajectory(#[from] SpatialError),
+    /// A live frame that does not come after the one before.
+    #[error("frame at {} ns does not come after {} ns; reset the stream where the source jumps back", next.nanos, previous.nanos)]
+    FrameNotIncreasing {
+        /// Stamp of the frame before.
+        previous: Stamp,
+        /// Its own stamp.
+        next: Stamp,
+    },
+    /// A live frame with NaN or infinity.
+    #[error("frame at {} ns is not finite", stamp.nanos)]
+    FrameNotFinite {
+        /// Its stamp.
+        stamp: Stamp,
+    },
+}
+
+/// What is wrong with a placement's field.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum PlacementProblem {
+    /// Wrong type, or an unknown field.
+    #[error("{message}")]
+    Malformed {
+        /// What the reader found.
+        message: String,
+    },
+    /// No value, and no default for it in the file.
+    #[error("missing; give it here or under `defaults`")]
+    Missing,
+    /// None or several of `site`, `triangle` with `barycentrics`, and `point`.
+    #[error("{given} of `site`, `triangle` with `barycentrics` and `point` given; give exactly one")]
+    OneSite {
+        /// How many are given.
+        given: usize,
+    },
+    /// None or several of the forms of a rotation.
+    #[error("{given} of `rotvec`, `quaternion_xyzw` and `matrix` given; give exactly one")]
+    OneRotation {
+        /// How many are given.
+        given: usize,
+    },
+    /// A name that cannot be part of a ROS topic.
+    #[error("`{name}` is no ROS name: letters, digits and single underscores, not starting with a digit")]
+    BadName {
+        /// The name.
+        name: String,
+    },
+    /// Two placements of one name.
+    #[error("there is another placement of this name")]
+    Duplicate,
+    /// A number out of its range.
+    #[error("{value} is out of range; {range}")]
+    OutOfRange {
+        /// The number.
+        value: f64,
+        /// What is allowed.
+        range: &'static str,
+    },
+    /// A rotation that is none.
+    #[error("{0}")]
+    NotARotation(SpatialError),
+}

@@ -1,0 +1,67 @@
+//! From a placement on a body to an inertial measurement unit.
+//!
+//! A [`Placement`] says where a sensor sits; a [`MountedSite`] gives its frame for any [`cromosim_body::BodyPose`]; a [`Scheme`]
+//! differentiates the frames, offline by [`simulate`] or live by [`StreamingImu`]; a [`Device`] adds noise and bias.
+//!
+//! The sensor reads, in its own axes (S sensor, B site on the body, G world; R_BG turns site axes into world axes),
+//!
+//! ```text
+//! a_S = R_SB^-1 R_BG^-1 (a_G - g)      specific force, m/s2: +9.80665 along "up" at rest
+//! w_S = R_SB^-1 R_BG^-1  w_G           angular velocity, rad/s
+//! g   = (0, 0, -9.80665) m/s2
+//! ```
+//!
+//! ```
+//! use cromosim_body::{BodyModel, BodyPose, ShapedBody};
+//! use cromosim_imu::{Device, MountedSite, NoiseSource, PlacementSet, Scheme, simulate};
+//! use cromosim_spatial::{Stamp, uniform_stamps};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let body = ShapedBody::new(BodyModel::embedded(), &[])?;
+//! let placements = PlacementSet::demo();
+//! let left_wrist = placements.get("left_wrist").ok_or("no such placement")?;
+//! let mounted = MountedSite::new(&body, left_wrist)?;
+//!
+//! let stamps = uniform_stamps(Stamp::from_seconds(0.0), Stamp::from_seconds(1.0), 120.0)?;
+//! let poses = vec![BodyPose::rest(nalgebra::Vector3::new(0.0, 0.0, 1.0)); stamps.len()];
+//! let trajectory = mounted.trajectory(&stamps, &poses)?;
+//!
+//! let output = uniform_stamps(stamps[0], stamps[120], left_wrist.rate_hz())?;
+//! let ideal = simulate(&trajectory, Scheme::Spline, &output)?;
+//! assert!((ideal[50].specific_force.norm() - 9.80665).abs() < 1e-6);
+//!
+//! let device = Device::embedded("consumer_mems")?;
+//! let mut noise = NoiseSource::new(&device, left_wrist.rate_hz(), 42, left_wrist.name())?;
+//! let real_looking: Vec<_> = ideal.iter().map(|sample| noise.apply(sample)).collect();
+//! # assert!(real_looking.len() == ideal.len() && real_looking[0] != ideal[0]);
+//! # Ok(())
+//! # }
+//! ```
+
+mod device;
+mod error;
+mod mount;
+mod noise;
+mod placement;
+mod placement_file;
+mod sample;
+mod schemes;
+mod simulate;
+mod stream;
+mod stream_spline;
+mod trajectory;
+
+#[cfg(test)]
+mod test_motions;
+
+pub use device::{Device, DeviceEffect, EMBEDDED_DEVICES};
+pub use error::{ImuError, PlacementProblem};
+pub use mount::{MountedSite, MountedSites, SiteFrame};
+pub use noise::{Covariances, NoiseSource};
+pub use placement::{Follow, Placement, SiteChoice};
+pub use placement_file::PlacementSet;
+pub use sample::{GRAVITY_IN_WORLD, ImuSample, KinematicSample, STANDARD_GRAVITY};
+pub use schemes::Scheme;
+pub use simulate::{simulate, simulate_kinematics, simulate_kinematics_on};
+pub use stream::{StreamOptions, StreamingImu};
+pub use trajectory::{SensorFrame, SensorTrajectory};

@@ -1,0 +1,259 @@
+//! Sensors on a body of one shape.
+
+use cromosim_body::{BodyPose, Joint, ShapedBody, Site, VertexSubset};
+use cromosim_spatial::Stamp;
+use nalgebra::{Isometry3, Matrix2, Matrix3, Rotation3, UnitQuaternion, Vector3};
+
+use crate::{Follow, ImuError, Placement, SensorFrame, SensorTrajectory, SiteChoice};
+
+/// Where a sensor is for one pose of the body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SiteFrame {
+    /// The sensor's frame, m.
+    pub world_from_sensor: Isometry3<f64>,
+    /// Outward unit normal of what the sensor follows: of the triangle, or of the rest triangle carried along by the segment.
+    pub normal_in_world: Vector3<f64>,
+    /// Corners of the site's triangle, m.
+    pub triangle_in_world: [Vector3<f64>; 3],
+}
+
+impl SiteFrame {
+    /// The frame with its time.
+    pub fn at(&self, stamp: Stamp) -> SensorFrame {
+        SensorFrame { stamp, world_from_sensor: self.world_from_sensor, normal_in_world: self.normal_in_world }
+    }
+}
+
+/// A placement on a body of one shape.
+///
+/// The site's frame at rest: z along the outward normal of the triangle, x along the bone towards its far end (the next joint; of the last
+/// segments the direction in which the limb arrives) as far as it is tangential, y = z cross x. Where bone and normal are parallel, x is
+/// forward instead. The sensor's frame is the site's turned by the placement's mount, moved outward by its distance from the skin.
+#[derive(Clone, Debug)]
+pub struct MountedSite {
+    name: String,
+    site: Site,
+    follow: Follow,
+    skin_distance: f64,
+    triangle: RestTriangle,
+    /// triangle_from_sensor, rotation.
+    triangle_from_sensor: UnitQuaternion<f64>,
+    segment_from_sensor: Isometry3<f64>,
+    /// The rest triangle's outward normal.
+    normal_in_segment: Vector3<f64>,
+    subset: VertexSubset,
+}
+
+impl MountedSite {
+    /// Mounts a placement.
+    ///
+    /// # Errors
+    /// [`ImuError::Site`] for a site that this body does not have, [`ImuError::FlatTriangle`].
+    pub fn new(body: &ShapedBody, placement: &Placement) -> Result<Self, ImuError> {
+        let refuse = |source| ImuError::Site { placement: placement.name().to_owned(), source };
+        let model = body.model();
+        let site = match placement.site() {
+            SiteChoice::Named(name) => model.site(name),
+            SiteChoice::Triangle { triangle, barycentrics } => model.site_at(*triangle, *barycentrics),
+            SiteChoice::NearestTo(point) => model.nearest_site(*point),
+        }
+        .map_err(refuse)?;
+        let vertices = model.triangle(&site).map_err(refuse)?;
+        let subset = body.subset(&vertices).map_err(refuse)?;
+        let corners = vertices.map(|vertex| body.rest_vertices()[vertex as usize]);
+        let flat = || ImuError::FlatTriangle { placement: placement.name().to_owned(), triangle: site.triangle };
+        let (triangle, model_from_triangle) = RestTriangle::new(&corners).ok_or_else(flat)?;
+        let normal = model_from_triangle * Vector3::z();
+        let model_from_sensor = site_axes(&normal, &bone_direction(body, site.joint)) * placement.mount();
+        let position = point_of(&corners, &site.barycentrics) + normal * placement.skin_distance();
+        let sensor_in_segment = position - body.joints_in_model()[site.joint.index()];
+        Ok(Self {
+            name: placement.name().to_owned(),
+            follow: placement.follow(),
+            skin_distance: placement.skin_distance(),
+            triangle,
+            triangle_from_sensor: model_from_triangle.inverse() * model_from_sensor,
+            // A segment's frame is parallel to the model's at rest.
+            segment_from_sensor: Isometry3::from_parts(sensor_in_segment.into(), model_from_sensor),
+            normal_in_segment: normal,
+            subset,
+            site,
+        })
+    }
+
+    /// The placement's name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The site on this body.
+    pub fn site(&self) -> &Site {
+        &self.site
+    }
+
+    /// The joint whose segment carries the sensor.
+    pub fn joint(&self) -> Joint {
+        self.site.joint
+    }
+
+    /// The sensor's frame in its segment's at rest; all the time where it follows the segment.
+    pub fn segment_from_sensor(&self) -> Isometry3<f64> {
+        self.segment_from_sensor
+    }
+
+    /// The frame for one pose of the body.
+    pub fn frame(&self, pose: &BodyPose) -> SiteFrame {
+        let mut positions = Vec::with_capacity(3);
+        let segments = self.subset.positions_and_segments_into(pose, &mut positions);
+        self.frame_of(&segments[self.site.joint.index()], [positions[0], positions[1], positions[2]])
+    }
+
+    /// The frames for a whole motion.
+    ///
+    /// # Errors
+    /// As [`SensorTrajectory::new`]; stamps beyond the poses, or poses beyond the stamps, are left out.
+    pub fn trajectory(&self, stamps: &[Stamp], poses: &[BodyPose]) -> Result<SensorTrajectory, ImuError> {
+        SensorTrajectory::new(stamps.iter().zip(poses).map(|(stamp, pose)| self.frame(pose).at(*stamp)).collect())
+    }
+
+    fn frame_of(&self, world_from_segment: &Isometry3<f64>, corners: [Vector3<f64>; 3]) -> SiteFrame {
+        let (world_from_sensor, normal_in_world) = match self.follow {
+            Follow::Segment => (world_from_segment * self.segment_from_sensor, world_from_segment.rotation * self.normal_in_segment),
+            Follow::Skin => {
+                let world_from_triangle = self.triangle.frame(&corners).unwrap_or(world_from_segment.rotation);
+                let normal = world_from_triangle * Vector3::z();
+                let position = point_of(&corners, &self.site.barycentrics) + normal * self.skin_distance;
+                (Isometry3::from_parts(position.into(), world_from_triangle * self.triangle_from_sensor), normal)
+            }
+        };
+        SiteFrame { world_from_sensor, normal_in_world, triangle_in_world: corners }
+    }
+}
+
+/// Several placements on one body, evaluated together: the skeleton is computed once a pose.
+#[derive(Clone, Debug)]
+pub struct MountedSites {
+    sites: Vec<MountedSite>,
+    subset: Option<VertexSubset>,
+}
+
+impl MountedSites {
+    /// Mounts placements.
+    ///
+    /// # Errors
+    /// As [`MountedSite::new`].
+    pub fn new(body: &ShapedBody, placements: &[Placement]) -> Result<Self, ImuError> {
+        let sites = placements.iter().map(|placement| MountedSite::new(body, placement)).collect::<Result<Vec<_>, _>>()?;
+        let vertices: Vec<u32> = sites.iter().flat_map(|site| site.subset.vertices()).collect();
+        let refuse = |source| ImuError::Site { placement: "(all)".to_owned(), source };
+        let subset = if sites.is_empty() { None } else { Some(body.subset(&vertices).map_err(refuse)?) };
+        Ok(Self { sites, subset })
+    }
+
+    /// The mounted placements, in order.
+    pub fn sites(&self) -> &[MountedSite] {
+        &self.sites
+    }
+
+    /// The frames of all placements for one pose, in order.
+    pub fn frames(&self, pose: &BodyPose) -> Vec<SiteFrame> {
+        let mut frames = Vec::new();
+        self.frames_into(pose, &mut Vec::new(), &mut frames);
+        frames
+    }
+
+    /// The frames of all placements for a whole motion.
+    ///
+    /// # Errors
+    /// As [`SensorTrajectory::new`]; stamps beyond the poses, or poses beyond the stamps, are left out.
+    pub fn trajectories(&self, stamps: &[Stamp], poses: &[BodyPose]) -> Result<Vec<SensorTrajectory>, ImuError> {
+        let mut by_site: Vec<Vec<SensorFrame>> = self.sites.iter().map(|_| Vec::with_capacity(stamps.len())).collect();
+        let (mut positions, mut frames) = (Vec::new(), Vec::new());
+        for (stamp, pose) in stamps.iter().zip(poses) {
+            self.frames_into(pose, &mut positions, &mut frames);
+            for (series, frame) in by_site.iter_mut().zip(&frames) {
+                series.push(frame.at(*stamp));
+            }
+        }
+        by_site.into_iter().map(SensorTrajectory::new).collect()
+    }
+
+    fn frames_into(&self, pose: &BodyPose, positions: &mut Vec<Vector3<f64>>, frames: &mut Vec<SiteFrame>) {
+        frames.clear();
+        let Some(subset) = &self.subset else { return };
+        let segments = subset.positions_and_segments_into(pose, positions);
+        let corners = positions.chunks_exact(3).map(|c| [c[0], c[1], c[2]]);
+        frames.extend(self.sites.iter().zip(corners).map(|(site, corners)| site.frame_of(&segments[site.site.joint.index()], corners)));
+    }
+}
+
+/// A triangle's shape at rest, in its own plane.
+#[derive(Clone, Copy, Debug)]
+struct RestTriangle {
+    /// Inverse of the matrix whose columns are the two edges from the first corner.
+    edges_inverse: Matrix2<f64>,
+}
+
+impl RestTriangle {
+    /// The shape, and model_from_triangle; `None` for a triangle without area.
+    fn new(corners: &[Vector3<f64>; 3]) -> Option<(Self, UnitQuaternion<f64>)> {
+        let [x, y, z] = edge_axes(corners)?;
+        let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, y, z]));
+        let edges_inverse = edges_in_plane(corners, &x, &y).try_inverse()?;
+        Some((Self { edges_inverse }, UnitQuaternion::from_rotation_matrix(&rotation)))
+    }
+
+    /// world_from_triangle of moved corners: z is their normal; about it, the rotation part (polar decomposition) of what turned the rest
+    /// triangle into the moved one, so that a stretched triangle turns as a whole and not as its first edge does.
+    fn frame(&self, corners: &[Vector3<f64>; 3]) -> Option<UnitQuaternion<f64>> {
+        let [edge, across, normal] = edge_axes(corners)?;
+        let gradient = edges_in_plane(corners, &edge, &across) * self.edges_inverse;
+        let (sine, cosine) = (gradient.m21 - gradient.m12, gradient.m11 + gradient.m22);
+        let x = (edge * cosine + across * sine) / sine.hypot(cosine);
+        let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, normal.cross(&x), normal]));
+        Some(UnitQuaternion::from_rotation_matrix(&rotation))
+    }
+}
+
+/// First edge, normal cross edge, normal.
+fn edge_axes(corners: &[Vector3<f64>; 3]) -> Option<[Vector3<f64>; 3]> {
+    let edge = (corners[1] - corners[0]).try_normalize(1e-9)?;
+    let normal = edge.cross(&(corners[2] - corners[0])).try_normalize(1e-9)?;
+    Some([edge, normal.cross(&edge), normal])
+}
+
+fn edges_in_plane(corners: &[Vector3<f64>; 3], x: &Vector3<f64>, y: &Vector3<f64>) -> Matrix2<f64> {
+    let (first, second) = (corners[1] - corners[0], corners[2] - corners[0]);
+    Matrix2::new(first.dot(x), second.dot(x), first.dot(y), second.dot(y))
+}
+
+fn point_of(corners: &[Vector3<f64>; 3], barycentrics: &[f64; 3]) -> Vector3<f64> {
+    corners.iter().zip(barycentrics).map(|(corner, weight)| corner * *weight).sum()
+}
+
+/// From a joint to the next one towards the far end; of a last joint the way from its parent. Model frame, unit length.
+fn bone_direction(body: &ShapedBody, joint: Joint) -> Vector3<f64> {
+    let joints = body.joints_in_model();
+    let next = match joint {
+        Joint::Pelvis => Some(Joint::Spine1),
+        Joint::Spine3 => Some(Joint::Neck),
+        _ => joint.children().next(),
+    };
+    let (from, to) = match (next, joint.parent()) {
+        (Some(next), _) => (joint, next),
+        (None, parent) => (parent.unwrap_or(joint), joint),
+    };
+    (joints[to.index()] - joints[from.index()]).try_normalize(1e-9).unwrap_or_else(Vector3::zeros)
+}
+
+/// model_from_site at rest: z the normal, x the bone's tangent.
+fn site_axes(normal: &Vector3<f64>, bone: &Vector3<f64>) -> UnitQuaternion<f64> {
+    let tangent = |direction: &Vector3<f64>| (direction - normal * normal.dot(direction)).try_normalize(0.2);
+    // One of left and forward is at least 45 degrees off any normal.
+    let x = tangent(bone).or_else(|| tangent(&Vector3::z())).or_else(|| tangent(&Vector3::x())).unwrap_or_else(Vector3::x);
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, normal.cross(&x), *normal])))
+}
+
+#[cfg(test)]
+#[path = "mount_tests.rs"]
+mod tests;

@@ -1,0 +1,134 @@
+//! Seeded noise, and the covariances that messages state.
+
+use cromosim_spatial::{SpatialError, so3};
+use nalgebra::Vector3;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha12Rng;
+
+use crate::{Device, ImuError, ImuSample};
+
+/// Covariances of a sensor_msgs/Imu, row-major 3x3, as REP-145 reads them: all zero is unknown, -1 first is "not reported".
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Covariances {
+    /// rad2.
+    pub orientation: [f64; 9],
+    /// (rad/s)2.
+    pub angular_velocity: [f64; 9],
+    /// (m/s2)2.
+    pub linear_acceleration: [f64; 9],
+}
+
+impl Covariances {
+    /// Of a device read at a rate: variance of the white noise per sample, density^2 rate, on the diagonals; a device without noise has
+    /// unknown (zero) covariances. The orientation is reported (`data`).
+    pub fn of(device: &Device, rate_hz: f64) -> Self {
+        Self {
+            orientation: diagonal(device.orientation_stddev().powi(2)),
+            angular_velocity: diagonal(device.gyro_density().powi(2) * rate_hz),
+            linear_acceleration: diagonal(device.accel_density().powi(2) * rate_hz),
+        }
+    }
+
+    /// The same without orientation (`data_raw`): its covariance starts with -1.
+    #[must_use]
+    pub fn without_orientation(self) -> Self {
+        let mut orientation = [0.0; 9];
+        orientation[0] = -1.0;
+        Self { orientation, ..self }
+    }
+}
+
+fn diagonal(variance: f64) -> [f64; 9] {
+    [variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, variance]
+}
+
+/// Adds a device's biases and white noise to ideal readings, one after the other.
+///
+/// Noise per sample: sigma = density sqrt(rate), independent per axis. Each channel of each placement has its own ChaCha stream, derived from
+/// seed, placement name and channel alone: the same bytes come out whatever else is simulated, in whatever order, on however many threads.
+#[derive(Clone, Debug)]
+pub struct NoiseSource {
+    accel: Channel,
+    gyro: Channel,
+    orientation: Channel,
+}
+
+#[derive(Clone, Debug)]
+struct Channel {
+    bias: Vector3<f64>,
+    sigma: f64,
+    random: ChaCha12Rng,
+}
+
+impl NoiseSource {
+    /// The source of one placement.
+    ///
+    /// # Errors
+    /// [`ImuError::Trajectory`] for a rate that is not positive.
+    pub fn new(device: &Device, rate_hz: f64, seed: u64, placement: &str) -> Result<Self, ImuError> {
+        if !(rate_hz > 0.0 && rate_hz.is_finite()) {
+            return Err(SpatialError::BadRate { rate_hz }.into());
+        }
+        let root = rate_hz.sqrt();
+        let channel = |number, bias, sigma| Channel { bias, sigma, random: stream(seed, placement, number) };
+        Ok(Self {
+            accel: channel(0, device.accel_bias(), device.accel_density() * root),
+            gyro: channel(1, device.gyro_bias(), device.gyro_density() * root),
+            orientation: channel(2, Vector3::zeros(), device.orientation_stddev()),
+        })
+    }
+
+    /// The reading with this device's errors; one call a sample, in order of time. The orientation's noise is a small turn in sensor axes.
+    pub fn apply(&mut self, ideal: &ImuSample) -> ImuSample {
+        ImuSample {
+            stamp: ideal.stamp,
+            world_from_sensor: ideal.world_from_sensor * so3::exp(&self.orientation.draw()),
+            specific_force: ideal.specific_force + self.accel.draw(),
+            angular_velocity: ideal.angular_velocity + self.gyro.draw(),
+        }
+    }
+
+    /// As [`NoiseSource::apply`] without the random part: biases alone.
+    pub fn apply_without_noise(&self, ideal: &ImuSample) -> ImuSample {
+        ImuSample {
+            specific_force: ideal.specific_force + self.accel.bias,
+            angular_velocity: ideal.angular_velocity + self.gyro.bias,
+            ..*ideal
+        }
+    }
+}
+
+impl Channel {
+    fn draw(&mut self) -> Vector3<f64> {
+        let [x, y] = normal_pair(&mut self.random);
+        let [z, _] = normal_pair(&mut self.random);
+        self.bias + Vector3::new(x, y, z) * self.sigma
+    }
+}
+
+/// Two independent standard normal numbers (Box and Muller 1958).
+fn normal_pair(random: &mut ChaCha12Rng) -> [f64; 2] {
+    let mut uniform = || ((random.next_u64() >> 11) as f64 + 0.5) / (1u64 << 53) as f64;
+    let radius = (-2.0 * uniform().ln()).sqrt();
+    let (sine, cosine) = (std::f64::consts::TAU * uniform()).sin_cos();
+    [radius * cosine, radius * sine]
+}
+
+/// A key of 32 bytes: seed, two hashes of the name, channel.
+fn stream(seed: u64, placement: &str, channel: u64) -> ChaCha12Rng {
+    let words = [seed, fnv1a(placement, 0xcbf2_9ce4_8422_2325), fnv1a(placement, 0x9e37_79b9_7f4a_7c15), channel];
+    let mut key = [0; 32];
+    for (bytes, word) in key.chunks_exact_mut(8).zip(words) {
+        bytes.copy_from_slice(&word.to_le_bytes());
+    }
+    ChaCha12Rng::from_seed(key)
+}
+
+/// Fowler, Noll and Vo's hash, which no version of a compiler or library changes.
+fn fnv1a(text: &str, start: u64) -> u64 {
+    text.bytes().fold(start, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3))
+}
+
+#[cfg(test)]
+#[path = "noise_tests.rs"]
+mod tests;

@@ -1,0 +1,50 @@
+//! What a sensor reads, and the motion behind it.
+
+use cromosim_spatial::Stamp;
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+
+/// Standard gravity, m/s2 (CGPM 1901).
+pub const STANDARD_GRAVITY: f64 = 9.80665;
+
+/// Gravity in the world (z up), m/s2.
+pub const GRAVITY_IN_WORLD: Vector3<f64> = Vector3::new(0.0, 0.0, -STANDARD_GRAVITY);
+
+/// How a sensor moves at one time, in world axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KinematicSample {
+    /// When.
+    pub stamp: Stamp,
+    /// The sensor's frame, m.
+    pub world_from_sensor: Isometry3<f64>,
+    /// Of the frame's origin, m/s2; zero at rest.
+    pub acceleration: Vector3<f64>,
+    /// Of the frame against the world, rad/s.
+    pub angular_velocity: Vector3<f64>,
+}
+
+/// One reading of an IMU, in sensor axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImuSample {
+    /// When.
+    pub stamp: Stamp,
+    /// Orientation of the sensor.
+    pub world_from_sensor: UnitQuaternion<f64>,
+    /// Specific force: acceleration less gravity, m/s2; +9.80665 along "up" at rest.
+    pub specific_force: Vector3<f64>,
+    /// Against the world, rad/s.
+    pub angular_velocity: Vector3<f64>,
+}
+
+impl KinematicSample {
+    /// What an error-free sensor reads: `a_S = R_SB^-1 R_BG^-1 (a_G - g)` and `w_S = R_SB^-1 R_BG^-1 w_G`.
+    pub fn imu(&self) -> ImuSample {
+        // world_from_sensor = world_from_site * site_from_sensor, so its inverse is R_SB^-1 R_BG^-1.
+        let sensor_from_world = self.world_from_sensor.rotation.inverse();
+        ImuSample {
+            stamp: self.stamp,
+            world_from_sensor: self.world_from_sensor.rotation,
+            specific_force: sensor_from_world * (self.acceleration - GRAVITY_IN_WORLD),
+            angular_velocity: sensor_from_world * self.angular_velocity,
+        }
+    }
+}

@@ -1,0 +1,119 @@
+//! Ways to differentiate a sensor's frames, one file each.
+
+use std::fmt;
+use std::str::FromStr;
+
+use cromosim_spatial::derivative_weights;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use crate::{ImuError, SensorFrame};
+
+mod normal_tracking;
+mod richardson;
+mod second_difference;
+pub(crate) mod spline;
+mod triangle;
+
+/// A way to get acceleration and angular velocity from frames; h is the frames' interval.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Scheme {
+    /// Richardson's extrapolation of central differences over five frames; errors O(h^4). Amplifies jitter the most.
+    Richardson,
+    /// The paper's baseline: the turning of the skin's normal alone, blind to rotation about it; central differences, O(h^2).
+    NormalTracking,
+    /// The triangle's full frame by central differences of its rotation matrix; O(h^2).
+    Triangle,
+    /// Smoothing quintic splines of position and quaternion, the smoothing chosen from the frames, at any output rate; O(h^4) for
+    /// acceleration, O(h^5) for angular velocity.
+    #[default]
+    Spline,
+    /// Plain second difference of the position and the turn between the neighbours; O(h^2).
+    SecondDifference,
+}
+
+impl Scheme {
+    /// All schemes.
+    pub const ALL: [Self; 5] = [Self::Richardson, Self::NormalTracking, Self::Triangle, Self::Spline, Self::SecondDifference];
+
+    /// The name on the command line and in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Richardson => "richardson",
+            Self::NormalTracking => "normal_tracking",
+            Self::Triangle => "triangle",
+            Self::Spline => "spline",
+            Self::SecondDifference => "second_difference",
+        }
+    }
+
+    /// Frames that an estimate needs after (and before) its own; `None` for the spline, which has no stencil.
+    pub(crate) fn reach(self) -> Option<usize> {
+        match self {
+            Self::Richardson => Some(2),
+            Self::NormalTracking | Self::Triangle | Self::SecondDifference => Some(1),
+            Self::Spline => None,
+        }
+    }
+
+    /// Acceleration and angular velocity (world axes) at frame `k` of `frames` by the scheme's stencil; at the ends the
+    /// stencil is one-sided and has one frame more. For schemes with a reach.
+    pub(crate) fn at_frame(self, frames: &[SensorFrame], k: usize) -> (Vector3<f64>, Vector3<f64>) {
+        let stencil = Stencil::new(frames, k, self.reach().unwrap_or(1));
+        let angular_velocity = match self {
+            Self::NormalTracking => normal_tracking::angular_velocity(&stencil),
+            Self::Triangle => triangle::angular_velocity(&stencil),
+            Self::SecondDifference => second_difference::angular_velocity(&stencil),
+            Self::Richardson | Self::Spline => richardson::angular_velocity(&stencil),
+        };
+        (stencil.acceleration(), angular_velocity)
+    }
+}
+
+impl fmt::Display for Scheme {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(self.name())
+    }
+}
+
+impl FromStr for Scheme {
+    type Err = ImuError;
+
+    fn from_str(name: &str) -> Result<Self, ImuError> {
+        Self::ALL.into_iter().find(|scheme| scheme.name() == name).ok_or_else(|| ImuError::UnknownScheme { name: name.to_owned() })
+    }
+}
+
+/// The frames around one frame, with the weights of their differences.
+pub(crate) struct Stencil<'a> {
+    frames: &'a [SensorFrame],
+    centre: &'a SensorFrame,
+    weights: [[f64; cromosim_spatial::MAX_STENCIL]; 3],
+}
+
+impl<'a> Stencil<'a> {
+    fn new(frames: &'a [SensorFrame], k: usize, reach: usize) -> Self {
+        // A one-sided second derivative needs one frame more to have the same order of error.
+        let inside = k >= reach && k + reach < frames.len();
+        let width = (2 * reach + if inside { 1 } else { 2 }).min(frames.len());
+        let start = k.saturating_sub(reach).min(frames.len() - width);
+        let (centre, frames) = (&frames[k], &frames[start..start + width]);
+        let mut seconds = [0.0; cromosim_spatial::MAX_STENCIL];
+        for (seconds, frame) in seconds.iter_mut().zip(frames) {
+            *seconds = frame.stamp - centre.stamp;
+        }
+        Self { frames, centre, weights: derivative_weights(&seconds[..width], 0.0) }
+    }
+
+    /// `sum_j w_j x_j` with the weights of a derivative of the given order.
+    fn sum(&self, order: usize, of: impl Fn(&SensorFrame) -> Vector3<f64>) -> Vector3<f64> {
+        self.frames.iter().zip(self.weights[order]).map(|(frame, weight)| of(frame) * weight).sum()
+    }
+
+    /// Second derivative of the position. Differences from the centre, so that rounding does not grow with the distance from the origin.
+    fn acceleration(&self) -> Vector3<f64> {
+        let centre = self.centre.world_from_sensor.translation.vector;
+        self.sum(2, |frame| frame.world_from_sensor.translation.vector - centre)
+    }
+}

@@ -1,0 +1,107 @@
+//! A sensor's frames over time: what the schemes differentiate.
+
+use cromosim_spatial::{SpatialError, Stamp, check_times, relative_seconds};
+use nalgebra::{Isometry3, Vector3};
+
+use crate::ImuError;
+
+/// A sensor's frame at one time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SensorFrame {
+    /// When.
+    pub stamp: Stamp,
+    /// The frame, m.
+    pub world_from_sensor: Isometry3<f64>,
+    /// The skin's outward unit normal, which [`crate::Scheme::NormalTracking`] follows.
+    pub normal_in_world: Vector3<f64>,
+}
+
+impl SensorFrame {
+    /// A frame without a skin: its own z axis stands for the normal.
+    pub fn new(stamp: Stamp, world_from_sensor: Isometry3<f64>) -> Self {
+        Self { stamp, world_from_sensor, normal_in_world: world_from_sensor * Vector3::z() }
+    }
+
+    pub(crate) fn is_finite(&self) -> bool {
+        let finite = |v: &Vector3<f64>| v.iter().all(|x| x.is_finite());
+        finite(&self.world_from_sensor.translation.vector)
+            && self.world_from_sensor.rotation.coords.iter().all(|x| x.is_finite())
+            && finite(&self.normal_in_world)
+    }
+}
+
+/// At least two frames with increasing stamps, all finite.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SensorTrajectory {
+    frames: Vec<SensorFrame>,
+}
+
+impl SensorTrajectory {
+    /// Parses frames: uneven stamps and gaps are welcome, duplicates and time going backwards are not.
+    ///
+    /// # Errors
+    /// [`ImuError::Trajectory`] with the index of the frame.
+    pub fn new(frames: Vec<SensorFrame>) -> Result<Self, ImuError> {
+        if frames.len() < 2 {
+            return Err(SpatialError::TooFewSamples { got: frames.len(), needed: 2 }.into());
+        }
+        check_times(&seconds(&frames))?;
+        if let Some(index) = frames.iter().position(|frame| !frame.is_finite()) {
+            return Err(SpatialError::NotFinite { index, what: "pose" }.into());
+        }
+        Ok(Self { frames })
+    }
+
+    /// The frames, in order of time.
+    pub fn frames(&self) -> &[SensorFrame] {
+        &self.frames
+    }
+
+    /// Stamp of the first frame.
+    pub fn start(&self) -> Stamp {
+        self.frames[0].stamp
+    }
+
+    /// Stamp of the last frame.
+    pub fn end(&self) -> Stamp {
+        self.frames[self.frames.len() - 1].stamp
+    }
+
+    /// Pairs of stamps with more than `seconds` and nothing in between. Schemes bridge gaps smoothly, but what they say there is a guess.
+    pub fn gaps(&self, seconds: f64) -> Vec<(Stamp, Stamp)> {
+        let stamps = self.frames.windows(2).map(|w| (w[0].stamp, w[1].stamp));
+        stamps.filter(|(before, after)| *after - *before > seconds).collect()
+    }
+}
+
+/// Seconds since the first frame.
+pub(crate) fn seconds(frames: &[SensorFrame]) -> Vec<f64> {
+    let stamps: Vec<_> = frames.iter().map(|frame| frame.stamp).collect();
+    relative_seconds(&stamps, stamps.first().copied().unwrap_or_default())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn frame(seconds: f64) -> SensorFrame {
+        SensorFrame::new(Stamp::from_seconds(seconds), Isometry3::identity())
+    }
+
+    #[test]
+    fn frames_are_checked_once() {
+        assert!(SensorTrajectory::new(vec![frame(0.0)]).is_err());
+        let backwards = SensorTrajectory::new(vec![frame(0.0), frame(0.2), frame(0.1)]).unwrap_err();
+        assert!(backwards.to_string().contains("sample 2"), "{backwards}");
+        let mut broken = vec![frame(0.0), frame(0.1)];
+        broken[1].world_from_sensor.translation.vector.y = f64::NAN;
+        assert!(SensorTrajectory::new(broken).unwrap_err().to_string().contains("sample 1: pose is not finite"));
+    }
+
+    #[test]
+    fn gaps_are_found() {
+        let trajectory = SensorTrajectory::new([0.0, 0.1, 0.9, 1.0].map(frame).to_vec()).unwrap();
+        assert_eq!(trajectory.gaps(0.2), [(Stamp::from_seconds(0.1), Stamp::from_seconds(0.9))]);
+    }
+}

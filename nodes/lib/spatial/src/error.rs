@@ -1,0 +1,72 @@
+//! What can go wrong.
+
+use thiserror::Error;
+
+/// Errors of this crate. `index` counts samples from zero.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum SpatialError {
+    /// Too few samples for the operation.
+    #[error("{got} samples given, at least {needed} needed")]
+    TooFewSamples {
+        /// Samples given.
+        got: usize,
+        /// Samples needed.
+        needed: usize,
+    },
+    /// A time equals the one before it or goes backwards.
+    #[error("sample {index}: time {next} s does not come after {previous} s; sort the samples and drop duplicates")]
+    TimeNotIncreasing {
+        /// Index of the later sample.
+        index: usize,
+        /// Time of the sample before it, s.
+        previous: f64,
+        /// Its own time, s.
+        next: f64,
+    },
+    /// A NaN or an infinity.
+    #[error("sample {index}: {what} is not finite")]
+    NotFinite {
+        /// Index of the sample.
+        index: usize,
+        /// What is not finite: "time", "value" …
+        what: &'static str,
+    },
+    /// Two series that belong together differ in length.
+    #[error("{what}: expected {expected} entries, found {found}")]
+    LengthMismatch {
+        /// Name of the second series.
+        what: &'static str,
+        /// Entries of the first series.
+        expected: usize,
+        /// Entries of the second.
+        found: usize,
+    },
+    /// A matrix that is not a rotation.
+    #[error(
+        "the matrix is not a rotation: |R^T R - I| = {orthogonality_error:.3e}, det R = {determinant:.6}; its columns must be orthonormal and right-handed"
+    )]
+    NotARotation {
+        /// Frobenius norm of `R^T R - I`.
+        orthogonality_error: f64,
+        /// Determinant.
+        determinant: f64,
+    },
+    /// A rate that is zero, negative or not finite.
+    #[error("a rate of {rate_hz} Hz; give a positive one")]
+    BadRate {
+        /// The rate given, Hz.
+        rate_hz: f64,
+    },
+    /// A smoothing weight that is negative or not finite.
+    #[error("a smoothing weight of {weight}; give zero or a positive number")]
+    BadWeight {
+        /// The weight given.
+        weight: f64,
+    },
+    /// The normal equations are numerically singular: the times are too unevenly spaced.
+    #[error("the spline's equations are singular at sample {index}: intervals of very different lengths; split the series at its gaps")]
+    Singular {
+        /// Row at which the factorisation broke down.
+        index: usize,
+    },
+}

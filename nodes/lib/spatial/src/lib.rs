@@ -1,0 +1,45 @@
+//! Time stamps, rotations, splines and resampling: the mathematics under every other crate.
+//!
+//! Transforms read right to left: `world_from_sensor = world_from_segment * segment_from_sensor`.
+//!
+//! - [`Stamp`]: time, in whole nanoseconds.
+//! - [`so3`]: exponential, logarithm, angular velocity from quaternion derivatives, sign-continuous quaternion series.
+//! - [`SmoothingSpline`]: quintic B-spline through or near samples of several channels, on any increasing times, in O(N).
+//! - [`PoseSpline`]: position and rotation splines together; gives velocity, acceleration, angular velocity and acceleration at any time.
+//! - [`derivative_weights`]: finite-difference stencils on any times; [`uniform_stamps`]: output grids.
+//!
+//! ```
+//! use cromosim_spatial::{Smoothing, SmoothingSpline};
+//!
+//! # fn main() -> Result<(), cromosim_spatial::SpatialError> {
+//! let seconds: Vec<f64> = (0..200).map(|k| 0.01 * f64::from(k)).collect();
+//! let samples: Vec<[f64; 1]> = seconds.iter().map(|t| [(3.0 * t).sin()]).collect();
+//! let spline = SmoothingSpline::fit(&seconds, &samples, Smoothing::Automatic)?;
+//! let [_value, _first, second] = spline.evaluate(0.777);
+//! assert!((second[0] + 9.0 * (3.0_f64 * 0.777).sin()).abs() < 1e-5);
+//! # Ok(())
+//! # }
+//! ```
+
+mod banded;
+mod basis;
+mod derivative_risk;
+mod difference;
+mod error;
+mod grid;
+mod pose_spline;
+mod select;
+pub mod so3;
+mod spline;
+mod stamp;
+mod system;
+
+pub use derivative_risk::Derivative;
+pub use difference::{MAX_STENCIL, derivative_weights};
+pub use error::SpatialError;
+pub use grid::{check_times, relative_seconds, uniform_stamps};
+pub use pose_spline::{Motion, PoseSmoothing, PoseSpline, PoseTimes, position_channels, rotation_channels};
+pub use select::WeightSearch;
+pub use spline::{Smoothing, SmoothingSpline};
+pub use stamp::Stamp;
+pub use system::SplineSystem;

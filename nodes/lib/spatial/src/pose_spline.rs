@@ -1,0 +1,134 @@
+//! Splines of position and rotation.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
+
+use crate::grid::relative_seconds;
+use crate::{Derivative, Smoothing, SmoothingSpline, SpatialError, SplineSystem, Stamp, so3};
+
+/// How a frame moves at one time, against the world and in its axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    /// world_from_body.
+    pub rotation: UnitQuaternion<f64>,
+    /// Origin, m.
+    pub position: Vector3<f64>,
+    /// m/s.
+    pub velocity: Vector3<f64>,
+    /// m/s2, zero at rest.
+    pub acceleration: Vector3<f64>,
+    /// rad/s.
+    pub angular_velocity: Vector3<f64>,
+    /// rad/s2.
+    pub angular_acceleration: Vector3<f64>,
+}
+
+/// Smoothing of the two halves of a [`PoseSpline`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseSmoothing {
+    /// Of the position.
+    pub position: Smoothing,
+    /// Of the rotation.
+    pub rotation: Smoothing,
+}
+
+impl Default for PoseSmoothing {
+    /// What the samples ask for, for the sake of acceleration and angular velocity.
+    fn default() -> Self {
+        Self { position: Smoothing::AutomaticFor(Derivative::Second), rotation: Smoothing::AutomaticFor(Derivative::First) }
+    }
+}
+
+/// The spline equations for a series of stamps; made once and shared by every series of poses on them.
+#[derive(Clone, Debug)]
+pub struct PoseTimes {
+    origin: Stamp,
+    system: Arc<SplineSystem>,
+}
+
+impl PoseTimes {
+    /// # Errors
+    /// Fewer than two stamps, or stamps that do not increase.
+    pub fn new(stamps: &[Stamp]) -> Result<Self, SpatialError> {
+        let origin = stamps.first().copied().unwrap_or_default();
+        let seconds = relative_seconds(stamps, origin);
+        Ok(Self { origin, system: Arc::new(SplineSystem::new(&seconds)?) })
+    }
+
+    /// The equations, with times in seconds since the first stamp.
+    pub fn system(&self) -> &Arc<SplineSystem> {
+        &self.system
+    }
+}
+
+/// Position (3 channels) and rotation (the 4 components of the sign-continuous quaternion, normalised afterwards) as smoothing quintic splines.
+/// With `s(t)` the quaternion spline: `R = s/|s|`, `w = 2 vec(s' s*) / |s|^2`, world axes.
+#[derive(Clone, Debug)]
+pub struct PoseSpline {
+    times: PoseTimes,
+    position: SmoothingSpline<3>,
+    rotation: SmoothingSpline<4>,
+}
+
+impl PoseSpline {
+    /// Fits world_from_body poses.
+    ///
+    /// # Errors
+    /// As [`SmoothingSpline::fit`].
+    pub fn fit(stamps: &[Stamp], world_from_body: &[Isometry3<f64>], smoothing: PoseSmoothing) -> Result<Self, SpatialError> {
+        Self::fit_on(&PoseTimes::new(stamps)?, world_from_body, smoothing)
+    }
+
+    /// As [`PoseSpline::fit`], on times whose equations are made already.
+    ///
+    /// # Errors
+    /// As [`SmoothingSpline::fit`].
+    pub fn fit_on(times: &PoseTimes, world_from_body: &[Isometry3<f64>], smoothing: PoseSmoothing) -> Result<Self, SpatialError> {
+        let positions = position_channels(world_from_body);
+        let rotations = rotation_channels(world_from_body);
+        let position = SmoothingSpline::fit_on(&times.system, &positions, smoothing.position)?;
+        let rotation = SmoothingSpline::fit_on(&times.system, &rotations, smoothing.rotation)?;
+        Ok(Self { times: times.clone(), position, rotation })
+    }
+
+    /// The motion at a stamp; stamps outside the samples are moved to the nearest end.
+    pub fn evaluate(&self, stamp: Stamp) -> Motion {
+        let (first, values) = self.times.system.basis_at(stamp - self.times.origin);
+        let [position, velocity, acceleration] = self.position.combine(first, &values).map(Vector3::from);
+        let [s, s_dot, s_ddot] = self.rotation.combine(first, &values).map(Quaternion::from);
+        Motion {
+            rotation: UnitQuaternion::new_normalize(s),
+            position,
+            velocity,
+            acceleration,
+            angular_velocity: so3::angular_velocity_in_world(&s, &s_dot),
+            angular_acceleration: so3::angular_acceleration_in_world(&s, &s_dot, &s_ddot),
+        }
+    }
+
+    /// The position's spline.
+    pub fn position(&self) -> &SmoothingSpline<3> {
+        &self.position
+    }
+
+    /// The quaternion's spline (channels i, j, k, w).
+    pub fn rotation(&self) -> &SmoothingSpline<4> {
+        &self.rotation
+    }
+}
+
+/// The three channels of a pose series' position, m.
+pub fn position_channels(world_from_body: &[Isometry3<f64>]) -> Vec<[f64; 3]> {
+    world_from_body.iter().map(|isometry| isometry.translation.vector.into()).collect()
+}
+
+/// The four channels (i, j, k, w) of a pose series' sign-continuous quaternion.
+pub fn rotation_channels(world_from_body: &[Isometry3<f64>]) -> Vec<[f64; 4]> {
+    let rotations: Vec<_> = world_from_body.iter().map(|isometry| isometry.rotation).collect();
+    so3::sign_continuous(&rotations).into_iter().map(|q| q.coords.into()).collect()
+}
+
+#[cfg(test)]
+#[path = "pose_spline_tests.rs"]
+mod tests;

@@ -1,0 +1,127 @@
+//! Smoothing quintic splines.
+
+use std::sync::Arc;
+
+use crate::SpatialError;
+use crate::basis::BasisValues;
+use crate::derivative_risk::Derivative;
+use crate::select::{LOWEST_LOG_WEIGHT, Scratch, centred};
+use crate::system::SplineSystem;
+
+/// How much a spline smooths.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Smoothing {
+    /// As much as the samples themselves ask for (REML, see [`crate::WeightSearch`]): exact samples are interpolated, jittered ones smoothed.
+    #[default]
+    Automatic,
+    /// The same, for the sake of a derivative: near the weight of the greatest likelihood that with the least error of this derivative, found
+    /// by comparing the halves of the samples.
+    AutomaticFor(Derivative),
+    /// Not at all: the spline passes through the samples (up to 1e-8 of the fifth derivative's penalty, which steadies gaps).
+    Interpolate,
+    /// A low-pass of zero phase whose response `1 / (1 + (f / cutoff)^10)` is one half at this frequency, Hz.
+    CutoffHz(f64),
+    /// The penalty's weight itself, for times counted in median sample intervals; no unit.
+    Weight(f64),
+}
+
+impl Smoothing {
+    /// The weight for samples on these times.
+    ///
+    /// # Errors
+    /// [`SpatialError::BadRate`] for a cutoff, [`SpatialError::BadWeight`] for a weight that is negative or not finite, zero cutoffs too.
+    pub fn weight<const C: usize>(self, system: &SplineSystem, values: &[[f64; C]]) -> Result<f64, SpatialError> {
+        let lowest = 10f64.powf(LOWEST_LOG_WEIGHT);
+        match self {
+            Self::Automatic => system.search(values, None),
+            Self::AutomaticFor(derivative) => system.search(values, Some(derivative)),
+            Self::Interpolate => Ok(lowest),
+            Self::CutoffHz(rate_hz) if !(rate_hz > 0.0 && rate_hz.is_finite()) => Err(SpatialError::BadRate { rate_hz }),
+            Self::CutoffHz(cutoff_hz) => Ok(system.weight_of_cutoff(cutoff_hz).max(lowest)),
+            Self::Weight(weight) if !(weight >= 0.0 && weight.is_finite()) => Err(SpatialError::BadWeight { weight }),
+            Self::Weight(weight) => Ok(weight.max(lowest)),
+        }
+    }
+}
+
+/// A quintic spline through or near samples of C channels, which share one smoothing weight (so that turning the axes turns the result).
+#[derive(Clone, Debug)]
+pub struct SmoothingSpline<const C: usize> {
+    system: Arc<SplineSystem>,
+    coefficients: Vec<[f64; C]>,
+    weight: f64,
+}
+
+impl<const C: usize> SmoothingSpline<C> {
+    /// Fits samples (N, C) at `seconds` (N), uneven and with gaps as they may be. O(N).
+    ///
+    /// # Errors
+    /// Times that do not increase, anything not finite, lengths that differ, fewer than two samples, a bad weight.
+    pub fn fit(seconds: &[f64], values: &[[f64; C]], smoothing: Smoothing) -> Result<Self, SpatialError> {
+        Self::fit_on(&Arc::new(SplineSystem::new(seconds)?), values, smoothing)
+    }
+
+    /// As [`SmoothingSpline::fit`], on times whose equations are made already.
+    ///
+    /// # Errors
+    /// As [`SmoothingSpline::fit`].
+    pub fn fit_on(system: &Arc<SplineSystem>, values: &[[f64; C]], smoothing: Smoothing) -> Result<Self, SpatialError> {
+        system.check(values)?;
+        let weight = smoothing.weight(system, values)?;
+        let mut scratch = Scratch::default();
+        let (first, centred) = centred(values);
+        system.solve(&centred, weight, &mut scratch)?;
+        // The basis functions sum to one, so a constant may go onto the coefficients.
+        for coefficient in &mut scratch.coefficients {
+            for c in 0..C {
+                coefficient[c] += first[c];
+            }
+        }
+        Ok(Self { system: system.clone(), coefficients: scratch.coefficients, weight })
+    }
+
+    /// Value, first and second derivative (per s, per s^2) at a time; times outside the samples are moved to the nearest end.
+    pub fn evaluate(&self, seconds: f64) -> [[f64; C]; 3] {
+        let (first, values) = self.system.basis_at(seconds);
+        self.combine(first, &values)
+    }
+
+    /// As [`SmoothingSpline::evaluate`], from what [`SplineSystem::basis_at`] gave.
+    pub(crate) fn combine(&self, first: usize, values: &BasisValues) -> [[f64; C]; 3] {
+        let mut result = [[0.0; C]; 3];
+        for (j, coefficient) in self.coefficients[first..first + values[0].len()].iter().enumerate() {
+            for (derivative, row) in result.iter_mut().zip(values) {
+                for c in 0..C {
+                    derivative[c] += row[j] * coefficient[c];
+                }
+            }
+        }
+        result
+    }
+
+    /// The penalty's weight, for times counted in median sample intervals.
+    pub fn weight(&self) -> f64 {
+        self.weight
+    }
+
+    /// Frequency at which the smoothing's response is one half, Hz.
+    pub fn cutoff_hz(&self) -> f64 {
+        self.system.cutoff_of_weight(self.weight)
+    }
+}
+
+impl SplineSystem {
+    /// First function and the basis' values and derivatives, per s and s^2, at a time moved into the range.
+    pub(crate) fn basis_at(&self, seconds: f64) -> (usize, BasisValues) {
+        let end = self.basis.interval(self.basis.interval_count() - 1).1;
+        let t = ((seconds - self.origin) / self.interval).clamp(0.0, end);
+        let first = self.basis.interval_of(t);
+        let [value, slope, second] = self.basis.values(first, t);
+        let per_second = 1.0 / self.interval;
+        (first, [value, slope.map(|s| s * per_second), second.map(|s| s * per_second * per_second)])
+    }
+}
+
+#[cfg(test)]
+#[path = "spline_tests.rs"]
+mod tests;
