@@ -1,0 +1,213 @@
+//! What every node's program does before it runs: help, parameters, checks.
+
+use std::time::{Duration, Instant};
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use crate::args::RosArgs;
+use crate::error::{RosError, RosResult};
+use crate::logging::init_logging;
+use crate::node::{Node, NodeOptions};
+use crate::parameter::Parameters;
+use crate::publisher::RawPublisher;
+use crate::shutdown::Shutdown;
+
+/// The parameters of a node as a struct; [`node_config!`](crate::node_config) makes one.
+pub trait NodeConfig: Default + Serialize + DeserializeOwned {
+    /// Name and description of every parameter, in the struct's order.
+    const ABOUT: &'static [(&'static str, &'static str)];
+}
+
+/// Defines the parameters of a node: `/// description` then `pub name: Type = default,` for each. The descriptions become the struct's
+/// documentation, the node's `--help` and what `ros2 param describe` says.
+#[macro_export]
+macro_rules! node_config {
+    ($(#[$meta:meta])* pub struct $name:ident { $( $(#[doc = $about:literal])+ pub $field:ident: $ty:ty = $default:expr, )* }) => {
+        $(#[$meta])*
+        #[derive(Clone, Debug, PartialEq, ::serde::Deserialize, ::serde::Serialize)]
+        #[serde(deny_unknown_fields, default)]
+        pub struct $name { $( $(#[doc = $about])+ pub $field: $ty, )* }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self { $( $field: $default, )* }
+            }
+        }
+
+        impl $crate::NodeConfig for $name {
+            const ABOUT: &'static [(&'static str, &'static str)] = &[ $( (stringify!($field), concat!($($about),+)), )* ];
+        }
+    };
+}
+
+/// A node that is about to start: its configuration is read and checked, DDS is not yet touched.
+pub struct Prepared<C> {
+    /// The configuration.
+    pub config: C,
+    options: NodeOptions,
+}
+
+impl<C> Prepared<C> {
+    /// Starts the node; SIGINT and SIGTERM end it.
+    ///
+    /// # Errors
+    /// As [`Node::start`].
+    pub fn start(self) -> RosResult<(Node, C)> {
+        let options = self.options.shutdown(&Shutdown::on_signals()?);
+        Ok((Node::start(options)?, self.config))
+    }
+}
+
+/// Reads a node's command line: `--help` prints what it takes, `--check-config` checks and prints the configuration; both give `None`.
+/// `check` finds what is wrong beyond types: files that are not there, values out of range.
+///
+/// # Errors
+/// One line that names the argument or the file, and what `check` says.
+pub fn prepare<C: NodeConfig, E: From<RosError>>(
+    name: &str,
+    about: &str,
+    arguments: &[String],
+    check: impl FnOnce(&C) -> Result<(), E>,
+) -> Result<Option<Prepared<C>>, E> {
+    let args = RosArgs::parse(arguments.iter().cloned())?;
+    let has = |flag: &str| args.rest.iter().any(|argument| argument == flag);
+    if has("--help") || has("-h") {
+        println!("{}", help::<C>(name, about));
+        return Ok(None);
+    }
+    let check_only = has("--check-config");
+    if let Some(unknown) = args.rest.iter().find(|argument| *argument != "--check-config") {
+        let problem = "not known here; parameters go after --ros-args as -p NAME:=VALUE (see --help)".to_owned();
+        return Err(RosError::Argument { place: unknown.clone(), problem }.into());
+    }
+    init_logging(&args.log_levels);
+    let parameters = Parameters::new();
+    parameters.declare_config(&C::default())?;
+    for (field, about) in C::ABOUT {
+        parameters.amend(plain(field), |parameter| parameter.about(about.trim()))?;
+    }
+    let options = NodeOptions::new(name, &args, &parameters)?;
+    let config: C = parameters.config()?;
+    check(&config)?;
+    if check_only {
+        println!("{}: the configuration is valid", options.name);
+        return Ok(None);
+    }
+    Ok(Some(Prepared { config, options }))
+}
+
+/// `r#loop` -> `loop`.
+fn plain(field: &str) -> &str {
+    field.trim_start_matches("r#")
+}
+
+fn help<C: NodeConfig>(name: &str, about: &str) -> String {
+    let defaults = serde_norway::to_value(C::default()).unwrap_or_default();
+    let shown = |field: &str| {
+        let value = defaults.get(field).map(|value| serde_norway::to_string(value).unwrap_or_default()).unwrap_or_default();
+        value.split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    let mut text = format!(
+        "{about}\n\nUsage: cromosim node {name} [--check-config] [--ros-args [-p NAME:=VALUE]... [--params-file FILE]... [-r FROM:=TO]... \
+         [--log-level LEVEL]]\n\nParameters [default]:\n"
+    );
+    for (field, about) in C::ABOUT {
+        let field = plain(field);
+        text += &format!("  {field} [{}]\n      {}\n", shown(field), about.trim());
+    }
+    text += "  use_sim_time [false]\n      Take the time from /clock.\n  qos_overrides./TOPIC.publisher.depth (or .subscription; depth, reliability, durability, history)\n      Quality of service of a topic.\n\n";
+    text += "Remaps: -r from:=to for topics, -r __node:=NAME, -r __ns:=/NAMESPACE\n";
+    text += "Environment: ROS_DOMAIN_ID; ROS_AUTOMATIC_DISCOVERY_RANGE (OFF, LOCALHOST, SUBNET, SYSTEM_DEFAULT; here LOCALHOST unless set); ROS_LOCALHOST_ONLY";
+    text
+}
+
+/// Prints the line `ready` on standard output once every publisher has `subscriptions` subscriptions, or the node ends; whoever started the
+/// process may wait for it. Does not block.
+pub fn announce_ready(node: &Node, publishers: &[&RawPublisher], subscriptions: i64) {
+    let subscriptions = usize::try_from(subscriptions).unwrap_or(0);
+    let publishers: Vec<_> = publishers.iter().map(|publisher| publisher.gid()).collect();
+    let watched = node.clone();
+    let wait = move || {
+        let connected = || publishers.iter().all(|&gid| watched.matched(gid) >= subscriptions);
+        while !watched.shutdown().is_requested() {
+            if connected() || watched.wait_for_graph(Duration::from_secs(3600), connected) {
+                println!("ready");
+                return;
+            }
+        }
+    };
+    if let Err(error) = std::thread::Builder::new().name("ready".into()).spawn(wait) {
+        log::error!("cannot watch the connections: {error}");
+    }
+}
+
+/// What is done again and again at a rate, in a loop that waits for messages.
+#[derive(Debug)]
+pub struct Periodic {
+    interval: Option<Duration>,
+    next: Instant,
+}
+
+impl Periodic {
+    /// Due at once, and then `rate_hz` times a second; never for a rate of 0.
+    pub fn new(rate_hz: f64) -> Self {
+        let interval = (rate_hz > 0.0).then(|| Duration::from_secs_f64(1.0 / rate_hz));
+        Self { interval, next: Instant::now() }
+    }
+
+    /// How long until it is due; `None`: never.
+    pub fn left(&self) -> Option<Duration> {
+        self.interval.map(|_| self.next.saturating_duration_since(Instant::now()))
+    }
+
+    /// True once in every interval. What was missed is not made up for.
+    pub fn is_due(&mut self) -> bool {
+        let (Some(interval), now) = (self.interval, Instant::now()) else { return false };
+        let due = now >= self.next;
+        if due {
+            self.next = (self.next + interval).max(now);
+        }
+        due
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    crate::node_config! {
+        /// For the tests.
+        pub struct Config {
+            /// How often, Hz.
+            pub rate_hz: f64 = 100.0,
+            /// Begin again
+            /// at the end.
+            pub r#loop: bool = false,
+        }
+    }
+
+    fn prepared(arguments: &[&str]) -> Result<Option<Prepared<Config>>, RosError> {
+        let arguments: Vec<String> = arguments.iter().map(|&text| text.to_owned()).collect();
+        prepare("test", "A node for tests", &arguments, |_| Ok(()))
+    }
+
+    #[test]
+    fn parameters_reach_the_config_and_unknown_ones_are_refused() {
+        let config = prepared(&["--ros-args", "-p", "rate_hz:=50.0", "-p", "loop:=true"]).unwrap().unwrap().config;
+        assert_eq!(config, Config { rate_hz: 50.0, r#loop: true });
+        assert!(prepared(&["--check-config"]).unwrap().is_none());
+        for (arguments, expected) in [(vec!["--rate", "5"], "--rate"), (vec!["--ros-args", "-p", "rate:=5.0"], "did you mean 'rate_hz'?")] {
+            let text = prepared(&arguments).err().unwrap().to_string();
+            assert!(text.contains(expected), "{text}");
+        }
+    }
+
+    #[test]
+    fn help_shows_every_parameter_with_its_default() {
+        let text = help::<Config>("test", "A node for tests");
+        assert!(text.contains("rate_hz [100.0]\n      How often, Hz.\n"), "{text}");
+        assert!(text.contains("loop [false]\n      Begin again at the end.\n"), "{text}");
+    }
+}

@@ -1,0 +1,65 @@
+//! ROS 2 nodes over DDS, without ROS: names and remaps, parameters, topics, services, time and the graph.
+//!
+//! The one crate that names ros2-client and RustDDS. Underneath, RustDDS carries bytes; every typed publisher, subscription and service
+//! encodes and decodes around them, so that a recorder of unknown types and a node of known ones are the same thing.
+//!
+//! ```no_run
+//! use cromosim_msgs::sensor_msgs::Imu;
+//! use cromosim_ros::{Node, NodeOptions, Parameter, Parameters, Qos, RosArgs, Shutdown, init_logging};
+//!
+//! # fn main() -> Result<(), cromosim_ros::RosError> {
+//! let args = RosArgs::from_env()?;
+//! init_logging(&args.log_levels);
+//! let parameters = Parameters::new();
+//! parameters.declare(Parameter::new("rate_hz", 100.0).about("Output rate, Hz.").range(1.0, 1000.0).read_only())?;
+//! let options = NodeOptions::new("doubler", &args, &parameters)?.shutdown(&Shutdown::on_signals()?);
+//! let node = Node::start(options)?;
+//! let publisher = node.publisher::<Imu>("imu/out", Qos::reliable())?;
+//! let subscription = node.subscription::<Imu>("imu/in", Qos::reliable())?;
+//! while let Some(received) = subscription.recv()? {
+//!     publisher.publish(&received.message)?;
+//! }
+//! # Ok(())
+//! # }
+//! ```
+
+mod args;
+mod clock;
+mod command;
+mod core;
+mod discovery;
+mod error;
+mod graph;
+mod logging;
+mod names;
+mod node;
+mod parameter;
+mod publisher;
+mod qos;
+mod raw;
+mod reader;
+mod service;
+mod shutdown;
+mod spin;
+mod subscription;
+#[cfg(feature = "testing")]
+pub mod testing;
+mod wake;
+
+pub use args::RosArgs;
+pub use clock::Clock;
+pub use command::{NodeConfig, Periodic, Prepared, announce_ready, prepare};
+pub use discovery::{DiscoveryRange, Network};
+pub use error::{RosError, RosResult};
+pub use graph::{Endpoint, TopicInfo};
+pub use logging::{LogLevels, init_logging};
+pub use names::{NodeName, dds_type_name, ros_type_name};
+pub use node::{ClockPublisher, Node, NodeOptions};
+pub use parameter::{Parameter, ParameterScalar, ParameterValue, Parameters};
+pub use publisher::{Publisher, RawPublisher};
+pub use qos::{Durability, History, Qos, Reliability};
+pub use raw::{Gid, RawMessage, Received};
+pub use service::{ServiceClient, ServiceServer};
+pub use shutdown::Shutdown;
+pub use subscription::{Listening, RawSubscription, Subscription};
+pub use wake::Bell;
