@@ -23,7 +23,8 @@ fn refuses(folder: &Path, arguments: &[&str], expected: &[&str]) {
 }
 
 fn listing(folder: &Path) -> Vec<String> {
-    let mut names: Vec<String> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect();
+    let mut names: Vec<String> =
+        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect();
     names.sort();
     names
 }
@@ -63,7 +64,11 @@ fn placements_and_settings() {
     let file = |fields: &str| format!("schema: cromosim/placements/1\nplacements:\n  wrist: {{{fields}}}\n");
     let cases = [
         ("site.yaml", file("site: left_toe_ring, rate_hz: 100"), vec!["left_toe_ring", "wrist"]),
-        ("mount.yaml", file("site: left_watch, rate_hz: 100, mount: {matrix: [[1, 0, 0], [0, 1, 0], [0, 0, 2]]}"), vec!["mount.yaml", "wrist", "mount"]),
+        (
+            "mount.yaml",
+            file("site: left_watch, rate_hz: 100, mount: {matrix: [[1, 0, 0], [0, 1, 0], [0, 0, 2]]}"),
+            vec!["mount.yaml", "wrist", "mount"],
+        ),
         ("rate.yaml", file("site: left_watch, rate_hz: -5"), vec!["rate.yaml", "wrist", "rate_hz"]),
         ("unknown.yaml", file("site: left_watch, rate_hz: 100, colour: red"), vec!["unknown.yaml", "wrist", "colour"]),
         ("yaml.yaml", "placements: [".to_owned(), vec!["yaml.yaml"]),
@@ -93,7 +98,11 @@ fn parameters_of_nodes() {
     refuses(folder.path(), &node("smpl_state", "smoothing_cutoff_hz:=fast"), &["smoothing_cutoff_hz", "number"]);
     refuses(folder.path(), &["node", "smpl_state", "--check-config", "--ros-args", "--params-file", "missing.yaml"], &["missing.yaml"]);
     fs::write(folder.path().join("p.yaml"), "smpl_state:\n  ros__parameters:\n    prefix: alice\n    hight: 3\n").unwrap();
-    refuses(folder.path(), &["node", "smpl_state", "--check-config", "--ros-args", "--params-file", "p.yaml"], &["p.yaml", "line 4", "hight"]);
+    refuses(
+        folder.path(),
+        &["node", "smpl_state", "--check-config", "--ros-args", "--params-file", "p.yaml"],
+        &["p.yaml", "line 4", "hight"],
+    );
     refuses(folder.path(), &["node", "nobody"], &["nobody", "replay"]);
     refuses(folder.path(), &["node", "replay", "--speed", "3"], &["--speed", "--help"]);
 }

@@ -163,7 +163,8 @@ mod tests {
 
     #[test]
     fn a_body_survives_the_way_there_and_back_and_nonsense_is_refused() {
-        let rotations = std::array::from_fn(|joint| UnitQuaternion::from_scaled_axis(nalgebra::Vector3::new(0.1 * joint as f64, 0.2, -0.3)));
+        let rotations =
+            std::array::from_fn(|joint| UnitQuaternion::from_scaled_axis(nalgebra::Vector3::new(0.1 * joint as f64, 0.2, -0.3)));
         let mut state = SmplState::default();
         state.set_root_and_rotations(nalgebra::Vector3::new(1.0, 2.0, 3.0), &rotations);
         let (root, back) = state.root_and_rotations().unwrap();

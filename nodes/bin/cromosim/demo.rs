@@ -27,7 +27,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     motion: Option<PathBuf>,
     /// Stop after so many seconds of the motion
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     duration: Option<f64>,
     /// Sensor placements (YAML) rather than left_wrist, right_ankle, pelvis, sternum and head
     #[arg(long, value_name = "FILE")]
@@ -63,7 +63,12 @@ impl NodeProcess {
         for (key, value) in parameters {
             command.arg("-p").arg(format!("{key}:={value}"));
         }
-        let mut child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(file).spawn().with_context(|| format!("{name} cannot be started"))?;
+        let mut child = command
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(file)
+            .spawn()
+            .with_context(|| format!("{name} cannot be started"))?;
         let (sender, ready) = mpsc::channel();
         if let Some(out) = child.stdout.take() {
             // Reads to the end, so that the node never blocks on a full pipe.
@@ -219,11 +224,8 @@ impl Arguments {
     fn listeners(&self, places: &Places) -> anyhow::Result<Vec<NodeProcess>> {
         let viewers = i64::from(!self.no_viewer);
         let path = |path: &Path| -> anyhow::Result<String> { Ok(quoted(&std::path::absolute(path)?.display().to_string())) };
-        let mut nodes = vec![NodeProcess::start(
-            "recorder",
-            &[("bag_path", path(&places.bag)?), ("seed", self.seed.to_string())],
-            &places.logs,
-        )?];
+        let mut nodes =
+            vec![NodeProcess::start("recorder", &[("bag_path", path(&places.bag)?), ("seed", self.seed.to_string())], &places.logs)?];
         if !self.no_viewer {
             nodes.push(NodeProcess::start("viewer", &[("recording", path(&places.recording)?)], &places.logs)?);
         }

@@ -31,7 +31,9 @@ fn inspect(path: &Path) -> anyhow::Result<()> {
         return inspect_bag(path);
     }
     let mut head = Vec::new();
-    File::open(path).and_then(|file| file.take(16).read_to_end(&mut head)).with_context(|| format!("{}: cannot be read", path.display()))?;
+    File::open(path)
+        .and_then(|file| file.take(16).read_to_end(&mut head))
+        .with_context(|| format!("{}: cannot be read", path.display()))?;
     match head.as_slice() {
         [0x89, b'M', b'C', b'A', b'P', ..] => inspect_bag(path),
         [b'P', b'K', ..] => inspect_body(path),

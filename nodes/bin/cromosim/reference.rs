@@ -6,7 +6,9 @@ use std::path::Path;
 use anyhow::bail;
 use cromosim_bag::{BagOptions, BagReader, BagWriter, Compression};
 use cromosim_body::{BodyModel, BodyPose, ShapedBody};
-use cromosim_imu::{Covariances, Device, ImuSample, MountedSites, NoiseSource, PlacementSet, Scheme, SensorFrame, SensorTrajectory, simulate};
+use cromosim_imu::{
+    Covariances, Device, ImuSample, MountedSites, NoiseSource, PlacementSet, Scheme, SensorFrame, SensorTrajectory, simulate,
+};
 use cromosim_msgs::RosMessage;
 use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_msgs::geometry_msgs::PoseStamped;
@@ -43,7 +45,10 @@ pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
     bar.finish_and_clear();
     let simulated = results.into_iter().collect::<anyhow::Result<Vec<_>>>()?;
 
-    let mut bag = BagWriter::create(&arguments.out, BagOptions { compression: Compression::Zstd, replace: arguments.force, ..BagOptions::default() })?;
+    let mut bag = BagWriter::create(
+        &arguments.out,
+        BagOptions { compression: Compression::Zstd, replace: arguments.force, ..BagOptions::default() },
+    )?;
     bag.write_metadata("cromosim", metadata(recording, scheme, arguments))?;
     let mut order: Vec<(i64, usize, usize)> = Vec::new();
     for (number, messages) in simulated.iter().enumerate() {
@@ -55,7 +60,13 @@ pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
         bag.write(&topics[number], Stamp::from_nanos(nanos), &simulated[number][index])?;
     }
     let summary = bag.finish()?;
-    println!("{}: {} messages of {} placements, from the reference in {}", arguments.out.display(), summary.message_count(), recorded.len(), recording.display());
+    println!(
+        "{}: {} messages of {} placements, from the reference in {}",
+        arguments.out.display(),
+        summary.message_count(),
+        recorded.len(),
+        recording.display()
+    );
     for placement in &recorded {
         if let Some(line) = outside(placement) {
             println!("  {}: {line}", placement.name);
@@ -104,7 +115,10 @@ fn from_reference(reader: &BagReader, name: &str) -> anyhow::Result<SensorTrajec
     let mut frames = Vec::new();
     for (_, message) in reader.read::<PoseStamped>(&topic)? {
         let stamp = Stamp::from_nanos(message.header.stamp.nanos());
-        let world_from_sensor = message.pose.try_into().map_err(|error| anyhow::anyhow!("{}, {topic} at {:.6} s: {error}", reader.path().display(), stamp.as_seconds()))?;
+        let world_from_sensor = message
+            .pose
+            .try_into()
+            .map_err(|error| anyhow::anyhow!("{}, {topic} at {:.6} s: {error}", reader.path().display(), stamp.as_seconds()))?;
         frames.push(SensorFrame::new(stamp, world_from_sensor));
     }
     frames.sort_by_key(|frame| frame.stamp);
@@ -115,7 +129,9 @@ fn from_reference(reader: &BagReader, name: &str) -> anyhow::Result<SensorTrajec
 fn from_states(reader: &BagReader) -> anyhow::Result<Vec<(String, SensorTrajectory)>> {
     let path = reader.path().display();
     let Some(placements) = reader.attachment("placements.yaml") else {
-        bail!("{path}: the recording holds neither /reference/NAME (geometry_msgs/msg/PoseStamped) nor an attachment placements.yaml beside SMPL states; there is no reference to simulate from");
+        bail!(
+            "{path}: the recording holds neither /reference/NAME (geometry_msgs/msg/PoseStamped) nor an attachment placements.yaml beside SMPL states; there is no reference to simulate from"
+        );
     };
     let placements = PlacementSet::parse(&String::from_utf8_lossy(placements), &format!("{path}, attachment placements.yaml"))?;
     let mut states = reader.read::<SmplState>("/smpl/state")?;
@@ -124,7 +140,8 @@ fn from_states(reader: &BagReader) -> anyhow::Result<Vec<(String, SensorTrajecto
     let shaped = ShapedBody::new(BodyModel::embedded(), &last.betas)?;
     let sites = MountedSites::new(&shaped, placements.placements())?;
     let stamps: Vec<Stamp> = states.iter().map(|(_, state)| Stamp::from_nanos(state.header.stamp.nanos())).collect();
-    let pose = |state: &SmplState| state.root_and_rotations().map(|(root_position, local_rotations)| BodyPose { root_position, local_rotations });
+    let pose =
+        |state: &SmplState| state.root_and_rotations().map(|(root_position, local_rotations)| BodyPose { root_position, local_rotations });
     let poses = states.iter().map(|(_, state)| pose(state)).collect::<Result<Vec<_>, _>>()?;
     let trajectories = sites.trajectories(&stamps, &poses)?;
     Ok(placements.placements().iter().map(|placement| placement.name().to_owned()).zip(trajectories).collect())
@@ -135,7 +152,9 @@ fn resimulate(placement: &Recorded, scheme: Scheme, arguments: &Arguments) -> an
     let trajectory = &placement.trajectory;
     let stamps = match (placement.measured.as_slice(), arguments.rate) {
         ([], Some(rate_hz)) => uniform_stamps(trajectory.start(), trajectory.end(), rate_hz)?,
-        ([], None) => bail!("{}: the recording has no /imu/{}/data_raw to take the stamps from; give --rate HZ", placement.name, placement.name),
+        ([], None) => {
+            bail!("{}: the recording has no /imu/{}/data_raw to take the stamps from; give --rate HZ", placement.name, placement.name)
+        }
         (measured, _) => measured.iter().map(|message| Stamp::from_nanos(message.header.stamp.nanos())).collect(),
     };
     let device = declared(&placement.measured, &stamps)?;

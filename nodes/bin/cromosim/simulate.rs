@@ -10,13 +10,13 @@ use anyhow::{Context, bail};
 use clap::Args;
 use cromosim_bag::{BagOptions, BagWriter, Compression, write_imu_csv};
 use cromosim_body::{BodyModel, ShapedBody};
-use cromosim_imu::{Covariances, Device, MountedSites, NoiseSource, PlacementSet, Scheme, SensorTrajectory, simulate_kinematics};
+use cromosim_imu::{Covariances, Device, MountedSites, NoiseSource, PlacementSet, Scheme, SensorTrajectory, simulate_kinematics_on};
 use cromosim_motion::{MotionOptions, SmplMotion, UpAxis, embedded_walk, read_motion};
 use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_msgs::std_msgs::Header;
-use cromosim_spatial::{Stamp, uniform_stamps};
+use cromosim_spatial::{PoseTimes, Stamp, uniform_stamps};
 use cromosim_virtual_imu::imu_message;
 use rayon::prelude::*;
 
@@ -31,7 +31,7 @@ pub struct Arguments {
     /// Motion files (BVH); none: the embedded walk
     motions: Vec<PathBuf>,
     /// Re-simulate the IMUs of this recording from its reference motion instead
-    #[arg(long, value_name = "RECORDING", conflicts_with_all = ["motions", "placements", "body", "csv", "up_axis", "unit"])]
+    #[arg(long, value_name = "RECORDING", conflicts_with_all = ["motions", "placements", "body", "csv", "up_axis", "unit", "start", "duration"])]
     pub reference: Option<PathBuf>,
     /// The bag to write (.mcap, or a rosbag2 directory); with several motions a directory for one .mcap each
     #[arg(long, value_name = "OUT")]
@@ -43,7 +43,7 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME")]
     pub scheme: Option<String>,
     /// Messages per second rather than the placements' own rate, Hz
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub rate: Option<f64>,
     /// Body model as npz rather than the embedded one
     #[arg(long, value_name = "FILE")]
@@ -61,8 +61,14 @@ pub struct Arguments {
     #[arg(long, default_value = "auto")]
     up_axis: String,
     /// Metres of one unit of the motion files; default: found out from the skeleton's size
-    #[arg(long, value_name = "METRES")]
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
     unit: Option<f64>,
+    /// Begin so many seconds after the motion's beginning
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, allow_negative_numbers = true)]
+    start: f64,
+    /// Take so many seconds of the motion; default: to its end
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    duration: Option<f64>,
     /// Replace OUT where it exists
     #[arg(long)]
     pub force: bool,
@@ -156,7 +162,8 @@ impl Setup {
             placement.with_rate_hz(rate_hz).with_scheme(scheme)
         });
         let folder = file.and_then(Path::parent).unwrap_or(Path::new("."));
-        let devices = placements.placements().iter().map(|placement| Device::resolve(placement.device(), folder)).collect::<Result<_, _>>()?;
+        let devices =
+            placements.placements().iter().map(|placement| Device::resolve(placement.device(), folder)).collect::<Result<_, _>>()?;
         let up_axis = match arguments.up_axis.as_str() {
             "auto" => UpAxis::Detect,
             "x" => UpAxis::X,
@@ -168,7 +175,13 @@ impl Setup {
             model: body::model(arguments.body.as_ref())?,
             placements,
             devices,
-            motion: MotionOptions { up_axis, unit_scale_m: arguments.unit, ..MotionOptions::default() },
+            motion: MotionOptions {
+                up_axis,
+                unit_scale_m: arguments.unit,
+                start_s: arguments.start,
+                duration_s: arguments.duration,
+                ..MotionOptions::default()
+            },
             seed: arguments.seed,
             noise: !arguments.no_noise,
             force: arguments.force,
@@ -179,7 +192,7 @@ impl Setup {
     fn read(&self, path: Option<&PathBuf>) -> anyhow::Result<SmplMotion> {
         Ok(match path {
             Some(path) => read_motion(path, &self.motion)?,
-            None => embedded_walk(),
+            None => embedded_walk().slice(self.motion.start_s, self.motion.duration_s)?,
         })
     }
 
@@ -188,11 +201,12 @@ impl Setup {
         let shaped = ShapedBody::new(self.model.clone(), &motion.betas)?;
         let sites = MountedSites::new(&shaped, self.placements.placements())?;
         let trajectories = sites.trajectories(stamps, &motion.frames)?;
-        let one = |(index, trajectory): (usize, &SensorTrajectory)| self.simulate_placement(index, trajectory);
+        let times = PoseTimes::new(stamps)?;
+        let one = |(index, trajectory): (usize, &SensorTrajectory)| self.simulate_placement(index, trajectory, &times);
         trajectories.par_iter().enumerate().map(one).collect()
     }
 
-    fn simulate_placement(&self, index: usize, trajectory: &SensorTrajectory) -> anyhow::Result<Simulated> {
+    fn simulate_placement(&self, index: usize, trajectory: &SensorTrajectory, times: &PoseTimes) -> anyhow::Result<Simulated> {
         let (placement, device) = (&self.placements.placements()[index], &self.devices[index]);
         let (name, rate_hz) = (placement.name(), placement.rate_hz());
         let output = uniform_stamps(trajectory.start(), trajectory.end(), rate_hz)?;
@@ -200,16 +214,16 @@ impl Setup {
         let covariances = Covariances::of(device, rate_hz);
         let frame_id = format!("{name}_imu");
         let (mut raw, mut full) = (Vec::with_capacity(output.len()), Vec::with_capacity(output.len()));
-        for kinematic in simulate_kinematics(trajectory, placement.scheme(), &output)? {
+        for kinematic in simulate_kinematics_on(times, trajectory, placement.scheme(), &output)? {
             let ideal = kinematic.imu();
             let sample = if self.noise { noise.apply(&ideal) } else { noise.apply_without_noise(&ideal) };
             raw.push(imu_message(&sample, &frame_id, &covariances.without_orientation(), false));
             full.push(imu_message(&sample, &frame_id, &covariances, true));
         }
-        let reference = trajectory.frames().iter().map(|frame| PoseStamped {
-            header: Header::new(frame.stamp.nanos, "world"),
-            pose: frame.world_from_sensor.into(),
-        });
+        let reference = trajectory
+            .frames()
+            .iter()
+            .map(|frame| PoseStamped { header: Header::new(frame.stamp.nanos, "world"), pose: frame.world_from_sensor.into() });
         Ok(Simulated { name: name.to_owned(), reference: reference.collect(), raw, full })
     }
 
@@ -219,7 +233,10 @@ impl Setup {
         BTreeMap::from([
             entry("version", env!("CARGO_PKG_VERSION").to_owned()),
             entry("command", "simulate".to_owned()),
-            entry("motion", Path::new(&motion.name).file_name().map_or_else(|| motion.name.clone(), |name| name.to_string_lossy().into_owned())),
+            entry(
+                "motion",
+                Path::new(&motion.name).file_name().map_or_else(|| motion.name.clone(), |name| name.to_string_lossy().into_owned()),
+            ),
             entry("body", self.model.id().to_owned()),
             entry("seed", self.seed.to_string()),
             entry("noise", self.noise.to_string()),
@@ -255,7 +272,8 @@ fn write_in_order_of_time(bag: &mut BagWriter, motion: &SmplMotion, stamps: &[St
     for (number, placement) in simulated.iter().enumerate() {
         let references = placement.reference.iter().enumerate();
         schedule.extend(references.map(|(index, message)| (message.header.stamp.nanos(), What::Reference(number), index)));
-        schedule.extend(placement.raw.iter().enumerate().map(|(index, message)| (message.header.stamp.nanos(), What::Samples(number), index)));
+        schedule
+            .extend(placement.raw.iter().enumerate().map(|(index, message)| (message.header.stamp.nanos(), What::Samples(number), index)));
     }
     schedule.sort_by_key(|(nanos, ..)| *nanos);
     let topics = |ending: &str| simulated.iter().map(|placement| format!("/imu/{}/{ending}", placement.name)).collect::<Vec<_>>();

@@ -23,11 +23,13 @@ const ABOUT: &str = "recorder: any topic of any type into a rosbag2 bag (MCAP)";
 pub fn run(arguments: &[String]) -> anyhow::Result<()> {
     let Some(prepared) = prepare("recorder", ABOUT, arguments, check)? else { return Ok(()) };
     let config = prepared.config.clone();
-    let path = if config.bag_path.is_empty() { PathBuf::from(node::default_name(Clock::system_now())) } else { PathBuf::from(&config.bag_path) };
+    let path =
+        if config.bag_path.is_empty() { PathBuf::from(node::default_name(Clock::system_now())) } else { PathBuf::from(&config.bag_path) };
     let mut logic = RecorderNode::new(config.clone(), &path)?;
     let (node, _) = prepared.start()?;
     log::info!("records into {}", path.display());
-    let mut recording = Recording { bell: Bell::new(), subscriptions: BTreeMap::new(), node: &node, depth: u32::try_from(config.depth).unwrap_or(1000) };
+    let mut recording =
+        Recording { bell: Bell::new(), subscriptions: BTreeMap::new(), node: &node, depth: u32::try_from(config.depth).unwrap_or(1000) };
     node.ring_at_graph_change(&recording.bell);
     node.shutdown().ring_at_request(&recording.bell);
     println!("ready");
@@ -36,7 +38,13 @@ pub fn run(arguments: &[String]) -> anyhow::Result<()> {
     let finished = logic.finish();
     outcome?;
     let summary = finished?;
-    log::info!("{}: {} messages on {} topics in {:.2} s", path.display(), summary.message_count(), summary.topics.len(), summary.duration());
+    log::info!(
+        "{}: {} messages on {} topics in {:.2} s",
+        path.display(),
+        summary.message_count(),
+        summary.topics.len(),
+        summary.duration()
+    );
     Ok(())
 }
 
@@ -84,7 +92,8 @@ impl Recording<'_> {
             if self.subscriptions.contains_key(topic) || !logic.wants(topic) || publisher.node.as_ref() == Some(self.node.name()) {
                 continue;
             }
-            let all: Vec<&Endpoint> = publishers.iter().filter(|other| other.topic == *topic && other.type_name == publisher.type_name).collect();
+            let all: Vec<&Endpoint> =
+                publishers.iter().filter(|other| other.topic == *topic && other.type_name == publisher.type_name).collect();
             // What the weakest publisher offers is what all of them can give.
             let mut qos = publisher.qos.matching_subscription(self.depth);
             for other in &all {

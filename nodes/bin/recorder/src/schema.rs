@@ -12,7 +12,8 @@ pub fn describe(name: &str, type_name: &str) -> Topic {
     if known_type(type_name).is_some() {
         return Topic::named(name, type_name);
     }
-    let prefixes: Vec<PathBuf> = std::env::var_os("AMENT_PREFIX_PATH").map(|paths| std::env::split_paths(&paths).collect()).unwrap_or_default();
+    let prefixes: Vec<PathBuf> =
+        std::env::var_os("AMENT_PREFIX_PATH").map(|paths| std::env::split_paths(&paths).collect()).unwrap_or_default();
     let text = installed(type_name, &prefixes);
     if text.is_none() {
         log::warn!("{name}: no definition of {type_name} is known (AMENT_PREFIX_PATH has none either); it is recorded without one");

@@ -20,9 +20,9 @@ use outlet::Outlet;
 use services::Remote;
 
 const ABOUT: &str = "replay: plays a motion file as smpl/pose, or a bag with everything in it";
-/// Silence between two rounds of a loop: longer than any gap that a node bridges.
 /// From ready to the first message, ns.
 const LEAD: i64 = 20_000_000;
+/// Silence between two rounds of a loop, ns: longer than any gap that a node bridges.
 const PAUSE_BETWEEN_ROUNDS: i64 = 1_000_000_000;
 
 /// Runs the node with these arguments until the end of what it plays, or until it is interrupted.

@@ -27,7 +27,11 @@ impl Player {
 
     /// Recorded time at `wall`.
     pub fn recorded_at(&self, wall: i64) -> i64 {
-        if self.paused { self.anchor_recorded } else { self.anchor_recorded + ((wall - self.anchor_wall) as f64 * self.rate).round() as i64 }
+        if self.paused {
+            self.anchor_recorded
+        } else {
+            self.anchor_recorded + ((wall - self.anchor_wall) as f64 * self.rate).round() as i64
+        }
     }
 
     /// When `recorded` is due; never while paused.

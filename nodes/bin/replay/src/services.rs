@@ -86,7 +86,11 @@ impl Remote {
             node.serve::<srv::Resume>("~/resume", move |_| resume.change(|shared, now| (shared.player.resume(now), Default::default()).1))?,
             node.serve::<srv::TogglePaused>("~/toggle_paused", move |_| {
                 toggle.change(|shared, now| {
-                    if shared.player.paused() { shared.player.resume(now) } else { shared.player.pause(now) }
+                    if shared.player.paused() {
+                        shared.player.resume(now)
+                    } else {
+                        shared.player.pause(now)
+                    }
                     Default::default()
                 })
             })?,

@@ -120,7 +120,12 @@ impl Source {
         let reader: &'static BagReader = Box::leak(Box::new(BagReader::open(Path::new(&config.bag))?));
         let Some((first, last)) = reader.summary().time_range else { anyhow::bail!("{}: the bag holds no messages", config.bag) };
         let from = first.plus_seconds(config.start_seconds);
-        anyhow::ensure!(from <= last, "parameter 'start_seconds': {} s lies beyond the bag's end at {:.3} s", config.start_seconds, last - first);
+        anyhow::ensure!(
+            from <= last,
+            "parameter 'start_seconds': {} s lies beyond the bag's end at {:.3} s",
+            config.start_seconds,
+            last - first
+        );
         let until = (config.duration_seconds > 0.0).then(|| from.plus_seconds(config.duration_seconds));
         let topics = (!config.topics.is_empty()).then(|| config.topics.clone());
         let selection = Selection { topics, from: Some(from), until };
@@ -189,7 +194,13 @@ impl Source {
             Self::Motion { motion, .. } => motion.describe(),
             Self::Bag { reader, .. } => {
                 let summary = reader.summary();
-                format!("{}: {} topics, {} messages, {:.2} s", reader.path().display(), summary.topics.len(), summary.message_count(), summary.duration())
+                format!(
+                    "{}: {} topics, {} messages, {:.2} s",
+                    reader.path().display(),
+                    summary.topics.len(),
+                    summary.message_count(),
+                    summary.duration()
+                )
             }
         }
     }

@@ -3,13 +3,13 @@
 use std::sync::Arc;
 
 use cromosim_body::{BodyError, BodyModel, BodyPose, Joint, ShapedBody};
+use cromosim_msgs::NotABody;
 use cromosim_msgs::builtin_interfaces::Time;
 use cromosim_msgs::cromosim_msgs::{SmplPose, SmplState};
 use cromosim_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use cromosim_msgs::geometry_msgs::TransformStamped;
 use cromosim_msgs::std_msgs::Header;
 use cromosim_msgs::tf2_msgs::TFMessage;
-use cromosim_msgs::NotABody;
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use crate::config::Config;
@@ -65,8 +65,10 @@ pub fn pelvis_from_base_link() -> UnitQuaternion<f64> {
 impl SmplStateNode {
     /// A node for bodies of this model.
     pub fn new(config: Config, model: Arc<BodyModel>) -> Result<Self, BodyError> {
-        let world_from_source =
-            Isometry3::from_parts(Translation3::from(Vector3::from(config.source_position)), UnitQuaternion::from_scaled_axis(Vector3::from(config.source_rotvec)));
+        let world_from_source = Isometry3::from_parts(
+            Translation3::from(Vector3::from(config.source_position)),
+            UnitQuaternion::from_scaled_axis(Vector3::from(config.source_rotvec)),
+        );
         let shaped = ShapedBody::new(model.clone(), &[])?;
         let smoother = Smoother::new(config.smoothing_cutoff_hz);
         Ok(Self { config, model, world_from_source, shape: ShapeAverage::default(), shaped, smoother, counts: Counts::default() })

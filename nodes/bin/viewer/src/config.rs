@@ -13,6 +13,8 @@ node_config! {
         pub body: String = String::new(),
         /// Pictures of the body per second, Hz.
         pub mesh_rate_hz: f64 = 25.0,
+        /// Seconds of curves shown up to the present, where it is live; a file shows all of them.
+        pub curve_window_seconds: f64 = 10.0,
         /// Draw the skeleton too.
         pub skeleton: bool = false,
         /// Put before every frame but the world's, with a slash; as for smpl_state.

@@ -37,11 +37,13 @@ struct Listeners {
 impl Listeners {
     fn new(node: &Node) -> Result<Self, RosError> {
         let bell = Bell::new();
-        let mut states = node.subscription::<SmplState>("smpl/state", Qos::reliable().depth(100))?;
+        let states = node.subscription::<SmplState>("smpl/state", Qos::reliable().depth(100))?;
         states.ring(bell.clone());
-        let mut frames =
-            vec![node.subscription::<TFMessage>("/tf", Qos::tf())?, node.subscription::<TFMessage>("/tf_static", Qos::tf_static().depth(100))?];
-        frames.iter_mut().for_each(|subscription| subscription.ring(bell.clone()));
+        let frames = vec![
+            node.subscription::<TFMessage>("/tf", Qos::tf())?,
+            node.subscription::<TFMessage>("/tf_static", Qos::tf_static().depth(100))?,
+        ];
+        frames.iter().for_each(|subscription| subscription.ring(bell.clone()));
         node.ring_at_graph_change(&bell);
         Ok(Self { node: node.clone(), bell, states, frames, imus: BTreeMap::new() })
     }
@@ -54,7 +56,7 @@ impl Listeners {
                 continue;
             }
             let qos = publisher.qos.matching_subscription(1000);
-            let mut subscription = self.node.subscription::<Imu>(&publisher.topic, qos)?;
+            let subscription = self.node.subscription::<Imu>(&publisher.topic, qos)?;
             subscription.ring(self.bell.clone());
             log::info!("shows {}", publisher.topic);
             self.imus.insert(publisher.topic.clone(), (placement.to_owned(), subscription));
@@ -100,13 +102,16 @@ pub fn run(arguments: &[String]) -> anyhow::Result<()> {
     let check = |config: &Config| -> anyhow::Result<()> {
         let rate_hz = config.mesh_rate_hz;
         anyhow::ensure!(rate_hz.is_finite() && rate_hz > 0.0, "parameter 'mesh_rate_hz': expected a positive rate, found {rate_hz}");
+        let window = config.curve_window_seconds;
+        anyhow::ensure!(window.is_finite() && window > 0.0, "parameter 'curve_window_seconds': expected more than 0, found {window}");
         destination(config).map(drop)
     };
     let Some(prepared) = prepare("viewer", ABOUT, arguments, check)? else { return Ok(()) };
     let config = prepared.config.clone();
     let model = if config.body.is_empty() { BodyModel::embedded() } else { BodyModel::read_npz(Path::new(&config.body))? };
     let destination = destination(&config)?;
-    let options = RecordingOptions { frame_rate_hz: config.mesh_rate_hz, ..RecordingOptions::default() };
+    let curve_window_s = destination.is_live().then_some(config.curve_window_seconds);
+    let options = RecordingOptions { frame_rate_hz: config.mesh_rate_hz, curve_window_s, ..RecordingOptions::default() };
     let recording = Recording::open(std::slice::from_ref(&destination), options)?;
     let mut logic = ViewerNode::new(config, model, recording)?;
     let (node, _) = prepared.start()?;
@@ -137,6 +142,7 @@ fn destination(config: &Config) -> anyhow::Result<Destination> {
     if !config.recording.is_empty() {
         return Ok(Destination::File { path: config.recording.clone().into() });
     }
-    let address: SocketAddr = config.connect.parse().with_context(|| format!("parameter 'connect': '{}': expected ADDRESS:PORT", config.connect))?;
+    let address: SocketAddr =
+        config.connect.parse().with_context(|| format!("parameter 'connect': '{}': expected ADDRESS:PORT", config.connect))?;
     Ok(Destination::Connect { address })
 }

@@ -32,18 +32,21 @@ struct Publishers {
     frames: Publisher<TFMessage>,
     diagnostics: Publisher<DiagnosticArray>,
     // Kept for late subscriptions.
-    _static_frames: Publisher<TFMessage>,
+    _static_frames: Option<Publisher<TFMessage>>,
     _placements: Publisher<std_msgs::String>,
 }
 
 impl Publishers {
     fn new(node: &Node, logic: &VirtualImuNode, config: &Config, placements: &PlacementSet) -> Result<Self, RosError> {
-        let topics = |ending: &str| logic.placements().iter().map(move |placement| format!("imu/{}/{ending}", placement.name())).collect::<Vec<_>>();
+        let topics =
+            |ending: &str| logic.placements().iter().map(move |placement| format!("imu/{}/{ending}", placement.name())).collect::<Vec<_>>();
         let imu = |ending| topics(ending).iter().map(|topic| node.publisher::<Imu>(topic, Qos::reliable())).collect::<Result<Vec<_>, _>>();
         let reference = |placement: &Placement| node.publisher::<PoseStamped>(&format!("reference/{}", placement.name()), Qos::reliable());
         let referenced = if config.publish_reference { logic.placements() } else { &[] };
-        let static_frames = node.publisher::<TFMessage>("/tf_static", Qos::tf_static())?;
-        static_frames.publish(&logic.static_frames(Time::from_nanos(node.now().nanos)))?;
+        let rigid = logic.static_frames(Time::from_nanos(node.now().nanos));
+        let static_frames =
+            if rigid.transforms.is_empty() { None } else { Some(node.publisher::<TFMessage>("/tf_static", Qos::tf_static())?) };
+        static_frames.as_ref().map(|publisher| publisher.publish(&rigid)).transpose()?;
         let described = node.publisher::<std_msgs::String>("virtual_imu/placements", Qos::tf_static())?;
         described.publish(&std_msgs::String { data: placements.to_yaml() })?;
         Ok(Self {
@@ -109,7 +112,10 @@ pub fn run(arguments: &[String]) -> anyhow::Result<()> {
 pub fn placements(config: &Config) -> anyhow::Result<PlacementSet> {
     let read = if config.placements.is_empty() { PlacementSet::demo() } else { PlacementSet::read(Path::new(&config.placements))? };
     let rate_hz = config.rate_hz;
-    anyhow::ensure!(rate_hz.is_finite() && rate_hz >= 0.0, "parameter 'rate_hz': expected a positive rate, or 0 for that of each placement, found {rate_hz}");
+    anyhow::ensure!(
+        rate_hz.is_finite() && rate_hz >= 0.0,
+        "parameter 'rate_hz': expected a positive rate, or 0 for that of each placement, found {rate_hz}"
+    );
     let scheme = if config.scheme.is_empty() { None } else { Some(Scheme::from_str(&config.scheme).context("parameter 'scheme'")?) };
     Ok(read.map(|placement| {
         let rate_hz = if rate_hz > 0.0 { rate_hz } else { placement.rate_hz() };

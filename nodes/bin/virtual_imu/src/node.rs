@@ -4,7 +4,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use cromosim_body::{BodyError, BodyModel, BodyPose, Joint, ShapedBody};
-use cromosim_imu::{Covariances, Device, Follow, ImuError, ImuSample, MountedSites, NoiseSource, Placement, PlacementSet, StreamOptions, StreamingImu};
+use cromosim_imu::{
+    Covariances, Device, Follow, ImuError, ImuSample, MountedSites, NoiseSource, Placement, PlacementSet, StreamOptions, StreamingImu,
+};
+use cromosim_msgs::NotABody;
 use cromosim_msgs::builtin_interfaces::Time;
 use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue};
@@ -12,7 +15,6 @@ use cromosim_msgs::geometry_msgs::{PoseStamped, TransformStamped};
 use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_msgs::std_msgs::Header;
 use cromosim_msgs::tf2_msgs::TFMessage;
-use cromosim_msgs::NotABody;
 use cromosim_spatial::Stamp;
 use nalgebra::{Isometry3, UnitQuaternion};
 
@@ -121,7 +123,8 @@ impl VirtualImuNode {
     fn fresh_channels(&self) -> Result<Vec<Channel>, ImuError> {
         let channel = |(placement, device): (&Placement, &Device)| {
             let rate_hz = placement.rate_hz();
-            let noise = if self.config.noise { Some(NoiseSource::new(device, rate_hz, self.config.seed as u64, placement.name())?) } else { None };
+            let noise =
+                if self.config.noise { Some(NoiseSource::new(device, rate_hz, self.config.seed as u64, placement.name())?) } else { None };
             let covariances = Covariances::of(device, rate_hz);
             Ok(Channel { stream: None, noise, covariances, frame_id: self.config.frame(&format!("{}_imu", placement.name())) })
         };
@@ -186,7 +189,8 @@ impl VirtualImuNode {
 
     fn open_streams(&mut self, state_rate_hz: f64) -> Result<(), ImuError> {
         for (channel, placement) in self.channels.iter_mut().zip(&self.placements) {
-            let options = StreamOptions { longest_gap: self.config.gap_seconds, ..StreamOptions::resampled(state_rate_hz, placement.rate_hz()) };
+            let options =
+                StreamOptions { longest_gap: self.config.gap_seconds, ..StreamOptions::resampled(state_rate_hz, placement.rate_hz()) };
             let stream = StreamingImu::new(placement.scheme(), options)?;
             log::info!("{}: {} at {} Hz, delay {:.4} s", placement.name(), placement.scheme(), placement.rate_hz(), stream.delay_seconds());
             channel.stream = Some(stream);
@@ -240,7 +244,9 @@ impl VirtualImuNode {
     /// For `/tf_static`: the frames of sensors that follow their segment.
     pub fn static_frames(&self, stamp: Time) -> TFMessage {
         let rigid = self.placements.iter().zip(self.sites.sites()).filter(|(placement, _)| placement.follow() == Follow::Segment);
-        TFMessage { transforms: rigid.map(|(placement, site)| self.edge(stamp, site.joint(), placement, site.segment_from_sensor())).collect() }
+        TFMessage {
+            transforms: rigid.map(|(placement, site)| self.edge(stamp, site.joint(), placement, site.segment_from_sensor())).collect(),
+        }
     }
 
     fn edge(&self, stamp: Time, joint: Joint, placement: &Placement, segment_from_sensor: Isometry3<f64>) -> TransformStamped {
@@ -270,8 +276,13 @@ impl VirtualImuNode {
             let delay = delay.map_or_else(|| "not yet known".to_owned(), |seconds| format!("{seconds:.4}"));
             values.push(value(format!("{}: delay of {}, s", placement.name(), placement.scheme()), delay));
         }
-        let status =
-            DiagnosticStatus { level, name: format!("{node_name}: virtual IMUs"), message, hardware_id: self.model.id().to_owned(), values };
+        let status = DiagnosticStatus {
+            level,
+            name: format!("{node_name}: virtual IMUs"),
+            message,
+            hardware_id: self.model.id().to_owned(),
+            values,
+        };
         DiagnosticArray { header: Header { stamp, frame_id: String::new() }, status: vec![status] }
     }
 }

@@ -1,0 +1,116 @@
+//! Live latency from SmplState to Imu, beyond the scheme's own delay: `cargo bench -p cromosim_virtual_imu`.
+//!
+//! A process of its own runs the node; this one publishes the states of the embedded walk at 100 Hz and receives `imu/NAME/data_raw` of every
+//! placement over DDS, in a private network namespace. A sample's latency is the time from just before the publication of the state that
+//! released it to its reception here, so two hops of DDS are in it. Goal: p99 under 2 ms at 5 and at 17 placements.
+#![allow(missing_docs)]
+
+use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::time::Duration;
+
+use cromosim_imu::PlacementSet;
+use cromosim_msgs::cromosim_msgs::SmplState;
+use cromosim_msgs::sensor_msgs::Imu;
+use cromosim_msgs::std_msgs::Header;
+use cromosim_ros::testing::{environment, inside_private_network, network};
+use cromosim_ros::{Bell, Clock, Node, NodeOptions, Parameters, Qos, RosArgs, Subscription};
+
+const NODE: &str = "CROMOSIM_BENCH_NODE";
+const STATES: usize = 1000;
+const INTERVAL_NANOS: i64 = 10_000_000;
+/// Left out: connections, caches and the first look at the states' rate.
+const WARM_UP: usize = 100;
+
+fn main() {
+    if let Ok(placements) = std::env::var(NODE) {
+        let arguments = ["--ros-args", "-p", &format!("placements:='{placements}'")].map(str::to_owned);
+        cromosim_virtual_imu::run(&arguments).expect("the node runs");
+        return;
+    }
+    // `cargo test --benches` asks for a list, and gets none.
+    if std::env::args().any(|argument| argument == "--list" || argument == "--test") {
+        return;
+    }
+    if !cromosim_ros::testing::is_private()
+        && let Some(mut command) = inside_private_network(&[])
+    {
+        assert!(command.status().expect("this program starts again").success());
+        return;
+    }
+    println!("latency from SmplState to Imu over DDS, {STATES} states at 100 Hz, scheme spline");
+    let folder = std::env::temp_dir();
+    for (name, set) in [("5 placements", PlacementSet::demo()), ("17 placements", PlacementSet::full17())] {
+        let file = folder.join(format!("cromosim_latency_{}.yaml", std::process::id()));
+        std::fs::write(&file, set.to_yaml()).expect("a temporary file can be written");
+        let latencies = measure(&set, &file.display().to_string());
+        std::fs::remove_file(&file).expect("the temporary file is there");
+        let at = |fraction: f64| 1e3 * latencies[((latencies.len() - 1) as f64 * fraction).round() as usize];
+        println!("{name}: {} samples, p50 {:.2} ms, p99 {:.2} ms, max {:.2} ms", latencies.len(), at(0.5), at(0.99), at(1.0));
+    }
+}
+
+/// The node's process; ended with its owner.
+struct NodeProcess(Child);
+
+impl Drop for NodeProcess {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+fn measure(set: &PlacementSet, file: &str) -> Vec<f64> {
+    let program = std::env::current_exe().expect("this program has a path");
+    let child = Command::new(program).env(NODE, file).envs(environment()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+    let _node_process = NodeProcess(child.expect("the node's process starts"));
+    let args = RosArgs::parse(Vec::<String>::new()).expect("no arguments");
+    let node = Node::start(NodeOptions::new("bench", &args, &Parameters::new()).expect("valid").network(network())).expect("DDS starts");
+    let states = node.publisher::<SmplState>("smpl/state", Qos::reliable()).expect("a publisher");
+    let bell = Bell::new();
+    let subscribe = |name: &str| {
+        let subscription = node.subscription::<Imu>(&format!("imu/{name}/data_raw"), Qos::recorder()).expect("a subscription");
+        subscription.ring(Arc::clone(&bell));
+        subscription
+    };
+    let imus: Vec<Subscription<Imu>> = set.placements().iter().map(|placement| subscribe(placement.name())).collect();
+    let long = Duration::from_secs(20);
+    assert!(states.wait_for_subscriptions(1, long) && imus.iter().all(|imu| imu.wait_for_publishers(1, long)), "no connection");
+
+    let walk = cromosim_motion::embedded_walk();
+    let begin = Clock::system_now().nanos + 50_000_000;
+    let mut sent: Vec<i64> = Vec::new();
+    let mut latencies = Vec::new();
+    while sent.len() < STATES {
+        let due = begin + sent.len() as i64 * INTERVAL_NANOS;
+        let left = due - Clock::system_now().nanos;
+        if left > 0 {
+            bell.wait(Some(Duration::from_nanos(left as u64)));
+            collect(&imus, &sent, &mut latencies);
+            continue;
+        }
+        let body = &walk.frames[sent.len() % walk.frames.len()];
+        let mut state = SmplState { header: Header::new(due, "world"), betas: walk.betas.clone(), ..SmplState::default() };
+        state.set_root_and_rotations(body.root_position, &body.local_rotations);
+        sent.push(Clock::system_now().nanos);
+        states.publish(&state).expect("the state gets out");
+    }
+    std::thread::sleep(Duration::from_millis(200));
+    collect(&imus, &sent, &mut latencies);
+    assert!(latencies.len() > (STATES - WARM_UP - 20) * imus.len(), "samples are missing: {}", latencies.len());
+    latencies.sort_unstable_by(f64::total_cmp);
+    latencies
+}
+
+/// Takes what has come. The state that released a sample is the last one sent before the node published it.
+fn collect(imus: &[Subscription<Imu>], sent: &[i64], latencies: &mut Vec<f64>) {
+    for subscription in imus {
+        while let Some(received) = subscription.try_recv().expect("readable samples") {
+            let published = received.source_stamp.map_or(received.received_stamp.nanos, |stamp| stamp.nanos);
+            let state = sent.partition_point(|&time| time <= published);
+            if state > WARM_UP {
+                latencies.push((received.received_stamp.nanos - sent[state - 1]) as f64 * 1e-9);
+            }
+        }
+    }
+}
