@@ -182,3 +182,27 @@ fn the_bags_that_are_shipped_are_made_by_the_commands_they_state() {
     }
     assert!(made > 0, "bags/README.md states no command");
 }
+
+#[test]
+fn an_interrupt_leaves_nothing_half_written() {
+    let Some(data) = shared_data() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    // A quarter of an hour of motion, so that there is time to interrupt.
+    let clip = fs::read_to_string(data.join("mocap_cmu/13_07.bvh")).unwrap();
+    let (head, frames) = clip.split_once("Frame Time:").unwrap();
+    let (time, frames) = frames.split_once('\n').unwrap();
+    let (structure, count) = head.rsplit_once("Frames:").unwrap();
+    let many = 75;
+    let count = count.trim().parse::<usize>().unwrap() * many;
+    fs::write(folder.path().join("long.bvh"), format!("{structure}Frames: {count}\nFrame Time:{time}\n{}", frames.repeat(many))).unwrap();
+    let mut command = std::process::Command::new(common::CROMOSIM);
+    command.args(["simulate", "long.bvh", "--out", "long.mcap"]).current_dir(folder.path()).stderr(std::process::Stdio::piped());
+    let child = command.spawn().unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(1500));
+    assert!(std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+    assert!(text(&output).contains("interrupted"), "{}", text(&output));
+    let left: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    assert_eq!(left, ["long.bvh"]);
+}

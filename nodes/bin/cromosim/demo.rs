@@ -4,20 +4,21 @@ use std::fs::{self, File};
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Receiver};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
 use clap::Args;
 
+use crate::progress::Interrupt;
 use crate::{progress, summary};
 
 /// What is left behind by a node that does not end when asked to.
 const PATIENCE: Duration = Duration::from_secs(15);
 /// Messages still under way once the last pose is out: the scheme's delay and the writers' queues.
 const DRAIN: Duration = Duration::from_millis(1500);
+/// What a node has for closing its files once the demo has failed.
+const LAST_MOMENT: Duration = Duration::from_secs(3);
 const READY: &str = "ready";
 
 /// Arguments of `cromosim demo`.
@@ -84,7 +85,7 @@ impl NodeProcess {
     }
 
     /// Waits until the node has said that its topics are connected.
-    fn wait_ready(&mut self, stop: &AtomicBool) -> anyhow::Result<()> {
+    fn wait_ready(&mut self, stop: &Interrupt) -> anyhow::Result<()> {
         let until = Instant::now() + PATIENCE;
         loop {
             match self.ready.recv_timeout(Duration::from_millis(50)) {
@@ -95,7 +96,7 @@ impl NodeProcess {
             if self.child.try_wait()?.is_some() {
                 bail!("{} ended early: {}", self.name, self.last_words());
             }
-            if stop.load(Ordering::Relaxed) {
+            if stop.is_set() {
                 bail!("interrupted before the motion began");
             }
         }
@@ -127,11 +128,18 @@ impl NodeProcess {
 }
 
 impl Drop for NodeProcess {
+    /// The demo failed: the node may still close its files, and is killed where it does not.
     fn drop(&mut self) {
-        if matches!(self.child.try_wait(), Ok(None)) {
-            let _ = self.child.kill();
-            let _ = self.child.wait();
+        if !matches!(self.child.try_wait(), Ok(None)) {
+            return;
         }
+        self.interrupt();
+        let until = Instant::now() + LAST_MOMENT;
+        while Instant::now() < until && matches!(self.child.try_wait(), Ok(None)) {
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        let _ = self.child.kill();
+        let _ = self.child.wait();
     }
 }
 
@@ -146,11 +154,8 @@ impl Places {
     /// Clears what an earlier demo left, and nothing else.
     fn prepare(out: &Path) -> anyhow::Result<Self> {
         let places = Self { bag: out.join("bag"), recording: out.join("demo.rrd"), logs: out.join("logs") };
-        for folder in [&places.bag, &places.logs] {
-            if folder.exists() {
-                fs::remove_dir_all(folder).with_context(|| format!("{}: cannot be replaced", folder.display()))?;
-            }
-        }
+        clear(&places.bag, |name| name == "metadata.yaml" || name.ends_with(".mcap"))?;
+        clear(&places.logs, |name| name.ends_with(".log"))?;
         if places.recording.exists() {
             fs::remove_file(&places.recording).with_context(|| format!("{}: cannot be replaced", places.recording.display()))?;
         }
@@ -159,14 +164,26 @@ impl Places {
     }
 }
 
+/// Removes a folder that holds nothing but what a demo leaves.
+fn clear(folder: &Path, ours: impl Fn(&str) -> bool) -> anyhow::Result<()> {
+    let cannot = || format!("{}: cannot be replaced", folder.display());
+    if !folder.exists() {
+        return Ok(());
+    }
+    for entry in fs::read_dir(folder).with_context(cannot)? {
+        let name = entry.with_context(cannot)?.file_name();
+        if !ours(&name.to_string_lossy()) {
+            bail!("{}: no demo made this, and it would be replaced; give another --out", folder.join(name).display());
+        }
+    }
+    fs::remove_dir_all(folder).with_context(cannot)
+}
+
 /// Runs the demo and prints what it made.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let duration = arguments.check()?;
     let places = Places::prepare(&arguments.out)?;
-    let stop = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
-        signal_hook::flag::register(signal, stop.clone())?;
-    }
+    let stop = Interrupt::watch()?;
 
     // Listeners first, so that nobody misses the beginning.
     let mut nodes = arguments.listeners(&places)?;
@@ -186,12 +203,12 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     summary::print(&places.bag, (!arguments.no_viewer).then_some(&*places.recording))
 }
 
-fn play(replay: &mut NodeProcess, duration: f64, stop: &AtomicBool) -> anyhow::Result<()> {
+fn play(replay: &mut NodeProcess, duration: f64, stop: &Interrupt) -> anyhow::Result<()> {
     replay.wait_ready(stop)?;
     let bar = progress::bar((duration * 10.0).ceil() as u64, "playing, 0.1 s");
     let begun = Instant::now();
     while replay.child.try_wait()?.is_none() {
-        if stop.load(Ordering::Relaxed) {
+        if stop.is_set() {
             replay.interrupt();
             break;
         }

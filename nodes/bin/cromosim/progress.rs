@@ -1,6 +1,10 @@
-//! Progress on work that takes longer than a second.
+//! Progress on work that takes longer than a second, and its end by a signal.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
+
+use anyhow::bail;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
@@ -13,4 +17,34 @@ pub fn bar(steps: u64, doing: &str) -> ProgressBar {
     bar.set_message(doing.to_owned());
     bar.enable_steady_tick(Duration::from_millis(500));
     bar
+}
+
+/// Set by SIGINT and SIGTERM, so that work can stop where nothing is left half-written.
+#[derive(Clone)]
+pub struct Interrupt(Arc<AtomicBool>);
+
+impl Interrupt {
+    /// Watches for the signals; a second one ends the process at once.
+    pub fn watch() -> anyhow::Result<Self> {
+        let flag = Arc::new(AtomicBool::new(false));
+        for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+            // In this order: the first signal finds the flag unset and sets it, the second finds it set.
+            signal_hook::flag::register_conditional_default(signal, flag.clone())?;
+            signal_hook::flag::register(signal, flag.clone())?;
+        }
+        Ok(Self(flag))
+    }
+
+    /// Whether a signal has come.
+    pub fn is_set(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+
+    /// An error once a signal has come: whoever writes a file gives it up.
+    pub fn check(&self) -> anyhow::Result<()> {
+        if self.is_set() {
+            bail!("interrupted; nothing was written");
+        }
+        Ok(())
+    }
 }

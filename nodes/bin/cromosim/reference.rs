@@ -17,7 +17,7 @@ use cromosim_spatial::{Stamp, uniform_stamps};
 use cromosim_virtual_imu::imu_message;
 use rayon::prelude::*;
 
-use crate::progress;
+use crate::progress::{self, Interrupt};
 use crate::simulate::Arguments;
 
 /// A placement of a recording: its reference, and its real IMU where there is one.
@@ -33,10 +33,12 @@ pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
     let scheme: Scheme = arguments.scheme.as_deref().unwrap_or("spline").parse()?;
     let reader = BagReader::open(recording)?;
     let recorded = read(&reader)?;
+    let interrupt = Interrupt::watch()?;
     let bar = progress::bar(recorded.len() as u64, "simulating, placements");
     let results: Vec<anyhow::Result<Vec<Imu>>> = recorded
         .par_iter()
         .map(|placement| {
+            interrupt.check()?;
             let messages = resimulate(placement, scheme, arguments);
             bar.inc(1);
             messages
@@ -57,6 +59,7 @@ pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
     order.sort_by_key(|(nanos, ..)| *nanos);
     let topics: Vec<String> = recorded.iter().map(|placement| format!("/imu/{}/data_raw", placement.name)).collect();
     for (nanos, number, index) in order {
+        interrupt.check()?;
         bag.write(&topics[number], Stamp::from_nanos(nanos), &simulated[number][index])?;
     }
     let summary = bag.finish()?;

@@ -18,8 +18,10 @@ use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_msgs::std_msgs::Header;
 use cromosim_spatial::{PoseTimes, Stamp, uniform_stamps};
 use cromosim_virtual_imu::imu_message;
+use indicatif::ProgressBar;
 use rayon::prelude::*;
 
+use crate::progress::Interrupt;
 use crate::{body, progress, reference};
 
 /// Stamp of the first frame: not zero, which TF takes for "the latest".
@@ -84,6 +86,7 @@ struct Setup {
     noise: bool,
     force: bool,
     csv: Option<PathBuf>,
+    interrupt: Interrupt,
 }
 
 /// One placement's results.
@@ -105,7 +108,11 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let setup = Setup::new(arguments)?;
     if arguments.motions.len() <= 1 {
         let motion = setup.read(arguments.motions.first())?;
-        return simulate_one(&setup, &motion, &arguments.out).map(|line| println!("{line}"));
+        let bar = progress::bar(setup.placements.placements().len() as u64 + 1, "simulating, placements");
+        let line = simulate_one(&setup, &motion, &arguments.out, &bar);
+        bar.finish_and_clear();
+        println!("{}", line?);
+        return Ok(());
     }
     fs::create_dir_all(&arguments.out).with_context(|| format!("{}: cannot be made", arguments.out.display()))?;
     let outs = output_names(&arguments.motions, &arguments.out)?;
@@ -115,7 +122,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .par_iter()
         .zip(&outs)
         .map(|(path, out)| {
-            let result = setup.read(Some(path)).and_then(|motion| simulate_one(&setup, &motion, out));
+            let result = setup.read(Some(path)).and_then(|motion| simulate_one(&setup, &motion, out, &ProgressBar::hidden()));
             bar.inc(1);
             result
         })
@@ -186,6 +193,7 @@ impl Setup {
             noise: !arguments.no_noise,
             force: arguments.force,
             csv: arguments.csv.clone(),
+            interrupt: Interrupt::watch()?,
         })
     }
 
@@ -197,12 +205,18 @@ impl Setup {
     }
 
     /// All placements of a motion, each on whatever core is free.
-    fn simulate(&self, motion: &SmplMotion, stamps: &[Stamp]) -> anyhow::Result<Vec<Simulated>> {
+    fn simulate(&self, motion: &SmplMotion, stamps: &[Stamp], bar: &ProgressBar) -> anyhow::Result<Vec<Simulated>> {
         let shaped = ShapedBody::new(self.model.clone(), &motion.betas)?;
         let sites = MountedSites::new(&shaped, self.placements.placements())?;
         let trajectories = sites.trajectories(stamps, &motion.frames)?;
         let times = PoseTimes::new(stamps)?;
-        let one = |(index, trajectory): (usize, &SensorTrajectory)| self.simulate_placement(index, trajectory, &times);
+        bar.inc(1);
+        let one = |(index, trajectory): (usize, &SensorTrajectory)| {
+            self.interrupt.check()?;
+            let simulated = self.simulate_placement(index, trajectory, &times);
+            bar.inc(1);
+            simulated
+        };
         trajectories.par_iter().enumerate().map(one).collect()
     }
 
@@ -245,14 +259,14 @@ impl Setup {
     }
 }
 
-fn simulate_one(setup: &Setup, motion: &SmplMotion, out: &Path) -> anyhow::Result<String> {
+fn simulate_one(setup: &Setup, motion: &SmplMotion, out: &Path, bar: &ProgressBar) -> anyhow::Result<String> {
     let last = motion.frames.len().saturating_sub(1) as f64 / motion.rate_hz;
     let stamps: Vec<Stamp> = (0..motion.frames.len()).map(|frame| BEGINS.plus_seconds(frame as f64 / motion.rate_hz)).collect();
-    let simulated = setup.simulate(motion, &stamps)?;
+    let simulated = setup.simulate(motion, &stamps, bar)?;
     let mut bag = BagWriter::create(out, BagOptions { compression: Compression::Zstd, replace: setup.force, ..BagOptions::default() })?;
     bag.write_metadata("cromosim", setup.metadata(motion))?;
     bag.attach("placements.yaml", "application/yaml", BEGINS, setup.placements.to_yaml().as_bytes())?;
-    write_in_order_of_time(&mut bag, motion, &stamps, &simulated)?;
+    write_in_order_of_time(&mut bag, motion, &stamps, &simulated, &setup.interrupt)?;
     let summary = bag.finish()?;
     if let Some(folder) = &setup.csv {
         write_csv(out, folder, &simulated)?;
@@ -261,7 +275,13 @@ fn simulate_one(setup: &Setup, motion: &SmplMotion, out: &Path) -> anyhow::Resul
 }
 
 /// Messages of one time: the state first, then each placement's.
-fn write_in_order_of_time(bag: &mut BagWriter, motion: &SmplMotion, stamps: &[Stamp], simulated: &[Simulated]) -> anyhow::Result<()> {
+fn write_in_order_of_time(
+    bag: &mut BagWriter,
+    motion: &SmplMotion,
+    stamps: &[Stamp],
+    simulated: &[Simulated],
+    interrupt: &Interrupt,
+) -> anyhow::Result<()> {
     enum What {
         State,
         Reference(usize),
@@ -281,6 +301,7 @@ fn write_in_order_of_time(bag: &mut BagWriter, motion: &SmplMotion, stamps: &[St
     let references: Vec<String> = simulated.iter().map(|placement| format!("/reference/{}", placement.name)).collect();
     for (nanos, what, index) in schedule {
         let stamp = Stamp::from_nanos(nanos);
+        interrupt.check()?;
         match what {
             What::State => bag.write("/smpl/state", stamp, &state(motion, index, stamp))?,
             What::Reference(number) => bag.write(&references[number], stamp, &simulated[number].reference[index])?,
