@@ -79,6 +79,7 @@ fn placements_and_settings() {
         refuses(folder.path(), &["node", "virtual_imu", "--check-config", "--ros-args", "-p", &format!("placements:={name}")], expected);
     }
     refuses(folder.path(), &["simulate", "--rate", "-5", "--out", "out.mcap"], &["--rate", "-5"]);
+    refuses(folder.path(), &["simulate", "--rate", "1e9", "--out", "out.mcap"], &["--rate", "100000"]);
     refuses(folder.path(), &["simulate", "--scheme", "guess", "--out", "out.mcap"], &["guess", "spline"]);
     refuses(folder.path(), &["simulate", "--body", "nobody.npz", "--out", "out.mcap"], &["nobody.npz"]);
     refuses(folder.path(), &["simulate", "--out", "missing/out.mcap"], &["missing"]);

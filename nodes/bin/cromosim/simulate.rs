@@ -10,7 +10,9 @@ use anyhow::{Context, bail};
 use clap::Args;
 use cromosim_bag::{BagOptions, BagWriter, Compression, write_imu_csv};
 use cromosim_body::{BodyModel, ShapedBody};
-use cromosim_imu::{Covariances, Device, MountedSites, NoiseSource, PlacementSet, Scheme, SensorTrajectory, simulate_kinematics_on};
+use cromosim_imu::{
+    Covariances, Device, MAX_RATE_HZ, MountedSites, NoiseSource, PlacementSet, Scheme, SensorTrajectory, simulate_kinematics_on,
+};
 use cromosim_motion::{MotionOptions, SmplMotion, UpAxis, embedded_walk, read_motion};
 use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_msgs::geometry_msgs::PoseStamped;
@@ -99,8 +101,8 @@ struct Simulated {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    if let Some(rate) = arguments.rate.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
-        bail!("--rate {rate}: expected a positive number of messages a second");
+    if let Some(rate) = arguments.rate.filter(|rate| !(*rate > 0.0 && *rate <= MAX_RATE_HZ)) {
+        bail!("--rate {rate}: expected a positive number of messages a second, at most {MAX_RATE_HZ}");
     }
     if let Some(recording) = &arguments.reference {
         return reference::run(recording, arguments);

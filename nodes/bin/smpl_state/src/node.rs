@@ -95,7 +95,12 @@ impl SmplStateNode {
         let mut body = BodyPose { root_position, local_rotations };
         body.local_rotations[0] = self.world_from_source.rotation * body.local_rotations[0];
         let body = self.smoother.smooth(nanos, body);
-        if self.shape.add(&source.betas) {
+        let betas = &source.betas;
+        if betas.len() > self.model.beta_count() || !betas.iter().all(|beta| beta.is_finite()) {
+            // Says what is wrong, before the average takes it in for good.
+            ShapedBody::new(self.model.clone(), betas)?;
+        }
+        if self.shape.add(betas) {
             self.shaped = ShapedBody::new(self.model.clone(), self.shape.betas())?;
         }
         let header = Header { stamp: source.header.stamp, frame_id: self.config.world_frame.clone() };

@@ -12,8 +12,7 @@ pub struct ShapeAverage {
 }
 
 impl ShapeAverage {
-    /// Takes one estimate in; true where the betas in force have changed. An empty estimate says nothing, and NaN is left to the caller's
-    /// body to refuse.
+    /// Takes one estimate of finite numbers in; true where the betas in force have changed. An empty estimate says nothing.
     pub fn add(&mut self, betas: &[f64]) -> bool {
         if betas.is_empty() {
             return false;

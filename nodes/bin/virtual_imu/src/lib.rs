@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use anyhow::Context;
 use cromosim_body::BodyModel;
-use cromosim_imu::{Placement, PlacementSet, Scheme};
+use cromosim_imu::{MAX_RATE_HZ, Placement, PlacementSet, Scheme};
 use cromosim_msgs::builtin_interfaces::Time;
 use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_msgs::diagnostic_msgs::DiagnosticArray;
@@ -113,8 +113,8 @@ pub fn placements(config: &Config) -> anyhow::Result<PlacementSet> {
     let read = if config.placements.is_empty() { PlacementSet::demo() } else { PlacementSet::read(Path::new(&config.placements))? };
     let rate_hz = config.rate_hz;
     anyhow::ensure!(
-        rate_hz.is_finite() && rate_hz >= 0.0,
-        "parameter 'rate_hz': expected a positive rate, or 0 for that of each placement, found {rate_hz}"
+        (0.0..=MAX_RATE_HZ).contains(&rate_hz),
+        "parameter 'rate_hz': expected a positive rate up to {MAX_RATE_HZ}, or 0 for that of each placement, found {rate_hz}"
     );
     let scheme = if config.scheme.is_empty() { None } else { Some(Scheme::from_str(&config.scheme).context("parameter 'scheme'")?) };
     Ok(read.map(|placement| {

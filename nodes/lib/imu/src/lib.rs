@@ -58,7 +58,7 @@ pub use device::{Device, DeviceEffect, EMBEDDED_DEVICES};
 pub use error::{ImuError, PlacementProblem};
 pub use mount::{MountedSite, MountedSites, SiteFrame};
 pub use noise::{Covariances, NoiseSource};
-pub use placement::{Follow, Placement, SiteChoice};
+pub use placement::{Follow, MAX_RATE_HZ, Placement, SiteChoice};
 pub use placement_file::PlacementSet;
 pub use sample::{GRAVITY_IN_WORLD, ImuSample, KinematicSample, STANDARD_GRAVITY};
 pub use schemes::Scheme;

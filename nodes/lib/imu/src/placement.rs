@@ -33,6 +33,9 @@ pub enum SiteChoice {
     NearestTo(Vector3<f64>),
 }
 
+/// No IMU is read faster, Hz; higher rates are typing errors that would fill the memory.
+pub const MAX_RATE_HZ: f64 = 1e5;
+
 /// One sensor on a body; parsed, so valid: the name can stand in a ROS topic, the rate is positive, the mount is a rotation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placement {
@@ -173,8 +176,8 @@ impl RawPlacement {
             return Err(("name", PlacementProblem::BadName { name }));
         }
         let rate_hz = self.rate_hz.or(defaults.rate_hz).ok_or(("rate_hz", PlacementProblem::Missing))?;
-        if !(rate_hz > 0.0 && rate_hz.is_finite()) {
-            return Err(("rate_hz", PlacementProblem::OutOfRange { value: rate_hz, range: "it must be positive" }));
+        if !(rate_hz > 0.0 && rate_hz <= MAX_RATE_HZ) {
+            return Err(("rate_hz", PlacementProblem::OutOfRange { value: rate_hz, range: "it must be positive, at most 100000" }));
         }
         let skin_distance = self.skin_distance.unwrap_or(0.0);
         if !(-0.2..=0.2).contains(&skin_distance) {

@@ -1,12 +1,21 @@
-//! What a node and all its endpoints share: the DDS participant, the endpoints, and what peers are told about them.
+//! What a node and all its endpoints share: ros2-client's context, the endpoints, and what peers are told about them.
+//!
+//! The context owns the DDS participant, makes the topics, and takes the node back from `ros_discovery_info` when it goes. Writers and
+//! readers, and what is announced of them, are RustDDS's and our own, for ros2-client 0.12.1:
+//! - hides `wait_for_acknowledgments` of its publishers, without which the last messages of a process that ends are lost;
+//! - announces only endpoints that its `Node` has made, so not those writers, and a second announcer of the same participant would
+//!   contradict the first: of two, peers keep whichever arrives last;
+//! - never takes dropped endpoints out of its announcement.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
+use ros2_client::entities_info::{NodeEntitiesInfo, ParticipantEntitiesInfo};
+use ros2_client::{Context, MessageTypeName, builtin_topics};
 use rustdds::{DomainParticipant, QosPolicies, Topic, TopicKind};
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
 use crate::clock::Clock;
 use crate::error::{RosResult, dds};
@@ -23,6 +32,7 @@ pub(crate) type Worker = Box<dyn FnMut() -> bool + Send>;
 
 pub(crate) struct Core {
     pub(crate) name: NodeName,
+    ros_name: ros2_client::NodeName,
     local: Mutex<BTreeMap<Gid, Endpoint>>,
     info_writer: RawWriter,
     pub(crate) graph: Graph,
@@ -37,17 +47,19 @@ pub(crate) struct Core {
     // Last, and in this order: endpoints must go before what they belong to.
     publisher: rustdds::Publisher,
     subscriber: rustdds::Subscriber,
+    context: Context,
     pub(crate) participant: DomainParticipant,
 }
 
-/// `rmw_dds_common/msg/ParticipantEntitiesInfo`: which nodes live in a participant, and which endpoints are theirs.
-#[derive(Debug, Serialize, Deserialize)]
+/// `rmw_dds_common/msg/ParticipantEntitiesInfo` as it is received: which nodes live in a participant, and which endpoints are theirs.
+/// Ours for reading: ros2-client's type does not let the endpoints out.
+#[derive(Debug, Deserialize)]
 pub(crate) struct ParticipantInfo {
     pub(crate) participant: Gid,
     pub(crate) nodes: Vec<NodeInfo>,
 }
 
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Deserialize)]
 pub(crate) struct NodeInfo {
     pub(crate) namespace: String,
     pub(crate) name: String,
@@ -55,25 +67,29 @@ pub(crate) struct NodeInfo {
     pub(crate) writers: Vec<Gid>,
 }
 
-const INFO_TOPIC: &str = "ros_discovery_info";
-const INFO_TYPE: &str = "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_";
+use builtin_topics::ros_discovery::{TOPIC_NAME as INFO_TOPIC, TYPE_NAME as INFO_TYPE};
 
 impl Core {
     pub(crate) fn new(name: NodeName, participant: DomainParticipant, clock: Clock, shutdown: Shutdown) -> RosResult<Self> {
         let qos = Qos::reliable();
         let doing = |what: &str| format!("node {name}: create {what}");
+        let context = Context::from_domain_participant(participant.clone()).map_err(|error| dds(doing("ros2-client's context"), error))?;
         let publisher = participant.create_publisher(&qos.to_dds()).map_err(|error| dds(doing("DDS publisher"), error))?;
         let subscriber = participant.create_subscriber(&qos.to_dds()).map_err(|error| dds(doing("DDS subscriber"), error))?;
         let info_qos = Qos::tf_static().to_dds();
-        let info_topic = make_topic(&participant, INFO_TOPIC, INFO_TYPE, &info_qos)?;
+        let info_topic = make_topic(&participant, INFO_TOPIC.into(), INFO_TYPE.into(), &info_qos)?;
         let info_writer =
             publisher.create_datawriter_no_key(&info_topic, Some(info_qos)).map_err(|error| dds(doing("ros_discovery_info"), error))?;
+        let ros_name =
+            ros2_client::NodeName::new(name.namespace(), name.name()).map_err(|error| dds(doing("ros2-client's name"), error))?;
         let bell = Bell::new();
         shutdown.ring_at_request(&bell);
         Ok(Self {
+            ros_name,
             graph: Graph::new(shutdown.clone()),
             name,
             participant,
+            context,
             publisher,
             subscriber,
             local: Mutex::default(),
@@ -90,7 +106,7 @@ impl Core {
     /// The reader of what other participants say about their nodes. Deep: every participant keeps its last word there.
     pub(crate) fn info_reader(self: &Arc<Self>) -> RosResult<Reader> {
         let qos = Qos::tf_static().depth(1000).to_dds();
-        let topic = make_topic(&self.participant, INFO_TOPIC, INFO_TYPE, &qos)?;
+        let topic = make_topic(&self.participant, INFO_TOPIC.into(), INFO_TYPE.into(), &qos)?;
         let reader: RawReader = self
             .subscriber
             .create_simple_datareader_no_key(&topic, Some(qos))
@@ -101,11 +117,10 @@ impl Core {
 
     /// Makes a reader on an absolute name and tells peers that it is this node's.
     pub(crate) fn reader(self: &Arc<Self>, kind: Kind, name: &str, type_name: &str, qos: Qos, bell: Arc<Bell>) -> RosResult<Reader> {
-        let dds_qos = qos.to_dds();
-        let topic = make_topic(&self.participant, &kind.dds_name(name), &dds_type_name(type_name)?, &dds_qos)?;
+        let topic = self.topic(kind, name, type_name, qos)?;
         let reader: RawReader = self
             .subscriber
-            .create_simple_datareader_no_key(&topic, Some(dds_qos))
+            .create_simple_datareader_no_key(&topic, Some(qos.to_dds()))
             .map_err(|error| dds(format!("subscribe to {name}"), error))?;
         let gid = Gid::from(reader.guid());
         let guard = self.register(gid, Side::Reads, kind, name, type_name, qos);
@@ -127,12 +142,22 @@ impl Core {
     /// Makes a writer on an absolute name and tells peers that it is this node's.
     pub(crate) fn writer(self: &Arc<Self>, kind: Kind, name: &str, type_name: &str, qos: Qos) -> RosResult<(RawWriter, EndpointGuard)> {
         use rustdds::RTPSEntity;
-        let dds_qos = qos.to_dds();
-        let topic = make_topic(&self.participant, &kind.dds_name(name), &dds_type_name(type_name)?, &dds_qos)?;
+        let topic = self.topic(kind, name, type_name, qos)?;
         let writer: RawWriter =
-            self.publisher.create_datawriter_no_key(&topic, Some(dds_qos)).map_err(|error| dds(format!("publish {name}"), error))?;
+            self.publisher.create_datawriter_no_key(&topic, Some(qos.to_dds())).map_err(|error| dds(format!("publish {name}"), error))?;
         let guard = self.register(Gid::from(writer.guid()), Side::Writes, kind, name, type_name, qos);
         Ok((writer, guard))
+    }
+
+    fn topic(&self, kind: Kind, name: &str, type_name: &str, qos: Qos) -> RosResult<Topic> {
+        let (dds_name, dds_type) = (kind.dds_name(name), dds_type_name(type_name)?);
+        let parts: Vec<&str> = type_name.split('/').collect();
+        let [package, "msg", base_name] = parts[..] else {
+            // ros2-client names only the types of messages in public, not those of requests and responses.
+            return make_topic(&self.participant, dds_name, dds_type, &qos.to_dds());
+        };
+        let type_name = MessageTypeName::new(package, base_name);
+        self.context.create_topic(dds_name, type_name, &qos.to_profile()).map_err(|error| dds(format!("create topic {name}"), error))
     }
 
     fn register(self: &Arc<Self>, gid: Gid, side: Side, kind: Kind, name: &str, type_name: &str, qos: Qos) -> EndpointGuard {
@@ -153,15 +178,12 @@ impl Core {
     /// Tells peers which endpoints this node has now; once it is stopping, that it has gone.
     pub(crate) fn announce(&self) {
         let local = lock(&self.local);
-        let gids = |writes| local.values().filter(|e| e.writes == writes).map(|e| e.gid).collect();
-        let node = NodeInfo {
-            namespace: self.name.namespace().to_owned(),
-            name: self.name.name().to_owned(),
-            readers: gids(false),
-            writers: gids(true),
-        };
+        let mut node = NodeEntitiesInfo::new(self.ros_name.clone());
+        for endpoint in local.values() {
+            if endpoint.writes { node.add_writer(endpoint.gid.into()) } else { node.add_reader(endpoint.gid.into()) }
+        }
         let nodes = if self.stopping.load(Ordering::SeqCst) { Vec::new() } else { vec![node] };
-        let info = ParticipantInfo { participant: self.participant_gid(), nodes };
+        let info = ParticipantEntitiesInfo::new(self.participant_gid().into(), nodes);
         // The lock is held: two threads must not announce in the wrong order.
         let sent = RawMessage::encode(&info).and_then(|raw| self.info_writer.write(raw, None).map_err(|error| error.to_string()));
         if let Err(problem) = sent {
@@ -241,10 +263,9 @@ enum Side {
     Writes,
 }
 
-fn make_topic(participant: &DomainParticipant, name: &str, type_name: &str, qos: &QosPolicies) -> RosResult<Topic> {
-    participant
-        .create_topic(name.to_owned(), type_name.to_owned(), qos, TopicKind::NoKey)
-        .map_err(|error| dds(format!("create DDS topic {name}"), error))
+fn make_topic(participant: &DomainParticipant, name: String, type_name: String, qos: &QosPolicies) -> RosResult<Topic> {
+    let doing = format!("create DDS topic {name}");
+    participant.create_topic(name, type_name, qos, TopicKind::NoKey).map_err(|error| dds(doing, error))
 }
 
 /// Takes the endpoint out of the node's announcement when it is dropped.

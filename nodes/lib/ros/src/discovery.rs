@@ -84,6 +84,7 @@ impl Network {
         Ok(Self { domain_id, range })
     }
 
+    /// Made by RustDDS's builder: ros2-client's options know the domain only, not the networks.
     pub(crate) fn participant(self) -> RosResult<DomainParticipant> {
         let builder = DomainParticipantBuilder::new(self.domain_id);
         let builder = match self.range {

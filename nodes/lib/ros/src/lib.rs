@@ -1,7 +1,21 @@
 //! ROS 2 nodes over DDS, without ROS: names and remaps, parameters, topics, services, time and the graph.
 //!
-//! The one crate that names ros2-client and RustDDS. Underneath, RustDDS carries bytes; every typed publisher, subscription and service
-//! encodes and decodes around them, so that a recorder of unknown types and a node of known ones are the same thing.
+//! The one crate that names ros2-client and RustDDS. Bytes cross DDS; every typed publisher, subscription and service encodes and decodes
+//! around them, so that a recorder of unknown types and a node of known ones are the same thing.
+//!
+//! On ros2-client stand the context with the DDS participant, topics and their types, quality of service, the words of
+//! `ros_discovery_info`, `/rosout` and the parameter services, and parameter values. On RustDDS, which ros2-client stands on too, stands
+//! directly what ros2-client 0.12.1 lacks:
+//!
+//! | what | why |
+//! |---|---|
+//! | the participant's builder | ros2-client's options cannot keep it to this machine |
+//! | publishers | ros2-client's hide `wait_for_acknowledgments`: the last messages of a process that ends would be lost |
+//! | sending `ros_discovery_info` | ros2-client's `Node` announces only endpoints that it made, and never takes dropped ones back |
+//! | subscriptions, services, their clients | only `Node` makes them, and its announcement would contradict ours, in which publishers are |
+//! | received `ros_discovery_info` | ros2-client's type hides the endpoints |
+//! | graph and matching | ros2-client's `Spinner` always reads `/clock` with a wrong type, and needs the `Node` |
+//! | stamps of received messages | ros2-client rounds down and loses a nanosecond |
 //!
 //! ```no_run
 //! use cromosim_msgs::sensor_msgs::Imu;

@@ -4,9 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, Weak};
 
 use log::{Level, LevelFilter, Log, Metadata, Record};
-use serde::Serialize;
-
-use cromosim_msgs::builtin_interfaces::Time;
+use ros2_client::{Log as LogMessage, ROSTime};
 
 use crate::core::Core;
 use crate::error::RosResult;
@@ -103,22 +101,10 @@ impl Log for Logger {
     fn flush(&self) {}
 }
 
-/// A node's publisher of `/rosout`.
+/// A node's publisher of `/rosout`. Ours, since ros2-client's own keeps only the last line, and loses the others of a burst.
 pub(crate) struct Rosout {
     publisher: RawPublisher,
     node: String,
-}
-
-/// `rcl_interfaces/msg/Log`.
-#[derive(Serialize)]
-struct LogMessage<'a> {
-    stamp: Time,
-    level: u8,
-    name: &'a str,
-    msg: String,
-    file: &'a str,
-    function: &'a str,
-    line: u32,
 }
 
 impl Rosout {
@@ -135,18 +121,18 @@ impl Rosout {
 
     fn publish(&self, record: &Record<'_>, now: i64) {
         let level = match record.level() {
-            Level::Error => 40,
-            Level::Warn => 30,
-            Level::Info => 20,
-            Level::Debug | Level::Trace => 10,
+            Level::Error => LogMessage::ERROR,
+            Level::Warn => LogMessage::WARN,
+            Level::Info => LogMessage::INFO,
+            Level::Debug | Level::Trace => LogMessage::DEBUG,
         };
         let message = LogMessage {
-            stamp: Time::from_nanos(now),
+            stamp: ROSTime::from_nanos(now).into(),
             level,
-            name: &self.node,
+            name: self.node.clone(),
             msg: record.args().to_string(),
-            file: record.file().unwrap_or_default(),
-            function: "",
+            file: record.file().unwrap_or_default().to_owned(),
+            function: String::new(),
             line: record.line().unwrap_or_default(),
         };
         // Nowhere to tell that a log line was lost: it stands on the screen.

@@ -2,8 +2,9 @@
 
 use std::time::Duration;
 
-use rustdds::policy;
-use rustdds::{QosPolicies, QosPolicyBuilder};
+use ros2_client::QosProfile;
+use ros2_client::qos::{self, WhenFull};
+use rustdds::{QosPolicies, policy};
 
 use crate::error::{RosError, RosResult};
 
@@ -133,21 +134,26 @@ impl Qos {
         }
     }
 
-    pub(crate) fn to_dds(self) -> QosPolicies {
-        let builder = QosPolicyBuilder::new()
+    /// As ros2-client knows it.
+    pub(crate) fn to_profile(self) -> QosProfile {
+        let profile = QosProfile::publisher_default()
             .durability(match self.durability {
-                Durability::Volatile => policy::Durability::Volatile,
-                Durability::TransientLocal => policy::Durability::TransientLocal,
+                Durability::Volatile => qos::Durability::Volatile,
+                Durability::TransientLocal => qos::Durability::TransientLocal,
             })
             .history(match self.history {
-                History::KeepLast(depth) => policy::History::KeepLast { depth: depth.clamp(1, i32::MAX as u32) as i32 },
-                History::KeepAll => policy::History::KeepAll,
+                History::KeepLast(depth) => qos::History::KeepLast { depth: depth.clamp(1, i32::MAX as u32) as usize },
+                History::KeepAll => qos::History::KeepAll,
             });
-        let blocking = rustdds::Duration::from_nanos(i64::try_from(self.max_blocking.as_nanos()).unwrap_or(i64::MAX));
         match self.reliability {
-            Reliability::BestEffort => builder.best_effort().build(),
-            Reliability::Reliable => builder.reliable(blocking).build(),
+            Reliability::BestEffort => profile.reliability_best_effort(),
+            Reliability::Reliable => profile.reliability_reliable(WhenFull::Wait(self.max_blocking)),
         }
+    }
+
+    /// As DDS knows it, by ros2-client's own mapping.
+    pub(crate) fn to_dds(self) -> QosPolicies {
+        QosPolicies::from(self.to_profile())
     }
 
     /// From a peer's announcement. DDS does not announce the history: it reads as keep last 0.

@@ -117,7 +117,13 @@ impl From<rustdds::GUID> for Gid {
     }
 }
 
-/// DDS counts fractions of 2^-32 s, rounded down; rounding up gives back the very nanosecond.
+impl From<Gid> for ros2_client::Gid {
+    fn from(gid: Gid) -> Self {
+        gid.0.into()
+    }
+}
+
+/// Ours, since ros2-client's conversion rounds down and loses a nanosecond. DDS counts fractions of 2^-32 s, rounded down; rounding up gives back the very nanosecond.
 pub(crate) fn stamp_from_dds(timestamp: Timestamp) -> Option<Stamp> {
     if timestamp == Timestamp::INVALID || timestamp == Timestamp::INFINITE {
         return None;

@@ -14,7 +14,7 @@ use crate::core::EndpointGuard;
 use crate::raw::{Gid, RawMessage, RawReader, Received, stamp_from_dds};
 use crate::wake::{Bell, lock};
 
-/// The receiving end of an endpoint.
+/// The receiving end of an endpoint. RustDDS's, since only ros2-client's `Node` makes subscriptions (see the crate's table).
 ///
 /// RustDDS forgets what it has received and confirmed but not yet handed out as soon as the publisher goes. So messages are taken out of
 /// it at once: by the thread that waits for them or, while that one is busy, by the node's thread.

@@ -1,6 +1,7 @@
 //! Services: requests and responses on two topics, told apart by the identity of the request.
 //!
 //! The identity travels in the DDS sample header ("enhanced" mapping of RPC over DDS), as Fast DDS does it for ROS 2.
+//! On RustDDS: only ros2-client's `Node` makes servers and clients, and its announcement would contradict ours (see the crate's table).
 //! With `RMW_IMPLEMENTATION=rmw_cyclonedds_cpp` it travels in the first 16 bytes of the payload, as Cyclone DDS does it for ROS 2.
 
 use std::marker::PhantomData;

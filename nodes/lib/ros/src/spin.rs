@@ -27,6 +27,7 @@ pub(crate) fn spawn_thread(core: &Arc<Core>, parameters: &Parameters) -> RosResu
     std::thread::Builder::new()
         .name(name.clone())
         .spawn(move || {
+            // RustDDS's own: ros2-client's Spinner reads `/clock` as a bare Time, whatever `use_sim_time` says, and needs its Node.
             let listener = core.participant.status_listener();
             let mut events = pin!(listener.as_async_status_stream());
             let waker = core.bell.waker();

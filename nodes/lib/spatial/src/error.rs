@@ -57,6 +57,16 @@ pub enum SpatialError {
         /// The rate given, Hz.
         rate_hz: f64,
     },
+    /// More samples than fit into memory.
+    #[error("{count:.3e} samples at {rate_hz} Hz; at most {limit:.0e} are made at once: lower the rate or cut the motion")]
+    TooManyStamps {
+        /// How many it would be.
+        count: f64,
+        /// How many are allowed.
+        limit: f64,
+        /// The rate given, Hz.
+        rate_hz: f64,
+    },
     /// A smoothing weight that is negative or not finite.
     #[error("a smoothing weight of {weight}; give zero or a positive number")]
     BadWeight {

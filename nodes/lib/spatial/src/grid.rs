@@ -2,6 +2,9 @@
 
 use crate::{SpatialError, Stamp};
 
+/// Two days at 100 Hz; the samples of so many stamps take some gigabytes.
+const MAX_STAMPS: f64 = 2e7;
+
 /// Checks that times (s) are finite and strictly increasing.
 ///
 /// # Errors
@@ -24,16 +27,20 @@ pub fn relative_seconds(stamps: &[Stamp], origin: Stamp) -> Vec<f64> {
 /// Stamps `first + k / rate` for k = 0, 1, ... up to and including `last`; each rounded to its own nearest nanosecond, so that no error adds up.
 ///
 /// # Errors
-/// [`SpatialError::BadRate`] for a rate that is not positive and finite.
+/// [`SpatialError::BadRate`] for a rate that is not positive and finite, [`SpatialError::TooManyStamps`] beyond twenty million.
 pub fn uniform_stamps(first: Stamp, last: Stamp, rate_hz: f64) -> Result<Vec<Stamp>, SpatialError> {
     if !(rate_hz > 0.0 && rate_hz.is_finite()) {
         return Err(SpatialError::BadRate { rate_hz });
     }
-    let count = (0..).map_while(|k: i64| {
+    let expected = (last - first) * rate_hz + 1.0;
+    if expected > MAX_STAMPS {
+        return Err(SpatialError::TooManyStamps { count: expected, limit: MAX_STAMPS, rate_hz });
+    }
+    let stamps = (0..).map_while(|k: i64| {
         let stamp = first.plus_seconds(k as f64 / rate_hz);
         (stamp <= last).then_some(stamp)
     });
-    Ok(count.collect())
+    Ok(stamps.collect())
 }
 
 #[cfg(test)]
@@ -56,5 +63,7 @@ mod tests {
         assert_eq!(stamps.len(), 3600 * 300 + 1);
         assert_eq!(stamps[300 * 1800] - first, 1800.0);
         assert!(uniform_stamps(first, first, -1.0).is_err());
+        let many = uniform_stamps(first, first.plus_seconds(10.0), 1e9);
+        assert!(matches!(many, Err(SpatialError::TooManyStamps { .. })), "ten thousand million stamps are refused");
     }
 }
