@@ -25,11 +25,11 @@ def generate_launch_description():
     finish = TimerAction(period=1.5, actions=[EmitEvent(event=Shutdown(reason="the motion has ended"))])
     return LaunchDescription([
         DeclareLaunchArgument("motion", default_value="", description="A BVH file; empty: the embedded walk"),
-        DeclareLaunchArgument("out", default_value="cromosim-demo", description="Where bag and recording go"),
+        DeclareLaunchArgument("out", default_value="cromosim-demo", description="Where bag and recording go; OUT/bag must not exist yet"),
         node("recorder", ["bag_path:=", PathJoinSubstitution([out, "bag"])]),
         node("viewer", ["recording:=", PathJoinSubstitution([out, "demo.rrd"])]),
-        node("virtual_imu"),
-        node("smpl_state"),
+        node("virtual_imu", "ready_subscriptions:=2"),
+        node("smpl_state", "ready_subscriptions:=3"),
         replay,
         RegisterEventHandler(OnProcessExit(target_action=replay, on_exit=[finish])),
     ])

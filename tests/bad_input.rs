@@ -71,6 +71,7 @@ fn placements_and_settings() {
         ),
         ("rate.yaml", file("site: left_watch, rate_hz: -5"), vec!["rate.yaml", "wrist", "rate_hz"]),
         ("unknown.yaml", file("site: left_watch, rate_hz: 100, colour: red"), vec!["unknown.yaml", "wrist", "colour"]),
+        ("none.yaml", "schema: cromosim/placements/1\nplacements: {}\n".to_owned(), vec!["none.yaml", "placements"]),
         ("yaml.yaml", "placements: [".to_owned(), vec!["yaml.yaml"]),
     ];
     for (name, content, expected) in &cases {
@@ -104,6 +105,8 @@ fn parameters_of_nodes() {
         &["node", "smpl_state", "--check-config", "--ros-args", "--params-file", "p.yaml"],
         &["p.yaml", "line 4", "hight"],
     );
+    refuses(folder.path(), &node("smpl_state", "source_position:=[.nan, 0.0, 0.0]"), &["source_position"]);
+    refuses(folder.path(), &node("replay", "ready_timeout_seconds:=1e300"), &["ready_timeout_seconds"]);
     refuses(folder.path(), &["node", "nobody"], &["nobody", "replay"]);
     refuses(folder.path(), &["node", "replay", "--speed", "3"], &["--speed", "--help"]);
 }
@@ -123,6 +126,7 @@ fn bags() {
     refuses(folder.path(), &["simulate", "--reference", "text.mcap", "--out", "out.mcap"], &["text.mcap"]);
     refuses(folder.path(), &["bag", "csv", "walk.mcap", "/imu/nose/data"], &["/imu/nose/data", "/imu/head/data"]);
     refuses(folder.path(), &["simulate", "--out", "walk.mcap"], &["walk.mcap"]);
+    refuses(folder.path(), &["simulate", "--reference", "walk.mcap", "--out", "walk.mcap", "--force"], &["walk.mcap", "another name"]);
     assert_eq!(fs::read(path("walk.mcap")).unwrap(), whole, "an existing bag is not touched");
 
     let said = succeed(folder.path(), &["bag", "recover", "cut.mcap"]);

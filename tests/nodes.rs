@@ -311,6 +311,7 @@ fn shipped_parameter_files_and_scripts_are_valid() {
             assert!(help.contains(&format!("  {parameter} [")), "{name}: --help does not tell of {parameter}");
         }
     }
+    assert!(common::succeed(folder.path(), &["node", "--help"]).contains("virtual_imu"));
     let placements: Vec<PathBuf> = fs::read_dir(root().join("config/placements")).unwrap().map(|entry| entry.unwrap().path()).collect();
     for file in placements {
         let parameter = format!("placements:='{}'", file.display());

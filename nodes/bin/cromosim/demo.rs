@@ -2,6 +2,7 @@
 
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader};
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{self, Receiver};
@@ -9,6 +10,8 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
 use clap::Args;
+use cromosim_body::{BodyModel, ShapedBody};
+use cromosim_imu::{Device, MountedSites, PlacementSet};
 
 use crate::progress::Interrupt;
 use crate::{progress, summary};
@@ -37,8 +40,8 @@ pub struct Arguments {
     #[arg(long, value_name = "DIR", default_value = "cromosim-demo")]
     out: PathBuf,
     /// Seed of the sensor noise
-    #[arg(long, default_value_t = 0)]
-    seed: u64,
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(i64).range(0..))]
+    seed: i64,
     /// Wait until so many more subscriptions than the demo's own listen to every IMU
     #[arg(long, value_name = "N", default_value_t = 0)]
     listeners: u32,
@@ -64,6 +67,8 @@ impl NodeProcess {
         for (key, value) in parameters {
             command.arg("-p").arg(format!("{key}:={value}"));
         }
+        // A group of its own: Ctrl-C reaches the demo alone, which ends the nodes in their order.
+        command.process_group(0);
         let mut child = command
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
@@ -232,7 +237,11 @@ impl Arguments {
             None => cromosim_motion::embedded_walk(),
         };
         if let Some(path) = &self.placements {
-            cromosim_imu::PlacementSet::read(path)?;
+            let placements = PlacementSet::read(path)?;
+            MountedSites::new(&ShapedBody::new(BodyModel::embedded(), &[])?, placements.placements())?;
+            for placement in placements.placements() {
+                Device::resolve(placement.device(), path.parent().unwrap_or(Path::new(".")))?;
+            }
         }
         let whole = motion.duration_s();
         Ok(self.duration.map_or(whole, |seconds| seconds.min(whole)))
@@ -241,8 +250,8 @@ impl Arguments {
     fn listeners(&self, places: &Places) -> anyhow::Result<Vec<NodeProcess>> {
         let viewers = i64::from(!self.no_viewer);
         let path = |path: &Path| -> anyhow::Result<String> { Ok(quoted(&std::path::absolute(path)?.display().to_string())) };
-        let mut nodes =
-            vec![NodeProcess::start("recorder", &[("bag_path", path(&places.bag)?), ("seed", self.seed.to_string())], &places.logs)?];
+        let recorder = [("bag_path", path(&places.bag)?), ("seed", self.seed.to_string()), ("run", quoted(&self.describe()))];
+        let mut nodes = vec![NodeProcess::start("recorder", &recorder, &places.logs)?];
         if !self.no_viewer {
             nodes.push(NodeProcess::start("viewer", &[("recording", path(&places.recording)?)], &places.logs)?);
         }
@@ -253,6 +262,20 @@ impl Arguments {
         nodes.push(NodeProcess::start("virtual_imu", &imu, &places.logs)?);
         nodes.push(NodeProcess::start("smpl_state", &[("ready_subscriptions", (2 + viewers).to_string())], &places.logs)?);
         Ok(nodes)
+    }
+
+    /// For the bag's metadata: what the nodes were told. The placements are attached to the bag.
+    fn describe(&self) -> String {
+        let name = |path: &Option<PathBuf>, default: &str| {
+            path.as_deref().and_then(Path::file_name).map_or_else(|| default.to_owned(), |name| name.to_string_lossy().into_owned())
+        };
+        let duration = self.duration.map_or_else(|| "whole".to_owned(), |seconds| format!("{seconds} s"));
+        format!(
+            "demo; motion: {}; duration: {duration}; placements: {}; seed: {}; all else as the nodes' defaults",
+            name(&self.motion, "embedded walk"),
+            name(&self.placements, "demo.yaml"),
+            self.seed
+        )
     }
 
     fn replay_parameters(&self) -> Vec<(&'static str, String)> {

@@ -7,6 +7,7 @@ use clap::Args;
 #[command(disable_help_flag = true, disable_version_flag = true)]
 pub struct Arguments {
     /// replay, smpl_state, virtual_imu, recorder or viewer
+    #[arg(allow_hyphen_values = true)]
     name: String,
     /// The node's arguments; `--help` lists them
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]

@@ -43,7 +43,7 @@ impl Interrupt {
     /// An error once a signal has come: whoever writes a file gives it up.
     pub fn check(&self) -> anyhow::Result<()> {
         if self.is_set() {
-            bail!("interrupted; nothing was written");
+            bail!("interrupted; what was being written is given up");
         }
         Ok(())
     }

@@ -30,6 +30,11 @@ struct Recorded {
 
 /// Runs `simulate --reference RECORDING`.
 pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
+    if let (Ok(from), Ok(to)) = (recording.canonicalize(), arguments.out.canonicalize())
+        && from == to
+    {
+        bail!("{}: --out is the recording itself, which would be lost; give another name", arguments.out.display());
+    }
     let scheme: Scheme = arguments.scheme.as_deref().unwrap_or("spline").parse()?;
     let reader = BagReader::open(recording)?;
     let recorded = read(&reader)?;
@@ -175,7 +180,7 @@ fn resimulate(placement: &Recorded, scheme: Scheme, arguments: &Arguments) -> an
 /// A device with the white noise that the messages declare: density = sigma / sqrt(rate).
 fn declared(measured: &[Imu], stamps: &[Stamp]) -> anyhow::Result<Device> {
     let Some(first) = measured.first() else { return Ok(Device::ideal()) };
-    let mean = |covariance: &[f64; 9]| ((covariance[0].max(0.0) + covariance[4] + covariance[8]) / 3.0).sqrt();
+    let mean = |covariance: &[f64; 9]| ((covariance[0].max(0.0) + covariance[4].max(0.0) + covariance[8].max(0.0)) / 3.0).sqrt();
     let root = rate(stamps).sqrt();
     let (accel, gyro) = (mean(&first.linear_acceleration_covariance) / root, mean(&first.angular_velocity_covariance) / root);
     Ok(Device::white(accel, gyro))

@@ -210,6 +210,9 @@ impl Setup {
     fn simulate(&self, motion: &SmplMotion, stamps: &[Stamp], bar: &ProgressBar) -> anyhow::Result<Vec<Simulated>> {
         let shaped = ShapedBody::new(self.model.clone(), &motion.betas)?;
         let sites = MountedSites::new(&shaped, self.placements.placements())?;
+        if motion.frames.len() < 2 {
+            bail!("{}: {} frame is no motion; at least 2 are needed", motion.name, motion.frames.len());
+        }
         let trajectories = sites.trajectories(stamps, &motion.frames)?;
         let times = PoseTimes::new(stamps)?;
         bar.inc(1);

@@ -15,6 +15,27 @@ struct Latency {
     beyond_state: Vec<f64>,
 }
 
+impl Latency {
+    /// Adds the samples of one placement: stamp and publication of each. The state that released a sample is the first whose stamp is the
+    /// scheme's delay later; the delay is the median distance to the newest state at the publication.
+    fn add(&mut self, states: &[(Stamp, Stamp)], samples: &[(Stamp, Stamp)]) {
+        let newest = |published: Stamp| states.partition_point(|&(_, time)| time <= published).checked_sub(1);
+        let mut delays: Vec<f64> =
+            samples.iter().filter_map(|&(stamp, published)| newest(published).map(|state| states[state].0 - stamp)).collect();
+        delays.sort_unstable_by(f64::total_cmp);
+        let delay = quantile(&delays, 0.5);
+        for &(stamp, published) in samples {
+            self.age.push(published - stamp);
+            // Half a millisecond of slack: states and samples need not stand on one grid.
+            let releasing = states.partition_point(|&(time, _)| time - stamp < delay - 0.5e-3);
+            // The first samples wait until the rate of the states is known.
+            if let Some(&(_, sent)) = states.get(releasing).filter(|&&(_, sent)| published >= sent) {
+                self.beyond_state.push(published - sent);
+            }
+        }
+    }
+}
+
 /// The value that a fraction of a sorted list stays below (nearest rank).
 fn quantile(sorted: &[f64], fraction: f64) -> f64 {
     let rank = (fraction * sorted.len() as f64).ceil() as usize;
@@ -30,19 +51,23 @@ fn latency(reader: &BagReader) -> anyhow::Result<Option<Latency>> {
     if states.is_empty() || imus.is_empty() {
         return Ok(None);
     }
-    let mut published: Vec<Stamp> = Vec::new();
+    // Stamp of each state, and when it was published.
+    let mut published: Vec<(Stamp, Stamp)> = Vec::new();
     for message in reader.messages(&Selection { topics: Some(states), ..Selection::default() })? {
-        published.push(message?.publish_time);
+        let message = message?;
+        let state: SmplState = message.decode()?;
+        published.push((Stamp::from_nanos(state.header.stamp.nanos()), message.publish_time));
     }
     published.sort_unstable();
     let mut latency = Latency { age: Vec::new(), beyond_state: Vec::new() };
-    for message in reader.messages(&Selection { topics: Some(imus), ..Selection::default() })? {
-        let message = message?;
-        let imu: Imu = message.decode()?;
-        latency.age.push(message.publish_time - Stamp::from_nanos(imu.header.stamp.nanos()));
-        if let Some(state) = published.partition_point(|&time| time <= message.publish_time).checked_sub(1) {
-            latency.beyond_state.push(message.publish_time - published[state]);
+    for topic in imus {
+        let mut samples: Vec<(Stamp, Stamp)> = Vec::new();
+        for message in reader.messages(&Selection::topic(&topic))? {
+            let message = message?;
+            let imu: Imu = message.decode()?;
+            samples.push((Stamp::from_nanos(imu.header.stamp.nanos()), message.publish_time));
         }
+        latency.add(&published, &samples);
     }
     latency.age.sort_unstable_by(f64::total_cmp);
     latency.beyond_state.sort_unstable_by(f64::total_cmp);

@@ -23,6 +23,8 @@ node_config! {
         pub compression: String = "none".to_owned(),
         /// Topic of std_msgs/msg/String whose last message becomes the attachment `placements.yaml`.
         pub placements_topic: String = "virtual_imu/placements".to_owned(),
+        /// What else the bag's metadata is to say of the run: the settings of the other nodes, say.
+        pub run: String = String::new(),
         /// Written into the bag's metadata, so that the run can be repeated.
         pub seed: i64 = 0,
     }

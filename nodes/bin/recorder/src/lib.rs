@@ -27,6 +27,7 @@ pub fn run(arguments: &[String]) -> anyhow::Result<()> {
         if config.bag_path.is_empty() { PathBuf::from(node::default_name(Clock::system_now())) } else { PathBuf::from(&config.bag_path) };
     let mut logic = RecorderNode::new(config.clone(), &path)?;
     let (node, _) = prepared.start()?;
+    logic.resolve_names(|name| node.resolve(name))?;
     log::info!("records into {}", path.display());
     let mut recording =
         Recording { bell: Bell::new(), subscriptions: BTreeMap::new(), node: &node, depth: u32::try_from(config.depth).unwrap_or(1000) };
@@ -50,7 +51,7 @@ pub fn run(arguments: &[String]) -> anyhow::Result<()> {
 
 fn check(config: &Config) -> anyhow::Result<()> {
     let flush = config.flush_seconds;
-    anyhow::ensure!(flush.is_finite() && flush > 0.0, "parameter 'flush_seconds': expected more than 0, found {flush}");
+    anyhow::ensure!(flush > 0.0 && flush <= 3600.0, "parameter 'flush_seconds': expected more than 0 and at most 3600, found {flush}");
     anyhow::ensure!(config.depth >= 1, "parameter 'depth': expected 1 or more, found {}", config.depth);
     let compression = config.compression.as_str();
     anyhow::ensure!(matches!(compression, "none" | "zstd"), "parameter 'compression': expected none or zstd, found '{compression}'");

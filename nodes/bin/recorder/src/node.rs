@@ -5,7 +5,7 @@ use std::path::Path;
 
 use cromosim_bag::{BagError, BagOptions, BagSummary, BagWriter, Compression, QosProfile, Topic, TopicId};
 use cromosim_msgs::std_msgs;
-use cromosim_ros::{Durability, Endpoint, History, Qos, RawMessage, Received, Reliability};
+use cromosim_ros::{Durability, Endpoint, History, Qos, RawMessage, Received, Reliability, RosResult};
 use cromosim_spatial::Stamp;
 
 use crate::config::Config;
@@ -36,6 +36,18 @@ impl RecorderNode {
         Ok(Self { config, bag, topics: BTreeMap::new(), placements: None })
     }
 
+    /// Makes the names of the configuration absolute, as `resolve` knows the node's namespace and remaps.
+    ///
+    /// # Errors
+    /// What `resolve` refuses.
+    pub fn resolve_names(&mut self, resolve: impl Fn(&str) -> RosResult<String>) -> RosResult<()> {
+        let Config { topics, exclude, placements_topic, .. } = &mut self.config;
+        for name in topics.iter_mut().chain(exclude).chain([placements_topic]) {
+            *name = resolve(name)?;
+        }
+        Ok(())
+    }
+
     /// Whether a topic is to be recorded.
     pub fn wants(&self, topic: &str) -> bool {
         let infrastructure = matches!(topic, "/rosout" | "/parameter_events");
@@ -63,7 +75,7 @@ impl RecorderNode {
         let Some(&id) = self.topics.get(topic) else { return Ok(()) };
         let published = received.source_stamp.unwrap_or(received.received_stamp);
         self.bag.write_payload(id, received.message.cdr(), received.received_stamp, published)?;
-        if topic.trim_start_matches('/') == self.config.placements_topic.trim_start_matches('/') {
+        if topic == self.config.placements_topic {
             self.attach_placements(received)?;
         }
         Ok(())
@@ -102,6 +114,7 @@ fn run_metadata(config: &Config) -> BTreeMap<String, String> {
         ("version".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
         ("seed".to_owned(), config.seed.to_string()),
         ("recorder".to_owned(), configuration),
+        ("run".to_owned(), config.run.clone()),
     ])
 }
 

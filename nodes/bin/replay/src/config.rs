@@ -23,7 +23,7 @@ node_config! {
         pub clock_rate_hz: f64 = 0.0,
         /// Wait for `~/resume` before the first message.
         pub start_paused: bool = false,
-        /// The up axis of the motion file: auto, y or z.
+        /// The up axis of the motion file: auto, x, y or z.
         pub up_axis: String = "auto".to_owned(),
         /// Metres of one unit of the motion file; 0: found out from the skeleton's size.
         pub unit_m: f64 = 0.0,

@@ -64,6 +64,8 @@ fn check(config: &Config) -> anyhow::Result<()> {
     for (name, value) in not_negative {
         anyhow::ensure!(value.is_finite() && value >= 0.0, "parameter '{name}': expected 0 or more, found {value}");
     }
+    let patience = config.ready_timeout_seconds;
+    anyhow::ensure!(patience <= 86_400.0, "parameter 'ready_timeout_seconds': expected at most a day (86400), found {patience}");
     // Opened here too, so that --check-config finds what is wrong with the file.
     Source::open(config).map(drop)
 }
@@ -90,7 +92,7 @@ impl Playback<'_> {
                 self.source.seek(recorded)?;
             }
             if let (Some(clock), true) = (&self.clock, ticks.is_due()) {
-                clock.publish(Stamp::from_nanos(self.remote.player().recorded_at(system_nanos())))?;
+                clock.publish(Stamp::from_nanos(self.remote.player().recorded_at(system_nanos()).max(self.source.begins())))?;
             }
             let Some(due) = self.source.due() else {
                 if !self.config.r#loop {
@@ -122,6 +124,7 @@ impl Playback<'_> {
     fn begin_again(&mut self) -> anyhow::Result<()> {
         let begins = self.source.begins();
         self.source.seek(begins)?;
+        anyhow::ensure!(self.source.due().is_some(), "nothing to play again: the part that was chosen holds no messages");
         self.remote.player().seek(system_nanos() + PAUSE_BETWEEN_ROUNDS, begins);
         Ok(())
     }

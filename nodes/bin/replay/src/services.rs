@@ -116,7 +116,7 @@ impl Remote {
     fn ask_for(&self, messages: u64) -> u64 {
         self.change(|shared, _| {
             let granted = if shared.player.paused() { messages } else { 0 };
-            shared.burst += granted;
+            shared.burst = shared.burst.saturating_add(granted);
             granted
         })
     }

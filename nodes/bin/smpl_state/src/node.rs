@@ -117,7 +117,7 @@ impl SmplStateNode {
         Ok(Step { state, frames })
     }
 
-    /// A source that starts over (a loop, a seek) starts the averages over too.
+    /// A source that starts over (a loop, a seek) starts the smoothing over too.
     fn watch_time(&mut self, nanos: i64) {
         if let Some(last) = self.counts.last_nanos {
             let gap = (nanos - last) as f64 * 1e-9;

@@ -54,6 +54,9 @@ pub enum Refusal {
     /// The shape does not suit the body.
     #[error(transparent)]
     Body(#[from] BodyError),
+    /// A state of the same time has been there.
+    #[error("a second state at {} ns", .0.nanos)]
+    Repeated(Stamp),
     /// A frame cannot be used.
     #[error(transparent)]
     Imu(#[from] ImuError),
@@ -164,6 +167,9 @@ impl VirtualImuNode {
         let (root_position, local_rotations) = state.root_and_rotations()?;
         let body = BodyPose { root_position, local_rotations };
         let stamp = Stamp::from_nanos(state.header.stamp.nanos());
+        if self.last == Some(stamp) {
+            return Err(Refusal::Repeated(stamp));
+        }
         self.watch_time(stamp);
         if state.betas != self.betas {
             self.shaped = ShapedBody::new(self.model.clone(), &state.betas)?;

@@ -60,6 +60,10 @@ impl PlacementSet {
             }
             placements.push(placement);
         }
+        if placements.is_empty() {
+            let (placement, field) = ("(all)".to_owned(), "placements");
+            return Err(ImuError::Placement { file: file.to_owned(), placement, field, problem: PlacementProblem::Missing });
+        }
         Ok(Self { placements })
     }
 

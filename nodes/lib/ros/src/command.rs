@@ -150,9 +150,9 @@ pub struct Periodic {
 }
 
 impl Periodic {
-    /// Due at once, and then `rate_hz` times a second; never for a rate of 0.
+    /// Due at once, and then `rate_hz` times a second; never for a rate of 0, or one that is as good as 0.
     pub fn new(rate_hz: f64) -> Self {
-        let interval = (rate_hz > 0.0).then(|| Duration::from_secs_f64(1.0 / rate_hz));
+        let interval = (rate_hz > 0.0).then(|| Duration::try_from_secs_f64(1.0 / rate_hz).ok()).flatten();
         Self { interval, next: Instant::now() }
     }
 
