@@ -235,6 +235,8 @@ fn playback_services_pause_step_seek_and_change_the_rate() {
         assert!(nothing(), "three and no more");
         let time = cromosim_msgs::builtin_interfaces::Time::from_nanos(6_000_000_000);
         assert!(call!(Seek, "seek", srv::SeekRequest { time }).success);
+        let beyond = cromosim_msgs::builtin_interfaces::Time::from_nanos(60_000_000_000);
+        assert!(!call!(Seek, "seek", srv::SeekRequest { time: beyond }).success);
         assert!(call!(PlayNext, "play_next", srv::PlayNextRequest::default()).success);
         let after = poses.recv_timeout(PATIENCE).unwrap().unwrap().message.header.stamp.nanos();
         assert!((6_000_000_000..6_020_000_000).contains(&after), "{after}");

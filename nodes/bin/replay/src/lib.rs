@@ -45,7 +45,7 @@ pub fn run(arguments: &[String]) -> anyhow::Result<()> {
     node.shutdown().ring_at_request(&bell);
     // A moment of lead, so that the first message is not late already.
     let player = Player::new(system_nanos() + LEAD, source.begins(), config.rate, config.start_paused);
-    let remote = Remote::new(player, &bell);
+    let remote = Remote::new(player, source.begins()..=source.ends(), &bell);
     let _services = remote.serve(&node)?;
     let ended = Playback { node: &node, config: &config, source, outlet: &outlet, clock, remote: &remote, bell: &bell }.play();
     outlet.wait_until_received(Duration::from_secs(2));
@@ -90,6 +90,7 @@ impl Playback<'_> {
         while !self.node.shutdown().is_requested() {
             if let Some(recorded) = self.remote.take_seek() {
                 self.source.seek(recorded)?;
+                self.remote.player().seek(system_nanos(), recorded);
             }
             if let (Some(clock), true) = (&self.clock, ticks.is_due()) {
                 clock.publish(Stamp::from_nanos(self.remote.player().recorded_at(system_nanos()).max(self.source.begins())))?;

@@ -1,5 +1,6 @@
 //! The playback services, with the names and types of rosbag2_interfaces.
 
+use std::ops::RangeInclusive;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use cromosim_msgs::rosbag2_interfaces as srv;
@@ -19,6 +20,8 @@ struct Shared {
     player: Player,
     /// Recorded time to go on at.
     seek: Option<i64>,
+    /// What `seek` may be.
+    seekable: RangeInclusive<i64>,
     /// Messages to publish at once while paused.
     burst: u64,
 }
@@ -40,9 +43,9 @@ impl std::ops::DerefMut for PlayerGuard<'_> {
 }
 
 impl Remote {
-    /// Control of `player`; `bell` wakes the playing loop.
-    pub fn new(player: Player, bell: &Arc<Bell>) -> Self {
-        Self { shared: Arc::new(Mutex::new(Shared { player, seek: None, burst: 0 })), bell: bell.clone() }
+    /// Control of `player` within the recorded times `seekable`; `bell` wakes the playing loop.
+    pub fn new(player: Player, seekable: RangeInclusive<i64>, bell: &Arc<Bell>) -> Self {
+        Self { shared: Arc::new(Mutex::new(Shared { player, seek: None, seekable, burst: 0 })), bell: bell.clone() }
     }
 
     fn lock(&self) -> MutexGuard<'_, Shared> {
@@ -101,11 +104,14 @@ impl Remote {
             node.serve::<srv::GetRate>("~/get_rate", move |_| srv::GetRateResponse { rate: get_rate.player().rate() })?,
             node.serve::<srv::Seek>("~/seek", move |request| {
                 let recorded = request.time.nanos();
-                seek.change(|shared, now| {
-                    shared.player.seek(now, recorded);
-                    shared.seek = Some(recorded);
-                });
-                srv::SeekResponse { success: true }
+                // The playing loop moves the source and the player together.
+                seek.change(|shared, _| {
+                    let success = shared.seekable.contains(&recorded);
+                    if success {
+                        shared.seek = Some(recorded);
+                    }
+                    srv::SeekResponse { success }
+                })
             })?,
             node.serve::<srv::PlayNext>("~/play_next", move |_| srv::PlayNextResponse { success: play_next.ask_for(1) == 1 })?,
             node.serve::<srv::Burst>("~/burst", move |request| srv::BurstResponse { actually_burst: burst.ask_for(request.num_messages) })?,

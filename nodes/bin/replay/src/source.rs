@@ -142,6 +142,14 @@ impl Source {
         }
     }
 
+    /// Recorded time of the end, ns.
+    pub fn ends(&self) -> i64 {
+        match self {
+            Self::Motion { motion, .. } => motion.recorded(motion.motion.frames.len().saturating_sub(1)),
+            Self::Bag { reader, .. } => reader.summary().time_range.map_or(0, |(_, last)| last.nanos),
+        }
+    }
+
     /// Recorded time of what comes next, ns; none at the end.
     pub fn due(&self) -> Option<i64> {
         match self {

@@ -15,7 +15,7 @@ use cromosim_msgs::RosMessage;
 use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_msgs::tf2_msgs::TFMessage;
-use cromosim_ros::{Bell, Node, Periodic, Qos, RosError, Subscription, prepare};
+use cromosim_ros::{Bell, Node, Periodic, Qos, Received, RosError, Subscription, prepare};
 use cromosim_view::{Destination, Recording, RecordingOptions};
 
 pub use config::Config;
@@ -67,20 +67,28 @@ impl Listeners {
     /// Hands everything that has come to the node's logic.
     fn drain(&self, logic: &mut ViewerNode) -> anyhow::Result<()> {
         for subscription in &self.frames {
-            while let Some(received) = subscription.try_recv()? {
+            while let Some(received) = next(subscription) {
                 logic.learn_frames(&received.message);
             }
         }
-        while let Some(received) = self.states.try_recv()? {
+        while let Some(received) = next(&self.states) {
             tolerate(logic.show_state(&received.message))?;
         }
         for (placement, subscription) in self.imus.values() {
-            while let Some(received) = subscription.try_recv()? {
+            while let Some(received) = next(subscription) {
                 tolerate(logic.show_imu(placement, &received.message))?;
             }
         }
         Ok(())
     }
+}
+
+/// The next message; what cannot be read is worth a line, and those after it are looked at in the next round.
+fn next<M: RosMessage>(subscription: &Subscription<M>) -> Option<Received<M>> {
+    subscription.try_recv().unwrap_or_else(|error| {
+        log::warn!("{error}");
+        None
+    })
 }
 
 /// A message that makes no sense is worth a line; a recording that is lost ends the node.
@@ -118,9 +126,11 @@ pub fn run(arguments: &[String]) -> anyhow::Result<()> {
     let mut listeners = Listeners::new(&node)?;
     println!("ready");
     let outcome = listen(&node, &mut listeners, &mut logic);
-    let summary = logic.finish()?;
+    let finished = logic.finish();
+    outcome?;
+    let summary = finished?;
     log::info!("{destination}: {} frames of the body, {} IMU samples", summary.body_frames, summary.imu_samples);
-    outcome
+    Ok(())
 }
 
 fn listen(node: &Node, listeners: &mut Listeners, logic: &mut ViewerNode) -> anyhow::Result<()> {

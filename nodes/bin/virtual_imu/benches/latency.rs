@@ -80,13 +80,13 @@ fn measure(set: &PlacementSet, file: &str) -> Vec<f64> {
     let walk = cromosim_motion::embedded_walk();
     let begin = Clock::system_now().nanos + 50_000_000;
     let mut sent: Vec<i64> = Vec::new();
-    let mut latencies = Vec::new();
+    let mut arrivals = Vec::new();
     while sent.len() < STATES {
         let due = begin + sent.len() as i64 * INTERVAL_NANOS;
         let left = due - Clock::system_now().nanos;
         if left > 0 {
             bell.wait(Some(Duration::from_nanos(left as u64)));
-            collect(&imus, &sent, &mut latencies);
+            collect(&imus, &mut arrivals);
             continue;
         }
         let body = &walk.frames[sent.len() % walk.frames.len()];
@@ -96,21 +96,37 @@ fn measure(set: &PlacementSet, file: &str) -> Vec<f64> {
         states.publish(&state).expect("the state gets out");
     }
     std::thread::sleep(Duration::from_millis(200));
-    collect(&imus, &sent, &mut latencies);
+    collect(&imus, &mut arrivals);
+    let latencies = latencies(begin, &sent, &arrivals);
     assert!(latencies.len() > (STATES - WARM_UP - 20) * imus.len(), "samples are missing: {}", latencies.len());
-    latencies.sort_unstable_by(f64::total_cmp);
     latencies
 }
 
-/// Takes what has come. The state that released a sample is the last one sent before the node published it.
-fn collect(imus: &[Subscription<Imu>], sent: &[i64], latencies: &mut Vec<f64>) {
+/// A sample's stamp, and when it arrived here; ns.
+type Arrival = (i64, i64);
+
+/// Takes what has come.
+fn collect(imus: &[Subscription<Imu>], arrivals: &mut Vec<Arrival>) {
     for subscription in imus {
         while let Some(received) = subscription.try_recv().expect("readable samples") {
-            let published = received.source_stamp.map_or(received.received_stamp.nanos, |stamp| stamp.nanos);
-            let state = sent.partition_point(|&time| time <= published);
-            if state > WARM_UP {
-                latencies.push((received.received_stamp.nanos - sent[state - 1]) as f64 * 1e-9);
-            }
+            arrivals.push((received.message.header.stamp.nanos(), received.received_stamp.nanos));
         }
     }
+}
+
+/// Seconds from just before the publication of the state that released each sample, sorted. That state is the first one whose stamp is the
+/// scheme's delay later than the sample's; the delay is the median age of samples on the grid of the states.
+fn latencies(begin: i64, sent: &[i64], arrivals: &[Arrival]) -> Vec<f64> {
+    let frames_of = |nanos: i64| nanos.div_euclid(INTERVAL_NANOS);
+    let mut ages: Vec<i64> = arrivals.iter().map(|(stamp, arrived)| frames_of(arrived - stamp)).collect();
+    ages.sort_unstable();
+    let delay_frames = ages[ages.len() / 2];
+    let releasing = |stamp: i64| usize::try_from((stamp - begin + INTERVAL_NANOS / 2).div_euclid(INTERVAL_NANOS) + delay_frames).ok();
+    let latency = |&(stamp, arrived): &Arrival| {
+        let state = releasing(stamp).filter(|&state| state > WARM_UP)?;
+        Some((arrived - sent.get(state)?) as f64 * 1e-9)
+    };
+    let mut latencies: Vec<f64> = arrivals.iter().filter_map(latency).collect();
+    latencies.sort_unstable_by(f64::total_cmp);
+    latencies
 }
