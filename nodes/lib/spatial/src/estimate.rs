@@ -1,0 +1,439 @@
+//! A continuous-time estimate of a motion from noisy poses, with its own uncertainty.
+
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use rustfft::num_complex::Complex64;
+
+use crate::holes::fill_holes;
+use crate::spectrum::interpolated;
+use crate::{FourierPair, KinematicTrack, SpatialError, Spectrum, Stamp, so3, welch};
+
+/// Length of the windows from which the spectra are learnt, s, and below which multiple of the noise a spectrum counts as noise alone: three
+/// standard errors over three axes of a minute. The longer ones resolve lines, which steady gaits and machines have.
+const WINDOWS: [(f64, f64); 3] = [(5.0, 1.4), (20.0, 3.0), (f64::INFINITY, 8.0)];
+/// What is added at each end before the transform, s.
+const PADDING_S: f64 = 2.0;
+/// The same beyond the band of motion, where among hundreds of frequencies some reach three standard errors by chance, and where the second
+/// derivative makes much of little.
+const LONE_BAND: f64 = 2.2;
+/// Largest factor by which a smoothing that is undone may amplify.
+const LARGEST_GAIN: f64 = 100.0;
+
+/// White noise of poses: standard deviation per sample and axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PoseNoise {
+    /// m.
+    pub position: f64,
+    /// rad.
+    pub rotation: f64,
+}
+
+/// A motion as poses at a steady rate report it, with what is noise in them told from what is motion.
+///
+/// Model: each coordinate (three of the position, four of the sign-continuous quaternion) is a stationary signal with white noise of density N.
+/// N is the floor of the Welch spectrum S; Wiener's filter `W(f) = max(0, 1 - N / S(f))`, zero where S is hardly above N, gives the estimate with the
+/// least mean square error, whose own error has the density `W N`. S is taken with short and long windows, whichever says more. Derivatives are taken in the Fourier domain, where they are exact.
+/// Holes between samples are filled by the likeliest series of the same spectrum and are reported by [`PoseEstimate::gaps`].
+#[derive(Clone, Debug)]
+pub struct PoseEstimate {
+    start: Stamp,
+    rate_hz: f64,
+    count: usize,
+    padding: usize,
+    transform: FourierPair,
+    /// Of each coordinate's padded series less a straight line.
+    spectra: Vec<Vec<Complex64>>,
+    /// Value at entry 0 of the padded series, slope per entry.
+    lines: Vec<(f64, f64)>,
+    position: Floor,
+    rotation: Floor,
+    gaps: Vec<(Stamp, Stamp)>,
+}
+
+/// What is noise in a spectrum.
+#[derive(Clone, Debug)]
+struct Floor {
+    spectrum: Spectrum,
+    /// One-sided density of the noise, mean over the coordinates.
+    noise: f64,
+    /// Wiener's filter, finer than the spectrum.
+    filter: Vec<f64>,
+    /// Distance of the filter's frequencies, Hz.
+    spacing_hz: f64,
+}
+
+impl PoseEstimate {
+    /// Learns from poses in the order of time: `stamps`, positions [m], rotations (world_from_segment).
+    ///
+    /// # Errors
+    /// [`SpatialError::TooFewSamples`] below 16, [`SpatialError::TimeNotIncreasing`], [`SpatialError::NotFinite`],
+    /// [`SpatialError::LengthMismatch`].
+    pub fn fit(stamps: &[Stamp], positions: &[Vector3<f64>], rotations: &[UnitQuaternion<f64>]) -> Result<Self, SpatialError> {
+        check(stamps, positions, rotations)?;
+        let raster = Raster::new(stamps)?;
+        let quaternions = so3::sign_continuous(rotations);
+        let coordinates: Vec<Vec<f64>> = (0..7)
+            .map(|channel| {
+                let of = |index: usize| if channel < 3 { positions[index][channel] } else { quaternions[index].coords[channel - 3] };
+                raster.resample(stamps, of)
+            })
+            .collect();
+        Ok(Self::on_raster(&raster, coordinates))
+    }
+
+    fn on_raster(raster: &Raster, mut coordinates: Vec<Vec<f64>>) -> Self {
+        let rate_hz = raster.rate_hz;
+        let padding = ((PADDING_S * rate_hz) as usize).min(raster.count - 1);
+        let transform = FourierPair::new(FourierPair::good_length(raster.count + 2 * padding));
+        let holes = raster.holes();
+        let learn = |coordinates: &[Vec<f64>]| [Floor::learn(&coordinates[..3], rate_hz), Floor::learn(&coordinates[3..], rate_hz)];
+        let mut floors = learn(&coordinates);
+        // Twice, because the first spectra saw straight lines across the holes.
+        for _ in 0..if holes.is_empty() { 0 } else { 2 } {
+            let (positions, quaternions) = coordinates.split_at_mut(3);
+            fill_holes(positions, &holes, &floors[0].spectrum, &transform, rate_hz);
+            fill_holes(quaternions, &holes, &floors[1].spectrum, &transform, rate_hz);
+            floors = learn(&coordinates);
+        }
+        let (spectra, lines) = coordinates.iter().map(|series| padded_transform(series, padding, &transform)).unzip();
+        let [position, rotation] = floors;
+        let (start, count, gaps) = (raster.start, raster.count, raster.gaps());
+        Self { start, rate_hz, count, padding, transform, spectra, lines, position, rotation, gaps }
+    }
+
+    /// Time of the first pose.
+    pub fn start(&self) -> Stamp {
+        self.start
+    }
+
+    /// Time of the last pose.
+    pub fn end(&self) -> Stamp {
+        self.start.plus_seconds((self.count - 1) as f64 / self.rate_hz)
+    }
+
+    /// Rate of the poses, Hz.
+    pub fn rate_hz(&self) -> f64 {
+        self.rate_hz
+    }
+
+    /// Where poses are missing: the stamps of the poses before and after.
+    pub fn gaps(&self) -> &[(Stamp, Stamp)] {
+        &self.gaps
+    }
+
+    /// White noise of the poses. A rotation vector's variance per axis is 4/3 of the quaternion components' sum.
+    pub fn noise(&self) -> PoseNoise {
+        let sigma = |density: f64| (density * self.rate_hz / 2.0).sqrt();
+        PoseNoise { position: sigma(self.position.noise), rotation: sigma(self.rotation.noise * 16.0 / 3.0) }
+    }
+
+    /// Mean spectra of position per axis [m2/Hz] and of the rotation vector per axis [rad2/Hz], noise included.
+    pub fn spectra(&self) -> (Spectrum, Spectrum) {
+        let mut rotation = self.rotation.spectrum.clone();
+        rotation.density.iter_mut().for_each(|value| *value *= 16.0 / 3.0);
+        (self.position.spectrum.clone(), rotation)
+    }
+
+    /// One-sided density per axis of the estimate's error at a frequency: position [m2/Hz], rotation vector [rad2/Hz].
+    /// `undone_hz` as in [`PoseEstimate::track`].
+    pub fn error_density(&self, frequency_hz: f64, undone_hz: Option<f64>) -> (f64, f64) {
+        let gain = undo(frequency_hz, undone_hz, self.rate_hz);
+        let density = |floor: &Floor| if gain > LARGEST_GAIN { 0.0 } else { floor.noise * floor.filter_at(frequency_hz) * gain * gain };
+        (density(&self.position), density(&self.rotation) * 16.0 / 3.0)
+    }
+
+    /// Share of the motion at a frequency that the estimate keeps, of position and of rotation, and the gain that undoes a smoothing.
+    pub fn filter_at(&self, frequency_hz: f64, undone_hz: Option<f64>) -> (f64, f64, f64) {
+        let gain = undo(frequency_hz, undone_hz, self.rate_hz);
+        if gain > LARGEST_GAIN {
+            return (0.0, 0.0, gain);
+        }
+        (self.position.filter_at(frequency_hz), self.rotation.filter_at(frequency_hz), gain)
+    }
+
+    /// The kinematics on a grid of at least `least_rate_hz`, a whole multiple of the poses' rate, from the first pose to the last.
+    /// `undone_hz`: cutoff of a zero-phase smoothing (second-order Butterworth, forwards and backwards) that the poses went through and that is undone,
+    /// up to a factor of 100.
+    pub fn track(&self, least_rate_hz: f64, undone_hz: Option<f64>) -> KinematicTrack {
+        let factor = (least_rate_hz / self.rate_hz).ceil().max(1.0) as usize;
+        let inverse = FourierPair::new(self.transform.length() * factor);
+        let rate_hz = self.rate_hz * factor as f64;
+        let count = (self.count - 1) * factor + 1;
+        let series = |channel: usize, order: i32| self.derivative(channel, order, factor, undone_hz, &inverse, count);
+        let accelerations = [series(0, 2), series(1, 2), series(2, 2)];
+        let values: Vec<Vec<f64>> = (3..7).map(|channel| series(channel, 0)).collect();
+        let rates: Vec<Vec<f64>> = (3..7).map(|channel| series(channel, 1)).collect();
+        let seconds: Vec<Vec<f64>> = (3..7).map(|channel| series(channel, 2)).collect();
+        let quaternion = |of: &[Vec<f64>], k: usize| Quaternion::new(of[3][k], of[0][k], of[1][k], of[2][k]);
+        let mut track = KinematicTrack { start: self.start, rate_hz, ..KinematicTrack::default() };
+        for k in 0..count {
+            let (q, q_dot, q_ddot) = (quaternion(&values, k), quaternion(&rates, k), quaternion(&seconds, k));
+            let world_from_segment = UnitQuaternion::from_quaternion(q);
+            let segment_from_world = world_from_segment.inverse();
+            track.world_from_segment.push(world_from_segment);
+            track.acceleration.push(segment_from_world * Vector3::new(accelerations[0][k], accelerations[1][k], accelerations[2][k]));
+            track.angular_velocity.push(so3::angular_velocity_in_body(&q, &q_dot));
+            track.angular_acceleration.push(segment_from_world * so3::angular_acceleration_in_world(&q, &q_dot, &q_ddot));
+        }
+        track
+    }
+
+    /// A coordinate's derivative of some order, upsampled by `factor`.
+    fn derivative(
+        &self,
+        channel: usize,
+        order: i32,
+        factor: usize,
+        undone_hz: Option<f64>,
+        inverse: &FourierPair,
+        count: usize,
+    ) -> Vec<f64> {
+        let floor = if channel < 3 { &self.position } else { &self.rotation };
+        let length = self.transform.length();
+        let spacing_hz = self.rate_hz / length as f64;
+        let mut values = vec![Complex64::default(); inverse.length()];
+        for k in 0..=length / 2 {
+            let frequency_hz = k as f64 * spacing_hz;
+            let gain = undo(frequency_hz, undone_hz, self.rate_hz);
+            let weight = if gain > LARGEST_GAIN { 0.0 } else { floor.filter_at(frequency_hz) * gain };
+            if weight == 0.0 || 2 * k == length {
+                continue;
+            }
+            let value = self.spectra[channel][k] * Complex64::new(0.0, TAU * frequency_hz).powi(order) * weight * factor as f64;
+            values[k] = value;
+            if k > 0 {
+                let mirror = inverse.length() - k;
+                values[mirror] = value.conj();
+            }
+        }
+        inverse.inverse(&mut values);
+        let (level, slope) = self.lines[channel];
+        let first = self.padding * factor;
+        (0..count)
+            .map(|k| {
+                let line = match order {
+                    0 => level + slope * (first + k) as f64 / factor as f64,
+                    1 => slope * self.rate_hz,
+                    _ => 0.0,
+                };
+                values[first + k].re + line
+            })
+            .collect()
+    }
+}
+
+/// Gain that undoes a zero-phase second-order Butterworth smoothing, `1 / (1 + (f / fc)^4)`, with the frequencies as the bilinear transform bends
+/// them at the poses' rate.
+pub(crate) fn undo(frequency_hz: f64, undone_hz: Option<f64>, rate_hz: f64) -> f64 {
+    undone_hz.map_or(1.0, |cutoff_hz| {
+        let bent = |hz: f64| (std::f64::consts::PI * (hz / rate_hz).min(0.499)).tan();
+        1.0 + (bent(frequency_hz) / bent(cutoff_hz)).powi(4)
+    })
+}
+
+fn check(stamps: &[Stamp], positions: &[Vector3<f64>], rotations: &[UnitQuaternion<f64>]) -> Result<(), SpatialError> {
+    for (what, found) in [("positions", positions.len()), ("rotations", rotations.len())] {
+        if found != stamps.len() {
+            return Err(SpatialError::LengthMismatch { what, expected: stamps.len(), found });
+        }
+    }
+    if stamps.len() < 16 {
+        return Err(SpatialError::TooFewSamples { got: stamps.len(), needed: 16 });
+    }
+    if let Some(index) = (1..stamps.len()).find(|&k| stamps[k] <= stamps[k - 1]) {
+        let (previous, next) = (stamps[index - 1].as_seconds(), stamps[index].as_seconds());
+        return Err(SpatialError::TimeNotIncreasing { index, previous, next });
+    }
+    let finite = |k: &usize| positions[*k].iter().chain(rotations[*k].coords.iter()).all(|value| value.is_finite());
+    match (0..stamps.len()).find(|k| !finite(k)) {
+        Some(index) => Err(SpatialError::NotFinite { index, what: "pose" }),
+        None => Ok(()),
+    }
+}
+
+/// A uniform grid through samples that may have holes.
+struct Raster {
+    start: Stamp,
+    rate_hz: f64,
+    count: usize,
+    /// Position of each sample on the grid.
+    places: Vec<f64>,
+}
+
+impl Raster {
+    fn new(stamps: &[Stamp]) -> Result<Self, SpatialError> {
+        let mut intervals: Vec<f64> = stamps.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        intervals.sort_unstable_by(f64::total_cmp);
+        let median = intervals[intervals.len() / 2];
+        // The mean interval, holes counted by how many medians they span.
+        let spans: f64 = stamps.windows(2).map(|pair| ((pair[1] - pair[0]) / median).round().max(1.0)).sum();
+        let mean = (stamps[stamps.len() - 1] - stamps[0]) / spans;
+        let interval = if (mean / median - 1.0).abs() < 0.02 { mean } else { median };
+        let places: Vec<f64> = stamps.iter().map(|stamp| (*stamp - stamps[0]) / interval).collect();
+        let count = places[places.len() - 1].round() as usize + 1;
+        if count > 20_000_000 {
+            return Err(SpatialError::TooManyStamps { count: count as f64, limit: 2e7, rate_hz: 1.0 / interval });
+        }
+        Ok(Self { start: stamps[0], rate_hz: 1.0 / interval, count, places })
+    }
+
+    /// Runs of entries without a sample.
+    fn holes(&self) -> Vec<Range<usize>> {
+        let between = |pair: &[f64]| (pair[0] + 0.5).ceil() as usize..(pair[1] - 0.5).ceil().max(0.0) as usize;
+        self.places.windows(2).filter(|pair| pair[1] - pair[0] > 1.6).map(between).filter(|hole| !hole.is_empty()).collect()
+    }
+
+    fn gaps(&self) -> Vec<(Stamp, Stamp)> {
+        let stamp = |place: f64| self.start.plus_seconds(place / self.rate_hz);
+        self.places.windows(2).filter(|pair| pair[1] - pair[0] > 1.6).map(|pair| (stamp(pair[0]), stamp(pair[1]))).collect()
+    }
+
+    /// Values at the grid's entries: the sample itself where one lies there, else a cubic through the four around it (no more than linear next to
+    /// a hole, so that nothing overshoots).
+    fn resample(&self, stamps: &[Stamp], of: impl Fn(usize) -> f64) -> Vec<f64> {
+        let mut right = 0;
+        (0..self.count)
+            .map(|entry| {
+                let place = entry as f64;
+                while right + 1 < stamps.len() && self.places[right] < place {
+                    right += 1;
+                }
+                let left = right.saturating_sub(1);
+                let nearest = if (self.places[left] - place).abs() < (self.places[right] - place).abs() { left } else { right };
+                if (self.places[nearest] - place).abs() < 0.01 {
+                    return of(nearest);
+                }
+                let from = left.saturating_sub(1);
+                let to = (right + 1).min(stamps.len() - 1);
+                if to - from == 3 && self.places[to] - self.places[from] < 4.0 {
+                    return lagrange(&self.places[from..=to], |k| of(from + k), place);
+                }
+                let span = self.places[right] - self.places[left];
+                let share = if span > 0.0 { ((place - self.places[left]) / span).clamp(0.0, 1.0) } else { 0.0 };
+                of(left) * (1.0 - share) + of(right) * share
+            })
+            .collect()
+    }
+}
+
+fn lagrange(nodes: &[f64], of: impl Fn(usize) -> f64, place: f64) -> f64 {
+    (0..nodes.len())
+        .map(|k| {
+            let others = nodes.iter().enumerate().filter(|(j, _)| *j != k);
+            of(k) * others.map(|(_, node)| (place - node) / (nodes[k] - node)).product::<f64>()
+        })
+        .sum()
+}
+
+/// Transform of a series continued oddly at both ends, less the line between the ends, faded out in the outer half of the padding.
+fn padded_transform(series: &[f64], padding: usize, transform: &FourierPair) -> (Vec<Complex64>, (f64, f64)) {
+    let count = series.len();
+    let last = count - 1;
+    let length = transform.length();
+    let slope = (series[last] - series[0]) / last as f64;
+    let level = series[0] - slope * padding as f64;
+    let value = |entry: i64| {
+        if entry < 0 {
+            2.0 * series[0] - series[((-entry) as usize).min(last)]
+        } else if entry as usize > last {
+            2.0 * series[last] - series[(2 * last).saturating_sub(entry as usize)]
+        } else {
+            series[entry as usize]
+        }
+    };
+    let mut values = vec![Complex64::default(); length];
+    for (k, slot) in values.iter_mut().enumerate().take(count + 2 * padding) {
+        let outside = padding.saturating_sub(k).max((k + 1).saturating_sub(count + padding));
+        let share = if padding > 0 { 2.0 * outside as f64 / padding as f64 - 1.0 } else { 0.0 };
+        let fade = if share > 0.0 { 0.5 + 0.5 * (share.min(1.0) * std::f64::consts::PI).cos() } else { 1.0 };
+        *slot = Complex64::new((value(k as i64 - padding as i64) - level - slope * k as f64) * fade, 0.0);
+    }
+    transform.forward(&mut values);
+    (values, (level, slope))
+}
+
+impl Floor {
+    fn learn(coordinates: &[Vec<f64>], rate_hz: f64) -> Self {
+        let count = coordinates[0].len();
+        let spectra: Vec<(Spectrum, f64)> = WINDOWS
+            .iter()
+            .map(|&(seconds, alone)| {
+                let window = if seconds.is_finite() { (seconds * rate_hz) as usize } else { count - 1 };
+                let most = if seconds > 5.0 { count - 1 } else { count / 4 };
+                (mean_spectrum(coordinates, rate_hz, window.min(most).max(8)), alone)
+            })
+            .collect();
+        let spectrum = spectra[0].0.clone();
+        let noise = noise_floor(&spectrum, rate_hz);
+        let spacing_hz = spectra[2].0.spacing_hz.min(spectrum.spacing_hz);
+        let edge_hz = edge(&spectrum, noise);
+        let filter = (0..=(rate_hz / 2.0 / spacing_hz) as usize)
+            .map(|k| {
+                let frequency_hz = k as f64 * spacing_hz;
+                // The mean and what is slower than a window is motion.
+                if frequency_hz < 1.5 * spectrum.spacing_hz {
+                    return 1.0;
+                }
+                let weight = |(spectrum, alone): &(Spectrum, f64)| {
+                    let density = spectrum.at(frequency_hz);
+                    let alone = if frequency_hz < edge_hz { *alone } else { alone.max(LONE_BAND) };
+                    if density <= alone * noise || density <= 0.0 { 0.0 } else { 1.0 - noise / density }
+                };
+                spectra.iter().map(weight).fold(0.0, f64::max)
+            })
+            .collect();
+        Self { spectrum, noise, filter, spacing_hz }
+    }
+
+    fn filter_at(&self, frequency_hz: f64) -> f64 {
+        interpolated(&self.filter, frequency_hz / self.spacing_hz)
+    }
+}
+
+/// Where the band of motion ends: from there on three neighbours lie at the noise.
+fn edge(spectrum: &Spectrum, noise: f64) -> f64 {
+    let quiet = |window: &[f64]| window.iter().all(|density| *density < WINDOWS[0].1 * noise);
+    let first = spectrum.density.windows(3).position(quiet).unwrap_or(spectrum.density.len());
+    spectrum.frequency(first)
+}
+
+/// Mean Welch spectrum of several coordinates.
+fn mean_spectrum(coordinates: &[Vec<f64>], rate_hz: f64, window: usize) -> Spectrum {
+    let mut mean = Spectrum::default();
+    for series in coordinates {
+        // Differences first: a steep spectrum would leak through the window. Undone by |2 sin(pi f / rate)|^2.
+        let differences: Vec<f64> = series.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let spectrum = welch(&differences, rate_hz, window);
+        if mean.density.is_empty() {
+            mean = Spectrum { density: vec![0.0; spectrum.density.len()], ..spectrum };
+        }
+        for (k, sum) in mean.density.iter_mut().enumerate() {
+            let gain = 2.0 * (std::f64::consts::PI * k.max(1) as f64 * spectrum.spacing_hz / rate_hz).sin();
+            *sum += spectrum.density[k] / (gain * gain * coordinates.len() as f64);
+        }
+    }
+    mean
+}
+
+/// Density of the white floor: the median between 70 and 97 % of Nyquist, where that is flat; else (poses that were resampled or filtered) the
+/// highest band further down in which the density stays level.
+fn noise_floor(spectrum: &Spectrum, rate_hz: f64) -> f64 {
+    let nyquist_hz = rate_hz / 2.0;
+    let level = |from: f64, to: f64| spectrum.median(from * nyquist_hz, to * nyquist_hz).unwrap_or(0.0);
+    let top = level(0.70, 0.97);
+    let mut upper = 0.97;
+    while upper > 0.3 {
+        let (high, low) = (level(upper - 0.12, upper), level(upper - 0.24, upper - 0.12));
+        if low < 1.5 * high && high > 0.5 * top {
+            return if upper > 0.96 { top } else { 0.5 * (high + low) };
+        }
+        upper -= 0.04;
+    }
+    top
+}
+
+#[cfg(test)]
+#[path = "estimate_tests.rs"]
+mod tests;

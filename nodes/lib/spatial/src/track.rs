@@ -1,0 +1,41 @@
+//! A motion's kinematics on a uniform grid of time.
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use crate::Stamp;
+
+/// Kinematics of a segment's frame on a uniform grid, in the segment's own axes: what an IMU model starts from.
+///
+/// All vectors have the same length; entry k belongs to `start + k / rate_hz`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct KinematicTrack {
+    /// Time of the first entry.
+    pub start: Stamp,
+    /// Entries per second.
+    pub rate_hz: f64,
+    /// Orientation of the segment.
+    pub world_from_segment: Vec<UnitQuaternion<f64>>,
+    /// `R^T a`: acceleration of the origin against the world, in segment axes, m/s2; zero at rest.
+    pub acceleration: Vec<Vector3<f64>>,
+    /// `w`: against the world, in segment axes, rad/s.
+    pub angular_velocity: Vec<Vector3<f64>>,
+    /// `dw/dt`, in segment axes, rad/s2.
+    pub angular_acceleration: Vec<Vector3<f64>>,
+}
+
+impl KinematicTrack {
+    /// Entries.
+    pub fn len(&self) -> usize {
+        self.world_from_segment.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.world_from_segment.is_empty()
+    }
+
+    /// Time of entry `index`.
+    pub fn stamp(&self, index: usize) -> Stamp {
+        Stamp::from_nanos(self.start.nanos + (index as f64 * 1e9 / self.rate_hz).round() as i64)
+    }
+}
