@@ -15,9 +15,9 @@ node_config! {
         pub rate_hz: f64 = 0.0,
         /// Rate of the states, Hz; 0: found out from the first ones. It sets the schemes' delay.
         pub state_rate_hz: f64 = 0.0,
-        /// Add the device's noise and bias.
+        /// Add the device's noise and other effects.
         pub noise: bool = true,
-        /// Seed of the noise.
+        /// Seed of the noise and of lost samples.
         pub seed: i64 = 0,
         /// Put before every frame but the world's, with a slash; as for smpl_state.
         pub prefix: String = String::new(),

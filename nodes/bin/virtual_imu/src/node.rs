@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use cromosim_body::{BodyError, BodyModel, BodyPose, Joint, ShapedBody};
 use cromosim_imu::{
-    Covariances, Device, Follow, ImuError, ImuSample, MountedSites, NoiseSource, Placement, PlacementSet, StreamOptions, StreamingImu,
+    Covariances, Device, Follow, ImuError, ImuSample, MountedSites, Placement, PlacementSet, StreamOptions, StreamingEffects, StreamingImu,
 };
 use cromosim_msgs::NotABody;
 use cromosim_msgs::builtin_interfaces::Time;
@@ -65,7 +65,8 @@ pub enum Refusal {
 /// One placement's way from frames to messages.
 struct Channel {
     stream: Option<StreamingImu>,
-    noise: Option<NoiseSource>,
+    /// The device's errors, where they are wanted.
+    effects: Option<StreamingEffects>,
     covariances: Covariances,
     frame_id: String,
 }
@@ -126,10 +127,10 @@ impl VirtualImuNode {
     fn fresh_channels(&self) -> Result<Vec<Channel>, ImuError> {
         let channel = |(placement, device): (&Placement, &Device)| {
             let rate_hz = placement.rate_hz();
-            let noise =
-                if self.config.noise { Some(NoiseSource::new(device, rate_hz, self.config.seed as u64, placement.name())?) } else { None };
+            let seed = self.config.seed as u64;
+            let effects = if self.config.noise { Some(StreamingEffects::new(device, rate_hz, seed, placement.name())?) } else { None };
             let covariances = Covariances::of(device, rate_hz);
-            Ok(Channel { stream: None, noise, covariances, frame_id: self.config.frame(&format!("{}_imu", placement.name())) })
+            Ok(Channel { stream: None, effects, covariances, frame_id: self.config.frame(&format!("{}_imu", placement.name())) })
         };
         self.placements.iter().zip(&self.devices).map(channel).collect()
     }
@@ -207,8 +208,10 @@ impl VirtualImuNode {
     fn push(&mut self, stamp: Stamp, body: &BodyPose, readings: &mut Vec<Reading>) -> Result<(), ImuError> {
         for (placement, (channel, frame)) in self.channels.iter_mut().zip(self.sites.frames(body)).enumerate() {
             let Some(stream) = &mut channel.stream else { continue };
-            for ideal in stream.push(frame.at(stamp))? {
-                let sample = channel.noise.as_mut().map_or(ideal, |noise| noise.apply(&ideal));
+            for motion in stream.push_kinematics(frame.at(stamp))? {
+                let sample = channel.effects.as_mut().map_or_else(|| Some(motion.imu()), |effects| effects.step(&motion));
+                // None: the device loses it.
+                let Some(sample) = sample else { continue };
                 let raw = imu_message(&sample, &channel.frame_id, &channel.covariances.without_orientation(), false);
                 let full = imu_message(&sample, &channel.frame_id, &channel.covariances, true);
                 readings.push(Reading { placement, raw, full });
@@ -222,8 +225,9 @@ impl VirtualImuNode {
         if self.last.is_some_and(|last| stamp < last) {
             self.counts.restarts += 1;
             self.early.clear();
-            for stream in self.channels.iter_mut().filter_map(|channel| channel.stream.as_mut()) {
-                stream.reset();
+            for channel in &mut self.channels {
+                channel.stream.iter_mut().for_each(StreamingImu::reset);
+                channel.effects.iter_mut().for_each(StreamingEffects::reset);
             }
         }
     }

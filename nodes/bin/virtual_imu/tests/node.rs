@@ -117,3 +117,37 @@ fn nonsense_is_refused_and_the_node_goes_on() {
     let report = node.diagnostics(Header::new(START, "").stamp, "/virtual_imu");
     assert!(report.status[0].message.contains("left out"), "{report:?}");
 }
+
+/// A node with one placement, whose device has these effects.
+fn with_device(name: &str, effects: &str) -> Result<VirtualImuNode, String> {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    let text = format!("schema: cromosim/device/1\ndeclared_noise: {{accel_density: 0.0, gyro_density: 0.0}}\neffects:\n{effects}");
+    std::fs::write(folder.join(name), text).unwrap();
+    let placements = format!("schema: cromosim/placements/1\nplacements:\n  wrist: {{site: left_watch, rate_hz: 100, device: {name}}}\n");
+    let placements = PlacementSet::parse(&placements, "placements.yaml").unwrap();
+    VirtualImuNode::new(Config::default(), BodyModel::embedded(), &placements, folder).map_err(|refusal| refusal.to_string())
+}
+
+#[test]
+fn a_devices_effects_act_live() {
+    let motion = embedded_walk();
+    let ideal = walk(&mut with_device("ideal.yaml", "- {effect: accel_bias, bias: [0.0, 0.0, 0.0]}").unwrap(), &motion, START);
+    let effects = "- {effect: time_offset, seconds: 0.25}\n- {effect: clock_drift, ppm: 1000}\n- {effect: gyro_units, factor: 1000}\n\
+                   - {effect: mount_rotation, rotvec: [0.0, 0.0, 1.5707963267948966]}\n";
+    let changed = walk(&mut with_device("changed.yaml", effects).unwrap(), &motion, START);
+    assert_eq!(ideal.len(), changed.len());
+    for (ideal, changed) in ideal.iter().zip(&changed) {
+        let since = ideal.raw.header.stamp.nanos() - START;
+        assert_eq!(changed.raw.header.stamp.nanos() - START, since + since / 1000 + 250_000_000);
+        let (ideal, changed) = (Vector3::from(ideal.raw.angular_velocity), Vector3::from(changed.raw.angular_velocity));
+        assert!((changed - Vector3::new(ideal.y, -ideal.x, ideal.z) * 1000.0).norm() < 1e-6, "{ideal} {changed}");
+    }
+    let lossy = walk(&mut with_device("lossy.yaml", "- {effect: dropped_samples, fraction: 0.3, mean_burst: 5}").unwrap(), &motion, START);
+    assert!(lossy.len() < ideal.len() * 9 / 10 && !lossy.is_empty());
+}
+
+#[test]
+fn effects_of_a_reference_are_none_of_a_live_device() {
+    let refusal = with_device("tilted.yaml", "- {effect: reference_tilt, rotvec: [0.01, 0.0, 0.0]}").err().unwrap();
+    assert!(refusal.contains("tilted.yaml: `reference_tilt` is an effect of a recording's reference"), "{refusal}");
+}

@@ -2,10 +2,9 @@
 
 use std::path::Path;
 
-use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
-use crate::ImuError;
+use crate::{EffectSet, ImuError, Stage};
 
 const SCHEMA: &str = "cromosim/device/1";
 
@@ -16,7 +15,7 @@ pub const EMBEDDED_DEVICES: [(&str, &str); 3] = [
     ("precision_mems", include_str!("../../../../config/devices/precision_mems.yaml")),
 ];
 
-/// White noise and constant errors of a device, with values as a data sheet has them.
+/// White noise and further effects of a device, with values as a data sheet has them.
 ///
 /// ```yaml
 /// schema: cromosim/device/1
@@ -25,29 +24,14 @@ pub const EMBEDDED_DEVICES: [(&str, &str); 3] = [
 ///   - {effect: accel_bias, bias: [0.05, -0.03, 0.08]}
 ///   - {effect: gyro_bias, bias: [0.004, -0.006, 0.003]}
 /// ```
-/// Densities are one-sided, (m/s2)/sqrt(Hz) and (rad/s)/sqrt(Hz); the list has the form of an effects file's.
+/// Densities are one-sided, (m/s2)/sqrt(Hz) and (rad/s)/sqrt(Hz); the list is that of an [`crate::EffectsFile`],
+/// without the effects of a reference. What depends on time is anchored at the first sample.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Device {
     accel_density: f64,
     gyro_density: f64,
     orientation_stddev: f64,
-    effects: Vec<DeviceEffect>,
-}
-
-/// One constant error.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "effect", rename_all = "snake_case", deny_unknown_fields)]
-pub enum DeviceEffect {
-    /// Added to the specific force.
-    AccelBias {
-        /// m/s2, sensor axes.
-        bias: [f64; 3],
-    },
-    /// Added to the angular velocity.
-    GyroBias {
-        /// rad/s, sensor axes.
-        bias: [f64; 3],
-    },
+    effects: EffectSet,
 }
 
 #[derive(Deserialize)]
@@ -56,7 +40,7 @@ struct RawDevice {
     schema: String,
     declared_noise: RawNoise,
     #[serde(default)]
-    effects: Vec<DeviceEffect>,
+    effects: EffectSet,
 }
 
 #[derive(Deserialize)]
@@ -71,7 +55,7 @@ struct RawNoise {
 impl Device {
     /// A device without error.
     pub fn ideal() -> Self {
-        Self { accel_density: 0.0, gyro_density: 0.0, orientation_stddev: 0.0, effects: Vec::new() }
+        Self { accel_density: 0.0, gyro_density: 0.0, orientation_stddev: 0.0, effects: EffectSet::new() }
     }
 
     /// A device with white noise alone: densities in (m/s2)/sqrt(Hz) and (rad/s)/sqrt(Hz), at least 0.
@@ -82,7 +66,7 @@ impl Device {
     /// Parses a file's text; `file` names it in errors.
     ///
     /// # Errors
-    /// [`ImuError::Yaml`], [`ImuError::Schema`], [`ImuError::DeviceNumber`].
+    /// [`ImuError::Yaml`], [`ImuError::Schema`], [`ImuError::DeviceNumber`], [`ImuError::ReferenceEffect`].
     pub fn parse(text: &str, file: &str) -> Result<Self, ImuError> {
         let raw: RawDevice = serde_norway::from_str(text).map_err(|source| ImuError::Yaml { file: file.to_owned(), source })?;
         if raw.schema != SCHEMA {
@@ -93,11 +77,10 @@ impl Device {
         if let Some((field, value)) = fields.into_iter().find(|(_, value)| !(*value >= 0.0 && value.is_finite())) {
             return Err(ImuError::DeviceNumber { file: file.to_owned(), field, value });
         }
-        let device = Self { accel_density, gyro_density, orientation_stddev, effects: raw.effects };
-        match device.accel_bias().iter().chain(device.gyro_bias().iter()).find(|b| !b.is_finite()) {
-            Some(&value) => Err(ImuError::DeviceNumber { file: file.to_owned(), field: "bias", value }),
-            None => Ok(device),
+        if let Some(effect) = raw.effects.iter().find(|effect| effect.kind().spec().stage == Stage::Reference) {
+            return Err(ImuError::ReferenceEffect { file: file.to_owned(), effect: effect.kind().name() });
         }
+        Ok(Self { accel_density, gyro_density, orientation_stddev, effects: raw.effects })
     }
 
     /// Reads a file.
@@ -151,20 +134,8 @@ impl Device {
         self.orientation_stddev
     }
 
-    /// The constant errors, in the order in which they act.
-    pub fn effects(&self) -> &[DeviceEffect] {
+    /// What the device does to readings beyond its declared noise.
+    pub fn effects(&self) -> &EffectSet {
         &self.effects
-    }
-
-    /// Sum of the accelerometer's biases, m/s2, sensor axes.
-    pub fn accel_bias(&self) -> Vector3<f64> {
-        let of = |effect: &DeviceEffect| if let DeviceEffect::AccelBias { bias } = effect { (*bias).into() } else { Vector3::zeros() };
-        self.effects.iter().map(of).sum()
-    }
-
-    /// Sum of the gyroscope's biases, rad/s, sensor axes.
-    pub fn gyro_bias(&self) -> Vector3<f64> {
-        let of = |effect: &DeviceEffect| if let DeviceEffect::GyroBias { bias } = effect { (*bias).into() } else { Vector3::zeros() };
-        self.effects.iter().map(of).sum()
     }
 }

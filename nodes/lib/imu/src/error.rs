@@ -87,6 +87,16 @@ pub enum ImuError {
         /// Its value.
         value: f64,
     },
+    /// An effect that belongs to a recording, in the file of a live device.
+    #[error(
+        "{file}: `{effect}` is an effect of a recording's reference; a device has none: take it out here and use it with `simulate --reference --effects`"
+    )]
+    ReferenceEffect {
+        /// The file's name.
+        file: String,
+        /// The effect.
+        effect: &'static str,
+    },
     /// Frames that cannot be differentiated.
     #[error("trajectory: {0}")]
     Trajectory(#[from] SpatialError),
@@ -103,6 +113,88 @@ pub enum ImuError {
     FrameNotFinite {
         /// Its stamp.
         stamp: Stamp,
+    },
+}
+
+/// What is wrong with an effect.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum EffectError {
+    /// No effect of this name.
+    #[error("unknown effect `{effect}`")]
+    UnknownEffect {
+        /// The name given.
+        effect: String,
+    },
+    /// The name of what a diagnosis could not explain.
+    #[error("`unknown` says that a gap has a cause without a model; it cannot be simulated: take the entry out")]
+    NotSimulated,
+    /// Two of one kind.
+    #[error("a second `{effect}`; give each effect once")]
+    Repeated {
+        /// The effect.
+        effect: &'static str,
+    },
+    /// A parameter that the effect does not have.
+    #[error("{effect}: unknown field `{field}`; expected {expected}")]
+    UnknownField {
+        /// The effect.
+        effect: &'static str,
+        /// The field.
+        field: String,
+        /// The fields that there are.
+        expected: String,
+    },
+    /// A parameter that is missing or given twice.
+    #[error("{effect}: {field}: expected once")]
+    NotOnce {
+        /// The effect.
+        effect: &'static str,
+        /// The field.
+        field: &'static str,
+    },
+    /// A parameter of another form.
+    #[error("{effect}: {field}: expected {expected}")]
+    Malformed {
+        /// The effect.
+        effect: &'static str,
+        /// The field.
+        field: String,
+        /// What it must be.
+        expected: &'static str,
+    },
+    /// A word that is none of the choices.
+    #[error("{effect}: {field}: expected one of {words}")]
+    NoChoice {
+        /// The effect.
+        effect: &'static str,
+        /// The field.
+        field: &'static str,
+        /// The choices.
+        words: String,
+    },
+    /// A wrong number of flat values.
+    #[error("{effect}: expected {expected} values, found {found}")]
+    Length {
+        /// The effect.
+        effect: &'static str,
+        /// Values of all parameters.
+        expected: usize,
+        /// Values given.
+        found: usize,
+    },
+    /// A value out of bounds, or NaN.
+    #[error("{effect}: {field}: {value} is out of range; expected {lower} to {upper}")]
+    OutOfRange {
+        /// The effect.
+        effect: &'static str,
+        /// The field.
+        field: &'static str,
+        /// The value.
+        value: f64,
+        /// The least.
+        lower: f64,
+        /// The greatest.
+        upper: f64,
     },
 }
 

@@ -1,7 +1,7 @@
 //! From a placement on a body to an inertial measurement unit.
 //!
 //! A [`Placement`] says where a sensor sits; a [`MountedSite`] gives its frame for any [`cromosim_body::BodyPose`]; a [`Scheme`]
-//! differentiates the frames, offline by [`simulate`] or live by [`StreamingImu`]; a [`Device`] adds noise and bias.
+//! differentiates the frames, offline by [`simulate`] or live by [`StreamingImu`]; a [`Device`] adds noise and further [`effects`].
 //!
 //! The sensor reads, in its own axes (S sensor, B site on the body, G world; R_BG turns site axes into world axes),
 //!
@@ -13,7 +13,7 @@
 //!
 //! ```
 //! use cromosim_body::{BodyModel, BodyPose, ShapedBody};
-//! use cromosim_imu::{Device, MountedSite, NoiseSource, PlacementSet, Scheme, simulate};
+//! use cromosim_imu::{Device, MountedSite, PlacementSet, Scheme, StreamingEffects, simulate, simulate_kinematics};
 //! use cromosim_spatial::{Stamp, uniform_stamps};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -31,14 +31,16 @@
 //! assert!((ideal[50].specific_force.norm() - 9.80665).abs() < 1e-6);
 //!
 //! let device = Device::embedded("consumer_mems")?;
-//! let mut noise = NoiseSource::new(&device, left_wrist.rate_hz(), 42, left_wrist.name())?;
-//! let real_looking: Vec<_> = ideal.iter().map(|sample| noise.apply(sample)).collect();
+//! let mut effects = StreamingEffects::new(&device, left_wrist.rate_hz(), 42, left_wrist.name())?;
+//! let motion = simulate_kinematics(&trajectory, Scheme::Spline, &output)?;
+//! let real_looking: Vec<_> = motion.iter().filter_map(|sample| effects.step(sample)).collect();
 //! # assert!(real_looking.len() == ideal.len() && real_looking[0] != ideal[0]);
 //! # Ok(())
 //! # }
 //! ```
 
 mod device;
+pub mod effects;
 mod error;
 mod mount;
 mod noise;
@@ -54,10 +56,14 @@ mod trajectory;
 #[cfg(test)]
 mod test_motions;
 
-pub use device::{Device, DeviceEffect, EMBEDDED_DEVICES};
-pub use error::{ImuError, PlacementProblem};
+pub use device::{Device, EMBEDDED_DEVICES};
+pub use effects::{
+    DeclaredNoise, Dropouts, Effect, EffectKind, EffectSet, EffectSpec, EffectsFile, GridTrace, ParameterSpec, PlacementEffects, Reading,
+    ResidualView, SensorModel, Shape, Stage, StreamingEffects,
+};
+pub use error::{EffectError, ImuError, PlacementProblem};
 pub use mount::{MountedSite, MountedSites, SiteFrame};
-pub use noise::{Covariances, NoiseSource};
+pub use noise::{Covariances, NoiseSource, normal_pair};
 pub use placement::{Follow, MAX_RATE_HZ, Placement, SiteChoice};
 pub use placement_file::PlacementSet;
 pub use sample::{GRAVITY_IN_WORLD, ImuSample, KinematicSample, STANDARD_GRAVITY};

@@ -1,11 +1,11 @@
 //! Seeded noise, and the covariances that messages state.
 
 use cromosim_spatial::{SpatialError, so3};
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 
-use crate::{Device, ImuError, ImuSample};
+use crate::{Device, ImuError, ImuSample, Reading};
 
 /// Covariances of a sensor_msgs/Imu, row-major 3x3, as REP-145 reads them: all zero is unknown, -1 first is "not reported".
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,7 +42,7 @@ fn diagonal(variance: f64) -> [f64; 9] {
     [variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, variance]
 }
 
-/// Adds a device's biases and white noise to ideal readings, one after the other.
+/// White noise for readings, one after the other.
 ///
 /// Noise per sample: sigma = density sqrt(rate), independent per axis. Each channel of each placement has its own ChaCha stream, derived from
 /// seed, placement name and channel alone: the same bytes come out whatever else is simulated, in whatever order, on however many threads.
@@ -55,46 +55,56 @@ pub struct NoiseSource {
 
 #[derive(Clone, Debug)]
 struct Channel {
-    bias: Vector3<f64>,
     sigma: f64,
     random: ChaCha12Rng,
 }
 
 impl NoiseSource {
-    /// The source of one placement.
+    /// The source of one placement: the device's declared white noise.
     ///
     /// # Errors
     /// [`ImuError::Trajectory`] for a rate that is not positive.
     pub fn new(device: &Device, rate_hz: f64, seed: u64, placement: &str) -> Result<Self, ImuError> {
+        let densities = (device.accel_density(), device.gyro_density());
+        Self::white(densities, device.orientation_stddev(), rate_hz, seed, placement)
+    }
+
+    /// The source of densities, (m/s2)/sqrt(Hz) and (rad/s)/sqrt(Hz), and of the orientation's standard deviation, rad.
+    ///
+    /// # Errors
+    /// As [`NoiseSource::new`].
+    pub fn white(densities: (f64, f64), orientation_stddev: f64, rate_hz: f64, seed: u64, placement: &str) -> Result<Self, ImuError> {
         if !(rate_hz > 0.0 && rate_hz.is_finite()) {
             return Err(SpatialError::BadRate { rate_hz }.into());
         }
         let root = rate_hz.sqrt();
-        let channel = |number, bias, sigma| Channel { bias, sigma, random: stream(seed, placement, number) };
+        let channel = |number, sigma| Channel { sigma, random: stream(seed, placement, number) };
         Ok(Self {
-            accel: channel(0, device.accel_bias(), device.accel_density() * root),
-            gyro: channel(1, device.gyro_bias(), device.gyro_density() * root),
-            orientation: channel(2, Vector3::zeros(), device.orientation_stddev()),
+            accel: channel(0, densities.0 * root),
+            gyro: channel(1, densities.1 * root),
+            orientation: channel(2, orientation_stddev),
         })
     }
 
-    /// The reading with this device's errors; one call a sample, in order of time. The orientation's noise is a small turn in sensor axes.
+    /// The reading with this noise; one call a sample, in order of time. The orientation's noise is a small turn in sensor axes.
     pub fn apply(&mut self, ideal: &ImuSample) -> ImuSample {
+        let Reading { force, rate } = self.draw();
         ImuSample {
             stamp: ideal.stamp,
-            world_from_sensor: ideal.world_from_sensor * so3::exp(&self.orientation.draw()),
-            specific_force: ideal.specific_force + self.accel.draw(),
-            angular_velocity: ideal.angular_velocity + self.gyro.draw(),
+            world_from_sensor: ideal.world_from_sensor * self.draw_turn(),
+            specific_force: ideal.specific_force + force,
+            angular_velocity: ideal.angular_velocity + rate,
         }
     }
 
-    /// As [`NoiseSource::apply`] without the random part: biases alone.
-    pub fn apply_without_noise(&self, ideal: &ImuSample) -> ImuSample {
-        ImuSample {
-            specific_force: ideal.specific_force + self.accel.bias,
-            angular_velocity: ideal.angular_velocity + self.gyro.bias,
-            ..*ideal
-        }
+    /// The noise of the next reading.
+    pub fn draw(&mut self) -> Reading {
+        Reading { force: self.accel.draw(), rate: self.gyro.draw() }
+    }
+
+    /// The noise of the next orientation, in sensor axes.
+    pub fn draw_turn(&mut self) -> UnitQuaternion<f64> {
+        so3::exp(&self.orientation.draw())
     }
 }
 
@@ -102,20 +112,27 @@ impl Channel {
     fn draw(&mut self) -> Vector3<f64> {
         let [x, y] = normal_pair(&mut self.random);
         let [z, _] = normal_pair(&mut self.random);
-        self.bias + Vector3::new(x, y, z) * self.sigma
+        Vector3::new(x, y, z) * self.sigma
     }
 }
 
 /// Two independent standard normal numbers (Box and Muller 1958).
-fn normal_pair(random: &mut ChaCha12Rng) -> [f64; 2] {
-    let mut uniform = || ((random.next_u64() >> 11) as f64 + 0.5) / (1u64 << 53) as f64;
-    let radius = (-2.0 * uniform().ln()).sqrt();
-    let (sine, cosine) = (std::f64::consts::TAU * uniform()).sin_cos();
+pub fn normal_pair(random: &mut ChaCha12Rng) -> [f64; 2] {
+    let radius = (-2.0 * uniform(random).ln()).sqrt();
+    let (sine, cosine) = (std::f64::consts::TAU * uniform(random)).sin_cos();
     [radius * cosine, radius * sine]
 }
 
+/// A number between 0 and 1, neither of them.
+pub(crate) fn uniform(random: &mut ChaCha12Rng) -> f64 {
+    ((random.next_u64() >> 11) as f64 + 0.5) / (1u64 << 53) as f64
+}
+
+/// The stream of lost samples; 0 to 2 are the channels of [`NoiseSource`].
+pub(crate) const DROPOUT_CHANNEL: u64 = 3;
+
 /// A key of 32 bytes: seed, two hashes of the name, channel.
-fn stream(seed: u64, placement: &str, channel: u64) -> ChaCha12Rng {
+pub(crate) fn stream(seed: u64, placement: &str, channel: u64) -> ChaCha12Rng {
     let words = [seed, fnv1a(placement, 0xcbf2_9ce4_8422_2325), fnv1a(placement, 0x9e37_79b9_7f4a_7c15), channel];
     let mut key = [0; 32];
     for (bytes, word) in key.chunks_exact_mut(8).zip(words) {

@@ -20,6 +20,8 @@ pub struct KinematicSample {
     pub acceleration: Vector3<f64>,
     /// Of the frame against the world, rad/s.
     pub angular_velocity: Vector3<f64>,
+    /// Its derivative, rad/s2; none from schemes that do not give it.
+    pub angular_acceleration: Option<Vector3<f64>>,
 }
 
 /// One reading of an IMU, in sensor axes.

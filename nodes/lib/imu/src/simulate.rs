@@ -66,7 +66,13 @@ fn by_differences(trajectory: &SensorTrajectory, scheme: Scheme, output: &[Stamp
 /// The estimate of a scheme with a stencil at one of its frames.
 pub(crate) fn at_frame(scheme: Scheme, frames: &[SensorFrame], k: usize) -> KinematicSample {
     let (acceleration, angular_velocity) = scheme.at_frame(frames, k);
-    KinematicSample { stamp: frames[k].stamp, world_from_sensor: frames[k].world_from_sensor, acceleration, angular_velocity }
+    KinematicSample {
+        stamp: frames[k].stamp,
+        world_from_sensor: frames[k].world_from_sensor,
+        acceleration,
+        angular_velocity,
+        angular_acceleration: None,
+    }
 }
 
 /// Cubic interpolation of estimates at frames; `stamp` lies within them.
@@ -94,6 +100,7 @@ pub(crate) fn between_frames(at_frames: &[KinematicSample], stamp: Stamp) -> Kin
         world_from_sensor: Isometry3::from_parts((before.translation.vector + step).into(), so3::exp(&turn) * before.rotation),
         acceleration: sum(&|sample| sample.acceleration),
         angular_velocity: sum(&|sample| sample.angular_velocity),
+        angular_acceleration: None,
     }
 }
 

@@ -30,6 +30,7 @@ pub(crate) fn wrist(t: f64) -> KinematicSample {
         world_from_sensor: Isometry3::from_parts(Vector3::new(x[0], y[0], z[0]).into(), rotation),
         acceleration: Vector3::new(x[2], y[2], z[2]),
         angular_velocity: Vector3::z() * yaw[1] + about_z * Vector3::y() * pitch[1] + about_zy * Vector3::x() * roll[1],
+        angular_acceleration: None,
     }
 }
 
@@ -44,6 +45,7 @@ pub(crate) fn spin(t: f64) -> KinematicSample {
         world_from_sensor: Isometry3::from_parts((Vector3::new(3.0, -4.0, 1.0) + lever_arm).into(), rotation),
         acceleration: angular_velocity.cross(&angular_velocity.cross(&lever_arm)),
         angular_velocity,
+        angular_acceleration: Some(Vector3::zeros()),
     }
 }
 

@@ -18,6 +18,8 @@ const PADDING_S: f64 = 2.0;
 /// The same beyond the band of motion, where among hundreds of frequencies some reach three standard errors by chance, and where the second
 /// derivative makes much of little.
 const LONE_BAND: f64 = 2.2;
+/// How far around a line the filter stays open, Hz: a line's amplitude changes over some seconds.
+const LINE_HZ: f64 = 0.1;
 /// Largest factor by which a smoothing that is undone may amplify.
 const LARGEST_GAIN: f64 = 100.0;
 
@@ -50,17 +52,22 @@ pub struct PoseEstimate {
     position: Floor,
     rotation: Floor,
     gaps: Vec<(Stamp, Stamp)>,
+    /// Cutoff of a smoothing that is undone.
+    undone_hz: Option<f64>,
 }
 
 /// What is noise in a spectrum.
 #[derive(Clone, Debug)]
 struct Floor {
-    spectrum: Spectrum,
-    /// One-sided density of the noise, mean over the coordinates.
-    noise: f64,
+    /// Mean spectra with short to long windows, and from which multiple of the noise on they show motion.
+    spectra: Vec<(Spectrum, f64)>,
+    /// One-sided density of the white floor of the poses as they are, mean over the coordinates.
+    white: f64,
+    /// Density of the noise after a smoothing is undone.
+    noise: Vec<f64>,
     /// Wiener's filter, finer than the spectrum.
     filter: Vec<f64>,
-    /// Distance of the filter's frequencies, Hz.
+    /// Distance of the frequencies of filter and noise, Hz.
     spacing_hz: f64,
 }
 
@@ -93,14 +100,14 @@ impl PoseEstimate {
         // Twice, because the first spectra saw straight lines across the holes.
         for _ in 0..if holes.is_empty() { 0 } else { 2 } {
             let (positions, quaternions) = coordinates.split_at_mut(3);
-            fill_holes(positions, &holes, &floors[0].spectrum, &transform, rate_hz);
-            fill_holes(quaternions, &holes, &floors[1].spectrum, &transform, rate_hz);
+            fill_holes(positions, &holes, floors[0].spectrum(), &transform, rate_hz);
+            fill_holes(quaternions, &holes, floors[1].spectrum(), &transform, rate_hz);
             floors = learn(&coordinates);
         }
         let (spectra, lines) = coordinates.iter().map(|series| padded_transform(series, padding, &transform)).unzip();
         let [position, rotation] = floors;
         let (start, count, gaps) = (raster.start, raster.count, raster.gaps());
-        Self { start, rate_hz, count, padding, transform, spectra, lines, position, rotation, gaps }
+        Self { start, rate_hz, count, padding, transform, spectra, lines, position, rotation, gaps, undone_hz: None }
     }
 
     /// Time of the first pose.
@@ -126,42 +133,46 @@ impl PoseEstimate {
     /// White noise of the poses. A rotation vector's variance per axis is 4/3 of the quaternion components' sum.
     pub fn noise(&self) -> PoseNoise {
         let sigma = |density: f64| (density * self.rate_hz / 2.0).sqrt();
-        PoseNoise { position: sigma(self.position.noise), rotation: sigma(self.rotation.noise * 16.0 / 3.0) }
+        PoseNoise { position: sigma(self.position.white), rotation: sigma(self.rotation.white * 16.0 / 3.0) }
     }
 
     /// Mean spectra of position per axis [m2/Hz] and of the rotation vector per axis [rad2/Hz], noise included.
     pub fn spectra(&self) -> (Spectrum, Spectrum) {
-        let mut rotation = self.rotation.spectrum.clone();
+        let mut rotation = self.rotation.spectrum().clone();
         rotation.density.iter_mut().for_each(|value| *value *= 16.0 / 3.0);
-        (self.position.spectrum.clone(), rotation)
+        (self.position.spectrum().clone(), rotation)
+    }
+
+    /// The estimate with a zero-phase smoothing of the poses undone (second-order Butterworth of this cutoff, forwards and backwards), up to a
+    /// factor of 100.
+    #[must_use]
+    pub fn undoing(&self, cutoff_hz: f64) -> Self {
+        let mut undone = self.clone();
+        undone.position = self.position.undoing(cutoff_hz, self.rate_hz);
+        undone.rotation = self.rotation.undoing(cutoff_hz, self.rate_hz);
+        undone.undone_hz = Some(cutoff_hz);
+        undone
     }
 
     /// One-sided density per axis of the estimate's error at a frequency: position [m2/Hz], rotation vector [rad2/Hz].
-    /// `undone_hz` as in [`PoseEstimate::track`].
-    pub fn error_density(&self, frequency_hz: f64, undone_hz: Option<f64>) -> (f64, f64) {
-        let gain = undo(frequency_hz, undone_hz, self.rate_hz);
-        let density = |floor: &Floor| if gain > LARGEST_GAIN { 0.0 } else { floor.noise * floor.filter_at(frequency_hz) * gain * gain };
+    pub fn error_density(&self, frequency_hz: f64) -> (f64, f64) {
+        let density = |floor: &Floor| floor.noise_at(frequency_hz) * floor.filter_at(frequency_hz);
         (density(&self.position), density(&self.rotation) * 16.0 / 3.0)
     }
 
     /// Share of the motion at a frequency that the estimate keeps, of position and of rotation, and the gain that undoes a smoothing.
-    pub fn filter_at(&self, frequency_hz: f64, undone_hz: Option<f64>) -> (f64, f64, f64) {
-        let gain = undo(frequency_hz, undone_hz, self.rate_hz);
-        if gain > LARGEST_GAIN {
-            return (0.0, 0.0, gain);
-        }
-        (self.position.filter_at(frequency_hz), self.rotation.filter_at(frequency_hz), gain)
+    pub fn filter_at(&self, frequency_hz: f64) -> (f64, f64, f64) {
+        let gain = undo(frequency_hz, self.undone_hz, self.rate_hz);
+        (self.position.filter_at(frequency_hz), self.rotation.filter_at(frequency_hz), gain.min(LARGEST_GAIN))
     }
 
     /// The kinematics on a grid of at least `least_rate_hz`, a whole multiple of the poses' rate, from the first pose to the last.
-    /// `undone_hz`: cutoff of a zero-phase smoothing (second-order Butterworth, forwards and backwards) that the poses went through and that is undone,
-    /// up to a factor of 100.
-    pub fn track(&self, least_rate_hz: f64, undone_hz: Option<f64>) -> KinematicTrack {
+    pub fn track(&self, least_rate_hz: f64) -> KinematicTrack {
         let factor = (least_rate_hz / self.rate_hz).ceil().max(1.0) as usize;
         let inverse = FourierPair::new(self.transform.length() * factor);
         let rate_hz = self.rate_hz * factor as f64;
         let count = (self.count - 1) * factor + 1;
-        let series = |channel: usize, order: i32| self.derivative(channel, order, factor, undone_hz, &inverse, count);
+        let series = |channel: usize, order: i32| self.derivative(channel, order, factor, &inverse, count);
         let accelerations = [series(0, 2), series(1, 2), series(2, 2)];
         let values: Vec<Vec<f64>> = (3..7).map(|channel| series(channel, 0)).collect();
         let rates: Vec<Vec<f64>> = (3..7).map(|channel| series(channel, 1)).collect();
@@ -186,7 +197,6 @@ impl PoseEstimate {
         channel: usize,
         order: i32,
         factor: usize,
-        undone_hz: Option<f64>,
         inverse: &FourierPair,
         count: usize,
     ) -> Vec<f64> {
@@ -196,8 +206,7 @@ impl PoseEstimate {
         let mut values = vec![Complex64::default(); inverse.length()];
         for k in 0..=length / 2 {
             let frequency_hz = k as f64 * spacing_hz;
-            let gain = undo(frequency_hz, undone_hz, self.rate_hz);
-            let weight = if gain > LARGEST_GAIN { 0.0 } else { floor.filter_at(frequency_hz) * gain };
+            let weight = floor.filter_at(frequency_hz) * undo(frequency_hz, self.undone_hz, self.rate_hz).min(LARGEST_GAIN);
             if weight == 0.0 || 2 * k == length {
                 continue;
             }
@@ -365,37 +374,85 @@ impl Floor {
                 (mean_spectrum(coordinates, rate_hz, window.min(most).max(8)), alone)
             })
             .collect();
-        let spectrum = spectra[0].0.clone();
-        let noise = noise_floor(&spectrum, rate_hz);
+        Self::from_spectra(spectra, rate_hz, None)
+    }
+
+    /// The floor after a smoothing of the poses is undone. The noise is what was added after the smoothing, amplified, or what was there before, a
+    /// plateau of the undone spectrum; whichever is more.
+    fn undoing(&self, cutoff_hz: f64, rate_hz: f64) -> Self {
+        Self::from_spectra(self.spectra.clone(), rate_hz, Some(cutoff_hz))
+    }
+
+    fn from_spectra(spectra: Vec<(Spectrum, f64)>, rate_hz: f64, undone_hz: Option<f64>) -> Self {
+        let spectrum = &spectra[0].0;
+        let gain2 = |frequency_hz: f64| undo(frequency_hz, undone_hz, rate_hz).powi(2);
+        let floor = noise_floor(spectrum, rate_hz);
+        // Where the undone spectrum is least, beyond the slowest motion, lies the noise that was there before.
+        let usable = (3..spectrum.density.len()).map(|k| (spectrum.frequency(k), spectrum.density[k])).filter(|(hz, _)| gain2(*hz) <= LARGEST_GAIN.powi(2));
+        let before = undone_hz.map_or(0.0, |_| usable.map(|(hz, density)| density * gain2(hz)).fold(f64::INFINITY, f64::min));
+        let before = if before.is_finite() { before } else { 0.0 };
+        let noise_at = |frequency_hz: f64| (floor * gain2(frequency_hz)).max(before);
         let spacing_hz = spectra[2].0.spacing_hz.min(spectrum.spacing_hz);
-        let edge_hz = edge(&spectrum, noise);
-        let filter = (0..=(rate_hz / 2.0 / spacing_hz) as usize)
-            .map(|k| {
-                let frequency_hz = k as f64 * spacing_hz;
-                // The mean and what is slower than a window is motion.
-                if frequency_hz < 1.5 * spectrum.spacing_hz {
-                    return 1.0;
-                }
-                let weight = |(spectrum, alone): &(Spectrum, f64)| {
-                    let density = spectrum.at(frequency_hz);
-                    let alone = if frequency_hz < edge_hz { *alone } else { alone.max(LONE_BAND) };
-                    if density <= alone * noise || density <= 0.0 { 0.0 } else { 1.0 - noise / density }
-                };
-                spectra.iter().map(weight).fold(0.0, f64::max)
-            })
-            .collect();
-        Self { spectrum, noise, filter, spacing_hz }
+        let edge_hz = edge(spectrum, &|hz| noise_at(hz) / gain2(hz));
+        let bins = (rate_hz / 2.0 / spacing_hz) as usize + 1;
+        let weight = |frequency_hz: f64, (spectrum, alone): &(Spectrum, f64)| {
+            let density = spectrum.at(frequency_hz) * gain2(frequency_hz);
+            let noise = noise_at(frequency_hz);
+            let alone = if frequency_hz < edge_hz { *alone } else { alone.max(LONE_BAND) };
+            if density <= alone * noise || density <= 0.0 || gain2(frequency_hz) > LARGEST_GAIN.powi(2) { 0.0 } else { 1.0 - noise / density }
+        };
+        let of = |which: usize| (0..bins).map(|k| weight(k as f64 * spacing_hz, &spectra[which])).collect::<Vec<f64>>();
+        let lines: Vec<f64> = of(1).iter().zip(of(2)).map(|(a, b)| a.max(b)).collect();
+        let reach = (LINE_HZ / spacing_hz).round() as usize;
+        let mut filter: Vec<f64> = of(0);
+        for (k, value) in filter.iter_mut().enumerate() {
+            let around = &lines[k.saturating_sub(reach)..(k + reach + 1).min(bins)];
+            *value = around.iter().copied().fold(*value, f64::max);
+        }
+        // Sharp edges ring for long.
+        let mut filter = running_mean(&running_mean(&filter, reach), reach);
+        for (k, value) in filter.iter_mut().enumerate() {
+            // The mean and what is slower than a window is motion.
+            if (k as f64) * spacing_hz < 1.5 * spectra[0].0.spacing_hz {
+                *value = 1.0;
+            }
+        }
+        let noise = (0..bins).map(|k| noise_at(k as f64 * spacing_hz).min(floor.max(before) * LARGEST_GAIN.powi(2))).collect();
+        Self { white: floor, spectra, noise, filter, spacing_hz }
     }
 
     fn filter_at(&self, frequency_hz: f64) -> f64 {
         interpolated(&self.filter, frequency_hz / self.spacing_hz)
     }
+
+    fn noise_at(&self, frequency_hz: f64) -> f64 {
+        interpolated(&self.noise, frequency_hz / self.spacing_hz)
+    }
+
+    fn spectrum(&self) -> &Spectrum {
+        &self.spectra[0].0
+    }
+}
+
+/// Mean over `reach` entries on either side.
+fn running_mean(values: &[f64], reach: usize) -> Vec<f64> {
+    let mut sums = vec![0.0; values.len() + 1];
+    for (k, value) in values.iter().enumerate() {
+        sums[k + 1] = sums[k] + value;
+    }
+    (0..values.len())
+        .map(|k| {
+            let (from, to) = (k.saturating_sub(reach), (k + reach + 1).min(values.len()));
+            (sums[to] - sums[from]) / (to - from) as f64
+        })
+        .collect()
 }
 
 /// Where the band of motion ends: from there on three neighbours lie at the noise.
-fn edge(spectrum: &Spectrum, noise: f64) -> f64 {
-    let quiet = |window: &[f64]| window.iter().all(|density| *density < WINDOWS[0].1 * noise);
-    let first = spectrum.density.windows(3).position(quiet).unwrap_or(spectrum.density.len());
+fn edge(spectrum: &Spectrum, noise_at: &dyn Fn(f64) -> f64) -> f64 {
+    let quiet = |k: usize| spectrum.density[k] < WINDOWS[0].1 * noise_at(spectrum.frequency(k));
+    let last = spectrum.density.len().saturating_sub(2);
+    let first = (0..last).find(|&k| quiet(k) && quiet(k + 1) && quiet(k + 2)).unwrap_or(spectrum.density.len());
     spectrum.frequency(first)
 }
 

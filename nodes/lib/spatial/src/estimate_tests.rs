@@ -60,20 +60,20 @@ fn noise_is_found_and_kept_out_of_the_derivatives() {
     let found = estimate.noise();
     assert!((found.position / truth.position - 1.0).abs() < 0.08, "{found:?}");
     assert!((found.rotation / truth.rotation - 1.0).abs() < 0.08, "{found:?}");
-    let track = estimate.track(200.0, None);
+    let track = estimate.track(200.0);
     assert_eq!(track.rate_hz, 200.0);
     let error = acceleration_error(&track);
     // Second differences at 100 Hz would err by sqrt(3) sqrt(6) 1e-4 100^2 = 4 m/s2.
     assert!(error < 0.2, "{error}");
     // The motion's three lines pass; at 20 Hz there is nothing but noise.
-    assert!(estimate.filter_at(1.3, None).0 > 0.99 && estimate.filter_at(20.0, None).0 == 0.0);
+    assert!(estimate.filter_at(1.3).0 > 0.99 && estimate.filter_at(20.0).0 == 0.0);
 }
 
 #[test]
 fn without_noise_derivatives_are_exact() {
     let (stamps, positions, rotations) = poses(PoseNoise::default(), 120.0, |_| true);
     let estimate = PoseEstimate::fit(&stamps, &positions, &rotations).unwrap();
-    let error = acceleration_error(&estimate.track(200.0, None));
+    let error = acceleration_error(&estimate.track(200.0));
     assert!(error < 5e-3, "{error}");
 }
 
@@ -85,7 +85,7 @@ fn holes_are_named_and_bridged() {
     assert_eq!(estimate.gaps().len(), 2);
     let (from, to) = estimate.gaps()[0];
     assert!((to - from - 0.31).abs() < 0.011, "{}", to - from);
-    let error = acceleration_error(&estimate.track(200.0, None));
+    let error = acceleration_error(&estimate.track(200.0));
     assert!(error < 0.6, "{error}");
 }
 
@@ -103,8 +103,8 @@ fn a_smoothing_is_undone() {
         *position = rest + Vector3::new(swing.x * gain(1.3), swing.y * gain(2.6), swing.z * gain(3.9)) + noise;
     }
     let estimate = PoseEstimate::fit(&stamps, &positions, &rotations).unwrap();
-    assert!(acceleration_error(&estimate.track(100.0, None)) > 5.0);
-    let error = acceleration_error(&estimate.track(100.0, Some(3.0)));
+    assert!(acceleration_error(&estimate.track(100.0)) > 5.0);
+    let error = acceleration_error(&estimate.undoing(3.0).track(100.0));
     assert!(error < 0.6, "{error}");
 }
 

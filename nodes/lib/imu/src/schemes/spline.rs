@@ -19,5 +19,6 @@ pub(crate) fn sample(spline: &PoseSpline, stamp: Stamp) -> KinematicSample {
         world_from_sensor: Isometry3::from_parts(motion.position.into(), motion.rotation),
         acceleration: motion.acceleration,
         angular_velocity: motion.angular_velocity,
+        angular_acceleration: Some(motion.angular_acceleration),
     }
 }

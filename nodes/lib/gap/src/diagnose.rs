@@ -1,0 +1,341 @@
+//! One placement's diagnosis, from record to answer.
+
+use cromosim_imu::{DeclaredNoise, Effect, EffectKind, EffectSet, PlacementEffects};
+use cromosim_spatial::PoseNoise;
+
+use crate::fit::Context;
+use crate::gross::{self, Digital, Gross, insert};
+use crate::problem::Problem;
+use crate::search::{State, debug, kinds, library};
+use crate::whiten::{NoiseBasis, NoiseModel};
+use crate::{Evidence, GapError, PlacementDiagnosis, PlacementRecord};
+
+/// Most effects of a set, in the first search and in those that follow.
+const FIRST: usize = 2;
+const MOST: usize = 5;
+/// Rounds of search, each with the noise that the one before leaves.
+const ROUNDS: usize = 3;
+/// Noise per sample and axis from which on the reference's noise is a cause: m, rad.
+pub(crate) const NAMED_NOISE: PoseNoise = PoseNoise { position: 1e-3, rotation: 0.25 * std::f64::consts::PI / 180.0 };
+/// What the reference's noise ordinarily is at most: m, rad.
+pub(crate) const ORDINARY_NOISE: PoseNoise = PoseNoise { position: 3e-4, rotation: 0.1 * std::f64::consts::PI / 180.0 };
+/// What every recording has: quartz and stamps are no better, mounts and calibrations neither. An effect whose values all stay below is fitted, so
+/// that it does not pass for another, but it is no cause. (Scales: distance from 1.)
+const ORDINARY: [(EffectKind, f64); 15] = [
+    (EffectKind::ReferenceTilt, 2e-3),
+    (EffectKind::ReferenceScale, 6e-3),
+    (EffectKind::MountRotation, 3e-3),
+    (EffectKind::LeverArm, 1e-3),
+    (EffectKind::TimeOffset, 1e-3),
+    (EffectKind::ClockDrift, 30.0),
+    (EffectKind::AccelBias, 5e-3),
+    (EffectKind::GyroBias, 4e-4),
+    (EffectKind::AccelScale, 2e-3),
+    (EffectKind::GyroScale, 2e-3),
+    (EffectKind::AccelMisalignment, 1.5e-3),
+    (EffectKind::GyroMisalignment, 1.5e-3),
+    (EffectKind::AccelBiasDrift, 2e-4),
+    (EffectKind::GyroBiasDrift, 1.5e-5),
+    (EffectKind::GyroGSensitivity, 5e-5),
+];
+/// The same of a slip's angle, rad.
+const ORDINARY_SLIP: f64 = 5e-3;
+/// Variance of the white noise against the declared one from which on it is a cause.
+const NAMED_NOISE_RATIO: f64 = 2.0;
+/// Steps of quantisation in units of the white noise from which on they are a cause.
+const NAMED_STEP: f64 = 1.0;
+
+/// Settings of a diagnosis.
+#[derive(Clone, Debug, Default)]
+pub struct DiagnoseOptions {
+    /// Effects taken out of the library.
+    pub without: Vec<EffectKind>,
+    /// Of the noise in comparisons with the noisy simulation.
+    pub seed: u64,
+}
+
+/// A placement's answer.
+#[derive(Clone, Debug)]
+pub struct PlacementAnswer {
+    /// For diagnosis.json.
+    pub diagnosis: PlacementDiagnosis,
+    /// For effects.yaml.
+    pub effects: PlacementEffects,
+    /// For pictures.
+    pub evidence: Evidence,
+}
+
+/// What the analysis found, before it is put into words.
+pub(crate) struct Findings<'a> {
+    pub context: Context<'a>,
+    pub state: State,
+    pub gross: Gross,
+    pub digital: [Digital; 2],
+    /// White noise per sample that the residual shows.
+    pub found: [f64; 2],
+    /// All named causes but `unknown`.
+    pub named: EffectSet,
+}
+
+/// Diagnoses one placement.
+///
+/// # Errors
+/// [`GapError`] where there is nothing to compare: no overlap in time, too few messages, readings that are no numbers or never change.
+pub fn diagnose(record: &PlacementRecord, options: &DiagnoseOptions) -> Result<PlacementAnswer, GapError> {
+    let begin = std::time::Instant::now();
+    let mut problem = Problem::new(record)?;
+    let raw = problem.measured.clone();
+    let gross = Gross::find(&problem, &problem.track(&problem.estimate));
+    let digital = [0, 1].map(|channel| gross::digital(&problem.measured, channel));
+    problem.cover(gross.lag_s)?;
+    let covered = problem.usable.clone();
+    for channel in 0..2 {
+        mask_clipped(&mut problem, channel, &digital[channel]);
+    }
+    let units = allowed_units(&gross, options);
+    for reading in &mut problem.measured {
+        reading.force /= units[0];
+        reading.rate /= units[1];
+    }
+    problem.declared = declared_in_si(&problem, units);
+    debug(|| eprintln!("{}: {gross:?} {digital:?} {:?} {:?}", problem.name, problem.estimate.noise(), begin.elapsed()));
+    let findings = analyse(&problem, &gross, digital, units, options)?;
+    debug(|| eprintln!("{}: {:?} {:?}", problem.name, kinds(&findings.named), begin.elapsed()));
+    let answer = crate::answer::Answer::new(&findings, &problem, &raw, &covered, options).finish();
+    debug(|| eprintln!("{}: answered {:?}", problem.name, begin.elapsed()));
+    let density = |c: usize| findings.problem_sigma(c) / problem.rate_hz.sqrt();
+    let effects = PlacementEffects {
+        epoch: problem.epoch,
+        declared_noise: DeclaredNoise { accel_density: density(0), gyro_density: density(1) },
+        effects: findings.named.clone(),
+    };
+    Ok(PlacementAnswer { diagnosis: answer.0, effects, evidence: answer.1 })
+}
+
+impl Findings<'_> {
+    /// Declared white noise per sample in SI units; where unknown, the found one counts as declared.
+    pub fn problem_sigma(&self, channel: usize) -> f64 {
+        self.context.problem.declared[channel].unwrap_or(self.found[channel])
+    }
+}
+
+fn allowed_units(gross: &Gross, options: &DiagnoseOptions) -> [f64; 2] {
+    [EffectKind::AccelUnits, EffectKind::GyroUnits].map(|kind| {
+        let factor = gross.units[usize::from(kind == EffectKind::GyroUnits)];
+        if options.without.contains(&kind) { 1.0 } else { factor }
+    })
+}
+
+/// The declared noise in SI units. Whether a device in other units declares its covariances in them is nowhere said: what is nearer to the noise of
+/// the readings holds.
+fn declared_in_si(problem: &Problem, units: [f64; 2]) -> [Option<f64>; 2] {
+    let series = problem.raster(|k, axis| crate::problem::axis_of(&problem.measured[k], axis));
+    [0, 1].map(|c| {
+        let declared = problem.declared[c]?;
+        let found = fourth_differences(problem, &series, c).unwrap_or(0.0).sqrt().max(1e-12);
+        let off = |sigma: f64| (sigma / found).ln().abs();
+        Some(if off(declared / units[c]) < off(declared) { declared / units[c] } else { declared })
+    })
+}
+
+/// Clipped values tell only that the true one lies beyond.
+fn mask_clipped(problem: &mut Problem, channel: usize, digital: &Digital) {
+    let Some(limit) = digital.limit else { return };
+    for (k, reading) in problem.measured.iter().enumerate() {
+        for axis in 0..3 {
+            let value = if channel == 0 { reading.force[axis] } else { reading.rate[axis] };
+            if value.abs() >= limit * (1.0 - 1e-9) {
+                problem.usable[k][3 * channel + axis] = false;
+            }
+        }
+    }
+}
+
+fn analyse<'a>(
+    problem: &'a Problem,
+    gross: &Gross,
+    digital: [Digital; 2],
+    units: [f64; 2],
+    options: &DiagnoseOptions,
+) -> Result<Findings<'a>, GapError> {
+    let track = problem.track(&problem.estimate);
+    let starts: Vec<EffectSet> = gross.starts().into_iter().map(|set| restricted(set, &options.without)).collect();
+    let first = problem.predict(&track, &starts[0]);
+    let residual = problem.residual(&first.readings);
+    let found = found_noise(problem, &residual);
+    let sigma = [0, 1].map(|c| problem.declared[c].map_or(found[c], |declared| declared.max(found[c])));
+    let count = track.len() as f64;
+    let mut basis = NoiseBasis::new(problem.estimate.clone(), sigma);
+    basis.rate_squared = track.angular_velocity.iter().map(|w| w.norm_squared()).sum::<f64>() / count;
+    basis.force_squared = first.readings.iter().map(|r| r.force.norm_squared()).sum::<f64>() / first.readings.len() as f64;
+    let library = library(&options.without);
+    basis.line_hz = suspicious_line(problem, &basis, &first.readings, &library);
+    let noise = NoiseModel::new(problem, &basis, Some(&residual));
+    let mut context = Context::new(problem, track, basis, noise);
+    let mut state = context.search(&starts, &library, FIRST, false);
+    debug(|| eprintln!("first: {:?} {:.2?}", kinds(&state.fit.set), state.fit.held_out_ratio()));
+    if !options.without.contains(&EffectKind::ReferenceSmoothing) {
+        (context, state) = crate::smoothing::try_smoothing(context, state, &starts, &library);
+    }
+    for round in 0..ROUNDS {
+        context = renewed(&context, &state, &library);
+        let before = state.fit.set.clone();
+        state = context.search(&[before.clone()], &library, MOST, false);
+        debug(|| eprintln!("round {round}: {:?} {:.2?}", kinds(&state.fit.set), state.fit.held_out_ratio()));
+        if kinds(&before) == kinds(&state.fit.set) {
+            break;
+        }
+    }
+    state = context.exchanged(state, &library);
+    let found = found_noise(problem, &problem.residual(&state.fit.prediction.readings));
+    let named = named(problem, &context, &state, &digital, units, found, &options.without);
+    Ok(Findings { context, state, gross: gross.clone(), digital, found, named })
+}
+
+/// The context with the noise that the residual of `state` shows, and with its lever arm.
+fn renewed<'a>(context: &Context<'a>, state: &State, library: &[EffectKind]) -> Context<'a> {
+    let set = &state.fit.set;
+    let mut basis = context.basis.clone();
+    basis.lever_arm_m = set.get(EffectKind::LeverArm).map_or(0.0, |lever| lever.values().iter().map(|v| v * v).sum::<f64>().sqrt());
+    basis.line_hz = match set.get(EffectKind::Vibration) {
+        Some(vibration) => vibration.values().first().copied(),
+        None => suspicious_line(context.problem, &basis, &state.fit.prediction.readings, library),
+    };
+    let residual = context.problem.residual(&state.fit.prediction.readings);
+    let found = found_noise(context.problem, &residual);
+    basis.sigma = [0, 1].map(|c| context.problem.declared[c].map_or(found[c], |declared| declared.max(found[c])));
+    let noise = NoiseModel::new(context.problem, &basis, Some(&residual));
+    Context::new(context.problem, context.track.clone(), basis, noise)
+}
+
+/// Frequency of the strongest line of the accelerometer's residual where it may be a vibration.
+fn suspicious_line(problem: &Problem, basis: &NoiseBasis, simulated: &[cromosim_imu::Reading], library: &[EffectKind]) -> Option<f64> {
+    if !library.contains(&EffectKind::Vibration) {
+        return None;
+    }
+    let view = cromosim_imu::ResidualView {
+        stamps: &problem.stamps,
+        epoch: problem.epoch,
+        rate_hz: problem.rate_hz,
+        measured: &problem.measured,
+        simulated,
+        accel_sigma: basis.sigma[0],
+        gyro_sigma: basis.sigma[1],
+    };
+    let values = (EffectKind::Vibration.spec().starts)(&view).into_iter().next()?;
+    let power: f64 = values[1..4].iter().map(|amplitude| 0.5 * amplitude * amplitude).sum();
+    (power > 0.3 * basis.sigma[0].powi(2)).then_some(values[0])
+}
+
+fn restricted(mut set: EffectSet, without: &[EffectKind]) -> EffectSet {
+    without.iter().for_each(|kind| {
+        set.remove(*kind);
+    });
+    set
+}
+
+/// White noise per sample of each channel: the least of four bands in the upper half of the residual's spectrum and of fourth differences of
+/// neighbours; whatever else is there only adds to each.
+pub(crate) fn found_noise(problem: &Problem, residual: &[Vec<f64>]) -> [f64; 2] {
+    [0, 1].map(|channel| {
+        let spectrum = problem.channel_spectrum(residual, channel);
+        let nyquist_hz = problem.rate_hz / 2.0;
+        let bands = [(0.5, 0.62), (0.62, 0.74), (0.74, 0.86), (0.86, 0.97)];
+        let least = bands.iter().filter_map(|(a, b)| spectrum.median(a * nyquist_hz, b * nyquist_hz)).fold(f64::INFINITY, f64::min);
+        let variance = least * problem.rate_hz / 2.0;
+        fourth_differences(problem, residual, channel).map_or(variance, |other| variance.min(other)).sqrt()
+    })
+}
+
+/// Variance of white noise from `x0 - 4 x1 + 6 x2 - 4 x3 + x4` (variance 70) of five neighbours that are all there, by the median of its squares.
+fn fourth_differences(problem: &Problem, residual: &[Vec<f64>], channel: usize) -> Option<f64> {
+    let mut squares = Vec::new();
+    for axis in 3 * channel..3 * channel + 3 {
+        for first in 0..problem.places.len().saturating_sub(4) {
+            let whole = problem.places[first + 4] == problem.places[first] + 4 && (first..first + 5).all(|k| problem.usable[k][axis]);
+            if whole {
+                let x = &residual[axis][problem.places[first]..];
+                squares.push((x[0] - 4.0 * x[1] + 6.0 * x[2] - 4.0 * x[3] + x[4]).powi(2));
+            }
+        }
+    }
+    if squares.len() < 300 {
+        return None;
+    }
+    let middle = squares.len() / 2;
+    // The median of a squared standard normal number is 0.4549.
+    Some(*squares.select_nth_unstable_by(middle, f64::total_cmp).1 / (70.0 * 0.4549))
+}
+
+/// The causes: fitted effects beyond what is ordinary, and those that are read off the readings.
+fn named(
+    problem: &Problem,
+    context: &Context,
+    state: &State,
+    digital: &[Digital; 2],
+    units: [f64; 2],
+    found: [f64; 2],
+    without: &[EffectKind],
+) -> EffectSet {
+    let mut set = state.fit.set.clone();
+    for kind in EffectKind::ALL {
+        if set.get(kind).is_some_and(is_ordinary) {
+            set.remove(kind);
+        }
+    }
+    let mut add = |kind: EffectKind, values: Vec<f64>| {
+        if !without.contains(&kind) {
+            insert(&mut set, kind, values);
+        }
+    };
+    for (c, kinds) in [
+        [EffectKind::AccelSaturation, EffectKind::AccelQuantization, EffectKind::AccelNoise, EffectKind::AccelUnits],
+        [EffectKind::GyroSaturation, EffectKind::GyroQuantization, EffectKind::GyroNoise, EffectKind::GyroUnits],
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        if let Some(limit) = digital[c].limit {
+            add(kinds[0], vec![limit / units[c]]);
+        }
+        let step = digital[c].lsb.map_or(0.0, |lsb| lsb / units[c]);
+        let declared = problem.declared[c].unwrap_or(found[c]);
+        if step > NAMED_STEP * declared && step > 0.0 {
+            add(kinds[1], vec![step]);
+        }
+        // Rounding adds step^2 / 12 of noise of its own.
+        let beyond = found[c].powi(2) - step * step / 12.0 - declared.powi(2);
+        if problem.declared[c].is_some() && beyond > (NAMED_NOISE_RATIO - 1.0) * declared.powi(2) + 0.2 * step * step / 12.0 {
+            add(kinds[2], vec![(beyond / problem.rate_hz).sqrt()]);
+        }
+        if units[c] != 1.0 {
+            add(kinds[3], vec![units[c]]);
+        }
+    }
+    if problem.dropped.0 > 0.0 {
+        add(EffectKind::DroppedSamples, vec![problem.dropped.0, problem.dropped.1.max(1.0)]);
+    }
+    let noise = problem.estimate.noise();
+    if noise.position >= NAMED_NOISE.position || noise.rotation >= NAMED_NOISE.rotation {
+        add(EffectKind::ReferenceNoise, vec![noise.position, noise.rotation]);
+    }
+    if let Some(cutoff_hz) = context.basis.undone_hz {
+        add(EffectKind::ReferenceSmoothing, vec![cutoff_hz]);
+    }
+    set
+}
+
+/// Whether an effect is no larger than what every recording has.
+fn is_ordinary(effect: &Effect) -> bool {
+    if effect.kind() == EffectKind::MountSlip {
+        return effect.values()[1..].iter().map(|value| value * value).sum::<f64>().sqrt() < ORDINARY_SLIP;
+    }
+    let neutral = effect.kind().spec().neutral();
+    let size = effect.values().iter().zip(&neutral).map(|(value, neutral)| (value - neutral).abs()).fold(0.0, f64::max);
+    ORDINARY.iter().any(|(kind, ordinary)| *kind == effect.kind() && size < *ordinary)
+}
+
+/// The values of an effect, or none.
+pub(crate) fn values_of(set: &EffectSet, kind: EffectKind) -> Option<&[f64]> {
+    set.get(kind).map(Effect::values)
+}

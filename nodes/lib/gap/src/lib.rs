@@ -1,0 +1,29 @@
+//! The gap between simulated and real IMUs: where it lies, which effect causes it, how far it shrinks once that effect is added.
+
+mod answer;
+mod diagnose;
+mod diagnosis;
+mod error;
+mod evidence;
+mod fit;
+mod gram;
+mod gross;
+mod identify;
+mod metrics;
+mod place;
+mod probability;
+mod problem;
+mod record;
+mod screen;
+mod search;
+mod smoothing;
+mod unknown;
+mod whiten;
+pub mod monitor;
+pub mod report;
+
+pub use diagnose::{DiagnoseOptions, PlacementAnswer, diagnose};
+pub use diagnosis::{Cause, Diagnosis, Gap, Interval, Metrics, Place, PlacementDiagnosis, SCHEMA, Unexplained, Unidentifiable};
+pub use evidence::{AXES, CoursePoint, Evidence, Spectra};
+pub use error::GapError;
+pub use record::{ImuSeries, PlacementRecord, PoseSeries};

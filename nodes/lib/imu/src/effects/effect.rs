@@ -1,0 +1,188 @@
+//! An effect with its values, and sets of them.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::spec::Shape;
+use super::{EffectKind, axis_convention};
+use crate::EffectError;
+
+/// One effect with values for its parameters; valid from its making on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Effect {
+    kind: EffectKind,
+    values: Vec<f64>,
+}
+
+impl Effect {
+    /// An effect with flat values, matrices row by row, in the order of its parameters.
+    ///
+    /// # Errors
+    /// [`EffectError`] for a wrong number of values, values that are not finite or out of bounds, an `axis_convention` that is no signed permutation.
+    pub fn new(kind: EffectKind, values: Vec<f64>) -> Result<Self, EffectError> {
+        let (effect, spec) = (kind.name(), kind.spec());
+        if values.len() != spec.len() {
+            return Err(EffectError::Length { effect, expected: spec.len(), found: values.len() });
+        }
+        let mut rest = values.as_slice();
+        for parameter in spec.parameters {
+            let (own, after) = rest.split_at(parameter.shape.len());
+            rest = after;
+            if let Some(&value) = own.iter().find(|value| !(parameter.lower..=parameter.upper).contains(*value)) {
+                let (field, lower, upper) = (parameter.name, parameter.lower, parameter.upper);
+                return Err(EffectError::OutOfRange { effect, field, value, lower, upper });
+            }
+            if matches!(parameter.shape, Shape::Choice(_)) && own[0].fract() != 0.0 {
+                return Err(EffectError::Malformed { effect, field: parameter.name.to_owned(), expected: "the number of a choice" });
+            }
+        }
+        if kind == EffectKind::AxisConvention && !axis_convention::is_signed_permutation(&Matrix3::from_row_slice(&values)) {
+            return Err(EffectError::Malformed {
+                effect,
+                field: "matrix".to_owned(),
+                expected: "a signed permutation: one 1 or -1 in each row and column",
+            });
+        }
+        Ok(Self { kind, values })
+    }
+
+    /// The effect with values that change nothing.
+    pub fn neutral(kind: EffectKind) -> Self {
+        Self { kind, values: kind.spec().neutral() }
+    }
+
+    /// Which effect.
+    pub fn kind(&self) -> EffectKind {
+        self.kind
+    }
+
+    /// All values, matrices row by row, in the order of the parameters.
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// The same effect with other values.
+    ///
+    /// # Errors
+    /// As [`Effect::new`].
+    pub fn with_values(&self, values: Vec<f64>) -> Result<Self, EffectError> {
+        Self::new(self.kind, values)
+    }
+
+    /// The values of one parameter.
+    pub fn parameter(&self, name: &str) -> Option<&[f64]> {
+        let mut first = 0;
+        for parameter in self.kind.spec().parameters {
+            let length = parameter.shape.len();
+            if parameter.name == name {
+                return self.values.get(first..first + length);
+            }
+            first += length;
+        }
+        None
+    }
+
+    /// The value at a place among all values; 0 beyond them.
+    pub(super) fn scalar(&self, index: usize) -> f64 {
+        self.values.get(index).copied().unwrap_or_default()
+    }
+
+    /// The three values from a place on.
+    pub(super) fn vector(&self, index: usize) -> Vector3<f64> {
+        Vector3::new(self.scalar(index), self.scalar(index + 1), self.scalar(index + 2))
+    }
+
+    /// The first nine values as a matrix.
+    pub(super) fn matrix(&self) -> Matrix3<f64> {
+        Matrix3::from_fn(|row, column| self.scalar(3 * row + column))
+    }
+}
+
+/// Effects, at most one of each kind, in the order of [`EffectKind::ALL`].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct EffectSet(Vec<Effect>);
+
+impl EffectSet {
+    /// The empty set: the nominal simulation.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// The effect of a kind.
+    pub fn get(&self, kind: EffectKind) -> Option<&Effect> {
+        self.0.binary_search_by_key(&kind, Effect::kind).ok().map(|index| &self.0[index])
+    }
+
+    /// Whether there is an effect of a kind.
+    pub fn contains(&self, kind: EffectKind) -> bool {
+        self.get(kind).is_some()
+    }
+
+    /// Adds an effect; returns the one of its kind that it replaces.
+    pub fn insert(&mut self, effect: Effect) -> Option<Effect> {
+        match self.0.binary_search_by_key(&effect.kind, Effect::kind) {
+            Ok(index) => Some(std::mem::replace(&mut self.0[index], effect)),
+            Err(index) => {
+                self.0.insert(index, effect);
+                None
+            }
+        }
+    }
+
+    /// Takes out the effect of a kind.
+    pub fn remove(&mut self, kind: EffectKind) -> Option<Effect> {
+        self.0.binary_search_by_key(&kind, Effect::kind).ok().map(|index| self.0.remove(index))
+    }
+
+    /// The set without a kind.
+    #[must_use]
+    pub fn without(&self, kind: EffectKind) -> Self {
+        Self(self.0.iter().filter(|effect| effect.kind != kind).cloned().collect())
+    }
+
+    /// The set with an effect, which replaces that of its kind.
+    #[must_use]
+    pub fn with(mut self, effect: Effect) -> Self {
+        self.insert(effect);
+        self
+    }
+
+    /// The effects, in the order of [`EffectKind::ALL`].
+    pub fn iter(&self) -> std::slice::Iter<'_, Effect> {
+        self.0.iter()
+    }
+
+    /// Number of effects.
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+}
+
+impl<'a> IntoIterator for &'a EffectSet {
+    type Item = &'a Effect;
+    type IntoIter = std::slice::Iter<'a, Effect>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter()
+    }
+}
+
+impl TryFrom<Vec<Effect>> for EffectSet {
+    type Error = EffectError;
+
+    /// Refuses a second effect of one kind.
+    fn try_from(effects: Vec<Effect>) -> Result<Self, EffectError> {
+        let mut set = Self::default();
+        for effect in effects {
+            let name = effect.kind.name();
+            if set.insert(effect).is_some() {
+                return Err(EffectError::Repeated { effect: name });
+            }
+        }
+        Ok(set)
+    }
+}

@@ -1,0 +1,26 @@
+//! `reference_noise`: scatter of the reported pose; it belongs to the recording and no simulation takes it away.
+
+use std::f64::consts::PI;
+
+use super::EffectKind;
+use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
+
+pub(super) static SPEC: EffectSpec = EffectSpec {
+    kind: EffectKind::ReferenceNoise,
+    name: "reference_noise",
+    stage: Stage::Reference,
+    summary: "The reference pose scatters from sample to sample; differentiated, the scatter leaves broadband residual in both channels.",
+    remedy: "Improve the motion capture: more cameras in view, larger marker spacing, or smooth the reference before use.",
+    parameters: &[
+        ParameterSpec { name: "position", unit: "m", shape: Shape::Scalar, neutral: &[0.0], lower: 0.0, upper: 1.0, step: 1e-5 },
+        ParameterSpec { name: "rotation", unit: "rad", shape: Shape::Scalar, neutral: &[0.0], lower: 0.0, upper: PI, step: 1e-5 },
+    ],
+    random: true,
+    continuous: true,
+    starts,
+};
+
+/// A standard deviation of zero has no gradient.
+fn starts(_: &ResidualView) -> Vec<Vec<f64>> {
+    vec![vec![0.001, 0.005]]
+}

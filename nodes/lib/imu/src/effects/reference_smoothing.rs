@@ -1,0 +1,28 @@
+//! `reference_smoothing`: a reference that was low-passed without phase; what is lost there no simulation brings back.
+
+use super::EffectKind;
+use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
+
+pub(super) static SPEC: EffectSpec = EffectSpec {
+    kind: EffectKind::ReferenceSmoothing,
+    name: "reference_smoothing",
+    stage: Stage::Reference,
+    summary: "The reference was smoothed: fast motion that the IMU feels is missing from it, in step with the motion and above the cutoff.",
+    remedy: "Export the motion capture unfiltered, or with a higher cutoff frequency.",
+    parameters: &[ParameterSpec {
+        name: "cutoff_hz",
+        unit: "Hz",
+        shape: Shape::Scalar,
+        neutral: &[1e4],
+        lower: 0.1,
+        upper: 1e4,
+        step: 1e-3,
+    }],
+    random: false,
+    continuous: true,
+    starts,
+};
+
+fn starts(_: &ResidualView) -> Vec<Vec<f64>> {
+    [4.0, 8.0, 16.0].map(|cutoff_hz| vec![cutoff_hz]).to_vec()
+}
