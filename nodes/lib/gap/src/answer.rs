@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use crate::diagnose::{DiagnoseOptions, Findings, ORDINARY_NOISE, values_of};
 use crate::metrics::Comparison;
 use crate::problem::{FOLDS, Problem, axis_of};
-use crate::unknown::{self, Unknown};
+use crate::unknown::Unknown;
 use crate::whiten::{NoiseModel, Whitener};
 use crate::{Cause, Evidence, Gap, Metrics, PlacementDiagnosis, Unexplained};
 
@@ -46,7 +46,7 @@ impl<'a> Answer<'a> {
     /// Diagnosis and curves.
     pub fn finish(&self) -> (PlacementDiagnosis, Evidence) {
         let named: Vec<Effect> = self.findings.named.iter().cloned().collect();
-        let unknown = unknown::look(self.findings);
+        let unknown = self.findings.unknown.clone();
         let shares = self.shares(&named);
         let mut order: Vec<usize> = (0..named.len()).collect();
         order.sort_by(|&a, &b| shares.of_effect[b].total_cmp(&shares.of_effect[a]));

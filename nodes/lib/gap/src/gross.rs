@@ -257,10 +257,10 @@ pub(crate) fn digital(measured: &[Reading], channel: usize) -> Digital {
     let lsb = lattice(&values);
     let largest = values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
     let repeats = values.iter().filter(|value| value.abs() >= largest * (1.0 - 1e-9)).count();
-    // On a coarse lattice a few equal extremes are chance: the next lower steps must be rarer than the limit itself.
     let below = lsb.map_or(0, |lsb| values.iter().filter(|value| (value.abs() - largest + lsb).abs() < 0.5 * lsb).count());
-    let least = if lsb.is_some() { 12.max(4 * below) } else { 4 };
-    let limit = (repeats >= least && largest > 0.0).then_some(largest);
+    // On a lattice the tail thins out from step to step, unless clipping piles it up.
+    let piled = if lsb.is_some() { repeats >= 12 && 2 * repeats > 3 * below } else { repeats >= 4 };
+    let limit = (piled && largest > 0.0).then_some(largest);
     Digital { limit, lsb }
 }
 

@@ -12,6 +12,7 @@ mod identify;
 mod metrics;
 mod place;
 mod probability;
+mod probes;
 mod problem;
 mod record;
 mod screen;

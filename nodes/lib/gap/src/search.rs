@@ -9,8 +9,6 @@ use crate::screen::FITTED;
 const BEAM: usize = 2;
 /// Candidates of each set that are fitted.
 const REFITS: usize = 3;
-/// Most effects of a set.
-pub(crate) fn most() -> usize { std::env::var("MOST").ok().and_then(|v| v.parse().ok()).unwrap_or(6) }
 /// What an effect has to gain on held-out data, nats.
 const LEAST_GAIN: f64 = 12.0;
 /// And for each of its values.
@@ -28,13 +26,12 @@ pub(crate) struct State {
     pub margins: Vec<(EffectKind, f64)>,
 }
 
-/// What a set costs.
-pub(crate) fn price(set: &EffectSet) -> f64 {
+fn price(set: &EffectSet, coarse: f64) -> f64 {
     set.iter()
         .map(|effect| match effect.kind() {
             // One of 48, one of 3: no values to fit, but a choice.
             EffectKind::AxisConvention | EffectKind::GravityConvention => LEAST_GAIN + 4.0,
-            kind => LEAST_GAIN + LEAST_GAIN_PER_VALUE * free_values(kind).len() as f64,
+            kind => coarse * (LEAST_GAIN + LEAST_GAIN_PER_VALUE * free_values(kind).len() as f64),
         })
         .sum()
 }
@@ -45,9 +42,17 @@ pub(crate) fn library(without: &[EffectKind]) -> Vec<EffectKind> {
 }
 
 impl Context<'_> {
+    /// What a set costs. Coarse rounding and a smoothing whose shape is only guessed leave errors that are no white noise, and are fitted by many
+    /// effects: everything costs more.
+    fn price(&self, set: &EffectSet) -> f64 {
+        let steps = self.basis.steps[0].max(self.basis.steps[1]);
+        let coarse = (1.0 + steps / 3.0) * if self.basis.undone_hz.is_some() { 5.0 } else { 1.0 };
+        price(set, coarse)
+    }
+
     pub fn state(&self, set: EffectSet) -> State {
         let fit = self.sharpen_slip(self.fit(set));
-        let score = fit.linear.held_out - price(&fit.set);
+        let score = fit.linear.held_out - self.price(&fit.set);
         State { fit, score, margins: Vec::new() }
     }
 
@@ -94,7 +99,7 @@ impl Context<'_> {
             .iter()
             .filter(|kind| state.fit.set.get(**kind).is_none())
             .filter_map(|kind| self.screen(&state.fit, *kind))
-            .map(|candidate| (candidate.promise - price(&candidate.set), candidate))
+            .map(|candidate| (candidate.promise - self.price(&candidate.set), candidate))
             .collect();
         candidates.sort_by(|a, b| b.0.total_cmp(&a.0));
         debug(|| {
@@ -138,7 +143,7 @@ impl Context<'_> {
                     .iter()
                     .filter(|other| **other != kind && smaller.fit.set.get(**other).is_none())
                     .filter_map(|other| self.screen(&smaller.fit, *other))
-                    .map(|candidate| (candidate.promise - price(&candidate.set), candidate))
+                    .map(|candidate| (candidate.promise - self.price(&candidate.set), candidate))
                     .collect();
                 candidates.sort_by(|a, b| b.0.total_cmp(&a.0));
                 for (promise, candidate) in candidates.into_iter().take(2) {

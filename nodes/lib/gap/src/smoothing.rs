@@ -71,5 +71,16 @@ pub(crate) fn try_smoothing<'a>(
     let other = smoothed(&context, &starts[0], best.1);
     let searched = other.search(starts, library, 2, false);
     debug(|| eprintln!("  smoothing {:.2} Hz with {:?}: {:.1}", best.1, kinds(&searched.fit.set), evidence(&other, &searched)));
-    if evidence(&other, &searched) > plain + 30.0 + 0.05 * context.excess(&state.fit) { (other, searched) } else { (context, state) }
+    let better = evidence(&other, &searched) > plain + 30.0 + 0.05 * context.excess(&state.fit);
+    if better && comes_closer(&context, &state, &searched) { (other, searched) } else { (context, state) }
+}
+
+/// Whether the simulation itself comes closer in one channel, and in none moves away: what is undone must not cost more than it gives.
+fn comes_closer(context: &Context, plain: &State, undone: &State) -> bool {
+    let rms = |state: &State, channel: usize| {
+        let residual = context.problem.residual(&state.fit.prediction.readings);
+        residual[3 * channel..3 * channel + 3].iter().flatten().map(|e| e * e).sum::<f64>().sqrt()
+    };
+    let ratio = [0, 1].map(|channel| rms(undone, channel) / rms(plain, channel).max(1e-30));
+    ratio[0].min(ratio[1]) < 0.95 && ratio[0].max(ratio[1]) < 1.05
 }

@@ -1,7 +1,29 @@
 //! Whether what is left is noise.
 
+use cromosim_imu::{EffectKind, Reading};
+
 use crate::Place;
 use crate::diagnose::Findings;
+use crate::fit::Fit;
+use crate::gram::dot;
+use crate::place::{bands, place, spectrum_of};
+use crate::probes::{Probe, probes, with_probes};
+use crate::problem::{Problem, axis_of};
+use crate::search::{debug, without};
+
+/// Mean square of a whitened residual in a band from which on it is structure. Without any effect none of a hundred placements reached 3.
+const BAND: f64 = 4.0;
+/// Held-out gain of a regression, nats, likewise; without any effect none reached 0.
+const PROBE: f64 = 60.0;
+/// Loudest two seconds against the median ones, where outliers are many.
+const BURST: f64 = 5.0;
+const OUTLIERS: f64 = 0.003;
+/// Share of repeated readings.
+const FROZEN: f64 = 0.002;
+/// Scatter of the stamps' intervals.
+const JITTER: f64 = 0.05;
+/// Part of its gain that an effect keeps beside what the residual depends on, if it is more than an imitation of that.
+const OWN_GAIN: f64 = 0.1;
 
 /// Structure that no named effect explains.
 #[derive(Clone, Debug)]
@@ -11,10 +33,155 @@ pub(crate) struct Unknown {
     pub axes: Vec<String>,
     pub depends_on: String,
     pub probability: f64,
+    /// Fitted effects that only imitate it.
+    pub imitations: Vec<EffectKind>,
+}
+
+/// What the residual of a fit looks like.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Signs {
+    /// Largest mean square of the whitened residual in a band, by channel.
+    pub band: [f64; 2],
+    /// Share of values beyond five standard deviations, by channel.
+    pub outliers: [f64; 2],
+    /// Largest mean square of two seconds over the median one, by channel.
+    pub burst: [f64; 2],
+    /// Share of readings that repeat the one before in all axes, by channel.
+    pub frozen: [f64; 2],
+    /// Standard deviation of the stamps' intervals over their median.
+    pub jitter: f64,
 }
 
 /// Looks for structure in the whitened residual.
 pub(crate) fn look(findings: &Findings) -> Option<Unknown> {
-    let _ = findings;
-    None
+    let signs = Signs::of(findings);
+    let mut probes = probes(findings);
+    probes.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    debug(|| {
+        let list: Vec<String> = probes.iter().take(4).map(|p| format!("{}/{}:{:.0}", p.depends_on, p.channel, p.gain)).collect();
+        eprintln!("SIGNS {signs:.3?} {}", list.join(" "));
+    });
+    let strong: Vec<&Probe> = probes.iter().filter(|probe| probe.gain > PROBE).collect();
+    let noisy = |c: usize| signs.band[c] > BAND || (signs.burst[c] > BURST && signs.outliers[c] > OUTLIERS);
+    let stuck = |c: usize| signs.frozen[c] > FROZEN && findings.digital[c].lsb.is_none();
+    let jittery = signs.jitter > JITTER;
+    let of_channel = |c: usize| noisy(c) || stuck(c) || strong.iter().any(|probe| probe.channel == c);
+    if !of_channel(0) && !of_channel(1) && !jittery {
+        return None;
+    }
+    let depends_on = if jittery {
+        "time stamps"
+    } else if stuck(0) || stuck(1) {
+        "repeated readings"
+    } else if let Some(probe) = strong.first() {
+        probe.depends_on
+    } else {
+        "time"
+    };
+    let place = place(&findings.state.fit.residual, findings.context.problem, &findings.context.whitener);
+    let channels: Vec<&str> = [(0, "accel"), (1, "gyro")].into_iter().filter(|(c, _)| of_channel(*c)).map(|(_, name)| name).collect();
+    let channel = if channels.len() == 1 { channels[0] } else { "both" };
+    let axes = place.axes.iter().filter(|(_, share)| **share > 0.1).map(|(name, _)| name.clone()).collect();
+    let mut imitations = imitations(findings, &strong);
+    for (c, kind) in [(0, EffectKind::AccelNoise), (1, EffectKind::GyroNoise)] {
+        if of_channel(c) || jittery {
+            imitations.push(kind);
+        }
+    }
+    if jittery {
+        imitations.push(EffectKind::DroppedSamples);
+    }
+    let gain = strong.first().map_or(0.0, |probe| probe.gain).max(signs.band[0].max(signs.band[1]) * 10.0);
+    let probability = 1.0 - 1.0 / (2.0 + gain / 20.0);
+    Some(Unknown { place, channel: channel.to_owned(), axes, depends_on: depends_on.to_owned(), probability, imitations })
+}
+
+/// Fitted effects which beside the strongest probes gain less than a tenth of what they gain without them.
+fn imitations(findings: &Findings, strong: &[&Probe]) -> Vec<EffectKind> {
+    let fit = &findings.state.fit;
+    let context = &findings.context;
+    // The strongest two of each channel say what the residual depends on; more only cost time.
+    let chosen: Vec<&Vec<Vec<f64>>> =
+        (0..2).flat_map(|c| strong.iter().filter(move |probe| probe.channel == c).take(2)).map(|probe| &probe.columns).collect();
+    if chosen.is_empty() {
+        return Vec::new();
+    }
+    let together = with_probes(findings, fit, &chosen).held_out;
+    let members: Vec<EffectKind> = fit.set.iter().map(|effect| effect.kind()).collect();
+    let nominal = context.state(cromosim_imu::EffectSet::new());
+    let explained = together - nominal.fit.linear.held_out;
+    members
+        .into_iter()
+        .filter(|kind| {
+            let smaller = context.state(without(&fit.set, *kind));
+            let alone = fit.linear.held_out - smaller.fit.linear.held_out;
+            let beside = together - with_probes(findings, &smaller.fit, &chosen).held_out;
+            debug(|| eprintln!("   member {} alone {alone:.0} beside probes {beside:.0} of {explained:.0}", kind.name()));
+            beside < OWN_GAIN * alone || beside < OWN_GAIN * explained
+        })
+        .collect()
+}
+
+impl Signs {
+    fn of(findings: &Findings) -> Self {
+        let context = &findings.context;
+        let problem = context.problem;
+        let fit = &findings.state.fit;
+        let mut signs = Self { jitter: jitter(problem), ..Self::default() };
+        for channel in 0..2 {
+            let spectrum = spectrum_of(&fit.residual, problem, 3 * channel..3 * channel + 3);
+            let kept = context.whitener.count[channel] / (3.0 * problem.length as f64);
+            let level = |from: f64, to: f64| {
+                let band = spectrum.band(from, to);
+                band.iter().sum::<f64>() / band.len().max(1) as f64 * problem.rate_hz / 6.0 / kept.max(1e-9)
+            };
+            signs.band[channel] = bands(problem.rate_hz / 2.0).into_iter().skip(1).map(|(a, b)| level(a, b)).fold(0.0, f64::max);
+            signs.outliers[channel] = outliers(fit, problem, channel, context.whitener.count[channel]);
+            signs.burst[channel] = burst(findings, channel);
+            signs.frozen[channel] = frozen(problem, channel);
+        }
+        signs
+    }
+}
+
+fn jitter(problem: &Problem) -> f64 {
+    let period = 1.0 / problem.rate_hz;
+    let mut intervals: Vec<f64> = (1..problem.stamps.len())
+        .filter(|&k| problem.places[k] == problem.places[k - 1] + 1)
+        .map(|k| ((problem.stamps[k] - problem.stamps[k - 1]) / period - 1.0).abs())
+        .collect();
+    intervals.sort_unstable_by(f64::total_cmp);
+    intervals.get(intervals.len() / 2).map_or(0.0, |median| median / 0.6745)
+}
+
+fn outliers(fit: &Fit, problem: &Problem, channel: usize, count: f64) -> f64 {
+    let half = 3 * problem.length;
+    let part = &fit.residual[channel * half..(channel + 1) * half];
+    let sigma = (dot(part, part) / count.max(1.0)).sqrt().clamp(1.0, 1.5);
+    part.iter().filter(|e| e.abs() > 5.0 * sigma).count() as f64 / count.max(1.0)
+}
+
+fn burst(findings: &Findings, channel: usize) -> f64 {
+    let problem = findings.context.problem;
+    let step = ((2.0 * problem.rate_hz) as usize).max(1);
+    let mut blocks: Vec<f64> = (0..problem.length / step)
+        .filter_map(|block| {
+            let (mut sum, mut weight) = (0.0, 0.0);
+            for axis in 3 * channel..3 * channel + 3 {
+                let range = axis * problem.length + block * step..axis * problem.length + (block + 1) * step;
+                sum += findings.state.fit.residual[range].iter().map(|e| e * e).sum::<f64>();
+                weight += findings.context.whitener.weight[axis][block * step..(block + 1) * step].iter().map(|w| w * w).sum::<f64>();
+            }
+            (weight > step as f64).then(|| sum / weight)
+        })
+        .collect();
+    blocks.sort_unstable_by(f64::total_cmp);
+    let median = blocks.get(blocks.len() / 2).copied().unwrap_or(1.0).max(1.0);
+    blocks.last().copied().unwrap_or(1.0) / median
+}
+
+/// Readings equal to the one before in all three axes: a live sensor's noise forbids it, unless it rounds coarsely.
+fn frozen(problem: &Problem, channel: usize) -> f64 {
+    let same = |a: &Reading, b: &Reading| (3 * channel..3 * channel + 3).all(|axis| axis_of(a, axis) == axis_of(b, axis));
+    problem.measured.windows(2).filter(|pair| same(&pair[0], &pair[1])).count() as f64 / problem.measured.len() as f64
 }

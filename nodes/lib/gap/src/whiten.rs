@@ -46,6 +46,8 @@ pub(crate) struct NoiseBasis {
     pub force_squared: f64,
     /// A line that may be a vibration.
     pub line_hz: Option<f64>,
+    /// Steps of quantisation in units of the white noise: rounding errors of slow motion are no white noise.
+    pub steps: [f64; 2],
     /// Shares of the reference's noise densities that are taken: position, rotation.
     pub reference_share: [f64; 2],
 }
@@ -60,6 +62,7 @@ impl NoiseBasis {
             rate_squared: 0.0,
             force_squared: STANDARD_GRAVITY.powi(2),
             line_hz: None,
+            steps: [0.0; 2],
             reference_share: [1.0; 2],
         }
     }

@@ -20,8 +20,10 @@ const PADDING_S: f64 = 2.0;
 const LONE_BAND: f64 = 2.2;
 /// How far around a line the filter stays open, Hz: a line's amplitude changes over some seconds.
 const LINE_HZ: f64 = 0.1;
-/// Largest factor by which a smoothing that is undone may amplify.
-const LARGEST_GAIN: f64 = 100.0;
+/// Largest factor by which a smoothing that is undone may amplify: its true shape is nowhere written, and errors grow with it.
+const LARGEST_GAIN: f64 = 8.0;
+/// And what is still said of the gain that it would take.
+const LARGEST_LOSS: f64 = 1000.0;
 
 /// White noise of poses: standard deviation per sample and axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -144,7 +146,7 @@ impl PoseEstimate {
     }
 
     /// The estimate with a zero-phase smoothing of the poses undone (second-order Butterworth of this cutoff, forwards and backwards), up to a
-    /// factor of 100.
+    /// factor of 8.
     #[must_use]
     pub fn undoing(&self, cutoff_hz: f64) -> Self {
         let mut undone = self.clone();
@@ -163,7 +165,7 @@ impl PoseEstimate {
     /// Share of the motion at a frequency that the estimate keeps, of position and of rotation, and the gain that undoes a smoothing.
     pub fn filter_at(&self, frequency_hz: f64) -> (f64, f64, f64) {
         let gain = undo(frequency_hz, self.undone_hz, self.rate_hz);
-        (self.position.filter_at(frequency_hz), self.rotation.filter_at(frequency_hz), gain.min(LARGEST_GAIN))
+        (self.position.filter_at(frequency_hz), self.rotation.filter_at(frequency_hz), gain.min(LARGEST_LOSS))
     }
 
     /// The kinematics on a grid of at least `least_rate_hz`, a whole multiple of the poses' rate, from the first pose to the last.

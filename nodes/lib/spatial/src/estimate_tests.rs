@@ -94,6 +94,7 @@ fn a_smoothing_is_undone() {
     // Through the smoothing's own gain at the motion's frequencies.
     let (stamps, mut positions, rotations) = poses(PoseNoise { position: 1e-6, rotation: 1e-6 }, 100.0, |_| true);
     let gain = |f: f64| 1.0 / undo(f, Some(3.0), 100.0);
+    assert!(undo(3.9, Some(3.0), 100.0) < LARGEST_GAIN);
     for (k, position) in positions.iter_mut().enumerate() {
         let t = k as f64 / 100.0;
         let clean = motion(t).0;

@@ -1,0 +1,225 @@
+//! Numbers and words for people.
+
+use std::fmt::Write;
+
+use cromosim_imu::effects::{EffectKind, EffectSpec};
+use serde_json::Value;
+
+/// Text with the five characters of markup replaced.
+pub(super) fn escape(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for character in text.chars() {
+        match character {
+            '&' => escaped.push_str("&amp;"),
+            '<' => escaped.push_str("&lt;"),
+            '>' => escaped.push_str("&gt;"),
+            '"' => escaped.push_str("&quot;"),
+            '\'' => escaped.push_str("&#39;"),
+            // Not allowed in XML, in any form.
+            control if control.is_control() && !matches!(control, '\n' | '\t') => escaped.push('\u{FFFD}'),
+            other => escaped.push(other),
+        }
+    }
+    escaped
+}
+
+/// A number with so many significant digits; `–` for none.
+pub(super) fn significant(value: f64, digits: usize) -> String {
+    if !value.is_finite() {
+        return "–".to_owned();
+    }
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let exponent = value.abs().log10().floor() as i32;
+    if !(-5..=6).contains(&exponent) {
+        return minus(&format!("{value:.*e}", digits.saturating_sub(1)));
+    }
+    decimals(value, (digits as i32 - 1 - exponent).max(0) as usize)
+}
+
+/// The same without zeros at its end.
+pub(super) fn trimmed(value: f64, digits: usize) -> String {
+    let text = significant(value, digits);
+    match text.split_once('.') {
+        Some((whole, fraction)) if !text.contains('e') => {
+            let fraction = fraction.trim_end_matches('0');
+            if fraction.is_empty() { whole.to_owned() } else { format!("{whole}.{fraction}") }
+        }
+        _ => text,
+    }
+}
+
+/// A number with so many decimals.
+pub(super) fn decimals(value: f64, decimals: usize) -> String {
+    if !value.is_finite() {
+        return "–".to_owned();
+    }
+    let text = format!("{value:.decimals$}");
+    // -0.00 is 0.00.
+    let is_zero = text.chars().all(|character| matches!(character, '-' | '0' | '.'));
+    minus(text.strip_prefix('-').filter(|_| is_zero).unwrap_or(&text))
+}
+
+/// The typographic minus, as wide as a digit.
+fn minus(text: &str) -> String {
+    text.replacen('-', "−", 1)
+}
+
+/// `62 %`; small shares are not rounded to nothing.
+pub(super) fn percent(share: f64) -> String {
+    match 100.0 * share {
+        value if !value.is_finite() => "–".to_owned(),
+        value if value > 0.0 && value < 1.0 => "&lt; 1 %".to_owned(),
+        value if value < 100.0 && value > 99.0 => "&gt; 99 %".to_owned(),
+        value => format!("{} %", decimals(value, 0)),
+    }
+}
+
+/// What the library knows of an effect; nothing of `unknown`.
+pub(super) fn spec(effect: &str) -> Option<&'static EffectSpec> {
+    EffectKind::from_name(effect).map(EffectKind::spec)
+}
+
+/// What an effect is, in a sentence.
+pub(super) fn summary(effect: &str) -> &'static str {
+    match effect {
+        "unknown" => "Structure in the residual that no named effect explains.",
+        name => spec(name).map_or("", |spec| spec.summary),
+    }
+}
+
+/// The unit of a parameter; empty for none.
+fn unit(effect: &str, parameter: &str) -> &'static str {
+    let own = spec(effect).and_then(|spec| spec.parameters.iter().find(|own| own.name == parameter)).map(|own| own.unit);
+    match (own, parameter) {
+        (Some(unit), _) => unit,
+        (None, "band_hz") => "Hz",
+        (None, "intervals_s") => "s",
+        (None, _) => "",
+    }
+}
+
+/// A parameter as markup: name, numbers with their standard errors, unit; also in degrees or milliseconds where people think in these.
+pub(super) fn parameter(effect: &str, name: &str, value: &Value, error: Option<&Value>) -> String {
+    let unit = unit(effect, name);
+    let mut text = format!("<span class=\"name\">{}</span> ", escape(name));
+    write_value(&mut text, value, error);
+    if !unit.is_empty() {
+        let _ = write!(text, " <span class=\"unit\">{}</span>", escape(unit));
+    }
+    if let Some(aside) = aside(unit, value) {
+        let _ = write!(text, " <span class=\"aside\">({aside})</span>");
+    }
+    text
+}
+
+fn write_value(text: &mut String, value: &Value, error: Option<&Value>) {
+    match value {
+        Value::Array(items) if items.iter().any(Value::is_array) => {
+            for (index, row) in items.iter().enumerate() {
+                text.push_str(if items.len() > 1 { "<br>" } else { "" });
+                write_value(text, row, error.and_then(|error| error.get(index)));
+            }
+        }
+        Value::Array(items) => {
+            for (index, item) in items.iter().enumerate() {
+                text.push_str(if index > 0 { ", " } else { "" });
+                write_value(text, item, error.and_then(|error| error.get(index)));
+            }
+        }
+        Value::Number(number) => text.push_str(&with_error(number.as_f64().unwrap_or(f64::NAN), error.and_then(Value::as_f64))),
+        Value::String(word) => text.push_str(&escape(word)),
+        Value::Object(fields) => {
+            let mut first = true;
+            for (key, field) in fields {
+                text.push_str(if first { "" } else { ", " });
+                first = false;
+                let _ = write!(text, "{} ", escape(key));
+                write_value(text, field, None);
+            }
+        }
+        other => text.push_str(&escape(&other.to_string())),
+    }
+}
+
+/// `0.0500 ± 0.0010`: decimals to the second digit of the error. Values within two errors of nothing are dimmed.
+fn with_error(value: f64, error: Option<f64>) -> String {
+    let Some(error) = error.filter(|error| error.is_finite() && *error > 0.0) else {
+        // Absolute times keep their milliseconds.
+        return if value.abs() > 1e7 { decimals(value, 3) } else { format!("<span class=\"number\">{}</span>", trimmed(value, 4)) };
+    };
+    let places = 1 - error.log10().floor() as i32;
+    let class = if value.abs() < 2.0 * error { "number dim" } else { "number" };
+    let (value, error) = match places {
+        0..=7 => (decimals(value, places as usize), decimals(error, places as usize)),
+        _ => (significant(value, 4), significant(error, 2)),
+    };
+    format!("<span class=\"{class}\">{value} ± {error}</span>")
+}
+
+fn aside(unit: &str, value: &Value) -> Option<String> {
+    let numbers: Vec<f64> = match value {
+        Value::Number(number) => vec![number.as_f64()?],
+        Value::Array(items) if items.len() == 3 => items.iter().map(Value::as_f64).collect::<Option<_>>()?,
+        _ => return None,
+    };
+    let norm = numbers.iter().map(|number| number * number).sum::<f64>().sqrt();
+    match unit {
+        "rad" => Some(format!("{}°", significant(norm.to_degrees(), 3))),
+        "rad/s" => Some(format!("{} °/s", significant(norm.to_degrees(), 3))),
+        "m" if norm < 1.0 => Some(format!("{} cm", significant(100.0 * norm, 3))),
+        "s" if norm < 1.0 => Some(format!("{} ms", significant(1e3 * norm, 3))),
+        _ => None,
+    }
+}
+
+/// `accel_x` as `accelerometer x`.
+pub(super) fn axis_name(axis: &str) -> String {
+    match axis.split_once('_') {
+        Some(("accel", axis)) => format!("accelerometer {axis}"),
+        Some(("gyro", axis)) => format!("gyroscope {axis}"),
+        _ => match axis {
+            "accel" => "accelerometer".to_owned(),
+            "gyro" => "gyroscope".to_owned(),
+            other => other.to_owned(),
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_the_digits_that_their_errors_allow() {
+        let plain = |value, error| {
+            let text = with_error(value, error);
+            text.replace("<span class=\"number\">", "").replace("<span class=\"number dim\">", "~").replace("</span>", "")
+        };
+        assert_eq!(plain(0.05, Some(0.001)), "0.0500 ± 0.0010");
+        assert_eq!(plain(0.0004, Some(0.001)), "~0.0004 ± 0.0010");
+        assert_eq!(plain(-123.456, Some(2.5)), "−123.5 ± 2.5");
+        assert_eq!(plain(-0.021_34, None), "−0.02134");
+        assert_eq!((plain(4.0, None).as_str(), plain(0.25, None).as_str(), plain(1200.0, None).as_str()), ("4", "0.25", "1200"));
+        assert_eq!(plain(1.7e-7, None), "1.700e-7".replace('-', "−"));
+        assert_eq!(plain(f64::NAN, None), "–");
+        assert_eq!((percent(0.004).as_str(), percent(0.62).as_str(), percent(1.0).as_str()), ("&lt; 1 %", "62 %", "100 %"));
+        assert_eq!(decimals(-0.0001, 2), "0.00");
+    }
+
+    #[test]
+    fn markup_cannot_come_in() {
+        assert_eq!(escape("<a href='x'>&\"\u{1}"), "&lt;a href=&#39;x&#39;&gt;&amp;&quot;\u{FFFD}");
+        let text = parameter("unknown", "<b>", &serde_json::json!(["<i>", {"<u>": "<s>"}]), None);
+        assert!(!text.contains("<b>") && !text.contains("<i>") && !text.contains("<u>") && !text.contains("<s>"), "{text}");
+    }
+
+    #[test]
+    fn parameters_say_their_unit_and_what_people_think_in() {
+        let text = parameter("time_offset", "seconds", &serde_json::json!(0.021), Some(&serde_json::json!(0.0004)));
+        assert!(text.contains("0.02100 ± 0.00040") && text.contains(">s<") && text.contains("(21.0 ms)"), "{text}");
+        let text = parameter("mount_rotation", "rotvec", &serde_json::json!([0.1, 0.0, 0.0]), None);
+        assert!(text.contains("(5.73°)"), "{text}");
+    }
+}
