@@ -5,6 +5,7 @@ mod diagnose;
 mod diagnosis;
 mod error;
 mod evidence;
+mod fill;
 mod fit;
 mod gram;
 mod gross;

@@ -14,7 +14,7 @@ use crate::search::{debug, without};
 /// Mean square of a whitened residual in a band from which on it is structure. Without any effect none of a hundred placements reached 3.
 const BAND: f64 = 4.0;
 /// Held-out gain of a regression, nats, likewise; without any effect none reached 0.
-const PROBE: f64 = 60.0;
+const PROBE: f64 = 100.0;
 /// Loudest two seconds against the median ones, where outliers are many.
 const BURST: f64 = 5.0;
 const OUTLIERS: f64 = 0.003;

@@ -7,6 +7,7 @@ use cromosim_imu::{Reading, STANDARD_GRAVITY};
 use cromosim_spatial::{FourierPair, PoseEstimate, Spectrum, welch};
 use rustfft::num_complex::Complex64;
 
+use crate::fill::Filler;
 use crate::problem::{Problem, axis_of};
 
 /// Length of the windows of residual spectra, s.
@@ -73,6 +74,7 @@ impl NoiseBasis {
 pub(crate) struct Whitener {
     transform: FourierPair,
     gain: [Vec<f64>; 2],
+    fillers: Vec<Arc<Filler>>,
     /// Square roots of the weights, [axis][raster]: 0 where nothing is compared.
     pub weight: Vec<Vec<f64>>,
     /// Number of values compared: accelerometer, gyroscope.
@@ -217,45 +219,44 @@ impl Whitener {
         let transform = FourierPair::new(length);
         let gain = noise.power.clone().map(|power| power.iter().map(|value| value.max(1e-30).sqrt().recip()).collect::<Vec<f64>>());
         let log_scale = noise.power.clone().map(|power| 0.5 * power.iter().map(|value| value.max(1e-30).ln()).sum::<f64>() / power.len() as f64);
-        let mut whitener = Self { transform, gain, weight: vec![vec![0.0; problem.length]; 6], count: [0.0; 2], log_scale };
+        let fillers = vec![Arc::new(Filler::default()); 6];
+        let mut whitener = Self { transform, gain, fillers, weight: vec![vec![0.0; problem.length]; 6], count: [0.0; 2], log_scale };
         whitener.set_weights(problem, noise);
         whitener
     }
 
     /// Zero where nothing is compared; less next to filled entries, whose error the whitening spreads: `1 / (1 + sum h^2 v)`, with h the
-    /// whitening's impulse response and v the variance of what a straight line misses.
+    /// whitening's impulse response and v the expected squared error of what is filled in.
     fn set_weights(&mut self, problem: &Problem, noise: &NoiseModel) {
         let length = self.transform.length();
-        for axis in 0..6 {
-            let channel = axis / 3;
-            let mut usable = vec![false; problem.length];
-            problem.places.iter().enumerate().for_each(|(k, &place)| usable[place] = problem.usable[k][axis]);
+        for channel in 0..2 {
             let covariance = self.covariance(&noise.power[channel]);
-            // A line between neighbours one step away misses 3/2 r0 - 2 r1 + 1/2 r2; in the middle of a long hole, everything.
-            let (r0, r1, r2) = (covariance[0], covariance[1], covariance[2]);
-            let short = (1.5 * r0 - 2.0 * r1 + 0.5 * r2).max(0.0);
-            let mut missing = vec![Complex64::default(); length];
-            let mut run = 0;
-            for k in (0..problem.length).rev() {
-                run = if usable[k] { 0 } else { run + 1 };
-                if run > 0 {
-                    let before = (0..k).rev().take(8).take_while(|&j| !usable[j]).count();
-                    let nearest = run.min(before + 1) as f64;
-                    missing[k].re = (short * nearest * nearest).min(1.5 * r0);
-                }
-            }
             let mut response: Vec<Complex64> =
                 (0..length).map(|k| Complex64::new(self.gain[channel][k.min(length - k)], 0.0)).collect();
             self.transform.inverse(&mut response);
             response.iter_mut().for_each(|value| *value = Complex64::new(value.re * value.re, 0.0));
             self.transform.forward(&mut response);
-            self.transform.forward(&mut missing);
-            missing.iter_mut().zip(&response).for_each(|(value, factor)| *value *= *factor);
-            self.transform.inverse(&mut missing);
-            for k in 0..problem.length {
-                self.weight[axis][k] = if usable[k] { (1.0 / (1.0 + missing[k].re.max(0.0))).sqrt() } else { 0.0 };
+            let mut known: Option<Vec<bool>> = None;
+            for axis in 3 * channel..3 * channel + 3 {
+                let mut there = vec![false; length];
+                problem.places.iter().enumerate().for_each(|(k, &place)| there[place] = problem.usable[k][axis]);
+                if known.as_ref() == Some(&there) {
+                    self.fillers[axis] = self.fillers[axis - 1].clone();
+                    self.weight[axis] = self.weight[axis - 1].clone();
+                } else {
+                    let filler = Filler::new(&there, &covariance);
+                    let mut missing: Vec<Complex64> = filler.variance.iter().map(|variance| Complex64::new(*variance, 0.0)).collect();
+                    self.transform.forward(&mut missing);
+                    missing.iter_mut().zip(&response).for_each(|(value, factor)| *value *= *factor);
+                    self.transform.inverse(&mut missing);
+                    for k in 0..problem.length {
+                        self.weight[axis][k] = if there[k] { (1.0 / (1.0 + missing[k].re.max(0.0))).sqrt() } else { 0.0 };
+                    }
+                    self.fillers[axis] = Arc::new(filler);
+                    known = Some(there);
+                }
+                self.count[channel] += self.weight[axis].iter().map(|weight| weight * weight).sum::<f64>();
             }
-            self.count[channel] += self.weight[axis].iter().map(|weight| weight * weight).sum::<f64>();
         }
     }
 
@@ -271,20 +272,20 @@ impl Whitener {
     pub fn apply(&self, series: &[Vec<f64>]) -> Vec<f64> {
         let count = series[0].len();
         let length = self.transform.length();
+        let extended: Vec<Vec<f64>> = (0..6)
+            .map(|axis| {
+                let mut values = series[axis].clone();
+                values.resize(length, 0.0);
+                self.fillers[axis].fill(&mut values);
+                values
+            })
+            .collect();
         let mut flat = vec![0.0; 6 * count];
         let mut buffer = vec![Complex64::default(); length];
         // Two axes of a channel at once; the last axes of both share one transform.
         for (first, second) in [(0, 1), (3, 4), (2, 5)] {
-            let (a, b) = (&series[first], &series[second]);
-            buffer.fill(Complex64::default());
-            for k in 0..count {
-                buffer[k] = Complex64::new(a[k], b[k]);
-            }
-            // Beyond the end: back to the start along a straight line, so that the ends do not ring into the middle.
-            let rest = (length - count + 1) as f64;
-            for k in count..length {
-                let share = (k + 1 - count) as f64 / rest;
-                buffer[k] = Complex64::new(a[count - 1] + (a[0] - a[count - 1]) * share, b[count - 1] + (b[0] - b[count - 1]) * share);
+            for (slot, (a, b)) in buffer.iter_mut().zip(extended[first].iter().zip(&extended[second])) {
+                *slot = Complex64::new(*a, *b);
             }
             self.transform.forward(&mut buffer);
             let (of_a, of_b) = (&self.gain[first / 3], &self.gain[second / 3]);

@@ -1,20 +1,20 @@
 //! A continuous-time estimate of a motion from noisy poses, with its own uncertainty.
 
-use std::f64::consts::TAU;
 use std::ops::Range;
+use std::sync::Arc;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use rustfft::num_complex::Complex64;
 
 use crate::holes::fill_holes;
+use crate::segments::{Filter, HOP_S, Segments, centres};
 use crate::spectrum::interpolated;
 use crate::{FourierPair, KinematicTrack, SpatialError, Spectrum, Stamp, so3, welch};
 
 /// Length of the windows from which the spectra are learnt, s, and below which multiple of the noise a spectrum counts as noise alone: three
 /// standard errors over three axes of a minute. The longer ones resolve lines, which steady gaits and machines have.
 const WINDOWS: [(f64, f64); 3] = [(5.0, 1.4), (20.0, 3.0), (f64::INFINITY, 8.0)];
-/// What is added at each end before the transform, s.
-const PADDING_S: f64 = 2.0;
+/// Multiple of the noise at which a window's band of motion ends.
+const LOCAL_EDGE: f64 = 1.6;
 /// The same beyond the band of motion, where among hundreds of frequencies some reach three standard errors by chance, and where the second
 /// derivative makes much of little.
 const LONE_BAND: f64 = 2.2;
@@ -45,12 +45,10 @@ pub struct PoseEstimate {
     start: Stamp,
     rate_hz: f64,
     count: usize,
-    padding: usize,
-    transform: FourierPair,
-    /// Of each coordinate's padded series less a straight line.
-    spectra: Vec<Vec<Complex64>>,
-    /// Value at entry 0 of the padded series, slope per entry.
-    lines: Vec<(f64, f64)>,
+    /// Position and sign-continuous quaternion on the grid, holes filled.
+    coordinates: Arc<Vec<Vec<f64>>>,
+    /// Spectra around each window's centre: of position, of rotation.
+    local: Arc<[Vec<Spectrum>; 2]>,
     position: Floor,
     rotation: Floor,
     gaps: Vec<(Stamp, Stamp)>,
@@ -67,8 +65,10 @@ struct Floor {
     white: f64,
     /// Density of the noise after a smoothing is undone.
     noise: Vec<f64>,
-    /// Wiener's filter, finer than the spectrum.
+    /// Wiener's filter, finer than the spectrum; its mean over the windows once these are known.
     filter: Vec<f64>,
+    /// The filter of each window.
+    windows: Vec<Filter>,
     /// Distance of the frequencies of filter and noise, Hz.
     spacing_hz: f64,
 }
@@ -94,22 +94,23 @@ impl PoseEstimate {
 
     fn on_raster(raster: &Raster, mut coordinates: Vec<Vec<f64>>) -> Self {
         let rate_hz = raster.rate_hz;
-        let padding = ((PADDING_S * rate_hz) as usize).min(raster.count - 1);
-        let transform = FourierPair::new(FourierPair::good_length(raster.count + 2 * padding));
         let holes = raster.holes();
         let learn = |coordinates: &[Vec<f64>]| [Floor::learn(&coordinates[..3], rate_hz), Floor::learn(&coordinates[3..], rate_hz)];
         let mut floors = learn(&coordinates);
         // Twice, because the first spectra saw straight lines across the holes.
         for _ in 0..if holes.is_empty() { 0 } else { 2 } {
+            let transform = FourierPair::new(FourierPair::good_length(raster.count + (4.0 * rate_hz) as usize));
             let (positions, quaternions) = coordinates.split_at_mut(3);
             fill_holes(positions, &holes, floors[0].spectrum(), &transform, rate_hz);
             fill_holes(quaternions, &holes, floors[1].spectrum(), &transform, rate_hz);
             floors = learn(&coordinates);
         }
-        let (spectra, lines) = coordinates.iter().map(|series| padded_transform(series, padding, &transform)).unzip();
-        let [position, rotation] = floors;
+        let local = [local_spectra(&coordinates[..3], rate_hz), local_spectra(&coordinates[3..], rate_hz)];
+        let [mut position, mut rotation] = floors;
+        position.localise(&local[0], rate_hz, None);
+        rotation.localise(&local[1], rate_hz, None);
         let (start, count, gaps) = (raster.start, raster.count, raster.gaps());
-        Self { start, rate_hz, count, padding, transform, spectra, lines, position, rotation, gaps, undone_hz: None }
+        Self { start, rate_hz, count, coordinates: Arc::new(coordinates), local: Arc::new(local), position, rotation, gaps, undone_hz: None }
     }
 
     /// Time of the first pose.
@@ -152,6 +153,8 @@ impl PoseEstimate {
         let mut undone = self.clone();
         undone.position = self.position.undoing(cutoff_hz, self.rate_hz);
         undone.rotation = self.rotation.undoing(cutoff_hz, self.rate_hz);
+        undone.position.localise(&self.local[0], self.rate_hz, Some(cutoff_hz));
+        undone.rotation.localise(&self.local[1], self.rate_hz, Some(cutoff_hz));
         undone.undone_hz = Some(cutoff_hz);
         undone
     }
@@ -171,14 +174,21 @@ impl PoseEstimate {
     /// The kinematics on a grid of at least `least_rate_hz`, a whole multiple of the poses' rate, from the first pose to the last.
     pub fn track(&self, least_rate_hz: f64) -> KinematicTrack {
         let factor = (least_rate_hz / self.rate_hz).ceil().max(1.0) as usize;
-        let inverse = FourierPair::new(self.transform.length() * factor);
         let rate_hz = self.rate_hz * factor as f64;
         let count = (self.count - 1) * factor + 1;
-        let series = |channel: usize, order: i32| self.derivative(channel, order, factor, &inverse, count);
-        let accelerations = [series(0, 2), series(1, 2), series(2, 2)];
-        let values: Vec<Vec<f64>> = (3..7).map(|channel| series(channel, 0)).collect();
-        let rates: Vec<Vec<f64>> = (3..7).map(|channel| series(channel, 1)).collect();
-        let seconds: Vec<Vec<f64>> = (3..7).map(|channel| series(channel, 2)).collect();
+        let segments = Segments { rate_hz: self.rate_hz, factor, count };
+        let gain = |hz: f64| undo(hz, self.undone_hz, self.rate_hz).min(LARGEST_GAIN);
+        let mut accelerations = Vec::new();
+        for channel in 0..3 {
+            accelerations.extend(segments.derivatives(&self.coordinates[channel], &self.position.windows, &gain, &[2]));
+        }
+        let (mut values, mut rates, mut seconds) = (Vec::new(), Vec::new(), Vec::new());
+        for channel in 3..7 {
+            let mut all = segments.derivatives(&self.coordinates[channel], &self.rotation.windows, &gain, &[0, 1, 2]).into_iter();
+            values.extend(all.next());
+            rates.extend(all.next());
+            seconds.extend(all.next());
+        }
         let quaternion = |of: &[Vec<f64>], k: usize| Quaternion::new(of[3][k], of[0][k], of[1][k], of[2][k]);
         let mut track = KinematicTrack { start: self.start, rate_hz, ..KinematicTrack::default() };
         for k in 0..count {
@@ -191,47 +201,6 @@ impl PoseEstimate {
             track.angular_acceleration.push(segment_from_world * so3::angular_acceleration_in_world(&q, &q_dot, &q_ddot));
         }
         track
-    }
-
-    /// A coordinate's derivative of some order, upsampled by `factor`.
-    fn derivative(
-        &self,
-        channel: usize,
-        order: i32,
-        factor: usize,
-        inverse: &FourierPair,
-        count: usize,
-    ) -> Vec<f64> {
-        let floor = if channel < 3 { &self.position } else { &self.rotation };
-        let length = self.transform.length();
-        let spacing_hz = self.rate_hz / length as f64;
-        let mut values = vec![Complex64::default(); inverse.length()];
-        for k in 0..=length / 2 {
-            let frequency_hz = k as f64 * spacing_hz;
-            let weight = floor.filter_at(frequency_hz) * undo(frequency_hz, self.undone_hz, self.rate_hz).min(LARGEST_GAIN);
-            if weight == 0.0 || 2 * k == length {
-                continue;
-            }
-            let value = self.spectra[channel][k] * Complex64::new(0.0, TAU * frequency_hz).powi(order) * weight * factor as f64;
-            values[k] = value;
-            if k > 0 {
-                let mirror = inverse.length() - k;
-                values[mirror] = value.conj();
-            }
-        }
-        inverse.inverse(&mut values);
-        let (level, slope) = self.lines[channel];
-        let first = self.padding * factor;
-        (0..count)
-            .map(|k| {
-                let line = match order {
-                    0 => level + slope * (first + k) as f64 / factor as f64,
-                    1 => slope * self.rate_hz,
-                    _ => 0.0,
-                };
-                values[first + k].re + line
-            })
-            .collect()
     }
 }
 
@@ -338,33 +307,6 @@ fn lagrange(nodes: &[f64], of: impl Fn(usize) -> f64, place: f64) -> f64 {
         .sum()
 }
 
-/// Transform of a series continued oddly at both ends, less the line between the ends, faded out in the outer half of the padding.
-fn padded_transform(series: &[f64], padding: usize, transform: &FourierPair) -> (Vec<Complex64>, (f64, f64)) {
-    let count = series.len();
-    let last = count - 1;
-    let length = transform.length();
-    let slope = (series[last] - series[0]) / last as f64;
-    let level = series[0] - slope * padding as f64;
-    let value = |entry: i64| {
-        if entry < 0 {
-            2.0 * series[0] - series[((-entry) as usize).min(last)]
-        } else if entry as usize > last {
-            2.0 * series[last] - series[(2 * last).saturating_sub(entry as usize)]
-        } else {
-            series[entry as usize]
-        }
-    };
-    let mut values = vec![Complex64::default(); length];
-    for (k, slot) in values.iter_mut().enumerate().take(count + 2 * padding) {
-        let outside = padding.saturating_sub(k).max((k + 1).saturating_sub(count + padding));
-        let share = if padding > 0 { 2.0 * outside as f64 / padding as f64 - 1.0 } else { 0.0 };
-        let fade = if share > 0.0 { 0.5 + 0.5 * (share.min(1.0) * std::f64::consts::PI).cos() } else { 1.0 };
-        *slot = Complex64::new((value(k as i64 - padding as i64) - level - slope * k as f64) * fade, 0.0);
-    }
-    transform.forward(&mut values);
-    (values, (level, slope))
-}
-
 impl Floor {
     fn learn(coordinates: &[Vec<f64>], rate_hz: f64) -> Self {
         let count = coordinates[0].len();
@@ -420,7 +362,45 @@ impl Floor {
             }
         }
         let noise = (0..bins).map(|k| noise_at(k as f64 * spacing_hz).min(floor.max(before) * LARGEST_GAIN.powi(2))).collect();
-        Self { white: floor, spectra, noise, filter, spacing_hz }
+        Self { white: floor, spectra, noise, filter, windows: Vec::new(), spacing_hz }
+    }
+
+    /// A filter for each window from its own spectrum; motion comes in bursts, and rests let noise through that the mean motion would hide.
+    /// The band ends where three neighbours lie near the noise; within it, lines that the long windows resolve keep their full height.
+    fn localise(&mut self, local: &[Spectrum], rate_hz: f64, undone_hz: Option<f64>) {
+        let gain2 = |hz: f64| undo(hz, undone_hz, rate_hz).powi(2);
+        let mut mean = vec![0.0; self.filter.len()];
+        self.windows = local
+            .iter()
+            .map(|spectrum| {
+                let ratio: Vec<f64> =
+                    spectrum.density.iter().enumerate().map(|(k, density)| {
+                        let hz = spectrum.frequency(k);
+                        density * gain2(hz) / self.noise_at(hz).max(1e-300)
+                    }).collect();
+                let bins = ratio.len();
+                let edge = (2..bins.saturating_sub(3)).find(|&k| ratio[k..k + 3].iter().all(|value| *value < LOCAL_EDGE)).unwrap_or(bins);
+                let weights: Vec<f64> = (0..bins)
+                    .map(|k| {
+                        let hz = spectrum.frequency(k);
+                        if k < 2 {
+                            1.0
+                        } else if k >= edge || ratio[k] <= 1.0 || gain2(hz) > LARGEST_GAIN.powi(2) {
+                            0.0
+                        } else {
+                            let own = 1.0 - 1.0 / ratio[k];
+                            if ratio[k] > LOCAL_EDGE { own.max(self.filter_at(hz)) } else { own }
+                        }
+                    })
+                    .collect();
+                let filter = Filter { spacing_hz: spectrum.spacing_hz, weights };
+                for (k, sum) in mean.iter_mut().enumerate() {
+                    *sum += filter.at(k as f64 * self.spacing_hz) / local.len() as f64;
+                }
+                filter
+            })
+            .collect();
+        self.filter = mean;
     }
 
     fn filter_at(&self, frequency_hz: f64) -> f64 {
@@ -446,6 +426,29 @@ fn running_mean(values: &[f64], reach: usize) -> Vec<f64> {
         .map(|k| {
             let (from, to) = (k.saturating_sub(reach), (k + reach + 1).min(values.len()));
             (sums[to] - sums[from]) / (to - from) as f64
+        })
+        .collect()
+}
+
+/// Spectra around the centres of the windows, smoothed over five neighbours.
+fn local_spectra(coordinates: &[Vec<f64>], rate_hz: f64) -> Vec<Spectrum> {
+    let count = coordinates[0].len();
+    let length = ((2.0 * HOP_S * rate_hz) as usize).min(count);
+    centres(count, rate_hz)
+        .into_iter()
+        .map(|centre| {
+            let from = centre.saturating_sub(length / 2).min(count - length);
+            let parts: Vec<Vec<f64>> = coordinates.iter().map(|series| series[from..from + length].to_vec()).collect();
+            let spectrum = mean_spectrum(&parts, rate_hz, length - 1);
+            let density = (0..spectrum.density.len())
+                .map(|k| {
+                    let near = |step: usize| 0.5 * (spectrum.density[k.saturating_sub(step)] + spectrum.density[(k + step).min(spectrum.density.len() - 1)]);
+                    // Not where the spectrum is steep: its slope would spill into the noise.
+                    let smooth = (spectrum.density[k] * 3.0 + near(1) * 4.0 + near(2) * 2.0) / 9.0;
+                    smooth.min(4.0 * spectrum.density[k].max(near(1).min(spectrum.density[k] * 4.0)))
+                })
+                .collect();
+            Spectrum { density, ..spectrum }
         })
         .collect()
 }

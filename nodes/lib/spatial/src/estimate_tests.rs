@@ -1,5 +1,7 @@
 #![allow(clippy::unwrap_used)]
 
+use std::f64::consts::TAU;
+
 use super::*;
 
 /// Deterministic noise: sums of twelve uniform numbers.

@@ -30,6 +30,7 @@ mod estimate;
 mod grid;
 mod holes;
 mod pose_spline;
+mod segments;
 mod select;
 pub mod so3;
 mod spectrum;
