@@ -62,6 +62,7 @@ fn imports_run_one_way() {
         ("nodes/lib/body", &["spatial"]),
         ("nodes/lib/motion", &["spatial", "body"]),
         ("nodes/lib/imu", &["spatial", "body"]),
+        ("nodes/lib/gap", &["spatial", "imu"]),
         ("nodes/lib/bag", &["msgs", "spatial"]),
         ("nodes/lib/ros", &["msgs", "spatial"]),
         ("nodes/lib/view", &["spatial"]),

@@ -8,10 +8,15 @@ use clap_complete::Shell;
 
 mod bag;
 mod body;
+mod compare;
 mod demo;
+mod diagnose;
+#[cfg(feature = "view")]
+mod diagnose_view;
 mod inspect;
 mod node;
 mod progress;
+mod recorded;
 mod reference;
 mod simulate;
 mod summary;
@@ -30,6 +35,10 @@ enum Command {
     Demo(demo::Arguments),
     /// Simulate IMUs from motion files, or again from a recording's reference; offline, on all cores
     Simulate(simulate::Arguments),
+    /// Say which effects separate a recording's real IMUs from their simulation, and how far the gap falls with them
+    Diagnose(diagnose::Arguments),
+    /// Say what differs between two diagnoses, or between the IMUs of two recordings
+    Compare(compare::Arguments),
     /// Say what is in a motion, body or bag file
     Inspect(inspect::Arguments),
     /// Work on bags: mend an unfinished one, export IMU topics as CSV
@@ -42,7 +51,7 @@ enum Command {
         #[command(subcommand)]
         command: body::Command,
     },
-    /// Run one node in this process: replay, smpl_state, virtual_imu, recorder or viewer
+    /// Run one node in this process: replay, smpl_state, virtual_imu, recorder, viewer or gap_monitor
     Node(node::Arguments),
     /// Print a shell's completion script
     Completion {
@@ -67,6 +76,8 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::Diagnose(arguments) => diagnose::run(&arguments),
+        Command::Compare(arguments) => compare::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Bag { command } => bag::run(&command),
         Command::Body { command } => body::run(&command),

@@ -6,7 +6,7 @@ use clap::Args;
 #[derive(Args)]
 #[command(disable_help_flag = true, disable_version_flag = true)]
 pub struct Arguments {
-    /// replay, smpl_state, virtual_imu, recorder or viewer
+    /// replay, smpl_state, virtual_imu, recorder, viewer or gap_monitor
     #[arg(allow_hyphen_values = true)]
     name: String,
     /// The node's arguments; `--help` lists them
@@ -22,14 +22,17 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         "smpl_state" => cromosim_smpl_state::run(rest),
         "virtual_imu" => cromosim_virtual_imu::run(rest),
         "recorder" => cromosim_recorder::run(rest),
+        "gap_monitor" => cromosim_gap_monitor::run(rest),
         #[cfg(feature = "view")]
         "viewer" => cromosim_viewer::run(rest),
         #[cfg(not(feature = "view"))]
         "viewer" => anyhow::bail!("this cromosim was built without the feature `view`; build it with default features to get the viewer"),
         "--help" | "-h" => {
-            println!("Usage: cromosim node <replay|smpl_state|virtual_imu|recorder|viewer> [--help] [--check-config] [--ros-args ...]");
+            println!(
+                "Usage: cromosim node <replay|smpl_state|virtual_imu|recorder|viewer|gap_monitor> [--help] [--check-config] [--ros-args ...]"
+            );
             Ok(())
         }
-        other => anyhow::bail!("there is no node '{other}'; there are replay, smpl_state, virtual_imu, recorder and viewer"),
+        other => anyhow::bail!("there is no node '{other}'; there are replay, smpl_state, virtual_imu, recorder, viewer and gap_monitor"),
     }
 }

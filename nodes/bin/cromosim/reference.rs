@@ -3,30 +3,21 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use anyhow::bail;
+use anyhow::{Context, bail};
 use cromosim_bag::{BagOptions, BagReader, BagWriter, Compression};
-use cromosim_body::{BodyModel, BodyPose, ShapedBody};
 use cromosim_imu::{
-    Covariances, Device, ImuSample, MountedSites, NoiseSource, PlacementSet, Scheme, SensorFrame, SensorTrajectory, simulate,
+    Covariances, DeclaredNoise, Device, Dropouts, EffectKind, EffectSet, EffectsFile, ImuSample, NoiseSource, PlacementEffects, Reading,
+    Scheme, SensorModel, SensorTrajectory, simulate_kinematics,
 };
-use cromosim_msgs::RosMessage;
-use cromosim_msgs::cromosim_msgs::SmplState;
-use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_msgs::sensor_msgs::Imu;
-use cromosim_spatial::{Stamp, uniform_stamps};
+use cromosim_spatial::{KinematicTrack, PoseEstimate, Stamp, uniform_stamps};
 use cromosim_virtual_imu::imu_message;
+use nalgebra::{UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use crate::progress::{self, Interrupt};
+use crate::recorded::{self, Recorded};
 use crate::simulate::Arguments;
-
-/// A placement of a recording: its reference, and its real IMU where there is one.
-struct Recorded {
-    name: String,
-    trajectory: SensorTrajectory,
-    /// Messages of `/imu/NAME/data_raw`.
-    measured: Vec<Imu>,
-}
 
 /// Runs `simulate --reference RECORDING`.
 pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
@@ -35,16 +26,18 @@ pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
     {
         bail!("{}: --out is the recording itself, which would be lost; give another name", arguments.out.display());
     }
-    let scheme: Scheme = arguments.scheme.as_deref().unwrap_or("spline").parse()?;
+    let scheme: Option<Scheme> = arguments.scheme.as_deref().map(str::parse).transpose().context("--scheme")?;
     let reader = BagReader::open(recording)?;
-    let recorded = read(&reader)?;
+    let recorded = recorded::read(&reader)?.into_iter().map(|(_, placement)| placement).collect::<anyhow::Result<Vec<_>>>()?;
+    let effects = arguments.effects.as_deref().map(|file| read_effects(file, &recorded)).transpose()?.unwrap_or_default();
+    let (recorded, without_stamps) = with_stamps(recorded, arguments.rate);
     let interrupt = Interrupt::watch()?;
     let bar = progress::bar(recorded.len() as u64, "simulating, placements");
     let results: Vec<anyhow::Result<Vec<Imu>>> = recorded
         .par_iter()
         .map(|placement| {
             interrupt.check()?;
-            let messages = resimulate(placement, scheme, arguments);
+            let messages = resimulate(placement, scheme, arguments, effects.placements.get(&placement.name));
             bar.inc(1);
             messages
         })
@@ -56,7 +49,7 @@ pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
         &arguments.out,
         BagOptions { compression: Compression::Zstd, replace: arguments.force, ..BagOptions::default() },
     )?;
-    bag.write_metadata("cromosim", metadata(recording, scheme, arguments))?;
+    bag.write_metadata("cromosim", metadata(recording, scheme, arguments, &effects))?;
     let mut order: Vec<(i64, usize, usize)> = Vec::new();
     for (number, messages) in simulated.iter().enumerate() {
         order.extend(messages.iter().enumerate().map(|(index, message)| (message.header.stamp.nanos(), number, index)));
@@ -76,126 +69,162 @@ pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
         recording.display()
     );
     for placement in &recorded {
-        if let Some(line) = outside(placement) {
+        for line in placement.notes.iter().cloned().chain(outside(placement)) {
             println!("  {}: {line}", placement.name);
         }
+    }
+    if !without_stamps.is_empty() {
+        println!(
+            "  {}: no messages on /imu/NAME/data_raw to take the stamps from; left out (--rate HZ takes them in)",
+            without_stamps.join(", ")
+        );
     }
     Ok(())
 }
 
-fn metadata(recording: &Path, scheme: Scheme, arguments: &Arguments) -> BTreeMap<String, String> {
+fn metadata(recording: &Path, scheme: Option<Scheme>, arguments: &Arguments, effects: &EffectsFile) -> BTreeMap<String, String> {
     let entry = |key: &str, value: String| (key.to_owned(), value);
-    BTreeMap::from([
+    let mut entries = BTreeMap::from([
         entry("version", env!("CARGO_PKG_VERSION").to_owned()),
         entry("command", "simulate --reference".to_owned()),
         entry("reference", recording.file_name().unwrap_or_default().to_string_lossy().into_owned()),
-        entry("scheme", scheme.to_string()),
+        entry("scheme", scheme.map_or_else(|| "estimate".to_owned(), |scheme| scheme.to_string())),
         entry("seed", arguments.seed.to_string()),
         entry("noise", (!arguments.no_noise).to_string()),
-    ])
-}
-
-/// Every placement of the recording: from `/reference/NAME`, else from its SMPL states and placements.
-fn read(reader: &BagReader) -> anyhow::Result<Vec<Recorded>> {
-    let names = |prefix: &str, suffix: &str, type_name: &str| -> Vec<String> {
-        let topics = reader.summary().topics.iter().filter(|counted| counted.topic.type_name == type_name);
-        topics.filter_map(|counted| Some(counted.topic.name.strip_prefix(prefix)?.strip_suffix(suffix)?.to_owned())).collect()
-    };
-    let mut references = names("/reference/", "", PoseStamped::TYPE_NAME);
-    references.sort();
-    let trajectories: Vec<(String, SensorTrajectory)> = if references.is_empty() {
-        from_states(reader)?
-    } else {
-        references.into_iter().map(|name| Ok((name.clone(), from_reference(reader, &name)?))).collect::<anyhow::Result<_>>()?
-    };
-    let imus = names("/imu/", "/data_raw", Imu::TYPE_NAME);
-    trajectories
-        .into_iter()
-        .map(|(name, trajectory)| {
-            let measured = if imus.contains(&name) { reader.read::<Imu>(&format!("/imu/{name}/data_raw"))? } else { Vec::new() };
-            Ok(Recorded { name, trajectory, measured: measured.into_iter().map(|(_, message)| message).collect() })
-        })
-        .collect()
-}
-
-fn from_reference(reader: &BagReader, name: &str) -> anyhow::Result<SensorTrajectory> {
-    let topic = format!("/reference/{name}");
-    let mut frames = Vec::new();
-    for (_, message) in reader.read::<PoseStamped>(&topic)? {
-        let stamp = Stamp::from_nanos(message.header.stamp.nanos());
-        let world_from_sensor = message
-            .pose
-            .try_into()
-            .map_err(|error| anyhow::anyhow!("{}, {topic} at {:.6} s: {error}", reader.path().display(), stamp.as_seconds()))?;
-        frames.push(SensorFrame::new(stamp, world_from_sensor));
+    ]);
+    if arguments.effects.is_some() {
+        entries.insert("effects".to_owned(), effects.to_yaml());
     }
-    frames.sort_by_key(|frame| frame.stamp);
-    SensorTrajectory::new(frames).map_err(|error| anyhow::anyhow!("{}, {topic}: {error}", reader.path().display()))
+    entries
 }
 
-/// The sites' poses from the recording's states and its attachment `placements.yaml`.
-fn from_states(reader: &BagReader) -> anyhow::Result<Vec<(String, SensorTrajectory)>> {
-    let path = reader.path().display();
-    let Some(placements) = reader.attachment("placements.yaml") else {
-        bail!(
-            "{path}: the recording holds neither /reference/NAME (geometry_msgs/msg/PoseStamped) nor an attachment placements.yaml beside SMPL states; there is no reference to simulate from"
-        );
-    };
-    let placements = PlacementSet::parse(&String::from_utf8_lossy(placements), &format!("{path}, attachment placements.yaml"))?;
-    let mut states = reader.read::<SmplState>("/smpl/state")?;
-    states.sort_by_key(|(_, state)| state.header.stamp.nanos());
-    let Some((_, last)) = states.last() else { bail!("{path}: /smpl/state holds no message") };
-    let shaped = ShapedBody::new(BodyModel::embedded(), &last.betas)?;
-    let sites = MountedSites::new(&shaped, placements.placements())?;
-    let stamps: Vec<Stamp> = states.iter().map(|(_, state)| Stamp::from_nanos(state.header.stamp.nanos())).collect();
-    let pose =
-        |state: &SmplState| state.root_and_rotations().map(|(root_position, local_rotations)| BodyPose { root_position, local_rotations });
-    let poses = states.iter().map(|(_, state)| pose(state)).collect::<Result<Vec<_>, _>>()?;
-    let trajectories = sites.trajectories(&stamps, &poses)?;
-    Ok(placements.placements().iter().map(|placement| placement.name().to_owned()).zip(trajectories).collect())
+/// The placements whose samples have stamps, from messages or by a rate, and the names of the others; all where none has any.
+fn with_stamps(recorded: Vec<Recorded>, rate_hz: Option<f64>) -> (Vec<Recorded>, Vec<String>) {
+    if rate_hz.is_some() || recorded.iter().all(|placement| placement.measured.is_empty()) {
+        return (recorded, Vec::new());
+    }
+    let (with, without): (Vec<_>, Vec<_>) = recorded.into_iter().partition(|placement| !placement.measured.is_empty());
+    (with, without.into_iter().map(|placement| placement.name).collect())
+}
+
+/// The effects file; what it names must be there, while placements that it does not name stay nominal.
+fn read_effects(file: &Path, recorded: &[Recorded]) -> anyhow::Result<EffectsFile> {
+    let effects = EffectsFile::read(file)?;
+    let names: Vec<&str> = recorded.iter().map(|placement| placement.name.as_str()).collect();
+    if let Some(name) = effects.placements.keys().find(|name| !names.contains(&name.as_str())) {
+        bail!("{}: placement `{name}`: the recording has no such placement; it has {}", file.display(), names.join(", "));
+    }
+    Ok(effects)
 }
 
 /// One Imu for each measured message, with its stamp; where nothing was measured, at `--rate`.
-fn resimulate(placement: &Recorded, scheme: Scheme, arguments: &Arguments) -> anyhow::Result<Vec<Imu>> {
-    let trajectory = &placement.trajectory;
+fn resimulate(
+    placement: &Recorded,
+    scheme: Option<Scheme>,
+    arguments: &Arguments,
+    effects: Option<&PlacementEffects>,
+) -> anyhow::Result<Vec<Imu>> {
+    let (name, (start, end), seed) = (&placement.name, placement.span(), arguments.seed);
     let stamps = match (placement.measured.as_slice(), arguments.rate) {
-        ([], Some(rate_hz)) => uniform_stamps(trajectory.start(), trajectory.end(), rate_hz)?,
-        ([], None) => {
-            bail!("{}: the recording has no /imu/{}/data_raw to take the stamps from; give --rate HZ", placement.name, placement.name)
-        }
+        ([], Some(rate_hz)) => uniform_stamps(start, end, rate_hz)?,
+        ([], None) => bail!("{name}: the recording has no /imu/{name}/data_raw to take the stamps from; give --rate HZ"),
         (measured, _) => measured.iter().map(|message| Stamp::from_nanos(message.header.stamp.nanos())).collect(),
     };
-    let device = declared(&placement.measured, &stamps)?;
     let rate_hz = rate(&stamps);
-    let mut noise = NoiseSource::new(&device, rate_hz, arguments.seed, &placement.name)?;
+    let nominal = PlacementEffects { epoch: stamps[0], declared_noise: declared(placement, rate_hz), effects: EffectSet::new() };
+    let PlacementEffects { epoch, declared_noise, effects } = effects.unwrap_or(&nominal);
+    let model = SensorModel::new(effects, *epoch);
+    let track = track(placement, scheme, rate_hz, effects).with_context(|| name.clone())?;
+    let mut readings = model.read(&model.sensor(model.tissue(model.segment(&track))), &stamps);
+    model.linear(&mut readings, &stamps);
+    let mut dropouts = None;
+    if !arguments.no_noise {
+        let beyond = model.noise_density();
+        let densities = (declared_noise.accel_density.hypot(beyond.0), declared_noise.gyro_density.hypot(beyond.1));
+        let mut noise = NoiseSource::white(densities, 0.0, rate_hz, seed, name)?;
+        for reading in &mut readings {
+            let drawn = noise.draw();
+            reading.force += drawn.force;
+            reading.rate += drawn.rate;
+        }
+        // A recording's own stamps have its losses in them.
+        if placement.measured.is_empty() {
+            dropouts = Dropouts::new(effects.get(EffectKind::DroppedSamples), seed, name);
+        }
+    }
+    model.digital(&mut readings);
+    let device = Device::white(declared_noise.accel_density, declared_noise.gyro_density);
     let covariances = Covariances::of(&device, rate_hz).without_orientation();
-    let frame_id = placement.measured.first().map_or_else(|| format!("{}_imu", placement.name), |message| message.header.frame_id.clone());
-    let message = |ideal: ImuSample| {
-        let sample = if arguments.no_noise { ideal } else { noise.apply(&ideal) };
-        imu_message(&sample, &frame_id, &covariances, false)
+    let frame_id = placement.measured.first().map_or_else(|| format!("{name}_imu"), |message| message.header.frame_id.clone());
+    let message = |(stamp, reading): (&Stamp, &Reading)| {
+        let world_from_sensor = UnitQuaternion::identity();
+        let sample = ImuSample { stamp: *stamp, world_from_sensor, specific_force: reading.force, angular_velocity: reading.rate };
+        let lost = dropouts.as_mut().is_some_and(Dropouts::next_is_lost);
+        (!lost).then(|| imu_message(&sample, &frame_id, &covariances, false))
     };
-    Ok(simulate(trajectory, scheme, &stamps)?.into_iter().map(message).collect())
+    Ok(stamps.iter().zip(&readings).filter_map(message).collect())
 }
 
-/// A device with the white noise that the messages declare: density = sigma / sqrt(rate).
-fn declared(measured: &[Imu], stamps: &[Stamp]) -> anyhow::Result<Device> {
-    let Some(first) = measured.first() else { return Ok(Device::ideal()) };
-    let mean = |covariance: &[f64; 9]| ((covariance[0].max(0.0) + covariance[4].max(0.0) + covariance[8].max(0.0)) / 3.0).sqrt();
-    let root = rate(stamps).sqrt();
-    let (accel, gyro) = (mean(&first.linear_acceleration_covariance) / root, mean(&first.angular_velocity_covariance) / root);
-    Ok(Device::white(accel, gyro))
+/// The reference's motion as the diagnosis estimates it, or by a scheme, at least at 200 Hz and twice the IMU's rate.
+fn track(placement: &Recorded, scheme: Option<Scheme>, imu_rate_hz: f64, effects: &EffectSet) -> anyhow::Result<KinematicTrack> {
+    let undone_hz = effects.get(EffectKind::ReferenceSmoothing).and_then(|smoothing| smoothing.values().first().copied());
+    let rate_hz = (2.0 * imu_rate_hz).max(200.0);
+    let Some(scheme) = scheme else {
+        let poses = placement.poses();
+        let estimate = PoseEstimate::fit(&poses.stamps, &poses.positions, &poses.rotations)
+            .context("the reference's motion cannot be estimated (--scheme spline does with two poses)")?;
+        return Ok(undone_hz.map(|cutoff_hz| estimate.undoing(cutoff_hz)).unwrap_or(estimate).track(rate_hz));
+    };
+    if undone_hz.is_some() {
+        bail!("--scheme {scheme} cannot undo reference_smoothing; leave --scheme out");
+    }
+    differentiated(&placement.trajectory()?, scheme, rate_hz)
 }
 
-/// Rate of stamps by the median of their intervals, Hz.
+/// The motion by a scheme, on a grid from the first frame to the last.
+fn differentiated(trajectory: &SensorTrajectory, scheme: Scheme, least_rate_hz: f64) -> anyhow::Result<KinematicTrack> {
+    let (start, seconds) = (trajectory.start(), trajectory.end() - trajectory.start());
+    // A whole number of intervals, so that the grid ends where the reference does.
+    let rate_hz = (seconds * least_rate_hz).ceil().max(1.0) / seconds;
+    let motion = simulate_kinematics(trajectory, scheme, &uniform_stamps(start, trajectory.end(), rate_hz)?)?;
+    let mut track = KinematicTrack { start, rate_hz, ..KinematicTrack::default() };
+    for (k, sample) in motion.iter().enumerate() {
+        let world_from_segment = sample.world_from_sensor.rotation;
+        let in_segment = |vector: &Vector3<f64>| world_from_segment.inverse_transform_vector(vector);
+        let difference = || {
+            let (before, after) = (&motion[k.saturating_sub(1)], &motion[(k + 1).min(motion.len() - 1)]);
+            (after.angular_velocity - before.angular_velocity) / (after.stamp - before.stamp).max(1e-9)
+        };
+        track.world_from_segment.push(world_from_segment);
+        track.acceleration.push(in_segment(&sample.acceleration));
+        track.angular_velocity.push(in_segment(&sample.angular_velocity));
+        track.angular_acceleration.push(in_segment(&sample.angular_acceleration.unwrap_or_else(difference)));
+    }
+    Ok(track)
+}
+
+/// The white noise that the messages declare, none where it is unknown: density = sigma / sqrt(rate).
+fn declared(placement: &Recorded, rate_hz: f64) -> DeclaredNoise {
+    let [accel_density, gyro_density] = placement.declared().map(|sigma| sigma.unwrap_or(0.0) / rate_hz.sqrt());
+    DeclaredNoise { accel_density, gyro_density }
+}
+
+/// Mean rate of stamps in Hz, losses counted by how many medians of the intervals they span: the rate that a diagnosis of them goes by.
 fn rate(stamps: &[Stamp]) -> f64 {
-    let mut intervals: Vec<f64> = stamps.windows(2).map(|pair| pair[1] - pair[0]).filter(|interval| *interval > 0.0).collect();
-    intervals.sort_unstable_by(f64::total_cmp);
-    intervals.get(intervals.len() / 2).map_or(1.0, |interval| interval.recip())
+    let mut stamps = stamps.to_vec();
+    stamps.sort();
+    stamps.dedup();
+    let intervals: Vec<f64> = stamps.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let mut sorted = intervals.clone();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let Some(median) = sorted.get(sorted.len() / 2) else { return 1.0 };
+    let steps: f64 = intervals.iter().map(|interval| (interval / median).round().max(1.0)).sum();
+    steps / (stamps[stamps.len() - 1] - stamps[0])
 }
 
 /// What a user should know of samples that the reference does not cover.
 fn outside(placement: &Recorded) -> Option<String> {
-    let (start, end) = (placement.trajectory.start(), placement.trajectory.end());
+    let (start, end) = placement.span();
     let covered = |message: &&Imu| (start..=end).contains(&Stamp::from_nanos(message.header.stamp.nanos()));
     let missing = placement.measured.len() - placement.measured.iter().filter(covered).count();
     (missing > 0).then(|| format!("{missing} messages lie outside the reference; they hold what its ends read"))

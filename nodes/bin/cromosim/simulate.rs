@@ -11,7 +11,7 @@ use clap::Args;
 use cromosim_bag::{BagOptions, BagWriter, Compression, write_imu_csv};
 use cromosim_body::{BodyModel, ShapedBody};
 use cromosim_imu::{
-    Covariances, Device, MAX_RATE_HZ, MountedSites, NoiseSource, PlacementSet, Scheme, SensorTrajectory, simulate_kinematics_on,
+    Covariances, Device, MAX_RATE_HZ, MountedSites, PlacementSet, Scheme, SensorTrajectory, StreamingEffects, simulate_kinematics_on,
 };
 use cromosim_motion::{MotionOptions, SmplMotion, UpAxis, embedded_walk, read_motion};
 use cromosim_msgs::cromosim_msgs::SmplState;
@@ -37,6 +37,9 @@ pub struct Arguments {
     /// Re-simulate the IMUs of this recording from its reference motion instead
     #[arg(long, value_name = "RECORDING", conflicts_with_all = ["motions", "placements", "body", "csv", "up_axis", "unit", "start", "duration"])]
     pub reference: Option<PathBuf>,
+    /// With --reference: the effects of each placement (YAML, as a diagnosis writes them) rather than the nominal simulation
+    #[arg(long, value_name = "FILE", requires = "reference")]
+    pub effects: Option<PathBuf>,
     /// The bag to write (.mcap, or a rosbag2 directory); with several motions a directory for one .mcap each
     #[arg(long, value_name = "OUT")]
     pub out: PathBuf,
@@ -229,13 +232,13 @@ impl Setup {
         let (placement, device) = (&self.placements.placements()[index], &self.devices[index]);
         let (name, rate_hz) = (placement.name(), placement.rate_hz());
         let output = uniform_stamps(trajectory.start(), trajectory.end(), rate_hz)?;
-        let mut noise = NoiseSource::new(device, rate_hz, self.seed, name)?;
+        let effects = StreamingEffects::new(device, rate_hz, self.seed, name)?;
+        let mut effects = if self.noise { effects } else { effects.without_noise() };
         let covariances = Covariances::of(device, rate_hz);
         let frame_id = format!("{name}_imu");
         let (mut raw, mut full) = (Vec::with_capacity(output.len()), Vec::with_capacity(output.len()));
         for kinematic in simulate_kinematics_on(times, trajectory, placement.scheme(), &output)? {
-            let ideal = kinematic.imu();
-            let sample = if self.noise { noise.apply(&ideal) } else { noise.apply_without_noise(&ideal) };
+            let Some(sample) = effects.step(&kinematic) else { continue };
             raw.push(imu_message(&sample, &frame_id, &covariances.without_orientation(), false));
             full.push(imu_message(&sample, &frame_id, &covariances, true));
         }

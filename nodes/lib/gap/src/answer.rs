@@ -12,7 +12,7 @@ use crate::metrics::Comparison;
 use crate::problem::{FOLDS, Problem, axis_of};
 use crate::unknown::Unknown;
 use crate::whiten::{NoiseModel, Whitener};
-use crate::{Cause, Evidence, Gap, Metrics, PlacementDiagnosis, Unexplained};
+use crate::{Cause, Evidence, Gap, Interval, Metrics, PlacementDiagnosis, Unexplained};
 
 /// Everything an answer is made of.
 pub(crate) struct Answer<'a> {
@@ -297,12 +297,28 @@ pub(crate) fn described(kind: EffectKind, values: &[f64]) -> BTreeMap<String, Va
 }
 
 fn unknown_cause(unknown: &Unknown, gap_share: f64, after: Metrics) -> Cause {
-    let bands: Vec<[f64; 2]> = unknown.place.bands_hz.iter().map(|band| [band.from, band.to]).collect();
-    let intervals: Vec<[f64; 2]> = unknown.place.intervals_s.iter().map(|interval| [interval.from, interval.to]).collect();
+    let bands: Vec<&Interval> = unknown.place.bands_hz.iter().filter(|band| band.share > 0.1).collect();
+    let band = match (bands.first(), bands.last()) {
+        (Some(first), Some(last)) => [first.from, last.to],
+        _ => [0.0, 0.0],
+    };
+    // Twice its due of an even spread.
+    let even = 1.0 / unknown.place.intervals_s.len().max(1) as f64;
+    let mut intervals: Vec<[f64; 2]> = Vec::new();
+    for interval in unknown.place.intervals_s.iter().filter(|interval| interval.share > 1.5 * even) {
+        match intervals.last_mut() {
+            Some(last) if (last[1] - interval.from).abs() < 1e-9 => last[1] = interval.to,
+            _ => intervals.push([interval.from, interval.to]),
+        }
+    }
+    if intervals.is_empty() {
+        let ends = (unknown.place.intervals_s.first(), unknown.place.intervals_s.last());
+        intervals.extend(ends.0.zip(ends.1).map(|(first, last)| [first.from, last.to]));
+    }
     let parameters = BTreeMap::from([
         ("channel".to_owned(), json!(unknown.channel)),
         ("axes".to_owned(), json!(unknown.axes)),
-        ("band_hz".to_owned(), json!(bands.first().copied().unwrap_or_default())),
+        ("band_hz".to_owned(), json!(band)),
         ("intervals_s".to_owned(), json!(intervals)),
         ("depends_on".to_owned(), json!(unknown.depends_on)),
     ]);

@@ -191,7 +191,8 @@ fn analyse<'a>(
     }
     state = context.exchanged(state, &library);
     let found = found_noise(problem, &problem.residual(&state.fit.prediction.readings));
-    let named = named(problem, &context, &state, &digital, units, found, &options.without);
+    let white = is_white(problem, &problem.residual(&state.fit.prediction.readings));
+    let named = named(problem, &context, &state, &digital, units, (found, white), &options.without);
     let mut findings = Findings { context, state, digital, found, named, unknown: None };
     findings.unknown = unknown::look(&findings);
     if let Some(unknown) = &findings.unknown {
@@ -268,6 +269,15 @@ pub(crate) fn found_noise(problem: &Problem, residual: &[Vec<f64>]) -> [f64; 2] 
     })
 }
 
+/// Whether the top of a channel's spectrum is level: motion that the reference does not resolve falls steeply there.
+fn is_white(problem: &Problem, residual: &[Vec<f64>]) -> [bool; 2] {
+    [0, 1].map(|channel| {
+        let spectrum = problem.channel_spectrum(residual, channel);
+        let level = |from: f64, to: f64| spectrum.median(from * problem.rate_hz / 2.0, to * problem.rate_hz / 2.0).unwrap_or(0.0);
+        level(0.70, 0.83) < 1.5 * level(0.84, 0.97)
+    })
+}
+
 /// Variance of white noise from `x0 - 4 x1 + 6 x2 - 4 x3 + x4` (variance 70) of five neighbours that are all there, by the median of its squares.
 fn fourth_differences(problem: &Problem, residual: &[Vec<f64>], channel: usize) -> Option<f64> {
     let mut squares = Vec::new();
@@ -295,12 +305,24 @@ fn named(
     state: &State,
     digital: &[Digital; 2],
     units: [f64; 2],
-    found: [f64; 2],
+    (found, white): ([f64; 2], [bool; 2]),
     without: &[EffectKind],
 ) -> EffectSet {
     let mut set = state.fit.set.clone();
+    let noise = problem.estimate.noise();
+    let noisy = noise.position >= NAMED_NOISE.position || noise.rotation >= NAMED_NOISE.rotation;
+    // What is fitted to a reference this poor is that much poorer.
+    let factor = if noisy {
+        15.0
+    } else if context.basis.undone_hz.is_some() {
+        8.0
+    } else {
+        1.0
+    };
+    let coarse = [0, 1].map(|c| if context.basis.steps[c] > 3.0 { context.basis.steps[c] * context.basis.sigma[c] } else { 0.0 });
+    let seconds = problem.length as f64 / problem.rate_hz;
     for kind in EffectKind::ALL {
-        if set.get(kind).is_some_and(is_ordinary) {
+        if set.get(kind).is_some_and(|effect| is_ordinary(effect, factor) || is_rounding(effect, coarse, seconds)) {
             set.remove(kind);
         }
     }
@@ -327,8 +349,9 @@ fn named(
         // Rounding adds step^2 / 12 of noise of its own.
         let beyond = found[c].powi(2) - step * step / 12.0 - declared.powi(2);
         // What a smoothed reference lacks is broad enough to pass for noise.
-        let factor = if context.basis.undone_hz.is_some() { 20.0 } else { NAMED_NOISE_RATIO - 1.0 };
-        if problem.declared[c].is_some() && beyond > factor * declared.powi(2) + 0.2 * step * step / 12.0 {
+        let doubtful = context.basis.undone_hz.is_some() || problem.dropped.0 > 0.02;
+        let factor = if doubtful { 20.0 } else { NAMED_NOISE_RATIO - 1.0 };
+        if problem.declared[c].is_some() && white[c] && beyond > factor * declared.powi(2) + 0.2 * step * step / 12.0 {
             add(kinds[2], vec![(beyond / problem.rate_hz).sqrt()]);
         }
         if units[c] != 1.0 {
@@ -338,8 +361,7 @@ fn named(
     if problem.dropped.0 > 0.0 {
         add(EffectKind::DroppedSamples, vec![problem.dropped.0, problem.dropped.1.max(1.0)]);
     }
-    let noise = problem.estimate.noise();
-    if noise.position >= NAMED_NOISE.position || noise.rotation >= NAMED_NOISE.rotation {
+    if noisy {
         add(EffectKind::ReferenceNoise, vec![noise.position, noise.rotation]);
     }
     if let Some(cutoff_hz) = context.basis.undone_hz {
@@ -349,13 +371,25 @@ fn named(
 }
 
 /// Whether an effect is no larger than what every recording has.
-fn is_ordinary(effect: &Effect) -> bool {
+fn is_ordinary(effect: &Effect, factor: f64) -> bool {
     if effect.kind() == EffectKind::MountSlip {
-        return effect.values()[1..].iter().map(|value| value * value).sum::<f64>().sqrt() < ORDINARY_SLIP;
+        return effect.values()[1..].iter().map(|value| value * value).sum::<f64>().sqrt() < factor * ORDINARY_SLIP;
     }
     let neutral = effect.kind().spec().neutral();
     let size = effect.values().iter().zip(&neutral).map(|(value, neutral)| (value - neutral).abs()).fold(0.0, f64::max);
-    ORDINARY.iter().any(|(kind, ordinary)| *kind == effect.kind() && size < *ordinary)
+    ORDINARY.iter().any(|(kind, ordinary)| *kind == effect.kind() && size < factor * ordinary)
+}
+
+/// Whether a bias or drift stays below half a step of a coarse rounding: slow motion dwells on one side of a step.
+fn is_rounding(effect: &Effect, step: [f64; 2], seconds: f64) -> bool {
+    let size = effect.values().iter().map(|value| value.abs()).fold(0.0, f64::max);
+    match effect.kind() {
+        EffectKind::AccelBias => size < 0.5 * step[0],
+        EffectKind::GyroBias => size < 0.5 * step[1],
+        EffectKind::AccelBiasDrift => size * seconds < 0.5 * step[0],
+        EffectKind::GyroBiasDrift => size * seconds < 0.5 * step[1],
+        _ => false,
+    }
 }
 
 /// The values of an effect, or none.

@@ -256,10 +256,14 @@ pub(crate) fn digital(measured: &[Reading], channel: usize) -> Digital {
         measured.iter().flat_map(|reading| if channel == 0 { reading.force } else { reading.rate }.iter().copied().collect::<Vec<_>>()).collect();
     let lsb = lattice(&values);
     let largest = values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
-    let repeats = values.iter().filter(|value| value.abs() >= largest * (1.0 - 1e-9)).count();
+    let clipped = |value: &f64| value.abs() >= largest * (1.0 - 1e-9);
+    let repeats = values.iter().filter(|value| clipped(value)).count();
     let below = lsb.map_or(0, |lsb| values.iter().filter(|value| (value.abs() - largest + lsb).abs() < 0.5 * lsb).count());
-    // On a lattice the tail thins out from step to step, unless clipping piles it up.
-    let piled = if lsb.is_some() { repeats >= 12 && 2 * repeats > 3 * below } else { repeats >= 4 };
+    // On a lattice the tail thins out from step to step, and a slow peak dwells on one: clipping piles up more than that, and at several times.
+    let episodes = values.iter().enumerate().filter(|(_, value)| clipped(value)).fold((0, usize::MAX / 2), |(count, last), (at, _)| {
+        (count + usize::from(last == usize::MAX / 2 || at > last + 60), at)
+    });
+    let piled = if lsb.is_some() { repeats >= 12 && repeats > 3 * below && episodes.0 >= 3 } else { repeats >= 4 };
     let limit = (piled && largest > 0.0).then_some(largest);
     Digital { limit, lsb }
 }

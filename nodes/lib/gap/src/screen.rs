@@ -29,6 +29,9 @@ pub(crate) const FITTED: [EffectKind; 20] = [
     EffectKind::AxisConvention,
 ];
 
+/// Slowest vibration, Hz.
+const LEAST_VIBRATION_HZ: f64 = 4.0;
+
 /// A set to be fitted, with what one linear step promises of it.
 #[derive(Clone, Debug)]
 pub(crate) struct Candidate {
@@ -200,7 +203,8 @@ impl Context<'_> {
         let Some(vibration) = fit.set.get(kind) else { return true };
         let values = vibration.values();
         let power: f64 = values[1..4].iter().map(|amplitude| 0.5 * amplitude * amplitude).sum();
-        if power < 0.3 * self.basis.sigma[0].powi(2) {
+        // Slow lines are gait.
+        if power < 0.3 * self.basis.sigma[0].powi(2) || values[0] < LEAST_VIBRATION_HZ {
             return false;
         }
         let without = self.problem.predict(&self.track, &crate::search::without(&fit.set, kind));

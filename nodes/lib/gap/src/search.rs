@@ -151,7 +151,7 @@ impl Context<'_> {
                         continue;
                     }
                     let other = self.state(candidate.set);
-                    if !plausible(&other.fit.set) {
+                    if !plausible(&other.fit.set) || !self.true_vibration(&other.fit) {
                         continue;
                     }
                     rival = rival.max(other.score);

@@ -42,8 +42,13 @@ pub(crate) fn try_smoothing<'a>(
         return (context, state);
     }
     let plain = evidence(&context, &state);
+    // Beside what was found without it, and alone.
+    let mut sets: Vec<EffectSet> = starts.to_vec();
+    if !starts.contains(&state.fit.set) {
+        sets.push(state.fit.set.clone());
+    }
     let best_start = |other: &Context<'a>| {
-        let states = starts.iter().map(|set| other.state(set.clone()));
+        let states = sets.iter().map(|set| other.state(set.clone()));
         states.max_by(|a, b| a.score.total_cmp(&b.score))
     };
     let worth = |cutoff_hz: f64| {
@@ -69,8 +74,12 @@ pub(crate) fn try_smoothing<'a>(
         factor = f64::sqrt(factor);
     }
     let other = smoothed(&context, &starts[0], best.1);
-    let searched = other.search(starts, library, 2, false);
+    let searched = other.search(&sets, library, 2, false);
     debug(|| eprintln!("  smoothing {:.2} Hz with {:?}: {:.1}", best.1, kinds(&searched.fit.set), evidence(&other, &searched)));
+    if best.1 > GRID_HZ[GRID_HZ.len() - 1] {
+        // At the grid's end nothing is undone but noise.
+        return (context, state);
+    }
     let better = evidence(&other, &searched) > plain + 30.0 + 0.05 * context.excess(&state.fit);
     if better && comes_closer(&context, &state, &searched) { (other, searched) } else { (context, state) }
 }

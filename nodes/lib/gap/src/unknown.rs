@@ -12,9 +12,9 @@ use crate::problem::{Problem, axis_of};
 use crate::search::{debug, without};
 
 /// Mean square of a whitened residual in a band from which on it is structure. Without any effect none of a hundred placements reached 3.
-const BAND: f64 = 4.0;
+const BAND: f64 = 12.0;
 /// Held-out gain of a regression, nats, likewise; without any effect none reached 0.
-const PROBE: f64 = 100.0;
+const PROBE: f64 = 200.0;
 /// Loudest two seconds against the median ones, where outliers are many.
 const BURST: f64 = 5.0;
 const OUTLIERS: f64 = 0.003;
@@ -22,6 +22,12 @@ const OUTLIERS: f64 = 0.003;
 const FROZEN: f64 = 0.002;
 /// Scatter of the stamps' intervals.
 const JITTER: f64 = 0.05;
+/// Factor on these beside a smoothing of the reference that is undone.
+const GUESSED: f64 = 20.0;
+/// Steps of quantisation, in units of the white noise, beyond which a channel's residual says nothing.
+const COARSE_STEPS: f64 = 3.0;
+/// Part of the strongest regression's gain from which on another counts.
+const SPECIAL_CASE: f64 = 0.3;
 /// Part of its gain that an effect keeps beside what the residual depends on, if it is more than an imitation of that.
 const OWN_GAIN: f64 = 0.1;
 
@@ -61,8 +67,13 @@ pub(crate) fn look(findings: &Findings) -> Option<Unknown> {
         let list: Vec<String> = probes.iter().take(4).map(|p| format!("{}/{}:{:.0}", p.depends_on, p.channel, p.gain)).collect();
         eprintln!("SIGNS {signs:.3?} {}", list.join(" "));
     });
-    let strong: Vec<&Probe> = probes.iter().filter(|probe| probe.gain > PROBE).collect();
-    let noisy = |c: usize| signs.band[c] > BAND || (signs.burst[c] > BURST && signs.outliers[c] > OUTLIERS);
+    // A smoothing whose shape is only guessed leaves much that is none of its own; rounding errors of slow motion are no noise at all.
+    let basis = &findings.context.basis;
+    let vague = if basis.undone_hz.is_some() { GUESSED } else { 1.0 };
+    let coarse = |c: usize| basis.steps[c] > COARSE_STEPS;
+    let strong: Vec<&Probe> = probes.iter().filter(|probe| probe.gain > PROBE * vague && !coarse(probe.channel)).collect();
+    let noisy =
+        |c: usize| !coarse(c) && (signs.band[c] > BAND * vague || (signs.burst[c] > BURST * vague && signs.outliers[c] > OUTLIERS));
     let stuck = |c: usize| signs.frozen[c] > FROZEN && findings.digital[c].lsb.is_none();
     let jittery = signs.jitter > JITTER;
     let of_channel = |c: usize| noisy(c) || stuck(c) || strong.iter().any(|probe| probe.channel == c);
@@ -83,6 +94,10 @@ pub(crate) fn look(findings: &Findings) -> Option<Unknown> {
     let channel = if channels.len() == 1 { channels[0] } else { "both" };
     let axes = place.axes.iter().filter(|(_, share)| **share > 0.1).map(|(name, _)| name.clone()).collect();
     let mut imitations = imitations(findings, &strong);
+    let most = strong.first().map_or(0.0, |probe| probe.gain);
+    for probe in strong.iter().filter(|probe| probe.gain > SPECIAL_CASE * most) {
+        imitations.extend(special_cases(probe));
+    }
     for (c, kind) in [(0, EffectKind::AccelNoise), (1, EffectKind::GyroNoise)] {
         if of_channel(c) || jittery {
             imitations.push(kind);
@@ -94,6 +109,27 @@ pub(crate) fn look(findings: &Findings) -> Option<Unknown> {
     let gain = strong.first().map_or(0.0, |probe| probe.gain).max(signs.band[0].max(signs.band[1]) * 10.0);
     let probability = 1.0 - 1.0 / (2.0 + gain / 20.0);
     Some(Unknown { place, channel: channel.to_owned(), axes, depends_on: depends_on.to_owned(), probability, imitations })
+}
+
+/// Effects that are special cases of what the residual depends on: they say no more than it does.
+fn special_cases(probe: &Probe) -> Vec<EffectKind> {
+    use EffectKind as K;
+    let [bias, drift, scale, misalignment] = if probe.channel == 0 {
+        [K::AccelBias, K::AccelBiasDrift, K::AccelScale, K::AccelMisalignment]
+    } else {
+        [K::GyroBias, K::GyroBiasDrift, K::GyroScale, K::GyroMisalignment]
+    };
+    match (probe.depends_on, probe.channel) {
+        ("delay over time", _) => vec![K::TimeOffset, K::ClockDrift],
+        ("time", _) => vec![bias, drift],
+        ("gain over time", _) => vec![scale],
+        ("mount over time", _) => vec![K::MountRotation, K::MountSlip, misalignment],
+        ("orientation", 1) => vec![K::GyroGSensitivity, bias],
+        ("orientation", _) => vec![bias],
+        ("specific force", 0) | ("angular rate", 1) => vec![scale, bias],
+        ("other axes", _) => vec![misalignment],
+        _ => Vec::new(),
+    }
 }
 
 /// Fitted effects which beside the strongest probes gain less than a tenth of what they gain without them.

@@ -10,6 +10,8 @@ use rustfft::num_complex::Complex64;
 use crate::fill::Filler;
 use crate::problem::{Problem, axis_of};
 
+/// Share of the motion from which on a frequency counts as resolved by the reference.
+const RESOLVED: f64 = 0.9;
 /// Length of the windows of residual spectra, s.
 const WINDOW_S: f64 = 4.0;
 
@@ -187,8 +189,8 @@ impl NoiseModel {
             let through = [if lever2 > 0.0 { through_p.min(through_r) } else { through_p }, through_r];
             for channel in 0..2 {
                 let lost = spectra.as_ref().map_or(0.02 * most[channel], |spectra| {
-                    let seen = if through[channel] < 0.5 { local(&spectra[channel], frequency_hz, &basis.line_hz) - known[channel] } else { 0.0 };
-                    seen.clamp(0.0, most[channel])
+                    let seen = if through[channel] < RESOLVED { local(&spectra[channel], frequency_hz, &basis.line_hz) - known[channel] } else { 0.0 };
+                    seen.clamp(0.0, most[channel].max(0.0))
                 });
                 power[channel][k] = (known[channel] + lost) * to_variance;
             }

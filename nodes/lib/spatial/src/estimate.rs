@@ -13,6 +13,8 @@ use crate::{FourierPair, KinematicTrack, SpatialError, Spectrum, Stamp, so3, wel
 /// Length of the windows from which the spectra are learnt, s, and below which multiple of the noise a spectrum counts as noise alone: three
 /// standard errors over three axes of a minute. The longer ones resolve lines, which steady gaits and machines have.
 const WINDOWS: [(f64, f64); 3] = [(5.0, 1.4), (20.0, 3.0), (f64::INFINITY, 8.0)];
+/// How far the poses are continued beyond their ends, s.
+const LEAD_S: f64 = 1.5;
 /// Multiple of the noise at which a window's band of motion ends.
 const LOCAL_EDGE: f64 = 1.6;
 /// The same beyond the band of motion, where among hundreds of frequencies some reach three standard errors by chance, and where the second
@@ -45,6 +47,8 @@ pub struct PoseEstimate {
     start: Stamp,
     rate_hz: f64,
     count: usize,
+    /// Entries that the coordinates hold before the first pose and after the last.
+    lead: usize,
     /// Position and sign-continuous quaternion on the grid, holes filled.
     coordinates: Arc<Vec<Vec<f64>>>,
     /// Spectra around each window's centre: of position, of rotation.
@@ -107,10 +111,15 @@ impl PoseEstimate {
         }
         let local = [local_spectra(&coordinates[..3], rate_hz), local_spectra(&coordinates[3..], rate_hz)];
         let [mut position, mut rotation] = floors;
+        // Beyond the ends as well: what is likely there keeps the last poses' derivatives sound.
+        let lead = ((LEAD_S * rate_hz) as usize).min(300).min(raster.count / 4);
+        let (positions, quaternions) = coordinates.split_at_mut(3);
+        lengthen(positions, lead, position.spectrum(), rate_hz);
+        lengthen(quaternions, lead, rotation.spectrum(), rate_hz);
         position.localise(&local[0], rate_hz, None);
         rotation.localise(&local[1], rate_hz, None);
         let (start, count, gaps) = (raster.start, raster.count, raster.gaps());
-        Self { start, rate_hz, count, coordinates: Arc::new(coordinates), local: Arc::new(local), position, rotation, gaps, undone_hz: None }
+        Self { start, rate_hz, count, lead, coordinates: Arc::new(coordinates), local: Arc::new(local), position, rotation, gaps, undone_hz: None }
     }
 
     /// Time of the first pose.
@@ -176,7 +185,7 @@ impl PoseEstimate {
         let factor = (least_rate_hz / self.rate_hz).ceil().max(1.0) as usize;
         let rate_hz = self.rate_hz * factor as f64;
         let count = (self.count - 1) * factor + 1;
-        let segments = Segments { rate_hz: self.rate_hz, factor, count };
+        let segments = Segments { rate_hz: self.rate_hz, factor, samples: self.count, lead: self.lead, count };
         let gain = |hz: f64| undo(hz, self.undone_hz, self.rate_hz).min(LARGEST_GAIN);
         let mut accelerations = Vec::new();
         for channel in 0..3 {
@@ -202,6 +211,19 @@ impl PoseEstimate {
         }
         track
     }
+}
+
+/// Continues series by `lead` entries at both ends: oddly, then by what is likeliest under their spectrum.
+fn lengthen(series: &mut [Vec<f64>], lead: usize, spectrum: &Spectrum, rate_hz: f64) {
+    let count = series[0].len();
+    for values in series.iter_mut() {
+        let last = count - 1;
+        let before = (1..=lead).rev().map(|k| 2.0 * values[0] - values[k.min(last)]);
+        let after = (1..=lead).map(|k| 2.0 * values[last] - values[last - k.min(last)]);
+        *values = before.chain(values.iter().copied()).chain(after).collect();
+    }
+    let transform = FourierPair::new(FourierPair::good_length(count + 2 * lead + (4.0 * rate_hz) as usize));
+    fill_holes(series, &[0..lead, lead + count..count + 2 * lead], spectrum, &transform, rate_hz);
 }
 
 /// Gain that undoes a zero-phase second-order Butterworth smoothing, `1 / (1 + (f / fc)^4)`, with the frequencies as the bilinear transform bends

@@ -130,3 +130,13 @@ fn white_noise_alone_passes_nowhere() {
     let passing: Vec<f64> = floor.filter.iter().enumerate().skip(40).filter(|(_, w)| **w > 0.0).map(|(k, _)| k as f64 * floor.spacing_hz).collect();
     assert!(passing.is_empty(), "{passing:?}");
 }
+
+#[test]
+fn the_ends_are_sound() {
+    let (stamps, positions, rotations) = poses(PoseNoise { position: 1e-4, rotation: 8e-4 }, 100.0, |_| true);
+    let track = PoseEstimate::fit(&stamps, &positions, &rotations).unwrap().track(200.0);
+    let at = |k: usize| (track.world_from_segment[k] * track.acceleration[k] - motion(k as f64 / track.rate_hz).2).norm();
+    let worst = (0..100).chain(track.len() - 100..track.len()).map(at).fold(0.0, f64::max);
+    // The motion reaches 27 m/s2; an odd continuation errs by as much.
+    assert!(worst < 5.0, "{worst}");
+}

@@ -37,6 +37,9 @@ pub(crate) fn centres(count: usize, rate_hz: f64) -> Vec<usize> {
 pub(crate) struct Segments {
     /// Of the series.
     pub rate_hz: f64,
+    /// Samples, and entries of the series before the first of them (as many follow the last).
+    pub samples: usize,
+    pub lead: usize,
     /// Entries of the result per sample.
     pub factor: usize,
     /// Entries of the result.
@@ -55,9 +58,9 @@ impl Segments {
         let mut results = vec![vec![0.0; self.count]; orders.len()];
         let mut values = vec![Complex64::default(); length];
         let mut filtered = vec![Complex64::default(); inverse.length()];
-        for (window, (filter, centre)) in filters.iter().zip(centres(series.len(), self.rate_hz)).enumerate() {
+        for (window, (filter, centre)) in filters.iter().zip(centres(self.samples, self.rate_hz)).enumerate() {
             let first = centre as i64 - half as i64;
-            let value = |k: usize| continued(series, first + k as i64);
+            let value = |k: usize| continued(series, first + (k + self.lead) as i64);
             let last = 2 * half;
             let (level, slope) = (value(0), (value(last) - value(0)) / last as f64);
             values.fill(Complex64::default());

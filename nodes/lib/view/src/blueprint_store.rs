@@ -91,6 +91,15 @@ impl BlueprintStore {
         Ok(container)
     }
 
+    /// Writes a container with one tab for each part, and opens the one with this index.
+    pub(crate) fn tabs(&self, name: &str, parts: &[Part], open: usize) -> Result<Part, ViewError> {
+        let tabs = self.container(ContainerKind::Tabs, Some(name), parts, &[])?;
+        if let Some(part) = parts.get(open) {
+            self.stream.log(tabs.path.as_str(), &ContainerBlueprint::update_fields().with_active_tab(part.path.as_str()))?;
+        }
+        Ok(tabs)
+    }
+
     /// Writes the state of a panel: "blueprint_panel" or "selection_panel".
     pub(crate) fn panel(&self, path: &str, state: PanelState) -> Result<(), ViewError> {
         Ok(self.stream.log(path, &PanelBlueprint::new().with_state(state))?)

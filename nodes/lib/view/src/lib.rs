@@ -15,6 +15,8 @@
 //! | `/world/sensors/NAME` | box, label, axes (x red, y green, z blue); world_from_sensor | static; at the frame rate |
 //! | `/imu/NAME/specific_force`, `/imu/NAME/angular_velocity` | three series, m/s² and rad/s | every sample |
 //!
+//! [`write_gap`] writes a diagnosis of the gap between simulated and real IMUs, with a layout of its own.
+//!
 //! ```
 //! use cromosim_spatial::Stamp;
 //! use cromosim_view::{Destination, Recording, RecordingOptions};
@@ -37,6 +39,9 @@
 
 mod blueprint_store;
 mod error;
+mod gap;
+mod gap_layout;
+mod gap_spectrum;
 mod layout;
 mod mesh;
 mod options;
@@ -46,6 +51,7 @@ mod sinks;
 mod style;
 
 pub use error::ViewError;
+pub use gap::{GapCoursePoint, GapPlacement, GapSpectrum, write_gap};
 pub use mesh::DisplayMesh;
 pub use options::{Destination, RecordingOptions, TimeAxis};
 pub use recording::{Recording, Summary};

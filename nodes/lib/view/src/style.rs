@@ -14,6 +14,14 @@ pub(crate) const BODY: [u8; 3] = [176, 187, 200];
 pub(crate) const SKELETON: [u8; 3] = [240, 200, 120];
 /// x, y and z, of axes and of curves alike.
 pub(crate) const AXES: [[u8; 3]; 3] = [[240, 98, 92], [106, 200, 120], [92, 150, 250]];
+/// What was measured, the simulation before and after its causes are added, and what noise alone would be.
+pub(crate) const MEASURED: [u8; 3] = [190, 196, 205];
+pub(crate) const BEFORE: [u8; 3] = [245, 139, 69];
+pub(crate) const AFTER: [u8; 3] = [88, 176, 242];
+pub(crate) const PREDICTED: [u8; 3] = [183, 149, 228];
+/// Lines and words around a plot of our own.
+pub(crate) const PLOT_GRID: [u8; 3] = [52, 58, 68];
+pub(crate) const PLOT_INK: [u8; 3] = [160, 168, 180];
 /// Length of a sensor's axes, m.
 pub(crate) const AXIS_LENGTH: f32 = 0.1;
 /// Radius of a sensor's axes, m.

@@ -1,0 +1,42 @@
+"""Watch the gap between real and virtual IMUs, for those who have ROS 2.
+
+ros2 launch gap.launch.py names:=left_wrist,head [placements:=FILE.yaml] [motion:=FILE.bvh]
+The drivers of the real IMUs publish /imu/NAME/data_raw, a source of motion publishes /smpl/pose (or motion:=FILE.bvh is looped); /diagnostics
+says how far real and virtual ones lie apart, and the first cause. The program `cromosim` has to be on PATH (cargo install --path .).
+"""
+
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, ExecuteProcess, OpaqueFunction
+from launch.substitutions import LaunchConfiguration
+
+
+def node(name, *arguments):
+    """One node of the suite, with its arguments after --ros-args."""
+    return ExecuteProcess(cmd=["cromosim", "node", name, "--ros-args", *arguments], name=name, output="screen")
+
+
+def nodes(context):
+    names = [name for name in LaunchConfiguration("names").perform(context).split(",") if name]
+    placements = LaunchConfiguration("placements").perform(context)
+    motion = LaunchConfiguration("motion").perform(context)
+    remaps = []
+    for name in names:
+        for ending in ["data_raw", "data"]:
+            remaps += ["-r", f"imu/{name}/{ending}:=/virtual/{name}/{ending}"]
+    started = [
+        node("gap_monitor", "-p", f"placements:=[{', '.join(names)}]"),
+        node("virtual_imu", "-p", f"placements:='{placements}'", *remaps),
+        node("smpl_state"),
+    ]
+    if motion:
+        started.append(node("replay", "-p", f"motion:='{motion}'", "-p", "loop:=true"))
+    return started
+
+
+def generate_launch_description():
+    return LaunchDescription([
+        DeclareLaunchArgument("names", description="Placements to watch, with commas between"),
+        DeclareLaunchArgument("placements", default_value="", description="Sensor placements (YAML); empty: the demo's"),
+        DeclareLaunchArgument("motion", default_value="", description="A BVH file to loop; empty: /smpl/pose comes from elsewhere"),
+        OpaqueFunction(function=nodes),
+    ])

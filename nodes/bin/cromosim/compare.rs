@@ -1,0 +1,104 @@
+//! `cromosim compare A B`: what differs between two diagnoses, or between the IMUs of two recordings.
+
+mod diagnoses;
+mod recordings;
+
+use std::fs::{self, File};
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail, ensure};
+use clap::Args;
+use cromosim_bag::BagReader;
+use cromosim_gap::{Diagnosis, SCHEMA};
+
+/// Say what differs between two diagnoses, or between the IMUs of two recordings
+#[derive(Args)]
+pub struct Arguments {
+    /// A diagnosis (diagnosis.json, or the folder of one) or a recording (.mcap, rosbag2 directory)
+    a: PathBuf,
+    /// Another of the same kind
+    b: PathBuf,
+    /// Write what is found to this file too, as JSON
+    #[arg(long, value_name = "FILE.json")]
+    out: Option<PathBuf>,
+}
+
+/// What one side is.
+enum Side {
+    Diagnosis(Diagnosis),
+    Recording(BagReader),
+}
+
+impl Side {
+    fn kind(&self) -> &'static str {
+        match self {
+            Self::Diagnosis(_) => "a diagnosis",
+            Self::Recording(_) => "a recording",
+        }
+    }
+}
+
+/// Runs the command.
+pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let (a, b) = (open(&arguments.a)?, open(&arguments.b)?);
+    println!("A  {}\nB  {}", arguments.a.display(), arguments.b.display());
+    let found = match (&a, &b) {
+        (Side::Diagnosis(a), Side::Diagnosis(b)) => diagnoses::compare(a, b)?,
+        (Side::Recording(a), Side::Recording(b)) => recordings::compare(a, b)?,
+        _ => {
+            bail!("{} is {} and {} is {}; two of a kind can be compared", arguments.a.display(), a.kind(), arguments.b.display(), b.kind())
+        }
+    };
+    if let Some(path) = &arguments.out {
+        let text = serde_json::to_string_pretty(&found).context("what was found is no JSON")? + "\n";
+        fs::write(path, text).with_context(|| format!("{}: cannot be written", path.display()))?;
+    }
+    Ok(())
+}
+
+/// Opens a side by its content.
+fn open(path: &Path) -> anyhow::Result<Side> {
+    if path.is_dir() {
+        let file = path.join("diagnosis.json");
+        return if file.is_file() { read_diagnosis(&file) } else { Ok(Side::Recording(BagReader::open(path)?)) };
+    }
+    let mut head = Vec::new();
+    File::open(path)
+        .and_then(|file| file.take(64).read_to_end(&mut head))
+        .with_context(|| format!("{}: cannot be read", path.display()))?;
+    match head.iter().find(|byte| !byte.is_ascii_whitespace()) {
+        None => bail!("{}: the file is empty", path.display()),
+        Some(b'{') => read_diagnosis(path),
+        Some(_) => Ok(Side::Recording(BagReader::open(path)?)),
+    }
+}
+
+fn read_diagnosis(path: &Path) -> anyhow::Result<Side> {
+    let text = fs::read_to_string(path).with_context(|| format!("{}: cannot be read", path.display()))?;
+    let diagnosis: Diagnosis = serde_json::from_str(&text).with_context(|| format!("{}: no diagnosis", path.display()))?;
+    ensure!(diagnosis.schema == SCHEMA, "{}: expected the schema '{SCHEMA}', found '{}'", path.display(), diagnosis.schema);
+    Ok(Side::Diagnosis(diagnosis))
+}
+
+/// A number with so many significant digits; `-` for none.
+fn significant(value: f64, digits: i32) -> String {
+    if !value.is_finite() {
+        return "-".to_owned();
+    }
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let exponent = value.abs().log10().floor() as i32;
+    if !(-5..=6).contains(&exponent) {
+        return format!("{value:.*e}", digits.max(1) as usize - 1);
+    }
+    format!("{value:.*}", (digits - 1 - exponent).max(0) as usize)
+}
+
+/// `x, y, z` of one side that the other lacks, as a line; nothing for none.
+fn print_only(side: &str, names: &[&str]) {
+    if !names.is_empty() {
+        println!("\nonly in {side}: {}", names.join(", "));
+    }
+}

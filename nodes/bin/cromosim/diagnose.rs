@@ -1,0 +1,399 @@
+//! `cromosim diagnose`: where the gap between simulated and real lies, which effects cause it, how far it shrinks.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, anyhow, bail};
+use clap::Args;
+use cromosim_bag::BagReader;
+use cromosim_gap::{Cause, DiagnoseOptions, Diagnosis, Evidence, PlacementAnswer, PlacementDiagnosis, SCHEMA};
+use cromosim_imu::{EffectKind, EffectsFile};
+use rayon::prelude::*;
+use serde_json::Value;
+
+use crate::progress::{self, Interrupt};
+use crate::recorded::{self, Recorded};
+
+/// The files in DIR.
+const FILES: [&str; 4] = ["diagnosis.json", "effects.yaml", "report.html", "diagnosis.rrd"];
+
+/// Say which effects separate a recording's real IMUs from their simulation, and how far the gap falls with them
+#[derive(Args)]
+#[command(after_long_help = "\
+The recording (MCAP, ROS 2) holds /reference/NAME (geometry_msgs/msg/PoseStamped) or SMPL states with an attachment placements.yaml, and
+/imu/NAME/data_raw (sensor_msgs/msg/Imu). DIR gets diagnosis.json, effects.yaml (for `cromosim simulate --reference RECORDING --effects`),
+report.html and diagnosis.rrd (for Rerun). The exit code is 0 when a diagnosis was made, whatever it says.
+
+A config FILE, every line of it optional:
+  placements: [wrist, ankle]     # only these
+  without: [lever_arm]           # effects taken out of the library; --without replaces the list
+  seed: 7                        # --seed wins")]
+pub struct Arguments {
+    /// The recording (.mcap, rosbag2 directory)
+    recording: PathBuf,
+    /// The folder for the four files; is made where it is missing, and files of an earlier diagnosis in it are replaced
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Settings (YAML), see below with --help
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Take an effect out of the library; may be given again
+    #[arg(long, value_name = "EFFECT")]
+    without: Vec<String>,
+    /// Seed of the noise in comparisons with the noisy simulation [default: 0]
+    #[arg(long)]
+    seed: Option<u64>,
+}
+
+/// Runs the command.
+pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let config = arguments.config.as_deref().map(Config::read).transpose()?.unwrap_or_default();
+    let (names, place) = match (&arguments.config, arguments.without.is_empty()) {
+        (Some(file), true) => (&config.without, format!("{}: without", file.display())),
+        _ => (&arguments.without, "--without".to_owned()),
+    };
+    let without = names.iter().map(|name| effect(name, &place)).collect::<anyhow::Result<_>>()?;
+    let options = DiagnoseOptions { without, seed: arguments.seed.or(config.seed).unwrap_or(0) };
+    check_folder(&arguments.out)?;
+    let reader = BagReader::open(&arguments.recording)?;
+    let (recorded, mut notes, mut failures) = select(&reader, &config.placements)?;
+
+    // Until the files are written a signal may end the process as it likes: there is nothing to clear away.
+    let bar = progress::bar(recorded.len() as u64, "diagnosing, placements");
+    let diagnose = |placement: &Recorded| {
+        let answer = cromosim_gap::diagnose(&placement.record(), &options).map_err(|error| error.to_string());
+        bar.inc(1);
+        answer
+    };
+    let results: Vec<_> = recorded.par_iter().map(diagnose).collect();
+    bar.finish_and_clear();
+    let mut answers = BTreeMap::new();
+    for (placement, result) in recorded.iter().zip(results) {
+        match result {
+            Ok(answer) => {
+                notes.extend(placement.notes.iter().map(|note| format!("placement {}: {note}", placement.name)));
+                answers.insert(placement.name.clone(), answer);
+            }
+            Err(error) => failures.push(error),
+        }
+    }
+    if answers.is_empty() {
+        bail!("{}: {}", arguments.recording.display(), failures.join("; "));
+    }
+    notes.iter().for_each(|note| eprintln!("warning: {note}"));
+    failures.iter().for_each(|failure| eprintln!("error: {failure}; the other placements are diagnosed"));
+    let (diagnosis, effects, evidence) = split(answers);
+    write(arguments, &diagnosis, &effects, &evidence)?;
+    print(&diagnosis);
+    let folder = arguments.out.display();
+    if cfg!(feature = "view") {
+        println!("\n{folder}: {}", FILES.join(", "));
+    } else {
+        println!("\n{folder}: {}; {} is left out, as this cromosim was built without its feature `view`", FILES[..3].join(", "), FILES[3]);
+    }
+    Ok(())
+}
+
+/// The placements to diagnose, what a user should know of the others, and which cannot be read.
+fn select(reader: &BagReader, only: &[String]) -> anyhow::Result<(Vec<Recorded>, Vec<String>, Vec<String>)> {
+    let file = reader.path().display();
+    let mut found = recorded::read(reader)?;
+    let names: Vec<&str> = found.iter().map(|(name, _)| name.as_str()).collect();
+    if let Some(name) = only.iter().find(|name| !names.contains(&name.as_str())) {
+        bail!("{file}: placement `{name}` of the config: the recording has no such placement; it has {}", names.join(", "));
+    }
+    found.retain(|(name, _)| only.is_empty() || only.contains(name));
+    let (mut recorded, mut notes, mut failures) = (Vec::new(), Vec::new(), Vec::new());
+    for (name, placement) in found {
+        match placement {
+            Ok(placement) if placement.measured.is_empty() => {
+                notes.push(format!("placement {name}: no messages on /imu/{name}/data_raw (sensor_msgs/msg/Imu); skipped"));
+            }
+            Ok(placement) => recorded.push(placement),
+            Err(error) => failures.push(format!("placement {name}: {error:#}")),
+        }
+    }
+    if recorded.is_empty() && failures.is_empty() {
+        bail!(
+            "{file}: no placement has both a reference and messages on /imu/NAME/data_raw (sensor_msgs/msg/Imu): {}",
+            if notes.is_empty() { "there is none".to_owned() } else { notes.join("; ") }
+        );
+    }
+    Ok((recorded, notes, failures))
+}
+
+fn split(answers: BTreeMap<String, PlacementAnswer>) -> (Diagnosis, EffectsFile, BTreeMap<String, Evidence>) {
+    let mut diagnosis = Diagnosis { schema: SCHEMA.to_owned(), placements: BTreeMap::new() };
+    let (mut effects, mut evidence) = (EffectsFile::default(), BTreeMap::new());
+    for (name, answer) in answers {
+        diagnosis.placements.insert(name.clone(), answer.diagnosis);
+        effects.placements.insert(name.clone(), answer.effects);
+        evidence.insert(name, answer.evidence);
+    }
+    (diagnosis, effects, evidence)
+}
+
+/// Settings from a file.
+#[derive(Debug, Default, PartialEq)]
+struct Config {
+    placements: Vec<String>,
+    without: Vec<String>,
+    seed: Option<u64>,
+}
+
+impl Config {
+    fn read(file: &Path) -> anyhow::Result<Self> {
+        let text = fs::read_to_string(file).with_context(|| format!("{}: cannot be read", file.display()))?;
+        Self::parse(&text).map_err(|(line, problem)| anyhow!("{}, line {line}: {problem}", file.display()))
+    }
+
+    /// The YAML that these three keys take: lists in brackets or one dash a line, plain or quoted words, comments. Errors with their line.
+    fn parse(text: &str) -> Result<Self, (usize, String)> {
+        let (mut config, mut seen, mut open) = (Self::default(), Vec::new(), None);
+        for (number, line) in text.lines().enumerate() {
+            let wrong = |problem: String| (number + 1, problem);
+            let line = line.split(" #").next().filter(|line| !line.starts_with('#')).unwrap_or_default().trim_end();
+            if line.is_empty() || line == "---" {
+                continue;
+            }
+            if let Some(item) = line.trim_start().strip_prefix("- ") {
+                let list = open.and_then(|key| config.list(key)).ok_or_else(|| wrong("a list item, but no list".to_owned()))?;
+                list.push(word(item).map_err(wrong)?);
+                continue;
+            }
+            let Some((key, value)) = line.split_once(':').filter(|_| !line.starts_with(' ')) else {
+                return Err(wrong(format!("expected `key: value`, found `{}`", line.trim())));
+            };
+            if !["placements", "without", "seed"].contains(&key) {
+                return Err(wrong(format!("unknown field `{key}`, expected one of placements, without, seed")));
+            }
+            if seen.contains(&key) {
+                return Err(wrong(format!("field `{key}` stands there twice")));
+            }
+            seen.push(key);
+            open = Some(key).filter(|_| value.trim().is_empty());
+            match config.list(key) {
+                Some(list) if open.is_none() => *list = words(value).map_err(|problem| wrong(format!("{key}: {problem}")))?,
+                Some(_) => {}
+                None => {
+                    config.seed =
+                        Some(value.trim().parse().map_err(|_| wrong(format!("seed: expected a whole number, found `{}`", value.trim())))?)
+                }
+            }
+        }
+        Ok(config)
+    }
+
+    fn list(&mut self, key: &str) -> Option<&mut Vec<String>> {
+        match key {
+            "placements" => Some(&mut self.placements),
+            "without" => Some(&mut self.without),
+            _ => None,
+        }
+    }
+}
+
+/// `[a, b]`.
+fn words(text: &str) -> Result<Vec<String>, String> {
+    let inner = text.trim().strip_prefix('[').and_then(|text| text.strip_suffix(']'));
+    let inner = inner.ok_or_else(|| format!("expected a list such as [a, b], found `{}`", text.trim()))?.trim();
+    if inner.is_empty() { Ok(Vec::new()) } else { inner.split(',').map(word).collect() }
+}
+
+/// A plain or quoted word.
+fn word(text: &str) -> Result<String, String> {
+    let text = text.trim();
+    let quoted = ['\'', '"'].iter().find_map(|quote| text.strip_prefix(*quote)?.strip_suffix(*quote));
+    let word = quoted.unwrap_or(text);
+    let plain = !word.is_empty() && !word.contains(|c: char| c.is_whitespace() || "[]{}:,'\"&*!|>%@`".contains(c));
+    if plain { Ok(word.to_owned()) } else { Err(format!("expected a name, found `{text}`")) }
+}
+
+/// The effect of a name, or an error that says which names are near.
+fn effect(name: &str, place: &str) -> anyhow::Result<EffectKind> {
+    EffectKind::from_name(name).ok_or_else(|| {
+        let mut known: Vec<&str> = EffectKind::ALL.into_iter().map(EffectKind::name).collect();
+        known.sort_by_key(|known| distance(known, name));
+        anyhow!("{place} {name}: no such effect; the nearest are {}", known[..3].join(", "))
+    })
+}
+
+/// Letters to insert, delete or replace (Levenshtein 1966).
+fn distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, from) in a.chars().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, to) in b.iter().enumerate() {
+            let replaced = diagonal + usize::from(from != *to);
+            diagonal = row[j + 1];
+            row[j + 1] = replaced.min(row[j] + 1).min(diagonal + 1);
+        }
+    }
+    row[b.len()]
+}
+
+/// Says before the work what would stop its files after it.
+fn check_folder(folder: &Path) -> anyhow::Result<()> {
+    if let Some(file) = folder.ancestors().find(|place| place.exists()).filter(|place| !place.is_dir()) {
+        bail!("{}: --out: {} is no folder", folder.display(), file.display());
+    }
+    match FILES.iter().map(|name| folder.join(name)).find(|path| path.is_dir()) {
+        Some(path) => bail!("{}: is a folder and cannot be replaced by a file", path.display()),
+        None => Ok(()),
+    }
+}
+
+/// Files under temporary names; those that have not got their own when this is dropped are removed, and so is a folder made for them.
+struct Staged {
+    folder: PathBuf,
+    made: bool,
+    names: Vec<&'static str>,
+}
+
+impl Staged {
+    fn new(folder: &Path) -> anyhow::Result<Self> {
+        let made = !folder.exists();
+        fs::create_dir_all(folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
+        Ok(Self { folder: folder.to_owned(), made, names: Vec::new() })
+    }
+
+    /// Where a file is written first.
+    fn temporary(&self, name: &str) -> PathBuf {
+        self.folder.join(format!(".{name}.{}.tmp", std::process::id()))
+    }
+
+    fn add(&mut self, name: &'static str, write: impl FnOnce(&Path) -> anyhow::Result<()>) -> anyhow::Result<()> {
+        self.names.push(name);
+        write(&self.temporary(name)).with_context(|| format!("{}: cannot be written", self.folder.join(name).display()))
+    }
+
+    /// Gives all files their names.
+    fn finish(mut self) -> anyhow::Result<()> {
+        for name in self.names.clone() {
+            let path = self.folder.join(name);
+            fs::rename(self.temporary(name), &path).with_context(|| format!("{}: cannot be written", path.display()))?;
+            self.names.retain(|other| *other != name);
+            self.made = false;
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Staged {
+    fn drop(&mut self) {
+        // What cannot be removed is nothing that an error on top would mend.
+        self.names.iter().for_each(|name| drop(fs::remove_file(self.temporary(name))));
+        if self.made {
+            drop(fs::remove_dir(&self.folder));
+        }
+    }
+}
+
+fn write(arguments: &Arguments, diagnosis: &Diagnosis, effects: &EffectsFile, evidence: &BTreeMap<String, Evidence>) -> anyhow::Result<()> {
+    let interrupt = Interrupt::watch()?;
+    let folder = &arguments.out;
+    let recording = arguments.recording.file_name().unwrap_or_default().to_string_lossy();
+    let texts = [
+        serde_json::to_string_pretty(diagnosis)? + "\n",
+        effects.to_yaml(),
+        cromosim_gap::report::html(diagnosis, evidence, &format!("Gap diagnosis of {recording}")),
+    ];
+    let mut staged = Staged::new(folder)?;
+    for (name, text) in FILES.into_iter().zip(texts) {
+        staged.add(name, |path| Ok(fs::write(path, text)?))?;
+        interrupt.check()?;
+    }
+    #[cfg(feature = "view")]
+    staged.add(FILES[3], |path| crate::diagnose_view::write_rrd(path, diagnosis, evidence))?;
+    interrupt.check()?;
+    staged.finish()?;
+    if cfg!(not(feature = "view")) {
+        // One of an earlier diagnosis would speak of other causes.
+        drop(fs::remove_file(folder.join(FILES[3])));
+    }
+    Ok(())
+}
+
+/// What was found, for people.
+fn print(diagnosis: &Diagnosis) {
+    for (name, placement) in &diagnosis.placements {
+        let PlacementDiagnosis { verdict, causes, .. } = placement;
+        println!("{name}: {verdict}");
+        for cause in causes {
+            let (effect, probability, share) = (&cause.effect, cause.probability, 100.0 * cause.gap_share);
+            println!("  {effect:<20} probability {probability:.2}, {share:5.1} % of the gap; {}", parameters(cause));
+        }
+    }
+}
+
+/// `offset [0.0502, 0.0001, -0.0611] m +- [0.0003, 0.0003, 0.0003]`.
+fn parameters(cause: &Cause) -> String {
+    let specs = EffectKind::from_name(&cause.effect).map_or(&[][..], |kind| kind.spec().parameters);
+    let one = |(name, value): (&String, &Value)| {
+        let unit = specs.iter().find(|spec| spec.name == *name).map_or("", |spec| spec.unit);
+        let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+        let error = cause.standard_errors.get(name).map(|error| format!(" +- {}", short(error, 2))).unwrap_or_default();
+        format!("{name} {}{unit}{error}", short(value, 4))
+    };
+    cause.parameters.iter().map(one).collect::<Vec<_>>().join(", ")
+}
+
+/// Numbers with so many significant digits.
+fn short(value: &Value, digits: i32) -> String {
+    match value {
+        Value::Array(values) => format!("[{}]", values.iter().map(|value| short(value, digits)).collect::<Vec<_>>().join(", ")),
+        Value::String(word) => word.clone(),
+        Value::Number(number) => {
+            let number = number.as_f64().unwrap_or(f64::NAN);
+            let magnitude = if number == 0.0 { 0 } else { number.abs().log10().floor() as i32 };
+            if number == 0.0 || (-4..9).contains(&magnitude) {
+                format!("{number:.*}", (digits - 1 - magnitude).clamp(0, 9) as usize)
+            } else {
+                format!("{number:.*e}", digits as usize - 1)
+            }
+        }
+        other => other.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Config, distance};
+
+    #[test]
+    fn config_takes_both_forms_of_lists() {
+        let list = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+        let expected = || Config { placements: list(&["wrist", "left"]), without: list(&["low_pass"]), seed: Some(7) };
+        for text in [
+            "placements: [wrist, 'left']\nwithout:\n  - low_pass  # why\nseed: 7\n",
+            "# c\nseed: 7\nplacements:\n- wrist\n- \"left\"\nwithout: [low_pass]",
+        ] {
+            assert_eq!(Config::parse(text), Ok(expected()), "{text}");
+        }
+        assert_eq!(Config::parse(""), Ok(Config::default()));
+    }
+
+    #[test]
+    fn config_names_the_line_of_what_is_wrong() {
+        for (text, line, part) in [
+            ("seed: 7\nwihtout: []", 2, "wihtout"),
+            ("seed: seven", 1, "whole number"),
+            ("without: lever_arm", 1, "list"),
+            ("- wrist", 1, "no list"),
+            ("seed: 1\nseed: 2", 2, "twice"),
+            ("without: [a, {b: c}]", 1, "name"),
+            ("what", 1, "key"),
+        ] {
+            let (found, problem) = Config::parse(text).expect_err(text);
+            assert!(found == line && problem.contains(part), "{text}: line {found}: {problem}");
+        }
+    }
+
+    #[test]
+    fn distance_counts_letters() {
+        assert_eq!((distance("lever_arm", "lever_arm"), distance("leverarm", "lever_arm"), distance("", "ab")), (0, 1, 2));
+    }
+}
