@@ -35,7 +35,12 @@ fn run(arguments: &Arguments) -> anyhow::Result<()> {
         let begin = std::time::Instant::now();
         match cromosim_gap::diagnose(&record, &options) {
             Ok(answer) => {
-                println!("{}", serde_json::to_string(&serde_json::json!({"placement": record.name, "seconds": begin.elapsed().as_secs_f64(), "diagnosis": answer.diagnosis}))?);
+                println!(
+                    "{}",
+                    serde_json::to_string(
+                        &serde_json::json!({"placement": record.name, "seconds": begin.elapsed().as_secs_f64(), "diagnosis": answer.diagnosis})
+                    )?
+                );
             }
             Err(error) => eprintln!("ERROR {error}"),
         }

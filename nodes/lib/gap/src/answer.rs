@@ -35,7 +35,13 @@ const NOISE_LIKE: [EffectKind; 6] = [
 ];
 
 impl<'a> Answer<'a> {
-    pub fn new(findings: &'a Findings<'a>, problem: &'a Problem, raw: &'a [Reading], covered: &'a [[bool; 6]], options: &DiagnoseOptions) -> Self {
+    pub fn new(
+        findings: &'a Findings<'a>,
+        problem: &'a Problem,
+        raw: &'a [Reading],
+        covered: &'a [[bool; 6]],
+        options: &DiagnoseOptions,
+    ) -> Self {
         let comparison = Comparison { problem, measured: raw, covered };
         let whole = Problem { usable: covered.to_vec(), ..problem.clone() };
         let factor = |kind| values_of(&findings.named, kind).map_or(1.0, |values| values[0]);
@@ -107,7 +113,9 @@ impl<'a> Answer<'a> {
         let has = |kind: EffectKind| set.contains(kind);
         let density = |kind| values_of(&self.findings.named, kind).map_or(0.0, |values| values[0]);
         for (c, (noise, step)) in
-            [(EffectKind::AccelNoise, EffectKind::AccelQuantization), (EffectKind::GyroNoise, EffectKind::GyroQuantization)].into_iter().enumerate()
+            [(EffectKind::AccelNoise, EffectKind::AccelQuantization), (EffectKind::GyroNoise, EffectKind::GyroQuantization)]
+                .into_iter()
+                .enumerate()
         {
             let mut variance = self.findings.problem_sigma(c).powi(2);
             variance += if has(noise) { density(noise).powi(2) * self.whole.rate_hz } else { 0.0 };
@@ -159,9 +167,8 @@ impl<'a> Answer<'a> {
     fn noisy(&self, set: &EffectSet, simulated: &[Reading]) -> Vec<Reading> {
         let mut random = ChaCha12Rng::seed_from_u64(self.seed);
         let density = |kind| values_of(set, kind).map_or(0.0, |values| values[0]);
-        let sigma = [(0, EffectKind::AccelNoise), (1, EffectKind::GyroNoise)].map(|(c, kind)| {
-            self.units[c] * (self.findings.problem_sigma(c).powi(2) + density(kind).powi(2) * self.whole.rate_hz).sqrt()
-        });
+        let sigma = [(0, EffectKind::AccelNoise), (1, EffectKind::GyroNoise)]
+            .map(|(c, kind)| self.units[c] * (self.findings.problem_sigma(c).powi(2) + density(kind).powi(2) * self.whole.rate_hz).sqrt());
         simulated
             .iter()
             .map(|reading| {
@@ -270,7 +277,16 @@ fn orders(count: usize) -> Vec<Vec<usize>> {
     if count <= 4 {
         let mut all = vec![Vec::new()];
         for k in 0..count {
-            all = all.into_iter().flat_map(|order: Vec<usize>| (0..=order.len()).map(move |at| { let mut next = order.clone(); next.insert(at, k); next })).collect();
+            all = all
+                .into_iter()
+                .flat_map(|order: Vec<usize>| {
+                    (0..=order.len()).map(move |at| {
+                        let mut next = order.clone();
+                        next.insert(at, k);
+                        next
+                    })
+                })
+                .collect();
         }
         return all;
     }

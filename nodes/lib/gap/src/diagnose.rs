@@ -91,8 +91,8 @@ pub fn diagnose(record: &PlacementRecord, options: &DiagnoseOptions) -> Result<P
     let digital = [0, 1].map(|channel| gross::digital(&problem.measured, channel));
     problem.cover(gross.lag_s)?;
     let covered = problem.usable.clone();
-    for channel in 0..2 {
-        mask_clipped(&mut problem, channel, &digital[channel]);
+    for (channel, digital) in digital.iter().enumerate() {
+        mask_clipped(&mut problem, channel, digital);
     }
     let units = allowed_units(&gross, options);
     for reading in &mut problem.measured {
@@ -183,7 +183,7 @@ fn analyse<'a>(
     for round in 0..ROUNDS {
         context = renewed(&context, &state, &library);
         let before = state.fit.set.clone();
-        state = context.search(&[before.clone()], &library, MOST, false);
+        state = context.search(std::slice::from_ref(&before), &library, MOST, false);
         debug(|| eprintln!("round {round}: {:?} {:.2?}", kinds(&state.fit.set), state.fit.held_out_ratio()));
         if kinds(&before) == kinds(&state.fit.set) {
             break;
@@ -281,11 +281,11 @@ fn is_white(problem: &Problem, residual: &[Vec<f64>]) -> [bool; 2] {
 /// Variance of white noise from `x0 - 4 x1 + 6 x2 - 4 x3 + x4` (variance 70) of five neighbours that are all there, by the median of its squares.
 fn fourth_differences(problem: &Problem, residual: &[Vec<f64>], channel: usize) -> Option<f64> {
     let mut squares = Vec::new();
-    for axis in 3 * channel..3 * channel + 3 {
+    for (axis, series) in residual.iter().enumerate().skip(3 * channel).take(3) {
         for first in 0..problem.places.len().saturating_sub(4) {
             let whole = problem.places[first + 4] == problem.places[first] + 4 && (first..first + 5).all(|k| problem.usable[k][axis]);
             if whole {
-                let x = &residual[axis][problem.places[first]..];
+                let x = &series[problem.places[first]..];
                 squares.push((x[0] - 4.0 * x[1] + 6.0 * x[2] - 4.0 * x[3] + x[4]).powi(2));
             }
         }

@@ -1,6 +1,5 @@
 //! What can go wrong.
 
-use cromosim_imu::ImuError;
 use cromosim_spatial::SpatialError;
 use thiserror::Error;
 
@@ -52,13 +51,5 @@ pub enum GapError {
         placement: String,
         /// Why.
         source: SpatialError,
-    },
-    /// An effect refuses its values.
-    #[error("placement {placement}: {source}")]
-    Effect {
-        /// Name.
-        placement: String,
-        /// Why.
-        source: ImuError,
     },
 }

@@ -78,14 +78,20 @@ pub(crate) fn collect(findings: &Findings, comparison: &Comparison, before: &[Re
     let of_after = spectrum(&|k, axis| axis_of(&measured[k], axis) - axis_of(&after[k], axis));
     let bins = of_measured.first().map_or(0, |spectrum| spectrum.density.len());
     let rows = |spectra: &[cromosim_spatial::Spectrum]| (0..bins).map(|k| std::array::from_fn(|axis| spectra[axis].density[k])).collect();
-    let units = [EffectKind::AccelUnits, EffectKind::GyroUnits].map(|kind| values_of(&findings.named, kind).map_or(1.0, |values| values[0]));
+    let units =
+        [EffectKind::AccelUnits, EffectKind::GyroUnits].map(|kind| values_of(&findings.named, kind).map_or(1.0, |values| values[0]));
     let frequencies: Vec<f64> = (0..bins).map(|k| of_measured[0].frequency(k)).collect();
     let predicted = frequencies
         .iter()
         .map(|&hz| std::array::from_fn(|axis| context.noise.density(axis / 3, hz, problem.rate_hz) * units[axis / 3].powi(2)))
         .collect();
-    let spectra =
-        Spectra { frequencies, measured: rows(&of_measured), residual_before: rows(&of_before), residual_after: rows(&of_after), predicted };
+    let spectra = Spectra {
+        frequencies,
+        measured: rows(&of_measured),
+        residual_before: rows(&of_before),
+        residual_after: rows(&of_after),
+        predicted,
+    };
     let white = |readings: &[Reading]| {
         context.whitener.apply(&problem.raster(|k, axis| (axis_of(&measured[k], axis) - axis_of(&readings[k], axis)) / units[axis / 3]))
     };

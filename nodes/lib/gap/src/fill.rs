@@ -118,8 +118,9 @@ mod tests {
     fn a_hole_in_a_slow_series_is_bridged_and_a_long_one_forgets() {
         let length = 1000;
         // Correlated over fifty entries.
-        let covariance: Vec<f64> =
-            (0..length).map(|k: usize| (-0.5 * (k.min(length - k) as f64 / 20.0).powi(2)).exp() + if k == 0 { 1e-3 } else { 0.0 }).collect();
+        let covariance: Vec<f64> = (0..length)
+            .map(|k: usize| (-0.5 * (k.min(length - k) as f64 / 20.0).powi(2)).exp() + if k == 0 { 1e-3 } else { 0.0 })
+            .collect();
         let mut there = vec![true; length];
         there[300..304].fill(false);
         there[600..800].fill(false);

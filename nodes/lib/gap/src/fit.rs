@@ -124,8 +124,7 @@ impl<'a> Context<'a> {
         let size = if (lower..=upper).contains(&(value + size)) { size } else { -size };
         let Some(moved) = changed(set, kind, &[(index, size)]) else { return vec![0.0; 6 * self.problem.length] };
         let readings = self.problem.predict_from(&self.track, base, &moved, stage_of(kind));
-        let difference =
-            self.problem.raster(|k, axis| (axis_of(&readings[k], axis) - axis_of(&base.readings[k], axis)) / size);
+        let difference = self.problem.raster(|k, axis| (axis_of(&readings[k], axis) - axis_of(&base.readings[k], axis)) / size);
         self.whitener.apply(&difference)
     }
 
@@ -191,7 +190,8 @@ impl<'a> Context<'a> {
     /// How well columns beside those of a fit would do, in one linear step.
     pub fn extended(&self, fit: &Fit, residual: &[f64], extra: &[Vec<f64>], extra_prior: &[f64]) -> Linear {
         let slices: Vec<&[f64]> = fit.columns.iter().chain(extra).map(Vec::as_slice).collect();
-        let prior = fit.layout.iter().map(|&(kind, index)| prior_deviation(kind, index).powi(-2)).chain(extra_prior.iter().copied()).collect();
+        let prior =
+            fit.layout.iter().map(|&(kind, index)| prior_deviation(kind, index).powi(-2)).chain(extra_prior.iter().copied()).collect();
         self.gram(&slices, residual, prior).solve()
     }
 }

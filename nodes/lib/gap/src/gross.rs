@@ -11,15 +11,8 @@ use crate::problem::Problem;
 const ACCEL_FACTORS: [f64; 8] =
     [1.0, 1.0 / STANDARD_GRAVITY, 1000.0 / STANDARD_GRAVITY, 100.0, 1000.0, 3.280_839_895, STANDARD_GRAVITY, 0.01];
 /// Degrees, millidegrees, milliradians, revolutions per minute and per second, and the inverse mistake.
-const GYRO_FACTORS: [f64; 7] = [
-    1.0,
-    57.295_779_513_082_32,
-    57_295.779_513_082_32,
-    1000.0,
-    9.549_296_585_513_72,
-    0.159_154_943_091_895_35,
-    0.017_453_292_519_943_295,
-];
+const GYRO_FACTORS: [f64; 7] =
+    [1.0, 57.295_779_513_082_32, 57_295.779_513_082_32, 1000.0, 9.549_296_585_513_72, 0.159_154_943_091_895_35, 0.017_453_292_519_943_295];
 /// A lag near zero is preferred to a distant one that correlates better by less than this.
 const NEAR_BONUS: f64 = 0.03;
 
@@ -178,7 +171,7 @@ fn gyro_axes(rows: &[(&Reading, usize)], track: &KinematicTrack) -> (Option<Matr
         let ratio = (rows.iter().map(|row| measured(row).norm_squared()).sum::<f64>()
             / rows.iter().map(|row| predicted(row).norm_squared()).sum::<f64>().max(1e-12))
         .sqrt();
-        return (None, if ratio > 5.0 || ratio < 0.05 { canonical(ratio, &GYRO_FACTORS) } else { 1.0 });
+        return (None, if !(0.05..=5.0).contains(&ratio) { canonical(ratio, &GYRO_FACTORS) } else { 1.0 });
     }
     let Some(inverse) = own.try_inverse() else { return (None, 1.0) };
     let matrix = cross * inverse;
@@ -252,17 +245,21 @@ pub(crate) struct Digital {
 
 /// Reads clipping and rounding off a channel (0 accelerometer, 1 gyroscope) of the measured readings.
 pub(crate) fn digital(measured: &[Reading], channel: usize) -> Digital {
-    let values: Vec<f64> =
-        measured.iter().flat_map(|reading| if channel == 0 { reading.force } else { reading.rate }.iter().copied().collect::<Vec<_>>()).collect();
+    let values: Vec<f64> = measured
+        .iter()
+        .flat_map(|reading| if channel == 0 { reading.force } else { reading.rate }.iter().copied().collect::<Vec<_>>())
+        .collect();
     let lsb = lattice(&values);
     let largest = values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
     let clipped = |value: &f64| value.abs() >= largest * (1.0 - 1e-9);
     let repeats = values.iter().filter(|value| clipped(value)).count();
     let below = lsb.map_or(0, |lsb| values.iter().filter(|value| (value.abs() - largest + lsb).abs() < 0.5 * lsb).count());
     // On a lattice the tail thins out from step to step, and a slow peak dwells on one: clipping piles up more than that, and at several times.
-    let episodes = values.iter().enumerate().filter(|(_, value)| clipped(value)).fold((0, usize::MAX / 2), |(count, last), (at, _)| {
-        (count + usize::from(last == usize::MAX / 2 || at > last + 60), at)
-    });
+    let episodes = values
+        .iter()
+        .enumerate()
+        .filter(|(_, value)| clipped(value))
+        .fold((0, usize::MAX / 2), |(count, last), (at, _)| (count + usize::from(last == usize::MAX / 2 || at > last + 60), at));
     let piled = if lsb.is_some() { repeats >= 12 && repeats > 3 * below && episodes.0 >= 3 } else { repeats >= 4 };
     let limit = (piled && largest > 0.0).then_some(largest);
     Digital { limit, lsb }

@@ -19,7 +19,9 @@ impl Comparison<'_> {
         let (mut sum, mut count) = (0.0, 0.0_f64);
         for (k, covered) in self.covered.iter().enumerate() {
             if covered[3 * channel] {
-                sum += (3 * channel..3 * channel + 3).map(|a| (axis_of(&self.measured[k], a) - axis_of(&simulated[k], a)).powi(2)).sum::<f64>();
+                sum += (3 * channel..3 * channel + 3)
+                    .map(|a| (axis_of(&self.measured[k], a) - axis_of(&simulated[k], a)).powi(2))
+                    .sum::<f64>();
                 count += 1.0;
             }
         }

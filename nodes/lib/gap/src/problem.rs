@@ -156,11 +156,6 @@ impl Problem {
         readings
     }
 
-    /// Seconds since the epoch by the IMU's clock.
-    pub fn seconds(&self, message: usize) -> f64 {
-        self.stamps[message] - self.epoch
-    }
-
     /// Which part of time an entry of the raster belongs to.
     pub fn fold(&self, place: usize) -> usize {
         (place as f64 / (BLOCK_S * self.rate_hz)) as usize % FOLDS

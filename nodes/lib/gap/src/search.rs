@@ -103,7 +103,8 @@ impl Context<'_> {
             .collect();
         candidates.sort_by(|a, b| b.0.total_cmp(&a.0));
         debug(|| {
-            let list: Vec<String> = candidates.iter().take(6).map(|(promise, c)| format!("{:?}:{:.0}", kinds(&c.set), promise - state.score)).collect();
+            let list: Vec<String> =
+                candidates.iter().take(6).map(|(promise, c)| format!("{:?}:{:.0}", kinds(&c.set), promise - state.score)).collect();
             eprintln!("  screen {:?}: {}", kinds(&state.fit.set), list.join(" "));
         });
         let best = candidates.first().map_or(0.0, |(promise, _)| promise - state.score);

@@ -31,12 +31,7 @@ fn smoothed<'a>(context: &Context<'a>, set: &EffectSet, cutoff_hz: f64) -> Conte
 }
 
 /// The better of `context` and contexts in which a smoothing of the reference is undone.
-pub(crate) fn try_smoothing<'a>(
-    context: Context<'a>,
-    state: State,
-    starts: &[EffectSet],
-    library: &[EffectKind],
-) -> (Context<'a>, State) {
+pub(crate) fn try_smoothing<'a>(context: Context<'a>, state: State, starts: &[EffectSet], library: &[EffectKind]) -> (Context<'a>, State) {
     let ratio = state.fit.held_out_ratio();
     if ratio[0].max(ratio[1]) < SUSPICIOUS {
         return (context, state);

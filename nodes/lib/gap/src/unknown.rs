@@ -72,8 +72,7 @@ pub(crate) fn look(findings: &Findings) -> Option<Unknown> {
     let vague = if basis.undone_hz.is_some() { GUESSED } else { 1.0 };
     let coarse = |c: usize| basis.steps[c] > COARSE_STEPS;
     let strong: Vec<&Probe> = probes.iter().filter(|probe| probe.gain > PROBE * vague && !coarse(probe.channel)).collect();
-    let noisy =
-        |c: usize| !coarse(c) && (signs.band[c] > BAND * vague || (signs.burst[c] > BURST * vague && signs.outliers[c] > OUTLIERS));
+    let noisy = |c: usize| !coarse(c) && (signs.band[c] > BAND * vague || (signs.burst[c] > BURST * vague && signs.outliers[c] > OUTLIERS));
     let stuck = |c: usize| signs.frozen[c] > FROZEN && findings.digital[c].lsb.is_none();
     let jittery = signs.jitter > JITTER;
     let of_channel = |c: usize| noisy(c) || stuck(c) || strong.iter().any(|probe| probe.channel == c);

@@ -71,6 +71,36 @@ impl NoiseBasis {
     }
 }
 
+/// One-sided densities at a frequency, by channel.
+struct Expected {
+    /// Sensor noise and the error of the estimate.
+    known: [f64; 2],
+    /// Most that motion which the estimate leaves out can be.
+    hidden: [f64; 2],
+    /// Share of the motion that the estimate keeps.
+    through: [f64; 2],
+}
+
+impl NoiseBasis {
+    fn expected(&self, frequency_hz: f64, rate_hz: f64, (position, rotation): &(Spectrum, Spectrum)) -> Expected {
+        let squared = (TAU * frequency_hz).powi(2);
+        let (error_p, error_r) = self.estimate.error_density(frequency_hz);
+        let (error_p, error_r) = (error_p * self.reference_share[0], error_r * self.reference_share[1]);
+        let (through_p, through_r, gain) = self.estimate.filter_at(frequency_hz);
+        let (lever2, w2, f2) = (self.lever_arm_m * self.lever_arm_m, self.rate_squared, self.force_squared);
+        let lever = 2.0 / 3.0 * lever2 * (squared * squared + 3.0 * squared * w2 + w2 * w2);
+        let white = self.sigma.map(|sigma| 2.0 * sigma * sigma / rate_hz);
+        let known =
+            [white[0] + squared * squared * error_p + (2.0 / 3.0 * f2 + lever) * error_r, white[1] + (squared + 2.0 / 3.0 * w2) * error_r];
+        // Motion below the reference's noise: at most that noise itself.
+        let hidden_p = squared * squared * position.at(frequency_hz) * (1.0 - through_p) * gain * gain;
+        let hidden_r = squared * rotation.at(frequency_hz) * (1.0 - through_r) * gain * gain;
+        let hidden = [hidden_p + 2.0 / 3.0 * lever2 * squared * hidden_r, hidden_r];
+        let through = [if lever2 > 0.0 { through_p.min(through_r) } else { through_p }, through_r];
+        Expected { known, hidden, through }
+    }
+}
+
 /// Whitens residuals: each comes out with unit variance where only predicted noise is in it.
 #[derive(Clone, Debug)]
 pub(crate) struct Whitener {
@@ -99,8 +129,8 @@ fn fill(series: &mut [f64], usable: &[bool]) {
             }
             Some(before) if k > before + 1 => {
                 let (from, to) = (series[before], series[k]);
-                for entry in before + 1..k {
-                    series[entry] = from + (to - from) * (entry - before) as f64 / (k - before) as f64;
+                for (step, value) in series[before + 1..k].iter_mut().enumerate() {
+                    *value = from + (to - from) * (step + 1) as f64 / (k - before) as f64;
                 }
             }
             _ => {}
@@ -148,8 +178,8 @@ impl Problem {
     pub fn channel_spectrum(&self, series: &[Vec<f64>], channel: usize) -> Spectrum {
         let window = ((WINDOW_S * self.rate_hz) as usize).min(self.length / 2).max(16);
         let mut sum = Spectrum::default();
-        for axis in 3 * channel..3 * channel + 3 {
-            let spectrum = welch(&series[axis], self.rate_hz, window);
+        for values in &series[3 * channel..3 * channel + 3] {
+            let spectrum = welch(values, self.rate_hz, window);
             if sum.density.is_empty() {
                 sum = Spectrum { density: vec![0.0; spectrum.density.len()], ..spectrum };
             }
@@ -165,37 +195,24 @@ impl NoiseModel {
         let length = problem.transform_length();
         let spacing_hz = problem.rate_hz / length as f64;
         let spectra = residual.map(|series| [problem.channel_spectrum(series, 0), problem.channel_spectrum(series, 1)]);
-        let estimate = &basis.estimate;
-        let (position, rotation) = estimate.spectra();
-        let mut power = [vec![0.0; length / 2 + 1], vec![0.0; length / 2 + 1]];
+        let reported = basis.estimate.spectra();
         let to_variance = problem.rate_hz / 2.0;
-        let lever2 = basis.lever_arm_m * basis.lever_arm_m;
-        let (w2, f2) = (basis.rate_squared, basis.force_squared);
-        for k in 0..=length / 2 {
-            let frequency_hz = k as f64 * spacing_hz;
-            let squared = (TAU * frequency_hz).powi(2);
-            let (error_p, error_r) = estimate.error_density(frequency_hz);
-            let (error_p, error_r) = (error_p * basis.reference_share[0], error_r * basis.reference_share[1]);
-            let (through_p, through_r, gain) = estimate.filter_at(frequency_hz);
-            let lever = 2.0 / 3.0 * lever2 * (squared * squared + 3.0 * squared * w2 + w2 * w2);
-            let known = [
-                2.0 * basis.sigma[0].powi(2) / problem.rate_hz + squared * squared * error_p + (2.0 / 3.0 * f2 + lever) * error_r,
-                2.0 * basis.sigma[1].powi(2) / problem.rate_hz + (squared + 2.0 / 3.0 * w2) * error_r,
-            ];
-            // Motion below the reference's noise: at most that noise itself.
-            let hidden_p = squared * squared * position.at(frequency_hz) * (1.0 - through_p) * gain * gain;
-            let hidden_r = squared * rotation.at(frequency_hz) * (1.0 - through_r) * gain * gain;
-            let most = [hidden_p + 2.0 / 3.0 * lever2 * squared * hidden_r, hidden_r];
-            let through = [if lever2 > 0.0 { through_p.min(through_r) } else { through_p }, through_r];
-            for channel in 0..2 {
-                let lost = spectra.as_ref().map_or(0.02 * most[channel], |spectra| {
-                    let seen = if through[channel] < RESOLVED { local(&spectra[channel], frequency_hz, &basis.line_hz) - known[channel] } else { 0.0 };
-                    seen.clamp(0.0, most[channel].max(0.0))
-                });
-                power[channel][k] = (known[channel] + lost) * to_variance;
-            }
-        }
-        Self { power, spacing_hz }
+        let of = |channel: usize| {
+            (0..=length / 2)
+                .map(|k| {
+                    let frequency_hz = k as f64 * spacing_hz;
+                    let expected = basis.expected(frequency_hz, problem.rate_hz, &reported);
+                    let (known, most) = (expected.known[channel], expected.hidden[channel].max(0.0));
+                    let lost = spectra.as_ref().map_or(0.02 * most, |spectra| {
+                        let resolved = expected.through[channel] >= RESOLVED;
+                        let seen = if resolved { 0.0 } else { local(&spectra[channel], frequency_hz, basis.line_hz) - known };
+                        seen.clamp(0.0, most)
+                    });
+                    (known + lost) * to_variance
+                })
+                .collect()
+        };
+        Self { power: [of(0), of(1)], spacing_hz }
     }
 
     /// One-sided density at a frequency, (unit)^2/Hz.
@@ -206,7 +223,7 @@ impl NoiseModel {
 }
 
 /// Mean of a spectrum within its resolution of a frequency; next to a line that a vibration explains, the median of its surroundings.
-fn local(spectrum: &Spectrum, frequency_hz: f64, line_hz: &Option<f64>) -> f64 {
+fn local(spectrum: &Spectrum, frequency_hz: f64, line_hz: Option<f64>) -> f64 {
     let spacing = spectrum.spacing_hz;
     if line_hz.is_some_and(|line| (line - frequency_hz).abs() < 4.0 * spacing) {
         return spectrum.median(frequency_hz - 12.0 * spacing, frequency_hz + 12.0 * spacing).unwrap_or(0.0);
@@ -220,8 +237,9 @@ impl Whitener {
         let length = problem.transform_length();
         let transform = FourierPair::new(length);
         let gain = noise.power.clone().map(|power| power.iter().map(|value| value.max(1e-30).sqrt().recip()).collect::<Vec<f64>>());
-        let log_scale = noise.power.clone().map(|power| 0.5 * power.iter().map(|value| value.max(1e-30).ln()).sum::<f64>() / power.len() as f64);
-        let fillers = vec![Arc::new(Filler::default()); 6];
+        let log_scale =
+            noise.power.clone().map(|power| 0.5 * power.iter().map(|value| value.max(1e-30).ln()).sum::<f64>() / power.len() as f64);
+        let fillers = (0..6).map(|_| Arc::new(Filler::default())).collect();
         let mut whitener = Self { transform, gain, fillers, weight: vec![vec![0.0; problem.length]; 6], count: [0.0; 2], log_scale };
         whitener.set_weights(problem, noise);
         whitener
@@ -233,8 +251,7 @@ impl Whitener {
         let length = self.transform.length();
         for channel in 0..2 {
             let covariance = self.covariance(&noise.power[channel]);
-            let mut response: Vec<Complex64> =
-                (0..length).map(|k| Complex64::new(self.gain[channel][k.min(length - k)], 0.0)).collect();
+            let mut response: Vec<Complex64> = (0..length).map(|k| Complex64::new(self.gain[channel][k.min(length - k)], 0.0)).collect();
             self.transform.inverse(&mut response);
             response.iter_mut().for_each(|value| *value = Complex64::new(value.re * value.re, 0.0));
             self.transform.forward(&mut response);

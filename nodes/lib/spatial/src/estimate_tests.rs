@@ -21,8 +21,7 @@ impl Normal {
 fn motion(t: f64) -> (Vector3<f64>, UnitQuaternion<f64>, Vector3<f64>) {
     let w = TAU * 1.3;
     let position = Vector3::new(0.2 * (w * t).sin(), 0.1 * (2.0 * w * t).cos(), 1.0 + 0.05 * (3.0 * w * t).sin());
-    let acceleration =
-        Vector3::new(-0.2 * w * w * (w * t).sin(), -0.4 * w * w * (2.0 * w * t).cos(), -0.45 * w * w * (3.0 * w * t).sin());
+    let acceleration = Vector3::new(-0.2 * w * w * (w * t).sin(), -0.4 * w * w * (2.0 * w * t).cos(), -0.45 * w * w * (3.0 * w * t).sin());
     let rotation = so3::exp(&Vector3::new(0.8 * (w * t).sin(), 0.0, 0.0)) * so3::exp(&Vector3::new(0.0, 0.0, 0.4 * t));
     (position, rotation, acceleration)
 }
@@ -127,7 +126,8 @@ fn white_noise_alone_passes_nowhere() {
     let count = 12_000;
     let series: Vec<Vec<f64>> = (0..3).map(|_| (0..count).map(|_| random.draw()).collect()).collect();
     let floor = Floor::learn(&series, 200.0);
-    let passing: Vec<f64> = floor.filter.iter().enumerate().skip(40).filter(|(_, w)| **w > 0.0).map(|(k, _)| k as f64 * floor.spacing_hz).collect();
+    let passing: Vec<f64> =
+        floor.filter.iter().enumerate().skip(40).filter(|(_, w)| **w > 0.0).map(|(k, _)| k as f64 * floor.spacing_hz).collect();
     assert!(passing.is_empty(), "{passing:?}");
 }
 

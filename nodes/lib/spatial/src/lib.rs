@@ -6,6 +6,7 @@
 //! - [`so3`]: exponential, logarithm, angular velocity from quaternion derivatives, sign-continuous quaternion series.
 //! - [`SmoothingSpline`]: quintic B-spline through or near samples of several channels, on any increasing times, in O(N).
 //! - [`PoseSpline`]: position and rotation splines together; gives velocity, acceleration, angular velocity and acceleration at any time.
+//! - [`PoseEstimate`]: a motion from noisy poses, its noise learnt from them, with derivatives and their error; [`KinematicTrack`] is what it gives.
 //! - [`derivative_weights`]: finite-difference stencils on any times; [`uniform_stamps`]: output grids.
 //!
 //! ```
@@ -27,9 +28,11 @@ mod derivative_risk;
 mod difference;
 mod error;
 mod estimate;
+mod floor;
 mod grid;
 mod holes;
 mod pose_spline;
+mod raster;
 mod segments;
 mod select;
 pub mod so3;

@@ -95,10 +95,10 @@ impl Segments {
                 let middle = window as f64 * hop;
                 let from = (middle - hop).ceil().max(0.0) as usize;
                 let to = ((middle + hop).floor() as usize).min(self.count - 1);
-                for entry in from..=to {
+                for (entry, sum) in result.iter_mut().enumerate().take(to + 1).skip(from) {
                     let weight = 0.5 + 0.5 * (PI * (entry as f64 - middle) / hop).cos();
                     let place = entry as i64 - first * self.factor as i64;
-                    result[entry] += weight * (filtered[place as usize].re + line(entry as i64));
+                    *sum += weight * (filtered[place as usize].re + line(entry as i64));
                 }
             }
         }

@@ -1,0 +1,113 @@
+//! Each effect alone, plain to see: exactly it is named, with its values.
+#![allow(clippy::unwrap_used)]
+
+mod support;
+
+use cromosim_gap::PlacementAnswer;
+use cromosim_imu::{EffectKind as K, STANDARD_GRAVITY};
+use support::Scene;
+use support::judge::{answer, names_exactly, values_are};
+
+/// Names exactly what was put in, with its values.
+fn found(scene: &Scene) -> PlacementAnswer {
+    let answer = answer(&scene.record());
+    names_exactly(&answer.diagnosis, &scene.effects);
+    for effect in &scene.effects {
+        values_are(&answer.diagnosis, effect);
+    }
+    answer
+}
+
+/// The same, and the simulation follows: the gap of the channels (accelerometer, gyroscope) falls at least to this part.
+fn followed(scene: &Scene, parts: [f64; 2]) {
+    let gap = found(scene).diagnosis.gap;
+    let [accel, gyro] = [gap.after.accel_rmse / gap.before.accel_rmse, gap.after.gyro_rmse / gap.before.gyro_rmse];
+    assert!(accel < parts[0] && gyro < parts[1], "{:?}: gaps fall to {accel:.3} and {gyro:.3}", scene.effects);
+    assert!(gap.after.nll_per_sample < gap.before.nll_per_sample);
+}
+
+/// A channel that the effect does not touch keeps its gap.
+const KEPT: f64 = 1.05;
+
+macro_rules! followed {
+    ($($name:ident: $kind:ident $values:expr => $parts:expr;)*) => {
+        $(#[test]
+        fn $name() {
+            followed(&Scene::new(K::$kind as u64).with(K::$kind, &$values), $parts);
+        })*
+        const FOLLOWED: &[K] = &[$(K::$kind),*];
+    };
+}
+
+followed! {
+    reference_smoothing: ReferenceSmoothing [3.0] => [0.9, 0.9];
+    reference_tilt: ReferenceTilt [0.04, -0.05, 0.0] => [0.5, KEPT];
+    reference_scale: ReferenceScale [1.1] => [0.5, KEPT];
+    mount_rotation: MountRotation [0.2, -0.15, 0.3] => [0.2, 0.2];
+    lever_arm: LeverArm [0.05, 0.02, -0.06] => [0.5, KEPT];
+    soft_tissue: SoftTissue [7.0, 0.3] => [0.5, KEPT];
+    time_offset: TimeOffset [0.021] => [0.5, 0.5];
+    clock_drift: ClockDrift [400.0] => [0.6, 0.6];
+    accel_bias: AccelBias [0.2, -0.15, 0.1] => [0.7, KEPT];
+    gyro_bias: GyroBias [0.05, -0.06, 0.03] => [KEPT, 0.6];
+    accel_scale: AccelScale [1.04, 0.95, 1.03] => [0.6, KEPT];
+    gyro_scale: GyroScale [1.04, 0.95, 1.03] => [KEPT, 0.6];
+    accel_misalignment: AccelMisalignment [0.03, -0.04, 0.02] => [0.6, KEPT];
+    gyro_misalignment: GyroMisalignment [0.03, -0.04, 0.02] => [KEPT, 0.9];
+    accel_bias_drift: AccelBiasDrift [0.008, -0.006, 0.007] => [0.9, KEPT];
+    gyro_bias_drift: GyroBiasDrift [2e-3, -1.5e-3, 1e-3] => [KEPT, 0.9];
+    accel_saturation: AccelSaturation [13.0] => [0.95, KEPT];
+    gyro_saturation: GyroSaturation [2.0] => [KEPT, 0.7];
+    low_pass: LowPass [8.0] => [0.5, 0.5];
+    gyro_g_sensitivity: GyroGSensitivity [2e-3, -1e-3, 1e-3, 1e-3, 2e-3, -2e-3, -1e-3, 1e-3, 2e-3] => [KEPT, 0.95];
+    vibration: Vibration [17.3, 0.5, -0.3, 0.4, 0.8] => [0.7, KEPT];
+    axis_convention: AxisConvention [0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, 1.0, 0.0] => [0.05, 0.1];
+    accel_units: AccelUnits [1.0 / STANDARD_GRAVITY] => [0.1, KEPT];
+    gyro_units: GyroUnits [180.0 / std::f64::consts::PI] => [KEPT, 0.1];
+    gravity_convention: GravityConvention [1.0] => [0.1, KEPT];
+}
+
+#[test]
+fn mount_slip() {
+    let scene = Scene::new(40);
+    let at = scene.epoch.as_seconds() + 31.3;
+    followed(&scene.with(K::MountSlip, &[at, 0.1, -0.12, 0.15]), [0.2, 0.3]);
+}
+
+#[test]
+fn gravity_negated() {
+    followed(&Scene::new(41).with(K::GravityConvention, &[2.0]), [0.1, KEPT]);
+}
+
+#[test]
+fn accel_units_declared_in_them() {
+    let mut scene = Scene::new(42).with(K::AccelUnits, &[1000.0 / STANDARD_GRAVITY]);
+    scene.declared[0] = scene.declared[0].map(|sigma| sigma * 1000.0 / STANDARD_GRAVITY);
+    followed(&scene, [0.1, KEPT]);
+}
+
+macro_rules! noise_like {
+    ($($name:ident: $kind:ident $values:expr;)*) => {
+        $(#[test]
+        fn $name() {
+            found(&Scene::new(K::$kind as u64).with(K::$kind, &$values));
+        })*
+        const NOISE_LIKE: &[K] = &[$(K::$kind),*];
+    };
+}
+
+// No simulation follows these sample by sample.
+noise_like! {
+    reference_noise: ReferenceNoise [4e-3, 0.014];
+    accel_noise: AccelNoise [0.01];
+    gyro_noise: GyroNoise [1e-3];
+    accel_quantization: AccelQuantization [0.2];
+    gyro_quantization: GyroQuantization [0.018];
+    dropped_samples: DroppedSamples [0.06, 3.0];
+}
+
+#[test]
+fn none_is_left_out() {
+    let tested = |kind: &K| FOLLOWED.contains(kind) || NOISE_LIKE.contains(kind) || *kind == K::MountSlip;
+    assert!(K::ALL.iter().all(tested), "{:?}", K::ALL.iter().filter(|kind| !tested(kind)).collect::<Vec<_>>());
+}

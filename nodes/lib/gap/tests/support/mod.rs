@@ -1,0 +1,174 @@
+//! Recordings of known motions with known effects.
+// Each test binary uses a part.
+#![allow(dead_code)]
+
+pub mod judge;
+pub mod motion;
+
+use std::f64::consts::{PI, SQRT_2};
+use std::ops::Range;
+
+use cromosim_gap::{ImuSeries, PlacementRecord, PoseSeries};
+use cromosim_imu::{Dropouts, Effect, EffectKind, EffectSet, Reading, SensorModel, normal_pair};
+use cromosim_spatial::{Stamp, so3};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use rand::SeedableRng;
+use rand_chacha::ChaCha12Rng;
+
+use motion::Motion;
+
+/// Rates of reference and IMU, Hz, and of the grid on which the true motion is sampled.
+pub const REFERENCE_HZ: f64 = 120.0;
+pub const IMU_HZ: f64 = 100.0;
+const GRID_HZ: f64 = 500.0;
+/// White noise per sample that the device has and declares: m/s2, rad/s.
+pub const SIGMA: [f64; 2] = [0.014, 0.0012];
+/// Ordinary scatter of the reference: m, rad.
+const SCATTER: [f64; 2] = [1e-4, 0.05 * PI / 180.0];
+/// How far the true motion goes on beyond the recording, s: filters have settled when it begins.
+const MARGIN_S: f64 = 4.0;
+/// An instant of today, so that nothing may lean on small times.
+const TODAY: Stamp = Stamp::from_nanos(1_700_000_000_123_456_789);
+
+/// What is to be recorded.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    pub motion: Motion,
+    pub effects: EffectSet,
+    /// Of all noise.
+    pub seed: u64,
+    pub seconds: f64,
+    /// Stamp of the first IMU message.
+    pub start: Stamp,
+    /// What depends on time is anchored here: the start of the device's first recording.
+    pub epoch: Stamp,
+    pub declared: [Option<f64>; 2],
+    /// Seconds of the recording in which the reference is lost.
+    pub lost: Vec<Range<f64>>,
+}
+
+impl Scene {
+    /// A minute of random motion without any effect.
+    pub fn new(seed: u64) -> Self {
+        let (start, declared) = (TODAY, SIGMA.map(Some));
+        Self {
+            motion: Motion::random(seed),
+            effects: EffectSet::new(),
+            seed,
+            seconds: 60.0,
+            start,
+            epoch: start,
+            declared,
+            lost: Vec::new(),
+        }
+    }
+
+    /// The same with an effect.
+    #[must_use]
+    pub fn with(mut self, kind: EffectKind, values: &[f64]) -> Self {
+        self.effects.insert(Effect::new(kind, values.to_vec()).unwrap());
+        self
+    }
+
+    /// Another recording of the same device, `later` seconds on, with another motion.
+    #[must_use]
+    pub fn again(&self, later: f64) -> Self {
+        let (motion, start) = (Motion::random(self.seed + 1000), self.start.plus_seconds(later));
+        Self { motion, seed: self.seed + 1000, start, ..self.clone() }
+    }
+
+    pub fn record(&self) -> PlacementRecord {
+        PlacementRecord { name: "wrist".to_owned(), reference: self.reference(), imu: self.imu() }
+    }
+
+    fn value(&self, kind: EffectKind, index: usize) -> Option<f64> {
+        self.effects.get(kind).map(|effect| effect.values()[index])
+    }
+
+    /// `p = T s p + noise`, `R = T R exp(noise)`, smoothed before the noise comes.
+    fn reference(&self) -> PoseSeries {
+        // 0.41 s before the IMU and after it, at no whole number of its intervals.
+        let (before, count) = (0.4137, ((self.seconds + 0.83) * REFERENCE_HZ) as usize);
+        let margin = (MARGIN_S * REFERENCE_HZ) as usize;
+        let seconds = |k: usize| (k as f64 - margin as f64) / REFERENCE_HZ - before;
+        let instants: Vec<_> = (0..count + 2 * margin).map(|k| self.motion.at(seconds(k))).collect();
+        let channel = |of: &dyn Fn(&motion::Instant) -> f64| {
+            let series: Vec<f64> = instants.iter().map(of).collect();
+            self.value(EffectKind::ReferenceSmoothing, 0).map_or(series.clone(), |cutoff_hz| zero_phase(&series, cutoff_hz))
+        };
+        let position = [0, 1, 2].map(|axis| channel(&|now| now.position[axis]));
+        let rotation = [0, 1, 2, 3].map(|part| channel(&|now| now.world_from_segment.coords[part]));
+        let scatter = [0, 1].map(|c| self.value(EffectKind::ReferenceNoise, c).unwrap_or(SCATTER[c]));
+        let tilt = self.effects.get(EffectKind::ReferenceTilt).map_or(Vector3::zeros(), |tilt| Vector3::from_row_slice(tilt.values()));
+        let tilt = so3::exp(&tilt);
+        let scale = self.value(EffectKind::ReferenceScale, 0).unwrap_or(1.0);
+        let mut random = ChaCha12Rng::seed_from_u64(self.seed ^ 0x5eed);
+        let mut series = PoseSeries::default();
+        for k in margin..margin + count {
+            let noise = [normal_vector(&mut random), normal_vector(&mut random)];
+            if self.lost.iter().any(|lost| lost.contains(&seconds(k))) {
+                continue;
+            }
+            let world_from_segment =
+                UnitQuaternion::from_quaternion(Quaternion::new(rotation[3][k], rotation[0][k], rotation[1][k], rotation[2][k]));
+            series.stamps.push(self.start.plus_seconds(seconds(k)));
+            series.positions.push(tilt * Vector3::new(position[0][k], position[1][k], position[2][k]) * scale + noise[0] * scatter[0]);
+            series.rotations.push(tilt * world_from_segment * so3::exp(&(noise[1] * scatter[1])));
+        }
+        series
+    }
+
+    /// The device's part of the effects on the exact kinematics, then noise, then what is digital, then losses.
+    fn imu(&self) -> ImuSeries {
+        use EffectKind as K;
+        let mut device = self.effects.clone();
+        for kind in [K::ReferenceNoise, K::ReferenceSmoothing, K::ReferenceTilt, K::ReferenceScale] {
+            device.remove(kind);
+        }
+        let model = SensorModel::new(&device, self.epoch);
+        let stamps: Vec<Stamp> = (0..(self.seconds * IMU_HZ) as usize).map(|k| self.start.plus_seconds(k as f64 / IMU_HZ)).collect();
+        let track = self.motion.track(self.start, -MARGIN_S, self.seconds + MARGIN_S, GRID_HZ);
+        let mut readings = model.read(&model.sensor(model.tissue(model.segment(&track))), &stamps);
+        model.linear(&mut readings, &stamps);
+        let beyond = model.noise_density();
+        let sigma = [SIGMA[0].hypot(beyond.0 * IMU_HZ.sqrt()), SIGMA[1].hypot(beyond.1 * IMU_HZ.sqrt())];
+        let mut random = ChaCha12Rng::seed_from_u64(self.seed ^ 0xdece);
+        for reading in &mut readings {
+            reading.force += normal_vector(&mut random) * sigma[0];
+            reading.rate += normal_vector(&mut random) * sigma[1];
+        }
+        model.digital(&mut readings);
+        let mut dropouts = Dropouts::new(self.effects.get(K::DroppedSamples), self.seed, "wrist");
+        let there = |_: &(Stamp, Reading)| !dropouts.as_mut().is_some_and(Dropouts::next_is_lost);
+        let (stamps, readings) = stamps.into_iter().zip(readings).filter(there).unzip();
+        ImuSeries { stamps, readings, declared: self.declared }
+    }
+}
+
+fn normal_vector(random: &mut ChaCha12Rng) -> Vector3<f64> {
+    let ([x, y], [z, _]) = (normal_pair(random), normal_pair(random));
+    Vector3::new(x, y, z)
+}
+
+/// Butterworth of second order, forth and back: `1 / (1 + (f / cutoff)^4)`.
+fn zero_phase(series: &[f64], cutoff_hz: f64) -> Vec<f64> {
+    let mut once = butterworth(series, cutoff_hz);
+    once.reverse();
+    let mut twice = butterworth(&once, cutoff_hz);
+    twice.reverse();
+    twice
+}
+
+/// By the bilinear transform, settled on the first value.
+fn butterworth(series: &[f64], cutoff_hz: f64) -> Vec<f64> {
+    let k = (PI * cutoff_hz / REFERENCE_HZ).tan();
+    let norm = 1.0 + SQRT_2 * k + k * k;
+    let (b, a1, a2) = (k * k / norm, 2.0 * (k * k - 1.0) / norm, (1.0 - SQRT_2 * k + k * k) / norm);
+    let (mut x, mut y) = ([series[0]; 2], [series[0]; 2]);
+    let step = |&now: &f64| {
+        let next = b * (now + 2.0 * x[0] + x[1]) - a1 * y[0] - a2 * y[1];
+        (x, y) = ([now, x[0]], [next, y[0]]);
+        next
+    };
+    series.iter().map(step).collect()
+}
