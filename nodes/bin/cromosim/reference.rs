@@ -173,7 +173,7 @@ fn track(placement: &Recorded, scheme: Option<Scheme>, imu_rate_hz: f64, effects
         let poses = placement.poses();
         let estimate = PoseEstimate::fit(&poses.stamps, &poses.positions, &poses.rotations)
             .context("the reference's motion cannot be estimated (--scheme spline does with two poses)")?;
-        return Ok(undone_hz.map(|cutoff_hz| estimate.undoing(cutoff_hz)).unwrap_or(estimate).track(rate_hz));
+        return Ok(undone_hz.map(|cutoff_hz| estimate.undoing(cutoff_hz)).unwrap_or(estimate).track_for(imu_rate_hz));
     };
     if undone_hz.is_some() {
         bail!("--scheme {scheme} cannot undo reference_smoothing; leave --scheme out");

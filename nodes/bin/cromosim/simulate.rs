@@ -46,7 +46,7 @@ pub struct Arguments {
     /// Sensor placements (YAML) rather than left_wrist, right_ankle, pelvis, sternum and head
     #[arg(long, value_name = "FILE")]
     placements: Option<PathBuf>,
-    /// Derivative scheme for every placement: spline, richardson, triangle, normal_tracking or second_difference
+    /// Derivative scheme for every placement: spline, richardson, triangle, normal_tracking or second_difference. With --reference the default is the estimate that a diagnosis uses
     #[arg(long, value_name = "NAME")]
     pub scheme: Option<String>,
     /// Messages per second rather than the placements' own rate, Hz

@@ -69,9 +69,11 @@ impl<'a> Answer<'a> {
         if let Some(last) = causes.last_mut() {
             last.after = after;
         }
-        let unexplained_share = if unknown.is_some() || causes.is_empty() { shares.unexplained } else { shares.unexplained.min(1.0) };
+        // What is predictable of the rest belongs to `unknown`; what is not even that stays unexplained.
+        let known_unknown = unknown.as_ref().map_or(0.0, |unknown| unknown.predictable);
+        let unexplained_share = shares.unexplained * (1.0 - known_unknown);
         if let Some(unknown) = &unknown {
-            causes.push(unknown_cause(unknown, unexplained_share, after));
+            causes.push(unknown_cause(unknown, shares.unexplained * known_unknown, after));
             causes.sort_by(|a, b| b.gap_share.total_cmp(&a.gap_share));
         }
         let white = self.whitened(&EffectSet::new(), &before_readings);

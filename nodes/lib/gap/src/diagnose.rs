@@ -7,6 +7,7 @@ use crate::fit::Context;
 use crate::gross::{self, Digital, Gross, insert};
 use crate::problem::Problem;
 use crate::search::{State, debug, kinds, library};
+use crate::sensor_noise::{allowed_digital, declared_in_si, found_noise, is_white, mask_clipped, white_noise};
 use crate::unknown::{self, Unknown};
 use crate::whiten::{NoiseBasis, NoiseModel};
 use crate::{Evidence, GapError, PlacementDiagnosis, PlacementRecord};
@@ -75,6 +76,8 @@ pub(crate) struct Findings<'a> {
     pub found: [f64; 2],
     /// All named causes but `unknown`.
     pub named: EffectSet,
+    /// What is denied to the library.
+    pub without: Vec<EffectKind>,
     /// What none of them explains.
     pub unknown: Option<Unknown>,
 }
@@ -88,7 +91,7 @@ pub fn diagnose(record: &PlacementRecord, options: &DiagnoseOptions) -> Result<P
     let mut problem = Problem::new(record)?;
     let raw = problem.measured.clone();
     let gross = Gross::find(&problem, &problem.track(&problem.estimate));
-    let digital = [0, 1].map(|channel| gross::digital(&problem.measured, channel));
+    let digital = [0, 1].map(|channel| allowed_digital(gross::digital(&problem.measured, channel), channel, options));
     problem.cover(gross.lag_s)?;
     let covered = problem.usable.clone();
     for (channel, digital) in digital.iter().enumerate() {
@@ -128,31 +131,6 @@ fn allowed_units(gross: &Gross, options: &DiagnoseOptions) -> [f64; 2] {
     })
 }
 
-/// The declared noise in SI units. Whether a device in other units declares its covariances in them is nowhere said: what is nearer to the noise of
-/// the readings holds.
-fn declared_in_si(problem: &Problem, units: [f64; 2]) -> [Option<f64>; 2] {
-    let series = problem.raster(|k, axis| crate::problem::axis_of(&problem.measured[k], axis));
-    [0, 1].map(|c| {
-        let declared = problem.declared[c]?;
-        let found = fourth_differences(problem, &series, c).unwrap_or(0.0).sqrt().max(1e-12);
-        let off = |sigma: f64| (sigma / found).ln().abs();
-        Some(if off(declared / units[c]) < off(declared) { declared / units[c] } else { declared })
-    })
-}
-
-/// Clipped values tell only that the true one lies beyond.
-fn mask_clipped(problem: &mut Problem, channel: usize, digital: &Digital) {
-    let Some(limit) = digital.limit else { return };
-    for (k, reading) in problem.measured.iter().enumerate() {
-        for axis in 0..3 {
-            let value = if channel == 0 { reading.force[axis] } else { reading.rate[axis] };
-            if value.abs() >= limit * (1.0 - 1e-9) {
-                problem.usable[k][3 * channel + axis] = false;
-            }
-        }
-    }
-}
-
 fn analyse<'a>(
     problem: &'a Problem,
     gross: &Gross,
@@ -165,13 +143,18 @@ fn analyse<'a>(
     let first = problem.predict(&track, &starts[0]);
     let residual = problem.residual(&first.readings);
     let found = found_noise(problem, &residual);
-    let sigma = [0, 1].map(|c| problem.declared[c].map_or(found[c], |declared| declared.max(found[c])));
+    let sigma = white_noise(problem, found, &digital, &options.without);
     let count = track.len() as f64;
     let mut basis = NoiseBasis::new(problem.estimate.clone(), sigma);
     basis.rate_squared = track.angular_velocity.iter().map(|w| w.norm_squared()).sum::<f64>() / count;
     basis.force_squared = first.readings.iter().map(|r| r.force.norm_squared()).sum::<f64>() / first.readings.len() as f64;
     let library = library(&options.without);
-    basis.line_hz = suspicious_line(problem, &basis, &first.readings, &library);
+    if options.without.contains(&EffectKind::ReferenceNoise) {
+        let noise = problem.estimate.noise();
+        let share = |ordinary: f64, found: f64| (ordinary / found.max(1e-12)).powi(2).min(1.0);
+        basis.reference_share = [share(ORDINARY_NOISE.position, noise.position), share(ORDINARY_NOISE.rotation, noise.rotation)];
+    }
+    basis.line_hz = suspicious_line(problem, &basis, &first.readings);
     basis.steps = [0, 1].map(|c| digital[c].lsb.map_or(0.0, |lsb| lsb / units[c] / sigma[c].max(1e-12)));
     let noise = NoiseModel::new(problem, &basis, Some(&residual));
     let mut context = Context::new(problem, track, basis, noise);
@@ -181,7 +164,7 @@ fn analyse<'a>(
         (context, state) = crate::smoothing::try_smoothing(context, state, &starts, &library);
     }
     for round in 0..ROUNDS {
-        context = renewed(&context, &state, &library);
+        context = renewed(&context, &state, &digital, &options.without);
         let before = state.fit.set.clone();
         state = context.search(std::slice::from_ref(&before), &library, MOST, false);
         debug(|| eprintln!("round {round}: {:?} {:.2?}", kinds(&state.fit.set), state.fit.held_out_ratio()));
@@ -193,7 +176,7 @@ fn analyse<'a>(
     let found = found_noise(problem, &problem.residual(&state.fit.prediction.readings));
     let white = is_white(problem, &problem.residual(&state.fit.prediction.readings));
     let named = named(problem, &context, &state, &digital, units, (found, white), &options.without);
-    let mut findings = Findings { context, state, digital, found, named, unknown: None };
+    let mut findings = Findings { context, state, digital, found, named, unknown: None, without: options.without.clone() };
     findings.unknown = unknown::look(&findings);
     if let Some(unknown) = &findings.unknown {
         let imitated = unknown.imitations.clone();
@@ -215,26 +198,23 @@ fn analyse<'a>(
 }
 
 /// The context with the noise that the residual of `state` shows, and with its lever arm.
-fn renewed<'a>(context: &Context<'a>, state: &State, library: &[EffectKind]) -> Context<'a> {
+fn renewed<'a>(context: &Context<'a>, state: &State, digital: &[Digital; 2], without: &[EffectKind]) -> Context<'a> {
     let set = &state.fit.set;
     let mut basis = context.basis.clone();
     basis.lever_arm_m = set.get(EffectKind::LeverArm).map_or(0.0, |lever| lever.values().iter().map(|v| v * v).sum::<f64>().sqrt());
     basis.line_hz = match set.get(EffectKind::Vibration) {
         Some(vibration) => vibration.values().first().copied(),
-        None => suspicious_line(context.problem, &basis, &state.fit.prediction.readings, library),
+        None => suspicious_line(context.problem, &basis, &state.fit.prediction.readings),
     };
     let residual = context.problem.residual(&state.fit.prediction.readings);
     let found = found_noise(context.problem, &residual);
-    basis.sigma = [0, 1].map(|c| context.problem.declared[c].map_or(found[c], |declared| declared.max(found[c])));
+    basis.sigma = white_noise(context.problem, found, digital, without);
     let noise = NoiseModel::new(context.problem, &basis, Some(&residual));
     Context::new(context.problem, context.track.clone(), basis, noise)
 }
 
 /// Frequency of the strongest line of the accelerometer's residual where it may be a vibration.
-fn suspicious_line(problem: &Problem, basis: &NoiseBasis, simulated: &[cromosim_imu::Reading], library: &[EffectKind]) -> Option<f64> {
-    if !library.contains(&EffectKind::Vibration) {
-        return None;
-    }
+fn suspicious_line(problem: &Problem, basis: &NoiseBasis, simulated: &[cromosim_imu::Reading]) -> Option<f64> {
     let view = cromosim_imu::ResidualView {
         stamps: &problem.stamps,
         epoch: problem.epoch,
@@ -254,48 +234,6 @@ fn restricted(mut set: EffectSet, without: &[EffectKind]) -> EffectSet {
         set.remove(*kind);
     });
     set
-}
-
-/// White noise per sample of each channel: the least of four bands in the upper half of the residual's spectrum and of fourth differences of
-/// neighbours; whatever else is there only adds to each.
-pub(crate) fn found_noise(problem: &Problem, residual: &[Vec<f64>]) -> [f64; 2] {
-    [0, 1].map(|channel| {
-        let spectrum = problem.channel_spectrum(residual, channel);
-        let nyquist_hz = problem.rate_hz / 2.0;
-        let bands = [(0.5, 0.62), (0.62, 0.74), (0.74, 0.86), (0.86, 0.97)];
-        let least = bands.iter().filter_map(|(a, b)| spectrum.median(a * nyquist_hz, b * nyquist_hz)).fold(f64::INFINITY, f64::min);
-        let variance = least * problem.rate_hz / 2.0;
-        fourth_differences(problem, residual, channel).map_or(variance, |other| variance.min(other)).sqrt()
-    })
-}
-
-/// Whether the top of a channel's spectrum is level: motion that the reference does not resolve falls steeply there.
-fn is_white(problem: &Problem, residual: &[Vec<f64>]) -> [bool; 2] {
-    [0, 1].map(|channel| {
-        let spectrum = problem.channel_spectrum(residual, channel);
-        let level = |from: f64, to: f64| spectrum.median(from * problem.rate_hz / 2.0, to * problem.rate_hz / 2.0).unwrap_or(0.0);
-        level(0.70, 0.83) < 1.5 * level(0.84, 0.97)
-    })
-}
-
-/// Variance of white noise from `x0 - 4 x1 + 6 x2 - 4 x3 + x4` (variance 70) of five neighbours that are all there, by the median of its squares.
-fn fourth_differences(problem: &Problem, residual: &[Vec<f64>], channel: usize) -> Option<f64> {
-    let mut squares = Vec::new();
-    for (axis, series) in residual.iter().enumerate().skip(3 * channel).take(3) {
-        for first in 0..problem.places.len().saturating_sub(4) {
-            let whole = problem.places[first + 4] == problem.places[first] + 4 && (first..first + 5).all(|k| problem.usable[k][axis]);
-            if whole {
-                let x = &series[problem.places[first]..];
-                squares.push((x[0] - 4.0 * x[1] + 6.0 * x[2] - 4.0 * x[3] + x[4]).powi(2));
-            }
-        }
-    }
-    if squares.len() < 300 {
-        return None;
-    }
-    let middle = squares.len() / 2;
-    // The median of a squared standard normal number is 0.4549.
-    Some(*squares.select_nth_unstable_by(middle, f64::total_cmp).1 / (70.0 * 0.4549))
 }
 
 /// The causes: fitted effects beyond what is ordinary, and those that are read off the readings.

@@ -241,6 +241,8 @@ pub(crate) fn signed_permutation(matrix: &Matrix3<f64>) -> Matrix3<f64> {
 pub(crate) struct Digital {
     pub limit: Option<f64>,
     pub lsb: Option<f64>,
+    /// Whether there is rounding that may not be named.
+    pub denied: bool,
 }
 
 /// Reads clipping and rounding off a channel (0 accelerometer, 1 gyroscope) of the measured readings.
@@ -262,7 +264,7 @@ pub(crate) fn digital(measured: &[Reading], channel: usize) -> Digital {
         .fold((0, usize::MAX / 2), |(count, last), (at, _)| (count + usize::from(last == usize::MAX / 2 || at > last + 60), at));
     let piled = if lsb.is_some() { repeats >= 12 && repeats > 3 * below && episodes.0 >= 3 } else { repeats >= 4 };
     let limit = (piled && largest > 0.0).then_some(largest);
-    Digital { limit, lsb }
+    Digital { limit, lsb, denied: false }
 }
 
 /// The step of which all values are whole multiples, to within rounding of doubles; none where there is none.

@@ -20,6 +20,7 @@ mod record;
 pub mod report;
 mod screen;
 mod search;
+mod sensor_noise;
 mod smoothing;
 mod unknown;
 mod whiten;

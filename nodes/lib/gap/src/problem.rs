@@ -123,7 +123,7 @@ impl Problem {
 
     /// Kinematics of an estimate of the reference.
     pub fn track(&self, estimate: &PoseEstimate) -> KinematicTrack {
-        estimate.track((2.0 * self.rate_hz).max(200.0))
+        estimate.track_for(self.rate_hz)
     }
 
     /// Runs the model without its digital stage: what clips, rounds and rescales is dealt with on the measured side.

@@ -125,7 +125,7 @@ impl Context<'_> {
         let mut right = nalgebra::Vector3::<f64>::zeros();
         let mut mixed = nalgebra::DMatrix::<f64>::zeros(size, 3);
         let mut best = (0.0, 0, nalgebra::Vector3::zeros());
-        let margin = length / 20;
+        let margin = length / 8;
         for place in (0..length).rev() {
             for axis in 0..6 {
                 let at = axis * length + place;

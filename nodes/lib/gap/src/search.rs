@@ -189,6 +189,12 @@ pub(crate) fn plausible(set: &EffectSet) -> bool {
     {
         return false;
     }
+    // Gravity left out is no scale, nor is a unit.
+    let scales =
+        [EffectKind::AccelScale, EffectKind::GyroScale].into_iter().flat_map(|kind| (0..3).filter_map(move |axis| value(kind, axis)));
+    if scales.chain(value(EffectKind::ReferenceScale, 0)).any(|factor| !(0.5..=2.0).contains(&factor)) {
+        return false;
+    }
     value(EffectKind::ReferenceScale, 0).is_none_or(|factor| (factor - 1.0).abs() > 0.006)
 }
 

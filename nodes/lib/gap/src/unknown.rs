@@ -24,6 +24,8 @@ const FROZEN: f64 = 0.002;
 const JITTER: f64 = 0.05;
 /// Factor on these beside a smoothing of the reference that is undone.
 const GUESSED: f64 = 20.0;
+/// Part of all that is explained from which on an effect is more than an imitation.
+const MAIN_PART: f64 = 0.3;
 /// Steps of quantisation, in units of the white noise, beyond which a channel's residual says nothing.
 const COARSE_STEPS: f64 = 3.0;
 /// Part of the strongest regression's gain from which on another counts.
@@ -39,6 +41,8 @@ pub(crate) struct Unknown {
     pub axes: Vec<String>,
     pub depends_on: String,
     pub probability: f64,
+    /// Part of the rest that regressions predict on held-out time, or, without any, that stands out of the noise.
+    pub predictable: f64,
     /// Fitted effects that only imitate it.
     pub imitations: Vec<EffectKind>,
 }
@@ -74,7 +78,8 @@ pub(crate) fn look(findings: &Findings) -> Option<Unknown> {
     let strong: Vec<&Probe> = probes.iter().filter(|probe| probe.gain > PROBE * vague && !coarse(probe.channel)).collect();
     let noisy = |c: usize| !coarse(c) && (signs.band[c] > BAND * vague || (signs.burst[c] > BURST * vague && signs.outliers[c] > OUTLIERS));
     let stuck = |c: usize| signs.frozen[c] > FROZEN && findings.digital[c].lsb.is_none();
-    let jittery = signs.jitter > JITTER;
+    let jittery =
+        signs.jitter > JITTER || (findings.without.contains(&EffectKind::DroppedSamples) && findings.context.problem.dropped.0 > FROZEN);
     let of_channel = |c: usize| noisy(c) || stuck(c) || strong.iter().any(|probe| probe.channel == c);
     if !of_channel(0) && !of_channel(1) && !jittery {
         return None;
@@ -94,7 +99,7 @@ pub(crate) fn look(findings: &Findings) -> Option<Unknown> {
     let axes = place.axes.iter().filter(|(_, share)| **share > 0.1).map(|(name, _)| name.clone()).collect();
     let mut imitations = imitations(findings, &strong);
     let most = strong.first().map_or(0.0, |probe| probe.gain);
-    for probe in strong.iter().filter(|probe| probe.gain > SPECIAL_CASE * most) {
+    for probe in strong.iter().filter(|probe| probe.gain > SPECIAL_CASE * most && changes_over_time(probe, &probes)) {
         imitations.extend(special_cases(probe));
     }
     for (c, kind) in [(0, EffectKind::AccelNoise), (1, EffectKind::GyroNoise)] {
@@ -106,8 +111,21 @@ pub(crate) fn look(findings: &Findings) -> Option<Unknown> {
         imitations.push(EffectKind::DroppedSamples);
     }
     let gain = strong.first().map_or(0.0, |probe| probe.gain).max(signs.band[0].max(signs.band[1]) * 10.0);
-    let probability = 1.0 - 1.0 / (2.0 + gain / 20.0);
-    Some(Unknown { place, channel: channel.to_owned(), axes, depends_on: depends_on.to_owned(), probability, imitations })
+    let probability = 0.97 * (1.0 - 1.0 / (2.0 + gain / 20.0));
+    let excess = findings.context.excess(&findings.state.fit).max(1.0);
+    let predictable = strong.first().map_or(0.5, |probe| (probe.gain / excess).clamp(0.05, 1.0));
+    Some(Unknown { predictable, place, channel: channel.to_owned(), axes, depends_on: depends_on.to_owned(), probability, imitations })
+}
+
+/// Whether a family over time says more than the same without time.
+fn changes_over_time(probe: &Probe, all: &[Probe]) -> bool {
+    let steady = match probe.depends_on {
+        "delay over time" => "rate of change",
+        "mount over time" => "other axes",
+        _ => return true,
+    };
+    let other = all.iter().find(|other| other.channel == probe.channel && other.depends_on == steady);
+    other.is_none_or(|other| probe.gain > 1.5 * other.gain)
 }
 
 /// Effects that are special cases of what the residual depends on: they say no more than it does.
@@ -136,8 +154,10 @@ fn imitations(findings: &Findings, strong: &[&Probe]) -> Vec<EffectKind> {
     let fit = &findings.state.fit;
     let context = &findings.context;
     // The strongest two of each channel say what the residual depends on; more only cost time.
-    let chosen: Vec<&Vec<Vec<f64>>> =
-        (0..2).flat_map(|c| strong.iter().filter(move |probe| probe.channel == c).take(2)).map(|probe| &probe.columns).collect();
+    let chosen: Vec<&Vec<Vec<f64>>> = (0..2)
+        .flat_map(|c| strong.iter().filter(move |probe| probe.channel == c && probe.depends_on != "rate of change").take(2))
+        .map(|probe| &probe.columns)
+        .collect();
     if chosen.is_empty() {
         return Vec::new();
     }
@@ -152,7 +172,8 @@ fn imitations(findings: &Findings, strong: &[&Probe]) -> Vec<EffectKind> {
             let alone = fit.linear.held_out - smaller.fit.linear.held_out;
             let beside = together - with_probes(findings, &smaller.fit, &chosen).held_out;
             debug(|| eprintln!("   member {} alone {alone:.0} beside probes {beside:.0} of {explained:.0}", kind.name()));
-            beside < OWN_GAIN * alone || beside < OWN_GAIN * explained
+            // What explains much of the gap by itself is no imitation of what little is left.
+            alone < MAIN_PART * explained && (beside < OWN_GAIN * alone || beside < OWN_GAIN * explained)
         })
         .collect()
 }

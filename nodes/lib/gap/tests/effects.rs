@@ -5,8 +5,8 @@ mod support;
 
 use cromosim_gap::PlacementAnswer;
 use cromosim_imu::{EffectKind as K, STANDARD_GRAVITY};
-use support::Scene;
-use support::judge::{answer, names_exactly, values_are};
+use support::judge::{answer, cause, names_exactly, near, values_are};
+use support::{IMU_HZ, Scene};
 
 /// Names exactly what was put in, with its values.
 fn found(scene: &Scene) -> PlacementAnswer {
@@ -40,7 +40,7 @@ macro_rules! followed {
 }
 
 followed! {
-    reference_smoothing: ReferenceSmoothing [3.0] => [0.9, 0.9];
+    reference_smoothing: ReferenceSmoothing [6.0] => [0.5, 0.7];
     reference_tilt: ReferenceTilt [0.04, -0.05, 0.0] => [0.5, KEPT];
     reference_scale: ReferenceScale [1.1] => [0.5, KEPT];
     mount_rotation: MountRotation [0.2, -0.15, 0.3] => [0.2, 0.2];
@@ -103,11 +103,25 @@ noise_like! {
     gyro_noise: GyroNoise [1e-3];
     accel_quantization: AccelQuantization [0.2];
     gyro_quantization: GyroQuantization [0.018];
-    dropped_samples: DroppedSamples [0.06, 3.0];
+}
+
+/// Counted against what was lost, which scatters about the chances that the effect states.
+#[test]
+fn dropped_samples() {
+    let scene = Scene::new(7).with(K::DroppedSamples, &[0.08, 4.0]);
+    let record = scene.record();
+    let diagnosis = answer(&record).diagnosis;
+    names_exactly(&diagnosis, &scene.effects);
+    let steps: Vec<f64> = record.imu.stamps.windows(2).map(|pair| ((pair[1] - pair[0]) * IMU_HZ).round() - 1.0).collect();
+    let (lost, holes) = (steps.iter().sum::<f64>(), steps.iter().filter(|lost| **lost > 0.0).count() as f64);
+    let parameters = &cause(&diagnosis, K::DroppedSamples).parameters;
+    let all = lost + record.imu.stamps.len() as f64;
+    near(parameters["fraction"].as_f64().unwrap(), lost / all, 1e-9, "fraction");
+    near(parameters["mean_burst"].as_f64().unwrap(), lost / holes, 1e-9, "mean burst");
 }
 
 #[test]
 fn none_is_left_out() {
-    let tested = |kind: &K| FOLLOWED.contains(kind) || NOISE_LIKE.contains(kind) || *kind == K::MountSlip;
+    let tested = |kind: &K| FOLLOWED.contains(kind) || NOISE_LIKE.contains(kind) || [K::MountSlip, K::DroppedSamples].contains(kind);
     assert!(K::ALL.iter().all(tested), "{:?}", K::ALL.iter().filter(|kind| !tested(kind)).collect::<Vec<_>>());
 }

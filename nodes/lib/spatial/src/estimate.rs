@@ -160,6 +160,11 @@ impl PoseEstimate {
         (self.position.filter_at(frequency_hz), self.rotation.filter_at(frequency_hz), gain.min(LARGEST_LOSS))
     }
 
+    /// The kinematics on a grid that serves an IMU of some rate: at least that and 200 Hz, which resolves all motion that poses show.
+    pub fn track_for(&self, imu_rate_hz: f64) -> KinematicTrack {
+        self.track(imu_rate_hz.max(200.0))
+    }
+
     /// The kinematics on a grid of at least `least_rate_hz`, a whole multiple of the poses' rate, from the first pose to the last.
     pub fn track(&self, least_rate_hz: f64) -> KinematicTrack {
         let factor = (least_rate_hz / self.rate_hz).ceil().max(1.0) as usize;

@@ -12,6 +12,8 @@ const LOCAL_EDGE: f64 = 1.6;
 /// The same beyond the band of motion, where among hundreds of frequencies some reach three standard errors by chance, and where the second
 /// derivative makes much of little.
 const LONE_BAND: f64 = 2.2;
+/// Slowest plateau that may be noise, Hz.
+const LEAST_PLATEAU_HZ: f64 = 12.0;
 /// How far around a line the filter stays open, Hz: a line's amplitude changes over some seconds.
 const LINE_HZ: f64 = 0.1;
 /// Largest factor by which a smoothing that is undone may amplify: its true shape is nowhere written, and errors grow with it.
@@ -229,19 +231,20 @@ fn mean_spectrum(coordinates: &[Vec<f64>], rate_hz: f64, window: usize) -> Spect
     mean
 }
 
-/// Density of the white floor: the median between 70 and 97 % of Nyquist, where that is flat; else (poses that were resampled or filtered) the
-/// highest band further down in which the density stays level.
+/// Density of the white floor: the median between 70 and 97 % of Nyquist; where a plateau of an octave stands four times above that (poses that
+/// were resampled from fewer frames, or filtered), the lowest such plateau beyond the motion.
 fn noise_floor(spectrum: &Spectrum, rate_hz: f64) -> f64 {
     let nyquist_hz = rate_hz / 2.0;
-    let level = |from: f64, to: f64| spectrum.median(from * nyquist_hz, to * nyquist_hz).unwrap_or(0.0);
-    let top = level(0.70, 0.97);
-    let mut upper = 0.97;
-    while upper > 0.3 {
-        let (high, low) = (level(upper - 0.12, upper), level(upper - 0.24, upper - 0.12));
-        if low < 1.5 * high && high > 0.5 * top {
-            return if upper > 0.96 { top } else { 0.5 * (high + low) };
+    let level = |from_hz: f64, to_hz: f64| spectrum.median(from_hz, to_hz).unwrap_or(0.0);
+    let top = level(0.70 * nyquist_hz, 0.97 * nyquist_hz);
+    let mut from_hz = LEAST_PLATEAU_HZ;
+    while from_hz * 2.2 < 0.9 * nyquist_hz {
+        let levels = [(1.0, 1.3), (1.3, 1.69), (1.69, 2.2)].map(|(a, b)| level(a * from_hz, b * from_hz));
+        let flat = levels.windows(2).all(|pair| pair[1] > 0.6 * pair[0] && pair[1] < 1.7 * pair[0]);
+        if flat && levels[1] > 4.0 * top {
+            return levels[1];
         }
-        upper -= 0.04;
+        from_hz *= 1.1;
     }
     top
 }

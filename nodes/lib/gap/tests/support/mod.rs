@@ -1,6 +1,6 @@
 //! Recordings of known motions with known effects.
 // Each test binary uses a part.
-#![allow(dead_code)]
+#![allow(dead_code, clippy::unwrap_used)]
 
 pub mod judge;
 pub mod motion;

@@ -93,17 +93,15 @@ impl Motion {
 
 /// Value and two derivatives.
 fn sum(terms: &[Term], t: f64) -> [Vector3<f64>; 3] {
-    let mut total = [Vector3::zeros(); 3];
+    let [mut value, mut first, mut second] = [Vector3::zeros(); 3];
     for term in terms {
         let rate = TAU * term.hz;
-        for axis in 0..3 {
-            let (sine, cosine) = (rate * t + term.phase[axis]).sin_cos();
-            total[0][axis] += term.amplitude[axis] * sine;
-            total[1][axis] += term.amplitude[axis] * rate * cosine;
-            total[2][axis] -= term.amplitude[axis] * rate * rate * sine;
-        }
+        let (sine, cosine) = (term.phase.map(|phase| (rate * t + phase).sin()), term.phase.map(|phase| (rate * t + phase).cos()));
+        value += term.amplitude.component_mul(&sine);
+        first += term.amplitude.component_mul(&cosine) * rate;
+        second -= term.amplitude.component_mul(&sine) * (rate * rate);
     }
-    total
+    [value, first, second]
 }
 
 /// c, s and the first two derivatives of s; near zero by their series.

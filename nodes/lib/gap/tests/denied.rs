@@ -1,0 +1,86 @@
+//! Effects that the library is denied: their gap is `unknown`.
+#![allow(clippy::unwrap_used)]
+
+mod support;
+
+use cromosim_gap::{DiagnoseOptions, PlacementAnswer, diagnose};
+use cromosim_imu::EffectKind as K;
+use cromosim_imu::STANDARD_GRAVITY;
+use support::Scene;
+use support::judge::{names, shares_add_up};
+
+/// Without the effect the gap holds structure that nothing explains.
+fn denied(kind: K, values: &[f64]) -> PlacementAnswer {
+    let options = DiagnoseOptions { without: vec![kind], ..DiagnoseOptions::default() };
+    let answer = diagnose(&Scene::new(kind as u64).with(kind, values).record(), &options).unwrap();
+    let diagnosis = &answer.diagnosis;
+    assert!(names(diagnosis).contains(&"unknown") && diagnosis.unexplained.significant, "{}", diagnosis.verdict);
+    assert!(!names(diagnosis).contains(&kind.name()) && !answer.effects.effects.contains(kind));
+    shares_add_up(diagnosis);
+    answer
+}
+
+/// And nothing else is said with it.
+fn denied_alone(kind: K, values: &[f64]) {
+    let answer = denied(kind, values);
+    let diagnosis = &answer.diagnosis;
+    assert_eq!(names(diagnosis), ["unknown"], "{}", diagnosis.verdict);
+    assert!(diagnosis.unexplained.share > 0.9 && answer.effects.effects.is_empty(), "{:?}", answer.effects.effects);
+    let unknown = &diagnosis.causes[0];
+    let channel = unknown.parameters["channel"].as_str().unwrap();
+    let name = kind.name();
+    let expected = if name.starts_with("accel_") {
+        "accel"
+    } else if name.starts_with("gyro_") {
+        "gyro"
+    } else {
+        channel
+    };
+    assert_eq!(channel, expected, "the channel of {name}");
+    for key in ["axes", "band_hz", "intervals_s", "depends_on"] {
+        assert!(unknown.parameters.contains_key(key), "{key}");
+    }
+}
+
+macro_rules! denied {
+    ($($name:ident: $kind:ident $values:expr;)*) => {
+        $(#[test]
+        fn $name() {
+            denied_alone(K::$kind, &$values);
+        })*
+    };
+}
+
+// Not here, because another effect says the same: time_offset (a low-pass of that delay), gyro_quantization (white noise).
+denied! {
+    reference_tilt: ReferenceTilt [0.04, -0.05, 0.0];
+    mount_rotation: MountRotation [0.2, -0.15, 0.3];
+    lever_arm: LeverArm [0.05, 0.02, -0.06];
+    clock_drift: ClockDrift [400.0];
+    dropped_samples: DroppedSamples [0.06, 3.0];
+    accel_bias: AccelBias [0.2, -0.15, 0.1];
+    gyro_scale: GyroScale [1.04, 0.95, 1.03];
+    accel_bias_drift: AccelBiasDrift [0.008, -0.006, 0.007];
+    gyro_saturation: GyroSaturation [2.0];
+    gyro_g_sensitivity: GyroGSensitivity [2e-3, -1e-3, 1e-3, 1e-3, 2e-3, -2e-3, -1e-3, 1e-3, 2e-3];
+    vibration: Vibration [17.3, 0.5, -0.3, 0.4, 0.8];
+    axis_convention: AxisConvention [0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    accel_units: AccelUnits [1.0 / STANDARD_GRAVITY];
+    gravity_convention: GravityConvention [1.0];
+}
+
+// Of these other effects explain a part.
+#[test]
+fn low_pass() {
+    denied(K::LowPass, &[8.0]);
+}
+
+#[test]
+fn soft_tissue() {
+    denied(K::SoftTissue, &[7.0, 0.3]);
+}
+
+#[test]
+fn reference_scale() {
+    denied(K::ReferenceScale, &[1.1]);
+}
