@@ -8,6 +8,12 @@ use crate::fit::Fit;
 use crate::gram::Linear;
 use crate::problem::axis_of;
 
+/// Root mean square of a regressor, in units of the white noise, below which it is left out.
+const LEAST_MOTION: f64 = 0.02;
+
+/// Standard deviation of a prediction, in units of the white noise, from which on a sensor moves.
+const MOVING: f64 = 2.0;
+
 /// A family of regressors, whitened.
 #[derive(Clone, Debug)]
 pub(crate) struct Probe {
@@ -28,12 +34,29 @@ pub(crate) fn probes(findings: &Findings) -> Vec<Probe> {
     let mut list = Vec::new();
     for channel in 0..2 {
         for (depends_on, columns) in families(findings, channel) {
+            // At rest nothing can depend on the motion, and time is all that passes.
+            if depends_on != "time" && !(moves(findings, 0) && moves(findings, 1)) {
+                continue;
+            }
             let columns: Vec<Vec<f64>> = columns.iter().map(|column| whitened(findings, column)).collect();
             let gain = with_probes(findings, fit, &[&columns]).held_out - fit.linear.held_out - 2.0 * columns.len() as f64;
             list.push(Probe { depends_on, channel, columns, gain });
         }
     }
     list
+}
+
+/// Whether the prediction of a channel varies by more than its white noise.
+fn moves(findings: &Findings, channel: usize) -> bool {
+    let readings = &findings.state.fit.prediction.readings;
+    let count = readings.len() as f64;
+    let variance: f64 = (3 * channel..3 * channel + 3)
+        .map(|axis| {
+            let mean = readings.iter().map(|reading| axis_of(reading, axis)).sum::<f64>() / count;
+            readings.iter().map(|reading| (axis_of(reading, axis) - mean).powi(2)).sum::<f64>() / count
+        })
+        .sum();
+    variance > 3.0 * (MOVING * findings.context.basis.sigma[channel]).powi(2)
 }
 
 /// A fit's linear step with probes beside its own values.
@@ -47,7 +70,9 @@ pub(crate) fn with_probes(findings: &Findings, fit: &Fit, families: &[&Vec<Vec<f
 fn whitened(findings: &Findings, (axis, values): &Column) -> Vec<f64> {
     let context = &findings.context;
     let rms = (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt().max(1e-12);
-    let factor = context.basis.sigma[axis / 3] / rms;
+    let sigma = context.basis.sigma[axis / 3];
+    // What hardly moves tells nothing, however much it is magnified.
+    let factor = if rms > LEAST_MOTION * sigma { sigma / rms } else { 0.0 };
     context.whitener.apply(&context.problem.raster(|k, other| if other == *axis { values[k] * factor } else { 0.0 }))
 }
 

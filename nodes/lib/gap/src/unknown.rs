@@ -173,7 +173,7 @@ fn imitations(findings: &Findings, strong: &[&Probe]) -> Vec<EffectKind> {
             let beside = together - with_probes(findings, &smaller.fit, &chosen).held_out;
             debug(|| eprintln!("   member {} alone {alone:.0} beside probes {beside:.0} of {explained:.0}", kind.name()));
             // What explains much of the gap by itself is no imitation of what little is left.
-            alone < MAIN_PART * explained && (beside < OWN_GAIN * alone || beside < OWN_GAIN * explained)
+            alone < MAIN_PART * explained && beside < OWN_GAIN * alone
         })
         .collect()
 }

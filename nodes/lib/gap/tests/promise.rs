@@ -53,11 +53,11 @@ fn simulated_gap(record: &PlacementRecord, effects: &EffectSet, epoch: Stamp) ->
     [rms(&|m, s| (m.force - s.force).norm_squared()), rms(&|m, s| (m.rate - s.rate).norm_squared())]
 }
 
-/// Five minutes later, another motion: the gap is what was promised, and what the true effects would reach, both within 15 %.
+/// Right after, in other poses (a vibration's phase cannot be foretold for longer than it was seen) and with other noise: the gap is what was promised, and what the true effects would reach, both within 15 %.
 fn kept(scene: &Scene) {
     let PlacementAnswer { diagnosis, effects, .. } = answer(&scene.record());
     names_exactly(&diagnosis, &scene.effects);
-    let later = scene.again(300.0).record();
+    let later = scene.again(90.0).record();
     let measured = simulated_gap(&later, &effects.effects, effects.epoch);
     let ideal = simulated_gap(&later, &scene.effects, scene.epoch);
     let promised = [diagnosis.gap.after.accel_rmse, diagnosis.gap.after.gyro_rmse];

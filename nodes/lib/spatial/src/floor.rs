@@ -8,7 +8,7 @@ use crate::{Spectrum, welch};
 /// standard errors over three axes of a minute. The longer ones resolve lines, which steady gaits and machines have.
 const WINDOWS: [(f64, f64); 3] = [(5.0, 1.4), (20.0, 3.0), (f64::INFINITY, 8.0)];
 /// Multiple of the noise at which a window's band of motion ends.
-const LOCAL_EDGE: f64 = 1.6;
+const LOCAL_EDGE: f64 = 2.2;
 /// The same beyond the band of motion, where among hundreds of frequencies some reach three standard errors by chance, and where the second
 /// derivative makes much of little.
 const LONE_BAND: f64 = 2.2;
@@ -231,20 +231,24 @@ fn mean_spectrum(coordinates: &[Vec<f64>], rate_hz: f64, window: usize) -> Spect
     mean
 }
 
-/// Density of the white floor: the median between 70 and 97 % of Nyquist; where a plateau of an octave stands four times above that (poses that
-/// were resampled from fewer frames, or filtered), the lowest such plateau beyond the motion.
+/// Density of the white floor: the median between 70 and 97 % of Nyquist, where the top of the spectrum is level. Where it falls, the poses were
+/// resampled from fewer frames, or filtered: then the noise is where the spectrum first falls slower than motion does (displacement of bodies falls
+/// with the fourth power of the frequency and more; f^-3.3 is the border here).
 fn noise_floor(spectrum: &Spectrum, rate_hz: f64) -> f64 {
     let nyquist_hz = rate_hz / 2.0;
     let level = |from_hz: f64, to_hz: f64| spectrum.median(from_hz, to_hz).unwrap_or(0.0);
     let top = level(0.70 * nyquist_hz, 0.97 * nyquist_hz);
+    if level(0.45 * nyquist_hz, 0.6 * nyquist_hz) < 1.6 * level(0.8 * nyquist_hz, 0.97 * nyquist_hz) {
+        return top;
+    }
     let mut from_hz = LEAST_PLATEAU_HZ;
     while from_hz * 2.2 < 0.9 * nyquist_hz {
         let levels = [(1.0, 1.3), (1.3, 1.69), (1.69, 2.2)].map(|(a, b)| level(a * from_hz, b * from_hz));
-        let flat = levels.windows(2).all(|pair| pair[1] > 0.6 * pair[0] && pair[1] < 1.7 * pair[0]);
-        if flat && levels[1] > 4.0 * top {
-            return levels[1];
+        let slow = levels.windows(2).all(|pair| pair[1] > 0.42 * pair[0] && pair[1] < 1.7 * pair[0]);
+        if slow && levels[0] > 4.0 * top {
+            return levels[0];
         }
-        from_hz *= 1.1;
+        from_hz *= 1.05;
     }
     top
 }

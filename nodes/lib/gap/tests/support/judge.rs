@@ -32,9 +32,7 @@ pub fn shares_add_up(diagnosis: &PlacementDiagnosis) {
     let shares: Vec<f64> = diagnosis.causes.iter().map(|cause| cause.gap_share).collect();
     assert!(shares.windows(2).all(|pair| pair[0] >= pair[1]), "shares fall: {shares:?}");
     assert!(shares.iter().all(|share| (0.0..=1.0).contains(share)), "{shares:?}");
-    // `unknown` is the unexplained under its name.
-    let named = diagnosis.causes.iter().filter(|cause| cause.effect != "unknown").map(|cause| cause.gap_share).sum::<f64>();
-    near(named + diagnosis.unexplained.share, 1.0, 1e-9, "causes and unexplained");
+    near(shares.iter().sum::<f64>() + diagnosis.unexplained.share, 1.0, 1e-9, "causes and unexplained");
     let place = &diagnosis.place;
     near(place.channels.values().sum(), 1.0, 1e-9, "channels");
     near(place.axes.values().sum(), 1.0, 1e-9, "axes");

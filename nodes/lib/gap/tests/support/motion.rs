@@ -54,6 +54,14 @@ impl Motion {
         Self::default()
     }
 
+    /// The same motion some seconds on: other poses, the same spectrum.
+    pub fn later(&self, seconds: f64) -> Self {
+        let shifted = |terms: &[Term]| {
+            terms.iter().map(|term| Term { phase: term.phase.add_scalar(TAU * term.hz * seconds), ..term.clone() }).collect()
+        };
+        Self { position: shifted(&self.position), rotation: shifted(&self.rotation) }
+    }
+
     pub fn at(&self, t: f64) -> Instant {
         let [position, _, acceleration_in_world] = sum(&self.position, t);
         let [r, r_dot, r_ddot] = sum(&self.rotation, t);
