@@ -3,12 +3,12 @@
 //! Measured on one core of a small shared machine: 0.44 s without effect, 0.56 s lever arm, 0.72 s two effects, 0.97 s smoothing (5 to 11 times
 //! within the goal). What such an analysis cannot do without are Fourier transforms (18 us each of 6000 values) and forward simulations (0.28 ms):
 //!
-//! | case | transforms (million values) | of Welch windows | forward simulations | these take |
+//! | case | transforms (million values) | Welch windows beside them | forward simulations | transforms and simulations take |
 //! |---|---|---|---|---|
-//! | no effect | 5000 (25) | 4300 | 138 | 0.12 s |
-//! | lever_arm | 6000 (31) | 5200 | 254 | 0.17 s |
+//! | no effect | 5000 (25) | 4300 | 138 | 0.11 s |
+//! | lever_arm | 6000 (31) | 5200 | 254 | 0.16 s |
 //! | time_offset + accel_bias | 7300 (39) | 5900 | 387 | 0.23 s |
-//! | reference_smoothing | 20200 (58) | 8500 | 283 | 0.26 s |
+//! | reference_smoothing | 20200 (58) | 8500 | 283 | 0.25 s |
 //!
 //! So 3 to 4 times off that limit; the reference's estimate takes 0.06 s of the rest, a track of it 13 ms for each smoothing that is tried.
 #![allow(missing_docs)]
