@@ -213,7 +213,7 @@ fn settings_of_a_diagnosis() {
         ("effect.yaml", "without: [accel_bais]\n", ["effect.yaml", "accel_bais", "accel_bias"]),
         ("field.yaml", "seed: 1\nwihtout: []\n", ["field.yaml", "line 2", "wihtout"]),
         ("seed.yaml", "seed: -1\n", ["seed.yaml", "line 1", "-1"]),
-        ("yaml.yaml", "placements: [\n", ["yaml.yaml", "line 1", "placements"]),
+        ("yaml.yaml", "placements: [\n", ["yaml.yaml", "line 2", "flow node"]),
         ("names.yaml", "placements: [nose]\n", ["good.mcap", "nose", "wrist"]),
     ];
     for (name, content, expected) in &cases {

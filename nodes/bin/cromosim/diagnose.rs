@@ -10,6 +10,7 @@ use cromosim_bag::BagReader;
 use cromosim_gap::{Cause, DiagnoseOptions, Diagnosis, Evidence, PlacementAnswer, PlacementDiagnosis, SCHEMA};
 use cromosim_imu::{EffectKind, EffectsFile};
 use rayon::prelude::*;
+use serde::Deserialize;
 use serde_json::Value;
 
 use crate::progress::{self, Interrupt};
@@ -135,7 +136,8 @@ fn split(answers: BTreeMap<String, PlacementAnswer>) -> (Diagnosis, EffectsFile,
 }
 
 /// Settings from a file.
-#[derive(Debug, Default, PartialEq)]
+#[derive(Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 struct Config {
     placements: Vec<String>,
     without: Vec<String>,
@@ -145,94 +147,22 @@ struct Config {
 impl Config {
     fn read(file: &Path) -> anyhow::Result<Self> {
         let text = fs::read_to_string(file).with_context(|| format!("{}: cannot be read", file.display()))?;
-        Self::parse(&text).map_err(|(line, problem)| anyhow!("{}, line {line}: {problem}", file.display()))
+        Self::parse(&text).with_context(|| file.display().to_string())
     }
 
-    /// The YAML that these three keys take: lists in brackets or one dash a line, plain or quoted words, comments. Errors with their line.
-    fn parse(text: &str) -> Result<Self, (usize, String)> {
-        let (mut config, mut seen, mut open) = (Self::default(), Vec::new(), None);
-        for (number, line) in text.lines().enumerate() {
-            let wrong = |problem: String| (number + 1, problem);
-            let line = line.split(" #").next().filter(|line| !line.starts_with('#')).unwrap_or_default().trim_end();
-            if line.is_empty() || line == "---" {
-                continue;
-            }
-            if let Some(item) = line.trim_start().strip_prefix("- ") {
-                let list = open.and_then(|key| config.list(key)).ok_or_else(|| wrong("a list item, but no list".to_owned()))?;
-                list.push(word(item).map_err(wrong)?);
-                continue;
-            }
-            let Some((key, value)) = line.split_once(':').filter(|_| !line.starts_with(' ')) else {
-                return Err(wrong(format!("expected `key: value`, found `{}`", line.trim())));
-            };
-            if !["placements", "without", "seed"].contains(&key) {
-                return Err(wrong(format!("unknown field `{key}`, expected one of placements, without, seed")));
-            }
-            if seen.contains(&key) {
-                return Err(wrong(format!("field `{key}` stands there twice")));
-            }
-            seen.push(key);
-            open = Some(key).filter(|_| value.trim().is_empty());
-            match config.list(key) {
-                Some(list) if open.is_none() => *list = words(value).map_err(|problem| wrong(format!("{key}: {problem}")))?,
-                Some(_) => {}
-                None => {
-                    config.seed =
-                        Some(value.trim().parse().map_err(|_| wrong(format!("seed: expected a whole number, found `{}`", value.trim())))?)
-                }
-            }
-        }
-        Ok(config)
+    /// An empty file sets nothing.
+    fn parse(text: &str) -> Result<Self, serde_norway::Error> {
+        serde_norway::from_str::<Option<Self>>(text).map(Option::unwrap_or_default)
     }
-
-    fn list(&mut self, key: &str) -> Option<&mut Vec<String>> {
-        match key {
-            "placements" => Some(&mut self.placements),
-            "without" => Some(&mut self.without),
-            _ => None,
-        }
-    }
-}
-
-/// `[a, b]`.
-fn words(text: &str) -> Result<Vec<String>, String> {
-    let inner = text.trim().strip_prefix('[').and_then(|text| text.strip_suffix(']'));
-    let inner = inner.ok_or_else(|| format!("expected a list such as [a, b], found `{}`", text.trim()))?.trim();
-    if inner.is_empty() { Ok(Vec::new()) } else { inner.split(',').map(word).collect() }
-}
-
-/// A plain or quoted word.
-fn word(text: &str) -> Result<String, String> {
-    let text = text.trim();
-    let quoted = ['\'', '"'].iter().find_map(|quote| text.strip_prefix(*quote)?.strip_suffix(*quote));
-    let word = quoted.unwrap_or(text);
-    let plain = !word.is_empty() && !word.contains(|c: char| c.is_whitespace() || "[]{}:,'\"&*!|>%@`".contains(c));
-    if plain { Ok(word.to_owned()) } else { Err(format!("expected a name, found `{text}`")) }
 }
 
 /// The effect of a name, or an error that says which names are near.
 fn effect(name: &str, place: &str) -> anyhow::Result<EffectKind> {
     EffectKind::from_name(name).ok_or_else(|| {
         let mut known: Vec<&str> = EffectKind::ALL.into_iter().map(EffectKind::name).collect();
-        known.sort_by_key(|known| distance(known, name));
+        known.sort_by_key(|known| strsim::levenshtein(known, name));
         anyhow!("{place} {name}: no such effect; the nearest are {}", known[..3].join(", "))
     })
-}
-
-/// Letters to insert, delete or replace (Levenshtein 1966).
-fn distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, from) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, to) in b.iter().enumerate() {
-            let replaced = diagonal + usize::from(from != *to);
-            diagonal = row[j + 1];
-            row[j + 1] = replaced.min(row[j] + 1).min(diagonal + 1);
-        }
-    }
-    row[b.len()]
 }
 
 /// Says before the work what would stop its files after it.
@@ -361,7 +291,7 @@ fn short(value: &Value, digits: i32) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Config, distance};
+    use super::Config;
 
     #[test]
     fn config_takes_both_forms_of_lists() {
@@ -371,29 +301,25 @@ mod tests {
             "placements: [wrist, 'left']\nwithout:\n  - low_pass  # why\nseed: 7\n",
             "# c\nseed: 7\nplacements:\n- wrist\n- \"left\"\nwithout: [low_pass]",
         ] {
-            assert_eq!(Config::parse(text), Ok(expected()), "{text}");
+            assert_eq!(Config::parse(text).expect(text), expected(), "{text}");
         }
-        assert_eq!(Config::parse(""), Ok(Config::default()));
+        assert_eq!(Config::parse("").expect("empty"), Config::default());
     }
 
     #[test]
     fn config_names_the_line_of_what_is_wrong() {
         for (text, line, part) in [
             ("seed: 7\nwihtout: []", 2, "wihtout"),
-            ("seed: seven", 1, "whole number"),
-            ("without: lever_arm", 1, "list"),
-            ("- wrist", 1, "no list"),
-            ("seed: 1\nseed: 2", 2, "twice"),
-            ("without: [a, {b: c}]", 1, "name"),
-            ("what", 1, "key"),
+            ("seed: seven", 1, "seven"),
+            ("without: lever_arm", 1, "sequence"),
+            ("- wrist", 1, "sequence"),
+            ("seed: 1\nseed: 2", 1, "duplicate field `seed`"),
+            ("without: [a, {b: c}]", 1, "string"),
+            ("what", 1, "what"),
         ] {
-            let (found, problem) = Config::parse(text).expect_err(text);
+            let error = Config::parse(text).expect_err(text);
+            let (found, problem) = (error.location().map_or(0, |location| location.line()), error.to_string());
             assert!(found == line && problem.contains(part), "{text}: line {found}: {problem}");
         }
-    }
-
-    #[test]
-    fn distance_counts_letters() {
-        assert_eq!((distance("lever_arm", "lever_arm"), distance("leverarm", "lever_arm"), distance("", "ab")), (0, 1, 2));
     }
 }

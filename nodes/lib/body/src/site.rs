@@ -86,7 +86,7 @@ impl BodyModel {
         if let Ok(index) = self.sites.binary_search_by(|named| named.name.as_str().cmp(name)) {
             return Ok(self.sites[index].site);
         }
-        let nearest = self.site_names().min_by_key(|known| edit_distance(known, name)).unwrap_or("none").to_owned();
+        let nearest = self.site_names().min_by_key(|known| strsim::levenshtein(known, name)).unwrap_or("none").to_owned();
         Err(BodyError::UnknownSite { body: self.id.clone(), name: name.to_owned(), nearest })
     }
 
@@ -215,20 +215,4 @@ fn nearest_barycentrics(point: Vector3<f64>, [a, b, c]: [Vector3<f64>; 3]) -> [f
     } else {
         [ca.1, 0.0, 1.0 - ca.1]
     }
-}
-
-/// Insertions, deletions and replacements that make `a` into `b` (Levenshtein 1966).
-fn edit_distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, from) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, to) in b.iter().enumerate() {
-            let replaced = diagonal + usize::from(from != *to);
-            diagonal = row[j + 1];
-            row[j + 1] = replaced.min(row[j] + 1).min(diagonal + 1);
-        }
-    }
-    row[b.len()]
 }

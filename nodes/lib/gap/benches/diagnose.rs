@@ -21,8 +21,7 @@ use std::time::Duration;
 use criterion::{Criterion, criterion_group, criterion_main};
 use cromosim_gap::{DiagnoseOptions, diagnose};
 use cromosim_imu::{EffectKind as K, SensorModel};
-use cromosim_spatial::{FourierPair, PoseEstimate};
-use rustfft::num_complex::Complex64;
+use cromosim_spatial::{Complex64, FourierPair, PoseEstimate};
 use support::Scene;
 
 fn scenes() -> [(&'static str, Scene); 4] {

@@ -1,13 +1,17 @@
 //! Findings put into numbers and words.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
+use std::rc::Rc;
+use std::sync::Arc;
 
 use cromosim_imu::{Effect, EffectKind, EffectSet, Reading, SensorModel, Shape};
+use cromosim_spatial::KinematicTrack;
 use rand::SeedableRng;
 use rand_chacha::ChaCha12Rng;
 use serde_json::{Value, json};
 
-use crate::diagnose::{DiagnoseOptions, Findings, ORDINARY_NOISE, values_of};
+use crate::diagnose::{DiagnoseOptions, Findings, ordinary_share, values_of};
 use crate::metrics::Comparison;
 use crate::problem::{FOLDS, Problem, axis_of};
 use crate::unknown::Unknown;
@@ -20,6 +24,12 @@ pub(crate) struct Answer<'a> {
     comparison: Comparison<'a>,
     /// The problem with clipped readings compared as well.
     whole: Problem,
+    /// The track of the poses as they are, where the analysis undoes a smoothing.
+    plain: Option<KinematicTrack>,
+    /// Of the fit, at every covered reading.
+    residual: Vec<Vec<f64>>,
+    /// By the noise-like effects that they know of.
+    whiteners: RefCell<BTreeMap<Vec<EffectKind>, Rc<Whitener>>>,
     units: [f64; 2],
     seed: u64,
 }
@@ -46,7 +56,9 @@ impl<'a> Answer<'a> {
         let whole = Problem { usable: covered.to_vec(), ..problem.clone() };
         let factor = |kind| values_of(&findings.named, kind).map_or(1.0, |values| values[0]);
         let units = [factor(EffectKind::AccelUnits), factor(EffectKind::GyroUnits)];
-        Self { findings, comparison, whole, units, seed: options.seed }
+        let plain = findings.context.basis.undone_hz.map(|_| whole.track(&whole.estimate));
+        let residual = whole.residual(&findings.state.fit.prediction.readings);
+        Self { findings, comparison, whole, plain, residual, whiteners: RefCell::default(), units, seed: options.seed }
     }
 
     /// Diagnosis and curves.
@@ -76,8 +88,8 @@ impl<'a> Answer<'a> {
             causes.push(unknown_cause(unknown, shares.unexplained * known_unknown, after));
             causes.sort_by(|a, b| b.gap_share.total_cmp(&a.gap_share));
         }
-        let white = self.whitened(&EffectSet::new(), &before_readings);
-        let place = crate::place::place(&white, &self.whole, &self.whitener(&EffectSet::new()));
+        let nominal = self.whitener(&EffectSet::new());
+        let place = crate::place::place(&self.whitened(&nominal, &before_readings), &self.whole, &nominal);
         let diagnosis = PlacementDiagnosis {
             verdict: verdict(&causes, &before, &after),
             gap: Gap { before, after },
@@ -96,12 +108,9 @@ impl<'a> Answer<'a> {
 
     /// The readings in the device's units under a set of effects, without noise.
     fn simulate(&self, set: &EffectSet) -> Vec<Reading> {
-        let plain;
-        let track = if set.contains(EffectKind::ReferenceSmoothing) || self.findings.context.basis.undone_hz.is_none() {
-            &self.findings.context.track
-        } else {
-            plain = self.whole.track(&self.whole.estimate);
-            &plain
+        let track = match &self.plain {
+            Some(plain) if !set.contains(EffectKind::ReferenceSmoothing) => plain,
+            _ => &self.findings.context.track,
         };
         let mut readings = self.whole.predict(track, set).readings;
         SensorModel::new(set, self.whole.epoch).digital(&mut readings);
@@ -109,9 +118,13 @@ impl<'a> Answer<'a> {
     }
 
     /// What a context predicts as noise under those effects of `set` that are noise.
-    fn whitener(&self, set: &EffectSet) -> Whitener {
-        let context = &self.findings.context;
-        let mut basis = context.basis.clone();
+    fn whitener(&self, set: &EffectSet) -> Rc<Whitener> {
+        let kinds: Vec<EffectKind> = NOISE_LIKE.into_iter().filter(|kind| set.contains(*kind)).collect();
+        Rc::clone(self.whiteners.borrow_mut().entry(kinds).or_insert_with(|| Rc::new(self.new_whitener(set))))
+    }
+
+    fn new_whitener(&self, set: &EffectSet) -> Whitener {
+        let mut basis = self.findings.context.basis.clone();
         let has = |kind: EffectKind| set.contains(kind);
         let density = |kind| values_of(&self.findings.named, kind).map_or(0.0, |values| values[0]);
         for (c, (noise, step)) in
@@ -124,33 +137,25 @@ impl<'a> Answer<'a> {
             variance += if has(step) { density(step).powi(2) / 12.0 } else { 0.0 };
             basis.sigma[c] = variance.sqrt();
         }
-        let noise = self.whole.estimate.noise();
         if self.findings.named.contains(EffectKind::ReferenceNoise) && !has(EffectKind::ReferenceNoise) {
-            basis.reference_share =
-                [(ORDINARY_NOISE.position / noise.position).powi(2).min(1.0), (ORDINARY_NOISE.rotation / noise.rotation).powi(2).min(1.0)];
+            basis.reference_share = ordinary_share(self.whole.estimate.noise());
         }
         if !has(EffectKind::ReferenceSmoothing) {
             basis.undone_hz = None;
-            basis.estimate = std::sync::Arc::new(self.whole.estimate.clone());
+            basis.estimate = Arc::new(self.whole.estimate.clone());
         }
-        let residual = self.whole.residual(&self.findings.state.fit.prediction.readings);
-        Whitener::new(&self.whole, &NoiseModel::new(&self.whole, &basis, Some(&residual)))
+        Whitener::new(&self.whole, &NoiseModel::new(&self.whole, &basis, &self.residual))
     }
 
     /// Whitened measured less simulated, in SI units.
-    fn whitened(&self, set: &EffectSet, simulated: &[Reading]) -> Vec<f64> {
-        let whitener = self.whitener(set);
-        self.whitened_by(&whitener, simulated)
-    }
-
-    fn whitened_by(&self, whitener: &Whitener, simulated: &[Reading]) -> Vec<f64> {
+    fn whitened(&self, whitener: &Whitener, simulated: &[Reading]) -> Vec<f64> {
         let measured = self.comparison.measured;
         whitener.apply(&self.whole.raster(|k, axis| (axis_of(&measured[k], axis) - axis_of(&simulated[k], axis)) / self.units[axis / 3]))
     }
 
     /// Log-likelihood of the readings under a set, nats, less the constant of the normal density.
     fn likelihood(&self, whitener: &Whitener, simulated: &[Reading]) -> f64 {
-        let squares: f64 = self.whitened_by(whitener, simulated).iter().map(|e| e * e).sum();
+        let squares: f64 = self.whitened(whitener, simulated).iter().map(|e| e * e).sum();
         -0.5 * squares - (0..2).map(|c| whitener.count[c] * whitener.log_scale[c]).sum::<f64>()
     }
 
@@ -225,20 +230,15 @@ impl<'a> Answer<'a> {
     fn shares(&self, named: &[Effect]) -> Shares {
         let count = named.len();
         let mut known: BTreeMap<u64, f64> = BTreeMap::new();
-        let mut whiteners: BTreeMap<u64, Whitener> = BTreeMap::new();
-        let noise_bits: u64 = (0..count).filter(|&k| NOISE_LIKE.contains(&named[k].kind())).map(|k| 1 << k).sum();
         let mut value = |members: u64| -> f64 {
             *known.entry(members).or_insert_with(|| {
                 let mut set = EffectSet::new();
                 (0..count).filter(|k| members & (1 << k) != 0).for_each(|k| {
                     set.insert(named[k].clone());
                 });
-                let whitener = whiteners.entry(members & noise_bits).or_insert_with(|| self.whitener(&set));
                 // Rounding the simulation adds error of its own; here its noise is in the prediction.
-                let mut unrounded = set.clone();
-                unrounded.remove(EffectKind::AccelQuantization);
-                unrounded.remove(EffectKind::GyroQuantization);
-                self.likelihood(whitener, &self.simulate(&unrounded))
+                let unrounded = set.without(EffectKind::AccelQuantization).without(EffectKind::GyroQuantization);
+                self.likelihood(&self.whitener(&set), &self.simulate(&unrounded))
             })
         };
         let mut gains = vec![0.0; count];
@@ -259,7 +259,7 @@ impl<'a> Answer<'a> {
             *gain = gain.max(0.0);
         }
         let whitener = self.whitener(&self.findings.named);
-        let squares: f64 = self.whitened_by(&whitener, &self.simulate(&self.findings.named)).iter().map(|e| e * e).sum();
+        let squares: f64 = self.whitened(&whitener, &self.simulate(&self.findings.named)).iter().map(|e| e * e).sum();
         let rest = (0.5 * (squares - whitener.count[0] - whitener.count[1])).max(0.0);
         let total: f64 = gains.iter().sum::<f64>() + rest;
         if total <= 0.0 {
@@ -320,7 +320,7 @@ fn unknown_cause(unknown: &Unknown, gap_share: f64, after: Metrics) -> Cause {
         (Some(first), Some(last)) => [first.from, last.to],
         _ => [0.0, 0.0],
     };
-    // Twice its due of an even spread.
+    // Half as much again as its due of an even spread.
     let even = 1.0 / unknown.place.intervals_s.len().max(1) as f64;
     let mut intervals: Vec<[f64; 2]> = Vec::new();
     for interval in unknown.place.intervals_s.iter().filter(|interval| interval.share > 1.5 * even) {

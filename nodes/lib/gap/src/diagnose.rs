@@ -1,7 +1,7 @@
 //! One placement's diagnosis, from record to answer.
 
-use cromosim_imu::{DeclaredNoise, Effect, EffectKind, EffectSet, PlacementEffects};
-use cromosim_spatial::PoseNoise;
+use cromosim_imu::{DeclaredNoise, Effect, EffectKind, EffectSet, PlacementEffects, Reading};
+use cromosim_spatial::{KinematicTrack, PoseNoise};
 
 use crate::fit::Context;
 use crate::gross::{self, Digital, Gross, insert};
@@ -18,9 +18,9 @@ const MOST: usize = 5;
 /// Rounds of search, each with the noise that the one before leaves.
 const ROUNDS: usize = 3;
 /// Noise per sample and axis from which on the reference's noise is a cause: m, rad.
-pub(crate) const NAMED_NOISE: PoseNoise = PoseNoise { position: 1e-3, rotation: 0.25 * std::f64::consts::PI / 180.0 };
+const NAMED_NOISE: PoseNoise = PoseNoise { position: 1e-3, rotation: 0.25 * std::f64::consts::PI / 180.0 };
 /// What the reference's noise ordinarily is at most: m, rad.
-pub(crate) const ORDINARY_NOISE: PoseNoise = PoseNoise { position: 3e-4, rotation: 0.1 * std::f64::consts::PI / 180.0 };
+const ORDINARY_NOISE: PoseNoise = PoseNoise { position: 3e-4, rotation: 0.1 * std::f64::consts::PI / 180.0 };
 /// What every recording has: quartz and stamps are no better, mounts and calibrations neither. An effect whose values all stay below is fitted, so
 /// that it does not pass for another, but it is no cause. (Scales: distance from 1.)
 const ORDINARY: [(EffectKind, f64); 15] = [
@@ -87,10 +87,10 @@ pub(crate) struct Findings<'a> {
 /// # Errors
 /// [`GapError`] where there is nothing to compare: no overlap in time, too few messages, readings that are no numbers or never change.
 pub fn diagnose(record: &PlacementRecord, options: &DiagnoseOptions) -> Result<PlacementAnswer, GapError> {
-    let begin = std::time::Instant::now();
     let mut problem = Problem::new(record)?;
     let raw = problem.measured.clone();
-    let gross = Gross::find(&problem, &problem.track(&problem.estimate));
+    let track = problem.track(&problem.estimate);
+    let gross = Gross::find(&problem, &track);
     let digital = [0, 1].map(|channel| allowed_digital(gross::digital(&problem.measured, channel), channel, options));
     problem.cover(gross.lag_s)?;
     let covered = problem.usable.clone();
@@ -103,24 +103,40 @@ pub fn diagnose(record: &PlacementRecord, options: &DiagnoseOptions) -> Result<P
         reading.rate /= units[1];
     }
     problem.declared = declared_in_si(&problem, units);
-    debug(|| eprintln!("{}: {gross:?} {digital:?} {:?} {:?}", problem.name, problem.estimate.noise(), begin.elapsed()));
-    let findings = analyse(&problem, &gross, digital, units, options)?;
-    debug(|| eprintln!("{}: {:?} {:?}", problem.name, kinds(&findings.named), begin.elapsed()));
-    let answer = crate::answer::Answer::new(&findings, &problem, &raw, &covered, options).finish();
-    debug(|| eprintln!("{}: answered {:?}", problem.name, begin.elapsed()));
+    debug(|| eprintln!("{}: {gross:?} {digital:?} {:?}", problem.name, problem.estimate.noise()));
+    let findings = analyse(&problem, track, &gross, digital, units, options);
+    debug(|| eprintln!("{}: {:?}", problem.name, kinds(&findings.named)));
+    let (diagnosis, evidence) = crate::answer::Answer::new(&findings, &problem, &raw, &covered, options).finish();
     let density = |c: usize| findings.problem_sigma(c) / problem.rate_hz.sqrt();
     let effects = PlacementEffects {
         epoch: problem.epoch,
         declared_noise: DeclaredNoise { accel_density: density(0), gyro_density: density(1) },
         effects: findings.named.clone(),
     };
-    Ok(PlacementAnswer { diagnosis: answer.0, effects, evidence: answer.1 })
+    Ok(PlacementAnswer { diagnosis, effects, evidence })
 }
 
 impl Findings<'_> {
     /// Declared white noise per sample in SI units; where unknown, the found one counts as declared.
     pub fn problem_sigma(&self, channel: usize) -> f64 {
         self.context.problem.declared[channel].unwrap_or(self.found[channel])
+    }
+
+    /// Takes out the effects that only imitate what is unknown, and fits the others again.
+    fn drop_imitations(&mut self) {
+        let Some(unknown) = &self.unknown else { return };
+        self.named = without_all(&self.named, &unknown.imitations);
+        let fitted = without_all(&self.state.fit.set, &unknown.imitations);
+        if fitted == self.state.fit.set {
+            return;
+        }
+        let margins = std::mem::take(&mut self.state.margins);
+        self.state = State { margins, ..self.context.state(fitted) };
+        for effect in self.state.fit.set.iter() {
+            if self.named.contains(effect.kind()) {
+                self.named.insert(effect.clone());
+            }
+        }
     }
 }
 
@@ -133,32 +149,16 @@ fn allowed_units(gross: &Gross, options: &DiagnoseOptions) -> [f64; 2] {
 
 fn analyse<'a>(
     problem: &'a Problem,
+    track: KinematicTrack,
     gross: &Gross,
     digital: [Digital; 2],
     units: [f64; 2],
     options: &DiagnoseOptions,
-) -> Result<Findings<'a>, GapError> {
-    let track = problem.track(&problem.estimate);
-    let starts: Vec<EffectSet> = gross.starts().into_iter().map(|set| restricted(set, &options.without)).collect();
-    let first = problem.predict(&track, &starts[0]);
-    let residual = problem.residual(&first.readings);
-    let found = found_noise(problem, &residual);
-    let sigma = white_noise(problem, found, &digital, &options.without);
-    let count = track.len() as f64;
-    let mut basis = NoiseBasis::new(problem.estimate.clone(), sigma);
-    basis.rate_squared = track.angular_velocity.iter().map(|w| w.norm_squared()).sum::<f64>() / count;
-    basis.force_squared = first.readings.iter().map(|r| r.force.norm_squared()).sum::<f64>() / first.readings.len() as f64;
+) -> Findings<'a> {
+    let starts: Vec<EffectSet> = gross.starts().into_iter().map(|set| without_all(&set, &options.without)).collect();
     let library = library(&options.without);
-    if options.without.contains(&EffectKind::ReferenceNoise) {
-        let noise = problem.estimate.noise();
-        let share = |ordinary: f64, found: f64| (ordinary / found.max(1e-12)).powi(2).min(1.0);
-        basis.reference_share = [share(ORDINARY_NOISE.position, noise.position), share(ORDINARY_NOISE.rotation, noise.rotation)];
-    }
-    basis.line_hz = suspicious_line(problem, &basis, &first.readings);
-    basis.steps = [0, 1].map(|c| digital[c].lsb.map_or(0.0, |lsb| lsb / units[c] / sigma[c].max(1e-12)));
-    let noise = NoiseModel::new(problem, &basis, Some(&residual));
-    let mut context = Context::new(problem, track, basis, noise);
-    let mut state = context.search(&starts, &library, FIRST, false);
+    let mut context = first_context(problem, track, &starts[0], &digital, units, &options.without);
+    let mut state = context.search(&starts, &library, FIRST);
     debug(|| eprintln!("first: {:?} {:.2?}", kinds(&state.fit.set), state.fit.held_out_ratio()));
     if !options.without.contains(&EffectKind::ReferenceSmoothing) {
         (context, state) = crate::smoothing::try_smoothing(context, state, &starts, &library);
@@ -166,35 +166,55 @@ fn analyse<'a>(
     for round in 0..ROUNDS {
         context = renewed(&context, &state, &digital, &options.without);
         let before = state.fit.set.clone();
-        state = context.search(std::slice::from_ref(&before), &library, MOST, false);
+        state = context.search(std::slice::from_ref(&before), &library, MOST);
         debug(|| eprintln!("round {round}: {:?} {:.2?}", kinds(&state.fit.set), state.fit.held_out_ratio()));
         if kinds(&before) == kinds(&state.fit.set) {
             break;
         }
     }
     state = context.exchanged(state, &library);
-    let found = found_noise(problem, &problem.residual(&state.fit.prediction.readings));
-    let white = is_white(problem, &problem.residual(&state.fit.prediction.readings));
+    let residual = problem.residual(&state.fit.prediction.readings);
+    let found = found_noise(problem, &residual);
+    let white = is_white(problem, &residual);
     let named = named(problem, &context, &state, &digital, units, (found, white), &options.without);
     let mut findings = Findings { context, state, digital, found, named, unknown: None, without: options.without.clone() };
     findings.unknown = unknown::look(&findings);
-    if let Some(unknown) = &findings.unknown {
-        let imitated = unknown.imitations.clone();
-        let real = |set: &EffectSet| imitated.iter().fold(set.clone(), |set, kind| set.without(*kind));
-        findings.named = real(&findings.named);
-        let fitted = real(&findings.state.fit.set);
-        if fitted != findings.state.fit.set {
-            let margins = std::mem::take(&mut findings.state.margins);
-            findings.state = findings.context.state(fitted);
-            findings.state.margins = margins;
-            for effect in findings.state.fit.set.iter() {
-                if findings.named.contains(effect.kind()) {
-                    findings.named.insert(effect.clone());
-                }
-            }
-        }
+    findings.drop_imitations();
+    findings
+}
+
+/// The context of the nominal simulation, with what is certain from the start.
+fn first_context<'a>(
+    problem: &'a Problem,
+    track: KinematicTrack,
+    start: &EffectSet,
+    digital: &[Digital; 2],
+    units: [f64; 2],
+    without: &[EffectKind],
+) -> Context<'a> {
+    let first = problem.predict(&track, start);
+    let residual = problem.residual(&first.readings);
+    let sigma = white_noise(problem, found_noise(problem, &residual), digital, without);
+    let mut basis = NoiseBasis::new(problem.estimate.clone(), sigma);
+    basis.rate_squared = track.angular_velocity.iter().map(|w| w.norm_squared()).sum::<f64>() / track.len() as f64;
+    basis.force_squared = first.readings.iter().map(|r| r.force.norm_squared()).sum::<f64>() / first.readings.len() as f64;
+    if without.contains(&EffectKind::ReferenceNoise) {
+        basis.reference_share = ordinary_share(problem.estimate.noise());
     }
-    Ok(findings)
+    basis.line_hz = suspicious_line(problem, &basis, &first.readings);
+    basis.steps = [0, 1].map(|c| digital[c].lsb.map_or(0.0, |lsb| lsb / units[c] / sigma[c].max(1e-12)));
+    let noise = NoiseModel::new(problem, &basis, &residual);
+    Context::new(problem, track, basis, noise)
+}
+
+/// Shares of a reference's noise densities, position and rotation, that an ordinary reference has.
+pub(crate) fn ordinary_share(found: PoseNoise) -> [f64; 2] {
+    let share = |ordinary: f64, found: f64| (ordinary / found.max(1e-12)).powi(2).min(1.0);
+    [share(ORDINARY_NOISE.position, found.position), share(ORDINARY_NOISE.rotation, found.rotation)]
+}
+
+fn without_all(set: &EffectSet, kinds: &[EffectKind]) -> EffectSet {
+    kinds.iter().fold(set.clone(), |set, kind| set.without(*kind))
 }
 
 /// The context with the noise that the residual of `state` shows, and with its lever arm.
@@ -209,31 +229,15 @@ fn renewed<'a>(context: &Context<'a>, state: &State, digital: &[Digital; 2], wit
     let residual = context.problem.residual(&state.fit.prediction.readings);
     let found = found_noise(context.problem, &residual);
     basis.sigma = white_noise(context.problem, found, digital, without);
-    let noise = NoiseModel::new(context.problem, &basis, Some(&residual));
+    let noise = NoiseModel::new(context.problem, &basis, &residual);
     Context::new(context.problem, context.track.clone(), basis, noise)
 }
 
 /// Frequency of the strongest line of the accelerometer's residual where it may be a vibration.
-fn suspicious_line(problem: &Problem, basis: &NoiseBasis, simulated: &[cromosim_imu::Reading]) -> Option<f64> {
-    let view = cromosim_imu::ResidualView {
-        stamps: &problem.stamps,
-        epoch: problem.epoch,
-        rate_hz: problem.rate_hz,
-        measured: &problem.measured,
-        simulated,
-        accel_sigma: basis.sigma[0],
-        gyro_sigma: basis.sigma[1],
-    };
-    let values = (EffectKind::Vibration.spec().starts)(&view).into_iter().next()?;
+fn suspicious_line(problem: &Problem, basis: &NoiseBasis, simulated: &[Reading]) -> Option<f64> {
+    let values = (EffectKind::Vibration.spec().starts)(&problem.view(basis, simulated)).into_iter().next()?;
     let power: f64 = values[1..4].iter().map(|amplitude| 0.5 * amplitude * amplitude).sum();
     (power > 0.3 * basis.sigma[0].powi(2)).then_some(values[0])
-}
-
-fn restricted(mut set: EffectSet, without: &[EffectKind]) -> EffectSet {
-    without.iter().for_each(|kind| {
-        set.remove(*kind);
-    });
-    set
 }
 
 /// The causes: fitted effects beyond what is ordinary, and those that are read off the readings.

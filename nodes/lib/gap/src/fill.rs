@@ -71,15 +71,12 @@ impl Filler {
 
     /// Overwrites what is missing.
     pub fn fill(&self, series: &mut [f64]) {
-        let mut next = 0;
         // What no run covers is far from any value.
         for (value, variance) in series.iter_mut().zip(&self.variance) {
             if *variance > 0.0 {
                 *value = 0.0;
             }
-            next += 1;
         }
-        debug_assert_eq!(next, self.variance.len());
         let filled: Vec<DVector<f64>> = self
             .runs
             .iter()

@@ -160,7 +160,7 @@ fn left(gram: &DMatrix<f64>, step: &DVector<f64>) -> f64 {
     squares
 }
 
-/// Inner product in four lanes, so that it vectorises.
+/// Inner product in eight lanes, so that it vectorises.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut lanes = [0.0; 8];
     let (left, right) = (a.chunks_exact(8), b.chunks_exact(8));

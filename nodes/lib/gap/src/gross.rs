@@ -1,9 +1,8 @@
 //! What is checked in closed form before any fit: clock, units, axes, gravity, clipping, rounding.
 
-use cromosim_imu::{Effect, EffectKind, EffectSet, GRAVITY_IN_WORLD, Reading, STANDARD_GRAVITY};
-use cromosim_spatial::{FourierPair, KinematicTrack, so3};
+use cromosim_imu::{Effect, EffectKind, EffectSet, GRAVITY_IN_WORLD, Reading, STANDARD_GRAVITY, lattice_spacing};
+use cromosim_spatial::{Complex64, FourierPair, KinematicTrack, so3};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
-use rustfft::num_complex::Complex64;
 
 use crate::problem::Problem;
 
@@ -251,46 +250,15 @@ pub(crate) fn digital(measured: &[Reading], channel: usize) -> Digital {
         .iter()
         .flat_map(|reading| if channel == 0 { reading.force } else { reading.rate }.iter().copied().collect::<Vec<_>>())
         .collect();
-    let lsb = lattice(&values);
+    let lsb = lattice_spacing(&mut values.clone());
     let largest = values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
     let clipped = |value: &f64| value.abs() >= largest * (1.0 - 1e-9);
-    let repeats = values.iter().filter(|value| clipped(value)).count();
     let below = lsb.map_or(0, |lsb| values.iter().filter(|value| (value.abs() - largest + lsb).abs() < 0.5 * lsb).count());
     // On a lattice the tail thins out from step to step, and a slow peak dwells on one: clipping piles up more than that, and at several times.
-    let episodes = values
-        .iter()
-        .enumerate()
-        .filter(|(_, value)| clipped(value))
-        .fold((0, usize::MAX / 2), |(count, last), (at, _)| (count + usize::from(last == usize::MAX / 2 || at > last + 60), at));
-    let piled = if lsb.is_some() { repeats >= 12 && repeats > 3 * below && episodes.0 >= 3 } else { repeats >= 4 };
+    let at: Vec<usize> = values.iter().enumerate().filter(|(_, value)| clipped(value)).map(|(at, _)| at).collect();
+    let episodes = 1 + at.windows(2).filter(|pair| pair[1] > pair[0] + 60).count();
+    let repeats = at.len();
+    let piled = if lsb.is_some() { repeats >= 12 && repeats > 3 * below && episodes >= 3 } else { repeats >= 4 };
     let limit = (piled && largest > 0.0).then_some(largest);
     Digital { limit, lsb, denied: false }
-}
-
-/// The step of which all values are whole multiples, to within rounding of doubles; none where there is none.
-fn lattice(values: &[f64]) -> Option<f64> {
-    let mut sorted: Vec<f64> = values.iter().map(|value| value.abs()).collect();
-    sorted.sort_unstable_by(f64::total_cmp);
-    let largest = *sorted.last()?;
-    sorted.dedup_by(|a, b| (*a - *b).abs() <= 1e-9 * largest);
-    if sorted.len() * 4 > values.len() * 3 || largest == 0.0 || sorted.len() < 3 {
-        return None;
-    }
-    let smallest = sorted.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);
-    // Refined by the whole multiples themselves.
-    let mut step = smallest;
-    for _ in 0..3 {
-        let (mut numerator, mut denominator) = (0.0, 0.0);
-        for value in &sorted {
-            let multiple = (value / step).round();
-            if multiple > 0.0 && multiple * 0.02 < largest / smallest {
-                numerator += value * multiple;
-                denominator += multiple * multiple;
-            }
-        }
-        step = numerator / denominator;
-    }
-    let clipped = sorted.len().saturating_sub(1);
-    let on = sorted[..clipped].iter().filter(|value| ((*value / step) - (*value / step).round()).abs() < 1e-3).count();
-    (on + 1 >= clipped).then_some(step)
 }

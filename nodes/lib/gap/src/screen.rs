@@ -1,12 +1,12 @@
 //! Candidates beside a fit: one linear step for each, so that only the promising ones are fitted.
 
-use cromosim_imu::{Effect, EffectKind, EffectSet, Reading, ResidualView};
+use cromosim_imu::{Effect, EffectKind, EffectSet};
 
 use crate::fit::{Context, Fit, free_values, prior_deviation};
 use crate::gram::{Linear, dot};
 
 /// Effects of the motion, the mount, the clock and the sensor that are fitted to residuals.
-pub(crate) const FITTED: [EffectKind; 20] = [
+pub(crate) const FITTED: [EffectKind; 19] = [
     EffectKind::ReferenceTilt,
     EffectKind::ReferenceScale,
     EffectKind::MountRotation,
@@ -26,7 +26,6 @@ pub(crate) const FITTED: [EffectKind; 20] = [
     EffectKind::LowPass,
     EffectKind::GyroGSensitivity,
     EffectKind::Vibration,
-    EffectKind::AxisConvention,
 ];
 
 /// Slowest vibration, Hz.
@@ -77,24 +76,11 @@ impl Context<'_> {
 
     fn starts(&self, fit: &Fit, kind: EffectKind) -> Vec<Vec<f64>> {
         match kind {
-            EffectKind::SoftTissue => vec![vec![5.0, 0.3], vec![9.0, 0.3], vec![15.0, 0.3]],
-            EffectKind::LowPass => vec![vec![4.0], vec![8.0], vec![14.0], vec![25.0], vec![40.0]],
-            EffectKind::Vibration => (kind.spec().starts)(&self.view(&fit.prediction.readings)),
+            // Without a gradient at their neutral values.
+            EffectKind::SoftTissue | EffectKind::LowPass | EffectKind::Vibration => {
+                (kind.spec().starts)(&self.problem.view(&self.basis, &fit.prediction.readings))
+            }
             _ => vec![kind.spec().neutral()],
-        }
-    }
-
-    /// What the effects' own guesses look at.
-    pub fn view<'b>(&'b self, simulated: &'b [Reading]) -> ResidualView<'b> {
-        let problem = self.problem;
-        ResidualView {
-            stamps: &problem.stamps,
-            epoch: problem.epoch,
-            rate_hz: problem.rate_hz,
-            measured: &problem.measured,
-            simulated,
-            accel_sigma: self.basis.sigma[0],
-            gyro_sigma: self.basis.sigma[1],
         }
     }
 
@@ -207,7 +193,7 @@ impl Context<'_> {
         if power < 0.3 * self.basis.sigma[0].powi(2) || values[0] < LEAST_VIBRATION_HZ {
             return false;
         }
-        let without = self.problem.predict(&self.track, &crate::search::without(&fit.set, kind));
+        let without = self.problem.predict(&self.track, &fit.set.without(kind));
         let (before, after) = (self.problem.residual(&without.readings), self.problem.residual(&fit.prediction.readings));
         let line = |series: &[Vec<f64>], channel: usize| {
             let spectrum = self.problem.channel_spectrum(series, channel);

@@ -38,7 +38,7 @@ fn price(set: &EffectSet, coarse: f64) -> f64 {
 
 /// Effects that may be tried: all fitted ones but those that the caller takes out of the library.
 pub(crate) fn library(without: &[EffectKind]) -> Vec<EffectKind> {
-    FITTED.into_iter().filter(|kind| !without.contains(kind) && *kind != EffectKind::AxisConvention).collect()
+    FITTED.into_iter().filter(|kind| !without.contains(kind)).collect()
 }
 
 impl Context<'_> {
@@ -50,9 +50,11 @@ impl Context<'_> {
         price(set, coarse)
     }
 
+    /// The fitted set and its worth; what no such effect looks like is worth nothing, wherever it comes from.
     pub fn state(&self, set: EffectSet) -> State {
         let fit = self.sharpen_slip(self.fit(set));
-        let score = fit.linear.held_out - self.price(&fit.set);
+        let sound = plausible(&fit.set) && self.true_vibration(&fit);
+        let score = if sound { fit.linear.held_out - self.price(&fit.set) } else { f64::NEG_INFINITY };
         State { fit, score, margins: Vec::new() }
     }
 
@@ -62,8 +64,8 @@ impl Context<'_> {
         (noise - fit.linear.held_out).max(0.0)
     }
 
-    /// Grows, prunes and exchanges from several starting sets.
-    pub fn search(&self, starts: &[EffectSet], library: &[EffectKind], most: usize, exchange: bool) -> State {
+    /// Grows and prunes from several starting sets.
+    pub fn search(&self, starts: &[EffectSet], library: &[EffectKind], most: usize) -> State {
         let mut beam: Vec<State> = starts.iter().map(|set| self.state(set.clone())).collect();
         sort(&mut beam);
         let mut best = self.pruned(beam[0].clone());
@@ -90,7 +92,7 @@ impl Context<'_> {
             grown[0] = best.clone();
             beam = grown;
         }
-        if exchange { self.exchanged(best, library) } else { best }
+        best
     }
 
     /// The set with one more effect, for the candidates that promise most.
@@ -114,7 +116,7 @@ impl Context<'_> {
             // One linear step says little of a large turn or delay: half the best promise is still worth a fit.
             .filter(|(promise, _)| *promise > state.score + (0.3 * best).min(best - 20.0).max(-10.0))
             .map(|(_, candidate)| self.state(candidate.set))
-            .filter(|state| plausible(&state.fit.set) && self.true_vibration(&state.fit))
+            .filter(|state| state.score > f64::NEG_INFINITY)
             .collect()
     }
 
@@ -122,7 +124,7 @@ impl Context<'_> {
     pub fn pruned(&self, mut state: State) -> State {
         loop {
             let members: Vec<EffectKind> = state.fit.set.iter().map(|effect| effect.kind()).collect();
-            let smaller = members.iter().map(|kind| self.state(without(&state.fit.set, *kind)));
+            let smaller = members.iter().map(|kind| self.state(state.fit.set.without(*kind)));
             let Some(best) = smaller.max_by(|a, b| a.score.total_cmp(&b.score)) else { return state };
             if best.score < state.score {
                 return state;
@@ -138,7 +140,7 @@ impl Context<'_> {
             let mut best: Option<State> = None;
             state.margins.clear();
             for kind in members {
-                let smaller = self.state(without(&state.fit.set, kind));
+                let smaller = self.state(state.fit.set.without(kind));
                 let mut rival = smaller.score;
                 let mut candidates: Vec<_> = library
                     .iter()
@@ -152,9 +154,6 @@ impl Context<'_> {
                         continue;
                     }
                     let other = self.state(candidate.set);
-                    if !plausible(&other.fit.set) || !self.true_vibration(&other.fit) {
-                        continue;
-                    }
                     rival = rival.max(other.score);
                     if other.score > best.as_ref().map_or(state.score, |best| best.score) {
                         best = Some(other);
@@ -196,12 +195,6 @@ pub(crate) fn plausible(set: &EffectSet) -> bool {
         return false;
     }
     value(EffectKind::ReferenceScale, 0).is_none_or(|factor| (factor - 1.0).abs() > 0.006)
-}
-
-pub(crate) fn without(set: &EffectSet, kind: EffectKind) -> EffectSet {
-    let mut smaller = set.clone();
-    smaller.remove(kind);
-    smaller
 }
 
 pub(crate) fn kinds(set: &EffectSet) -> Vec<&'static str> {

@@ -26,7 +26,7 @@ fn smoothed<'a>(context: &Context<'a>, set: &EffectSet, cutoff_hz: f64) -> Conte
     let mut basis = context.basis.clone();
     basis.estimate = Arc::new(estimate);
     basis.undone_hz = Some(cutoff_hz);
-    let noise = NoiseModel::new(context.problem, &basis, Some(&residual));
+    let noise = NoiseModel::new(context.problem, &basis, &residual);
     Context::new(context.problem, track, basis, noise)
 }
 
@@ -69,7 +69,7 @@ pub(crate) fn try_smoothing<'a>(context: Context<'a>, state: State, starts: &[Ef
         factor = f64::sqrt(factor);
     }
     let other = smoothed(&context, &starts[0], best.1);
-    let searched = other.search(&sets, library, 2, false);
+    let searched = other.search(&sets, library, 2);
     debug(|| eprintln!("  smoothing {:.2} Hz with {:?}: {:.1}", best.1, kinds(&searched.fit.set), evidence(&other, &searched)));
     if best.1 > GRID_HZ[GRID_HZ.len() - 1] {
         // At the grid's end nothing is undone but noise.

@@ -9,7 +9,7 @@ use crate::gram::dot;
 use crate::place::{bands, place, spectrum_of};
 use crate::probes::{Probe, probes, with_probes};
 use crate::problem::{Problem, axis_of};
-use crate::search::{debug, without};
+use crate::search::debug;
 
 /// Mean square of a whitened residual in a band from which on it is structure. Without any effect none of a hundred placements reached 3.
 const BAND: f64 = 12.0;
@@ -137,7 +137,7 @@ fn special_cases(probe: &Probe) -> Vec<EffectKind> {
         [K::GyroBias, K::GyroBiasDrift, K::GyroScale, K::GyroMisalignment]
     };
     match (probe.depends_on, probe.channel) {
-        ("delay over time", _) => vec![K::TimeOffset, K::ClockDrift],
+        ("delay over time", _) => vec![K::TimeOffset, K::ClockDrift, K::LowPass],
         ("time", _) => vec![bias, drift],
         ("gain over time", _) => vec![scale],
         ("mount over time", _) => vec![K::MountRotation, K::MountSlip, misalignment],
@@ -168,7 +168,7 @@ fn imitations(findings: &Findings, strong: &[&Probe]) -> Vec<EffectKind> {
     members
         .into_iter()
         .filter(|kind| {
-            let smaller = context.state(without(&fit.set, *kind));
+            let smaller = context.state(fit.set.without(*kind));
             let alone = fit.linear.held_out - smaller.fit.linear.held_out;
             let beside = together - with_probes(findings, &smaller.fit, &chosen).held_out;
             debug(|| eprintln!("   member {} alone {alone:.0} beside probes {beside:.0} of {explained:.0}", kind.name()));

@@ -3,9 +3,8 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use cromosim_imu::{Reading, STANDARD_GRAVITY};
-use cromosim_spatial::{FourierPair, PoseEstimate, Spectrum, welch};
-use rustfft::num_complex::Complex64;
+use cromosim_imu::{Reading, ResidualView, STANDARD_GRAVITY};
+use cromosim_spatial::{Complex64, FourierPair, PoseEstimate, Spectrum, welch};
 
 use crate::fill::Filler;
 use crate::problem::{Problem, axis_of};
@@ -147,6 +146,19 @@ fn fill(series: &mut [f64], usable: &[bool]) {
 }
 
 impl Problem {
+    /// What the effects' own guesses look at.
+    pub fn view<'a>(&'a self, basis: &NoiseBasis, simulated: &'a [Reading]) -> ResidualView<'a> {
+        ResidualView {
+            stamps: &self.stamps,
+            epoch: self.epoch,
+            rate_hz: self.rate_hz,
+            measured: &self.measured,
+            simulated,
+            accel_sigma: basis.sigma[0],
+            gyro_sigma: basis.sigma[1],
+        }
+    }
+
     /// Residuals on the raster, by axis, with straight lines over what is not compared.
     pub fn raster(&self, of: impl Fn(usize, usize) -> f64) -> Vec<Vec<f64>> {
         (0..6)
@@ -191,10 +203,10 @@ impl Problem {
 
 impl NoiseModel {
     /// From the declared (or found) noise per sample, the reference's error, and the residual's own spectrum above what the reference resolves.
-    pub fn new(problem: &Problem, basis: &NoiseBasis, residual: Option<&[Vec<f64>]>) -> Self {
+    pub fn new(problem: &Problem, basis: &NoiseBasis, residual: &[Vec<f64>]) -> Self {
         let length = problem.transform_length();
         let spacing_hz = problem.rate_hz / length as f64;
-        let spectra = residual.map(|series| [problem.channel_spectrum(series, 0), problem.channel_spectrum(series, 1)]);
+        let spectra = [problem.channel_spectrum(residual, 0), problem.channel_spectrum(residual, 1)];
         let reported = basis.estimate.spectra();
         let to_variance = problem.rate_hz / 2.0;
         let of = |channel: usize| {
@@ -203,11 +215,9 @@ impl NoiseModel {
                     let frequency_hz = k as f64 * spacing_hz;
                     let expected = basis.expected(frequency_hz, problem.rate_hz, &reported);
                     let (known, most) = (expected.known[channel], expected.hidden[channel].max(0.0));
-                    let lost = spectra.as_ref().map_or(0.02 * most, |spectra| {
-                        let resolved = expected.through[channel] >= RESOLVED;
-                        let seen = if resolved { 0.0 } else { local(&spectra[channel], frequency_hz, basis.line_hz) - known };
-                        seen.clamp(0.0, most)
-                    });
+                    let resolved = expected.through[channel] >= RESOLVED;
+                    let seen = if resolved { 0.0 } else { local(&spectra[channel], frequency_hz, basis.line_hz) - known };
+                    let lost = seen.clamp(0.0, most);
                     (known + lost) * to_variance
                 })
                 .collect()

@@ -59,7 +59,7 @@ mod test_motions;
 pub use device::{Device, EMBEDDED_DEVICES};
 pub use effects::{
     DeclaredNoise, Dropouts, Effect, EffectKind, EffectSet, EffectSpec, EffectsFile, GridTrace, ParameterSpec, PlacementEffects, Reading,
-    ResidualView, SensorModel, Shape, Stage, StreamingEffects,
+    ResidualView, SensorModel, Shape, Stage, StreamingEffects, lattice_spacing,
 };
 pub use error::{EffectError, ImuError, PlacementProblem};
 pub use mount::{MountedSite, MountedSites, SiteFrame};

@@ -48,6 +48,7 @@ pub use error::SpatialError;
 pub use estimate::{PoseEstimate, PoseNoise};
 pub use grid::{check_times, relative_seconds, uniform_stamps};
 pub use pose_spline::{Motion, PoseSmoothing, PoseSpline, PoseTimes, position_channels, rotation_channels};
+pub use rustfft::num_complex::Complex64;
 pub use select::WeightSearch;
 pub use spectrum::{FourierPair, Spectrum, welch};
 pub use spline::{Smoothing, SmoothingSpline};

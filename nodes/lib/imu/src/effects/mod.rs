@@ -62,6 +62,7 @@ pub use dropped_samples::Dropouts;
 pub use effect::{Effect, EffectSet};
 pub use file::{DeclaredNoise, EffectsFile, PlacementEffects};
 pub use model::{GridTrace, SensorModel};
+pub use quantization::lattice_spacing;
 pub use spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
 pub use streaming::StreamingEffects;
 

@@ -29,12 +29,12 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
 
 fn starts(view: &ResidualView, channel: Channel) -> Vec<Vec<f64>> {
     let mut values: Vec<f64> = view.pairs(channel).flat_map(|(m, _)| <[f64; 3]>::from(m)).collect();
-    vec![vec![lattice(&mut values).unwrap_or(0.0)]]
+    vec![vec![lattice_spacing(&mut values).unwrap_or(0.0)]]
 }
 
 /// Spacing of the lattice through zero that all values lie on, where there is one: the greatest common divisor of the sorted values'
 /// differences, found by Euclid's steps down to 1e-7 of the largest value. Reorders the values.
-pub(super) fn lattice(values: &mut [f64]) -> Option<f64> {
+pub fn lattice_spacing(values: &mut [f64]) -> Option<f64> {
     values.sort_unstable_by(f64::total_cmp);
     let largest = values.first()?.abs().max(values.last()?.abs());
     let least = largest * 1e-7;

@@ -19,5 +19,5 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
 };
 
 fn starts(_: &ResidualView) -> Vec<Vec<f64>> {
-    [[5.0, 0.3], [9.0, 0.2], [16.0, 0.3]].map(Vec::from).to_vec()
+    [[5.0, 0.3], [9.0, 0.3], [15.0, 0.3]].map(Vec::from).to_vec()
 }

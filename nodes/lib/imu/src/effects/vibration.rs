@@ -2,6 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
+use cromosim_spatial::{Complex64, FourierPair};
 use nalgebra::{Matrix3x2, Vector3};
 
 use super::spec::{Channel, EffectSpec, ParameterSpec, ResidualView, Shape, Stage, median};
@@ -119,19 +120,18 @@ fn coarse_line(seconds: &[f64], residual: &[Vector3<f64>], mean: &Vector3<f64>, 
     if size > 1 << 24 {
         return None;
     }
+    let transform = FourierPair::new(size);
     let mut power = vec![0.0; size / 2];
     for axis in 0..3 {
-        let mut signal = vec![(0.0, 0.0); size];
+        let mut signal = vec![Complex64::default(); size];
         for (seconds, residual) in seconds.iter().zip(residual) {
             let index = ((seconds - first) * rate_hz).round() as usize;
             // A Hann window, so that strong motion does not leak over the line.
             let window = 0.5 - 0.5 * (TAU * index as f64 / count as f64).cos();
-            signal[index.min(size - 1)].0 = (residual[axis] - mean[axis]) * window;
+            signal[index.min(size - 1)].re = (residual[axis] - mean[axis]) * window;
         }
-        transform(&mut signal);
-        for (power, (real, imaginary)) in power.iter_mut().zip(&signal) {
-            *power += real * real + imaginary * imaginary;
-        }
+        transform.forward(&mut signal);
+        power.iter_mut().zip(&signal).for_each(|(power, value)| *power += value.norm_sqr());
     }
     let spacing = rate_hz / size as f64;
     let around = ((1.0 / spacing) as usize).max(20);
@@ -148,28 +148,4 @@ fn coarse_line(seconds: &[f64], residual: &[Vector3<f64>], mean: &Vector3<f64>, 
         }
     }
     (best.1 > 0).then_some((best.1 as f64 * spacing, spacing))
-}
-
-/// Discrete Fourier transform in place (Cooley and Tukey 1965); the length is a power of two.
-fn transform(signal: &mut [(f64, f64)]) {
-    let size = signal.len();
-    let bits = size.trailing_zeros();
-    for k in 0..size {
-        let reversed = k.reverse_bits() >> (usize::BITS - bits);
-        if reversed > k {
-            signal.swap(k, reversed);
-        }
-    }
-    let mut half = 1;
-    while half < size {
-        let turns: Vec<(f64, f64)> = (0..half).map(|k| (-PI * k as f64 / half as f64).sin_cos()).collect();
-        for block in signal.chunks_exact_mut(2 * half) {
-            let (low, high) = block.split_at_mut(half);
-            for ((low, high), (sine, cosine)) in low.iter_mut().zip(high).zip(&turns) {
-                let turned = (high.0 * cosine - high.1 * sine, high.0 * sine + high.1 * cosine);
-                (*low, *high) = ((low.0 + turned.0, low.1 + turned.1), (low.0 - turned.0, low.1 - turned.1));
-            }
-        }
-        half *= 2;
-    }
 }

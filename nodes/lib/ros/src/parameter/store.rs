@@ -257,8 +257,8 @@ impl Parameters {
         let names = self.names();
         // A part of a name ('rate' for 'rate_hz') is as good as a slip of the finger.
         let part = |known: &str| name.len() > 2 && (known.starts_with(name) || name.starts_with(known));
-        let close = |known: &str| part(known) || edits(name, known) <= (name.len() / 3).max(2);
-        let nearest = names.iter().filter(|known| close(known)).min_by_key(|known| edits(name, known)).cloned();
+        let close = |known: &str| part(known) || strsim::levenshtein(name, known) <= (name.len() / 3).max(2);
+        let nearest = names.iter().filter(|known| close(known)).min_by_key(|known| strsim::levenshtein(name, known)).cloned();
         RosError::UnknownParameter { place: place.to_owned(), name: name.to_owned(), nearest }
     }
 
@@ -309,22 +309,6 @@ fn plain_text(value: &ParameterValue) -> String {
         ParameterValue::String(text) => text.clone(),
         other => to_text(other),
     }
-}
-
-/// Insertions, deletions and replacements from one word to the other (Levenshtein).
-fn edits(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, from) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, to) in b.iter().enumerate() {
-            let replaced = diagonal + usize::from(from != *to);
-            diagonal = row[j + 1];
-            row[j + 1] = replaced.min(row[j] + 1).min(diagonal + 1);
-        }
-    }
-    row[b.len()]
 }
 
 #[cfg(test)]

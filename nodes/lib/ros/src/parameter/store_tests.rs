@@ -87,10 +87,3 @@ fn qos_overrides_change_presets_and_show_as_parameters() {
     assert_eq!(parameters.get::<String>("qos_overrides./imu.publisher.durability").as_deref(), Some("volatile"));
     assert!(parameters.set("qos_overrides./imu.publisher.depth", 5_i64).is_err());
 }
-
-#[test]
-fn words_differ_by_edits() {
-    assert_eq!(edits("sede", "seed"), 2);
-    assert_eq!(edits("", "abc"), 3);
-    assert_eq!(edits("rate_khz", "rate_hz"), 1);
-}
