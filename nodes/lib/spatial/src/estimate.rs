@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-use crate::floor::{Floor, LARGEST_GAIN, LARGEST_LOSS, local_spectra, undo};
+use crate::floor::{Floor, LARGEST_GAIN, LARGEST_LOSS, LARGEST_RISE, local_spectra, undo};
 use crate::holes::fill_holes;
 use crate::raster::Raster;
 use crate::segments::Segments;
@@ -68,7 +68,9 @@ impl PoseEstimate {
     fn on_raster(raster: &Raster, mut coordinates: Vec<Vec<f64>>) -> Self {
         let rate_hz = raster.rate_hz;
         let holes = raster.holes();
-        let learn = |coordinates: &[Vec<f64>]| [Floor::learn(&coordinates[..3], rate_hz), Floor::learn(&coordinates[3..], rate_hz)];
+        let learn = |coordinates: &[Vec<f64>]| {
+            [Floor::learn(&coordinates[..3], rate_hz, LARGEST_RISE[0]), Floor::learn(&coordinates[3..], rate_hz, LARGEST_RISE[1])]
+        };
         let mut floors = learn(&coordinates);
         // Twice, because the first spectra saw straight lines across the holes.
         for _ in 0..if holes.is_empty() { 0 } else { 2 } {

@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::*;
+use crate::Complex64;
 
 /// Deterministic noise: sums of twelve uniform numbers.
 struct Normal(u64);
@@ -125,10 +126,68 @@ fn white_noise_alone_passes_nowhere() {
     let mut random = Normal(3);
     let count = 12_000;
     let series: Vec<Vec<f64>> = (0..3).map(|_| (0..count).map(|_| random.draw()).collect()).collect();
-    let floor = Floor::learn(&series, 200.0);
+    let floor = Floor::learn(&series, 200.0, 1.0);
     let passing: Vec<f64> =
         floor.filter.iter().enumerate().skip(40).filter(|(_, w)| **w > 0.0).map(|(k, _)| k as f64 * floor.spacing_hz).collect();
     assert!(passing.is_empty(), "{passing:?}");
+}
+
+/// Series of a given one-sided density, unit^2/Hz, at `rate_hz`.
+fn coloured(random: &mut Normal, count: usize, rate_hz: f64, density: impl Fn(f64) -> f64) -> Vec<f64> {
+    let transform = FourierPair::new(count);
+    let mut values: Vec<Complex64> = (0..count).map(|_| Complex64::new(random.draw(), 0.0)).collect();
+    transform.forward(&mut values);
+    for (k, value) in values.iter_mut().enumerate() {
+        let frequency_hz = k.min(count - k).max(1) as f64 * rate_hz / count as f64;
+        *value *= (density(frequency_hz) * rate_hz / 2.0).sqrt();
+    }
+    transform.inverse(&mut values);
+    values.iter().map(|value| value.re).collect()
+}
+
+#[test]
+fn noise_that_wanders_is_told_from_motion_by_its_knee() {
+    // As optical recordings that were resampled to the IMU's rate: motion falls by f^-9, noise by 1/f up to 15 Hz, then by f^-2.5.
+    let (count, rate_hz) = (18_000, 300.0);
+    let motion = |f: f64| 1e-2 / (1.0 + (f / 2.0).powi(9));
+    let noise = |f: f64| 1e-10 * if f < 15.0 { 15.0 / f.max(0.5) } else { (15.0 / f).powf(2.5) };
+    let mut random = Normal(5);
+    let mut axis = |density: &dyn Fn(f64) -> f64| coloured(&mut random, count, rate_hz, density);
+    let clean = [0; 3].map(|_| axis(&motion));
+    let noisy: Vec<Vec<f64>> = clean.iter().map(|series| series.iter().zip(axis(&noise)).map(|(a, b)| a + b).collect()).collect();
+    let floor = Floor::learn(&noisy, rate_hz, 1.0);
+    for hz in [8.0, 12.0, 20.0, 30.0] {
+        let ratio = floor.noise_at(hz) / noise(hz);
+        assert!((0.4..2.5).contains(&ratio), "{ratio} at {hz} Hz");
+    }
+    // Accelerations are as good as the best filter makes them, which knows both densities.
+    let stamps: Vec<Stamp> = (0..count).map(|k| Stamp::from_nanos((k as f64 * 1e9 / rate_hz).round() as i64)).collect();
+    let positions: Vec<Vector3<f64>> = (0..count).map(|k| Vector3::new(noisy[0][k], noisy[1][k], noisy[2][k])).collect();
+    let track = PoseEstimate::fit(&stamps, &positions, &vec![UnitQuaternion::identity(); count]).unwrap().track(rate_hz);
+    let truth: Vec<Vec<f64>> = clean.iter().map(|series| second_derivative(series, rate_hz)).collect();
+    let inner = 1000..count - 1000;
+    let every = (track.rate_hz / rate_hz).round() as usize;
+    let squares: f64 = inner.clone().map(|k| (0..3).map(|i| (track.acceleration[every * k][i] - truth[i][k]).powi(2)).sum::<f64>()).sum();
+    let error = (squares / (3.0 * inner.len() as f64)).sqrt();
+    let step_hz = 0.05;
+    let best: f64 = (1..3000)
+        .map(|k| f64::from(k) * step_hz)
+        .map(|f| (TAU * f).powi(4) * motion(f) * noise(f) / (motion(f) + noise(f)) * step_hz)
+        .sum::<f64>()
+        .sqrt();
+    assert!(error < 1.15 * best, "{error} against {best} m/s2");
+}
+
+/// In the Fourier domain.
+fn second_derivative(series: &[f64], rate_hz: f64) -> Vec<f64> {
+    let transform = FourierPair::new(series.len());
+    let mut values: Vec<Complex64> = series.iter().map(|value| Complex64::new(*value, 0.0)).collect();
+    transform.forward(&mut values);
+    for (k, value) in values.iter_mut().enumerate() {
+        *value *= -(TAU * k.min(series.len() - k) as f64 * rate_hz / series.len() as f64).powi(2);
+    }
+    transform.inverse(&mut values);
+    values.iter().map(|value| value.re).collect()
 }
 
 #[test]

@@ -14,6 +14,18 @@ const LOCAL_EDGE: f64 = 2.2;
 const LONE_BAND: f64 = 2.2;
 /// Slowest plateau that may be noise, Hz.
 const LEAST_PLATEAU_HZ: f64 = 12.0;
+/// A third of an octave, about.
+const THIRD: f64 = 1.3;
+/// What of the density a third of an octave leaves of motion at most: f^-3.3; where a clear knee lies before it f^-5.3.
+const SLOW: f64 = 0.42;
+const SLOW_AFTER_KNEE: f64 = 0.25;
+/// Fall from the middle of the band to its top, as a factor, up to which the top counts as level.
+const LEVEL_TOP: f64 = 1.35;
+/// Largest rise of a wandering noise below its knee, as a power of the frequency: of positions, of rotations. Where poses were compared with IMUs
+/// (11 optical recordings), these served better than a random walk's 2.
+pub(crate) const LARGEST_RISE: [f64; 2] = [1.0, 0.0];
+/// How motion is taken to fall beyond its band, as a power of the frequency.
+const MOTION_FALL: f64 = 8.0;
 /// How far around a line the filter stays open, Hz: a line's amplitude changes over some seconds.
 const LINE_HZ: f64 = 0.1;
 /// Largest factor by which a smoothing that is undone may amplify: its true shape is nowhere written, and errors grow with it.
@@ -28,6 +40,9 @@ pub(crate) struct Floor {
     pub spectra: Vec<(Spectrum, f64)>,
     /// One-sided density of the white floor of the poses as they are, mean over the coordinates.
     pub white: f64,
+    /// Whether the noise wanders: then no level plateau shows where motion ends, and its fall goes on beneath the noise.
+    wandering: bool,
+    largest_rise: f64,
     /// Density of the noise after a smoothing is undone.
     pub noise: Vec<f64>,
     /// Wiener's filter, finer than the spectrum; its mean over the windows once these are known.
@@ -48,7 +63,7 @@ pub(crate) fn undo(frequency_hz: f64, undone_hz: Option<f64>, rate_hz: f64) -> f
 }
 
 impl Floor {
-    pub fn learn(coordinates: &[Vec<f64>], rate_hz: f64) -> Self {
+    pub fn learn(coordinates: &[Vec<f64>], rate_hz: f64, largest_rise: f64) -> Self {
         let count = coordinates[0].len();
         let spectra: Vec<(Spectrum, f64)> = WINDOWS
             .iter()
@@ -58,26 +73,27 @@ impl Floor {
                 (mean_spectrum(coordinates, rate_hz, window.min(most).max(8)), alone)
             })
             .collect();
-        Self::from_spectra(spectra, rate_hz, None)
+        Self::from_spectra(spectra, rate_hz, None, largest_rise)
     }
 
     /// The floor after a smoothing of the poses is undone. The noise is what was added after the smoothing, amplified, or what was there before, a
     /// plateau of the undone spectrum; whichever is more.
     pub fn undoing(&self, cutoff_hz: f64, rate_hz: f64) -> Self {
-        Self::from_spectra(self.spectra.clone(), rate_hz, Some(cutoff_hz))
+        Self::from_spectra(self.spectra.clone(), rate_hz, Some(cutoff_hz), self.largest_rise)
     }
 
-    pub fn from_spectra(spectra: Vec<(Spectrum, f64)>, rate_hz: f64, undone_hz: Option<f64>) -> Self {
+    fn from_spectra(spectra: Vec<(Spectrum, f64)>, rate_hz: f64, undone_hz: Option<f64>, largest_rise: f64) -> Self {
         let spectrum = &spectra[0].0;
         let gain2 = |frequency_hz: f64| undo(frequency_hz, undone_hz, rate_hz).powi(2);
-        let floor = noise_floor(spectrum, rate_hz);
+        let shape = NoiseShape::learn(spectrum, rate_hz, largest_rise);
+        let floor = shape.level;
         // Where the undone spectrum is least, beyond the slowest motion, lies the noise that was there before.
         let usable = (3..spectrum.density.len())
             .map(|k| (spectrum.frequency(k), spectrum.density[k]))
             .filter(|(hz, _)| gain2(*hz) <= LARGEST_GAIN.powi(2));
         let before = undone_hz.map_or(0.0, |_| usable.map(|(hz, density)| density * gain2(hz)).fold(f64::INFINITY, f64::min));
         let before = if before.is_finite() { before } else { 0.0 };
-        let noise_at = |frequency_hz: f64| (floor * gain2(frequency_hz)).max(before);
+        let noise_at = |frequency_hz: f64| (shape.at(frequency_hz) * gain2(frequency_hz)).max(before);
         let spacing_hz = spectra[2].0.spacing_hz.min(spectrum.spacing_hz);
         let edge_hz = edge(spectrum, &|hz| noise_at(hz) / gain2(hz));
         let bins = (rate_hz / 2.0 / spacing_hz) as usize + 1;
@@ -107,8 +123,10 @@ impl Floor {
                 *value = 1.0;
             }
         }
-        let noise = (0..bins).map(|k| noise_at(k as f64 * spacing_hz).min(floor.max(before) * LARGEST_GAIN.powi(2))).collect();
-        Self { white: floor, spectra, noise, filter, windows: Vec::new(), spacing_hz }
+        let noise = (0..bins)
+            .map(|k| noise_at(k as f64 * spacing_hz).min(shape.at(k as f64 * spacing_hz).max(before) * LARGEST_GAIN.powi(2)))
+            .collect();
+        Self { white: floor, spectra, wandering: shape.above > 0.0, largest_rise, noise, filter, windows: Vec::new(), spacing_hz }
     }
 
     /// A filter for each window from its own spectrum; motion comes in bursts, and rests let noise through that the mean motion would hide.
@@ -130,11 +148,20 @@ impl Floor {
                     .collect();
                 let bins = ratio.len();
                 let edge = (2..bins.saturating_sub(3)).find(|&k| ratio[k..k + 3].iter().all(|value| *value < LOCAL_EDGE)).unwrap_or(bins);
+                let edge_hz = spectrum.frequency(edge);
+                // Above what the noise is, at the last three frequencies of the band.
+                let last = (1..=3).filter_map(|back| ratio.get(edge.checked_sub(back)?)).sum::<f64>() / 3.0 - 1.0;
+                let beyond = |hz: f64| {
+                    let motion = last.max(0.0) * self.noise_at(edge_hz) * (edge_hz / hz).powf(MOTION_FALL);
+                    motion / (motion + self.noise_at(hz)).max(1e-300)
+                };
                 let weights: Vec<f64> = (0..bins)
                     .map(|k| {
                         let hz = spectrum.frequency(k);
                         if k < 2 {
                             1.0
+                        } else if k >= edge && self.wandering && undone_hz.is_none() {
+                            beyond(hz)
                         } else if k >= edge || ratio[k] <= 1.0 || gain2(hz) > LARGEST_GAIN.powi(2) {
                             0.0
                         } else {
@@ -231,24 +258,52 @@ fn mean_spectrum(coordinates: &[Vec<f64>], rate_hz: f64, window: usize) -> Spect
     mean
 }
 
-/// Density of the white floor: the median between 70 and 97 % of Nyquist, where the top of the spectrum is level. Where it falls, the poses were
-/// resampled from fewer frames, or filtered: then the noise is where the spectrum first falls slower than motion does (displacement of bodies falls
-/// with the fourth power of the frequency and more; f^-3.3 is the border here).
-fn noise_floor(spectrum: &Spectrum, rate_hz: f64) -> f64 {
-    let nyquist_hz = rate_hz / 2.0;
-    let level = |from_hz: f64, to_hz: f64| spectrum.median(from_hz, to_hz).unwrap_or(0.0);
-    let top = level(0.70 * nyquist_hz, 0.97 * nyquist_hz);
-    if level(0.45 * nyquist_hz, 0.6 * nyquist_hz) < 1.6 * level(0.8 * nyquist_hz, 0.97 * nyquist_hz) {
-        return top;
-    }
-    let mut from_hz = LEAST_PLATEAU_HZ;
-    while from_hz * 2.2 < 0.9 * nyquist_hz {
-        let levels = [(1.0, 1.3), (1.3, 1.69), (1.69, 2.2)].map(|(a, b)| level(a * from_hz, b * from_hz));
-        let slow = levels.windows(2).all(|pair| pair[1] > 0.42 * pair[0] && pair[1] < 1.7 * pair[0]);
-        if slow && levels[0] > 4.0 * top {
-            return levels[0];
+/// Density of the noise over the frequency: level, or a power law around a knee.
+///
+/// White noise shows as a level top of the spectrum. Where the top falls, the poses were resampled from fewer frames, filtered, or come from a
+/// tracker whose errors wander: then noise begins at the knee where the spectrum first falls slower than motion does (displacement of bodies falls with
+/// the fourth power of the frequency and more; f^-3.3 is the border here), and rises a little below the knee.
+#[derive(Clone, Copy, Debug)]
+struct NoiseShape {
+    /// Density at the knee, or everywhere.
+    level: f64,
+    knee_hz: f64,
+    /// Negative exponents below and above the knee.
+    below: f64,
+    above: f64,
+}
+
+impl NoiseShape {
+    fn learn(spectrum: &Spectrum, rate_hz: f64, largest_rise: f64) -> Self {
+        let nyquist_hz = rate_hz / 2.0;
+        let level = |from_hz: f64, to_hz: f64| spectrum.median(from_hz, to_hz).unwrap_or(0.0);
+        let top = level(0.70 * nyquist_hz, 0.97 * nyquist_hz);
+        let white = Self { level: top, knee_hz: nyquist_hz, below: 0.0, above: 0.0 };
+        // Lines (of the frames that were resampled) lift parts of the top.
+        let parts = [(0.6, 0.7), (0.7, 0.8), (0.8, 0.9), (0.9, 0.97)].map(|(a, b)| level(a * nyquist_hz, b * nyquist_hz));
+        let least = parts.into_iter().fold(f64::INFINITY, f64::min);
+        if level(0.45 * nyquist_hz, 0.6 * nyquist_hz) < LEVEL_TOP * least {
+            return white;
         }
-        from_hz *= 1.05;
+        let mut from_hz = LEAST_PLATEAU_HZ;
+        while from_hz * THIRD.powi(3) < 0.9 * nyquist_hz {
+            let thirds = [-2, -1, 0, 1, 2].map(|k| level(THIRD.powi(k) * from_hz, THIRD.powi(k + 1) * from_hz));
+            let ratios = [thirds[1] / thirds[0], thirds[3] / thirds[2], thirds[4] / thirds[3]];
+            let slow =
+                ratios[1..].iter().all(|&ratio| ratio < 1.7 && (ratio > SLOW || ratio > SLOW_AFTER_KNEE && ratios[0] < 0.45 * ratio));
+            if slow && thirds[2] > 4.0 * least {
+                let above = ((thirds[2] / thirds[4]).ln() / THIRD.powi(2).ln()).max(0.0);
+                // At the knee itself some motion is left.
+                let level = thirds[2].min(thirds[3] * THIRD.powf(above));
+                return Self { level, knee_hz: THIRD.sqrt() * from_hz, below: above.min(largest_rise), above };
+            }
+            from_hz *= 1.05;
+        }
+        white
     }
-    top
+
+    fn at(&self, frequency_hz: f64) -> f64 {
+        let ratio = self.knee_hz / frequency_hz.max(0.1);
+        self.level * ratio.powf(if ratio > 1.0 { self.below } else { self.above })
+    }
 }
