@@ -40,6 +40,11 @@ const ORDINARY: [(EffectKind, f64); 15] = [
     (EffectKind::GyroBiasDrift, 1.5e-5),
     (EffectKind::GyroGSensitivity, 5e-5),
 ];
+/// Part of the gap's excess over noise (in log-likelihood) below which the unexplained rest is the smaller part.
+const MOSTLY: f64 = 0.5;
+/// What every sensor has to be calibrated for.
+pub(crate) const CALIBRATIONS: [EffectKind; 5] =
+    [EffectKind::MountRotation, EffectKind::LeverArm, EffectKind::TimeOffset, EffectKind::AccelBias, EffectKind::GyroBias];
 /// The same of a slip's angle, rad.
 const ORDINARY_SLIP: f64 = 5e-3;
 /// Variance of the white noise against the declared one from which on it is a cause.
@@ -80,6 +85,8 @@ pub(crate) struct Findings<'a> {
     pub without: Vec<EffectKind>,
     /// What none of them explains.
     pub unknown: Option<Unknown>,
+    /// Whether little is unknown against what the found effects explain: then calibrations among these are no imitations of it.
+    pub mostly_explained: bool,
 }
 
 /// Diagnoses one placement.
@@ -120,6 +127,38 @@ impl Findings<'_> {
     /// Declared white noise per sample in SI units; where unknown, the found one counts as declared.
     pub fn problem_sigma(&self, channel: usize) -> f64 {
         self.context.problem.declared[channel].unwrap_or(self.found[channel])
+    }
+
+    /// Fits once more, each frequency in units of what is left there: else what is unexplained pulls at the values. Calibrations that help then are
+    /// taken up.
+    fn refit_beside_unknown(&mut self, library: &[EffectKind]) {
+        let Some(unknown) = &self.unknown else { return };
+        if !self.mostly_explained {
+            return;
+        }
+        let calibrations: Vec<EffectKind> =
+            library.iter().copied().filter(|kind| CALIBRATIONS.contains(kind) && !unknown.imitations.contains(kind)).collect();
+        let residual = self.context.problem.residual(&self.state.fit.prediction.readings);
+        let noise = self.context.noise.covering(self.context.problem, &residual);
+        let context = Context::new(self.context.problem, self.context.track.clone(), self.context.basis.clone(), noise);
+        let found = context.search(std::slice::from_ref(&self.state.fit.set), &calibrations, CALIBRATIONS.len());
+        debug(|| {
+            eprintln!(
+                "beside unknown: {:?} -> {:?}",
+                self.state.fit.set.iter().collect::<Vec<_>>(),
+                found.fit.set.iter().collect::<Vec<_>>()
+            )
+        });
+        for kind in EffectKind::ALL {
+            match (self.state.fit.set.get(kind), found.fit.set.get(kind)) {
+                (Some(_), None) => self.named.remove(kind),
+                (None, Some(effect)) if !is_ordinary(effect, 1.0) => self.named.insert(effect.clone()),
+                (Some(_), Some(effect)) if self.named.contains(kind) => self.named.insert(effect.clone()),
+                _ => None,
+            };
+        }
+        let margins = std::mem::take(&mut self.state.margins);
+        self.state = State { margins, ..self.context.state_as_it_is(found.fit.set) };
     }
 
     /// Takes out the effects that only imitate what is unknown, and fits the others again.
@@ -177,9 +216,15 @@ fn analyse<'a>(
     let found = found_noise(problem, &residual);
     let white = is_white(problem, &residual);
     let named = named(problem, &context, &state, &digital, units, (found, white), &options.without);
-    let mut findings = Findings { context, state, digital, found, named, unknown: None, without: options.without.clone() };
-    findings.unknown = unknown::look(&findings);
-    findings.drop_imitations();
+    let nominal = context.excess(&context.state(EffectSet::new()).fit);
+    let mostly_explained = context.excess(&state.fit) < MOSTLY * nominal;
+    let without = options.without.clone();
+    let mut findings = Findings { context, state, digital, found, named, without, unknown: None, mostly_explained };
+    for calibrations in [false, true] {
+        findings.unknown = unknown::look(&findings, calibrations);
+        findings.drop_imitations();
+    }
+    findings.refit_beside_unknown(&library);
     findings
 }
 

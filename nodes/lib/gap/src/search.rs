@@ -58,6 +58,12 @@ impl Context<'_> {
         State { fit, score, margins: Vec::new() }
     }
 
+    /// A set with the values that it has.
+    pub fn state_as_it_is(&self, set: EffectSet) -> State {
+        let fit = self.fit_steps(set, 0);
+        State { score: fit.linear.held_out - self.price(&fit.set), fit, margins: Vec::new() }
+    }
+
     /// Log-likelihood that is still to be gained: of the held-out residual down to noise alone.
     pub fn excess(&self, fit: &Fit) -> f64 {
         let noise: f64 = (0..2).map(|c| -0.5 * self.whitener.count[c]).sum();
@@ -179,7 +185,7 @@ pub(crate) fn plausible(set: &EffectSet) -> bool {
         return false;
     }
     if let (Some(hz), Some(seconds)) = (cutoff_hz, value(EffectKind::TimeOffset, 0))
-        && (seconds + 0.225 / hz).abs() < 0.2 * 0.225 / hz
+        && (seconds + 0.225 / hz).abs() < 0.35 * 0.225 / hz
     {
         return false;
     }

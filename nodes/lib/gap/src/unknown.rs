@@ -3,7 +3,7 @@
 use cromosim_imu::{EffectKind, Reading};
 
 use crate::Place;
-use crate::diagnose::Findings;
+use crate::diagnose::{CALIBRATIONS, Findings};
 use crate::fit::Fit;
 use crate::gram::dot;
 use crate::place::{bands, place, spectrum_of};
@@ -32,6 +32,9 @@ const COARSE_STEPS: f64 = 3.0;
 const SPECIAL_CASE: f64 = 0.3;
 /// Part of its gain that an effect keeps beside what the residual depends on, if it is more than an imitation of that.
 const OWN_GAIN: f64 = 0.1;
+
+/// Part of what regressions in its place would gain that a calibration has to gain, if it is to stand beside them.
+const NEARLY_ALL: f64 = 0.7;
 
 /// Structure that no named effect explains.
 #[derive(Clone, Debug)]
@@ -62,8 +65,9 @@ pub(crate) struct Signs {
     pub jitter: f64,
 }
 
-/// Looks for structure in the whitened residual.
-pub(crate) fn look(findings: &Findings) -> Option<Unknown> {
+/// Looks for structure in the whitened residual. `calibrations`: whether these may pass for imitations as well; they stand in for each other and
+/// for filters, and are judged once the others are gone.
+pub(crate) fn look(findings: &Findings, calibrations: bool) -> Option<Unknown> {
     let signs = Signs::of(findings);
     let mut probes = probes(findings);
     probes.sort_by(|a, b| b.gain.total_cmp(&a.gain));
@@ -97,10 +101,10 @@ pub(crate) fn look(findings: &Findings) -> Option<Unknown> {
     let channels: Vec<&str> = [(0, "accel"), (1, "gyro")].into_iter().filter(|(c, _)| of_channel(*c)).map(|(_, name)| name).collect();
     let channel = if channels.len() == 1 { channels[0] } else { "both" };
     let axes = place.axes.iter().filter(|(_, share)| **share > 0.1).map(|(name, _)| name.clone()).collect();
-    let mut imitations = imitations(findings, &strong);
+    let (mut imitations, sound) = imitations(findings, &strong);
     let most = strong.first().map_or(0.0, |probe| probe.gain);
     for probe in strong.iter().filter(|probe| probe.gain > SPECIAL_CASE * most && changes_over_time(probe, &probes)) {
-        imitations.extend(special_cases(probe));
+        imitations.extend(special_cases(probe).into_iter().filter(|kind| !sound.contains(kind)));
     }
     for (c, kind) in [(0, EffectKind::AccelNoise), (1, EffectKind::GyroNoise)] {
         if of_channel(c) || jittery {
@@ -109,6 +113,9 @@ pub(crate) fn look(findings: &Findings) -> Option<Unknown> {
     }
     if jittery {
         imitations.push(EffectKind::DroppedSamples);
+    }
+    if !calibrations {
+        imitations.retain(|kind| !CALIBRATIONS.contains(kind));
     }
     let gain = strong.first().map_or(0.0, |probe| probe.gain).max(signs.band[0].max(signs.band[1]) * 10.0);
     let probability = 0.97 * (1.0 - 1.0 / (2.0 + gain / 20.0));
@@ -149,8 +156,9 @@ fn special_cases(probe: &Probe) -> Vec<EffectKind> {
     }
 }
 
-/// Fitted effects which beside the strongest probes gain less than a tenth of what they gain without them.
-fn imitations(findings: &Findings, strong: &[&Probe]) -> Vec<EffectKind> {
+/// Fitted effects which beside the strongest probes gain less than a tenth of what they gain without them; and calibrations that explain nearly all
+/// that the probes in their place would.
+fn imitations(findings: &Findings, strong: &[&Probe]) -> (Vec<EffectKind>, Vec<EffectKind>) {
     let fit = &findings.state.fit;
     let context = &findings.context;
     // The strongest two of each channel say what the residual depends on; more only cost time.
@@ -158,24 +166,33 @@ fn imitations(findings: &Findings, strong: &[&Probe]) -> Vec<EffectKind> {
         .flat_map(|c| strong.iter().filter(move |probe| probe.channel == c && probe.depends_on != "rate of change").take(2))
         .map(|probe| &probe.columns)
         .collect();
+    let (mut imitations, mut sound) = (Vec::new(), Vec::new());
     if chosen.is_empty() {
-        return Vec::new();
+        return (imitations, sound);
     }
     let together = with_probes(findings, fit, &chosen).held_out;
-    let members: Vec<EffectKind> = fit.set.iter().map(|effect| effect.kind()).collect();
     let nominal = context.state(cromosim_imu::EffectSet::new());
     let explained = together - nominal.fit.linear.held_out;
-    members
-        .into_iter()
-        .filter(|kind| {
-            let smaller = context.state(fit.set.without(*kind));
-            let alone = fit.linear.held_out - smaller.fit.linear.held_out;
-            let beside = together - with_probes(findings, &smaller.fit, &chosen).held_out;
-            debug(|| eprintln!("   member {} alone {alone:.0} beside probes {beside:.0} of {explained:.0}", kind.name()));
+    for kind in fit.set.iter().map(|effect| effect.kind()) {
+        let smaller = context.state(fit.set.without(kind));
+        let instead = with_probes(findings, &smaller.fit, &chosen).held_out;
+        let alone = fit.linear.held_out - smaller.fit.linear.held_out;
+        let of_probes = instead - smaller.fit.linear.held_out;
+        debug(|| {
+            eprintln!(
+                "   member {} alone {alone:.0}, probes instead {of_probes:.0}, beside {:.0} of {explained:.0}",
+                kind.name(),
+                together - instead
+            )
+        });
+        if findings.mostly_explained && CALIBRATIONS.contains(&kind) && alone > NEARLY_ALL * of_probes {
+            sound.push(kind);
+        } else if alone < MAIN_PART * explained && together - instead < OWN_GAIN * alone {
             // What explains much of the gap by itself is no imitation of what little is left.
-            alone < MAIN_PART * explained && beside < OWN_GAIN * alone
-        })
-        .collect()
+            imitations.push(kind);
+        }
+    }
+    (imitations, sound)
 }
 
 impl Signs {

@@ -225,6 +225,18 @@ impl NoiseModel {
         Self { power: [of(0), of(1)], spacing_hz }
     }
 
+    /// At least what a residual shows, for a refit where something unexplained is in it: frequencies that it fills say little of the effects.
+    #[must_use]
+    pub fn covering(&self, problem: &Problem, residual: &[Vec<f64>]) -> Self {
+        let to_variance = problem.rate_hz / 2.0;
+        let power = [0, 1].map(|channel| {
+            let seen = problem.channel_spectrum(residual, channel);
+            let level = |k: usize| local(&seen, k as f64 * self.spacing_hz, None) * to_variance;
+            self.power[channel].iter().enumerate().map(|(k, power)| power.max(level(k))).collect()
+        });
+        Self { power, ..*self }
+    }
+
     /// One-sided density at a frequency, (unit)^2/Hz.
     pub fn density(&self, channel: usize, frequency_hz: f64, rate_hz: f64) -> f64 {
         let index = ((frequency_hz / self.spacing_hz).round() as usize).min(self.power[channel].len() - 1);
