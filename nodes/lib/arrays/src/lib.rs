@@ -1,0 +1,51 @@
+//! Containers of arrays, as tools around body models and motion write them: `.npy`, `.npz`, pickles of protocols 0 to 5, joblib files
+//! (plain, zlib, gzip), torch files (zip and legacy).
+//!
+//! What a file is, its first bytes tell. Nothing is executed: a pickle refers to Python functions by name, and this reader rebuilds what a
+//! fixed list names (arrays and scalars of numpy, sparse csc and csr matrices of scipy, chumpy arrays, torch tensors, builtin and ordered
+//! dictionaries) and refuses all else by name. What a file declares is checked against the bytes that it has before memory is taken, and
+//! [`Limits`] bound what compression, sharing and nesting can multiply.
+//!
+//! ```
+//! use std::io::Cursor;
+//! use std::path::Path;
+//! use cromosim_arrays::{Container, Limits, NpzWriter};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let mut writer = NpzWriter::new(Cursor::new(Vec::new()));
+//! writer.floats("trans", &[2, 3], &[0.0, 0.5, 1.0, 1.5, 2.0, 2.5])?;
+//! let file = writer.finish()?;
+//! let mut container = Container::new(file, Path::new("walk.npz"), Limits::default())?;
+//! let trans = container.at("trans")?.floats(&[None, Some(3)], "(N, 3)")?;
+//! assert_eq!((trans.shape, trans.values[4]), (vec![2, 3], 2.0));
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! Why an own pickle reader: `serde-pickle` 1.2 drops the types of numpy arrays and reads no joblib; `repugnant-pickle` 0.0.1 fails on
+//! joblib; `pyferrite` 0.0.2 reads most of this, but not protocol 0 nor torch tensors within `.npy`, and is too young to lean on.
+//! zip and zlib are left to `zip` and `flate2`.
+
+mod array;
+mod blob;
+mod container;
+mod dtype;
+mod entry;
+mod error;
+mod limits;
+mod npy;
+mod npz;
+mod npz_write;
+mod pickle;
+mod value;
+
+pub use array::{Array, ArrayData};
+pub use container::{Container, Format};
+pub use dtype::{DType, Kind};
+pub use entry::Entry;
+pub use error::ArraysError;
+pub use limits::{ELEMENTS_LIMIT, Limits};
+pub use npy::NpyHeader;
+pub use npz::NpzReader;
+pub use npz_write::NpzWriter;
+pub use value::{Dict, Sparse, SparseKind, Value};

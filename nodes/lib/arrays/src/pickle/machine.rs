@@ -1,0 +1,415 @@
+//! The stack machine.
+
+use std::sync::Arc;
+
+use super::known::{Known, known};
+use super::{Fault, NESTING_LIMIT, Reason, text};
+use crate::array::ArrayData;
+use crate::blob::Blob;
+use crate::dtype::DType;
+use crate::limits::Budget;
+use crate::value::{SparseKind, Value};
+
+/// Index into the arena.
+pub(super) type Id = u32;
+
+/// An object under construction.
+#[derive(Clone, Debug)]
+pub(super) enum Node {
+    None,
+    Bool(bool),
+    Int(i64),
+    BigInt(Arc<str>),
+    Float(f64),
+    Complex(f64, f64),
+    Text(Arc<str>),
+    Bytes(Blob),
+    /// A `str` of Python 2: text or bytes.
+    OldText(Blob),
+    List(Vec<Id>),
+    Tuple(Vec<Id>),
+    Dict(Vec<(Id, Id)>),
+    Known(Known, Arc<str>),
+    DType(DType),
+    /// A numpy array that waits for its state.
+    NewArray,
+    Array(Arc<ArrayData>),
+    Objects(Vec<usize>, Vec<Id>),
+    Sparse(SparseKind, Option<Id>),
+    ChumpyArray(Option<Id>),
+    ChumpySelect(Option<Id>),
+    JoblibArray,
+    Storage(Arc<Storage>),
+    Tensor(Box<Tensor>),
+    /// Out of a nested pickle.
+    Value(Value),
+}
+
+/// The memory behind torch tensors.
+#[derive(Debug)]
+pub(super) struct Storage {
+    /// `None` where only the tensor says.
+    pub dtype: Option<DType>,
+    pub source: Source,
+}
+
+#[derive(Debug)]
+pub(super) enum Source {
+    /// Elsewhere in the file, under this name.
+    Key(Arc<str>),
+    Loaded(Blob),
+}
+
+/// A torch tensor: a view of a storage, in elements.
+#[derive(Clone, Debug)]
+pub(super) struct Tensor {
+    pub storage: Arc<Storage>,
+    pub dtype: DType,
+    pub first: usize,
+    pub shape: Vec<usize>,
+    pub strides: Vec<usize>,
+    /// Where the pickle asks for it.
+    pub offset: usize,
+}
+
+/// What a node and its place on the stack take, about.
+const NODE_BYTES: u64 = 96;
+
+pub(super) struct Machine<'a> {
+    pub bytes: Blob,
+    pub position: usize,
+    pub nodes: Vec<Node>,
+    pub budget: &'a mut Budget,
+    pub nesting: usize,
+    stack: Vec<Id>,
+    marks: Vec<usize>,
+    memo: Vec<Option<Id>>,
+    memo_count: usize,
+    opcodes: usize,
+}
+
+impl<'a> Machine<'a> {
+    pub fn new(bytes: Blob, budget: &'a mut Budget, nesting: usize) -> Result<Self, Fault> {
+        if nesting > NESTING_LIMIT {
+            return Err(Fault::new(0, format!("pickles lie within pickles more than {NESTING_LIMIT} levels deep")));
+        }
+        let (nodes, stack, marks, memo) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Ok(Self { bytes, position: 0, nodes, budget, nesting, stack, marks, memo, memo_count: 0, opcodes: 0 })
+    }
+
+    /// Runs to the end of the pickle; the result is what is left on the stack.
+    pub fn run(&mut self) -> Result<Id, Fault> {
+        // One machine reads the pickles of a legacy torch file one after another: each starts afresh.
+        (self.memo_count, self.opcodes) = (0, 0);
+        self.memo.clear();
+        self.stack.clear();
+        self.marks.clear();
+        loop {
+            let offset = self.position;
+            let fault = |reason: Reason| Fault { offset, reason };
+            self.opcodes += 1;
+            self.budget.opcodes = self.budget.opcodes.checked_sub(1).ok_or_else(|| {
+                fault(format!("more than {} opcodes; raise Limits::opcodes if the file is sound", self.budget.limits.opcodes).into())
+            })?;
+            let opcode = self.take(1).map_err(fault)?.first().copied().unwrap_or_default();
+            if opcode == b'.' {
+                return self.pop().map_err(fault);
+            }
+            self.step(opcode).map_err(fault)?;
+        }
+    }
+
+    /// Protocols 0 and 1.
+    fn step(&mut self, opcode: u8) -> Result<(), Reason> {
+        match opcode {
+            b'(' => self.marks.push(self.stack.len()),
+            b'0' => self.drop_top()?,
+            b'1' => drop(self.pop_mark()?),
+            b'2' => self.stack.push(self.top()?),
+            b'F' => self.from_line("a float", |line| text::float(line).map(Node::Float))?,
+            b'I' | b'L' => self.from_line("an integer", text::integer)?,
+            b'S' => self.from_line("a quoted string", |line| text::quoted(line).map(|bytes| Node::OldText(bytes.into())))?,
+            b'V' => self.from_line("a string", |line| text::raw_unicode(line).map(|text| Node::Text(text.into())))?,
+            b'G' => self.from_bytes(|bytes: [u8; 8]| Node::Float(f64::from_be_bytes(bytes)))?,
+            b'J' => self.from_bytes(|bytes| Node::Int(i32::from_le_bytes(bytes).into()))?,
+            b'K' => self.from_bytes(|[byte]| Node::Int(byte.into()))?,
+            b'M' => self.from_bytes(|bytes| Node::Int(u16::from_le_bytes(bytes).into()))?,
+            b'N' => self.push(Node::None)?,
+            b'T' => self.sized::<4>(|bytes| Ok(Node::OldText(bytes)))?,
+            b'U' => self.sized::<1>(|bytes| Ok(Node::OldText(bytes)))?,
+            b'X' => self.sized::<4>(utf8)?,
+            b']' => self.push(Node::List(Vec::new()))?,
+            b'}' => self.push(Node::Dict(Vec::new()))?,
+            b')' => self.push(Node::Tuple(Vec::new()))?,
+            b'l' => self.from_mark(Node::List)?,
+            b't' => self.from_mark(Node::Tuple)?,
+            b'd' => {
+                let items = self.pop_mark()?;
+                self.push(Node::Dict(pairs(&items)?))?;
+            }
+            b'a' => self.append(1)?,
+            b'e' => self.append_mark()?,
+            b's' => self.set_items(false)?,
+            b'u' => self.set_items(true)?,
+            b'g' | b'p' => self.memo_by_line(opcode == b'g')?,
+            b'h' => self.memo_by_bytes::<1>(true)?,
+            b'j' => self.memo_by_bytes::<4>(true)?,
+            b'q' => self.memo_by_bytes::<1>(false)?,
+            b'r' => self.memo_by_bytes::<4>(false)?,
+            b'c' => self.global_by_lines()?,
+            b'R' => self.reduce()?,
+            b'b' => self.build()?,
+            b'i' | b'o' => self.old_instance(opcode == b'i')?,
+            b'Q' => self.persistent()?,
+            _ => self.step_newer(opcode)?,
+        }
+        Ok(())
+    }
+
+    /// Protocols 2 to 5.
+    fn step_newer(&mut self, opcode: u8) -> Result<(), Reason> {
+        match opcode {
+            0x80 => drop(self.take(1)?),
+            0x81 => self.new_object()?,
+            0x85..=0x87 => {
+                let items = self.pop_several(usize::from(opcode - 0x84))?;
+                self.push(Node::Tuple(items))?;
+            }
+            0x88 => self.push(Node::Bool(true))?,
+            0x89 => self.push(Node::Bool(false))?,
+            0x8a => self.sized::<1>(|bytes| text::long(&bytes).ok_or_else(|| "an integer is too long".into()))?,
+            0x8b => self.sized::<4>(|bytes| text::long(&bytes).ok_or_else(|| "an integer is too long".into()))?,
+            b'B' => self.sized::<4>(|bytes| Ok(Node::Bytes(bytes)))?,
+            b'C' => self.sized::<1>(|bytes| Ok(Node::Bytes(bytes)))?,
+            0x8c => self.sized::<1>(utf8)?,
+            0x8d => self.sized::<8>(utf8)?,
+            0x8e | 0x96 => self.sized::<8>(|bytes| Ok(Node::Bytes(bytes)))?,
+            0x8f => self.push(Node::List(Vec::new()))?,
+            0x90 => self.append_mark()?,
+            0x91 => self.from_mark(Node::List)?,
+            0x92 => {
+                let keywords = self.pop()?;
+                if !matches!(self.node(keywords), Node::Dict(pairs) if pairs.is_empty()) {
+                    return Err("an object is made with keywords, which this reader does not know".into());
+                }
+                self.new_object()?;
+            }
+            0x93 => {
+                let (name, module) = (self.pop()?, self.pop()?);
+                let (Some(module), Some(name)) = (self.text(module), self.text(name)) else { return Err("a name is no text".into()) };
+                self.global(&module, &name)?;
+            }
+            0x94 => self.memoize()?,
+            0x95 => drop(self.take(8)?), // a frame is a hint for reading ahead
+            b'P' => return Err("a persistent id in text; only torch's are known".into()),
+            0x82..=0x84 => return Err("a name from Python's extension registry, which is not in the file".into()),
+            0x97 | 0x98 => return Err("a buffer outside of the pickle, which is not in the file".into()),
+            _ => return Err(format!("0x{opcode:02x} is no opcode; the file may be damaged, or be no pickle").into()),
+        }
+        Ok(())
+    }
+
+    pub fn push(&mut self, node: Node) -> Result<(), Reason> {
+        let id = self.add(node)?;
+        self.stack.push(id);
+        Ok(())
+    }
+
+    pub fn add(&mut self, node: Node) -> Result<Id, Reason> {
+        self.budget.take(NODE_BYTES)?;
+        let id = Id::try_from(self.nodes.len()).map_err(|_| "more objects than this reader numbers")?;
+        self.nodes.push(node);
+        Ok(id)
+    }
+
+    pub fn push_id(&mut self, id: Id) {
+        self.stack.push(id);
+    }
+
+    pub fn node(&self, id: Id) -> &Node {
+        self.nodes.get(id as usize).unwrap_or(&Node::None)
+    }
+
+    pub fn replace(&mut self, id: Id, node: Node) {
+        if let Some(place) = self.nodes.get_mut(id as usize) {
+            *place = node;
+        }
+    }
+
+    fn floor(&self) -> usize {
+        self.marks.last().copied().unwrap_or(0)
+    }
+
+    pub fn pop(&mut self) -> Result<Id, Reason> {
+        if self.stack.len() <= self.floor() {
+            return Err("the stack is empty; the file may be damaged".into());
+        }
+        self.stack.pop().ok_or_else(|| "the stack is empty".into())
+    }
+
+    pub fn top(&self) -> Result<Id, Reason> {
+        let top = if self.stack.len() > self.floor() { self.stack.last() } else { None };
+        top.copied().ok_or_else(|| "the stack is empty; the file may be damaged".into())
+    }
+
+    /// `POP` also takes a mark off.
+    fn drop_top(&mut self) -> Result<(), Reason> {
+        if self.marks.last() == Some(&self.stack.len()) {
+            self.marks.pop();
+            return Ok(());
+        }
+        self.pop().map(drop)
+    }
+
+    fn pop_several(&mut self, count: usize) -> Result<Vec<Id>, Reason> {
+        let start = self.stack.len().checked_sub(count).filter(|&start| start >= self.floor());
+        Ok(self.stack.split_off(start.ok_or("the stack is empty; the file may be damaged")?))
+    }
+
+    pub fn pop_mark(&mut self) -> Result<Vec<Id>, Reason> {
+        let mark = self.marks.pop().ok_or("a mark is missing; the file may be damaged")?;
+        Ok(self.stack.split_off(mark.min(self.stack.len())))
+    }
+
+    fn from_mark(&mut self, node: impl FnOnce(Vec<Id>) -> Node) -> Result<(), Reason> {
+        let items = self.pop_mark()?;
+        self.push(node(items))
+    }
+
+    pub fn take(&mut self, count: usize) -> Result<Blob, Reason> {
+        let left = self.bytes.len() - self.position;
+        let part = self.bytes.part(self.position, count);
+        let part = part.ok_or_else(|| format!("{count} more bytes expected, but {left} are left; the file is cut short or damaged"))?;
+        self.position += count;
+        Ok(part)
+    }
+
+    fn fixed<const N: usize>(&mut self) -> Result<[u8; N], Reason> {
+        let part = self.take(N)?;
+        part.first_chunk().copied().ok_or_else(|| "cut short".into())
+    }
+
+    /// Up to the end of the line, which is taken too.
+    pub fn line(&mut self) -> Result<Blob, Reason> {
+        let rest = self.bytes.get(self.position..).unwrap_or_default();
+        let length = rest.iter().position(|&byte| byte == b'\n').ok_or("a line has no end; the file is cut short or damaged")?;
+        let line = self.take(length)?;
+        self.position += 1;
+        Ok(line)
+    }
+
+    fn from_line(&mut self, what: &str, node: impl FnOnce(&[u8]) -> Option<Node>) -> Result<(), Reason> {
+        let line = self.line()?;
+        self.budget.take(line.len() as u64)?;
+        self.push(node(&line).ok_or_else(|| format!("`{}` is not {what}", shortened(&line)))?)
+    }
+
+    fn from_bytes<const N: usize>(&mut self, node: impl FnOnce([u8; N]) -> Node) -> Result<(), Reason> {
+        let bytes = self.fixed::<N>()?;
+        self.push(node(bytes))
+    }
+
+    /// A length of N bytes, least significant first, and as many bytes.
+    fn sized<const N: usize>(&mut self, node: impl FnOnce(Blob) -> Result<Node, Reason>) -> Result<(), Reason> {
+        let length = little_endian(self.fixed::<N>()?);
+        let bytes = self.take(usize::try_from(length).unwrap_or(usize::MAX))?;
+        self.budget.take(bytes.len() as u64)?;
+        self.push(node(bytes)?)
+    }
+
+    fn append(&mut self, count: usize) -> Result<(), Reason> {
+        let items = self.pop_several(count)?;
+        self.extend_top(items)
+    }
+
+    fn append_mark(&mut self) -> Result<(), Reason> {
+        let items = self.pop_mark()?;
+        self.extend_top(items)
+    }
+
+    fn extend_top(&mut self, items: Vec<Id>) -> Result<(), Reason> {
+        let list = self.top()?;
+        match self.nodes.get_mut(list as usize) {
+            Some(Node::List(list)) => list.extend(items),
+            _ => return Err("items are added to what is no list".into()),
+        }
+        Ok(())
+    }
+
+    fn set_items(&mut self, many: bool) -> Result<(), Reason> {
+        let items = if many { self.pop_mark()? } else { self.pop_several(2)? };
+        let (dict, pairs) = (self.top()?, pairs(&items)?);
+        match self.nodes.get_mut(dict as usize) {
+            Some(Node::Dict(dict)) => dict.extend(pairs),
+            _ => return Err("keys are set in what is no dictionary".into()),
+        }
+        Ok(())
+    }
+
+    fn memo_by_line(&mut self, get: bool) -> Result<(), Reason> {
+        let line = self.line()?;
+        let index = std::str::from_utf8(&line).ok().and_then(|text| text.trim().parse().ok());
+        self.memo(index.ok_or("a memo number is no number")?, get)
+    }
+
+    fn memo_by_bytes<const N: usize>(&mut self, get: bool) -> Result<(), Reason> {
+        let index = little_endian(self.fixed::<N>()?);
+        self.memo(usize::try_from(index).unwrap_or(usize::MAX), get)
+    }
+
+    fn memo(&mut self, index: usize, get: bool) -> Result<(), Reason> {
+        if get {
+            let id = self.memo.get(index).copied().flatten().ok_or_else(|| format!("memo {index} is empty"))?;
+            self.stack.push(id);
+            return Ok(());
+        }
+        let id = self.top()?;
+        // Python numbers them one by one; a table may not grow faster than the file.
+        if index > self.opcodes {
+            return Err(format!("memo {index} is numbered out of turn").into());
+        }
+        if index >= self.memo.len() {
+            self.memo.resize(index + 1, None);
+        }
+        if let Some(place) = self.memo.get_mut(index) {
+            self.memo_count += usize::from(place.is_none());
+            *place = Some(id);
+        }
+        Ok(())
+    }
+
+    fn memoize(&mut self) -> Result<(), Reason> {
+        self.memo(self.memo_count, false)
+    }
+
+    fn global_by_lines(&mut self) -> Result<(), Reason> {
+        let (module, name) = (self.line()?, self.line()?);
+        self.global(&String::from_utf8_lossy(&module), &String::from_utf8_lossy(&name))
+    }
+
+    pub fn global(&mut self, module: &str, name: &str) -> Result<(), Reason> {
+        let full = format!("{}.{}", shortened(module.as_bytes()), shortened(name.as_bytes()));
+        let known = known(module, name).ok_or_else(|| Reason::Refused(full.clone()))?;
+        self.push(Node::Known(known, full.into()))
+    }
+}
+
+fn utf8(bytes: Blob) -> Result<Node, Reason> {
+    // Lone surrogates, which Python lets pass, are no text here.
+    Ok(Node::Text(String::from_utf8_lossy(&bytes).into()))
+}
+
+pub(super) fn pairs(items: &[Id]) -> Result<Vec<(Id, Id)>, Reason> {
+    let (pairs, rest) = items.as_chunks::<2>();
+    if rest.is_empty() { Ok(pairs.iter().map(|&[key, value]| (key, value)).collect()) } else { Err("a key has no value".into()) }
+}
+
+fn little_endian<const N: usize>(bytes: [u8; N]) -> u64 {
+    bytes.iter().rev().fold(0, |sum, &byte| sum << 8 | u64::from(byte))
+}
+
+/// For messages: one line, not endless.
+pub(super) fn shortened(bytes: &[u8]) -> String {
+    let start = bytes.get(..100).unwrap_or(bytes);
+    String::from_utf8_lossy(start).chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
+}

@@ -1,0 +1,169 @@
+//! What a container holds, as Python would see it.
+
+use std::collections::HashMap;
+use std::fmt;
+use std::sync::Arc;
+
+use crate::array::ArrayData;
+
+/// A Python value. Cloning is cheap: what it holds is shared, as it was in the file.
+#[derive(Clone)]
+#[non_exhaustive]
+pub enum Value {
+    /// `None`.
+    None,
+    /// `bool`.
+    Bool(bool),
+    /// `int` within 64 bits.
+    Int(i64),
+    /// Any other `int`: its decimal digits, or its bytes as `0x…` (two's complement, most significant first).
+    BigInt(Arc<str>),
+    /// `float`.
+    Float(f64),
+    /// `complex`: real and imaginary part.
+    Complex(f64, f64),
+    /// `str`; of Python 2 also a `str` of sound UTF-8.
+    Text(Arc<str>),
+    /// `bytes`, `bytearray`; of Python 2 a `str` that is no text.
+    Bytes(Arc<[u8]>),
+    /// `list`, `set`, `frozenset` (in the file's order).
+    List(Arc<Vec<Value>>),
+    /// `tuple`, `torch.Size`.
+    Tuple(Arc<Vec<Value>>),
+    /// `dict`, `OrderedDict`, `defaultdict`.
+    Dict(Arc<Dict>),
+    /// A numpy array or scalar, a torch tensor, a chumpy array.
+    Array(Arc<ArrayData>),
+    /// A matrix of scipy.sparse.
+    Sparse(Arc<Sparse>),
+    /// A type or function that is named but not called, such as `torch.float32`.
+    Name(Arc<str>),
+}
+
+/// A dictionary in the order of the file; of keys set twice the last value counts.
+#[derive(Default)]
+pub struct Dict {
+    pairs: Vec<(Value, Value)>,
+    by_text: HashMap<Arc<str>, usize>,
+}
+
+/// Which index of a sparse matrix is compressed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SparseKind {
+    /// `csc_matrix`: columns.
+    Columns,
+    /// `csr_matrix`: rows.
+    Rows,
+}
+
+/// A sparse matrix; indices are checked against the shape.
+#[derive(Debug)]
+pub struct Sparse {
+    /// Rows and columns.
+    pub shape: [usize; 2],
+    /// Row, column and value of each stored element, in the file's order.
+    pub entries: Vec<(u32, u32, f64)>,
+    /// How the file stored it.
+    pub kind: SparseKind,
+}
+
+impl Dict {
+    pub(crate) fn new(pairs: impl IntoIterator<Item = (Value, Value)>) -> Self {
+        let mut dict = Self::default();
+        let mut by_number = HashMap::new();
+        for (key, value) in pairs {
+            let next = dict.pairs.len();
+            let index = match (&key, key.text()) {
+                (_, Some(text)) => *dict.by_text.entry(text).or_insert(next),
+                (Value::Int(number), None) => *by_number.entry(*number).or_insert(next),
+                _ => next,
+            };
+            match dict.pairs.get_mut(index) {
+                Some(pair) => pair.1 = value,
+                None => dict.pairs.push((key, value)),
+            }
+        }
+        dict
+    }
+
+    /// The value under a key of text (`str`, or `bytes` of the same letters).
+    pub fn get(&self, key: &str) -> Option<&Value> {
+        self.by_text.get(key).and_then(|&index| self.pairs.get(index)).map(|(_, value)| value)
+    }
+
+    /// Keys and values in the order of the file.
+    pub fn pairs(&self) -> &[(Value, Value)] {
+        &self.pairs
+    }
+}
+
+impl Value {
+    /// The text of `str` or of `bytes` in UTF-8.
+    pub(crate) fn text(&self) -> Option<Arc<str>> {
+        match self {
+            Self::Text(text) => Some(Arc::clone(text)),
+            Self::Bytes(bytes) => std::str::from_utf8(bytes).ok().map(Arc::from),
+            _ => None,
+        }
+    }
+
+    /// The object in a 0-dimensional array of objects, as `numpy.save` wraps a dictionary; else the value itself.
+    pub fn unwrapped(&self) -> &Self {
+        let mut value = self;
+        // Arrays of objects nest at most as deep as `Limits::depth`.
+        while let Self::Array(array) = value
+            && array.shape().is_empty()
+            && let [only] = array.object_elements()
+        {
+            value = only;
+        }
+        value
+    }
+
+    /// The Python type's name, for messages.
+    pub fn type_name(&self) -> &'static str {
+        match self {
+            Self::None => "None",
+            Self::Bool(_) => "a bool",
+            Self::Int(_) | Self::BigInt(_) => "an int",
+            Self::Float(_) => "a float",
+            Self::Complex(..) => "a complex number",
+            Self::Text(_) => "text",
+            Self::Bytes(_) => "bytes",
+            Self::List(_) => "a list",
+            Self::Tuple(_) => "a tuple",
+            Self::Dict(_) => "a dictionary",
+            Self::Array(_) => "an array",
+            Self::Sparse(_) => "a sparse matrix",
+            Self::Name(_) => "a name",
+        }
+    }
+}
+
+/// One level only: shared values could fill any memory when written out.
+impl fmt::Debug for Value {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::None => formatter.write_str("None"),
+            Self::Bool(value) => write!(formatter, "{value}"),
+            Self::Int(value) => write!(formatter, "{value}"),
+            Self::BigInt(digits) => formatter.write_str(digits),
+            Self::Float(value) => write!(formatter, "{value}"),
+            Self::Complex(real, imaginary) => write!(formatter, "{real}{imaginary:+}i"),
+            Self::Text(text) => write!(formatter, "{text:?}"),
+            Self::Bytes(bytes) => write!(formatter, "{} bytes", bytes.len()),
+            Self::List(items) => write!(formatter, "list of {}", items.len()),
+            Self::Tuple(items) => write!(formatter, "tuple of {}", items.len()),
+            Self::Dict(dict) => write!(formatter, "{dict:?}"),
+            Self::Array(array) => write!(formatter, "array {:?} of {}", array.shape(), array.dtype()),
+            Self::Sparse(sparse) => write!(formatter, "sparse {:?}", sparse.shape),
+            Self::Name(name) => write!(formatter, "name {name}"),
+        }
+    }
+}
+
+impl fmt::Debug for Dict {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "dictionary of {}", self.pairs.len())
+    }
+}
