@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use super::Fault;
-use super::machine::{Id, Machine, Node, Source, Tensor};
+use super::machine::Machine;
+use super::node::{Id, Node, Source, Tensor};
 use super::torch::tensor_array;
 use crate::array::ArrayData;
 use crate::blob::Blob;

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use super::machine::{Id, Machine, Node};
+use super::machine::Machine;
+use super::node::{Id, Node};
 use super::{Reason, read_nested};
 use crate::array::ArrayData;
 use crate::dtype::Kind;

@@ -1,76 +1,10 @@
 //! The stack machine.
 
-use std::sync::Arc;
-
-use super::known::{Known, known};
+use super::known::known;
+use super::node::{Id, Node};
 use super::{Fault, NESTING_LIMIT, Reason, text};
-use crate::array::ArrayData;
 use crate::blob::Blob;
-use crate::dtype::DType;
 use crate::limits::Budget;
-use crate::value::{SparseKind, Value};
-
-/// Index into the arena.
-pub(super) type Id = u32;
-
-/// An object under construction.
-#[derive(Clone, Debug)]
-pub(super) enum Node {
-    None,
-    Bool(bool),
-    Int(i64),
-    BigInt(Arc<str>),
-    Float(f64),
-    Complex(f64, f64),
-    Text(Arc<str>),
-    Bytes(Blob),
-    /// A `str` of Python 2: text or bytes.
-    OldText(Blob),
-    List(Vec<Id>),
-    Tuple(Vec<Id>),
-    Dict(Vec<(Id, Id)>),
-    Known(Known, Arc<str>),
-    DType(DType),
-    /// A numpy array that waits for its state.
-    NewArray,
-    Array(Arc<ArrayData>),
-    Objects(Vec<usize>, Vec<Id>),
-    Sparse(SparseKind, Option<Id>),
-    ChumpyArray(Option<Id>),
-    ChumpySelect(Option<Id>),
-    JoblibArray,
-    Storage(Arc<Storage>),
-    Tensor(Box<Tensor>),
-    /// Out of a nested pickle.
-    Value(Value),
-}
-
-/// The memory behind torch tensors.
-#[derive(Debug)]
-pub(super) struct Storage {
-    /// `None` where only the tensor says.
-    pub dtype: Option<DType>,
-    pub source: Source,
-}
-
-#[derive(Debug)]
-pub(super) enum Source {
-    /// Elsewhere in the file, under this name.
-    Key(Arc<str>),
-    Loaded(Blob),
-}
-
-/// A torch tensor: a view of a storage, in elements.
-#[derive(Clone, Debug)]
-pub(super) struct Tensor {
-    pub storage: Arc<Storage>,
-    pub dtype: DType,
-    pub first: usize,
-    pub shape: Vec<usize>,
-    pub strides: Vec<usize>,
-    /// Where the pickle asks for it.
-    pub offset: usize,
-}
 
 /// What a node and its place on the stack take, about.
 const NODE_BYTES: u64 = 96;
@@ -126,14 +60,14 @@ impl<'a> Machine<'a> {
             b'0' => self.drop_top()?,
             b'1' => drop(self.pop_mark()?),
             b'2' => self.stack.push(self.top()?),
-            b'F' => self.from_line("a float", |line| text::float(line).map(Node::Float))?,
-            b'I' | b'L' => self.from_line("an integer", text::integer)?,
-            b'S' => self.from_line("a quoted string", |line| text::quoted(line).map(|bytes| Node::OldText(bytes.into())))?,
-            b'V' => self.from_line("a string", |line| text::raw_unicode(line).map(|text| Node::Text(text.into())))?,
-            b'G' => self.from_bytes(|bytes: [u8; 8]| Node::Float(f64::from_be_bytes(bytes)))?,
-            b'J' => self.from_bytes(|bytes| Node::Int(i32::from_le_bytes(bytes).into()))?,
-            b'K' => self.from_bytes(|[byte]| Node::Int(byte.into()))?,
-            b'M' => self.from_bytes(|bytes| Node::Int(u16::from_le_bytes(bytes).into()))?,
+            b'F' => self.push_line("a float", |line| text::float(line).map(Node::Float))?,
+            b'I' | b'L' => self.push_line("an integer", text::integer)?,
+            b'S' => self.push_line("a quoted string", |line| text::quoted(line).map(|bytes| Node::OldText(bytes.into())))?,
+            b'V' => self.push_line("a string", |line| text::raw_unicode(line).map(|text| Node::Text(text.into())))?,
+            b'G' => self.push_fixed(|bytes: [u8; 8]| Node::Float(f64::from_be_bytes(bytes)))?,
+            b'J' => self.push_fixed(|bytes| Node::Int(i32::from_le_bytes(bytes).into()))?,
+            b'K' => self.push_fixed(|[byte]| Node::Int(byte.into()))?,
+            b'M' => self.push_fixed(|bytes| Node::Int(u16::from_le_bytes(bytes).into()))?,
             b'N' => self.push(Node::None)?,
             b'T' => self.sized::<4>(|bytes| Ok(Node::OldText(bytes)))?,
             b'U' => self.sized::<1>(|bytes| Ok(Node::OldText(bytes)))?,
@@ -141,8 +75,8 @@ impl<'a> Machine<'a> {
             b']' => self.push(Node::List(Vec::new()))?,
             b'}' => self.push(Node::Dict(Vec::new()))?,
             b')' => self.push(Node::Tuple(Vec::new()))?,
-            b'l' => self.from_mark(Node::List)?,
-            b't' => self.from_mark(Node::Tuple)?,
+            b'l' => self.push_mark(Node::List)?,
+            b't' => self.push_mark(Node::Tuple)?,
             b'd' => {
                 let items = self.pop_mark()?;
                 self.push(Node::Dict(pairs(&items)?))?;
@@ -186,7 +120,7 @@ impl<'a> Machine<'a> {
             0x8e | 0x96 => self.sized::<8>(|bytes| Ok(Node::Bytes(bytes)))?,
             0x8f => self.push(Node::List(Vec::new()))?,
             0x90 => self.append_mark()?,
-            0x91 => self.from_mark(Node::List)?,
+            0x91 => self.push_mark(Node::List)?,
             0x92 => {
                 let keywords = self.pop()?;
                 if !matches!(self.node(keywords), Node::Dict(pairs) if pairs.is_empty()) {
@@ -271,7 +205,7 @@ impl<'a> Machine<'a> {
         Ok(self.stack.split_off(mark.min(self.stack.len())))
     }
 
-    fn from_mark(&mut self, node: impl FnOnce(Vec<Id>) -> Node) -> Result<(), Reason> {
+    fn push_mark(&mut self, node: impl FnOnce(Vec<Id>) -> Node) -> Result<(), Reason> {
         let items = self.pop_mark()?;
         self.push(node(items))
     }
@@ -298,13 +232,13 @@ impl<'a> Machine<'a> {
         Ok(line)
     }
 
-    fn from_line(&mut self, what: &str, node: impl FnOnce(&[u8]) -> Option<Node>) -> Result<(), Reason> {
+    fn push_line(&mut self, what: &str, node: impl FnOnce(&[u8]) -> Option<Node>) -> Result<(), Reason> {
         let line = self.line()?;
         self.budget.take(line.len() as u64)?;
         self.push(node(&line).ok_or_else(|| format!("`{}` is not {what}", shortened(&line)))?)
     }
 
-    fn from_bytes<const N: usize>(&mut self, node: impl FnOnce([u8; N]) -> Node) -> Result<(), Reason> {
+    fn push_fixed<const N: usize>(&mut self, node: impl FnOnce([u8; N]) -> Node) -> Result<(), Reason> {
         let bytes = self.fixed::<N>()?;
         self.push(node(bytes))
     }

@@ -8,6 +8,7 @@ mod finish;
 mod joblib;
 mod known;
 mod machine;
+mod node;
 mod numpy;
 mod object;
 mod text;

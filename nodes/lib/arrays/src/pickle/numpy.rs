@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use super::Reason;
-use super::machine::{Id, Machine, Node, shortened};
+use super::machine::{Machine, shortened};
+use super::node::{Id, Node};
 use crate::array::ArrayData;
 use crate::blob::Blob;
 use crate::dtype::{DType, Kind};

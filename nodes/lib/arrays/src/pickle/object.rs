@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use super::Reason;
 use super::known::Known;
-use super::machine::{Id, Machine, Node, shortened};
+use super::machine::{Machine, shortened};
+use super::node::{Id, Node};
 use crate::blob::Blob;
 
 /// What a shallow copy of one item takes.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::machine::Node;
+use super::node::Node;
 
 /// Python's `repr` of a `str` of Python 2: quotes and backslashes.
 pub(super) fn quoted(line: &[u8]) -> Option<Vec<u8>> {

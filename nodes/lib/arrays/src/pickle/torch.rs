@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use super::finish::finish;
 use super::known::Known;
-use super::machine::{Id, Machine, Node, Source, Storage, Tensor};
+use super::machine::Machine;
+use super::node::{Id, Node, Source, Storage, Tensor};
 use super::{Fault, Reason};
 use crate::array::ArrayData;
 use crate::blob::Blob;
