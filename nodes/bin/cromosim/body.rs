@@ -37,7 +37,7 @@ fn export_obj(out: &Path, model: &Arc<BodyModel>, betas: &[f64]) -> anyhow::Resu
 /// The model of a file, or the embedded one.
 pub fn model(path: Option<&PathBuf>) -> anyhow::Result<Arc<BodyModel>> {
     Ok(match path {
-        Some(path) => BodyModel::read_npz(path)?,
+        Some(path) => BodyModel::read(path)?,
         None => BodyModel::embedded(),
     })
 }

@@ -62,7 +62,7 @@ fn inspect_bag(path: &Path) -> anyhow::Result<()> {
 }
 
 fn inspect_body(path: &Path) -> anyhow::Result<()> {
-    let model = BodyModel::read_npz(path)?;
+    let model = BodyModel::read(path)?;
     let body = ShapedBody::new(model.clone(), &[])?;
     let heights = body.rest_vertices().iter().map(|vertex| vertex.y);
     let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| (low.min(y), high.max(y)));

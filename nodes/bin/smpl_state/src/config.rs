@@ -5,7 +5,7 @@ use cromosim_ros::node_config;
 node_config! {
     /// ROS parameters of `smpl_state`.
     pub struct Config {
-        /// Body model as npz; empty: the embedded body.
+        /// Body model file (SMPL, SMPL-H, SMPL-X; npz or pickle); empty: the embedded body.
         pub body: String = String::new(),
         /// Name of the world frame (z up).
         pub world_frame: String = "world".to_owned(),

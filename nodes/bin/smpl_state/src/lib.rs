@@ -65,7 +65,7 @@ fn logic(config: &Config) -> anyhow::Result<SmplStateNode> {
     for (name, values) in [("source_position", config.source_position), ("source_rotvec", config.source_rotvec)] {
         anyhow::ensure!(values.iter().all(|value| value.is_finite()), "parameter '{name}': expected finite numbers, found {values:?}");
     }
-    let model = if config.body.is_empty() { BodyModel::embedded() } else { BodyModel::read_npz(Path::new(&config.body))? };
+    let model = if config.body.is_empty() { BodyModel::embedded() } else { BodyModel::read(Path::new(&config.body))? };
     Ok(SmplStateNode::new(config.clone(), model)?)
 }
 

@@ -9,7 +9,7 @@ node_config! {
         pub recording: String = String::new(),
         /// Rerun viewer to show it in, as `127.0.0.1:9876`; used where `recording` is empty.
         pub connect: String = "127.0.0.1:9876".to_owned(),
-        /// Body model as npz; empty: the embedded body.
+        /// Body model file (SMPL, SMPL-H, SMPL-X; npz or pickle); empty: the embedded body.
         pub body: String = String::new(),
         /// Pictures of the body per second, Hz.
         pub mesh_rate_hz: f64 = 25.0,

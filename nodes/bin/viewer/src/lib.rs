@@ -116,7 +116,7 @@ pub fn run(arguments: &[String]) -> anyhow::Result<()> {
     };
     let Some(prepared) = prepare("viewer", ABOUT, arguments, check)? else { return Ok(()) };
     let config = prepared.config.clone();
-    let model = if config.body.is_empty() { BodyModel::embedded() } else { BodyModel::read_npz(Path::new(&config.body))? };
+    let model = if config.body.is_empty() { BodyModel::embedded() } else { BodyModel::read(Path::new(&config.body))? };
     let destination = destination(&config)?;
     let curve_window_s = destination.is_live().then_some(config.curve_window_seconds);
     let options = RecordingOptions { frame_rate_hz: config.mesh_rate_hz, curve_window_s, ..RecordingOptions::default() };

@@ -7,7 +7,7 @@ node_config! {
     pub struct Config {
         /// Sensor placements (YAML); empty: left_wrist, right_ankle, pelvis, sternum and head.
         pub placements: String = String::new(),
-        /// Body model as npz; empty: the embedded body.
+        /// Body model file (SMPL, SMPL-H, SMPL-X; npz or pickle); empty: the embedded body.
         pub body: String = String::new(),
         /// Scheme of the derivatives for every placement; empty: the one that each placement names.
         pub scheme: String = String::new(),

@@ -140,7 +140,7 @@ fn logic(config: &Config) -> anyhow::Result<(VirtualImuNode, PlacementSet)> {
     }
     anyhow::ensure!(config.gap_seconds > 0.0, "parameter 'gap_seconds': expected more than 0, found {}", config.gap_seconds);
     let placements = placements(config)?;
-    let model = if config.body.is_empty() { BodyModel::embedded() } else { BodyModel::read_npz(Path::new(&config.body))? };
+    let model = if config.body.is_empty() { BodyModel::embedded() } else { BodyModel::read(Path::new(&config.body))? };
     let folder = Path::new(&config.placements).parent().unwrap_or(Path::new("."));
     Ok((VirtualImuNode::new(config.clone(), model, &placements, folder)?, placements))
 }

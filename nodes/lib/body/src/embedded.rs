@@ -4,12 +4,13 @@ use std::io::Cursor;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
+use cromosim_arrays::{Container, Limits};
+
 use crate::model::Gender;
-use crate::npz::NpzReader;
 use crate::posedirs::{Constants, generated_pose_blocks};
 use crate::read::read_without_posedirs;
 use crate::site::embedded_sites;
-use crate::{BodyError, BodyModel, JOINT_COUNT};
+use crate::{BodyError, BodyModel, JOINT_COUNT, ShapeSpace};
 
 static ARRAYS: &[u8] = include_bytes!("../assets/body-without-posedirs.npz");
 static POSEDIRS: &str = include_str!("../assets/posedirs.json");
@@ -31,12 +32,12 @@ impl BodyModel {
 
 fn load() -> Result<BodyModel, BodyError> {
     let path = Path::new("cromosim_neutral");
-    let mut npz = NpzReader::new(Cursor::new(ARRAYS), path)?;
-    let mut raw = read_without_posedirs(&mut npz, path)?;
+    let mut arrays = Container::new(Cursor::new(ARRAYS), path, Limits::default()).map_err(BodyError::Arrays)?;
+    let mut raw = read_without_posedirs(&mut arrays)?.reduced()?;
+    raw.space = ShapeSpace::Cromosim;
     raw.gender = Some(Gender::Neutral);
     // The exact joints that the constants were made with; J_regressor gives them back within 0.02 mm.
-    let missing = || BodyError::MissingKey { path: path.to_owned(), key: "J".to_owned() };
-    let joints = npz.floats("J", &[Some(JOINT_COUNT), Some(3)], "(24, 3)")?.ok_or_else(missing)?;
+    let joints = arrays.at("J").and_then(|entry| entry.floats(&[Some(JOINT_COUNT), Some(3)], "(24, 3)")).map_err(BodyError::Arrays)?;
     let constants: Constants = serde_json::from_str(POSEDIRS).expect("the embedded constants are sound");
     raw.pose_blocks = generated_pose_blocks(&constants, &raw, &joints.values);
     let mut body = BodyModel::from_raw(raw)?;

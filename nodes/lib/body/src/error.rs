@@ -3,25 +3,22 @@
 use std::io;
 use std::path::PathBuf;
 
+use cromosim_arrays::ArraysError;
+
 /// An error of this crate; the message names the file, the key and what to do.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum BodyError {
-    /// The file cannot be opened.
-    #[error("{}: cannot open the body file: {source}", path.display())]
-    Open {
+    /// A file of arrays that cannot be read, or an array in it that does not suit.
+    #[error(transparent)]
+    Arrays(ArraysError),
+    /// The file holds another kind of body.
+    #[error("{}: key kintree_table: {joints} joints; bodies have 24 (SMPL), 52 (SMPL-H) or 55 (SMPL-X)", path.display())]
+    BodyType {
         /// The body file.
         path: PathBuf,
-        /// The reason.
-        source: io::Error,
-    },
-    /// The file is no archive of arrays.
-    #[error("{}: not an npz archive ({source}); convert a .pkl model to npz with numpy.savez first", path.display())]
-    Archive {
-        /// The body file.
-        path: PathBuf,
-        /// The reason.
-        source: io::Error,
+        /// How many joints it has.
+        joints: usize,
     },
     /// An array is missing.
     #[error("{}: key {key} is missing; an SMPL file holds v_template, shapedirs, posedirs, J_regressor, weights, kintree_table and f", path.display())]
@@ -30,74 +27,6 @@ pub enum BodyError {
         path: PathBuf,
         /// The array.
         key: String,
-    },
-    /// An array cannot be decoded.
-    #[error("{}: key {key}: unreadable: {source}", path.display())]
-    Unreadable {
-        /// The body file.
-        path: PathBuf,
-        /// The array.
-        key: String,
-        /// The reason.
-        source: io::Error,
-    },
-    /// An array holds elements of a type that does not suit.
-    #[error("{}: key {key}: elements are {found}, expected {expected}", path.display())]
-    ElementType {
-        /// The body file.
-        path: PathBuf,
-        /// The array.
-        key: String,
-        /// numpy's type description in the file.
-        found: String,
-        /// What suits.
-        expected: &'static str,
-    },
-    /// An array has an unsuitable shape.
-    #[error("{}: key {key}: shape is {found:?}, expected {expected}", path.display())]
-    Shape {
-        /// The body file.
-        path: PathBuf,
-        /// The array.
-        key: String,
-        /// The shape in the file.
-        found: Vec<u64>,
-        /// What suits.
-        expected: String,
-    },
-    /// An array is larger than any body.
-    #[error("{}: key {key}: {bytes} bytes, more than the {limit} that a body may have", path.display())]
-    TooLarge {
-        /// The body file.
-        path: PathBuf,
-        /// The array.
-        key: String,
-        /// Its size.
-        bytes: u64,
-        /// The largest allowed.
-        limit: u64,
-    },
-    /// The file holds another kind of body.
-    #[error("{}: key posedirs: {columns} columns, so this is {found}; only SMPL (207 columns, 24 joints) can be read", path.display())]
-    BodyType {
-        /// The body file.
-        path: PathBuf,
-        /// posedirs' last dimension.
-        columns: u64,
-        /// The kind of body that has so many.
-        found: &'static str,
-    },
-    /// A value is NaN or infinite.
-    #[error("{}: key {key}: element {element} (C order) is {value}", path.display())]
-    NotFinite {
-        /// The body file.
-        path: PathBuf,
-        /// The array.
-        key: String,
-        /// Flat index, last dimension fastest.
-        element: usize,
-        /// NaN or an infinity.
-        value: f64,
     },
     /// A triangle names a vertex that is not there.
     #[error("{}: key f: triangle {triangle} names vertex {vertex}, but there are {vertex_count} (0-based)", path.display())]
@@ -134,6 +63,18 @@ pub enum BodyError {
         row: usize,
         /// The sum.
         sum: f64,
+    },
+    /// Shape coefficients of one kind of body are given to another.
+    #[error(
+        "betas belong to {betas_of}, but body {body} has the shapes of {body_of}; name the file of their body (--body FILE), or fit this one to bone lengths"
+    )]
+    ForeignBetas {
+        /// The body's id.
+        body: String,
+        /// Whose shapes the body has.
+        body_of: String,
+        /// Whose shapes the betas tell.
+        betas_of: String,
     },
     /// More shape coefficients than the body has.
     #[error("{given} betas given, but body {body} has {available}; fewer are allowed, the rest is 0")]

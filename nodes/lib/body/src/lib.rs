@@ -3,6 +3,9 @@
 //! A body is a triangle mesh over 24 joints (SMPL, Loper et al. 2015). Shape coefficients `betas` move the rest mesh, the joints follow it,
 //! and a [`BodyPose`] turns it: `world_from_segments` is the skeleton, `skin` the whole mesh (f32, fast), `subset` a few vertices (f64).
 //!
+//! Files of SMPL, SMPL-H and SMPL-X are read by their content, npz or pickle; SMPL-H and SMPL-X keep their mesh and become bodies of 24
+//! joints, exactly so while their fingers, jaw and eyes rest ([`BodyModel::read`]).
+//!
 //! Frames: the model frame has x to the subject's left, y up and z forward, in T-pose; the world is z up. A segment's frame stands at its
 //! joint and is parallel to the model frame at rest. Lengths are metres, angles radians, and transforms read right to left.
 //!
@@ -24,12 +27,13 @@
 mod embedded;
 mod error;
 mod joint;
+mod kind;
 mod model;
-pub mod npz;
 mod pose;
 mod posedirs;
 mod read;
 mod shape;
+mod shape_fit;
 mod site;
 mod skin;
 mod subset;
@@ -37,9 +41,11 @@ mod write;
 
 pub use error::BodyError;
 pub use joint::{JOINT_COUNT, Joint};
+pub use kind::ShapeSpace;
 pub use model::{BodyModel, Gender};
 pub use pose::BodyPose;
 pub use shape::ShapedBody;
+pub use shape_fit::ShapeFit;
 pub use site::Site;
 pub use subset::VertexSubset;
 pub use write::write_obj;

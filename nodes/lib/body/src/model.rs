@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::site::NamedSite;
 use crate::skin::SkinTables;
-use crate::{BodyError, JOINT_COUNT, Joint};
+use crate::{BodyError, JOINT_COUNT, ShapeSpace};
 
 /// The group of people a body model was made from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
@@ -66,6 +66,7 @@ pub(crate) struct PoseBlock {
 pub struct BodyModel {
     pub(crate) id: String,
     pub(crate) gender: Option<Gender>,
+    pub(crate) space: ShapeSpace,
     /// (V, 3), m.
     pub(crate) template: Vec<Vector3<f64>>,
     pub(crate) beta_count: usize,
@@ -114,6 +115,7 @@ pub(crate) struct RawModel {
     /// Names the file in errors.
     pub path: PathBuf,
     pub id: String,
+    pub space: ShapeSpace,
     pub gender: Option<Gender>,
     /// (V, 3).
     pub template: Vec<f64>,
@@ -125,8 +127,6 @@ pub(crate) struct RawModel {
     pub regressor: Vec<f64>,
     /// (V, 24).
     pub weights: Vec<f64>,
-    /// Row 0 of kintree_table.
-    pub parents: Vec<i64>,
     /// (F, 3).
     pub faces: Vec<i64>,
 }
@@ -135,7 +135,6 @@ impl BodyModel {
     /// Checks what shapes alone do not tell, and brings the arrays into the order in which they are used.
     pub(crate) fn from_raw(raw: RawModel) -> Result<Self, BodyError> {
         let vertex_count = raw.template.len() / 3;
-        check_skeleton(&raw.path, &raw.parents)?;
         check_sums(&raw.path, "weights", &raw.weights, JOINT_COUNT)?;
         check_sums(&raw.path, "J_regressor", &raw.regressor, vertex_count)?;
         let faces = checked_faces(&raw.path, &raw.faces, vertex_count)?;
@@ -151,6 +150,7 @@ impl BodyModel {
         Ok(Self {
             id: raw.id,
             gender: raw.gender,
+            space: raw.space,
             template,
             beta_count: raw.beta_count,
             shape_directions: raw.shape_directions,
@@ -171,6 +171,11 @@ impl BodyModel {
     /// Whom the body was made from, where the file says so.
     pub fn gender(&self) -> Option<Gender> {
         self.gender
+    }
+
+    /// Whose shapes the body has: betas of another kind of body do not suit it.
+    pub fn shape_space(&self) -> ShapeSpace {
+        self.space
     }
 
     /// The triangles, counter-clockwise seen from outside; every index is below [`Self::vertex_count`].
@@ -204,19 +209,6 @@ impl BodyModel {
         let mean = at(&|vertex| self.template[vertex]);
         (mean, (0..self.beta_count).map(|beta| at(&|vertex| direction(vertex, beta))).collect())
     }
-}
-
-fn check_skeleton(path: &Path, parents: &[i64]) -> Result<(), BodyError> {
-    for (joint, &found) in Joint::ALL.iter().zip(parents) {
-        let (suits, expected) = match joint.parent() {
-            Some(parent) => (found == parent.index() as i64, parent.index() as i64),
-            None => (found == -1 || found == i64::from(u32::MAX) || found == i64::MAX, -1),
-        };
-        if !suits {
-            return Err(BodyError::Skeleton { path: path.to_owned(), joint: joint.index(), found, expected });
-        }
-    }
-    Ok(())
 }
 
 /// Rows of `width` must sum to one within 1e-3: float32 files are within 1e-6, and a body whose weights do not would tear apart.

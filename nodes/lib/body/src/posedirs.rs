@@ -9,8 +9,8 @@
 use nalgebra::{SMatrix, Vector3};
 use serde::Deserialize;
 
+use crate::kind::vertex_pose_blocks;
 use crate::model::{PoseBlock, RawModel, Rows};
-use crate::read::pose_blocks;
 use crate::{JOINT_COUNT, Joint};
 
 /// One vertex' directions (3, 207), row-major.
@@ -80,7 +80,7 @@ pub(crate) fn generated_pose_blocks(constants: &Constants, raw: &RawModel, joint
         for gaussians in &constants.rbf {
             add_gaussians(&mut directions, gaussians, vertex);
         }
-        pose_blocks(directions.map(|entry| if entry.abs() < SMALLEST { 0.0 } else { entry }).as_slice())
+        vertex_pose_blocks(directions.map(|entry| if entry.abs() < SMALLEST { 0.0 } else { entry }).as_slice(), JOINT_COUNT)
     };
     Rows::new(vertices.iter().zip(&normals).zip(weights).map(of_vertex))
 }
@@ -181,8 +181,9 @@ fn add_gaussians(directions: &mut Directions, gaussians: &Gaussians, vertex: &Ve
 mod tests {
     use std::path::{Path, PathBuf};
 
+    use cromosim_arrays::NpzReader;
+
     use crate::BodyModel;
-    use crate::npz::NpzReader;
 
     /// The largest difference between the embedded body's posedirs and those of `ids` in `expected` (K, 3, 207).
     fn largest_difference(ids: impl Iterator<Item = usize>, expected: &[f64]) -> f64 {

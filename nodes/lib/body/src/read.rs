@@ -1,124 +1,152 @@
-//! SMPL model files in npz layout.
+//! Body model files.
 
 use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 use std::sync::Arc;
 
+use cromosim_arrays::{Array, ArraysError, Container, Limits};
+
+use crate::kind::{FileModel, Kind, pose_blocks};
 use crate::model::{Gender, PoseBlock, RawModel, Rows};
-use crate::npz::{Array, NpzReader};
-use crate::{BodyError, BodyModel, JOINT_COUNT};
+use crate::{BodyError, BodyModel, ShapeSpace};
 
 /// Vertices of the largest mesh that is read; SMPL-X has 10475.
 const VERTEX_LIMIT: usize = 100_000;
 const TRIANGLE_LIMIT: usize = 2 * VERTEX_LIMIT;
 const BETA_LIMIT: usize = 400;
-const POSE_FEATURES: usize = 9 * (JOINT_COUNT - 1);
 
 impl BodyModel {
-    /// Reads an SMPL model: an npz with v_template (V, 3) m, shapedirs (V, 3, B), posedirs (V, 3, 207), J_regressor (24, V),
-    /// weights (V, 24), kintree_table (2, 24) and f (F, 3); float32 or float64, integers of any width. Other keys are passed over,
-    /// `gender` aside. Without it the gender is read off a file name such as `SMPL_FEMALE.npz`.
+    /// Reads a model file of SMPL, SMPL-H or SMPL-X, npz or pickle (with chumpy and scipy objects too), told by its content: v_template
+    /// (V, 3) m, shapedirs (V, 3, B), posedirs (V, 3, 9 (J - 1)), J_regressor (J, V), weights (V, J), kintree_table (2, J) and f (F, 3)
+    /// with J = 24, 52 or 55; numbers of any type. Other keys are passed over, `gender` aside. Without it the gender is read off the
+    /// name of the file or of its folder, such as `SMPL_FEMALE.npz` and `female/model.npz`.
+    ///
+    /// SMPL-H and SMPL-X keep their mesh, shapes and body joints and become bodies of 24 joints. While fingers, jaw and eyes keep their
+    /// rest rotation (a flat hand) this is exact. Fingers follow SMPL's hand joint, placed at the root of the middle finger; jaw and eyes
+    /// follow the head; expressions of SMPL-X are left out (its columns from 300 on, or from 10 on of 20).
     ///
     /// # Errors
     /// Every [`BodyError`] that names a path: a file that is cut short, lacks a key, holds wrong shapes, NaN, or indices out of range.
-    pub fn read_npz(path: &Path) -> Result<Arc<Self>, BodyError> {
-        let file = std::fs::File::open(path).map_err(|source| BodyError::Open { path: path.to_owned(), source })?;
-        Self::from_npz(BufReader::new(file), path)
+    pub fn read(path: &Path) -> Result<Arc<Self>, BodyError> {
+        let file = std::fs::File::open(path).map_err(|source| BodyError::Arrays(ArraysError::Open { path: path.to_owned(), source }))?;
+        Self::from_reader(BufReader::new(file), path)
     }
 
-    /// Like [`Self::read_npz`] from any reader; `path` names it, in errors too.
+    /// Like [`Self::read`] from any reader; `path` names it, in errors too.
     ///
     /// # Errors
-    /// As [`Self::read_npz`].
-    pub fn from_npz(reader: impl Read + Seek, path: &Path) -> Result<Arc<Self>, BodyError> {
-        let mut npz = NpzReader::new(reader, path)?;
-        let posedirs = read_posedirs(&mut npz, path)?;
-        let mut raw = read_without_posedirs(&mut npz, path)?;
-        if posedirs.shape[0] * 3 != raw.template.len() {
-            let expected = format!("({}, 3, {POSE_FEATURES})", raw.template.len() / 3);
-            let found = posedirs.shape.iter().map(|&size| size as u64).collect();
-            return Err(BodyError::Shape { path: path.to_owned(), key: "posedirs".to_owned(), found, expected });
+    /// As [`Self::read`].
+    pub fn from_reader(reader: impl Read + Seek, path: &Path) -> Result<Arc<Self>, BodyError> {
+        let mut arrays = Container::new(reader, path, Limits::default()).map_err(BodyError::Arrays)?;
+        let mut file = read_without_posedirs(&mut arrays)?;
+        let (vertex_count, joint_count) = (file.raw.template.len() / 3, file.parents.len());
+        let features = 9 * (joint_count - 1);
+        let expectation = format!("({vertex_count}, 3, {features}) for {joint_count} joints");
+        let posedirs = floats(&mut arrays, "posedirs", &[Some(vertex_count), Some(3), Some(features)], &expectation)?;
+        file.raw.pose_blocks = pose_blocks(&posedirs.values, joint_count);
+        let mut body = Self::from_raw(file.reduced()?)?;
+        // The embedded body, exported and read again, keeps its own shapes.
+        if body.faces == Self::embedded().faces {
+            body.space = ShapeSpace::Cromosim;
         }
-        raw.pose_blocks = Rows::new(posedirs.values.chunks_exact(3 * POSE_FEATURES).map(pose_blocks));
-        let mut body = Self::from_raw(raw)?;
         body.sites = crate::site::transferred_sites(&body)?;
         Ok(Arc::new(body))
     }
 }
 
-/// posedirs come first: their last dimension says which kind of body this is.
-fn read_posedirs<R: Read + Seek>(npz: &mut NpzReader<R>, path: &Path) -> Result<Array<f64>, BodyError> {
-    match npz.floats("posedirs", &[None, Some(3), Some(POSE_FEATURES)], "(V, 3, 207)") {
-        Err(BodyError::Shape { found, .. }) if found.len() == 3 && found[2] == 9 * 51 => {
-            Err(BodyError::BodyType { path: path.to_owned(), columns: found[2], found: "SMPL-H" })
-        }
-        Err(BodyError::Shape { found, .. }) if found.len() == 3 && found[2] == 9 * 54 => {
-            Err(BodyError::BodyType { path: path.to_owned(), columns: found[2], found: "SMPL-X" })
-        }
-        read => read?.ok_or_else(|| missing(path, "posedirs")),
+fn floats<R: Read + Seek>(
+    arrays: &mut Container<R>,
+    key: &str,
+    expected: &[Option<usize>],
+    expectation: &str,
+) -> Result<Array<f64>, BodyError> {
+    let entry = arrays.at(key).map_err(without_key)?;
+    entry.floats(expected, expectation).map_err(BodyError::Arrays)
+}
+
+fn integers<R: Read + Seek>(
+    arrays: &mut Container<R>,
+    key: &str,
+    expected: &[Option<usize>],
+    expectation: &str,
+) -> Result<Array<i64>, BodyError> {
+    let entry = arrays.at(key).map_err(without_key)?;
+    entry.integers(expected, expectation).map_err(BodyError::Arrays)
+}
+
+/// What a body file lacks is said in terms of bodies.
+fn without_key(error: ArraysError) -> BodyError {
+    match error {
+        ArraysError::MissingKey { path, key, .. } => BodyError::MissingKey { path, key },
+        other => BodyError::Arrays(other),
     }
 }
 
 /// Everything but the pose blocks and the sites, which stay empty.
-pub(crate) fn read_without_posedirs<R: Read + Seek>(npz: &mut NpzReader<R>, path: &Path) -> Result<RawModel, BodyError> {
-    let template = npz.floats("v_template", &[None, Some(3)], "(V, 3)")?.ok_or_else(|| missing(path, "v_template"))?;
+pub(crate) fn read_without_posedirs<R: Read + Seek>(arrays: &mut Container<R>) -> Result<FileModel, BodyError> {
+    let path = arrays.path().to_owned();
+    let kintree = integers(arrays, "kintree_table", &[Some(2), None], "(2, 24), (2, 52) or (2, 55)")?;
+    let joint_count = kintree.shape[1];
+    let kind = Kind::of_joint_count(joint_count, &path)?;
+    let template = floats(arrays, "v_template", &[None, Some(3)], "(V, 3)")?;
     let vertex_count = template.shape[0];
     if !(3..=VERTEX_LIMIT).contains(&vertex_count) {
-        return Err(limited(path, "v_template", &template.shape, format!("(V, 3) with V from 3 to {VERTEX_LIMIT}")));
+        return Err(limited(&path, "v_template", &template.shape, format!("(V, 3) with V from 3 to {VERTEX_LIMIT}")));
     }
-    let mut floats = |key: &str, expected: &[Option<usize>], expectation: String| {
-        npz.floats(key, expected, &expectation)?.ok_or_else(|| missing(path, key))
-    };
-    let shapedirs = floats("shapedirs", &[Some(vertex_count), Some(3), None], format!("({vertex_count}, 3, B)"))?;
-    let beta_count = shapedirs.shape[2];
-    if !(1..=BETA_LIMIT).contains(&beta_count) {
-        return Err(limited(path, "shapedirs", &shapedirs.shape, format!("({vertex_count}, 3, B) with B from 1 to {BETA_LIMIT}")));
+    let shapedirs = floats(arrays, "shapedirs", &[Some(vertex_count), Some(3), None], &format!("({vertex_count}, 3, B)"))?;
+    let columns = shapedirs.shape[2];
+    if !(1..=BETA_LIMIT).contains(&columns) {
+        return Err(limited(&path, "shapedirs", &shapedirs.shape, format!("({vertex_count}, 3, B) with B from 1 to {BETA_LIMIT}")));
     }
-    let regressor = floats("J_regressor", &[Some(JOINT_COUNT), Some(vertex_count)], format!("({JOINT_COUNT}, {vertex_count})"))?;
-    let weights = floats("weights", &[Some(vertex_count), Some(JOINT_COUNT)], format!("({vertex_count}, {JOINT_COUNT})"))?;
-    let mut integers = |key: &str, expected: &[Option<usize>], expectation: &str| {
-        npz.integers(key, expected, expectation)?.ok_or_else(|| missing(path, key))
-    };
-    let kintree = integers("kintree_table", &[Some(2), Some(JOINT_COUNT)], "(2, 24)")?;
-    let faces = integers("f", &[None, Some(3)], "(F, 3)")?;
+    let beta_count = kind.beta_count(columns);
+    let shape_directions = shapedirs.values.chunks_exact(columns).flat_map(|row| &row[..beta_count]).copied().collect();
+    let regressor = floats(arrays, "J_regressor", &[Some(joint_count), Some(vertex_count)], &format!("({joint_count}, {vertex_count})"))?;
+    let weights = floats(arrays, "weights", &[Some(vertex_count), Some(joint_count)], &format!("({vertex_count}, {joint_count})"))?;
+    let faces = integers(arrays, "f", &[None, Some(3)], "(F, 3)")?;
     if !(1..=TRIANGLE_LIMIT).contains(&faces.shape[0]) {
-        return Err(limited(path, "f", &faces.shape, format!("(F, 3) with F from 1 to {TRIANGLE_LIMIT}")));
+        return Err(limited(&path, "f", &faces.shape, format!("(F, 3) with F from 1 to {TRIANGLE_LIMIT}")));
     }
-    let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-    let gender = npz.text("gender")?.and_then(|name| Gender::from_name(&name)).or_else(|| gender_in_file_name(&stem));
-    Ok(RawModel {
-        path: path.to_owned(),
-        id: stem,
+    let gender = arrays
+        .get("gender")
+        .map_err(BodyError::Arrays)?
+        .and_then(|entry| Gender::from_name(&entry.text().ok()?))
+        .or_else(|| gender_in_name(&path));
+    let raw = RawModel {
+        id: id(&path),
+        path,
+        space: kind.space(),
         gender,
         template: template.values,
-        shape_directions: shapedirs.values,
+        shape_directions,
         beta_count,
         pose_blocks: Rows::new(std::iter::empty::<Vec<PoseBlock>>()),
         regressor: regressor.values,
         weights: weights.values,
-        parents: kintree.values[..JOINT_COUNT].to_vec(),
         faces: faces.values,
-    })
-}
-
-/// Of one vertex' posedirs (3, 207), the joints' blocks (3, 9) that are not zero.
-pub(crate) fn pose_blocks(directions: &[f64]) -> Vec<PoseBlock> {
-    let block = |joint: usize| PoseBlock {
-        joint: joint as u8,
-        coefficients: std::array::from_fn(|i| directions[(i / 9) * POSE_FEATURES + 9 * (joint - 1) + i % 9] as f32),
     };
-    (1..JOINT_COUNT).map(block).filter(|block| block.coefficients.iter().any(|&c| c != 0.0)).collect()
+    Ok(FileModel { raw, parents: kintree.values[..joint_count].to_vec() })
 }
 
-/// `SMPL_FEMALE`, `basicmodel_m_lbs_10_207_0_v1.0.0`.
-fn gender_in_file_name(stem: &str) -> Option<Gender> {
-    stem.split(['_', '-', '.']).find_map(Gender::from_name)
+fn stem(path: Option<&Path>) -> Option<String> {
+    Some(path?.file_stem()?.to_string_lossy().into_owned())
 }
 
-fn missing(path: &Path, key: &str) -> BodyError {
-    BodyError::MissingKey { path: path.to_owned(), key: key.to_owned() }
+/// The file's stem, with its folder where that alone tells files apart (`female/model.npz`).
+fn id(path: &Path) -> String {
+    let own = stem(Some(path)).unwrap_or_default();
+    match stem(path.parent()) {
+        Some(folder) if own == "model" => format!("{folder}/{own}"),
+        _ => own,
+    }
+}
+
+/// `SMPL_FEMALE`, `basicmodel_m_lbs_10_207_0_v1.0.0`, `smplh/male/model`.
+fn gender_in_name(path: &Path) -> Option<Gender> {
+    let in_name = |name: String| name.split(['_', '-', '.']).find_map(Gender::from_name);
+    stem(Some(path)).and_then(in_name).or_else(|| stem(path.parent()).and_then(in_name))
 }
 
 fn limited(path: &Path, key: &str, shape: &[usize], expected: String) -> BodyError {
-    BodyError::Shape { path: path.to_owned(), key: key.to_owned(), found: shape.iter().map(|&size| size as u64).collect(), expected }
+    let found = shape.iter().map(|&size| size as u64).collect();
+    BodyError::Arrays(ArraysError::Shape { path: path.to_owned(), key: key.to_owned(), found, expected })
 }

@@ -4,7 +4,8 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-use crate::npz::NpzWriter;
+use cromosim_arrays::NpzWriter;
+
 use crate::{BodyError, BodyModel, JOINT_COUNT, Joint};
 
 impl BodyModel {

@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use cromosim_body::npz::NpzReader;
+use cromosim_arrays::NpzReader;
 use cromosim_body::{BodyModel, BodyPose, Joint, ShapedBody};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use cromosim_body::npz::{NpzReader, NpzWriter};
+use cromosim_arrays::{NpzReader, NpzWriter};
 use cromosim_body::{BodyModel, Joint, ShapedBody};
 use nalgebra::Vector3;
 
@@ -112,7 +112,7 @@ fn named_sites_are_carried_over_to_other_bodies() {
     target.integers("f", &[embedded.faces().len(), 3], &faces).unwrap();
     target.finish().unwrap();
 
-    let other = BodyModel::read_npz(&other).unwrap();
+    let other = BodyModel::read(&other).unwrap();
     assert_eq!(other.site_names().count(), 68);
     let other = ShapedBody::new(other, &[]).unwrap();
     let distances = embedded.site_names().map(|name| {

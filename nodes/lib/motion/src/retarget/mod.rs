@@ -13,11 +13,10 @@ mod lead_in;
 mod rest;
 mod scale;
 mod segments;
-mod shape_fit;
 
 use std::sync::Arc;
 
-use cromosim_body::{BodyModel, BodyPose, Gender, JOINT_COUNT, Joint, ShapedBody};
+use cromosim_body::{BodyModel, BodyPose, Gender, JOINT_COUNT, Joint, ShapeFit, ShapedBody};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use crate::axes::{axis_name, minimal_rotation};
@@ -48,7 +47,7 @@ pub fn retarget(clip: &BvhClip, body: &Arc<BodyModel>, options: &MotionOptions) 
     let up_in_file = scale::up_axis(clip, &map, options.up_axis)?;
     let rest = rest::choose(clip, &map, options.rest, up_in_file)?;
     let (unit_scale_m, source_height_m) = scale::unit_scale(clip.name(), &map, &rest, body, options.unit_scale_m)?;
-    let (betas, bone_length_rms_m) = shape_fit::fit_betas(&map, &rest, body, unit_scale_m);
+    let ShapeFit { betas, length_rms_m: bone_length_rms_m } = body.fit_bone_lengths(|joint| rest.joint(&map, joint), unit_scale_m);
     let shaped = ShapedBody::new(body.clone(), &betas)?;
     let leg_ratio = scale::leg_length(&|joint| Some(shaped.joints_in_model()[joint.index()]))
         / (unit_scale_m * scale::leg_length(&|joint| rest.joint(&map, joint)));
