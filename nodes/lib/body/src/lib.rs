@@ -37,6 +37,7 @@ mod shape_fit;
 mod site;
 mod skin;
 mod subset;
+mod transfer;
 mod write;
 
 pub use error::BodyError;

@@ -49,7 +49,7 @@ impl BodyModel {
         if body.faces == Self::embedded().faces {
             body.space = ShapeSpace::Cromosim;
         }
-        body.sites = crate::site::transferred_sites(&body)?;
+        body.sites = crate::transfer::transferred_sites(&body)?;
         Ok(Arc::new(body))
     }
 }

@@ -39,36 +39,7 @@ pub(crate) fn embedded_sites(body: &BodyModel) -> Result<Vec<NamedSite>, BodyErr
     records.into_iter().map(site).collect()
 }
 
-/// The embedded body's sites on another body. With the embedded body's triangles they are the same; else each keeps its place
-/// relative to its joint, scaled by the bone's length, on the nearest skin that this joint moves: centimetres off, not more exact than
-/// a person's hand.
-pub(crate) fn transferred_sites(body: &BodyModel) -> Result<Vec<NamedSite>, BodyError> {
-    let embedded = BodyModel::embedded();
-    if body.faces == embedded.faces {
-        return Ok(embedded.sites.clone());
-    }
-    let (from, _) = embedded.joint_shape_directions();
-    let (to, _) = body.joint_shape_directions();
-    let owners = body.triangle_owners();
-    let transferred = |named: &NamedSite| {
-        let joint = named.site.joint;
-        let point = point_at(&embedded.faces[named.site.triangle as usize], &named.site.barycentrics, &embedded.template);
-        let scale = bone_length(&to, joint) / bone_length(&from, joint);
-        let wanted = to[joint.index()] + (point - from[joint.index()]) * scale;
-        let site = nearest(body, &body.template, wanted, |triangle| owners[triangle] == joint)
-            .or_else(|| nearest(body, &body.template, wanted, |_| true));
-        site.map(|site| NamedSite { name: named.name.clone(), site })
-    };
-    Ok(embedded.sites.iter().filter_map(transferred).collect())
-}
-
-/// From a joint to its first child, or from its parent where it is the last.
-fn bone_length(joints: &[Vector3<f64>; JOINT_COUNT], joint: Joint) -> f64 {
-    let other = joint.children().next().or(joint.parent()).unwrap_or(joint);
-    (joints[joint.index()] - joints[other.index()]).norm()
-}
-
-fn point_at(corners: &[u32; 3], barycentrics: &[f64; 3], vertices: &[Vector3<f64>]) -> Vector3<f64> {
+pub(crate) fn point_at(corners: &[u32; 3], barycentrics: &[f64; 3], vertices: &[Vector3<f64>]) -> Vector3<f64> {
     corners.iter().zip(barycentrics).map(|(&vertex, weight)| vertices[vertex as usize] * *weight).sum()
 }
 
@@ -141,7 +112,7 @@ impl BodyModel {
         Joint::ALL.into_iter().rev().max_by(|a, b| sums[a.index()].total_cmp(&sums[b.index()])).unwrap_or(Joint::Pelvis)
     }
 
-    fn triangle_owners(&self) -> Vec<Joint> {
+    pub(crate) fn triangle_owners(&self) -> Vec<Joint> {
         self.faces.iter().map(|corners| self.owner(corners, &[1.0 / 3.0; 3])).collect()
     }
 }
@@ -176,7 +147,7 @@ impl ShapedBody {
 }
 
 /// The nearest point on the triangles that `allowed` lets pass; the first of equals.
-fn nearest(body: &BodyModel, vertices: &[Vector3<f64>], point: Vector3<f64>, allowed: impl Fn(usize) -> bool) -> Option<Site> {
+pub(crate) fn nearest(body: &BodyModel, vertices: &[Vector3<f64>], point: Vector3<f64>, allowed: impl Fn(usize) -> bool) -> Option<Site> {
     let mut best: Option<(f64, usize, [f64; 3])> = None;
     for (triangle, corners) in body.faces.iter().enumerate().filter(|(triangle, _)| allowed(*triangle)) {
         let barycentrics = nearest_barycentrics(point, corners.map(|vertex| vertices[vertex as usize]));
