@@ -13,7 +13,7 @@ use cromosim_body::{BodyModel, ShapedBody};
 use cromosim_imu::{
     Covariances, Device, MAX_RATE_HZ, MountedSites, PlacementSet, Scheme, SensorTrajectory, StreamingEffects, simulate_kinematics_on,
 };
-use cromosim_motion::{MotionOptions, SmplMotion, UpAxis, embedded_walk, read_motion};
+use cromosim_motion::{MotionOptions, SmplMotion, UpAxis, embedded_walk, read_motion_for};
 use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_msgs::sensor_msgs::Imu;
@@ -204,7 +204,7 @@ impl Setup {
 
     fn read(&self, path: Option<&PathBuf>) -> anyhow::Result<SmplMotion> {
         Ok(match path {
-            Some(path) => read_motion(path, &self.motion)?,
+            Some(path) => read_motion_for(path, &self.model, &self.motion)?,
             None => embedded_walk().slice(self.motion.start_s, self.motion.duration_s)?,
         })
     }

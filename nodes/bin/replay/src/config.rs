@@ -27,6 +27,8 @@ node_config! {
         pub up_axis: String = "auto".to_owned(),
         /// Metres of one unit of the motion file; 0: found out from the skeleton's size.
         pub unit_m: f64 = 0.0,
+        /// Body model file that the motion's person is fitted to: the one that smpl_state and virtual_imu have; empty: the embedded body.
+        pub body: String = String::new(),
         /// A skeleton map of one's own (YAML); empty: the one that fits the file's joint names.
         pub skeleton_map: String = String::new(),
         /// Tells several people apart.

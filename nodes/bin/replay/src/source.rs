@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use cromosim_bag::{BagReader, Message, Messages, Selection};
-use cromosim_motion::{MotionOptions, SmplMotion, UpAxis, embedded_walk, read_motion};
+use cromosim_body::BodyModel;
+use cromosim_motion::{MotionOptions, SmplMotion, UpAxis, embedded_walk, read_motion_for};
 use cromosim_msgs::cromosim_msgs::SmplPose;
 use cromosim_msgs::std_msgs::Header;
 use cromosim_spatial::Stamp;
@@ -45,7 +46,8 @@ impl MotionSource {
                 duration_s,
                 ..MotionOptions::default()
             };
-            read_motion(Path::new(&config.motion), &options)?
+            let body = if config.body.is_empty() { BodyModel::embedded() } else { BodyModel::read(Path::new(&config.body))? };
+            read_motion_for(Path::new(&config.motion), &body, &options)?
         };
         Ok(Self { motion, body_id: config.body_id.clone(), frame_id: config.frame_id.clone() })
     }

@@ -88,7 +88,7 @@ impl ArrayData {
 
     /// Number of elements.
     pub fn element_count(&self) -> usize {
-        self.shape.iter().product()
+        if self.shape.contains(&0) { 0 } else { self.shape.iter().product() }
     }
 
     /// The elements of an array of objects, in C order; none of another.
@@ -179,8 +179,9 @@ fn element_count(shape: &[usize]) -> Result<usize, String> {
     if empty && shape.iter().any(|&size| size > EMPTY_DIMENSION_LIMIT) {
         return Err(format!("shape {shape:?} of an empty array"));
     }
-    let product = if empty { Some(0) } else { shape.iter().try_fold(1_usize, |product, &size| product.checked_mul(size)) };
-    product.ok_or_else(|| format!("shape {shape:?} has more elements than any memory holds"))
+    // Of an empty array too, so that whoever multiplies its other dimensions does not overflow.
+    let product = shape.iter().filter(|&&size| size > 0).try_fold(1_usize, |product, &size| product.checked_mul(size));
+    product.map(|product| if empty { 0 } else { product }).ok_or_else(|| format!("shape {shape:?} has more elements than any memory holds"))
 }
 
 fn c_strides(shape: &[usize]) -> Vec<usize> {
@@ -237,6 +238,7 @@ mod tests {
         };
         assert!(check(&[], "<f8", 8) && check(&[0, 7], "<f8", 0) && check(&[3], "<U0", 0));
         assert!(!check(&[1 << 40, 1 << 40], "<f8", 8) && !check(&[1 << 60], "<U0", 0) && !check(&[1 << 60, 0], "<f8", 0));
+        assert!(check(&[1 << 20, 0], "<f8", 0) && !check(&[1 << 23, 1 << 23, 1 << 23, 0], "<f8", 0));
         assert!(!check(&[2], "<f8", 15) && !check(&[2], "<f8", 17) && !check(&[1; 40], "<f8", 8));
     }
 }

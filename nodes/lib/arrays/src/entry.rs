@@ -262,7 +262,7 @@ impl Entry {
 
     fn check_size(&self, elements: usize) -> Result<(), ArraysError> {
         if elements > ELEMENTS_LIMIT {
-            let (bytes, limit) = (8 * elements as u64, 8 * ELEMENTS_LIMIT as u64);
+            let (bytes, limit) = ((elements as u64).saturating_mul(8), 8 * ELEMENTS_LIMIT as u64);
             return Err(ArraysError::TooLarge { path: self.path.to_path_buf(), key: self.key.clone(), bytes, limit });
         }
         Ok(())

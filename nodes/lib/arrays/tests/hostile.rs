@@ -110,6 +110,34 @@ fn declared_sizes_take_no_memory() {
     assert!(read(b"\x80\x02]r\xff\xff\xff\x7f.").unwrap_err().to_string().contains("out of turn"));
 }
 
+/// A matrix of scipy with three stored numbers.
+fn sparse_pickle(rows: &str, columns: &str, ends: &[u8]) -> Vec<u8> {
+    let array = |bytes: &[u8]| {
+        let shape = format!("(I{}\nt", bytes.len());
+        let whole = array_pickle(&shape, bytes);
+        let text = whole.windows(4).position(|part| part == b"S'f8").unwrap();
+        [&whole[..text], b"S'u1", &whole[text + 4..whole.len() - 1]].concat()
+    };
+    let start = format!(
+        "ccopy_reg\n_reconstructor\n(cscipy.sparse.csc\ncsc_matrix\nc__builtin__\nobject\nNtR(dS'_shape'\n(I{rows}\nI{columns}\ntsS'data'\n"
+    );
+    [start.as_bytes(), &array(&[1, 2, 3]), b"sS'indices'\n", &array(&[0, 1, 1]), b"sS'indptr'\n", &array(ends), b"sb."].concat()
+}
+
+#[test]
+fn sparse_matrices_are_checked() {
+    let dense = read(sparse_pickle("2", "2", &[0, 1, 3])).unwrap().floats(&[Some(2), Some(2)], "(2, 2)").unwrap();
+    assert_eq!(dense.values, [1.0, 0.0, 0.0, 5.0]);
+    for (rows, columns, ends) in
+        [("1", "2", &[0, 1, 3][..]), ("2", "2", &[0, 1]), ("2", "2", &[0, 3, 1]), ("2", "2", &[0, 1, 4]), ("-2", "2", &[0, 1, 3])]
+    {
+        assert!(read(sparse_pickle(rows, columns, ends)).is_err(), "{rows} {columns} {ends:?}");
+    }
+    let wide = read(sparse_pickle("4000000000", "2", &[0, 1, 3])).unwrap();
+    assert!(matches!(wide.floats(&[None, None], "(R, C)"), Err(ArraysError::TooLarge { .. })));
+    assert!(read(sparse_pickle("9000000000000000000", "2", &[0, 1, 3])).is_err());
+}
+
 #[test]
 fn npy_headers_are_checked() {
     let npy =
