@@ -47,6 +47,28 @@ pub enum MotionError {
         /// What stands there.
         found: String,
     },
+    /// Something else was expected at a byte of a binary file.
+    #[error("{name}, byte {offset}: expected {expected}, found {found}")]
+    Bytes {
+        /// The file.
+        name: String,
+        /// 0-based.
+        offset: usize,
+        /// What fits.
+        expected: String,
+        /// What stands there.
+        found: String,
+    },
+    /// Several people in a recording, or none of the given name.
+    #[error("{name}: subject {given} asked for, the file has {}; set subject to one of them", if known.is_empty() { "no named subjects".to_owned() } else { known.join(", ") })]
+    Subject {
+        /// The file.
+        name: String,
+        /// What was asked for.
+        given: String,
+        /// The subjects that the labels name.
+        known: Vec<String>,
+    },
     /// A frame has the wrong number of values.
     #[error("{name}, line {line}: expected {expected} channels, found {found}")]
     ChannelCount {

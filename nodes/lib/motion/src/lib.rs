@@ -11,23 +11,33 @@
 //! assert!(halfway.root_position.z > 0.5);
 //! ```
 
+mod amc;
+mod asf;
 mod axes;
 mod bvh;
+mod c3d;
 mod error;
+mod markers;
 mod motion;
 mod options;
 mod read;
 mod report;
 mod retarget;
 mod skeleton_map;
+mod trc;
 mod walk;
 
+pub use amc::{AMC_RATE_HZ, parse_amc};
+pub use asf::{AsfBone, AsfChannel, AsfSkeleton, parse_asf};
 pub use bvh::{BvhClip, BvhJoint, Channel, MAX_JOINTS, MAX_VALUE, SkeletonPose, parse_bvh};
+pub use c3d::parse_c3d;
 pub use error::MotionError;
+pub use markers::MarkerClip;
 pub use motion::SmplMotion;
 pub use options::{MotionOptions, RestChoice, UpAxis};
 pub use read::{read_motion, read_motion_for};
 pub use report::RetargetReport;
 pub use retarget::retarget;
 pub use skeleton_map::{FeetAtRest, Sides, SkeletonMap};
+pub use trc::parse_trc;
 pub use walk::embedded_walk;

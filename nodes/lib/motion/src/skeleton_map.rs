@@ -9,8 +9,9 @@ use serde::Deserialize;
 use crate::axes::frame_of;
 use crate::{BvhClip, MotionError};
 
-const EMBEDDED: [(&str, &str); 5] = [
+const EMBEDDED: [(&str, &str); 6] = [
     ("cmu", include_str!("../maps/cmu.yaml")),
+    ("cmu_asf", include_str!("../maps/cmu_asf.yaml")),
     ("daz", include_str!("../maps/daz.yaml")),
     ("lafan1", include_str!("../maps/lafan1.yaml")),
     ("mixamo", include_str!("../maps/mixamo.yaml")),
@@ -119,7 +120,7 @@ pub(crate) struct BoundMap {
 }
 
 impl SkeletonMap {
-    /// The maps that come with the suite: cmu, daz, lafan1, mixamo, xsens.
+    /// The maps that come with the suite: cmu, cmu_asf, daz, lafan1, mixamo, xsens.
     ///
     /// # Errors
     /// None in practice: a test reads them all.

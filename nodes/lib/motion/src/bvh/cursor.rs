@@ -4,7 +4,7 @@ use crate::MotionError;
 use crate::bvh::MAX_VALUE;
 
 /// Reads words and lines one after the other.
-pub(super) struct Cursor<'a> {
+pub(crate) struct Cursor<'a> {
     rest: &'a str,
     line: usize,
     name: &'a str,
@@ -12,7 +12,7 @@ pub(super) struct Cursor<'a> {
 
 /// A word or line and the 1-based line it stands on.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Token<'a> {
+pub(crate) struct Token<'a> {
     pub text: &'a str,
     pub line: usize,
 }

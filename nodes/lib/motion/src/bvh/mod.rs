@@ -3,7 +3,7 @@
 //! There is no standard; what is read follows what tools write. A joint's rotation is the product of its rotation channels in their order,
 //! `Rz Rx Ry` for `Zrotation Xrotation Yrotation`, in degrees; position channels take the place of the joint's rest position.
 
-mod cursor;
+pub(crate) mod cursor;
 mod frames;
 mod hierarchy;
 mod kinematics;

@@ -1,7 +1,10 @@
 //! What several tests need.
 #![allow(dead_code, clippy::unwrap_used)]
 
+pub mod acclaim;
 pub mod export;
+pub mod known;
+pub mod marker_files;
 
 use std::path::PathBuf;
 
