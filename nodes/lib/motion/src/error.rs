@@ -69,6 +69,31 @@ pub enum MotionError {
         /// The subjects that the labels name.
         known: Vec<String>,
     },
+    /// The recording's labels are not those of the marker set.
+    #[error(
+        "{name}: {found} of the {total} markers of set {set} found, {needed} needed; labels there: {}; choose or write another marker_set",
+        labels.join(", ")
+    )]
+    MarkerLabels {
+        /// The file.
+        name: String,
+        /// The marker set.
+        set: String,
+        /// How many of its markers are in the file.
+        found: usize,
+        /// How many it has.
+        total: usize,
+        /// How many a fit takes.
+        needed: usize,
+        /// The first labels of the file.
+        labels: Vec<String>,
+    },
+    /// No frame shows three markers.
+    #[error("{name}: no frame shows three markers of the set; check the labels and the recording's gaps")]
+    NoMarkers {
+        /// The file.
+        name: String,
+    },
     /// A frame has the wrong number of values.
     #[error("{name}, line {line}: expected {expected} channels, found {found}")]
     ChannelCount {
@@ -164,7 +189,15 @@ pub enum MotionError {
         /// The reason, with its line.
         source: serde_norway::Error,
     },
-    /// A skeleton map contradicts itself.
+    /// A marker set cannot be parsed.
+    #[error("{origin}: not a marker set: {source}")]
+    MarkerSetSyntax {
+        /// The set's file.
+        origin: String,
+        /// The reason, with its line.
+        source: serde_norway::Error,
+    },
+    /// A skeleton map or a marker set contradicts itself.
     #[error("{origin}: key {key}: {problem}")]
     MapContent {
         /// The map's file.

@@ -32,7 +32,7 @@ pub use asf::{AsfBone, AsfChannel, AsfSkeleton, parse_asf};
 pub use bvh::{BvhClip, BvhJoint, Channel, MAX_JOINTS, MAX_VALUE, SkeletonPose, parse_bvh};
 pub use c3d::parse_c3d;
 pub use error::MotionError;
-pub use markers::MarkerClip;
+pub use markers::{MarkerClip, MarkerFit, MarkerOptions, MarkerPlace, MarkerReport, MarkerSet, SetMarker, fit_markers, place_markers};
 pub use motion::SmplMotion;
 pub use options::{MotionOptions, RestChoice, UpAxis};
 pub use read::{read_motion, read_motion_for};

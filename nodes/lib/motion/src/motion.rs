@@ -3,7 +3,7 @@
 use cromosim_body::{BodyPose, Gender, JOINT_COUNT};
 use nalgebra::{UnitQuaternion, Vector3};
 
-use crate::{MotionError, RetargetReport};
+use crate::{MarkerReport, MotionError, RetargetReport};
 
 /// A clip: poses at a constant rate, in a world with z up.
 #[derive(Clone, Debug)]
@@ -22,6 +22,8 @@ pub struct SmplMotion {
     pub confidence: Option<Vec<f64>>,
     /// How the source was read, where it was retargeted.
     pub report: Option<RetargetReport>,
+    /// How the markers were fitted, where it comes from markers.
+    pub markers: Option<MarkerReport>,
 }
 
 impl SmplMotion {
@@ -114,6 +116,7 @@ impl SmplMotion {
             frames: Vec::new(),
             confidence: None,
             report: self.report.clone(),
+            markers: self.markers.clone(),
         }
     }
 

@@ -117,11 +117,11 @@ fn errors_name_file_and_place() {
         (of_trc(&text.replace("DataRate", "Rate")), "a.trc, line 2: expected DataRate"),
         (of_trc(&text.replace("\tmm\t", "\tleague\t")), "a.trc, line 3: expected Units of mm, cm, m, in or ft, found \"league\""),
         (of_trc(&text.replace("120.000", "0")), "a.trc: rate_hz is 0, expected 0.1 to 100000 Hz"),
-        (of_trc(&text.replace("\t4\t3\t", "\t5\t3\t")), "a.trc, line 9: expected 5 frames (as line 3 says), found 4"),
+        (of_trc(&text.replace("\t4\t3\t", "\t5\t3\t")), "a.trc, line 10: expected 5 frames (as line 3 says), found 4"),
         (of_trc(&text.replace("\t4\t3\t", "\t4\t2\t")), "a.trc, line 4: expected 2 labels (as line 3 says), found \"3 labels\""),
         (of_trc(&text.replace("\t4\t3\t", "\t4\t30000\t")), "a.trc, line 3: more than 10000 markers"),
-        (of_trc(&text.replace("\t500.00", "\t5oo.00")), "a.trc, line 6: expected a coordinate, found \"5oo."),
-        (of_trc(&format!("{} 7\t8\n", text.trim_end())), "a.trc, line 9: expected"),
+        (of_trc(&text.replace("\t500.00", "\t5oo.00")), "a.trc, line 7: expected a coordinate, found \"5oo."),
+        (of_trc(&format!("{} 7\t8\n", text.trim_end())), "a.trc, line 10: expected"),
     ];
     for (found, expected) in cases {
         assert!(found.starts_with(expected), "expected {expected}\n   found {found}");

@@ -81,6 +81,7 @@ pub fn retarget(clip: &BvhClip, body: &Arc<BodyModel>, options: &MotionOptions) 
         frames,
         confidence: None,
         report: Some(report),
+        markers: None,
     })
 }
 
@@ -116,7 +117,7 @@ impl Source<'_> {
     }
 }
 
-fn check_finite(name: &str, frames: &[BodyPose]) -> Result<(), MotionError> {
+pub(crate) fn check_finite(name: &str, frames: &[BodyPose]) -> Result<(), MotionError> {
     for (frame, pose) in frames.iter().enumerate() {
         let not_finite = |what| MotionError::NotFinite { name: name.to_owned(), frame, what };
         if !pose.root_position.iter().all(|value| value.is_finite()) {

@@ -52,5 +52,6 @@ fn make() -> SmplMotion {
         frames: continuous(frames),
         confidence: None,
         report: None,
+        markers: None,
     }
 }

@@ -1,0 +1,161 @@
+//! The fit as a whole: labels, person, poses, report.
+
+use std::sync::Arc;
+
+use cromosim_body::{BodyModel, Gender, Joint, Site};
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use super::bind::{Bound, bind};
+use super::clip::MarkerClip;
+use super::keyframes::choose;
+use super::prior::PosePrior;
+use super::report::{MarkerFit, MarkerReport};
+use super::set::MarkerSet;
+use super::shape::{Keyframe, Person, fit_person, joint_sigmas};
+use super::skin::{ShapedSkin, Skin};
+use super::start::{cold_start, trunk_markers};
+use super::track::Tracker;
+use crate::axes::axis_name;
+use crate::motion::continuous;
+use crate::{MotionError, SmplMotion, UpAxis};
+
+/// Frames that the shape is fitted to.
+const KEYFRAMES: usize = 12;
+
+/// How to fit a body to markers; every field has a default.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MarkerOptions {
+    /// The subject whose markers are taken; needed where the labels name several.
+    pub subject: Option<String>,
+    /// The recording's up axis.
+    pub up_axis: UpAxis,
+    /// Metres per unit of the file; as the file says where absent.
+    pub unit_scale_m: Option<f64>,
+    /// Fits where each marker is stuck, about a centimetre around the set's place; else the set is taken at its word.
+    pub fit_placement: bool,
+    /// The largest number of shape coefficients that are fitted.
+    pub betas: usize,
+}
+
+impl Default for MarkerOptions {
+    fn default() -> Self {
+        Self { subject: None, up_axis: UpAxis::Detect, unit_scale_m: None, fit_placement: true, betas: 10 }
+    }
+}
+
+/// Finds the body that moved under the markers, after MoSh (Loper et al. 2014): shape, and where the markers are stuck, from twelve frames
+/// that are unlike each other; then, with these held, a pose for every frame.
+///
+/// A frame's cost is `sum rho(|m_i - y_i|) / (3 mm)^2 + w |pose - mean|^2 / sigma^2 + |pose - expected|^2 / sigma_t^2` with Huber's rho, linear
+/// beyond 3 mm, the marker `m_i` on the skin by linear blend skinning with pose corrections, the prior's weight w falling from 4 to 0.25
+/// where a frame starts from nothing, and what the frames around it promise. Markers that are not seen count nothing. The world has z up,
+/// the recording's origin and floor. The motion's `confidence` is the share of the set's markers that were seen.
+///
+/// # Errors
+/// [`MotionError`] where labels, subject, unit or up axis do not fit; the message says which option helps.
+pub fn fit_markers(
+    clip: &MarkerClip,
+    body: &Arc<BodyModel>,
+    set: &MarkerSet,
+    options: &MarkerOptions,
+) -> Result<(SmplMotion, MarkerReport), MotionError> {
+    let bound = bind(clip, body, set, options)?;
+    let skin = Skin::new(body, &bound.sites, options.betas.min(body.beta_count()))?;
+    let stuck_at: Vec<Vector3<f64>> = bound.markers.iter().map(|marker| Vector3::new(0.0, 0.0, marker.height_m)).collect();
+    let (prior, trunk) = (PosePrior::standing(), trunk_markers(&bound.sites.iter().map(|site| site.joint).collect::<Vec<Joint>>()));
+    let chosen = choose(&bound.frames, KEYFRAMES);
+    let mean = skin.shaped(&[], &stuck_at)?;
+    let keyframe = |&index: &usize| {
+        let observed = bound.frames[index].clone();
+        let pose = cold_start(&mean, &observed, &trunk, &prior, &[])?;
+        Some(Keyframe { observed, pose })
+    };
+    let mut keyframes: Vec<Keyframe> = chosen.par_iter().map(keyframe).collect::<Vec<_>>().into_iter().flatten().collect();
+    if keyframes.is_empty() {
+        return Err(MotionError::NoMarkers { name: clip.name.clone() });
+    }
+    let person = fit_person(&skin, &stuck_at, &prior, &mut keyframes, options.fit_placement)?;
+    let shaped = skin.shaped(&person.betas, &person.placements)?;
+    let known: Vec<_> = keyframes.iter().map(|frame| frame.pose.clone()).collect();
+    let tracker = Tracker { skin: &shaped, prior: &prior, trunk: &trunk, rate_hz: clip.rate_hz, known: &known };
+    let frames = continuous(tracker.track(&bound.frames));
+    crate::retarget::check_finite(&clip.name, &frames)?;
+    let (markers, rms_m) = marker_fits(&bound, &shaped, &person, &stuck_at, &frames);
+    let seen = |frame: &Vec<Option<Vector3<f64>>>| frame.iter().flatten().count() as f64 / set.markers().len() as f64;
+    let missing = bound.frames.iter().flatten().filter(|point| point.is_none()).count();
+    let sigmas = joint_sigmas(&shaped, &prior, &keyframes, rms_m / f64::sqrt(3.0));
+    let report = MarkerReport {
+        marker_set: set.name().to_owned(),
+        subjects: clip.subjects(),
+        up_axis: axis_name(bound.up_in_file),
+        unit_scale_m: options.unit_scale_m.unwrap_or(clip.unit_scale_m),
+        markers,
+        rms_m,
+        missing_share: missing as f64 / (bound.frames.len() * bound.sites.len()) as f64,
+        keyframes: chosen,
+        betas: person.betas.clone(),
+        joint_sigma_m: Joint::ALL.into_iter().zip(sigmas).collect(),
+        absent: bound.absent,
+        unknown: bound.unknown,
+    };
+    let motion = SmplMotion {
+        name: clip.name.clone(),
+        rate_hz: clip.rate_hz,
+        gender: body.gender().unwrap_or(Gender::Neutral),
+        betas: person.betas,
+        confidence: Some(bound.frames.iter().map(seen).collect()),
+        frames,
+        report: None,
+        markers: Some(report.clone()),
+    };
+    Ok((motion, report))
+}
+
+/// Each marker's error, worst first, and that of all together, m.
+fn marker_fits(
+    bound: &Bound<'_>,
+    shaped: &ShapedSkin<'_>,
+    person: &Person,
+    stuck_at: &[Vector3<f64>],
+    poses: &[cromosim_body::BodyPose],
+) -> (Vec<MarkerFit>, f64) {
+    let mut sums = vec![(0.0, 0_usize); bound.sites.len()];
+    for (frame, pose) in bound.frames.iter().zip(poses) {
+        let markers = shaped.posed(pose).markers;
+        for ((sum, seen), marker) in sums.iter_mut().zip(frame).zip(markers) {
+            if let Some(seen) = seen {
+                *sum = (sum.0 + (marker - seen).norm_squared(), sum.1 + 1);
+            }
+        }
+    }
+    let rms = |(squares, count): (f64, usize)| (squares / count.max(1) as f64).sqrt();
+    let fit = |(index, &sum): (usize, &(f64, usize))| MarkerFit {
+        label: bound.markers[index].label.clone(),
+        rms_m: rms(sum),
+        missing_share: 1.0 - sum.1 as f64 / poses.len().max(1) as f64,
+        moved_m: (person.placements[index] - stuck_at[index]).norm(),
+    };
+    let mut fits: Vec<MarkerFit> = sums.iter().enumerate().map(fit).collect();
+    fits.sort_by(|left, right| right.rms_m.total_cmp(&left.rms_m));
+    (fits, rms(sums.iter().fold((0.0, 0), |all, sum| (all.0 + sum.0, all.1 + sum.1))))
+}
+
+/// Where a set's markers are on a body in a pose of its own shape: what [`fit_markers`] would see.
+///
+/// # Errors
+/// [`MotionError`] where a place of the set is not on the body.
+pub fn place_markers(motion: &SmplMotion, body: &Arc<BodyModel>, set: &MarkerSet) -> Result<MarkerClip, MotionError> {
+    let sites: Vec<Site> = set.markers().iter().map(|marker| marker.site_on(body, set.name())).collect::<Result<_, _>>()?;
+    let skin = Skin::new(body, &sites, 0)?;
+    let stuck_at: Vec<Vector3<f64>> = set.markers().iter().map(|marker| Vector3::new(0.0, 0.0, marker.height_m)).collect();
+    let shaped = skin.shaped(&motion.betas, &stuck_at)?;
+    let frame = |pose| shaped.posed(pose).markers.into_iter().map(|marker| Some(marker.into())).collect();
+    Ok(MarkerClip {
+        name: motion.name.clone(),
+        rate_hz: motion.rate_hz,
+        unit_scale_m: 1.0,
+        labels: set.markers().iter().map(|marker| marker.label.clone()).collect(),
+        frames: motion.frames.iter().map(frame).collect(),
+    })
+}

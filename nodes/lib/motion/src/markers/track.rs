@@ -1,0 +1,117 @@
+//! From frame to frame, with the person known.
+//!
+//! Frames are cut into chunks of a fixed length, which run in parallel: each begins on its own, a few frames early so that its first frame
+//! has a past, and goes on from frame to frame. A second pass then improves every frame with both of its neighbours from the first. What
+//! comes out depends on the frames alone, not on the number of threads.
+
+use cromosim_body::{BodyPose, JOINT_COUNT};
+use nalgebra::{UnitQuaternion, Vector3};
+use rayon::prelude::*;
+
+use super::frame::{Expected, Terms, solve};
+use super::prior::PosePrior;
+use super::skin::ShapedSkin;
+use super::start::{cold_start, placed};
+use crate::motion::slerp;
+
+/// Frames of a chunk.
+const CHUNK: usize = 240;
+/// Frames before a chunk that only lead into it.
+const RUN_IN: usize = 24;
+/// Steps of a frame that follows another one, and in the second pass.
+const STEPS: usize = 6;
+const STEPS_AGAIN: usize = 2;
+const PRIOR_WEIGHT: f64 = 0.25;
+const HUBER_M: f64 = 0.003;
+/// Share of a joint's turn from frame to frame that the next frame is expected to have.
+const PERSISTENCE: f64 = 0.9;
+/// How far poses depart from what their past promises at 120 Hz: about 100 rad/s^2 and 30 m/s^2.
+const TURN_SIGMA: f64 = 0.02;
+const POSITION_SIGMA_M: f64 = 0.005;
+/// Fewer markers than these do not start a chunk.
+const MARKERS_TO_START: usize = 6;
+
+/// Everything that is the same for all frames.
+pub(super) struct Tracker<'a> {
+    pub skin: &'a ShapedSkin<'a>,
+    pub prior: &'a PosePrior,
+    pub trunk: &'a [bool],
+    pub rate_hz: f64,
+    /// Poses of the keyframes.
+    pub known: &'a [BodyPose],
+}
+
+impl Tracker<'_> {
+    /// A pose for every frame.
+    pub fn track(&self, frames: &[Vec<Option<Vector3<f64>>>]) -> Vec<BodyPose> {
+        let chunk = |number: usize| {
+            let (first, end) = (number * CHUNK, ((number + 1) * CHUNK).min(frames.len()));
+            let lead = first.saturating_sub(RUN_IN);
+            self.chunk(&frames[lead..end]).split_off(first - lead)
+        };
+        let forward: Vec<BodyPose> = (0..frames.len().div_ceil(CHUNK)).into_par_iter().flat_map_iter(chunk).collect();
+        (0..frames.len()).into_par_iter().map(|index| self.again(frames, &forward, index)).collect()
+    }
+
+    fn chunk(&self, frames: &[Vec<Option<Vector3<f64>>>]) -> Vec<BodyPose> {
+        let seen = |frame: &[Option<Vector3<f64>>]| frame.iter().flatten().count();
+        let start = frames.iter().position(|frame| seen(frame) >= MARKERS_TO_START).unwrap_or(0);
+        let observed = frames.get(start).map_or(&[][..], |frame| frame);
+        let fallback = || self.known.first().cloned().unwrap_or_else(|| self.prior.mean_pose());
+        let mut pose = cold_start(self.skin, observed, self.trunk, self.prior, self.known).unwrap_or_else(fallback);
+        let mut poses: Vec<BodyPose> = Vec::with_capacity(frames.len());
+        for (index, frame) in frames.iter().enumerate() {
+            if index > 0 {
+                let expected = self.expected(extrapolated(&pose, index.checked_sub(2).map(|before| &poses[before])), 1.0);
+                // A body that was lost is looked for anew once it can be seen again.
+                let lost = seen(&frames[index - 1]) < 3 && seen(frame) >= MARKERS_TO_START;
+                let found = if lost { placed(self.skin, frame, self.trunk, &pose) } else { None };
+                let expected = if found.is_some() { None } else { Some(&expected) };
+                let start = found.or_else(|| expected.map(|expected| expected.pose.clone())).unwrap_or_else(|| pose.clone());
+                pose = solve(self.skin, frame, &self.terms(expected), start, STEPS).0;
+            }
+            poses.push(pose.clone());
+        }
+        poses
+    }
+
+    fn terms<'a>(&'a self, expected: Option<&'a Expected>) -> Terms<'a> {
+        Terms { prior: self.prior, prior_weight: PRIOR_WEIGHT, huber_m: HUBER_M, expected }
+    }
+
+    fn expected(&self, pose: BodyPose, share: f64) -> Expected {
+        // Departures are accelerations: they grow with the square of the time between frames.
+        let slower = (120.0 / self.rate_hz).powi(2);
+        Expected {
+            pose,
+            turn_sigma: (share * TURN_SIGMA * slower).clamp(1e-3, 1.0),
+            position_sigma_m: (share * POSITION_SIGMA_M * slower).clamp(1e-4, 1.0),
+        }
+    }
+
+    /// The second pass: what both neighbours promise, half as far off as what one does.
+    fn again(&self, frames: &[Vec<Option<Vector3<f64>>>], poses: &[BodyPose], index: usize) -> BodyPose {
+        let own = poses[index].clone();
+        let Some((before, after)) = index.checked_sub(1).and_then(|before| Some((&poses[before], poses.get(index + 1)?))) else {
+            return own;
+        };
+        let middle = BodyPose {
+            root_position: (before.root_position + after.root_position) / 2.0,
+            local_rotations: std::array::from_fn(|joint| slerp(&before.local_rotations[joint], &after.local_rotations[joint], 0.5)),
+        };
+        solve(self.skin, &frames[index], &self.terms(Some(&self.expected(middle, 0.5))), own, STEPS_AGAIN).0
+    }
+}
+
+/// The pose after `pose` if it goes on as it came from `before`, a little slower.
+fn extrapolated(pose: &BodyPose, before: Option<&BodyPose>) -> BodyPose {
+    let Some(before) = before else { return pose.clone() };
+    let rotation = |joint: usize| {
+        let way = (before.local_rotations[joint].inverse() * pose.local_rotations[joint]).scaled_axis() * PERSISTENCE;
+        pose.local_rotations[joint] * UnitQuaternion::from_scaled_axis(way)
+    };
+    BodyPose {
+        root_position: pose.root_position + (pose.root_position - before.root_position) * PERSISTENCE,
+        local_rotations: std::array::from_fn::<_, JOINT_COUNT, _>(rotation),
+    }
+}
