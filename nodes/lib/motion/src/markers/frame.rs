@@ -18,8 +18,9 @@ const LARGEST_DAMPING: f64 = 1e6;
 /// A pose that the neighbouring frames make likely.
 pub(super) struct Expected {
     pub pose: BodyPose,
-    /// Standard deviations: joints, rad; root, m.
-    pub turn_sigma: f64,
+    /// 1 / variance of the joints' turns about their axes, 1/rad^2.
+    pub turn_precisions: [Vector3<f64>; JOINT_COUNT],
+    /// Standard deviation of the root's position, m.
     pub position_sigma_m: f64,
 }
 
@@ -112,8 +113,7 @@ pub(super) fn normal_equations(
     for (joint, own) in pose.local_rotations.iter().enumerate() {
         normal.add_turn(joint, &terms.prior.means[joint], own, terms.prior.precisions[joint] * terms.prior_weight);
         if let Some(expected) = terms.expected {
-            let precision = Vector3::repeat(expected.turn_sigma.powi(-2));
-            normal.add_turn(joint, &expected.pose.local_rotations[joint], own, precision);
+            normal.add_turn(joint, &expected.pose.local_rotations[joint], own, expected.turn_precisions[joint]);
         }
     }
     if let Some(expected) = terms.expected {
@@ -133,7 +133,8 @@ pub(super) fn cost(observed: &[Option<Vector3<f64>>], terms: &Terms<'_>, pose: &
         let away = (terms.prior.means[joint].inverse() * own).scaled_axis();
         turns += 0.5 * terms.prior_weight * away.component_mul(&away).dot(&terms.prior.precisions[joint]);
         if let Some(expected) = terms.expected {
-            turns += 0.5 * (expected.pose.local_rotations[joint].angle_to(own) / expected.turn_sigma).powi(2);
+            let away = (expected.pose.local_rotations[joint].inverse() * own).scaled_axis();
+            turns += 0.5 * away.component_mul(&away).dot(&expected.turn_precisions[joint]);
         }
     }
     let root = terms.expected.map_or(0.0, |expected| {

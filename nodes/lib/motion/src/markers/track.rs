@@ -16,17 +16,18 @@ use crate::motion::slerp;
 
 /// Frames of a chunk.
 const CHUNK: usize = 240;
-/// Frames before a chunk that only lead into it.
-const RUN_IN: usize = 24;
+/// Frames before and after a chunk that only lead into it.
+const MARGIN: usize = 24;
 /// Steps of a frame that follows another one, and in the second pass.
 const STEPS: usize = 6;
 const STEPS_AGAIN: usize = 2;
-const PRIOR_WEIGHT: f64 = 0.25;
+const PRIOR_WEIGHT: f64 = 0.05;
 const HUBER_M: f64 = 0.003;
 /// Share of a joint's turn from frame to frame that the next frame is expected to have.
 const PERSISTENCE: f64 = 0.9;
 /// How far poses depart from what their past promises at 120 Hz: about 100 rad/s^2 and 30 m/s^2.
-const TURN_SIGMA: f64 = 0.02;
+const TURN_SIGMA: f64 = 0.05;
+const TURN_SHARE: f64 = 0.1;
 const POSITION_SIGMA_M: f64 = 0.005;
 /// Fewer markers than these do not start a chunk.
 const MARKERS_TO_START: usize = 6;
@@ -46,11 +47,24 @@ impl Tracker<'_> {
     pub fn track(&self, frames: &[Vec<Option<Vector3<f64>>>]) -> Vec<BodyPose> {
         let chunk = |number: usize| {
             let (first, end) = (number * CHUNK, ((number + 1) * CHUNK).min(frames.len()));
-            let lead = first.saturating_sub(RUN_IN);
-            self.chunk(&frames[lead..end]).split_off(first - lead)
+            let (lead, tail) = (first.saturating_sub(MARGIN), (end + MARGIN).min(frames.len()));
+            let mut poses = self.chunk(&frames[lead..tail]);
+            for backwards in [true, false] {
+                self.sweep(&frames[lead..tail], &mut poses, backwards);
+            }
+            poses.truncate(end - lead);
+            poses.split_off(first - lead)
         };
-        let forward: Vec<BodyPose> = (0..frames.len().div_ceil(CHUNK)).into_par_iter().flat_map_iter(chunk).collect();
-        (0..frames.len()).into_par_iter().map(|index| self.again(frames, &forward, index)).collect()
+        let poses: Vec<BodyPose> = (0..frames.len().div_ceil(CHUNK)).into_par_iter().flat_map_iter(chunk).collect();
+        (0..frames.len()).into_par_iter().map(|index| self.again(frames, &poses, index)).collect()
+    }
+
+    /// Every frame anew, with both of its neighbours as they are by then: what comes later in the sweep's direction is told to all before.
+    fn sweep(&self, frames: &[Vec<Option<Vector3<f64>>>], poses: &mut [BodyPose], backwards: bool) {
+        for step in 0..frames.len() {
+            let index = if backwards { frames.len() - 1 - step } else { step };
+            poses[index] = self.again(frames, poses, index);
+        }
     }
 
     fn chunk(&self, frames: &[Vec<Option<Vector3<f64>>>]) -> Vec<BodyPose> {
@@ -84,7 +98,11 @@ impl Tracker<'_> {
         let slower = (120.0 / self.rate_hz).powi(2);
         Expected {
             pose,
-            turn_sigma: (share * TURN_SIGMA * slower).clamp(1e-3, 1.0),
+            turn_precisions: std::array::from_fn(|joint| {
+                // A joint that bends little turns slowly, too; the root turns as it likes.
+                let usual = if joint == 0 { Vector3::repeat(TURN_SIGMA.powi(-2)) } else { self.prior.precisions[joint] / (TURN_SHARE * TURN_SHARE) };
+                usual / (share * slower).powi(2).clamp(1e-3, 1e3)
+            }),
             position_sigma_m: (share * POSITION_SIGMA_M * slower).clamp(1e-4, 1.0),
         }
     }
