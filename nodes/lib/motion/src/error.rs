@@ -28,12 +28,38 @@ pub enum MotionError {
         limit: u64,
     },
     /// The content is no known motion format.
-    #[error("{}: not a motion file: expected BVH (first word HIERARCHY), found {found}", path.display())]
+    #[error("{}: not a motion file: expected BVH (first word HIERARCHY), AMC, C3D or TRC, found {found}", path.display())]
     UnknownFormat {
         /// The file.
         path: PathBuf,
         /// How the content begins.
         found: String,
+    },
+    /// A skeleton without a motion.
+    #[error("{}: an Acclaim skeleton has no motion; give the AMC file, and this one as skeleton where it does not lie beside it", path.display())]
+    SkeletonOnly {
+        /// The file.
+        path: PathBuf,
+    },
+    /// No ASF file belongs to an AMC file.
+    #[error(
+        "{}: its skeleton is not beside it ({}); set skeleton to the ASF file",
+        path.display(),
+        if found.is_empty() { "no ASF file there".to_owned() } else { format!("only {}", found.join(", ")) }
+    )]
+    NoSkeleton {
+        /// The AMC file.
+        path: PathBuf,
+        /// ASF files beside it, with other names.
+        found: Vec<String>,
+    },
+    /// A marker set's name is neither embedded nor a file.
+    #[error("marker set {given} is neither a file nor one of {}", known.join(", "))]
+    UnknownMarkerSet {
+        /// What was given.
+        given: String,
+        /// The embedded sets.
+        known: Vec<String>,
     },
     /// Something else was expected at a line of the file.
     #[error("{name}, line {line}: expected {expected}, found {found}")]

@@ -1,8 +1,9 @@
 //! Motion files and the embedded walk, all in SMPL's joints.
 //!
-//! [`read_motion`] takes a file, finds out what it is by its content and retargets it: a [`SmplMotion`] in a world with z up, feet on z = 0,
-//! with shape coefficients fitted to the source's bones. [`embedded_walk`] is a motion without a file. The [`RetargetReport`] says how a
-//! source was understood.
+//! [`read_motion`] takes a file and finds out what it is by its content. Skeletons (BVH, ASF/AMC) are retargeted: a [`SmplMotion`] in a world
+//! with z up, feet on z = 0, with shape coefficients fitted to the source's bones; the [`RetargetReport`] says how a source was understood.
+//! To markers (C3D, TRC) a body is fitted, which stays on the recording's floor; the [`MarkerReport`] says how well. [`embedded_walk`] is a
+//! motion without a file.
 //!
 //! ```
 //! let walk = cromosim_motion::embedded_walk();
@@ -17,6 +18,7 @@ mod axes;
 mod bvh;
 mod c3d;
 mod error;
+mod format;
 mod markers;
 mod motion;
 mod options;
@@ -32,6 +34,7 @@ pub use asf::{AsfBone, AsfChannel, AsfSkeleton, parse_asf};
 pub use bvh::{BvhClip, BvhJoint, Channel, MAX_JOINTS, MAX_VALUE, SkeletonPose, parse_bvh};
 pub use c3d::parse_c3d;
 pub use error::MotionError;
+pub use format::MotionFormat;
 pub use markers::{MarkerClip, MarkerFit, MarkerOptions, MarkerPlace, MarkerReport, MarkerSet, SetMarker, fit_markers, place_markers};
 pub use motion::SmplMotion;
 pub use options::{MotionOptions, RestChoice, UpAxis};

@@ -1,11 +1,11 @@
 //! Settings of reading and retargeting.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
 use serde::Deserialize;
 
-use crate::{MotionError, SkeletonMap};
+use crate::{MarkerOptions, MarkerSet, MotionError, SkeletonMap};
 
 /// The direction that points up in the source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Deserialize)]
@@ -63,6 +63,16 @@ pub struct MotionOptions {
     pub rest: RestChoice,
     /// Keeps a leading T-pose and the frames that blend it into the motion.
     pub keep_lead_in: bool,
+    /// An AMC file's skeleton (ASF); the one beside it where absent.
+    pub skeleton: Option<PathBuf>,
+    /// An AMC file's frames per second, which it does not say; 120 Hz where absent.
+    pub rate_hz: Option<f64>,
+    /// An embedded marker set's name or a YAML file; plug_in_gait where absent.
+    pub marker_set: Option<String>,
+    /// Whose markers are taken; needed where the labels name several people.
+    pub subject: Option<String>,
+    /// Takes markers to be stuck exactly where the marker set says, instead of about a centimetre around it.
+    pub placements_as_given: bool,
     /// Where to begin, s after the first frame that is kept.
     pub start_s: f64,
     /// How much to take, s; all where absent.
@@ -83,5 +93,31 @@ impl MotionOptions {
         }
         let yaml = std::fs::read_to_string(path).map_err(|source| MotionError::Read { path: path.to_owned(), source })?;
         SkeletonMap::from_yaml(&yaml, given).map(Some)
+    }
+
+    /// The chosen marker set, from its file if it is no embedded one.
+    pub(crate) fn markers_set(&self) -> Result<MarkerSet, MotionError> {
+        let given = self.marker_set.as_deref().unwrap_or("plug_in_gait");
+        let embedded = MarkerSet::embedded()?;
+        if let Some(set) = embedded.iter().find(|set| set.name() == given) {
+            return Ok(set.clone());
+        }
+        let path = Path::new(given);
+        if !path.exists() {
+            let known = embedded.iter().map(|set| set.name().to_owned()).collect();
+            return Err(MotionError::UnknownMarkerSet { given: given.to_owned(), known });
+        }
+        let yaml = std::fs::read_to_string(path).map_err(|source| MotionError::Read { path: path.to_owned(), source })?;
+        MarkerSet::from_yaml(&yaml, given)
+    }
+
+    pub(crate) fn markers_options(&self) -> MarkerOptions {
+        MarkerOptions {
+            subject: self.subject.clone(),
+            up_axis: self.up_axis,
+            unit_scale_m: self.unit_scale_m,
+            fit_placement: !self.placements_as_given,
+            ..Default::default()
+        }
     }
 }

@@ -2,19 +2,23 @@
 
 use std::fs::File;
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use cromosim_body::BodyModel;
 
 use crate::bvh::shortened;
-use crate::{MotionError, MotionOptions, SmplMotion, parse_bvh, retarget};
+use crate::{
+    AMC_RATE_HZ, BvhClip, MarkerClip, MotionError, MotionFormat, MotionOptions, SmplMotion, fit_markers, parse_amc, parse_asf, parse_bvh,
+    parse_c3d, parse_trc, retarget,
+};
 
 /// Larger files are refused: a thousand hours of BVH at 120 Hz are smaller.
 const MAX_BYTES: u64 = 4 << 30;
 
-/// Reads a motion file and retargets it to the embedded body. What the file is, is told by its content, not by its name's ending: BVH
-/// begins with HIERARCHY.
+/// Reads a motion file and retargets or fits it to the embedded body. What the file is, is told by its content ([`MotionFormat::of`]), not by
+/// its name's ending. BVH and ASF/AMC are retargeted; an AMC file takes its skeleton from [`MotionOptions::skeleton`] or from the ASF file
+/// beside it. To C3D and TRC a body is fitted ([`fit_markers`]).
 ///
 /// # Errors
 /// One line that names the file and the place: unreadable, no motion file, wrong content ([`MotionError`]).
@@ -28,15 +32,55 @@ pub fn read_motion(path: &Path, options: &MotionOptions) -> Result<SmplMotion, M
 /// As [`read_motion`].
 pub fn read_motion_for(path: &Path, body: &Arc<BodyModel>, options: &MotionOptions) -> Result<SmplMotion, MotionError> {
     let bytes = read_bytes(path)?;
-    let text = String::from_utf8_lossy(&bytes);
-    let start = text.trim_start_matches('\u{feff}').trim_start();
-    if !start.get(..9).is_some_and(|word| word.eq_ignore_ascii_case("HIERARCHY")) {
-        let found =
-            if bytes.is_empty() { "an empty file".to_owned() } else { format!("\"{}\"", shortened(start.get(..60).unwrap_or(start))) };
-        return Err(MotionError::UnknownFormat { path: path.to_owned(), found });
-    }
-    let clip = parse_bvh(&text, &path.display().to_string())?;
-    retarget(&clip, body, options)?.slice(options.start_s, options.duration_s)
+    let name = path.display().to_string();
+    let text = || String::from_utf8_lossy(&bytes);
+    let skeletal = |clip: BvhClip| retarget(&clip, body, options);
+    let motion = match MotionFormat::of(&bytes) {
+        Some(MotionFormat::Bvh) => skeletal(parse_bvh(&text(), &name)?),
+        Some(MotionFormat::Amc) => skeletal(acclaim(path, &text(), options)?),
+        Some(MotionFormat::C3d) => of_markers(&parse_c3d(&bytes, &name)?, body, options),
+        Some(MotionFormat::Trc) => of_markers(&parse_trc(&text(), &name)?, body, options),
+        Some(MotionFormat::Asf) => Err(MotionError::SkeletonOnly { path: path.to_owned() }),
+        None => {
+            let content = text();
+            let start = content.trim_start_matches('\u{feff}').trim_start();
+            let short: String = start.chars().take(60).collect();
+            let found = if bytes.is_empty() { "an empty file".to_owned() } else { format!("\"{}\"", shortened(&short)) };
+            Err(MotionError::UnknownFormat { path: path.to_owned(), found })
+        }
+    }?;
+    motion.slice(options.start_s, options.duration_s)
+}
+
+fn of_markers(clip: &MarkerClip, body: &Arc<BodyModel>, options: &MotionOptions) -> Result<SmplMotion, MotionError> {
+    Ok(fit_markers(clip, body, &options.markers_set()?, &options.markers_options())?.0)
+}
+
+fn acclaim(path: &Path, text: &str, options: &MotionOptions) -> Result<BvhClip, MotionError> {
+    let asf = options.skeleton.clone().map_or_else(|| skeleton_beside(path), Ok)?;
+    let bytes = read_bytes(&asf)?;
+    let skeleton = parse_asf(&String::from_utf8_lossy(&bytes), &asf.display().to_string())?;
+    parse_amc(text, &path.display().to_string(), &skeleton, options.rate_hz.unwrap_or(AMC_RATE_HZ))
+}
+
+/// The ASF file beside an AMC file whose stem is the longest beginning of the AMC's own: `02.asf` for `02_01.amc`.
+fn skeleton_beside(path: &Path) -> Result<PathBuf, MotionError> {
+    let stem = |path: &Path| path.file_stem().map(|stem| stem.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    let own = stem(path);
+    let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let entries = std::fs::read_dir(folder).map_err(|source| MotionError::Read { path: folder.to_owned(), source })?;
+    let mut skeletons: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+    skeletons.retain(|path| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("asf")));
+    skeletons.sort();
+    let begins = |path: &&PathBuf| {
+        let rest = own.strip_prefix(&stem(path));
+        rest.is_some_and(|rest| rest.is_empty() || !rest.starts_with(|next: char| next.is_alphanumeric()))
+    };
+    let longest = skeletons.iter().filter(begins).max_by_key(|path| stem(path).len()).cloned();
+    longest.ok_or_else(|| MotionError::NoSkeleton {
+        path: path.to_owned(),
+        found: skeletons.iter().filter_map(|path| Some(path.file_name()?.to_string_lossy().into_owned())).collect(),
+    })
 }
 
 fn read_bytes(path: &Path) -> Result<Vec<u8>, MotionError> {

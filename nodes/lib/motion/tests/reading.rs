@@ -65,7 +65,10 @@ fn files_that_cannot_be_read_are_named() {
     let path = folder.path().join("motion.bvh");
     std::fs::write(&path, b"PK\x03\x04 an archive").unwrap();
     let found = message(read_motion(&path, &MotionOptions::default()));
-    assert!(found.contains("motion.bvh: not a motion file: expected BVH (first word HIERARCHY), found \"PK\\u{3}"), "{found}");
+    assert!(
+        found.contains("motion.bvh: not a motion file: expected BVH (first word HIERARCHY), AMC, C3D or TRC, found \"PK\\u{3}"),
+        "{found}"
+    );
     std::fs::write(&path, b"").unwrap();
     assert!(message(read_motion(&path, &MotionOptions::default())).ends_with("found an empty file"));
 }

@@ -100,7 +100,11 @@ impl Tracker<'_> {
             pose,
             turn_precisions: std::array::from_fn(|joint| {
                 // A joint that bends little turns slowly, too; the root turns as it likes.
-                let usual = if joint == 0 { Vector3::repeat(TURN_SIGMA.powi(-2)) } else { self.prior.precisions[joint] / (TURN_SHARE * TURN_SHARE) };
+                let usual = if joint == 0 {
+                    Vector3::repeat(TURN_SIGMA.powi(-2))
+                } else {
+                    self.prior.precisions[joint] / (TURN_SHARE * TURN_SHARE)
+                };
                 usual / (share * slower).powi(2).clamp(1e-3, 1e3)
             }),
             position_sigma_m: (share * POSITION_SIGMA_M * slower).clamp(1e-4, 1.0),
