@@ -3,7 +3,7 @@
 use cromosim_body::{BodyPose, JOINT_COUNT};
 use nalgebra::{DMatrix, DVector, Matrix3, UnitQuaternion, Vector3};
 
-use super::prior::{PosePrior, right_jacobian_inverse};
+use super::prior::{HINGES, PosePrior, right_jacobian_inverse};
 use super::skin::{Posed, ShapedSkin};
 
 /// Parameters of a pose: root position, and a turn of each joint in its own axes.
@@ -11,9 +11,9 @@ pub(super) const POSE: usize = 3 + 3 * JOINT_COUNT;
 /// How far a marker is believed to be from its place on the skin, m.
 pub(super) const MARKER_SIGMA_M: f64 = 0.003;
 /// Steps smaller than this end the iteration, rad and m.
-const SMALL_STEP: f64 = 2e-5;
-/// Damping that gives up.
-const LARGEST_DAMPING: f64 = 1e6;
+const SMALL_STEP: f64 = 1e-4;
+/// How often a step may be refused, each time for a shorter one.
+const REFUSALS: usize = 4;
 
 /// A pose that the neighbouring frames make likely.
 pub(super) struct Expected {
@@ -116,6 +116,13 @@ pub(super) fn normal_equations(
             normal.add_turn(joint, &expected.pose.local_rotations[joint], own, expected.turn_precisions[joint]);
         }
     }
+    for hinge in &HINGES {
+        let (over, row, precision) = hinge.overstretch(&pose.local_rotations[hinge.joint]);
+        let mut part = normal.gradient.fixed_rows_mut::<3>(3 + 3 * hinge.joint);
+        part += row * (precision * over);
+        let mut part = normal.hessian.fixed_view_mut::<3, 3>(3 + 3 * hinge.joint, 3 + 3 * hinge.joint);
+        part += row * row.transpose() * precision;
+    }
     if let Some(expected) = terms.expected {
         let weight = expected.position_sigma_m.powi(-2);
         normal.add(&[(0, Matrix3::identity())], pose.root_position - expected.pose.root_position, weight);
@@ -136,6 +143,10 @@ pub(super) fn cost(observed: &[Option<Vector3<f64>>], terms: &Terms<'_>, pose: &
             let away = (expected.pose.local_rotations[joint].inverse() * own).scaled_axis();
             turns += 0.5 * away.component_mul(&away).dot(&expected.turn_precisions[joint]);
         }
+    }
+    for hinge in &HINGES {
+        let (over, _, precision) = hinge.overstretch(&pose.local_rotations[hinge.joint]);
+        turns += 0.5 * precision * over * over;
     }
     let root = terms.expected.map_or(0.0, |expected| {
         0.5 * (pose.root_position - expected.pose.root_position).norm_squared() / expected.position_sigma_m.powi(2)
@@ -178,24 +189,25 @@ pub(super) fn solve(
     let mut damping = 1e-4;
     for _ in 0..steps {
         let normal = normal_equations(skin, observed, terms, &pose, &posed);
-        let size = loop {
+        let mut improved = false;
+        for _ in 0..=REFUSALS {
             let step = damped(&normal.hessian, damping).cholesky().map(|cholesky| -cholesky.solve(&normal.gradient));
             if let Some(step) = step {
+                if step.amax() < SMALL_STEP {
+                    return (pose, least);
+                }
                 let next = stepped(&pose, &step);
                 let next_posed = skin.posed(&next);
                 let next_cost = cost(observed, terms, &next, &next_posed);
                 if next_cost <= least {
-                    (pose, posed, least) = (next, next_posed, next_cost);
+                    (pose, posed, least, improved) = (next, next_posed, next_cost, true);
                     damping = f64::max(damping / 10.0, 1e-6);
-                    break Some(step.amax());
+                    break;
                 }
             }
-            damping *= 10.0;
-            if damping > LARGEST_DAMPING {
-                break None;
-            }
-        };
-        if size.is_none_or(|size| size < SMALL_STEP) {
+            damping *= 30.0;
+        }
+        if !improved {
             break;
         }
     }

@@ -3,6 +3,37 @@
 use cromosim_body::{BodyPose, JOINT_COUNT, Joint};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
+/// A joint that bends one way only: elbows and knees.
+pub(super) struct Hinge {
+    pub joint: usize,
+    /// The axis of the joint that it bends about, and the sign of bending.
+    pub axis: usize,
+    pub sign: f64,
+}
+
+/// How far a hinge may be overstretched before it costs, and the standard deviation beyond, rad.
+const OVERSTRETCH: f64 = 0.1;
+const OVERSTRETCH_SIGMA: f64 = 0.1;
+
+impl Hinge {
+    /// By how much the hinge is overstretched (negative, rad, 0 where it is not), how that changes with a turn of the joint in its own axes,
+    /// and the precision.
+    pub fn overstretch(&self, rotation: &UnitQuaternion<f64>) -> (f64, Vector3<f64>, f64) {
+        let vector = rotation.scaled_axis();
+        let over = (self.sign * vector[self.axis] + OVERSTRETCH).min(0.0);
+        let row = if over < 0.0 { right_jacobian_inverse(vector).row(self.axis).transpose() * self.sign } else { Vector3::zeros() };
+        (over, row, OVERSTRETCH_SIGMA.powi(-2))
+    }
+}
+
+/// The hinges: elbows bend forwards (about y), knees backwards (about x).
+pub(super) const HINGES: [Hinge; 4] = [
+    Hinge { joint: Joint::LeftElbow.index(), axis: 1, sign: -1.0 },
+    Hinge { joint: Joint::RightElbow.index(), axis: 1, sign: 1.0 },
+    Hinge { joint: Joint::LeftKnee.index(), axis: 0, sign: 1.0 },
+    Hinge { joint: Joint::RightKnee.index(), axis: 0, sign: 1.0 },
+];
+
 /// Independent normal distributions of the joints' rotation vectors about a mean pose.
 pub(super) struct PosePrior {
     pub means: [UnitQuaternion<f64>; JOINT_COUNT],

@@ -78,12 +78,12 @@ pub(super) fn cold_start(
     Some(best.0)
 }
 
-/// Mean error of a frame that counts as found, m.
-const GOOD_M: f64 = 0.03;
+/// Largest error of a marker in a frame that counts as found, m.
+const GOOD_M: f64 = 0.02;
 
-/// Mean distance of the markers seen from where the body has them, m.
+/// Largest distance of a marker seen from where the body has it, m.
 fn error(skin: &ShapedSkin<'_>, observed: &[Option<Vector3<f64>>], pose: &BodyPose) -> f64 {
     let markers = skin.posed(pose).markers;
-    let distances: Vec<f64> = observed.iter().zip(&markers).filter_map(|(seen, marker)| Some((marker - (*seen)?).norm())).collect();
-    distances.iter().sum::<f64>() / distances.len().max(1) as f64
+    let distances = observed.iter().zip(&markers).filter_map(|(seen, marker)| Some((marker - (*seen)?).norm()));
+    distances.fold(0.0, f64::max)
 }

@@ -1,8 +1,9 @@
 //! From frame to frame, with the person known.
 //!
-//! Frames are cut into chunks of a fixed length, which run in parallel: each begins on its own, a few frames early so that its first frame
-//! has a past, and goes on from frame to frame. A second pass then improves every frame with both of its neighbours from the first. What
-//! comes out depends on the frames alone, not on the number of threads.
+//! Frames are cut into chunks of a fixed length, which run in parallel: each begins on its own and goes on from frame to frame,
+//! with some frames of its neighbours on both sides, so that its first and last frame have a past and a future. Sweeps back and forth then
+//! improve every frame with both of its neighbours; a last pass over all frames smooths the seams. What comes out depends on the frames
+//! alone, not on the number of threads.
 
 use cromosim_body::{BodyPose, JOINT_COUNT};
 use nalgebra::{UnitQuaternion, Vector3};
@@ -29,7 +30,7 @@ const PERSISTENCE: f64 = 0.9;
 const TURN_SIGMA: f64 = 0.05;
 const TURN_SHARE: f64 = 0.1;
 const POSITION_SIGMA_M: f64 = 0.005;
-/// Fewer markers than these do not start a chunk.
+/// A body that was lost is found again by as many markers.
 const MARKERS_TO_START: usize = 6;
 
 /// Everything that is the same for all frames.
@@ -67,26 +68,37 @@ impl Tracker<'_> {
         }
     }
 
+    /// Begins at the best seen of the first frames, and goes from there to both ends.
     fn chunk(&self, frames: &[Vec<Option<Vector3<f64>>>]) -> Vec<BodyPose> {
-        let seen = |frame: &[Option<Vector3<f64>>]| frame.iter().flatten().count();
-        let start = frames.iter().position(|frame| seen(frame) >= MARKERS_TO_START).unwrap_or(0);
+        // The first of equals.
+        let start = (0..frames.len().min(MARGIN)).max_by_key(|&index| (seen(&frames[index]), usize::MAX - index)).unwrap_or(0);
         let observed = frames.get(start).map_or(&[][..], |frame| frame);
         let fallback = || self.known.first().cloned().unwrap_or_else(|| self.prior.mean_pose());
-        let mut pose = cold_start(self.skin, observed, self.trunk, self.prior, self.known).unwrap_or_else(fallback);
-        let mut poses: Vec<BodyPose> = Vec::with_capacity(frames.len());
-        for (index, frame) in frames.iter().enumerate() {
-            if index > 0 {
-                let expected = self.expected(extrapolated(&pose, index.checked_sub(2).map(|before| &poses[before])), 1.0);
-                // A body that was lost is looked for anew once it can be seen again.
-                let lost = seen(&frames[index - 1]) < 3 && seen(frame) >= MARKERS_TO_START;
-                let found = if lost { placed(self.skin, frame, self.trunk, &pose) } else { None };
-                let expected = if found.is_some() { None } else { Some(&expected) };
-                let start = found.or_else(|| expected.map(|expected| expected.pose.clone())).unwrap_or_else(|| pose.clone());
-                pose = solve(self.skin, frame, &self.terms(expected), start, STEPS).0;
-            }
-            poses.push(pose.clone());
-        }
+        let pose = cold_start(self.skin, observed, self.trunk, self.prior, self.known).unwrap_or_else(fallback);
+        let mut poses = vec![pose; frames.len()];
+        self.follow(frames, &mut poses, start + 1..frames.len(), false);
+        self.follow(frames, &mut poses, 0..start, true);
         poses
+    }
+
+    /// From the frame before the range (after it, where backwards) through the range, each frame from those before it.
+    fn follow(&self, frames: &[Vec<Option<Vector3<f64>>>], poses: &mut [BodyPose], range: std::ops::Range<usize>, backwards: bool) {
+        let indices: Vec<usize> = if backwards { range.clone().rev().collect() } else { range.clone().collect() };
+        for (step, &index) in indices.iter().enumerate() {
+            let back = |count: usize| if backwards { index + count } else { index - count };
+            let (last, frame) = (back(1), &frames[index]);
+            let before = if step > 0 { Some(&poses[back(2)]) } else { None };
+            // A body that was lost is looked for anew once it can be seen again.
+            let lost = seen(&frames[last]) < 3 && seen(frame) >= MARKERS_TO_START;
+            let found = if lost { placed(self.skin, frame, self.trunk, &poses[last]) } else { None };
+            poses[index] = match found {
+                Some(pose) => solve(self.skin, frame, &self.terms(None), pose, STEPS).0,
+                None => {
+                    let expected = self.expected(extrapolated(&poses[last], before), 1.0);
+                    solve(self.skin, frame, &self.terms(Some(&expected)), expected.pose.clone(), STEPS).0
+                }
+            };
+        }
     }
 
     fn terms<'a>(&'a self, expected: Option<&'a Expected>) -> Terms<'a> {
@@ -123,6 +135,11 @@ impl Tracker<'_> {
         };
         solve(self.skin, &frames[index], &self.terms(Some(&self.expected(middle, 0.5))), own, STEPS_AGAIN).0
     }
+}
+
+/// Markers seen in a frame.
+fn seen(frame: &[Option<Vector3<f64>>]) -> usize {
+    frame.iter().flatten().count()
 }
 
 /// The pose after `pose` if it goes on as it came from `before`, a little slower.
