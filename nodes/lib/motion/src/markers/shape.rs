@@ -234,7 +234,7 @@ fn reduced_step(
 /// axis, the prior as it is; shape and placements taken as known.
 pub(super) fn joint_sigmas(shaped: &ShapedSkin<'_>, prior: &PosePrior, keyframes: &[Keyframe], error_m: f64) -> Vec<f64> {
     use cromosim_body::{JOINT_COUNT, Joint};
-    let mut variances = vec![0.0; JOINT_COUNT];
+    let mut variances = [0.0; JOINT_COUNT];
     let terms = Terms { prior, prior_weight: 0.25, huber_m: f64::MAX, expected: None };
     for frame in keyframes {
         let posed = shaped.posed(&frame.pose);

@@ -123,12 +123,11 @@ impl ShapedSkin<'_> {
         let mut corners = Vec::with_capacity(self.corners.len());
         let segments = self.subset.positions_and_segments_into(pose, &mut corners);
         let frames: Vec<Matrix3<f64>> = corners.as_chunks::<3>().0.iter().map(triangle_frame).collect();
-        let place = |(((patch, corners), frame), placement): (((&Patch, &[Vector3<f64>; 3]), &Matrix3<f64>), &Vector3<f64>)| {
-            let [a, b, c] = patch.barycentrics;
-            corners[0] * a + corners[1] * b + corners[2] * c + frame * placement
+        let place = |marker: usize| {
+            let [a, b, c] = self.skin.patches[marker].barycentrics;
+            corners[3 * marker] * a + corners[3 * marker + 1] * b + corners[3 * marker + 2] * c + frames[marker] * self.placements[marker]
         };
-        let patches = self.skin.patches.iter().zip(corners.as_chunks::<3>().0);
-        let markers = patches.zip(&frames).zip(&self.placements).map(place).collect();
+        let markers = (0..frames.len()).map(place).collect();
         Posed { markers, frames, segments }
     }
 

@@ -26,12 +26,13 @@ const PRIOR_WEIGHT: f64 = 0.05;
 const HUBER_M: f64 = 0.003;
 /// Share of a joint's turn from frame to frame that the next frame is expected to have.
 const PERSISTENCE: f64 = 0.9;
-/// How far poses depart from what their past promises at 120 Hz: about 100 rad/s^2 and 30 m/s^2.
+/// How far the root departs from what its past promises within a frame of 120 Hz, rad and m.
 const TURN_SIGMA: f64 = 0.05;
-const TURN_SHARE: f64 = 0.1;
 const POSITION_SIGMA_M: f64 = 0.005;
-/// A body that was lost is found again by as many markers.
-const MARKERS_TO_START: usize = 6;
+/// The same of the other joints, as a share of the prior's standard deviation.
+const TURN_SHARE: f64 = 0.1;
+/// Frames with fewer markers stand between their neighbours, and a body that was lost is found again by as many.
+const FEWEST_MARKERS: usize = 6;
 
 /// Everything that is the same for all frames.
 pub(super) struct Tracker<'a> {
@@ -56,7 +57,8 @@ impl Tracker<'_> {
             poses.truncate(end - lead);
             poses.split_off(first - lead)
         };
-        let poses: Vec<BodyPose> = (0..frames.len().div_ceil(CHUNK)).into_par_iter().flat_map_iter(chunk).collect();
+        let mut poses: Vec<BodyPose> = (0..frames.len().div_ceil(CHUNK)).into_par_iter().flat_map_iter(chunk).collect();
+        bridge(&mut poses, |index| seen(&frames[index]) < FEWEST_MARKERS);
         (0..frames.len()).into_par_iter().map(|index| self.again(frames, &poses, index)).collect()
     }
 
@@ -89,7 +91,7 @@ impl Tracker<'_> {
             let (last, frame) = (back(1), &frames[index]);
             let before = if step > 0 { Some(&poses[back(2)]) } else { None };
             // A body that was lost is looked for anew once it can be seen again.
-            let lost = seen(&frames[last]) < 3 && seen(frame) >= MARKERS_TO_START;
+            let lost = seen(&frames[last]) < 3 && seen(frame) >= FEWEST_MARKERS;
             let found = if lost { placed(self.skin, frame, self.trunk, &poses[last]) } else { None };
             poses[index] = match found {
                 Some(pose) => solve(self.skin, frame, &self.terms(None), pose, STEPS).0,
@@ -134,6 +136,23 @@ impl Tracker<'_> {
             local_rotations: std::array::from_fn(|joint| slerp(&before.local_rotations[joint], &after.local_rotations[joint], 0.5)),
         };
         solve(self.skin, &frames[index], &self.terms(Some(&self.expected(middle, 0.5))), own, STEPS_AGAIN).0
+    }
+}
+
+/// Frames that are `unknown` go evenly from the last known one to the next; at either end they stay at the nearest.
+fn bridge(poses: &mut [BodyPose], unknown: impl Fn(usize) -> bool) {
+    let known: Vec<usize> = (0..poses.len()).filter(|&index| !unknown(index)).collect();
+    for index in (0..poses.len()).filter(|&index| unknown(index)) {
+        let next = known.partition_point(|&other| other < index);
+        let before = next.checked_sub(1).and_then(|place| known.get(place));
+        let (Some(&from), Some(&to)) = (before.or(known.first()), known.get(next).or(known.last())) else { return };
+        let share = if from == to { 0.0 } else { (index - from) as f64 / (to - from) as f64 };
+        poses[index] = BodyPose {
+            root_position: poses[from].root_position.lerp(&poses[to].root_position, share),
+            local_rotations: std::array::from_fn(|joint| {
+                slerp(&poses[from].local_rotations[joint], &poses[to].local_rotations[joint], share)
+            }),
+        };
     }
 }
 
