@@ -49,8 +49,9 @@ impl Default for MarkerOptions {
 ///
 /// A frame's cost is `sum rho(|m_i - y_i|) / (3 mm)^2 + w |pose - mean|^2 / sigma^2 + |pose - expected|^2 / sigma_t^2` with Huber's rho, linear
 /// beyond 3 mm, the marker `m_i` on the skin by linear blend skinning with pose corrections, the prior's weight w falling from 4 to 0.25
-/// where a frame starts from nothing, and what the frames around it promise. Markers that are not seen count nothing. The world has z up,
-/// the recording's origin and floor. The motion's `confidence` is the share of the set's markers that were seen.
+/// where a frame starts from nothing, and what the frames around it promise; elbows and knees that bend the wrong way cost more. Markers that
+/// are not seen count nothing; frames with fewer than six are interpolated. The world has z up, the recording's origin and floor. The
+/// motion's `confidence` is the share of the set's markers that were seen.
 ///
 /// # Errors
 /// [`MotionError`] where labels, subject, unit or up axis do not fit; the message says which option helps.

@@ -22,7 +22,7 @@ const MARGIN: usize = 24;
 /// Steps of a frame that follows another one, and in the second pass.
 const STEPS: usize = 6;
 const STEPS_AGAIN: usize = 2;
-const PRIOR_WEIGHT: f64 = 0.05;
+const PRIOR_WEIGHT: f64 = 0.25;
 const HUBER_M: f64 = 0.003;
 /// Share of a joint's turn from frame to frame that the next frame is expected to have.
 const PERSISTENCE: f64 = 0.9;
@@ -51,6 +51,7 @@ impl Tracker<'_> {
             let (first, end) = (number * CHUNK, ((number + 1) * CHUNK).min(frames.len()));
             let (lead, tail) = (first.saturating_sub(MARGIN), (end + MARGIN).min(frames.len()));
             let mut poses = self.chunk(&frames[lead..tail]);
+            bridge(&mut poses, |index| seen(&frames[lead + index]) < FEWEST_MARKERS);
             for backwards in [true, false] {
                 self.sweep(&frames[lead..tail], &mut poses, backwards);
             }
