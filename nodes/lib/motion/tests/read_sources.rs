@@ -173,6 +173,8 @@ fn formats_are_told_by_their_content() {
     for (bytes, format) in cases {
         assert_eq!(MotionFormat::of(bytes), format, "{bytes:?}");
     }
+    let text = format!("{:600}", "OPENPOSE");
+    assert_eq!(MotionFormat::of(text.as_bytes()), None, "its second letter is C3D's key");
     let sample = std::fs::read(common::own_file("ez.c3d")).unwrap();
     assert_eq!(MotionFormat::of(&sample), Some(MotionFormat::C3d));
     assert!(parse_c3d(&sample, "ez.c3d").is_ok());

@@ -20,8 +20,12 @@ const KEY: u8 = 0x50;
 /// The frame counts of 16 bits end here: longer recordings say this, and their data go on.
 const MANY_FRAMES: usize = 65_535;
 
-/// Whether the bytes begin like a C3D file.
+/// Whether the bytes begin like a C3D file: the key, and a known processor in the parameter section (nearly always the second block).
 pub(crate) fn is_c3d(bytes: &[u8]) -> bool {
+    has_key(bytes) && bytes.get((usize::from(bytes[0]) - 1) * BLOCK + 3).is_some_and(|&code| Processor::from_code(code).is_some())
+}
+
+fn has_key(bytes: &[u8]) -> bool {
     bytes.len() >= BLOCK && bytes[1] == KEY && bytes[0] >= 2
 }
 
@@ -51,7 +55,7 @@ pub fn parse_c3d(bytes: &[u8], name: &str) -> Result<MarkerClip, MotionError> {
         expected: expected.to_owned(),
         found,
     };
-    if !is_c3d(bytes) {
+    if !has_key(bytes) {
         let found = format!("{} bytes that begin with {:02x?}", bytes.len(), &bytes[..bytes.len().min(2)]);
         return Err(wrong(0, "a C3D header of 512 bytes (second byte 0x50)", found));
     }

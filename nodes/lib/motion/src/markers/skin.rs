@@ -74,7 +74,9 @@ impl Skin {
                 directions.push(corner(&one, vertex) - corner(&mean, vertex));
             }
         }
-        let weights = skin_weights(body, &vertices)?;
+        // A body of one shape does not tell its weights: there a marker moves with its site's joint alone.
+        let rigid = || sites.iter().flat_map(|site| std::iter::repeat_n(vec![(site.joint.index(), 1.0)], 3)).collect();
+        let weights = if body.beta_count() > 0 { skin_weights(body, &vertices)? } else { rigid() };
         let patches = sites.iter().zip(weights.as_chunks::<3>().0).map(|(site, weights)| Patch::new(site.barycentrics, weights)).collect();
         let (_, mut joint_directions) = body.joint_shape_directions();
         joint_directions.truncate(beta_count);

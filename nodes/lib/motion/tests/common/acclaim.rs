@@ -19,7 +19,38 @@ pub enum End {
     By([f64; 3]),
 }
 
-/// 29 bones.
+type Side = (&'static str, f64, (Joint, Joint, Joint, Joint, Joint, Joint, Joint, Joint));
+
+const LEFT: Side = (
+    "lhipjoint lfemur ltibia lfoot ltoes lclavicle lhumerus lradius lwrist lhand lfingers lthumb",
+    1.0,
+    (
+        Joint::LeftHip,
+        Joint::LeftKnee,
+        Joint::LeftAnkle,
+        Joint::LeftFoot,
+        Joint::LeftCollar,
+        Joint::LeftShoulder,
+        Joint::LeftElbow,
+        Joint::LeftWrist,
+    ),
+);
+const RIGHT: Side = (
+    "rhipjoint rfemur rtibia rfoot rtoes rclavicle rhumerus rradius rwrist rhand rfingers rthumb",
+    -1.0,
+    (
+        Joint::RightHip,
+        Joint::RightKnee,
+        Joint::RightAnkle,
+        Joint::RightFoot,
+        Joint::RightCollar,
+        Joint::RightShoulder,
+        Joint::RightElbow,
+        Joint::RightWrist,
+    ),
+);
+
+/// 30 bones.
 pub fn cmu_bones() -> Vec<Bone> {
     let mut bones = vec![
         ("lowerback", "root", Joint::Spine1, End::At(Joint::Spine2), "rx ry rz", [0.0; 3]),
@@ -29,47 +60,9 @@ pub fn cmu_bones() -> Vec<Bone> {
         ("upperneck", "lowerneck", Joint::Neck, End::At(Joint::Head), "", [0.0; 3]),
         ("head", "upperneck", Joint::Head, End::By([0.0, 0.1, 0.0]), "rz ry rx", [0.0; 3]),
     ];
-    type Side = (Joint, Joint, Joint, Joint, Joint, Joint, Joint, Joint);
-    use Joint::*;
-    let sides: [(&'static [&'static str; 12], f64, Side); 2] = [
-        (
-            &[
-                "lhipjoint",
-                "lfemur",
-                "ltibia",
-                "lfoot",
-                "ltoes",
-                "lclavicle",
-                "lhumerus",
-                "lradius",
-                "lwrist",
-                "lhand",
-                "lfingers",
-                "lthumb",
-            ],
-            1.0,
-            (LeftHip, LeftKnee, LeftAnkle, LeftFoot, LeftCollar, LeftShoulder, LeftElbow, LeftWrist),
-        ),
-        (
-            &[
-                "rhipjoint",
-                "rfemur",
-                "rtibia",
-                "rfoot",
-                "rtoes",
-                "rclavicle",
-                "rhumerus",
-                "rradius",
-                "rwrist",
-                "rhand",
-                "rfingers",
-                "rthumb",
-            ],
-            -1.0,
-            (RightHip, RightKnee, RightAnkle, RightFoot, RightCollar, RightShoulder, RightElbow, RightWrist),
-        ),
-    ];
-    for (n, side, (hip, knee, ankle, foot, collar, shoulder, elbow, wrist)) in sides {
+    use Joint::Pelvis;
+    for (names, side, (hip, knee, ankle, foot, collar, shoulder, elbow, wrist)) in [LEFT, RIGHT] {
+        let n: Vec<&'static str> = names.split(' ').collect();
         let legs = [0.0, 0.0, 20.0 * side];
         bones.extend([
             (n[0], "root", Pelvis, End::At(hip), "", [0.0; 3]),
