@@ -116,6 +116,16 @@ fn the_walk_of_another_body() {
     }
 }
 
+/// What frames promise each other depends on the time between them.
+#[test]
+fn other_rates() {
+    for rate_hz in [30.0, 60.0, 250.0] {
+        let known = walk().slice(1.0, Some(4.0)).unwrap().resampled(rate_hz).unwrap();
+        let outcome = fitted(&format!("walk at {rate_hz} Hz"), &known, &plug_in_gait(), true);
+        assert!(outcome.median_mm < 3.0 && outcome.high_mm < 8.0);
+    }
+}
+
 /// Recordings of the CMU database, retargeted: their motion, their shape.
 #[test]
 fn recordings_of_the_cmu_database() {
