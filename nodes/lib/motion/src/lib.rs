@@ -17,6 +17,7 @@ mod asf;
 mod axes;
 mod bvh;
 mod c3d;
+pub mod camera;
 mod error;
 mod format;
 mod markers;

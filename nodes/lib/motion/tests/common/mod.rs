@@ -5,6 +5,7 @@ pub mod acclaim;
 pub mod export;
 pub mod known;
 pub mod marker_files;
+pub mod shot;
 
 use std::path::PathBuf;
 

@@ -1,0 +1,237 @@
+//! Kalman filter and Rauch-Tung-Striebel smoother of the root's position.
+//!
+//! State x = (position, velocity, acceleration), 9 numbers; the jerk is white with density q [m2/s5] on each axis, so that over dt
+//! `F = [1 dt dt^2/2; 0 1 dt; 0 0 1]` and `Q = q [dt^5/20 dt^4/8 dt^3/6; . dt^3/3 dt^2/2; . . dt]` (Bar-Shalom, Li and Kirubarajan 2001,
+//! section 6.2.3, extended to white jerk). A frame measures the position with its own full 3 x 3 covariance.
+
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+
+type State = SVector<f64, 9>;
+type Covariance = SMatrix<f64, 9, 9>;
+
+/// One frame's position and the two parts of its covariance, m and m2.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measurement {
+    /// Of the root in the world, m.
+    pub position: Vector3<f64>,
+    /// From the pixel's error, m2.
+    pub covariance_of_pixel: Matrix3<f64>,
+    /// From the depth's error, m2.
+    pub covariance_of_depth: Matrix3<f64>,
+}
+
+/// What the filter has to know; learnt by [`super::learn_noise`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FilterNoise {
+    /// Density of the white jerk per axis, m2/s5.
+    pub jerk_density: f64,
+    /// Factor on the standard deviation that pixels are said to have.
+    pub pixel_factor: f64,
+    /// Factor on the standard deviation that depths are said to have.
+    pub depth_factor: f64,
+}
+
+impl FilterNoise {
+    /// Covariance of a measurement with the factors, m2.
+    pub fn covariance(&self, measurement: &Measurement) -> Matrix3<f64> {
+        // A micrometre of its own keeps it invertible where an axis has no error at all.
+        measurement.covariance_of_pixel * self.pixel_factor.powi(2)
+            + measurement.covariance_of_depth * self.depth_factor.powi(2)
+            + Matrix3::identity() * 1e-12
+    }
+}
+
+/// Position, velocity, acceleration in one frame, and how sure they are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RootState {
+    /// m.
+    pub position: Vector3<f64>,
+    /// m/s.
+    pub velocity: Vector3<f64>,
+    /// m/s2.
+    pub acceleration: Vector3<f64>,
+    /// Of the position, m2.
+    pub position_covariance: Matrix3<f64>,
+    /// Of the velocity, m2/s2.
+    pub velocity_covariance: Matrix3<f64>,
+}
+
+/// Squared Mahalanobis distance beyond which a position is an outlier: chi-square of 3 degrees of freedom at 99.9 %.
+pub const GATE: f64 = 16.266;
+/// Standard deviations at the start: about the median of the first measurements, and of people who walk; m, m/s, m/s2.
+const START_STD: [f64; 3] = [0.5, 2.0, 4.0];
+/// Where nothing was measured at all, m.
+const UNKNOWN_STD: f64 = 10.0;
+/// How many measurements tell where the track starts: so many that an outlier among them does not decide.
+const START_MEASUREMENTS: usize = 9;
+
+/// The states of all frames.
+#[derive(Clone, Debug)]
+pub struct FilterRun {
+    estimates: Vec<Estimate>,
+    /// For each frame, whether its measurement was used.
+    pub accepted: Vec<bool>,
+    /// Log-likelihood of the used measurements; outliers count as spread evenly over `outlier_volume_m3`.
+    pub log_likelihood: f64,
+}
+
+#[derive(Clone, Debug)]
+struct Estimate {
+    predicted: State,
+    predicted_covariance: Covariance,
+    filtered: State,
+    filtered_covariance: Covariance,
+}
+
+/// How measurements are chosen.
+#[derive(Clone, Copy, Debug)]
+pub enum Gate<'a> {
+    /// By the Mahalanobis distance to the prediction.
+    Mahalanobis,
+    /// As decided before; one flag a frame.
+    Fixed(&'a [bool]),
+}
+
+/// Share of frames that are outliers beforehand, for the likelihood.
+const OUTLIER_SHARE: f64 = 0.02;
+/// Where outliers may be, m3: a room.
+const OUTLIER_VOLUME_M3: f64 = 100.0;
+
+/// Runs the filter over frames `dt` seconds apart; frames without a measurement, and those beyond the gate, are bridged by the prediction,
+/// whose covariance grows. Starts at the median of the first nine measurements, at rest within what people do.
+pub fn kalman_filter(measurements: &[Option<Measurement>], dt: f64, noise: &FilterNoise, gate: Gate<'_>) -> FilterRun {
+    let (transition, process) = (transition(dt), process_noise(dt, noise.jerk_density));
+    let mut run = FilterRun { estimates: Vec::with_capacity(measurements.len()), accepted: Vec::new(), log_likelihood: 0.0 };
+    let (mut state, mut covariance) = start(measurements);
+    for (frame, measurement) in measurements.iter().enumerate() {
+        if frame > 0 {
+            state = transition * state;
+            covariance = transition * covariance * transition.transpose() + process;
+        }
+        let (predicted, predicted_covariance) = (state, covariance);
+        let mut used = false;
+        if let Some(measurement) = measurement {
+            let allowed = match gate {
+                Gate::Mahalanobis => true,
+                Gate::Fixed(accepted) => accepted.get(frame).copied().unwrap_or(false),
+            };
+            let updated = update(&state, &covariance, measurement, noise)
+                .filter(|updated| allowed && (matches!(gate, Gate::Fixed(_)) || updated.distance < GATE));
+            match updated {
+                Some(updated) => {
+                    (state, covariance, used) = (updated.state, updated.covariance, true);
+                    run.log_likelihood += updated.log_density + (1.0 - OUTLIER_SHARE).ln();
+                }
+                None => run.log_likelihood += (OUTLIER_SHARE / OUTLIER_VOLUME_M3).ln(),
+            }
+        }
+        run.accepted.push(used);
+        run.estimates.push(Estimate { predicted, predicted_covariance, filtered: state, filtered_covariance: covariance });
+    }
+    run
+}
+
+fn start(measurements: &[Option<Measurement>]) -> (State, Covariance) {
+    let first: Vec<Vector3<f64>> = measurements.iter().flatten().take(START_MEASUREMENTS).map(|measurement| measurement.position).collect();
+    let mut state = State::zeros();
+    for axis in 0..3 {
+        let mut values: Vec<f64> = first.iter().map(|position| position[axis]).collect();
+        values.sort_by(f64::total_cmp);
+        state[axis] = values.get(values.len() / 2).copied().unwrap_or(0.0);
+    }
+    let std = |order: usize| if order == 0 && first.is_empty() { UNKNOWN_STD } else { START_STD[order] };
+    (state, Covariance::from_fn(|row, column| if row == column { std(row / 3).powi(2) } else { 0.0 }))
+}
+
+struct Update {
+    state: State,
+    covariance: Covariance,
+    distance: f64,
+    log_density: f64,
+}
+
+/// Joseph's form, which keeps the covariance symmetric and positive. `None` where the innovation's covariance is not positive.
+fn update(state: &State, covariance: &Covariance, measurement: &Measurement, noise: &FilterNoise) -> Option<Update> {
+    let own = noise.covariance(measurement);
+    let innovation: Vector3<f64> = measurement.position - state.fixed_rows::<3>(0);
+    let spread: Matrix3<f64> = covariance.fixed_view::<3, 3>(0, 0) + own;
+    let factor = spread.cholesky()?;
+    let distance = innovation.dot(&factor.solve(&innovation));
+    let log_determinant = 2.0 * factor.l().diagonal().iter().map(|value| value.ln()).sum::<f64>();
+    let gain: SMatrix<f64, 9, 3> = factor.solve(&covariance.fixed_rows::<3>(0).into_owned()).transpose();
+    let mut kept = Covariance::identity();
+    let mut left = kept.fixed_columns_mut::<3>(0);
+    left -= gain;
+    let covariance = kept * covariance * kept.transpose() + gain * own * gain.transpose();
+    let log_density = -0.5 * (distance + log_determinant + 3.0 * std::f64::consts::TAU.ln());
+    Some(Update { state: state + gain * innovation, covariance: symmetric(&covariance), distance, log_density })
+        .filter(|update| update.distance.is_finite() && update.log_density.is_finite())
+}
+
+impl FilterRun {
+    /// The filter's own states: each frame knows its past only.
+    pub fn filtered(&self) -> Vec<RootState> {
+        self.estimates.iter().map(|estimate| root_state(&estimate.filtered, &estimate.filtered_covariance)).collect()
+    }
+
+    /// Rauch, Tung and Striebel (1965): backwards, `x_s = x + C (x_s,next - x_predicted,next)` with `C = P F^T P_predicted,next^-1`, so
+    /// that each frame knows all others.
+    pub fn smoothed(&self, dt: f64) -> Vec<RootState> {
+        let transition = transition(dt);
+        let Some(last) = self.estimates.last() else { return Vec::new() };
+        let (mut state, mut covariance) = (last.filtered, last.filtered_covariance);
+        let mut states = vec![root_state(&state, &covariance)];
+        for pair in self.estimates.windows(2).rev() {
+            let (here, next) = (&pair[0], &pair[1]);
+            // Positive by construction; without its factor the filter's own state is the best there is.
+            let gain =
+                next.predicted_covariance.cholesky().map(|factor| factor.solve(&(transition * here.filtered_covariance)).transpose());
+            (state, covariance) = match gain {
+                Some(gain) => (
+                    here.filtered + gain * (state - next.predicted),
+                    symmetric(&(here.filtered_covariance + gain * (covariance - next.predicted_covariance) * gain.transpose())),
+                ),
+                None => (here.filtered, here.filtered_covariance),
+            };
+            states.push(root_state(&state, &covariance));
+        }
+        states.reverse();
+        states
+    }
+}
+
+fn root_state(state: &State, covariance: &Covariance) -> RootState {
+    RootState {
+        position: state.fixed_rows::<3>(0).into_owned(),
+        velocity: state.fixed_rows::<3>(3).into_owned(),
+        acceleration: state.fixed_rows::<3>(6).into_owned(),
+        position_covariance: covariance.fixed_view::<3, 3>(0, 0).into_owned(),
+        velocity_covariance: covariance.fixed_view::<3, 3>(3, 3).into_owned(),
+    }
+}
+
+fn symmetric(matrix: &Covariance) -> Covariance {
+    (matrix + matrix.transpose()) * 0.5
+}
+
+fn transition(dt: f64) -> Covariance {
+    blocks([[1.0, dt, dt * dt / 2.0], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])
+}
+
+fn process_noise(dt: f64, density: f64) -> Covariance {
+    let power = |exponent: i32| density * dt.powi(exponent);
+    blocks([
+        [power(5) / 20.0, power(4) / 8.0, power(3) / 6.0],
+        [power(4) / 8.0, power(3) / 3.0, power(2) / 2.0],
+        [power(3) / 6.0, power(2) / 2.0, power(1)],
+    ])
+}
+
+/// The same 3 x 3 numbers on each axis.
+fn blocks(of_axis: [[f64; 3]; 3]) -> Covariance {
+    Covariance::from_fn(|row, column| if row % 3 == column % 3 { of_axis[row / 3][column / 3] } else { 0.0 })
+}
+
+#[cfg(test)]
+#[path = "filter_tests.rs"]
+mod tests;

@@ -1,0 +1,154 @@
+//! The files of a shot: which belongs to which frame, and opening them. What stands in them is read by the parsers.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use nalgebra::Vector2;
+
+use super::{
+    Camera, CameraAxes, CameraError, DepthEncoding, DepthMap, DepthProvider, MAX_DEPTH_PIXELS, PersonKeypoints, parse_camera, parse_depth,
+    parse_openpose, parse_plain_depth, track_person,
+};
+
+/// Larger files are no frame.
+const MAX_BYTES: u64 = 8 * MAX_DEPTH_PIXELS as u64 + 4096;
+/// More frames than this are refused: nine hours at 30 Hz.
+const MAX_FRAMES: usize = 1_000_000;
+
+/// What the files do not say themselves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FolderLayout {
+    /// What the depth maps hold.
+    pub encoding: DepthEncoding,
+    /// Which way the cameras' axes point.
+    pub axes: CameraAxes,
+    /// Width and height of the image of the keypoints (the video), px.
+    pub keypoint_image_px: Vector2<f64>,
+    /// Width and height of the image that the intrinsics are for, px.
+    pub intrinsics_image_px: Vector2<f64>,
+    /// Width and height of depth maps without a header (plain float32); `None` for maps that say it themselves.
+    pub plain_depth_px: Option<[usize; 2]>,
+}
+
+/// The folders of a shot; they may be the same one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CameraFolder {
+    /// Of OpenPose's `*_keypoints.json`.
+    pub keypoints: PathBuf,
+    /// Of `frame_NNNNNN.raw`, `.npy` or `.png`.
+    pub depth: PathBuf,
+    /// Of `frame_NNNNNN.npz`.
+    pub cameras: PathBuf,
+    /// What they do not say.
+    pub layout: FolderLayout,
+}
+
+/// What stood in the folders, but for the depth maps.
+#[derive(Clone, Debug)]
+pub struct FolderFrames {
+    /// The followed person.
+    pub keypoints: Vec<Option<PersonKeypoints>>,
+    /// Cameras.
+    pub cameras: Vec<Option<Camera>>,
+    /// Depth maps, read when asked for.
+    pub depth: FolderDepth,
+}
+
+/// Depth maps in files, each read when its frame is asked for.
+#[derive(Clone, Debug)]
+pub struct FolderDepth {
+    files: BTreeMap<usize, PathBuf>,
+    layout: FolderLayout,
+}
+
+impl CameraFolder {
+    /// Reads keypoints and cameras and lists the depth maps. A file's frame is the last number of its name; the smallest number in each
+    /// folder is frame 0, since some tools count from 1. `frames` is the number of frames; files beyond it are left alone.
+    ///
+    /// # Errors
+    /// [`CameraError::Read`], [`CameraError::NoFrames`], and those of the parsers.
+    pub fn read(&self, frames: usize, least_confidence: f64) -> Result<FolderFrames, CameraError> {
+        let frames = frames.min(MAX_FRAMES);
+        let keypoint_files = numbered(&self.keypoints, &["_keypoints.json"], "*_keypoints.json")?;
+        let camera_files = numbered(&self.cameras, &[".npz"], "frame_NNNNNN.npz")?;
+        let depth_files = numbered(&self.depth, &[".raw", ".npy", ".png"], "frame_NNNNNN.raw, .npy or .png")?;
+        let mut people = Vec::with_capacity(frames);
+        let mut cameras = Vec::with_capacity(frames);
+        for frame in 0..frames {
+            people.push(match keypoint_files.get(&frame) {
+                Some(path) => parse_openpose(&read(path)?, &path.display().to_string())?,
+                None => Vec::new(),
+            });
+            cameras.push(match camera_files.get(&frame) {
+                Some(path) => {
+                    let name = path.display().to_string();
+                    Some(parse_camera(&read(path)?, self.layout.intrinsics_image_px, self.layout.axes, &name)?)
+                }
+                None => None,
+            });
+        }
+        let chosen = track_person(&people, least_confidence);
+        let keypoints = people.iter().zip(chosen).map(|(people, person)| people.get(person?).copied()).collect();
+        Ok(FolderFrames { keypoints, cameras, depth: FolderDepth { files: depth_files, layout: self.layout } })
+    }
+}
+
+impl DepthProvider for FolderDepth {
+    fn depth(&mut self, frame: usize) -> Result<Option<DepthMap>, CameraError> {
+        let Some(path) = self.files.get(&frame) else { return Ok(None) };
+        let (bytes, name) = (read(path)?, path.display().to_string());
+        match self.layout.plain_depth_px {
+            Some([width, height]) => parse_plain_depth(&bytes, width, height, self.layout.encoding, &name),
+            None => parse_depth(&bytes, self.layout.encoding, &name),
+        }
+        .map(Some)
+    }
+}
+
+/// Files with one of the endings by the last number in their name, counted from the smallest.
+fn numbered(folder: &Path, endings: &[&str], expected: &'static str) -> Result<BTreeMap<usize, PathBuf>, CameraError> {
+    let unreadable = |source| CameraError::Read { path: folder.to_owned(), source };
+    let mut files = BTreeMap::new();
+    for entry in std::fs::read_dir(folder).map_err(unreadable)? {
+        let path = entry.map_err(unreadable)?.path();
+        let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        let stem = endings.iter().find_map(|ending| name.strip_suffix(ending));
+        if let Some(number) = stem.and_then(last_number) {
+            files.insert(number, path);
+        }
+    }
+    let first = *files.keys().next().ok_or_else(|| CameraError::NoFrames { path: folder.to_owned(), expected })?;
+    Ok(files.into_iter().map(|(number, path)| (number - first, path)).collect())
+}
+
+fn last_number(stem: &str) -> Option<usize> {
+    let end = stem.rfind(|c: char| c.is_ascii_digit())? + 1;
+    let start =
+        stem[..end].rfind(|c: char| !c.is_ascii_digit()).map_or(0, |place| place + stem[place..].chars().next().map_or(1, char::len_utf8));
+    stem[start..end].parse().ok()
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, CameraError> {
+    let unreadable = |source| CameraError::Read { path: path.to_owned(), source };
+    let mut bytes = Vec::new();
+    File::open(path).map_err(unreadable)?.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(CameraError::TooLarge { name: path.display().to_string(), bytes: bytes.len() as u64, limit: MAX_BYTES });
+    }
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::last_number;
+
+    #[test]
+    fn frames_are_numbered_by_the_last_number_of_the_name() {
+        assert_eq!(last_number("frame_000012"), Some(12));
+        assert_eq!(last_number("GH01_000000000007"), Some(7));
+        assert_eq!(last_number("clip2é05x"), Some(5));
+        assert_eq!((last_number("frame"), last_number("99999999999999999999999")), (None, None));
+    }
+}
