@@ -26,6 +26,7 @@ mod options;
 mod read;
 mod report;
 mod retarget;
+pub mod rigid;
 mod skeleton_map;
 mod trc;
 mod walk;

@@ -52,7 +52,11 @@ fn steps(name: &str, shot: &Shot, solved: &GlobalTrajectory) -> [TrackError; 5] 
     let smoothed: Vec<_> = track.smoothed.iter().map(|state| Some(state.position)).collect();
     let errors = [&raw, &scaled, &gated, &filtered, &smoothed].map(|track| track_error(track, &truth));
     println!("{name}: {}", solved.report);
-    println!("  joints of the estimator: {:.0} mm off, {:.0} mm without the root's turn", 1e3 * shot.pose_error_m[0], 1e3 * shot.pose_error_m[1]);
+    println!(
+        "  joints of the estimator: {:.0} mm off, {:.0} mm without the root's turn",
+        1e3 * shot.pose_error_m[0],
+        1e3 * shot.pose_error_m[1]
+    );
     for (step, error) in ["raw", "scaled", "gated", "filtered", "smoothed"].iter().zip(&errors) {
         println!("  {step:9} position {:.3} m, acceleration {:6.2} m/s2", error.position, error.acceleration);
     }
@@ -89,11 +93,19 @@ fn check_published(name: &str, motion: &SmplMotion, seed: u64) {
     let aligned = upright_alignment(&own, &truth);
     let laid: Vec<_> = own.iter().map(|p| Some((aligned * nalgebra::Point3::from(*p)).coords)).collect();
     let whole = track_error(&laid, &truth);
-    let inside = solved.states.iter().zip(&laid).zip(&truth).filter(|((state, own), truth)| {
-        (own.unwrap() - *truth).norm() < 2.8 * (state.position_covariance.trace() / 3.0).sqrt()
-    });
+    let inside = solved
+        .states
+        .iter()
+        .zip(&laid)
+        .zip(&truth)
+        .filter(|((state, own), truth)| (own.unwrap() - *truth).norm() < 2.8 * (state.position_covariance.trace() / 3.0).sqrt());
     let inside = inside.count() as f64 / truth.len() as f64;
-    println!("  scale off by {:+.2} %, up by {tilt:.2} deg, after yaw and place: {:.3} m; {:.0} % within 2.8 std", 100.0 * off, whole.position, 100.0 * inside);
+    println!(
+        "  scale off by {:+.2} %, up by {tilt:.2} deg, after yaw and place: {:.3} m; {:.0} % within 2.8 std",
+        100.0 * off,
+        whole.position,
+        100.0 * inside
+    );
     assert!(off.abs() < 0.02, "{name}: scale off by {off}");
     assert!(smoothed.acceleration * 5.0 < raw.acceleration && smoothed.acceleration * 5.0 < scaled.acceleration, "{name}: fivefold");
     assert!(smoothed.position < scaled.position && scaled.position < raw.position, "{name}");
@@ -116,7 +128,7 @@ fn the_walk_is_found_again_through_published_errors() {
 #[test]
 fn recorded_motions_are_found_again_through_published_errors() {
     let Some(folder) = common::shared_data("mocap_cmu") else { return };
-    for name in ["07_01.bvh", "03_01.bvh"] {
+    for name in ["07_01.bvh", "02_01.bvh", "06_10.bvh"] {
         let motion = read_motion(&folder.join(name), &MotionOptions::default()).unwrap();
         check_published(name, &motion, 7);
     }
@@ -151,7 +163,7 @@ fn the_pose_stands_in_the_world_and_in_place_where_asked() {
         assert!(yaw.axis().is_none_or(|axis| axis.z.abs() > 1.0 - 1e-6));
         for (own, truth) in motion.frames.iter().zip(&shot.truth) {
             assert!((yaw * truth.local_rotations[0]).angle_to(&own.local_rotations[0]) < 1e-6);
-            assert_eq!(own.local_rotations[5].angle_to(&truth.local_rotations[5]), 0.0);
+            assert!(own.local_rotations[5].angle_to(&truth.local_rotations[5]) < 1e-9);
         }
     }
     let first = lite.motion.frames[0].root_position;
@@ -189,4 +201,37 @@ fn what_is_missing_is_said() {
     assert!(message(&shot, &options(&walk)).contains("5 of 31 frames"), "{}", message(&shot, &options(&walk)));
     shot.clip.cameras.pop();
     assert!(message(&shot, &options(&walk)).contains("cameras of 30 frames, but poses of 31"));
+}
+
+#[test]
+fn zz_diag() {
+    let folder = common::shared_data("mocap_cmu").unwrap();
+    let p = shot::PUBLISHED;
+    for (name, motion) in [
+        ("walk", embedded_walk()),
+        ("07_01", read_motion(&folder.join("07_01.bvh"), &MotionOptions::default()).unwrap()),
+        ("06_10", read_motion(&folder.join("06_10.bvh"), &MotionOptions::default()).unwrap()),
+    ] {
+        for (what, errors) in [
+            ("none", Errors { dropout: 0.1, ..shot::NONE }),
+            ("all", p),
+            ("pose only", Errors { keypoint_px: 0.0, depth_scale: 0.0, keypoint_offset_m: 0.0, depth_flicker: 0.0, depth_pixel: 0.0, ..p }),
+        ] {
+            let mut line = String::new();
+            for seed in 1..=6 {
+                let shot = shot::shoot(&motion, &errors, 0.6, seed);
+                let solved = solve(&shot, &options(&motion)).unwrap();
+                let sc = solved.report.scale.unwrap();
+                let tilt = solved_up(&shot, &solved).angle(&Vector3::z()).to_degrees();
+                let noise = solved.report.noise.unwrap();
+                line += &format!(
+                    " {:+.1}({:.1}) t{tilt:.1} jv{:.0};",
+                    100.0 * (sc.metres_per_unit * 0.6 - 1.0),
+                    100.0 * sc.relative_std,
+                    noise.vertical_jerk
+                );
+            }
+            println!("{name} {what}:{line}");
+        }
+    }
 }

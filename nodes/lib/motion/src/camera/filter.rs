@@ -1,8 +1,9 @@
 //! Kalman filter and Rauch-Tung-Striebel smoother of the root's position.
 //!
-//! State x = (position, velocity, acceleration), 9 numbers; the jerk is white with density q [m2/s5] on each axis, so that over dt
+//! State x = (position, velocity, acceleration), 9 numbers; the jerk is white with density q [m2/s5], so that over dt each axis has
 //! `F = [1 dt dt^2/2; 0 1 dt; 0 0 1]` and `Q = q [dt^5/20 dt^4/8 dt^3/6; . dt^3/3 dt^2/2; . . dt]` (Bar-Shalom, Li and Kirubarajan 2001,
-//! section 6.2.3, extended to white jerk). A frame measures the position with its own full 3 x 3 covariance.
+//! section 6.2.3, extended to white jerk). People bounce at every step and walk evenly: q has one value along the vertical and one across
+//! it. A frame measures the position with its own full 3 x 3 covariance.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
@@ -23,8 +24,12 @@ pub struct Measurement {
 /// What the filter has to know; learnt by [`super::learn_noise`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FilterNoise {
-    /// Density of the white jerk per axis, m2/s5.
-    pub jerk_density: f64,
+    /// Up or down, in the measurements' world; of length 1. Some degrees off do no harm.
+    pub vertical: Vector3<f64>,
+    /// Density of the white jerk across the vertical, per axis, m2/s5.
+    pub horizontal_jerk: f64,
+    /// Density of the white jerk along the vertical, m2/s5.
+    pub vertical_jerk: f64,
     /// Factor on the standard deviation that pixels are said to have.
     pub pixel_factor: f64,
     /// Factor on the standard deviation that depths are said to have.
@@ -100,7 +105,7 @@ const OUTLIER_VOLUME_M3: f64 = 100.0;
 /// Runs the filter over frames `dt` seconds apart; frames without a measurement, and those beyond the gate, are bridged by the prediction,
 /// whose covariance grows. Starts at the median of the first nine measurements, at rest within what people do.
 pub fn kalman_filter(measurements: &[Option<Measurement>], dt: f64, noise: &FilterNoise, gate: Gate<'_>) -> FilterRun {
-    let (transition, process) = (transition(dt), process_noise(dt, noise.jerk_density));
+    let (transition, process) = (transition(dt), process_noise(dt, noise));
     let mut run = FilterRun { estimates: Vec::with_capacity(measurements.len()), accepted: Vec::new(), log_likelihood: 0.0 };
     let (mut state, mut covariance) = start(measurements);
     for (frame, measurement) in measurements.iter().enumerate() {
@@ -218,13 +223,16 @@ fn transition(dt: f64) -> Covariance {
     blocks([[1.0, dt, dt * dt / 2.0], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])
 }
 
-fn process_noise(dt: f64, density: f64) -> Covariance {
-    let power = |exponent: i32| density * dt.powi(exponent);
-    blocks([
+fn process_noise(dt: f64, noise: &FilterNoise) -> Covariance {
+    let power = |exponent: i32| dt.powi(exponent);
+    let of_time = [
         [power(5) / 20.0, power(4) / 8.0, power(3) / 6.0],
         [power(4) / 8.0, power(3) / 3.0, power(2) / 2.0],
         [power(3) / 6.0, power(2) / 2.0, power(1)],
-    ])
+    ];
+    let along = noise.vertical * noise.vertical.transpose();
+    let density = along * noise.vertical_jerk + (Matrix3::identity() - along) * noise.horizontal_jerk;
+    Covariance::from_fn(|row, column| density[(row % 3, column % 3)] * of_time[row / 3][column / 3])
 }
 
 /// The same 3 x 3 numbers on each axis.

@@ -7,6 +7,14 @@ use super::super::learn_noise;
 use super::*;
 
 const DT: f64 = 1.0 / 30.0;
+const NOISE: FilterNoise =
+    FilterNoise { vertical: Vector3::new(1.0, 0.0, 0.0), horizontal_jerk: 1.0, vertical_jerk: 1.0, pixel_factor: 1.0, depth_factor: 1.0 };
+
+impl FilterNoise {
+    fn with_jerk(self, density: f64) -> Self {
+        Self { horizontal_jerk: density, vertical_jerk: density, ..self }
+    }
+}
 
 fn normal(random: &mut ChaCha8Rng) -> f64 {
     let (u, v): (f64, f64) = (random.random(), random.random());
@@ -16,7 +24,7 @@ fn normal(random: &mut ChaCha8Rng) -> f64 {
 /// Motion of the very model: white jerk, measured with noise.
 fn simulated(jerk_density: f64, pixel_std: f64, depth_std: f64, count: usize) -> (Vec<Vector3<f64>>, Vec<Option<Measurement>>) {
     let mut random = ChaCha8Rng::seed_from_u64(5);
-    let factor = process_noise(DT, jerk_density).cholesky().unwrap().l();
+    let factor = process_noise(DT, &NOISE.with_jerk(jerk_density)).cholesky().unwrap().l();
     let mut state = State::zeros();
     let (mut truth, mut measurements) = (Vec::new(), Vec::new());
     for frame in 0..count {
@@ -42,11 +50,13 @@ fn simulated(jerk_density: f64, pixel_std: f64, depth_std: f64, count: usize) ->
 #[test]
 fn the_noise_is_learnt_and_the_covariance_is_honest() {
     let (truth, measurements) = simulated(200.0, 0.01, 0.06, 3000);
-    let noise = learn_noise(&measurements, DT);
+    let noise = learn_noise(&measurements, DT, &Vector3::x());
     println!("{noise:?}");
     assert!((noise.pixel_factor - 0.5).abs() < 0.05, "{noise:?}");
     assert!((noise.depth_factor - 3.0).abs() < 0.3, "{noise:?}");
-    assert!((noise.jerk_density / 200.0).ln().abs() < 0.5, "{noise:?}");
+    for jerk in [noise.horizontal_jerk, noise.vertical_jerk] {
+        assert!((jerk / 200.0).ln().abs() < 0.5, "{noise:?}");
+    }
     let run = kalman_filter(&measurements, DT, &noise, Gate::Mahalanobis);
     let consistency = |states: &[RootState]| {
         let of = |(state, truth): (&RootState, &Vector3<f64>)| {
@@ -75,7 +85,7 @@ fn outliers_are_gated_and_gaps_bridged_with_growing_doubt() {
     for missing in &mut measurements[300..320] {
         *missing = None;
     }
-    let run = kalman_filter(&measurements, DT, &learn_noise(&measurements, DT), Gate::Mahalanobis);
+    let run = kalman_filter(&measurements, DT, &learn_noise(&measurements, DT, &Vector3::x()), Gate::Mahalanobis);
     let outliers: Vec<usize> = (0..600).filter(|&frame| measurements[frame].is_some() && !run.accepted[frame]).collect();
     let planted: Vec<usize> = (50..600).step_by(40).filter(|&frame| measurements[frame].is_some()).collect();
     println!("gated {outliers:?}");
@@ -89,12 +99,8 @@ fn outliers_are_gated_and_gaps_bridged_with_growing_doubt() {
 
 #[test]
 fn nothing_measured_is_nothing_known() {
-    let run = kalman_filter(&[None, None], DT, &FilterNoise { jerk_density: 1.0, pixel_factor: 1.0, depth_factor: 1.0 }, Gate::Mahalanobis);
+    let run = kalman_filter(&[None, None], DT, &NOISE, Gate::Mahalanobis);
     assert_eq!(run.accepted, [false, false]);
     assert!(run.smoothed(DT)[1].position_covariance.trace() > 100.0);
-    assert!(
-        kalman_filter(&[], DT, &FilterNoise { jerk_density: 1.0, pixel_factor: 1.0, depth_factor: 1.0 }, Gate::Mahalanobis)
-            .smoothed(DT)
-            .is_empty()
-    );
+    assert!(kalman_filter(&[], DT, &NOISE, Gate::Mahalanobis).smoothed(DT).is_empty());
 }

@@ -1,7 +1,7 @@
 //! Which way is up, and where the floor is.
 
 use cromosim_body::{BodyError, BodyPose, ShapedBody, VertexSubset};
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix2, Matrix3, UnitQuaternion, Vector2, Vector3};
 
 /// How the up direction is found.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -10,8 +10,8 @@ pub enum Gravity {
     Given(Vector3<f64>),
     /// The first camera was held level: up is its image's upward direction.
     FirstCamera,
-    /// The plane that the lowest points of the feet lie in over time, with the first camera (within some 10 degrees) deciding what the
-    /// feet do not tell: the tilt about the line of a straight walk.
+    /// The plane that the lowest points of the feet lie in over time; the way the cameras are held on average (within some 10 degrees) and
+    /// the trunk (within some 5) decide what the feet do not tell: the tilt about the line of a straight walk. For level floors.
     Floor,
 }
 
@@ -32,7 +32,7 @@ impl Soles {
     /// Of a shaped body: the outermost of the vertices within 12 mm of the lowest one, on each side.
     ///
     /// # Errors
-    /// None for a body that is one; the subset's otherwise.
+    /// [`BodyError::UnknownVertex`], which a sound body does not give.
     pub fn new(shaped: &ShapedBody) -> Result<Self, BodyError> {
         let lowest = shaped.rest_vertices().iter().map(|vertex| vertex.y).fold(f64::MAX, f64::min);
         let mut chosen = Vec::new();
@@ -53,33 +53,90 @@ impl Soles {
     }
 }
 
-/// The normal of the floor from the lowest points of the feet, starting at `camera_up`: least squares of `(n x_k - h) / 5 cm` and of the
-/// angle between n and `camera_up` by 10 degrees, Huber's weights against feet in the air, half a second of frames counted as one.
-pub fn floor_normal(lowest_points: &[Vector3<f64>], camera_up: Vector3<f64>, rate_hz: f64) -> Vector3<f64> {
-    let across = if camera_up.x.abs() < 0.8 { Vector3::x() } else { Vector3::y() };
-    let (mut up, side) = (camera_up.normalize(), camera_up.cross(&across).normalize());
-    let ahead = up.cross(&side);
-    let centre = lowest_points.iter().sum::<Vector3<f64>>() / lowest_points.len().max(1) as f64;
-    let together = (CORRELATION_S * rate_hz).max(1.0);
-    let mut height = 0.0;
+/// What tells the floor's normal beside the feet.
+#[derive(Clone, Copy, Debug)]
+pub struct UpHints {
+    /// Up as the camera is held; within some 10 degrees.
+    pub camera: Vector3<f64>,
+    /// Mean direction of the trunk, of length 1 times how steady it is: the mean of unit vectors. People lean by some 5 degrees, and by more
+    /// the less steady they are.
+    pub trunk: Vector3<f64>,
+}
+
+/// How far the trunk of people who walk and stand leans, rad.
+const TRUNK_LEAN_STD: f64 = 0.09;
+
+/// The normal of the floor from the lowest points of the feet and how far each may be displaced along its line of sight (one standard
+/// deviation of the depth), m: least squares of `(n x_k - h) / s` with `s^2 = (5 cm)^2 + (n e_k)^2`, Huber's weights against feet in the air, half a
+/// second of frames counted as one; and of the angles between n and the hints by their standard deviations. Displacements also widen the
+/// points' spread along the lines of sight and so would tilt the plane towards these: their expected share is taken off the normal
+/// equations (errors in variables), as far as these stay positive.
+pub fn floor_normal(feet: &[(Vector3<f64>, Vector3<f64>)], hints: &UpHints, rate_hz: f64) -> Vector3<f64> {
+    let start = hints.camera.try_normalize(1e-9).unwrap_or_else(Vector3::z);
+    let across = if start.x.abs() < 0.8 { Vector3::x() } else { Vector3::y() };
+    let side = start.cross(&across).normalize();
+    let basis = [side, start.cross(&side)];
+    let flat = |vector: &Vector3<f64>| Vector2::new(basis[0].dot(vector), basis[1].dot(vector));
+    let steadiness = hints.trunk.norm().clamp(1e-6, 1.0);
+    let scatter = 2.0 * (1.0 - steadiness);
+    let (trunk, trunk_precision) = (flat(&(hints.trunk / steadiness)), (TRUNK_LEAN_STD * TRUNK_LEAN_STD + scatter).recip());
+    let camera_precision = (CAMERA_TILT_STD * CAMERA_TILT_STD).recip();
+    let prior = Matrix2::identity() * (camera_precision + trunk_precision);
+    let mut slope = Vector2::<f64>::zeros();
     for _ in 0..20 {
-        let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
-        for point in lowest_points {
-            let away = point - centre;
-            let residual = up.dot(&away) - height;
-            let weight = (FOOT_STD_M / residual.abs().max(FOOT_STD_M)) / (together * FOOT_STD_M * FOOT_STD_M);
-            let row = Vector3::new(side.dot(&away), ahead.dot(&away), -1.0);
-            normal += row * row.transpose() * weight;
-            right += row * (weight * -camera_up.normalize().dot(&away));
-        }
-        let prior = 1.0 / (CAMERA_TILT_STD * CAMERA_TILT_STD);
-        normal += Matrix3::from_diagonal(&Vector3::new(prior, prior, 1e-9));
-        let Some(factor) = normal.cholesky() else { break };
-        let solution = factor.solve(&right);
-        up = camera_up.normalize() + side * solution.x + ahead * solution.y;
-        height = solution.z;
+        let up = (start + basis[0] * slope.x + basis[1] * slope.y).normalize();
+        let Some(data) = PlaneSums::of(feet, &up, &start, flat, rate_hz) else { break };
+        // As much of the correction as leaves the feet's own information positive.
+        let kept = (0..=20).map(|step| 1.0 - f64::from(step) / 20.0);
+        let corrected = kept.map(|share| (data.information - data.noise * share, data.pull - data.noise_pull * share));
+        let Some((information, pull)) = corrected.into_iter().find(|(information, _)| information.symmetric_eigenvalues().min() >= 0.0)
+        else {
+            break;
+        };
+        let Some(factor) = (information + prior).cholesky() else { break };
+        slope = factor.solve(&(pull + trunk * trunk_precision));
     }
-    up.normalize()
+    (start + basis[0] * slope.x + basis[1] * slope.y).normalize()
+}
+
+/// Normal equations of the plane's slope about `start`, its height already eliminated by the weighted mean.
+struct PlaneSums {
+    information: Matrix2<f64>,
+    pull: Vector2<f64>,
+    noise: Matrix2<f64>,
+    noise_pull: Vector2<f64>,
+}
+
+impl PlaneSums {
+    fn of(
+        feet: &[(Vector3<f64>, Vector3<f64>)],
+        up: &Vector3<f64>,
+        start: &Vector3<f64>,
+        flat: impl Fn(&Vector3<f64>) -> Vector2<f64>,
+        rate_hz: f64,
+    ) -> Option<Self> {
+        let together = (CORRELATION_S * rate_hz).max(1.0);
+        let mut heights: Vec<f64> = feet.iter().map(|(point, _)| up.dot(point)).collect();
+        heights.sort_by(f64::total_cmp);
+        let middle = *heights.get(heights.len() / 2)?;
+        let weight = |(point, displaced): &(Vector3<f64>, Vector3<f64>)| {
+            let variance = FOOT_STD_M * FOOT_STD_M + up.dot(displaced).powi(2);
+            let away = (up.dot(point) - middle).abs() / variance.sqrt();
+            1.0 / (variance * together * away.max(1.0))
+        };
+        let total: f64 = feet.iter().map(weight).sum();
+        let centre = feet.iter().map(|foot| foot.0 * weight(foot)).sum::<Vector3<f64>>() / total;
+        let mut sums =
+            Self { information: Matrix2::zeros(), pull: Vector2::zeros(), noise: Matrix2::zeros(), noise_pull: Vector2::zeros() };
+        for foot in feet {
+            let (weight, away, displaced) = (weight(foot), foot.0 - centre, foot.1);
+            sums.information += flat(&away) * flat(&away).transpose() * weight;
+            sums.pull -= flat(&away) * (weight * start.dot(&away));
+            sums.noise += flat(&displaced) * flat(&displaced).transpose() * weight;
+            sums.noise_pull -= flat(&displaced) * (weight * start.dot(&displaced));
+        }
+        Some(sums)
+    }
 }
 
 /// The turn of a reconstruction's world into one with z up and the horizontal part of `forward` along x.
@@ -105,22 +162,52 @@ pub fn floor_height(lowest_points: &[Vector3<f64>]) -> f64 {
 mod tests {
     use super::*;
 
+    fn angle(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
+        a.angle(b).to_degrees()
+    }
+
     #[test]
-    fn the_floor_is_found_where_feet_tell_and_left_to_the_camera_where_not() {
+    fn the_floor_is_found_where_feet_tell_and_left_to_the_hints_where_not() {
         let truth = Vector3::new(0.1, -1.0, 0.05).normalize();
-        let camera_up = Vector3::new(0.0, -1.0, 0.0);
+        let camera = Vector3::new(0.0, -1.0, 0.0);
         let plane = |u: f64, v: f64| {
             let side = truth.cross(&Vector3::z()).normalize();
             side * u + truth.cross(&side) * v + Vector3::new(1.0, 2.0, 4.0)
         };
         let lifted = |k: usize| truth * if k.is_multiple_of(9) { 0.4 } else { 0.0 };
-        let square: Vec<_> = (0..900).map(|k| plane((k % 30) as f64 * 0.1, (k / 30) as f64 * 0.1) + lifted(k)).collect();
-        let angle = |a: &Vector3<f64>, b: &Vector3<f64>| a.angle(b).to_degrees();
-        println!("feet over a square: {:.3} deg off", angle(&floor_normal(&square, camera_up, 30.0), &truth));
-        assert!(angle(&floor_normal(&square, camera_up, 30.0), &truth) < 0.5);
-        let standing: Vec<_> = (0..300).map(|_| plane(0.0, 0.0)).collect();
-        assert!(angle(&floor_normal(&standing, camera_up, 30.0), &camera_up) < 0.01, "who stands still says nothing");
-        assert!((upright(&truth, &Vector3::z()) * truth - Vector3::z()).norm() < 1e-12);
-        assert!((upright(&truth, &truth) * truth - Vector3::z()).norm() < 1e-12, "a camera that looks up");
+        let none = Vector3::zeros();
+        let square: Vec<_> = (0..900).map(|k| (plane((k % 30) as f64 * 0.1, (k / 30) as f64 * 0.1) + lifted(k), none)).collect();
+        let hints = UpHints { camera, trunk: camera * 0.95 };
+        println!("feet over a square: {:.3} deg off", angle(&floor_normal(&square, &hints, 30.0), &truth));
+        assert!(angle(&floor_normal(&square, &hints, 30.0), &truth) < 1.0);
+        let standing: Vec<_> = (0..300).map(|_| (plane(0.0, 0.0), none)).collect();
+        assert!(angle(&floor_normal(&standing, &hints, 30.0), &camera) < 0.01, "who stands still says nothing");
+        let upright_trunk = UpHints { camera, trunk: truth * 0.999 };
+        assert!(angle(&floor_normal(&standing, &upright_trunk, 30.0), &truth) < 0.5 * angle(&camera, &truth), "the trunk is nearer");
+        assert_eq!(floor_normal(&[], &hints, 30.0), camera);
+    }
+
+    #[test]
+    fn errors_of_the_depth_do_not_tilt_the_floor_towards_the_line_of_sight() {
+        // A straight walk along x on z = 0, seen from the side and above: every foot is displaced along a line of sight that falls by 20 degrees.
+        let sight = Vector3::new(0.0, 0.94, -0.34);
+        let feet: Vec<_> = (0..300)
+            .map(|k| (Vector3::new(f64::from(k) * 0.015, 0.0, 0.0) + sight * (0.2 * (f64::from(k) * 0.05).sin()), sight * 0.15))
+            .collect();
+        let hints = UpHints { camera: Vector3::new(0.0, 0.08, 1.0), trunk: Vector3::z() * 0.995 };
+        let tilt = angle(&floor_normal(&feet, &hints, 30.0), &Vector3::z());
+        let naive: Vec<_> = feet.iter().map(|(point, _)| (*point, Vector3::zeros())).collect();
+        let naive = angle(&floor_normal(&naive, &hints, 30.0), &Vector3::z());
+        println!("tilt {tilt:.2} deg, {naive:.2} deg where the points are taken as exact");
+        assert!(tilt < 3.0 && naive > 8.0);
+    }
+
+    #[test]
+    fn upright_is_up() {
+        let up = Vector3::new(0.1, -1.0, 0.05).normalize();
+        assert!((upright(&up, &Vector3::z()) * up - Vector3::z()).norm() < 1e-12);
+        assert!((upright(&up, &up) * up - Vector3::z()).norm() < 1e-12, "a camera that looks up");
+        let ahead = upright(&up, &Vector3::z()) * Vector3::z();
+        assert!(ahead.x > 0.9 && ahead.y.abs() < 1e-12);
     }
 }

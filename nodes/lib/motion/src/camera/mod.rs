@@ -36,7 +36,7 @@ pub use depth_map::{
 pub use error::CameraError;
 pub use filter::{FilterNoise, FilterRun, GATE, Gate, Measurement, RootState, kalman_filter};
 pub use folder::{CameraFolder, FolderDepth, FolderFrames, FolderLayout};
-pub use ground::{Gravity, Soles, floor_height, floor_normal, upright};
+pub use ground::{Gravity, Soles, UpHints, floor_height, floor_normal, upright};
 pub use keypoints::{BODY_25_COUNT, Keypoint, PersonKeypoints, track_person};
 pub use learn::learn_noise;
 pub use observe::{ObservedBody, RootObservation, measure, observe};
@@ -47,6 +47,6 @@ pub use report::TrajectoryReport;
 pub use scale::{
     ObjectLength, ScaleEstimate, ScaleSource, combined_scale, position_by_keypoints, scale_of_frame, scale_of_object, standing_height,
 };
-pub use surface::{PelvisSkin, SurfaceDepth, surface_depth};
+pub use surface::{PelvisSkin, PosedHips, SurfaceDepth, surface_depth};
 pub use torso::{PelvisPixel, PelvisSource, pelvis_pixel};
 pub use trajectory::{GlobalTrajectory, RootTrack, Trajectory, TrajectoryOptions, global_trajectory};

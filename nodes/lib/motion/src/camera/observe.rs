@@ -5,7 +5,7 @@ use nalgebra::{Vector2, Vector3};
 
 use super::{Camera, CameraClip, DepthMap, Measurement, PelvisSkin, TrajectoryOptions, pelvis_pixel, position_by_keypoints, surface_depth};
 
-/// How exactly the skin's distance before the joint is known, m: clothing, and thighs that are lifted.
+/// How exactly the skin's distance before the joint is known, m: clothing, and limbs that the pose has elsewhere.
 const SKIN_STD_M: f64 = 0.02;
 
 /// One frame, before the scale is known.
@@ -33,8 +33,8 @@ pub struct RootObservation {
 pub struct ObservedBody<'a> {
     /// Shaped by the clip's average betas.
     pub shaped: &'a ShapedBody,
-    /// Its hips.
-    pub skin: &'a PelvisSkin,
+    /// Its skin.
+    pub skin: PelvisSkin<'a>,
     /// Factor on the body's size: the known height by its own, 1 where none is known.
     pub size: f64,
 }
@@ -44,7 +44,7 @@ pub fn observe(
     clip: &CameraClip,
     frame: usize,
     map: &DepthMap,
-    body: &ObservedBody<'_>,
+    body: &mut ObservedBody<'_>,
     options: &TrajectoryOptions,
 ) -> Option<RootObservation> {
     let person = clip.keypoints.get(frame)?.as_ref()?;
@@ -52,9 +52,7 @@ pub fn observe(
     let pose = clip.poses.get(frame).filter(|_| clip.pose_confidence.get(frame).is_some_and(|confidence| *confidence > 0.0))?;
     let pelvis = pelvis_pixel(person, options.least_confidence)?;
     let surface = surface_depth(map, &camera, pelvis.pixel, pelvis.torso_px)?;
-    let camera_from_pelvis = pose.local_rotations[0];
-    let ray = camera.ray(pelvis.pixel).normalize();
-    let behind_skin_m = body.skin.depth_behind_skin(&(camera_from_pelvis.inverse() * ray)) * body.size;
+    let hips = body.skin.hips(pose, &camera.ray(pelvis.pixel));
     let by_keypoints = position_by_keypoints(person, pose, body.shaped, body.size, &camera, options.least_confidence);
     Some(RootObservation {
         frame,
@@ -62,8 +60,8 @@ pub fn observe(
         pixel_std: options.keypoint_std_px * clip.keypoint_image_px.y / 1080.0 * pelvis.spread / pelvis.confidence,
         confidence: pelvis.confidence,
         skin_depth: surface.depth,
-        behind_skin_m,
-        pelvis_from_mid_hip: camera_from_pelvis * body.skin.pelvis_from_mid_hip() * body.size,
+        behind_skin_m: hips.behind_skin_m * body.size,
+        pelvis_from_mid_hip: -hips.mid_hip * body.size,
         distance_by_keypoints_m: by_keypoints.map(|position| position.z),
     })
 }

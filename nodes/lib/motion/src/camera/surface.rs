@@ -1,6 +1,6 @@
 //! Depth of the skin in front of the pelvis, in the map and on the body.
 
-use cromosim_body::{Joint, ShapedBody};
+use cromosim_body::{BodyPose, Joint, ShapedBody};
 use nalgebra::{Vector2, Vector3};
 
 use super::{Camera, DepthMap};
@@ -65,81 +65,96 @@ fn disc(map: &DepthMap, centre: Vector2<f64>, radius: f64) -> Vec<f64> {
     depths
 }
 
-/// The skin around the pelvis of a shaped body at rest: how far in front of the middle of the hips it lies, seen from any side.
+/// What a body shows before its hips: the skin of its pose, arms and thighs included, seen from any side.
 #[derive(Clone, Debug)]
-pub struct PelvisSkin {
-    /// Corners about the middle of the hip joints, model axes, m.
-    triangles: Vec<[Vector3<f64>; 3]>,
+pub struct PelvisSkin<'a> {
+    shaped: &'a ShapedBody,
     /// Neck to middle of the hips, m.
     torso_m: f64,
-    pelvis_from_mid_hip: Vector3<f64>,
+    vertices: Vec<[f32; 3]>,
 }
 
-/// Triangles farther from the middle of the hips belong to legs and chest.
-const PELVIS_RADIUS_M: f64 = 0.4;
+/// A pose's hips in camera axes, root at the origin, m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PosedHips {
+    /// The middle of the hip joints.
+    pub mid_hip: Vector3<f64>,
+    /// How far the skin lies before it along the view.
+    pub behind_skin_m: f64,
+}
+
 /// Rays of the window: a grid with this many to each side of the middle.
 const GRID: i32 = 2;
 
-impl PelvisSkin {
+impl<'a> PelvisSkin<'a> {
     /// Of a shaped body.
-    pub fn new(shaped: &ShapedBody) -> Self {
+    pub fn new(shaped: &'a ShapedBody) -> Self {
         let joint = |joint: Joint| shaped.joints_in_model()[joint.index()];
         let mid_hip = (joint(Joint::LeftHip) + joint(Joint::RightHip)) / 2.0;
-        let corners = |face: &[u32; 3]| face.map(|vertex| shaped.rest_vertices()[vertex as usize] - mid_hip);
-        // Hands hang far from the hips in the T-pose, so that what is near belongs to the trunk and thighs.
-        let near = |corners: &[Vector3<f64>; 3]| corners.iter().all(|corner| corner.norm() < PELVIS_RADIUS_M);
-        let triangles = shaped.model().faces().iter().map(corners).filter(near).collect();
         let shoulders = (joint(Joint::LeftShoulder) + joint(Joint::RightShoulder)) / 2.0;
-        Self { triangles, torso_m: (shoulders - mid_hip).norm(), pelvis_from_mid_hip: joint(Joint::Pelvis) - mid_hip }
+        Self { shaped, torso_m: (shoulders - mid_hip).norm(), vertices: Vec::new() }
     }
 
-    /// The pelvis joint from the middle of the hip joints, pelvis axes, m.
-    pub fn pelvis_from_mid_hip(&self) -> Vector3<f64> {
-        self.pelvis_from_mid_hip
-    }
-
-    /// Distance from the skin to the middle of the hips along the view, m: the median over the window of [`surface_depth`].
-    /// `view_in_pelvis` points away from the camera, in pelvis axes.
-    pub fn depth_behind_skin(&self, view_in_pelvis: &Vector3<f64>) -> f64 {
-        let Some(view) = view_in_pelvis.try_normalize(1e-9) else { return 0.0 };
+    /// The hips of a pose in camera axes, its root position left out. How far they lie behind the skin is the median over the window of
+    /// [`surface_depth`], which sees arms that hang before the hips as well. `view` points away from the camera.
+    pub fn hips(&mut self, pose: &BodyPose, view: &Vector3<f64>) -> PosedHips {
+        let pose = BodyPose { root_position: Vector3::zeros(), ..pose.clone() };
+        let segments = self.shaped.world_from_segments(&pose);
+        let place = |joint: Joint| segments[joint.index()].translation.vector;
+        let mid_hip = (place(Joint::LeftHip) + place(Joint::RightHip)) / 2.0;
+        let Some(view) = view.try_normalize(1e-9) else { return PosedHips { mid_hip, behind_skin_m: 0.0 } };
+        self.shaped.skin(&pose, &mut self.vertices);
         let right = view.cross(&if view.y.abs() < 0.9 { Vector3::y() } else { Vector3::x() }).normalize();
         let down = view.cross(&right);
+        // Across the view in steps of the grid, and before the hips.
         let step = self.torso_m * WINDOW_BY_TORSO / f64::from(GRID);
-        let mut depths = Vec::new();
-        for row in -GRID..=GRID {
-            for column in (-GRID..=GRID).filter(|column| row * row + column * column <= GRID * GRID) {
-                let origin = (right * f64::from(column) + down * f64::from(row)) * step;
-                depths.extend(self.first_hit(&origin, &view));
+        let seen = |vertex: &[f32; 3]| {
+            let away = Vector3::from(vertex.map(f64::from)) - mid_hip;
+            (Vector2::new(right.dot(&away), down.dot(&away)) / step, -view.dot(&away))
+        };
+        let corners: Vec<(Vector2<f64>, f64)> = self.vertices.iter().map(seen).collect();
+        let mut before = first_hits(self.shaped.model().faces(), &corners);
+        before.sort_by(|a, b| b.total_cmp(a));
+        let nearest = before.get(before.len() / 10).copied().unwrap_or(0.0);
+        before.retain(|distance| *distance >= nearest - BODY_DEPTH_BY_TORSO * self.torso_m);
+        PosedHips { mid_hip, behind_skin_m: before.get(before.len() / 2).copied().unwrap_or(0.0) }
+    }
+}
+
+/// For each ray of the round window that meets the body, how far before the middle its first skin is. Corners are in steps of the grid.
+fn first_hits(faces: &[[u32; 3]], corners: &[(Vector2<f64>, f64)]) -> Vec<f64> {
+    let side = (2 * GRID + 1) as usize;
+    let mut hits = vec![f64::NEG_INFINITY; side * side];
+    let reach = f64::from(GRID);
+    for face in faces {
+        let [Some((a, a_before)), Some((b, b_before)), Some((c, c_before))] = face.map(|vertex| corners.get(vertex as usize)) else {
+            continue;
+        };
+        let area = (b - a).perp(&(c - a));
+        let (low, high) = (a.inf(b).inf(c), a.sup(b).sup(c));
+        if low.max() > reach || high.min() < -reach || area == 0.0 {
+            continue;
+        }
+        for row in low.y.max(-reach).ceil() as i32..=high.y.min(reach).floor() as i32 {
+            for column in low.x.max(-reach).ceil() as i32..=high.x.min(reach).floor() as i32 {
+                let point = Vector2::new(f64::from(column), f64::from(row));
+                let weights = [(c - b).perp(&(point - b)), (a - c).perp(&(point - c)), (b - a).perp(&(point - a))].map(|part| part / area);
+                if row * row + column * column <= GRID * GRID && weights.iter().all(|weight| *weight >= 0.0) {
+                    let hit = &mut hits[(row + GRID) as usize * side + (column + GRID) as usize];
+                    *hit = hit.max(weights[0] * a_before + weights[1] * b_before + weights[2] * c_before);
+                }
             }
         }
-        depths.sort_by(f64::total_cmp);
-        depths.get(depths.len() / 2).copied().unwrap_or(0.0)
     }
-
-    /// How far before `origin` a ray along `view` enters the body; `None` where it passes by.
-    fn first_hit(&self, origin: &Vector3<f64>, view: &Vector3<f64>) -> Option<f64> {
-        let hits = self.triangles.iter().filter_map(|[a, b, c]| {
-            let (ab, ac) = (b - a, c - a);
-            let normal = view.cross(&ac);
-            let determinant = ab.dot(&normal);
-            if determinant.abs() < 1e-15 {
-                return None;
-            }
-            let from_a = origin - a;
-            let u = from_a.dot(&normal) / determinant;
-            let across = from_a.cross(&ab);
-            let v = view.dot(&across) / determinant;
-            (u >= 0.0 && v >= 0.0 && u + v <= 1.0).then(|| -ac.dot(&across) / determinant)
-        });
-        hits.max_by(f64::total_cmp)
-    }
+    hits.retain(|hit| hit.is_finite());
+    hits
 }
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
     use cromosim_body::BodyModel;
-    use nalgebra::Isometry3;
+    use nalgebra::{Isometry3, UnitQuaternion};
 
     use super::*;
 
@@ -168,13 +183,19 @@ mod tests {
     #[test]
     fn skin_lies_before_the_hips_on_every_side() {
         let shaped = ShapedBody::new(BodyModel::embedded(), &[]).unwrap();
-        let skin = PelvisSkin::new(&shaped);
-        let [front, back, left, right] =
-            [-Vector3::z(), Vector3::z(), -Vector3::x(), Vector3::x()].map(|view| skin.depth_behind_skin(&view));
+        let mut skin = PelvisSkin::new(&shaped);
+        let mut pose = BodyPose::rest(Vector3::new(3.0, 4.0, 5.0));
+        let views = [-Vector3::z(), Vector3::z(), -Vector3::x(), Vector3::x()];
+        let [front, back, left, right] = views.map(|view| skin.hips(&pose, &view).behind_skin_m);
         println!("skin before the hips: front {front:.3}, back {back:.3}, left {left:.3}, right {right:.3} m");
         // Half the depth and half the breadth of an adult's hips.
         assert!((0.06..0.16).contains(&front) && (0.06..0.16).contains(&back), "{front} {back}");
         assert!((0.12..0.22).contains(&left) && (left - right).abs() < 0.01, "{left} {right}");
-        assert!((0.03..0.12).contains(&skin.pelvis_from_mid_hip().norm()));
+        assert!((0.03..0.12).contains(&skin.hips(&pose, &Vector3::z()).mid_hip.norm()), "the pelvis joint is somewhat above the hips");
+        // The left arm hangs down before the left hip.
+        pose.local_rotations[Joint::LeftShoulder.index()] = UnitQuaternion::from_scaled_axis(Vector3::new(0.0, 0.0, -1.45));
+        let arm = skin.hips(&pose, &-Vector3::x()).behind_skin_m;
+        println!("with an arm before them: {arm:.3} m");
+        assert!(arm > left + 0.02 && (skin.hips(&pose, &Vector3::x()).behind_skin_m - right).abs() < 1e-6);
     }
 }

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use cromosim_body::{BodyModel, BodyPose, ShapedBody};
+use cromosim_body::{BodyModel, BodyPose, Joint, ShapedBody};
 use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 
-use super::ground::{Soles, floor_height, floor_normal, upright};
+use super::ground::{Soles, UpHints, floor_height, floor_normal, upright};
 use super::observe::{ObservedBody, RootObservation, measure, observe};
 use super::placed::{Placed, placed};
 use super::{
@@ -117,7 +117,7 @@ pub fn global_trajectory(
         Trajectory::Depth => {
             let (scale, measured) = measurements(clip, depths, &shaped, options)?;
             let dt = clip.rate_hz.recip();
-            let (track, noise) = smooth_track(measured, dt);
+            let (track, noise) = smooth_track(measured, dt, &roughly_up(options, &placed.cameras));
             (Some(scale), Some(track), Some(noise))
         }
     };
@@ -174,7 +174,7 @@ fn measurements(
     options: &TrajectoryOptions,
 ) -> Result<(ScaleEstimate, Vec<Option<Measurement>>), CameraError> {
     let size = if let ScaleSource::BodyHeight(height) = options.scale { height / standing_height(shaped) } else { 1.0 };
-    let body = ObservedBody { shaped, skin: &PelvisSkin::new(shaped), size };
+    let mut body = ObservedBody { shaped, skin: PelvisSkin::new(shaped), size };
     let mut observations: Vec<Option<RootObservation>> = Vec::with_capacity(clip.poses.len());
     let mut of_objects = Vec::new();
     for frame in 0..clip.poses.len() {
@@ -184,7 +184,7 @@ fn measurements(
             let here = objects.iter().filter(|object| object.frame == frame);
             of_objects.extend(here.filter_map(|object| scale_of_object(object, map, &camera)).map(|scale| (scale, 1.0)));
         }
-        observations.push(map.and_then(|map| observe(clip, frame, &map, &body, options)));
+        observations.push(map.and_then(|map| observe(clip, frame, &map, &mut body, options)));
     }
     let found = observations.iter().flatten().count();
     if found < LEAST_MEASUREMENTS {
@@ -226,10 +226,18 @@ fn scale(
     }
 }
 
+/// Up as far as it is known before the track: as given, or as the cameras are held on average.
+fn roughly_up(options: &TrajectoryOptions, cameras: &[Camera]) -> Vector3<f64> {
+    match options.gravity {
+        Gravity::Given(up) => up,
+        _ => mean_up(cameras),
+    }
+}
+
 /// Learns the noise, filters, smooths, and decides once more about every frame from both sides: an outlier at the start of a gap can fool the
 /// prediction, but not the smoothed track.
-fn smooth_track(measured: Vec<Option<Measurement>>, dt: f64) -> (RootTrack, FilterNoise) {
-    let noise = learn_noise(&measured, dt);
+fn smooth_track(measured: Vec<Option<Measurement>>, dt: f64, up: &Vector3<f64>) -> (RootTrack, FilterNoise) {
+    let noise = learn_noise(&measured, dt, up);
     let mut run = kalman_filter(&measured, dt, &noise, Gate::Mahalanobis);
     for _ in 0..2 {
         let smoothed = run.smoothed(dt);
@@ -263,6 +271,33 @@ impl InSource {
     }
 }
 
+impl InSource {
+    /// See [`floor_normal`]; feet that move in place tell nothing, and the hints decide.
+    fn floor_normal(&self, shaped: &ShapedBody, soles: &Soles, poses: &[BodyPose], rate_hz: f64, depth_scale_std: f64) -> Vector3<f64> {
+        let camera = mean_up(&self.placed.cameras);
+        let trunk = |pose: &BodyPose| {
+            let segments = shaped.world_from_segments(pose);
+            let along = segments[Joint::Neck.index()].translation.vector - segments[Joint::Pelvis.index()].translation.vector;
+            along.try_normalize(1e-9).unwrap_or_else(Vector3::zeros)
+        };
+        let trunk = poses.iter().map(trunk).sum::<Vector3<f64>>() / poses.len().max(1) as f64;
+        let foot = |(pose, own): (&BodyPose, &Camera)| {
+            let lowest = soles.lowest(pose, &camera)?;
+            Some((lowest, (lowest - own.world_from_camera.translation.vector * self.metres) * depth_scale_std))
+        };
+        let feet: Vec<_> = match self.smoothed {
+            Some(_) => poses.iter().zip(&self.placed.cameras).filter_map(foot).collect(),
+            None => Vec::new(),
+        };
+        floor_normal(&feet, &UpHints { camera, trunk }, rate_hz)
+    }
+}
+
+/// Up as the cameras are held on average.
+fn mean_up(cameras: &[Camera]) -> Vector3<f64> {
+    cameras.iter().map(|camera| camera.world_from_camera.rotation * -Vector3::y()).sum()
+}
+
 struct Upright {
     poses: Vec<BodyPose>,
     states: Vec<RootState>,
@@ -277,16 +312,10 @@ fn stand_up(clip: &CameraClip, source: &InSource, shaped: &ShapedBody, options: 
     let poses = source.poses();
     let no_frames = || CameraError::Gravity { name: clip.name.clone(), problem: "the clip has no frames".to_owned() };
     let first_camera = source.placed.cameras.first().ok_or_else(no_frames)?.world_from_camera.rotation;
-    let camera_up = first_camera * -Vector3::y();
     let up = match options.gravity {
         Gravity::Given(up) => up.normalize(),
-        Gravity::FirstCamera => camera_up,
-        // Feet that move in place tell the floor's height, not its slope.
-        Gravity::Floor if source.smoothed.is_none() => camera_up,
-        Gravity::Floor => {
-            let lowest: Vec<Vector3<f64>> = poses.iter().filter_map(|pose| soles.lowest(pose, &camera_up)).collect();
-            floor_normal(&lowest, camera_up, clip.rate_hz)
-        }
+        Gravity::FirstCamera => first_camera * -Vector3::y(),
+        Gravity::Floor => source.floor_normal(shaped, &soles, &poses, clip.rate_hz, options.depth_scale_std),
     };
     let turn = upright(&up, &(first_camera * Vector3::z()));
     let mut poses: Vec<BodyPose> = poses.into_iter().map(|pose| turned(pose, &turn)).collect();

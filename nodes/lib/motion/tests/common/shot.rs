@@ -47,7 +47,7 @@ pub const PUBLISHED: Errors = Errors {
     depth_scale: 0.05,
     depth_flicker: 0.01,
     depth_pixel: 0.02,
-    pose_slow_deg: 8.0,
+    pose_slow_deg: 7.0,
     pose_white_deg: 2.0,
     camera_deg: 0.3,
     camera_m: 0.01,
@@ -124,7 +124,8 @@ pub fn shoot(motion: &SmplMotion, errors: &Errors, scale: f64, seed: u64) -> Sho
     let count = truth.len();
     let true_cameras = cameras(&truth);
     // The reconstruction's world is the first camera's, as usual, at another place.
-    let source_from_world = Isometry3::new(Vector3::new(0.3, -0.2, 0.5), Vector3::new(0.02, 0.4, -0.03)) * true_cameras[0].world_from_camera.inverse();
+    let source_from_world =
+        Isometry3::new(Vector3::new(0.3, -0.2, 0.5), Vector3::new(0.02, 0.4, -0.03)) * true_cameras[0].world_from_camera.inverse();
     let depths = render_all(&truth, &true_cameras, &shaped, errors, scale, &mut random);
     let mut keypoints = keypoints(&truth, &true_cameras, &shaped, errors, &mut random);
     drop_out(&mut keypoints, errors, &mut random);
@@ -136,7 +137,8 @@ pub fn shoot(motion: &SmplMotion, errors: &Errors, scale: f64, seed: u64) -> Sho
         pose.rotation *= UnitQuaternion::from_scaled_axis(turns[frame] * errors.camera_deg.to_radians());
         Some(Camera { world_from_camera: pose, ..*camera }.resized(Vector2::new(MAP_PX[0] as f64, MAP_PX[1] as f64)))
     };
-    let betas = (0..count).map(|_| motion.betas.iter().map(|beta| beta + if errors.pose_slow_deg > 0.0 { 0.3 * random.normal() } else { 0.0 }).collect());
+    let betas = (0..count)
+        .map(|_| motion.betas.iter().map(|beta| beta + if errors.pose_slow_deg > 0.0 { 0.3 * random.normal() } else { 0.0 }).collect());
     let clip = CameraClip {
         name: "shot".to_owned(),
         rate_hz: RATE_HZ,
@@ -198,7 +200,13 @@ fn body_points(shaped: &ShapedBody, pose: &BodyPose) -> Vec<(usize, Vector3<f64>
     points
 }
 
-fn keypoints(truth: &[BodyPose], cameras: &[Camera], shaped: &ShapedBody, errors: &Errors, random: &mut Random) -> Vec<Option<PersonKeypoints>> {
+fn keypoints(
+    truth: &[BodyPose],
+    cameras: &[Camera],
+    shaped: &ShapedBody,
+    errors: &Errors,
+    random: &mut Random,
+) -> Vec<Option<PersonKeypoints>> {
     let offsets: Vec<Vector3<f64>> = (0..BODY_25_COUNT).map(|_| random.vector() * errors.keypoint_offset_m).collect();
     let frame = |(pose, camera): (&BodyPose, &Camera)| {
         let mut person = [Keypoint::default(); BODY_25_COUNT];
@@ -259,7 +267,10 @@ fn poses(truth: &[BodyPose], cameras: &[Camera], shaped: &ShapedBody, errors: &E
             }
             let with_root = mean_distance(shaped, &given, pose);
             let root = pose.local_rotations[0];
-            let without = BodyPose { local_rotations: std::array::from_fn(|joint| if joint == 0 { root } else { given.local_rotations[joint] }), ..given.clone() };
+            let without = BodyPose {
+                local_rotations: std::array::from_fn(|joint| if joint == 0 { root } else { given.local_rotations[joint] }),
+                ..given.clone()
+            };
             distance[0] += with_root / truth.len() as f64;
             distance[1] += mean_distance(shaped, &without, pose) / truth.len() as f64;
             given.local_rotations[0] = camera.world_from_camera.rotation.inverse() * given.local_rotations[0];
@@ -275,7 +286,14 @@ fn mean_distance(shaped: &ShapedBody, given: &BodyPose, truth: &BodyPose) -> f64
     pairs.map(|(a, b)| (a.translation.vector - b.translation.vector).norm()).sum::<f64>() / 24.0
 }
 
-fn render_all(truth: &[BodyPose], cameras: &[Camera], shaped: &ShapedBody, errors: &Errors, scale: f64, random: &mut Random) -> Vec<Option<DepthMap>> {
+fn render_all(
+    truth: &[BodyPose],
+    cameras: &[Camera],
+    shaped: &ShapedBody,
+    errors: &Errors,
+    scale: f64,
+    random: &mut Random,
+) -> Vec<Option<DepthMap>> {
     let slow = random.slow(truth.len());
     let mut vertices = Vec::new();
     let frame = |(frame, (pose, camera)): (usize, (&BodyPose, &Camera))| {

@@ -1,0 +1,46 @@
+//! Poses and IMU readings over time.
+
+use cromosim_spatial::Stamp;
+use nalgebra::{UnitQuaternion, Vector3};
+
+/// Poses of one rigid body. All lists have the same length; stamps increase.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PoseTrajectory {
+    /// When.
+    pub stamps: Vec<Stamp>,
+    /// The body's origin in the world, m.
+    pub positions: Vec<Vector3<f64>>,
+    /// world_from_body.
+    pub rotations: Vec<UnitQuaternion<f64>>,
+    /// Name of the world's frame where the file says it; empty elsewhere.
+    pub frame: String,
+}
+
+impl PoseTrajectory {
+    /// Adds a pose at the end.
+    pub(crate) fn push(&mut self, stamp: Stamp, position: Vector3<f64>, rotation: UnitQuaternion<f64>) {
+        self.stamps.push(stamp);
+        self.positions.push(position);
+        self.rotations.push(rotation);
+    }
+}
+
+/// Readings of one IMU. All lists have the same length; stamps increase.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ImuSeries {
+    /// When.
+    pub stamps: Vec<Stamp>,
+    /// Accelerometer in its own axes, m/s2: +g up at rest.
+    pub specific_force: Vec<Vector3<f64>>,
+    /// Gyroscope in its own axes, rad/s.
+    pub angular_velocity: Vec<Vector3<f64>>,
+}
+
+impl ImuSeries {
+    /// Adds a reading at the end.
+    pub(crate) fn push(&mut self, stamp: Stamp, specific_force: Vector3<f64>, angular_velocity: Vector3<f64>) {
+        self.stamps.push(stamp);
+        self.specific_force.push(specific_force);
+        self.angular_velocity.push(angular_velocity);
+    }
+}

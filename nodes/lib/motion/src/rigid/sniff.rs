@@ -1,0 +1,53 @@
+//! Which format a text file is, by its content.
+
+/// The formats of rigid bodies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RigidFormat {
+    /// [`super::parse_tum`].
+    Tum,
+    /// [`super::parse_euroc_ground_truth`].
+    EurocGroundTruth,
+    /// [`super::parse_euroc_imu`].
+    EurocImu,
+    /// [`super::parse_pose_csv`].
+    PoseCsv,
+}
+
+/// How much of the content is looked at.
+const LOOKED_AT: usize = 64 << 10;
+
+/// The format by the header, or by number and kind of the first row's columns: 8 between blanks are TUM's; 7, 8 or 17 between commas, the
+/// first of them a whole number, are EuRoC's. `None` for anything else.
+pub fn sniff_rigid(bytes: &[u8]) -> Option<RigidFormat> {
+    let start = String::from_utf8_lossy(&bytes[..bytes.len().min(LOOKED_AT)]);
+    let start = start.trim_start_matches('\u{feff}');
+    let first = start.lines().map(str::trim).find(|line| !line.is_empty())?;
+    let lower = first.to_lowercase();
+    let names = |names: &[&str]| names.iter().all(|name| lower.contains(name));
+    if first.starts_with('#') && names(&["w_rs_s_x", "a_rs_s_x"]) && !names(&["p_rs"]) {
+        return Some(RigidFormat::EurocImu);
+    }
+    if first.starts_with('#') && names(&["p_rs", "q_rs"]) {
+        return Some(RigidFormat::EurocGroundTruth);
+    }
+    let separators = first.contains([',', ';', '\t']);
+    let cells: Vec<String> =
+        lower.split([',', ';', '\t']).map(|cell| cell.split(['[', '(']).next().unwrap_or_default().trim().to_owned()).collect();
+    let ends = |ending: &str| cells.iter().any(|cell| cell.ends_with(ending));
+    let quaternion = ends("qw") || ends("q_w") || ends("orientation.w") || ends("orientation_w") || ends("quat_w") || ends("quaternion_w");
+    if separators && quaternion && first.chars().any(char::is_alphabetic) {
+        return Some(RigidFormat::PoseCsv);
+    }
+    let row = start.lines().map(str::trim).find(|line| !line.is_empty() && !line.starts_with('#'))?;
+    let numbers = |cells: &[&str]| cells.iter().all(|cell| cell.parse::<f64>().is_ok());
+    let (blanks, commas): (Vec<&str>, Vec<&str>) = (row.split_ascii_whitespace().collect(), row.split(',').map(str::trim).collect());
+    if blanks.len() == 8 && numbers(&blanks) {
+        return Some(RigidFormat::Tum);
+    }
+    let whole = commas.first().is_some_and(|cell| cell.parse::<i64>().is_ok());
+    match commas.len() {
+        7 if whole && numbers(&commas) => Some(RigidFormat::EurocImu),
+        8 | 17 if whole && numbers(&commas) => Some(RigidFormat::EurocGroundTruth),
+        _ => None,
+    }
+}
