@@ -18,6 +18,7 @@ mod axes;
 mod bvh;
 mod c3d;
 pub mod camera;
+pub mod datasets;
 mod error;
 mod format;
 mod markers;

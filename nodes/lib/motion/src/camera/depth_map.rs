@@ -3,6 +3,7 @@
 use std::io::Cursor;
 
 use super::CameraError;
+use super::npy::NpyHeader;
 
 /// More pixels than this are no depth map.
 pub const MAX_DEPTH_PIXELS: usize = 64 << 20;
@@ -113,49 +114,13 @@ fn floats(
 /// # Errors
 /// [`CameraError::Depth`] with the byte.
 pub fn parse_npy_depth(bytes: &[u8], encoding: DepthEncoding, name: &str) -> Result<DepthMap, CameraError> {
-    let (header, start) = npy_header(bytes).map_err(|problem| depth_error(name, 0, problem.to_owned()))?;
-    let (Some(element), Some(shape)) = (between(header, "'descr':", '\'', '\''), between(header, "'shape':", '(', ')')) else {
-        return Err(depth_error(name, 10, "the numpy header has no descr or shape".to_owned()));
+    let header = NpyHeader::parse(bytes).map_err(|problem| depth_error(name, 0, problem.to_owned()))?;
+    let [height, width] = header.shape[..] else {
+        return Err(depth_error(name, 10, format!("expected shape (height, width), found {:?}", header.shape)));
     };
-    let sizes: Vec<usize> = shape.split(',').filter_map(|size| size.trim().parse().ok()).collect();
-    let [height, width] = sizes[..] else {
-        return Err(depth_error(name, 10, format!("expected shape (height, width), found ({shape})")));
-    };
-    if header.split_once("'fortran_order':").is_none_or(|(_, rest)| !rest.trim_start().starts_with("False")) {
-        return Err(depth_error(name, 10, "the array is in Fortran order; save numpy.ascontiguousarray of it".to_owned()));
-    }
-    let content = &bytes[start..];
-    match element {
-        "<f4" => floats(content, start, (width, height), encoding, name),
-        "<f8" => {
-            let pixels = checked_pixels(width, height, name)?;
-            if content.len() != 8 * pixels {
-                let problem = format!("{width} x {height} pixels take {} bytes, found {}", 8 * pixels, content.len());
-                return Err(depth_error(name, start, problem));
-            }
-            let values = content.as_chunks::<8>().0.iter().map(|chunk| f64::from_le_bytes(*chunk) as f32);
-            map(width, height, values.map(|value| decoded(value, encoding)).collect(), name)
-        }
-        other => Err(depth_error(name, 10, format!("expected float32 or float64 (<f4, <f8), found {other}"))),
-    }
-}
-
-fn npy_header(bytes: &[u8]) -> Result<(&str, usize), &'static str> {
-    if bytes.len() < 12 || !bytes.starts_with(b"\x93NUMPY") {
-        return Err("not a numpy array");
-    }
-    let (length, start): (usize, usize) = match bytes[6] {
-        1 => (usize::from(u16::from_le_bytes([bytes[8], bytes[9]])), 10),
-        2 | 3 => (u32::from_le_bytes([bytes[8], bytes[9], bytes[10], bytes[11]]) as usize, 12),
-        _ => return Err("numpy format version is none of 1 to 3"),
-    };
-    let header = bytes.get(start..start.saturating_add(length)).ok_or("the numpy header is cut short")?;
-    Ok((std::str::from_utf8(header).map_err(|_| "the numpy header is no text")?, start + length))
-}
-
-fn between<'a>(text: &'a str, key: &str, open: char, close: char) -> Option<&'a str> {
-    let (_, rest) = text.split_once(key)?;
-    Some(rest.trim_start().strip_prefix(open)?.split_once(close)?.0)
+    checked_pixels(width, height, name)?;
+    let values = header.floats(bytes).map_err(|problem| depth_error(name, header.start, problem))?;
+    map(width, height, values.into_iter().map(|value| decoded(value as f32, encoding)).collect(), name)
 }
 
 /// A grey PNG of 16 bits, in millimetres; 0 is unknown. Depths come out in metres.

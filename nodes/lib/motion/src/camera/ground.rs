@@ -70,7 +70,7 @@ const TRUNK_LEAN_STD: f64 = 0.09;
 /// deviation of the depth), m: least squares of `(n x_k - h) / s` with `s^2 = (5 cm)^2 + (n e_k)^2`, Huber's weights against feet in the air, half a
 /// second of frames counted as one; and of the angles between n and the hints by their standard deviations. Displacements also widen the
 /// points' spread along the lines of sight and so would tilt the plane towards these: their expected share is taken off the normal
-/// equations (errors in variables), as far as these stay positive.
+/// equations (errors in variables), and a direction counts by the share of its spread that is left.
 pub fn floor_normal(feet: &[(Vector3<f64>, Vector3<f64>)], hints: &UpHints, rate_hz: f64) -> Vector3<f64> {
     let start = hints.camera.try_normalize(1e-9).unwrap_or_else(Vector3::z);
     let across = if start.x.abs() < 0.8 { Vector3::x() } else { Vector3::y() };
@@ -86,13 +86,7 @@ pub fn floor_normal(feet: &[(Vector3<f64>, Vector3<f64>)], hints: &UpHints, rate
     for _ in 0..20 {
         let up = (start + basis[0] * slope.x + basis[1] * slope.y).normalize();
         let Some(data) = PlaneSums::of(feet, &up, &start, flat, rate_hz) else { break };
-        // As much of the correction as leaves the feet's own information positive.
-        let kept = (0..=20).map(|step| 1.0 - f64::from(step) / 20.0);
-        let corrected = kept.map(|share| (data.information - data.noise * share, data.pull - data.noise_pull * share));
-        let Some((information, pull)) = corrected.into_iter().find(|(information, _)| information.symmetric_eigenvalues().min() >= 0.0)
-        else {
-            break;
-        };
+        let (information, pull) = data.reliable();
         let Some(factor) = (information + prior).cholesky() else { break };
         slope = factor.solve(&(pull + trunk * trunk_precision));
     }
@@ -108,6 +102,23 @@ struct PlaneSums {
 }
 
 impl PlaneSums {
+    /// Information and pull without the displacements' share: along each principal direction v with `l = v (I - N) v` left of the spread, the
+    /// slope is that of `I - N`, its information `l^2 / (l + v N v)`; nothing where l is not positive.
+    fn reliable(&self) -> (Matrix2<f64>, Vector2<f64>) {
+        let pull = self.pull - self.noise_pull;
+        let eigen = (self.information - self.noise).symmetric_eigen();
+        let (mut information, mut pulled) = (Matrix2::zeros(), Vector2::zeros());
+        for (&left, direction) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+            let noise = direction.dot(&(self.noise * direction));
+            if left > 0.0 {
+                let kept = left / (left + noise);
+                information += direction * direction.transpose() * (left * kept);
+                pulled += direction * (direction.dot(&pull) * kept);
+            }
+        }
+        (information, pulled)
+    }
+
     fn of(
         feet: &[(Vector3<f64>, Vector3<f64>)],
         up: &Vector3<f64>,

@@ -6,20 +6,27 @@ use super::filter::{FilterNoise, Gate, Measurement, kalman_filter};
 
 /// Bounds of the search: densities of human motion and errors of cameras lie well inside.
 const BOUNDS: [(f64, f64); 4] = [(1e-2, 1e6), (1e-2, 1e6), (0.02, 50.0), (0.02, 50.0)];
-/// Density of a walking person's jerk, m2/s5: where the search starts.
-const START_JERK: f64 = 300.0;
+/// Density of a walking person's jerk, m2/s5, and the standard deviation of its logarithm: the exact positions of the embedded walk give 8 across
+/// the vertical and 103 along it.
+const USUAL_JERK: f64 = 30.0;
+const JERK_SPREAD: f64 = 1.5;
+/// Standard deviation of the factors' logarithms.
+const FACTOR_SPREAD: f64 = 2.0;
 const HALVINGS: usize = 7;
 
 /// The jerk's densities and the factors on pixel and depth errors that make the measurements likeliest:
 /// `log L = sum log N(innovation; 0, S)` over the frames within the gate, outliers even over a room. Coordinate search over the logarithms
-/// with steps that halve from a factor of 8; a weak prior (each factor 1 within a factor of e^2) decides where the data say nothing, as
-/// where the pixels' and depths' axes never turn apart. `vertical` need not be exact; see [`FilterNoise`].
+/// with steps that halve from a factor of 8; weak priors (densities 30 m2/s5 within a factor of 4.5, factors 1 within one of 7.4) decide where the
+/// data say nothing, as in a clip of two seconds, or where the pixels' and depths' axes never turn apart. `vertical` need not be exact; see [`FilterNoise`].
 pub fn learn_noise(measurements: &[Option<Measurement>], dt: f64, vertical: &Vector3<f64>) -> FilterNoise {
     let vertical = vertical.try_normalize(1e-9).unwrap_or_else(Vector3::z);
-    let mut best = [START_JERK.ln(), START_JERK.ln(), 0.0, 0.0];
+    let usual = [USUAL_JERK.ln(), USUAL_JERK.ln(), 0.0, 0.0];
+    let spreads = [JERK_SPREAD, JERK_SPREAD, FACTOR_SPREAD, FACTOR_SPREAD];
+    let mut best = usual;
     let score = |logarithms: &[f64; 4]| {
         let likelihood = kalman_filter(measurements, dt, &noise(logarithms, vertical), Gate::Mahalanobis).log_likelihood;
-        likelihood - logarithms[2..].iter().map(|value| value * value / 8.0).sum::<f64>()
+        let away = logarithms.iter().zip(usual).zip(spreads).map(|((value, usual), spread)| ((value - usual) / spread).powi(2));
+        likelihood - 0.5 * away.sum::<f64>()
     };
     let mut best_score = score(&best);
     let mut step = 8.0_f64.ln();

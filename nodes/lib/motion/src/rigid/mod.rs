@@ -11,7 +11,7 @@ mod euroc;
 mod pose_csv;
 mod series;
 mod sniff;
-mod table;
+pub(crate) mod table;
 mod tum;
 
 pub use error::RigidError;
@@ -20,5 +20,3 @@ pub use pose_csv::{parse_pose_csv, write_pose_csv};
 pub use series::{ImuSeries, PoseTrajectory};
 pub use sniff::{RigidFormat, sniff_rigid};
 pub use tum::{parse_tum, write_tum};
-
-pub(crate) use table::{Row, unit_quaternion};

@@ -260,9 +260,9 @@ fn poses(truth: &[BodyPose], cameras: &[Camera], shaped: &ShapedBody, errors: &E
         .enumerate()
         .map(|(frame, (pose, camera))| {
             let mut given = BodyPose { root_position: Vector3::zeros(), ..pose.clone() };
-            for joint in 0..24 {
+            for (joint, slow) in slow.iter().enumerate() {
                 // Degrees are those of the angle, hence each axis has its share.
-                let error = slow[joint][frame] * errors.pose_slow_deg + random.vector() * errors.pose_white_deg;
+                let error = slow[frame] * errors.pose_slow_deg + random.vector() * errors.pose_white_deg;
                 given.local_rotations[joint] *= UnitQuaternion::from_scaled_axis(error.map(f64::to_radians) / 3.0_f64.sqrt());
             }
             let with_root = mean_distance(shaped, &given, pose);

@@ -1,0 +1,18 @@
+//! Importers of the data sets that people have: TotalCapture, PAMAP2, RealWorld (HAR), BROAD, and the structure of DIP-IMU. Each gives the
+//! IMUs by placement, and references where there are.
+//!
+//! Parsers work over bytes and open nothing. What a data set does not say (gyroscopes in DIP-IMU) is not made up.
+
+mod broad;
+mod dip;
+mod pamap2;
+mod realworld;
+mod recording;
+mod totalcapture;
+
+pub use broad::parse_broad;
+pub use dip::{DIP_RATE_HZ, DIP_SENSORS, DipArray, DipRecording};
+pub use pamap2::{PAMAP2_RATE_HZ, pamap2_activity, parse_pamap2};
+pub use realworld::parse_realworld;
+pub use recording::{ActivitySpan, DatasetRecording, PlacedImu};
+pub use totalcapture::{TOTALCAPTURE_RATE_HZ, parse_totalcapture_calibration, parse_totalcapture_reference, parse_totalcapture_sensors};

@@ -1,0 +1,60 @@
+//! What every importer gives.
+
+use cromosim_body::Joint;
+use cromosim_spatial::Stamp;
+use nalgebra::{UnitQuaternion, Vector3};
+
+use crate::rigid::{ImuSeries, PoseTrajectory};
+
+/// One IMU and where it was worn.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PlacedImu {
+    /// The data set's own name: `L_LowArm`, `hand`, `forearm`.
+    pub placement: String,
+    /// SMPL's segment that the placement moves with; `None` off the body, and where the data set does not say the side.
+    pub segment: Option<Joint>,
+    /// Its readings.
+    pub series: ImuSeries,
+    /// world_from_sensor as the device estimated it; one a reading, or none at all.
+    pub world_from_sensor: Vec<UnitQuaternion<f64>>,
+    /// Magnetometer in the sensor's axes, in the data set's unit; one a reading, or none at all.
+    pub magnetic_field: Vec<Vector3<f64>>,
+    /// Rows without readings of this IMU, or out of the order of time.
+    pub rows_left_out: usize,
+}
+
+/// A stretch of one activity.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ActivitySpan {
+    /// Its first row.
+    pub start: Stamp,
+    /// Its last row.
+    pub end: Stamp,
+    /// Its name.
+    pub activity: String,
+}
+
+/// One recording of a data set.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DatasetRecording {
+    /// The file.
+    pub name: String,
+    /// Nominal rate of the readings, Hz.
+    pub rate_hz: f64,
+    /// By placement, in the file's order.
+    pub imus: Vec<PlacedImu>,
+    /// Reference poses of bodies or joints, by name; z up.
+    pub references: Vec<(String, PoseTrajectory)>,
+    /// What was done when, where the data set says it.
+    pub activities: Vec<ActivitySpan>,
+}
+
+impl DatasetRecording {
+    /// Adds a row's activity: the last span goes on, or a new one begins.
+    pub(super) fn mark(&mut self, stamp: Stamp, activity: &str) {
+        match self.activities.last_mut().filter(|span| span.activity == activity) {
+            Some(span) => span.end = stamp,
+            None => self.activities.push(ActivitySpan { start: stamp, end: stamp, activity: activity.to_owned() }),
+        }
+    }
+}
