@@ -59,6 +59,8 @@ fn steps(name: &str, shot: &Shot, solved: &GlobalTrajectory) -> [TrackError; 5] 
         1e3 * shot.pose_error_m[0],
         1e3 * shot.pose_error_m[1]
     );
+    let still: Vec<_> = truth.iter().map(|_| Some(Vector3::zeros())).collect();
+    println!("  the root's own acceleration is {:.2} m/s2", track_error(&still, &truth).acceleration);
     for (step, error) in ["raw", "scaled", "gated", "filtered", "smoothed"].iter().zip(&errors) {
         println!("  {step:9} position {:.3} m, acceleration {:6.2} m/s2", error.position, error.acceleration);
     }

@@ -33,11 +33,8 @@ impl<'a> NpyHeader<'a> {
         Ok(Self { element, shape, c_order, start: start + length })
     }
 
-    /// The elements, NaN included; what is wrong with them otherwise. They take no more memory than twice the file.
+    /// The elements in C order, NaN included; what is wrong with them otherwise. They take no more memory than four times the file.
     pub fn floats(&self, bytes: &[u8]) -> Result<Vec<f64>, String> {
-        if !self.c_order && self.shape.len() > 1 {
-            return Err("the array is in Fortran order; save numpy.ascontiguousarray of it".to_owned());
-        }
         let content = bytes.get(self.start..).unwrap_or_default();
         let size = match self.element {
             "<f4" => 4,
@@ -48,11 +45,19 @@ impl<'a> NpyHeader<'a> {
         if expected != Some(content.len()) {
             return Err(format!("shape {:?} of {} does not fit the {} bytes of data", self.shape, self.element, content.len()));
         }
-        Ok(if size == 4 {
+        let values: Vec<f64> = if size == 4 {
             content.as_chunks::<4>().0.iter().map(|chunk| f64::from(f32::from_le_bytes(*chunk))).collect()
         } else {
             content.as_chunks::<8>().0.iter().map(|chunk| f64::from_le_bytes(*chunk)).collect()
-        })
+        };
+        match self.shape[..] {
+            [rows, columns] if !self.c_order => {
+                Ok((0..rows * columns).map(|index| values[index % columns * rows + index / columns]).collect())
+            }
+            [_] | [] => Ok(values),
+            _ if self.c_order => Ok(values),
+            _ => Err("the array is in Fortran order; save numpy.ascontiguousarray of it".to_owned()),
+        }
     }
 }
 

@@ -45,7 +45,7 @@ impl fmt::Display for TrajectoryReport {
         };
         write!(
             formatter,
-            "{} of {} frames used ({} left out, {} outliers, longest gap {:.2} s), {:.4} m per unit ({:.1} %), jerk {:.0} m2/s5 level and {:.0} up, pixel errors x {:.2}, depth errors x {:.2}, position within {:.3} m, velocity within {:.3} m/s, feet within {:.3} m of the floor",
+            "{} of {} frames used ({} left out, {} outliers, longest gap {:.2} s), {:.4} m per unit ({:.1} %), jerk {:.0} m2/s5 level and {:.0} up, bounce {:.1} cm at {:.2} Hz, pixel errors x {:.2}, depth errors x {:.2}, position within {:.3} m, velocity within {:.3} m/s, feet within {:.3} m of the floor",
             self.used,
             self.frames,
             self.left_out.len(),
@@ -55,6 +55,8 @@ impl fmt::Display for TrajectoryReport {
             100.0 * scale.relative_std,
             noise.horizontal_jerk,
             noise.vertical_jerk,
+            100.0 * noise.bounce_std,
+            noise.bounce_hz,
             noise.pixel_factor,
             noise.depth_factor,
             self.position_std_m,
