@@ -5,6 +5,9 @@
 //! To markers (C3D, TRC) a body is fitted, which stays on the recording's floor; the [`MarkerReport`] says how well. [`embedded_walk`] is a
 //! motion without a file.
 //!
+//! [`camera`] places in-place poses that were estimated from video in the world; [`rigid`] reads and writes trajectories and IMU files of rigid
+//! bodies; [`datasets`] imports recordings with real IMUs.
+//!
 //! ```
 //! let walk = cromosim_motion::embedded_walk();
 //! assert_eq!(walk.duration_s().round(), 10.0);

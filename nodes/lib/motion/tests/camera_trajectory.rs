@@ -233,6 +233,7 @@ fn a_folder_of_files_gives_what_the_shot_gave() {
         axes: CameraAxes::OpenCv,
         keypoint_image_px: shot.clip.keypoint_image_px,
         intrinsics_image_px: shot.clip.cameras[0].unwrap().image_px,
+        first_number: 0,
         plain_depth_px: None,
     };
     let mut read = CameraFolder { keypoints: at(), depth: at(), cameras: at(), layout }.read(shot.clip.poses.len(), 0.3).unwrap();

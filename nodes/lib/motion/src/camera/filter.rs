@@ -2,9 +2,9 @@
 //!
 //! State x = (position, velocity, acceleration, cycle), 11 numbers; the jerk is white with density q [m2/s5], so that over dt each axis has
 //! `F = [1 dt dt^2/2; 0 1 dt; 0 0 1]` and `Q = q [dt^5/20 dt^4/8 dt^3/6; . dt^3/3 dt^2/2; . . dt]` (Bar-Shalom, Li and Kirubarajan 2001,
-//! section 6.2.3, extended to white jerk), q with one value along the vertical and one across it. On top of it the body bounces at every step: a
-//! stochastic cycle (c, s) along the vertical (Harvey 1989, section 2.3.4), turned by `2 pi f dt` and damped by `exp(-dt / 2 s)` from frame to
-//! frame, with standard deviation b. A frame measures `position + n c` with its own full 3 x 3 covariance.
+//! section 6.2.3, extended to white jerk), q with one value along the vertical and one across it. On top of it the body bounces at every
+//! step: a stochastic cycle (c, s) along the vertical (Harvey 1989, section 2.3.4), turned by `2 pi f dt` and damped by `exp(-dt / 2 s)`
+//! from frame to frame, with standard deviation b. A frame measures `position + n c` with its own full 3 x 3 covariance.
 
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector3};
 

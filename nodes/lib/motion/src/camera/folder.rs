@@ -28,6 +28,8 @@ pub struct FolderLayout {
     pub keypoint_image_px: Vector2<f64>,
     /// Width and height of the image that the intrinsics are for, px.
     pub intrinsics_image_px: Vector2<f64>,
+    /// Number of the first frame in the files' names: 0 as OpenPose and Robust CVD count, 1 where a tool counts from 1.
+    pub first_number: usize,
     /// Width and height of depth maps without a header (plain float32); `None` for maps that say it themselves.
     pub plain_depth_px: Option<[usize; 2]>,
 }
@@ -64,16 +66,16 @@ pub struct FolderDepth {
 }
 
 impl CameraFolder {
-    /// Reads keypoints and cameras and lists the depth maps. A file's frame is the last number of its name; the smallest number in each
-    /// folder is frame 0, since some tools count from 1. `frames` is the number of frames; files beyond it are left alone.
+    /// Reads keypoints and cameras and lists the depth maps. A file's frame is the last number of its name less
+    /// [`FolderLayout::first_number`]. `frames` is the number of frames; files beyond it are left alone.
     ///
     /// # Errors
     /// [`CameraError::Read`], [`CameraError::NoFrames`], and those of the parsers.
     pub fn read(&self, frames: usize, least_confidence: f64) -> Result<FolderFrames, CameraError> {
         let frames = frames.min(MAX_FRAMES);
-        let keypoint_files = numbered(&self.keypoints, &["_keypoints.json"], "*_keypoints.json")?;
-        let camera_files = numbered(&self.cameras, &[".npz"], "frame_NNNNNN.npz")?;
-        let depth_files = numbered(&self.depth, &[".raw", ".npy", ".png"], "frame_NNNNNN.raw, .npy or .png")?;
+        let keypoint_files = self.numbered(&self.keypoints, &["_keypoints.json"], "*_keypoints.json")?;
+        let camera_files = self.numbered(&self.cameras, &[".npz"], "frame_NNNNNN.npz")?;
+        let depth_files = self.numbered(&self.depth, &[".raw", ".npy", ".png"], "frame_NNNNNN.raw, .npy or .png")?;
         let mut people = Vec::with_capacity(frames);
         let mut cameras = Vec::with_capacity(frames);
         for frame in 0..frames {
@@ -93,6 +95,27 @@ impl CameraFolder {
         let keypoints = people.iter().zip(chosen).map(|(people, person)| people.get(person?).copied()).collect();
         Ok(FolderFrames { keypoints, cameras, depth: FolderDepth { files: depth_files, layout: self.layout } })
     }
+
+    /// Files with one of the endings by frame; where a frame has several, the one with the first ending.
+    fn numbered(&self, folder: &Path, endings: &[&str], expected: &'static str) -> Result<BTreeMap<usize, PathBuf>, CameraError> {
+        let unreadable = |source| CameraError::Read { path: folder.to_owned(), source };
+        let mut found = Vec::new();
+        for entry in std::fs::read_dir(folder).map_err(unreadable)? {
+            let path = entry.map_err(unreadable)?.path();
+            let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+            let stem = endings.iter().enumerate().find_map(|(rank, ending)| Some((rank, name.strip_suffix(ending)?)));
+            let frame = stem.and_then(|(rank, stem)| Some((last_number(stem)?.checked_sub(self.layout.first_number)?, rank)));
+            if let Some((frame, rank)) = frame {
+                found.push((frame, rank, path));
+            }
+        }
+        if found.is_empty() {
+            return Err(CameraError::NoFrames { path: folder.to_owned(), expected });
+        }
+        // The first of a frame is inserted last.
+        found.sort();
+        Ok(found.into_iter().rev().map(|(frame, _, path)| (frame, path)).collect())
+    }
 }
 
 impl DepthProvider for FolderDepth {
@@ -105,22 +128,6 @@ impl DepthProvider for FolderDepth {
         }
         .map(Some)
     }
-}
-
-/// Files with one of the endings by the last number in their name, counted from the smallest.
-fn numbered(folder: &Path, endings: &[&str], expected: &'static str) -> Result<BTreeMap<usize, PathBuf>, CameraError> {
-    let unreadable = |source| CameraError::Read { path: folder.to_owned(), source };
-    let mut files = BTreeMap::new();
-    for entry in std::fs::read_dir(folder).map_err(unreadable)? {
-        let path = entry.map_err(unreadable)?.path();
-        let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-        let stem = endings.iter().find_map(|ending| name.strip_suffix(ending));
-        if let Some(number) = stem.and_then(last_number) {
-            files.insert(number, path);
-        }
-    }
-    let first = *files.keys().next().ok_or_else(|| CameraError::NoFrames { path: folder.to_owned(), expected })?;
-    Ok(files.into_iter().map(|(number, path)| (number - first, path)).collect())
 }
 
 fn last_number(stem: &str) -> Option<usize> {

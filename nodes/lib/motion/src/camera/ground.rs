@@ -58,8 +58,8 @@ impl Soles {
 pub struct UpHints {
     /// Up as the camera is held; within some 10 degrees.
     pub camera: Vector3<f64>,
-    /// Mean direction of the trunk, of length 1 times how steady it is: the mean of unit vectors. People lean by some 5 degrees, and by more
-    /// the less steady they are.
+    /// Mean direction of the trunk, of length 1 times how steady it is: the mean of unit vectors. People lean by some 5 degrees, and by
+    /// more the less steady they are.
     pub trunk: Vector3<f64>,
 }
 
@@ -67,10 +67,10 @@ pub struct UpHints {
 const TRUNK_LEAN_STD: f64 = 0.09;
 
 /// The normal of the floor from the lowest points of the feet and how far each may be displaced along its line of sight (one standard
-/// deviation of the depth), m: least squares of `(n x_k - h) / s` with `s^2 = (5 cm)^2 + (n e_k)^2`, Huber's weights against feet in the air, half a
-/// second of frames counted as one; and of the angles between n and the hints by their standard deviations. Displacements also widen the
-/// points' spread along the lines of sight and so would tilt the plane towards these: their expected share is taken off the normal
-/// equations (errors in variables), and a direction counts by the share of its spread that is left.
+/// deviation of the depth), m: least squares of `(n x_k - h) / s` with `s^2 = (5 cm)^2 + (n e_k)^2`, Huber's weights against feet in the
+/// air, half a second of frames counted as one; and of the angles between n and the hints by their standard deviations. Displacements also
+/// widen the points' spread along the lines of sight and so would tilt the plane towards these: their expected share is taken off the
+/// normal equations (errors in variables), and a direction counts by the share of its spread that is left.
 pub fn floor_normal(feet: &[(Vector3<f64>, Vector3<f64>)], hints: &UpHints, rate_hz: f64) -> Vector3<f64> {
     let start = hints.camera.try_normalize(1e-9).unwrap_or_else(Vector3::z);
     let across = if start.x.abs() < 0.8 { Vector3::x() } else { Vector3::y() };
@@ -102,8 +102,8 @@ struct PlaneSums {
 }
 
 impl PlaneSums {
-    /// Information and pull without the displacements' share: along each principal direction v with `l = v (I - N) v` left of the spread, the
-    /// slope is that of `I - N`, its information `l^2 / (l + v N v)`; nothing where l is not positive.
+    /// Information and pull without the displacements' share: along each principal direction v with `l = v (I - N) v` left of the spread,
+    /// the slope is that of `I - N`, its information `l^2 / (l + v N v)`; nothing where l is not positive.
     fn reliable(&self) -> (Matrix2<f64>, Vector2<f64>) {
         let pull = self.pull - self.noise_pull;
         let eigen = (self.information - self.noise).symmetric_eigen();
@@ -200,7 +200,8 @@ mod tests {
 
     #[test]
     fn errors_of_the_depth_do_not_tilt_the_floor_towards_the_line_of_sight() {
-        // A straight walk along x on z = 0, seen from the side and above: every foot is displaced along a line of sight that falls by 20 degrees.
+        // A straight walk along x on z = 0, seen from the side and above: every foot is displaced along a line of sight that falls by 20
+        // degrees.
         let sight = Vector3::new(0.0, 0.94, -0.34);
         let feet: Vec<_> = (0..300)
             .map(|k| (Vector3::new(f64::from(k) * 0.015, 0.0, 0.0) + sight * (0.2 * (f64::from(k) * 0.05).sin()), sight * 0.15))

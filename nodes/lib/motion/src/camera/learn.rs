@@ -16,8 +16,9 @@ struct Parameter {
     pace: f64,
 }
 
-/// Densities of jerk across the vertical and along it (m2/s5; the exact positions of the embedded walk give 9 and, without a bounce of its own,
-/// 100), the bounce (m, Hz; walking people rise by 4 cm, 1.6 to 2.2 times a second, runners up to 3), factors on the errors of pixels and depths.
+/// Densities of jerk across the vertical and along it (m2/s5; the exact positions of the embedded walk give 9 and, without a bounce of its
+/// own, 100), the bounce (m, Hz; walking people rise by 4 cm, 1.6 to 2.2 times a second, runners up to 3), factors on the errors of pixels
+/// and depths.
 const PARAMETERS: [Parameter; 6] = [
     Parameter { usual: 30.0, spread: 1.5, bounds: (1e-2, 1e6), pace: 1.0 },
     Parameter { usual: 30.0, spread: 1.5, bounds: (1e-2, 1e6), pace: 1.0 },

@@ -24,6 +24,7 @@ mod pinhole;
 mod placed;
 mod report;
 mod scale;
+mod stand;
 mod surface;
 mod torso;
 mod trajectory;

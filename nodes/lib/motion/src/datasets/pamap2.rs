@@ -8,12 +8,12 @@ use crate::rigid::table::{Row, by_blanks, rows, text};
 
 /// The IMUs' rate, Hz.
 pub const PAMAP2_RATE_HZ: f64 = 100.0;
-/// Placements and their first column (0-based): temperature, acceleration of 16 g (3) and of 6 g (3), gyroscope (3), magnetometer (3), and four
-/// of an orientation that the data set calls invalid. Hand and ankle are those of the dominant side, which the file does not name.
+/// Placements and their first column (0-based): temperature, acceleration of 16 g (3) and of 6 g (3), gyroscope (3), magnetometer (3), and
+/// four of an orientation that the data set calls invalid. Hand and ankle are those of the dominant side, which the file does not name.
 const IMUS: [(&str, usize, Option<Joint>); 3] = [("hand", 3, None), ("chest", 20, Some(Joint::Spine3)), ("ankle", 37, None)];
 
-/// Reads a recording: time (s), activity, heart rate, and three IMUs. The accelerometer of 16 g is taken, as the data set advises (the one of 6 g
-/// saturates); m/s2, rad/s, microtesla. Rows in which an IMU lost its packet (NaN) are left out of its series.
+/// Reads a recording: time (s), activity, heart rate, and three IMUs. The accelerometer of 16 g is taken, as the data set advises (the one
+/// of 6 g saturates); m/s2, rad/s, microtesla. Rows in which an IMU lost its packet (NaN) are left out of its series.
 ///
 /// # Errors
 /// [`RigidError::Columns`], [`RigidError::Value`], [`RigidError::Order`], [`RigidError::Empty`].

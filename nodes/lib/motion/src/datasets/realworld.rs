@@ -1,5 +1,5 @@
-//! RealWorld (HAR; Sztyler and Stuckenschmidt 2016): zips of `acc_ACTIVITY_POSITION.csv` and `Gyroscope_ACTIVITY_POSITION.csv`, with columns
-//! `id,attr_time,attr_x,attr_y,attr_z`, milliseconds since 1970.
+//! RealWorld (HAR; Sztyler and Stuckenschmidt 2016): zips of `acc_ACTIVITY_POSITION.csv` and `Gyroscope_ACTIVITY_POSITION.csv`, with
+//! columns `id,attr_time,attr_x,attr_y,attr_z`, milliseconds since 1970.
 
 use std::io::{Read, Seek};
 
@@ -15,7 +15,7 @@ use crate::rigid::table::{by_commas, rows, text};
 /// Nominal rate of the phones, Hz.
 const RATE_HZ: f64 = 50.0;
 /// A position's table is about 3 MB.
-const MAX_TABLE_BYTES: u64 = 256 << 20;
+const MAX_TABLE_BYTES: u64 = 32 << 20;
 const MAX_TABLES: usize = 64;
 /// Where the gyroscope is silent for longer, its readings are not interpolated.
 const LONGEST_GAP_NS: i64 = 100_000_000;
@@ -103,6 +103,10 @@ fn tables<R: Read + Seek>(reader: R, name: &str) -> Result<Vec<Table>, RigidErro
     for member in members {
         let stem = member.trim_end_matches(".csv").to_lowercase();
         let Some((position, segment)) = POSITIONS.iter().find(|(position, _)| stem.ends_with(position)) else { continue };
+        // One table a position: what else matches is a copy.
+        if tables.iter().any(|table: &Table| table.position == *position) {
+            continue;
+        }
         let entry = archive.by_name(&member).map_err(|error| problem(&member, error.to_string()))?;
         let mut bytes = Vec::new();
         entry.take(MAX_TABLE_BYTES + 1).read_to_end(&mut bytes).map_err(|error| problem(&member, error.to_string()))?;

@@ -16,8 +16,8 @@ const MAX_SENSORS: usize = 100;
 const MAX_JOINTS: usize = 200;
 const METRES_PER_INCH: f64 = 0.0254;
 
-/// Reads a `.sensors` file: a line with the numbers of sensors and frames; per frame a line with its number, and a line per sensor with its name,
-/// orientation (w x y z, world_from_sensor), specific force (m/s2), angular velocity (rad/s) and magnetic field, in its own axes.
+/// Reads a `.sensors` file: a line with the numbers of sensors and frames; per frame a line with its number, and a line per sensor with its
+/// name, orientation (w x y z, world_from_sensor), specific force (m/s2), angular velocity (rad/s) and magnetic field, in its own axes.
 ///
 /// # Errors
 /// [`RigidError::Columns`] (the plain `_Xsens.sensors` have no gyroscope: take `_Xsens_AuxFields.sensors`), [`RigidError::Value`],
@@ -132,7 +132,8 @@ pub fn parse_totalcapture_reference(
 }
 
 /// Reads a calibration: a line with the number of sensors, then per sensor its name and a quaternion x y z w. In `_calib_imu_ref` these are
-/// reference_from_inertial, in `_calib_imu_bone` bone_from_sensor inverted as the data set's notes use it: R_bone = R_ref R_imu R_bone_imu^-1.
+/// reference_from_inertial, in `_calib_imu_bone` bone_from_sensor inverted as the data set's notes use it: R_bone = R_ref R_imu
+/// R_bone_imu^-1.
 ///
 /// # Errors
 /// [`RigidError::Columns`], [`RigidError::Value`], [`RigidError::Quaternion`], [`RigidError::Empty`].

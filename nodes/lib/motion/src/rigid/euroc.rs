@@ -1,4 +1,5 @@
-//! EuRoC MAV / ASL files: `state_groundtruth_estimate0/data.csv` and `imu0/data.csv`. Stamps are whole nanoseconds, a header begins with `#`.
+//! EuRoC MAV / ASL files: `state_groundtruth_estimate0/data.csv` and `imu0/data.csv`. Stamps are whole nanoseconds, a header begins with
+//! `#`.
 
 use std::fmt::Write;
 

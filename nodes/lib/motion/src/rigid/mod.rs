@@ -1,10 +1,10 @@
 //! Rigid bodies and their IMUs as plain text files: TUM trajectories, EuRoC/ASL ground truth and IMU files, and tables of poses with a
 //! header. So robots and props can carry virtual IMUs, too.
 //!
-//! One file a format, each with a parser over bytes and a writer. Stamps are exact to the nanosecond both ways, numbers are written with the
-//! fewest digits that give the same float64, so that a file that was written here comes back bit for bit. Rows have to be in the order of
-//! time without repeated stamps; quaternions may be off length 1 by a hundredth, as printed digits make them, and are normalised where they are off by
-//! more than 1e-9.
+//! One file a format, each with a parser over bytes and a writer. Stamps are exact to the nanosecond both ways, numbers are written with
+//! the fewest digits that give the same float64, so that a file that was written here comes back bit for bit. Rows have to be in the order
+//! of time without repeated stamps; quaternions may be off length 1 by a hundredth, as printed digits make them, and are normalised where
+//! they are off by more than 1e-9.
 
 mod error;
 mod euroc;

@@ -10,8 +10,8 @@ use super::{PoseTrajectory, RigidError};
 /// time (`stamp`, `time`, `timestamp`, `t`, or `sec` with `nanosec`/`nsec`), position (`x`, `px`, `tx`, `pos_x`, `position.x` …) and
 /// orientation (`qx`, `q_x`, `quat_x`, `orientation.x` …; w as well). Other columns are left alone, but for `frame_id`.
 ///
-/// The unit of time stands in the header (`time [ms]`, `stamp_ns`); elsewhere the first row's size tells: from 1e17 on nanoseconds, from 1e14
-/// microseconds, from 1e11 milliseconds, else seconds. Positions are metres, or millimetres where the header says `[mm]`.
+/// The unit of time stands in the header (`time [ms]`, `stamp_ns`); elsewhere the first row's size tells: from 1e17 on nanoseconds, from
+/// 1e14 microseconds, from 1e11 milliseconds, else seconds. Positions are metres, or millimetres where the header says `[mm]`.
 ///
 /// # Errors
 /// [`RigidError::Header`], [`RigidError::Value`], [`RigidError::Order`], [`RigidError::Quaternion`], [`RigidError::Empty`],

@@ -37,7 +37,8 @@ pub fn quantile(values: &[f64], fraction: f64) -> f64 {
     sorted[((sorted.len() - 1) as f64 * fraction).round() as usize]
 }
 
-/// Calls `parse` with `rounds` damaged versions of a sample: bytes changed, removed, repeated, cut off, digits grown; the same ones every time.
+/// Calls `parse` with `rounds` damaged versions of a sample: bytes changed, removed, repeated, cut off, digits grown; the same ones every
+/// time.
 pub fn damaged(sample: &[u8], rounds: u64, mut parse: impl FnMut(&[u8])) {
     use rand::{RngExt, SeedableRng};
     let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(11);
