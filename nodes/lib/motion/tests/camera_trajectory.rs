@@ -7,9 +7,9 @@ use common::shot::{self, Errors, RATE_HZ, Shot};
 use cromosim_body::npz::NpzWriter;
 use cromosim_body::{BodyModel, ShapedBody};
 use cromosim_motion::camera::{
-    CameraAxes, CameraClip, CameraError, CameraFolder, DepthEncoding, DepthMap, FolderLayout, GlobalTrajectory, Gravity, ScaleSource,
-    Trajectory, TrajectoryOptions, confidence_of_std, global_trajectory, parse_camera, parse_depth, parse_openpose, standing_height,
-    std_of_confidence, write_openpose, write_raw_depth,
+    CameraAxes, CameraClip, CameraError, CameraFolder, DepthEncoding, DepthMap, FolderLayout, GlobalTrajectory, Gravity, ObjectLength,
+    ScaleSource, Trajectory, TrajectoryOptions, confidence_of_std, global_trajectory, parse_camera, parse_depth, parse_openpose,
+    standing_height, std_of_confidence, write_openpose, write_raw_depth,
 };
 use cromosim_motion::{MotionOptions, SmplMotion, embedded_walk, read_motion};
 use nalgebra::{Isometry3, Vector3};
@@ -183,6 +183,24 @@ fn the_pose_stands_in_the_world_and_in_place_where_asked() {
         assert_eq!(*confidence, confidence_of_std(std_m));
         assert!((std_of_confidence(*confidence) - std_m).abs() < 1e-9);
     }
+}
+
+#[test]
+fn a_known_length_on_the_floor_gives_the_scale() {
+    let walk = embedded_walk().slice(2.0, Some(1.0)).unwrap();
+    let shot = shot::shoot(&walk, &shot::NONE, 0.6, 1);
+    let place = shot.truth[0].root_position;
+    let pixel = |frame: usize, point: Vector3<f64>| {
+        let camera = &shot.true_cameras[frame];
+        camera.project(&(camera.world_from_camera.inverse() * nalgebra::Point3::from(point)).coords).unwrap()
+    };
+    // Two marks on the floor beside the person, 1.2 m apart, seen in three frames.
+    let ends = [Vector3::new(place.x + 0.9, place.y - 0.6, 0.0), Vector3::new(place.x + 0.9, place.y + 0.6, 0.0)];
+    let object = |frame| ObjectLength { frame, from: pixel(frame, ends[0]), to: pixel(frame, ends[1]), length_m: 1.2 };
+    let options = TrajectoryOptions { scale: ScaleSource::Object([0, 7, 20].map(object).to_vec()), ..options(&walk) };
+    let scale = solve(&shot, &options).unwrap().report.scale.unwrap();
+    println!("scale by an object: {scale:?}");
+    assert!((scale.metres_per_unit * 0.6 - 1.0).abs() < 0.02 && scale.observations == 3);
 }
 
 #[test]
