@@ -4,7 +4,7 @@
 mod common;
 
 use common::shot::{self, Errors, RATE_HZ, Shot};
-use cromosim_body::npz::NpzWriter;
+use cromosim_arrays::NpzWriter;
 use cromosim_body::{BodyModel, ShapedBody};
 use cromosim_motion::camera::{
     CameraAxes, CameraClip, CameraError, CameraFolder, DepthEncoding, DepthMap, FolderLayout, GlobalTrajectory, Gravity, ObjectLength,

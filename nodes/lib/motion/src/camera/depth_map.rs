@@ -1,9 +1,11 @@
 //! Depth maps: Robust CVD's raw files, plain float32, numpy arrays, and PNG in millimetres.
 
 use std::io::Cursor;
+use std::path::Path;
+
+use cromosim_arrays::{Container, Kind, Limits, Value};
 
 use super::CameraError;
-use super::npy::NpyHeader;
 
 /// More pixels than this are no depth map.
 pub const MAX_DEPTH_PIXELS: usize = 64 << 20;
@@ -109,18 +111,25 @@ fn floats(
     map(width, height, values.map(|value| decoded(value, encoding)).collect(), name)
 }
 
-/// A numpy array (.npy) of shape (height, width), float32 or float64, C order.
+/// A numpy array (.npy) of shape (height, width), float32 or float64. Infinities and NaN are unknown depths.
 ///
 /// # Errors
-/// [`CameraError::Depth`] with the byte.
+/// [`CameraError::Arrays`], [`CameraError::Depth`] for too many pixels and for elements that are no floats.
 pub fn parse_npy_depth(bytes: &[u8], encoding: DepthEncoding, name: &str) -> Result<DepthMap, CameraError> {
-    let header = NpyHeader::parse(bytes).map_err(|problem| depth_error(name, 0, problem.to_owned()))?;
-    let [height, width] = header.shape[..] else {
-        return Err(depth_error(name, 10, format!("expected shape (height, width), found {:?}", header.shape)));
-    };
-    checked_pixels(width, height, name)?;
-    let values = header.floats(bytes).map_err(|problem| depth_error(name, header.start, problem))?;
-    map(width, height, values.into_iter().map(|value| decoded(value as f32, encoding)).collect(), name)
+    let limits = Limits { decoded_bytes: bytes.len() as u64, opcodes: 0, depth: 0 };
+    let array = Container::new(Cursor::new(bytes), Path::new(name), limits)?.root()?;
+    if let Value::Array(array) = array.value()
+        && array.dtype().kind != Kind::Float
+    {
+        // Whole numbers are mostly millimetres, but not all who write them agree.
+        return Err(depth_error(name, 0, format!("expected float32 or float64 (<f4, <f8), found {}", array.dtype())));
+    }
+    if let [height, width] = array.shape()?[..] {
+        checked_pixels(width, height, name)?;
+    }
+    let array = array.floats_with_nan(&[None, None], "(height, width)")?;
+    let values = array.values.into_iter().map(|value| decoded(value as f32, encoding)).collect();
+    map(array.shape[1], array.shape[0], values, name)
 }
 
 /// A grey PNG of 16 bits, in millimetres; 0 is unknown. Depths come out in metres.
@@ -150,7 +159,7 @@ pub fn parse_png_depth(bytes: &[u8], name: &str) -> Result<DepthMap, CameraError
 /// A depth map of any of the forms with a header, told by its content.
 ///
 /// # Errors
-/// [`CameraError::Depth`], [`CameraError::Png`].
+/// [`CameraError::Depth`], [`CameraError::Arrays`], [`CameraError::Png`].
 pub fn parse_depth(bytes: &[u8], encoding: DepthEncoding, name: &str) -> Result<DepthMap, CameraError> {
     match bytes {
         [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => parse_npy_depth(bytes, encoding, name),

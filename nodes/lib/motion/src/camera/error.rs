@@ -3,6 +3,7 @@
 use std::io;
 use std::path::PathBuf;
 
+use cromosim_arrays::ArraysError;
 use cromosim_body::BodyError;
 
 /// An error of [`crate::camera`]: one line that names the file, the place and what to do.
@@ -135,7 +136,10 @@ pub enum CameraError {
         /// Which files.
         expected: &'static str,
     },
-    /// The body or an archive refuses.
+    /// An array or its archive refuses.
+    #[error(transparent)]
+    Arrays(#[from] ArraysError),
+    /// The body refuses.
     #[error(transparent)]
     Body(#[from] BodyError),
 }

@@ -16,7 +16,6 @@ mod folder;
 mod ground;
 mod keypoints;
 mod learn;
-pub(crate) mod npy;
 mod observe;
 mod openpose;
 mod parameters;

@@ -3,7 +3,7 @@
 use std::io::Cursor;
 use std::path::Path;
 
-use cromosim_body::npz::NpzReader;
+use cromosim_arrays::{Limits, NpzReader};
 use cromosim_spatial::so3;
 use nalgebra::{Isometry3, Matrix3, Vector2, Vector3};
 
@@ -13,21 +13,23 @@ use super::{Camera, CameraAxes, CameraError};
 const INTRINSICS: [&str; 4] = ["intrinsics", "intrinsic", "K", "cam_K"];
 const CAMERA_TO_WORLD: [&str; 6] = ["extrinsics", "camera_to_world", "cam_c2w", "c2w", "pose", "world_from_camera"];
 const LARGEST_PIXEL: f64 = 1e6;
+/// A camera is a few dozen numbers.
+const LIMITS: Limits = Limits { decoded_bytes: 1 << 20, opcodes: 10_000, depth: 10 };
 
 /// The camera of an npz: intrinsics as (fx, fy), (fx, fy, cx, cy) or a 3 x 3 matrix, under `intrinsics`, `intrinsic`, `K` or `cam_K`; and
 /// world_from_camera as a 4 x 4 or 3 x 4 matrix under `extrinsics`, `camera_to_world`, `cam_c2w`, `c2w`, `pose` or `world_from_camera`.
 /// The principal point is the image's middle where absent. `image_px` is the size of the image that the intrinsics are for.
 ///
 /// # Errors
-/// [`CameraError::Parameters`], [`CameraError::Body`] for a damaged archive.
+/// [`CameraError::Parameters`], [`CameraError::Arrays`] for a damaged archive or array.
 pub fn parse_camera(bytes: &[u8], image_px: Vector2<f64>, axes: CameraAxes, name: &str) -> Result<Camera, CameraError> {
-    let mut npz = NpzReader::new(Cursor::new(bytes), Path::new(name))?;
+    let mut npz = NpzReader::with_limits(Cursor::new(bytes), Path::new(name), LIMITS)?;
     let keys = npz.keys();
     let problem = |key: &str, problem: String| CameraError::Parameters { name: name.to_owned(), key: key.to_owned(), problem };
     let find = |names: &[&'static str]| names.iter().copied().find(|name| keys.iter().any(|key| key == name));
     let missing = |names: &[&str]| problem(names[0], format!("absent, as is any of {}", names[1..].join(", ")));
     let key = find(&INTRINSICS).ok_or_else(|| missing(&INTRINSICS))?;
-    let (focal_px, principal_point_px) = match &array(&mut npz, key, name)?[..] {
+    let (focal_px, principal_point_px) = match &array(&mut npz, key)?[..] {
         [fx, fy] => (Vector2::new(*fx, *fy), image_px / 2.0),
         [fx, fy, cx, cy] => (Vector2::new(*fx, *fy), Vector2::new(*cx, *cy)),
         [fx, _, cx, _, fy, cy, _, _, _] => (Vector2::new(*fx, *fy), Vector2::new(*cx, *cy)),
@@ -38,7 +40,7 @@ pub fn parse_camera(bytes: &[u8], image_px: Vector2<f64>, axes: CameraAxes, name
         return Err(problem(key, found));
     }
     let key = find(&CAMERA_TO_WORLD).ok_or_else(|| missing(&CAMERA_TO_WORLD))?;
-    let values = array(&mut npz, key, name)?;
+    let values = array(&mut npz, key)?;
     if values.len() != 16 && values.len() != 12 {
         return Err(problem(key, format!("expected a 4 x 4 or 3 x 4 matrix, found {} numbers", values.len())));
     }
@@ -49,27 +51,21 @@ pub fn parse_camera(bytes: &[u8], image_px: Vector2<f64>, axes: CameraAxes, name
     Ok(Camera { focal_px, principal_point_px, image_px, world_from_camera })
 }
 
-/// The numbers of a small array of any of the shapes that cameras come in.
-fn array(npz: &mut NpzReader<Cursor<&[u8]>>, key: &str, name: &str) -> Result<Vec<f64>, CameraError> {
-    let shapes: [&[Option<usize>]; 3] = [&[None], &[None, None], &[Some(1), None, None]];
-    let mut last = None;
-    for shape in shapes {
-        match npz.floats(key, shape, "a vector or a matrix") {
-            Ok(found) => return Ok(found.map(|array| array.values).unwrap_or_default()),
-            Err(error @ cromosim_body::BodyError::Shape { .. }) => last = Some(error),
-            Err(error) => return Err(error.into()),
-        }
-    }
-    Err(last.map_or_else(
-        || CameraError::Parameters { name: name.to_owned(), key: key.to_owned(), problem: "absent".to_owned() },
-        CameraError::Body,
-    ))
+/// The numbers of a small array of any of the shapes that cameras come in: a vector, a matrix, or a stack of one matrix.
+fn array(npz: &mut NpzReader<Cursor<&[u8]>>, key: &str) -> Result<Vec<f64>, CameraError> {
+    let entry = npz.at(key)?;
+    let shape: &[Option<usize>] = match entry.shape()?.len() {
+        1 => &[None],
+        3 => &[Some(1), None, None],
+        _ => &[None, None],
+    };
+    Ok(entry.floats(shape, "a vector or a matrix")?.values)
 }
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
-    use cromosim_body::npz::NpzWriter;
+    use cromosim_arrays::NpzWriter;
 
     use super::*;
 

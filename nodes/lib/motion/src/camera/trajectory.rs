@@ -134,6 +134,7 @@ pub fn global_trajectory(
         frames: continuous(upright.poses),
         confidence,
         report: None,
+        markers: None,
     };
     Ok(GlobalTrajectory { motion, states: upright.states, track, world_from_source: upright.world_from_source, report })
 }

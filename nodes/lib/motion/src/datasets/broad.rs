@@ -1,31 +1,32 @@
 //! BROAD (Laidig et al. 2021) as npz: `fs`, `acc`, `gyr`, `mag`, `pos`, `quat_wxyz`; NaN where the optical system lost the body.
 
 use std::io::{Read, Seek};
+use std::path::Path;
 
+use cromosim_arrays::{Limits, NpzReader};
 use cromosim_spatial::Stamp;
 use nalgebra::{Quaternion, Vector3};
-use zip::ZipArchive;
 
 use super::{DatasetRecording, PlacedImu};
-use crate::camera::npy::NpyHeader;
 use crate::rigid::table::unit_quaternion;
 use crate::rigid::{PoseTrajectory, RigidError};
 
 /// The longest trial is a tenth of this.
-const MAX_ARRAY_BYTES: u64 = 64 << 20;
+const LIMITS: Limits = Limits { decoded_bytes: 64 << 20, opcodes: 10_000, depth: 10 };
 
 /// Reads a trial: one IMU in a rigid body and the body's optical pose (z up) where it was seen. Stamps count from 0 at the sample rate.
 ///
 /// # Errors
-/// [`RigidError::Content`] that names the array.
+/// [`RigidError::Arrays`], [`RigidError::Content`]; both name the array.
 pub fn parse_broad<R: Read + Seek>(reader: R, name: &str) -> Result<DatasetRecording, RigidError> {
-    let mut archive = ZipArchive::new(reader).map_err(|error| content(name, "npz", error.to_string()))?;
-    let rate = array(&mut archive, "fs", None, name)?;
-    let rate_hz =
-        *rate.first().filter(|rate| (1.0..1e5).contains(*rate)).ok_or_else(|| content(name, "fs", "expected a rate in Hz".to_owned()))?;
-    let acc = array(&mut archive, "acc", Some(3), name)?;
-    let [gyr, mag, pos] = ["gyr", "mag", "pos"].map(|key| array(&mut archive, key, Some(3), name));
-    let (gyr, mag, pos, quat) = (gyr?, mag?, pos?, array(&mut archive, "quat_wxyz", Some(4), name)?);
+    let mut npz = NpzReader::with_limits(reader, Path::new(name), LIMITS)?;
+    let rate_hz = npz.at("fs")?.float()?;
+    if !(1.0..1e5).contains(&rate_hz) {
+        return Err(content(name, "fs", format!("expected a rate in Hz, found {rate_hz}")));
+    }
+    let acc = rows(&mut npz, "acc", 3)?;
+    let [gyr, mag, pos] = ["gyr", "mag", "pos"].map(|key| rows(&mut npz, key, 3));
+    let (gyr, mag, pos, quat) = (gyr?, mag?, pos?, rows(&mut npz, "quat_wxyz", 4)?);
     let count = acc.len() / 3;
     for (key, found) in [("gyr", gyr.len() / 3), ("mag", mag.len() / 3), ("pos", pos.len() / 3), ("quat_wxyz", quat.len() / 4)] {
         if found != count {
@@ -56,25 +57,10 @@ pub fn parse_broad<R: Read + Seek>(reader: R, name: &str) -> Result<DatasetRecor
     Ok(DatasetRecording { name: name.to_owned(), rate_hz, imus: vec![imu], references, activities: Vec::new() })
 }
 
-/// The numbers of an array of `columns` columns, or of a scalar.
-fn array<R: Read + Seek>(archive: &mut ZipArchive<R>, key: &str, columns: Option<usize>, name: &str) -> Result<Vec<f64>, RigidError> {
-    let entry = archive.by_name(&format!("{key}.npy")).map_err(|error| content(name, key, error.to_string()))?;
-    let mut bytes = Vec::new();
-    entry.take(MAX_ARRAY_BYTES + 1).read_to_end(&mut bytes).map_err(|error| content(name, key, error.to_string()))?;
-    if bytes.len() as u64 > MAX_ARRAY_BYTES {
-        return Err(content(name, key, format!("more than {MAX_ARRAY_BYTES} bytes")));
-    }
-    let header = NpyHeader::parse(&bytes).map_err(|problem| content(name, key, problem.to_owned()))?;
-    let fits = match (columns, &header.shape[..]) {
-        (None, []) => true,
-        (Some(columns), [_, found]) => *found == columns,
-        _ => false,
-    };
-    if !fits {
-        let expected = columns.map_or("a scalar".to_owned(), |columns| format!("(N, {columns})"));
-        return Err(content(name, key, format!("expected shape {expected}, found {:?}", header.shape)));
-    }
-    header.floats(&bytes).map_err(|problem| content(name, key, problem))
+/// The numbers of an array of `columns` columns, row by row, NaN included.
+fn rows<R: Read + Seek>(npz: &mut NpzReader<R>, key: &str, columns: usize) -> Result<Vec<f64>, RigidError> {
+    let expectation = format!("(N, {columns})");
+    Ok(npz.at(key)?.floats_with_nan(&[None, Some(columns)], &expectation)?.values)
 }
 
 fn content(name: &str, place: &str, problem: String) -> RigidError {

@@ -98,7 +98,7 @@ pub enum RigidError {
         /// The reason, with its line.
         source: csv::Error,
     },
-    /// A numpy archive refuses.
+    /// An array or its archive refuses.
     #[error(transparent)]
-    Npz(#[from] cromosim_body::BodyError),
+    Arrays(#[from] cromosim_arrays::ArraysError),
 }
