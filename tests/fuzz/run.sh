@@ -17,6 +17,8 @@ for target in "$@"; do
         npz) find nodes -path '*/tests/data/*.npz' -size -100k -exec cp {} "$seeds" \; ;;
         pickle) cp nodes/lib/arrays/tests/data/* "$seeds" ;;
         model) cp nodes/lib/body/tests/data/model_* "$seeds" ;;
+        bvh | c3d) cp nodes/lib/motion/tests/data/*."$target" "$seeds" ;;
+        *) cp tests/fuzz/samples/"$target"/* "$seeds" ;;
     esac
     echo "== $target: $seconds s"
     cargo fuzz run --fuzz-dir tests/fuzz --sanitizer none "$target" "$corpus" "$seeds" -- \
