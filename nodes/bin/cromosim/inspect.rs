@@ -1,45 +1,86 @@
-//! `cromosim inspect`: what is in a motion, body or bag file, found out from its content.
+//! `cromosim inspect`: what is in a motion, body, trajectory or bag file, found out from its content.
 
-use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 use clap::Args;
 use cromosim_bag::BagReader;
 use cromosim_body::{BodyModel, Joint, ShapedBody};
-use cromosim_motion::{SmplMotion, read_motion};
+use cromosim_motion::rigid::{RigidFormat, sniff_rigid};
+use cromosim_motion::{MotionFormat, MotionOptions, SmplMotion, read_motion};
+use cromosim_spatial::Stamp;
+
+use crate::convert::{Content, source};
+use crate::motion_arguments::MotionArguments;
 
 /// Say what is in a file
 #[derive(Args)]
 pub struct Arguments {
-    /// Motion (BVH), body (SMPL npz) or bag (.mcap, rosbag2 directory)
+    /// Motion (BVH, ASF/AMC, C3D, TRC), body (SMPL), trajectory or IMU series (TUM, EuRoC, CSV), or bag (.mcap, rosbag2 directory)
     #[arg(required = true)]
     files: Vec<PathBuf>,
+    #[command(flatten)]
+    motion: MotionArguments,
 }
 
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let options = arguments.motion.options()?;
     for path in &arguments.files {
-        inspect(path)?;
+        inspect(path, &options)?;
     }
     Ok(())
 }
 
-fn inspect(path: &Path) -> anyhow::Result<()> {
+fn inspect(path: &Path, options: &MotionOptions) -> anyhow::Result<()> {
     if path.is_dir() {
         return inspect_bag(path);
     }
-    let mut head = Vec::new();
-    File::open(path)
-        .and_then(|file| file.take(16).read_to_end(&mut head))
-        .with_context(|| format!("{}: cannot be read", path.display()))?;
+    let head = source::head(path)?;
     match head.as_slice() {
         [0x89, b'M', b'C', b'A', b'P', ..] => inspect_bag(path),
         [b'P', b'K', ..] => inspect_body(path),
         [] => bail!("{}: the file is empty", path.display()),
-        _ => inspect_motion(path),
+        _ => match sniff_rigid(&head).filter(|_| MotionFormat::of(&head).is_none()) {
+            Some(format) => inspect_rigid(path, format),
+            None => inspect_motion(path, options),
+        },
     }
+}
+
+/// A trajectory or an IMU series.
+fn inspect_rigid(path: &Path, format: RigidFormat) -> anyhow::Result<()> {
+    let Some(content) = source::rigid(path, &source::bytes(path)?)? else { bail!("{}: the file changed", path.display()) };
+    let kind = match format {
+        RigidFormat::Tum => "trajectory (TUM)",
+        RigidFormat::EurocGroundTruth => "trajectory (EuRoC ground truth)",
+        RigidFormat::PoseCsv => "trajectory (table with a header)",
+        RigidFormat::EurocImu => "IMU series (EuRoC)",
+        RigidFormat::ImuCsv => "IMU series (table with a header)",
+    };
+    let (stamps, more) = match &content {
+        Content::Poses(poses) => {
+            let length: f64 = poses.trajectory.positions.windows(2).map(|pair| (pair[1] - pair[0]).norm()).sum();
+            (&poses.trajectory.stamps, format!("path of {length:.2} m"))
+        }
+        Content::Imu(series) => {
+            let mean = |vectors: &[nalgebra::Vector3<f64>]| vectors.iter().map(|v| v.norm()).sum::<f64>() / vectors.len() as f64;
+            let (force, rate) = (mean(&series.specific_force), mean(&series.angular_velocity));
+            (&series.stamps, format!("mean specific force {force:.3} m/s2, mean angular velocity {rate:.4} rad/s"))
+        }
+        Content::Motion(_) => return Ok(()),
+    };
+    let [first, last] = [stamps[0], stamps[stamps.len() - 1]];
+    let rate = median_rate(stamps).map_or_else(String::new, |rate| format!(" at {rate:.3} Hz (median)"));
+    println!("{}: {kind}, {} rows{rate}, {:.3} s from {:.6} s on", path.display(), stamps.len(), last - first, first.as_seconds());
+    println!("  {more}");
+    Ok(())
+}
+
+fn median_rate(stamps: &[Stamp]) -> Option<f64> {
+    let mut intervals: Vec<f64> = stamps.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    intervals.sort_unstable_by(f64::total_cmp);
+    intervals.get(intervals.len() / 2).map(|interval| interval.recip())
 }
 
 fn inspect_bag(path: &Path) -> anyhow::Result<()> {
@@ -80,12 +121,19 @@ fn inspect_body(path: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn inspect_motion(path: &Path) -> anyhow::Result<()> {
-    let motion = read_motion(path, &Default::default())?;
+fn inspect_motion(path: &Path, options: &MotionOptions) -> anyhow::Result<()> {
+    let motion = read_motion(path, options)?;
     println!("{}: motion, {} frames at {:.4} Hz, {:.3} s", path.display(), motion.frames.len(), motion.rate_hz, motion.duration_s());
     if let Some(report) = &motion.report {
         println!("  {report}");
         println!("  betas {:.2?}, bone lengths within {:.1} mm (RMS)", report.betas, 1e3 * report.bone_length_rms_m);
+    }
+    if let Some(report) = &motion.markers {
+        println!("  {report}");
+        println!("  betas {:.2?}", report.betas);
+        for (what, labels) in [("absent", &report.absent), ("unknown", &report.unknown)].iter().filter(|(_, labels)| !labels.is_empty()) {
+            println!("  {what}: {}", labels.join(", "));
+        }
     }
     println!("  {}", extent(&motion));
     Ok(())

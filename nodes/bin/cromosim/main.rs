@@ -9,11 +9,13 @@ use clap_complete::Shell;
 mod bag;
 mod body;
 mod compare;
+mod convert;
 mod demo;
 mod diagnose;
 #[cfg(feature = "view")]
 mod diagnose_view;
 mod inspect;
+mod motion_arguments;
 mod node;
 mod progress;
 mod recorded;
@@ -34,13 +36,15 @@ enum Command {
     /// Play a motion through the five nodes over DDS on this machine; leaves a bag and a Rerun recording
     Demo(demo::Arguments),
     /// Simulate IMUs from motion files, or again from a recording's reference; offline, on all cores
-    Simulate(simulate::Arguments),
+    Simulate(Box<simulate::Arguments>),
     /// Say which effects separate a recording's real IMUs from their simulation, and how far the gap falls with them
     Diagnose(diagnose::Arguments),
     /// Say what differs between two diagnoses, or between the IMUs of two recordings
     Compare(compare::Arguments),
-    /// Say what is in a motion, body or bag file
-    Inspect(inspect::Arguments),
+    /// Convert motions, trajectories, IMU series and recordings into each other's files
+    Convert(Box<convert::Arguments>),
+    /// Say what is in a motion, body, trajectory or bag file
+    Inspect(Box<inspect::Arguments>),
     /// Work on bags: mend an unfinished one, export IMU topics as CSV
     Bag {
         #[command(subcommand)]
@@ -78,6 +82,7 @@ fn main() -> ExitCode {
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Diagnose(arguments) => diagnose::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::Convert(arguments) => convert::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Bag { command } => bag::run(&command),
         Command::Body { command } => body::run(&command),

@@ -54,8 +54,13 @@ fn with_imu(reader: &BagReader, name: String, frames: Vec<SensorFrame>, notes: V
 }
 
 fn from_reference(reader: &BagReader, name: &str, notes: &mut Vec<String>) -> anyhow::Result<Vec<SensorFrame>> {
-    let (topic, file) = (format!("/reference/{name}"), reader.path().display());
-    let messages = reader.read::<PoseStamped>(&topic)?;
+    poses(reader, &format!("/reference/{name}"), notes)
+}
+
+/// The poses of a PoseStamped topic: finite, in the order of time, no stamp twice, at least one. `notes` says what was left out.
+pub fn poses(reader: &BagReader, topic: &str, notes: &mut Vec<String>) -> anyhow::Result<Vec<SensorFrame>> {
+    let file = reader.path().display();
+    let messages = reader.read::<PoseStamped>(topic)?;
     let count = messages.len();
     let mut frames = Vec::with_capacity(count);
     for (_, message) in messages {

@@ -4,17 +4,20 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::{Context, bail};
-use cromosim_bag::{BagOptions, BagReader, BagWriter, Compression};
+use cromosim_bag::{BagOptions, BagReader, BagSummary, BagWriter, Compression};
 use cromosim_imu::{
-    Covariances, DeclaredNoise, Device, Dropouts, EffectKind, EffectSet, EffectsFile, ImuSample, NoiseSource, PlacementEffects, Reading,
-    Scheme, SensorModel, SensorTrajectory, simulate_kinematics,
+    Covariances, DeclaredNoise, Device, Dropouts, EffectKind, EffectSet, EffectsFile, ImuSample, NoiseSource, Placement, PlacementEffects,
+    Reading, Scheme, SensorFrame, SensorModel, SensorTrajectory, simulate_kinematics,
 };
+use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_msgs::sensor_msgs::Imu;
+use cromosim_msgs::std_msgs::Header;
 use cromosim_spatial::{KinematicTrack, PoseEstimate, Stamp, uniform_stamps};
 use cromosim_virtual_imu::imu_message;
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
+use crate::convert::{Content, source};
 use crate::progress::{self, Interrupt};
 use crate::recorded::{self, Recorded};
 use crate::simulate::Arguments;
@@ -31,36 +34,8 @@ pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
     let recorded = recorded::read(&reader)?.into_iter().map(|(_, placement)| placement).collect::<anyhow::Result<Vec<_>>>()?;
     let effects = arguments.effects.as_deref().map(|file| read_effects(file, &recorded)).transpose()?.unwrap_or_default();
     let (recorded, without_stamps) = with_stamps(recorded, arguments.rate);
-    let interrupt = Interrupt::watch()?;
-    let bar = progress::bar(recorded.len() as u64, "simulating, placements");
-    let results: Vec<anyhow::Result<Vec<Imu>>> = recorded
-        .par_iter()
-        .map(|placement| {
-            interrupt.check()?;
-            let messages = resimulate(placement, scheme, arguments, effects.placements.get(&placement.name));
-            bar.inc(1);
-            messages
-        })
-        .collect();
-    bar.finish_and_clear();
-    let simulated = results.into_iter().collect::<anyhow::Result<Vec<_>>>()?;
-
-    let mut bag = BagWriter::create(
-        &arguments.out,
-        BagOptions { compression: Compression::Zstd, replace: arguments.force, ..BagOptions::default() },
-    )?;
-    bag.write_metadata("cromosim", metadata(recording, scheme, arguments, &effects))?;
-    let mut order: Vec<(i64, usize, usize)> = Vec::new();
-    for (number, messages) in simulated.iter().enumerate() {
-        order.extend(messages.iter().enumerate().map(|(index, message)| (message.header.stamp.nanos(), number, index)));
-    }
-    order.sort_by_key(|(nanos, ..)| *nanos);
-    let topics: Vec<String> = recorded.iter().map(|placement| format!("/imu/{}/data_raw", placement.name)).collect();
-    for (nanos, number, index) in order {
-        interrupt.check()?;
-        bag.write(&topics[number], Stamp::from_nanos(nanos), &simulated[number][index])?;
-    }
-    let summary = bag.finish()?;
+    let simulated = simulate_all(&recorded, scheme, arguments, |name| effects.placements.get(name))?;
+    let summary = write(&arguments.out, metadata(recording, scheme, arguments, &effects), &recorded, &simulated, false, arguments)?;
     println!(
         "{}: {} messages of {} placements, from the reference in {}",
         arguments.out.display(),
@@ -82,17 +57,106 @@ pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Runs `simulate --rigid TRAJECTORY`: the trajectory is the reference of one placement.
+pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()> {
+    let scheme: Option<Scheme> = arguments.scheme.as_deref().map(str::parse).transpose().context("--scheme")?;
+    let name = &arguments.placement;
+    if let Err((_, problem)) = Placement::at_site(name, "left_watch", 1.0) {
+        bail!("--placement {name}: {problem}");
+    }
+    let Some(Content::Poses(poses)) = source::rigid(trajectory, &source::bytes(trajectory)?)? else {
+        bail!(
+            "{}: not a trajectory of a rigid body: expected TUM, EuRoC ground truth or a table of poses with a header",
+            trajectory.display()
+        );
+    };
+    let poses = poses.trajectory;
+    let frame = |((stamp, position), rotation): ((&Stamp, &Vector3<f64>), &UnitQuaternion<f64>)| {
+        SensorFrame::new(*stamp, Isometry3::from_parts((*position).into(), *rotation))
+    };
+    let frames = poses.stamps.iter().zip(&poses.positions).zip(&poses.rotations).map(frame).collect();
+    let recorded = vec![Recorded { name: name.clone(), frames, measured: Vec::new(), notes: Vec::new() }];
+    let mut effects = arguments.effects.as_deref().map(|file| read_effects(file, &recorded)).transpose()?.unwrap_or_default();
+    if let Some(device) = &arguments.device {
+        let device = Device::resolve(Some(device), Path::new("."))?;
+        let declared_noise = DeclaredNoise { accel_density: device.accel_density(), gyro_density: device.gyro_density() };
+        let of_device = PlacementEffects { epoch: recorded[0].span().0, declared_noise, effects: device.effects().clone() };
+        effects.placements.insert(name.clone(), of_device);
+    }
+    let simulated = simulate_all(&recorded, scheme, arguments, |name| effects.placements.get(name))?;
+    let summary = write(&arguments.out, metadata(trajectory, scheme, arguments, &effects), &recorded, &simulated, true, arguments)?;
+    println!("{}: {} messages of {name}, along {}", arguments.out.display(), summary.message_count(), trajectory.display());
+    Ok(())
+}
+
+/// Each placement on whatever core is free.
+fn simulate_all<'a>(
+    recorded: &[Recorded],
+    scheme: Option<Scheme>,
+    arguments: &Arguments,
+    effects: impl Fn(&str) -> Option<&'a PlacementEffects> + Sync,
+) -> anyhow::Result<Vec<Vec<Imu>>> {
+    let interrupt = Interrupt::watch()?;
+    let bar = progress::bar(recorded.len() as u64, "simulating, placements");
+    let one = |placement: &Recorded| {
+        interrupt.check()?;
+        let messages = resimulate(placement, scheme, arguments, effects(&placement.name));
+        bar.inc(1);
+        messages
+    };
+    let results: Vec<anyhow::Result<Vec<Imu>>> = recorded.par_iter().map(one).collect();
+    bar.finish_and_clear();
+    results.into_iter().collect()
+}
+
+/// Writes the messages in order of time, with the references where they are wanted.
+fn write(
+    out: &Path,
+    metadata: BTreeMap<String, String>,
+    recorded: &[Recorded],
+    simulated: &[Vec<Imu>],
+    with_references: bool,
+    arguments: &Arguments,
+) -> anyhow::Result<BagSummary> {
+    let options = BagOptions { compression: Compression::Zstd, replace: arguments.force, ..BagOptions::default() };
+    let mut bag = BagWriter::create(out, options)?;
+    bag.write_metadata("cromosim", metadata)?;
+    // Of one time, references first.
+    let mut order: Vec<(i64, bool, usize, usize)> = Vec::new();
+    for (number, placement) in recorded.iter().enumerate() {
+        if with_references {
+            order.extend(placement.frames.iter().enumerate().map(|(index, frame)| (frame.stamp.nanos, false, number, index)));
+        }
+        order.extend(simulated[number].iter().enumerate().map(|(index, message)| (message.header.stamp.nanos(), true, number, index)));
+    }
+    order.sort_by_key(|(nanos, is_sample, ..)| (*nanos, *is_sample));
+    let topics: Vec<String> = recorded.iter().map(|placement| format!("/imu/{}/data_raw", placement.name)).collect();
+    let references: Vec<String> = recorded.iter().map(|placement| format!("/reference/{}", placement.name)).collect();
+    let interrupt = Interrupt::watch()?;
+    for (nanos, is_sample, number, index) in order {
+        interrupt.check()?;
+        let stamp = Stamp::from_nanos(nanos);
+        if is_sample {
+            bag.write(&topics[number], stamp, &simulated[number][index])?;
+        } else {
+            let pose = recorded[number].frames[index].world_from_sensor.into();
+            bag.write(&references[number], stamp, &PoseStamped { header: Header::new(nanos, "world"), pose })?;
+        }
+    }
+    Ok(bag.finish()?)
+}
+
 fn metadata(recording: &Path, scheme: Option<Scheme>, arguments: &Arguments, effects: &EffectsFile) -> BTreeMap<String, String> {
     let entry = |key: &str, value: String| (key.to_owned(), value);
     let mut entries = BTreeMap::from([
         entry("version", env!("CARGO_PKG_VERSION").to_owned()),
-        entry("command", "simulate --reference".to_owned()),
+        entry("command", if arguments.rigid.is_some() { "simulate --rigid" } else { "simulate --reference" }.to_owned()),
         entry("reference", recording.file_name().unwrap_or_default().to_string_lossy().into_owned()),
         entry("scheme", scheme.map_or_else(|| "estimate".to_owned(), |scheme| scheme.to_string())),
         entry("seed", arguments.seed.to_string()),
         entry("noise", (!arguments.no_noise).to_string()),
     ]);
-    if arguments.effects.is_some() {
+    if arguments.effects.is_some() || arguments.device.is_some() {
         entries.insert("effects".to_owned(), effects.to_yaml());
     }
     entries

@@ -13,7 +13,7 @@ use cromosim_body::{BodyModel, ShapedBody};
 use cromosim_imu::{
     Covariances, Device, MAX_RATE_HZ, MountedSites, PlacementSet, Scheme, SensorTrajectory, StreamingEffects, simulate_kinematics_on,
 };
-use cromosim_motion::{MotionOptions, SmplMotion, UpAxis, embedded_walk, read_motion_for};
+use cromosim_motion::{MotionOptions, SmplMotion, embedded_walk, read_motion_for};
 use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_msgs::sensor_msgs::Imu;
@@ -23,22 +23,33 @@ use cromosim_virtual_imu::imu_message;
 use indicatif::ProgressBar;
 use rayon::prelude::*;
 
+use crate::motion_arguments::MotionArguments;
 use crate::progress::Interrupt;
 use crate::{body, progress, reference};
 
 /// Stamp of the first frame: not zero, which TF takes for "the latest".
-const BEGINS: Stamp = Stamp::from_nanos(1_000_000_000);
+pub const BEGINS: Stamp = Stamp::from_nanos(1_000_000_000);
 
 /// Simulate IMUs from motion files, or again from a recording's reference
 #[derive(Args)]
+#[command(group = clap::ArgGroup::new("recorded").args(["reference", "rigid"]).multiple(false))]
 pub struct Arguments {
-    /// Motion files (BVH); none: the embedded walk
+    /// Motion files (BVH, ASF/AMC, C3D, TRC); none: the embedded walk
     motions: Vec<PathBuf>,
     /// Re-simulate the IMUs of this recording from its reference motion instead
-    #[arg(long, value_name = "RECORDING", conflicts_with_all = ["motions", "placements", "body", "csv", "up_axis", "unit", "start", "duration"])]
+    #[arg(long, value_name = "RECORDING", conflicts_with_all = ["motions", "placements", "body", "csv", "up_axis", "unit", "start", "duration", "skeleton", "motion_rate", "marker_set", "subject", "placements_as_given"])]
     pub reference: Option<PathBuf>,
-    /// With --reference: the effects of each placement (YAML, as a diagnosis writes them) rather than the nominal simulation
-    #[arg(long, value_name = "FILE", requires = "reference")]
+    /// Simulate an IMU on a rigid body (robot, prop) that moves along this trajectory (TUM, EuRoC or CSV) instead
+    #[arg(long, value_name = "FILE", requires = "rate", conflicts_with_all = ["motions", "placements", "body", "csv", "up_axis", "unit", "start", "duration", "skeleton", "motion_rate", "marker_set", "subject", "placements_as_given"])]
+    pub rigid: Option<PathBuf>,
+    /// With --rigid: the placement's name, in /imu/NAME/data_raw
+    #[arg(long, value_name = "NAME", default_value = "body", requires = "rigid")]
+    pub placement: String,
+    /// With --rigid: a device's name or file, for its noise and effects; default: an ideal sensor
+    #[arg(long, value_name = "DEVICE", requires = "rigid", conflicts_with = "effects")]
+    pub device: Option<String>,
+    /// With --reference or --rigid: the effects of each placement (YAML, as a diagnosis writes them) rather than the nominal simulation
+    #[arg(long, value_name = "FILE", requires = "recorded")]
     pub effects: Option<PathBuf>,
     /// The bag to write (.mcap, or a rosbag2 directory); with several motions a directory for one .mcap each
     #[arg(long, value_name = "OUT")]
@@ -64,18 +75,8 @@ pub struct Arguments {
     /// Write the samples of each placement as CSV into this directory too
     #[arg(long, value_name = "DIR")]
     csv: Option<PathBuf>,
-    /// Up axis of the motion files: auto, x, y or z
-    #[arg(long, default_value = "auto")]
-    up_axis: String,
-    /// Metres of one unit of the motion files; default: found out from the skeleton's size
-    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
-    unit: Option<f64>,
-    /// Begin so many seconds after the motion's beginning
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, allow_negative_numbers = true)]
-    start: f64,
-    /// Take so many seconds of the motion; default: to its end
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
-    duration: Option<f64>,
+    #[command(flatten)]
+    motion: MotionArguments,
     /// Replace OUT where it exists
     #[arg(long)]
     pub force: bool,
@@ -106,6 +107,9 @@ struct Simulated {
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if let Some(rate) = arguments.rate.filter(|rate| !(*rate > 0.0 && *rate <= MAX_RATE_HZ)) {
         bail!("--rate {rate}: expected a positive number of messages a second, at most {MAX_RATE_HZ}");
+    }
+    if let Some(trajectory) = &arguments.rigid {
+        return reference::run_rigid(trajectory, arguments);
     }
     if let Some(recording) = &arguments.reference {
         return reference::run(recording, arguments);
@@ -176,24 +180,11 @@ impl Setup {
         let folder = file.and_then(Path::parent).unwrap_or(Path::new("."));
         let devices =
             placements.placements().iter().map(|placement| Device::resolve(placement.device(), folder)).collect::<Result<_, _>>()?;
-        let up_axis = match arguments.up_axis.as_str() {
-            "auto" => UpAxis::Detect,
-            "x" => UpAxis::X,
-            "y" => UpAxis::Y,
-            "z" => UpAxis::Z,
-            other => bail!("--up-axis {other}: expected auto, x, y or z"),
-        };
         Ok(Self {
             model: body::model(arguments.body.as_ref())?,
             placements,
             devices,
-            motion: MotionOptions {
-                up_axis,
-                unit_scale_m: arguments.unit,
-                start_s: arguments.start,
-                duration_s: arguments.duration,
-                ..MotionOptions::default()
-            },
+            motion: arguments.motion.options()?,
             seed: arguments.seed,
             noise: !arguments.no_noise,
             force: arguments.force,

@@ -5,7 +5,7 @@ use cromosim_ros::node_config;
 node_config! {
     /// ROS parameters of `replay`.
     pub struct Config {
-        /// Motion file (BVH) to play; empty, with no bag either: the embedded walk.
+        /// Motion file (BVH, ASF/AMC, C3D, TRC) to play; empty, with no bag either: the embedded walk.
         pub motion: String = String::new(),
         /// Recording to play: everything in it, with its times; a .mcap file or a rosbag2 directory.
         pub bag: String = String::new(),
@@ -31,6 +31,16 @@ node_config! {
         pub body: String = String::new(),
         /// A skeleton map of one's own (YAML); empty: the one that fits the file's joint names.
         pub skeleton_map: String = String::new(),
+        /// An AMC file's skeleton (ASF); empty: the one beside it.
+        pub skeleton: String = String::new(),
+        /// Frames per second of a motion file that does not say it, Hz; 0: 120 for AMC.
+        pub motion_rate_hz: f64 = 0.0,
+        /// Which marker is where: plug_in_gait, or a YAML file; empty: plug_in_gait.
+        pub marker_set: String = String::new(),
+        /// Whose markers are taken, where the labels name several people.
+        pub subject: String = String::new(),
+        /// Take markers to be stuck exactly where the marker set says.
+        pub placements_as_given: bool = false,
         /// Tells several people apart.
         pub body_id: String = "0".to_owned(),
         /// Frame of the root pose.

@@ -1,6 +1,6 @@
 //! What is played: a motion as `smpl/pose`, or everything in a bag.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use cromosim_bag::{BagReader, Message, Messages, Selection};
 use cromosim_body::BodyModel;
@@ -44,6 +44,11 @@ impl MotionSource {
                 unit_scale_m: (config.unit_m > 0.0).then_some(config.unit_m),
                 start_s: config.start_seconds,
                 duration_s,
+                skeleton: Some(&config.skeleton).filter(|file| !file.is_empty()).map(PathBuf::from),
+                rate_hz: (config.motion_rate_hz > 0.0).then_some(config.motion_rate_hz),
+                marker_set: Some(config.marker_set.clone()).filter(|set| !set.is_empty()),
+                subject: Some(config.subject.clone()).filter(|name| !name.is_empty()),
+                placements_as_given: config.placements_as_given,
                 ..MotionOptions::default()
             };
             let body = if config.body.is_empty() { BodyModel::embedded() } else { BodyModel::read(Path::new(&config.body))? };
@@ -55,7 +60,8 @@ impl MotionSource {
     /// A line about what is played.
     pub fn describe(&self) -> String {
         let motion = &self.motion;
-        let report = motion.report.as_ref().map_or_else(String::new, |report| format!("; {report}"));
+        let retargeted = motion.report.as_ref().map(|report| format!("; {report}"));
+        let report = retargeted.or_else(|| motion.markers.as_ref().map(|report| format!("; {report}"))).unwrap_or_default();
         format!("{}: {} frames at {:.2} Hz, {:.2} s{report}", motion.name, motion.frames.len(), motion.rate_hz, motion.duration_s())
     }
 

@@ -15,6 +15,7 @@
 //! assert!(halfway.root_position.z > 0.5);
 //! ```
 
+mod amass_write;
 mod amc;
 mod asf;
 mod axes;
@@ -35,9 +36,10 @@ mod skeleton_map;
 mod trc;
 mod walk;
 
+pub use amass_write::write_amass;
 pub use amc::{AMC_RATE_HZ, parse_amc};
 pub use asf::{AsfBone, AsfChannel, AsfSkeleton, parse_asf};
-pub use bvh::{BvhClip, BvhJoint, Channel, MAX_JOINTS, MAX_VALUE, SkeletonPose, parse_bvh};
+pub use bvh::{BvhClip, BvhJoint, Channel, MAX_JOINTS, MAX_VALUE, SkeletonPose, parse_bvh, write_bvh};
 pub use c3d::parse_c3d;
 pub use error::MotionError;
 pub use format::MotionFormat;
@@ -48,5 +50,5 @@ pub use read::{read_motion, read_motion_for};
 pub use report::RetargetReport;
 pub use retarget::retarget;
 pub use skeleton_map::{FeetAtRest, Sides, SkeletonMap};
-pub use trc::parse_trc;
+pub use trc::{parse_trc, write_trc};
 pub use walk::embedded_walk;

@@ -96,7 +96,10 @@ impl MotionOptions {
     }
 
     /// The chosen marker set, from its file if it is no embedded one.
-    pub(crate) fn markers_set(&self) -> Result<MarkerSet, MotionError> {
+    ///
+    /// # Errors
+    /// [`MotionError::UnknownMarkerSet`], [`MotionError::Read`], and those of [`MarkerSet::from_yaml`].
+    pub fn markers_set(&self) -> Result<MarkerSet, MotionError> {
         let given = self.marker_set.as_deref().unwrap_or("plug_in_gait");
         let embedded = MarkerSet::embedded()?;
         if let Some(set) = embedded.iter().find(|set| set.name() == given) {

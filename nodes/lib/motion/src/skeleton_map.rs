@@ -9,12 +9,13 @@ use serde::Deserialize;
 use crate::axes::frame_of;
 use crate::{BvhClip, MotionError};
 
-const EMBEDDED: [(&str, &str); 6] = [
+const EMBEDDED: [(&str, &str); 7] = [
     ("cmu", include_str!("../maps/cmu.yaml")),
     ("cmu_asf", include_str!("../maps/cmu_asf.yaml")),
     ("daz", include_str!("../maps/daz.yaml")),
     ("lafan1", include_str!("../maps/lafan1.yaml")),
     ("mixamo", include_str!("../maps/mixamo.yaml")),
+    ("smpl", include_str!("../maps/smpl.yaml")),
     ("xsens", include_str!("../maps/xsens.yaml")),
 ];
 
@@ -120,7 +121,7 @@ pub(crate) struct BoundMap {
 }
 
 impl SkeletonMap {
-    /// The maps that come with the suite: cmu, cmu_asf, daz, lafan1, mixamo, xsens.
+    /// The maps that come with the suite: cmu, cmu_asf, daz, lafan1, mixamo, smpl, xsens.
     ///
     /// # Errors
     /// None in practice: a test reads them all.

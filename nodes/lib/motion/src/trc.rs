@@ -1,5 +1,7 @@
 //! TRC (Motion Analysis, OpenSim): marker positions as a table of text.
 
+use std::fmt::Write;
+
 use nalgebra::Point3;
 
 use crate::bvh::cursor::{Cursor, Token};
@@ -138,4 +140,27 @@ fn frame(cursor: &Cursor<'_>, line: Token<'_>, header: &Header) -> Result<Vec<Op
         return Err(cursor.unexpected(&format!("{} coordinates", 3 * header.markers), Some(Token { text: &found, line: line.line })));
     }
     Ok(points)
+}
+
+/// Writes markers as TRC in millimetres, in their own axes; what was not seen has empty cells. The inverse of [`parse_trc`] but for rounding
+/// to a nanometre.
+pub fn write_trc(clip: &MarkerClip) -> String {
+    let (frames, markers, rate) = (clip.frames.len(), clip.labels.len(), clip.rate_hz);
+    let mut text = "PathFileType\t4\t(X/Y/Z)\tmarkers.trc\n".to_owned();
+    text += "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames\n";
+    let _ = writeln!(text, "{rate}\t{rate}\t{frames}\t{markers}\tmm\t{rate}\t1\t{frames}");
+    let _ = writeln!(text, "Frame#\tTime\t{}", clip.labels.join("\t\t\t"));
+    let axes: Vec<String> = (1..=markers).map(|number| format!("X{number}\tY{number}\tZ{number}")).collect();
+    let _ = writeln!(text, "\t\t{}\n", axes.join("\t"));
+    for (index, frame) in clip.frames.iter().enumerate() {
+        let _ = write!(text, "{}\t{:.6}", index + 1, index as f64 / rate);
+        for point in frame {
+            let _ = match point {
+                Some(p) => write!(text, "\t{:.6}\t{:.6}\t{:.6}", 1e3 * p.x, 1e3 * p.y, 1e3 * p.z),
+                None => write!(text, "\t\t\t"),
+            };
+        }
+        text.push('\n');
+    }
+    text
 }

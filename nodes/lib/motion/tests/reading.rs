@@ -94,16 +94,16 @@ fn unknown_skeletons_are_described() {
     assert!(found.contains("skeleton map daz does not fit, not found: hip, lThigh"), "{found}");
     let unknown = MotionOptions { skeleton_map: Some("kinect".to_owned()), ..Default::default() };
     let found = message(read_motion(&own_file("a_ok.bvh"), &unknown));
-    assert_eq!(found, "skeleton map kinect is neither a file nor one of cmu, cmu_asf, daz, lafan1, mixamo, xsens");
+    assert_eq!(found, "skeleton map kinect is neither a file nor one of cmu, cmu_asf, daz, lafan1, mixamo, smpl, xsens");
 }
 
 #[test]
 fn embedded_maps_are_sound_and_own_maps_are_checked() {
     let maps = SkeletonMap::embedded().unwrap();
-    assert_eq!(maps.iter().map(SkeletonMap::name).collect::<Vec<_>>(), ["cmu", "cmu_asf", "daz", "lafan1", "mixamo", "xsens"]);
+    assert_eq!(maps.iter().map(SkeletonMap::name).collect::<Vec<_>>(), ["cmu", "cmu_asf", "daz", "lafan1", "mixamo", "smpl", "xsens"]);
     assert!(maps.iter().all(|map| !map.description().is_empty()));
     let clip = parse_bvh(&xsens(), "walk.bvh").unwrap();
-    assert_eq!(maps[5].missing_in(&clip), ["Chest2"]);
+    assert_eq!(maps[6].missing_in(&clip), ["Chest2"]);
     let yaml = include_str!("../maps/xsens.yaml");
     let error = |yaml: &str| SkeletonMap::from_yaml(yaml, "own.yaml").unwrap_err().to_string();
     assert!(error(&yaml.replace("pelvis: Hips", "pelvic: Hips")).starts_with("own.yaml: key joints.pelvic: SMPL has no such joint"));

@@ -7,11 +7,13 @@ pub(crate) mod cursor;
 mod frames;
 mod hierarchy;
 mod kinematics;
+mod write;
 
 use nalgebra::Vector3;
 
 pub(crate) use cursor::shortened;
 pub use kinematics::SkeletonPose;
+pub use write::write_bvh;
 
 use crate::MotionError;
 

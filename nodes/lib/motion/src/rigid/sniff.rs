@@ -11,6 +11,8 @@ pub enum RigidFormat {
     EurocImu,
     /// [`super::parse_pose_csv`].
     PoseCsv,
+    /// [`super::parse_imu_csv`].
+    ImuCsv,
 }
 
 /// How much of the content is looked at.
@@ -34,6 +36,17 @@ pub fn sniff_rigid(bytes: &[u8]) -> Option<RigidFormat> {
     let cells: Vec<String> =
         lower.split([',', ';', '\t']).map(|cell| cell.split(['[', '(']).next().unwrap_or_default().trim().to_owned()).collect();
     let ends = |ending: &str| cells.iter().any(|cell| cell.ends_with(ending));
+    let has = |names: &[&str]| {
+        let is = |cell: &str, name: &str| cell.replace(['.', '/'], "_").strip_suffix("_x").is_some_and(|cell| cell.ends_with(name));
+        cells.iter().any(|cell| names.iter().any(|name| is(cell, name)))
+    };
+    // Single letters name columns of many tables: they do not tell what a file is.
+    let longer = |name: &&&str| name.len() > 1;
+    let names = |names: &'static [&'static str]| names.iter().filter(longer).copied().collect::<Vec<_>>();
+    let placed = cells.iter().any(|cell| matches!(cell.as_str(), "x" | "px" | "tx")) || has(&["position", "pos"]);
+    if separators && !placed && has(&names(&super::imu_csv::RATES)) && has(&names(&super::imu_csv::FORCES)) {
+        return Some(RigidFormat::ImuCsv);
+    }
     let quaternion = ends("qw") || ends("q_w") || ends("orientation.w") || ends("orientation_w") || ends("quat_w") || ends("quaternion_w");
     if separators && quaternion && first.chars().any(char::is_alphabetic) {
         return Some(RigidFormat::PoseCsv);

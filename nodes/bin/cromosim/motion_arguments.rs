@@ -1,0 +1,67 @@
+//! How motion files are read: the same options for every command that takes motions.
+
+use std::path::PathBuf;
+
+use anyhow::bail;
+use clap::Args;
+use cromosim_motion::{MotionOptions, UpAxis};
+
+/// Options of reading motion files.
+#[derive(Args)]
+pub struct MotionArguments {
+    /// Up axis of the motion files: auto, x, y or z
+    #[arg(long, default_value = "auto")]
+    up_axis: String,
+    /// Metres of one unit of the motion files; default: found out from the skeleton's size, or as the file says
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
+    unit: Option<f64>,
+    /// Begin so many seconds after the motion's beginning
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, allow_negative_numbers = true)]
+    start: f64,
+    /// Take so many seconds of the motion; default: to its end
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    duration: Option<f64>,
+    /// An AMC file's skeleton (ASF) rather than the one beside it
+    #[arg(long, value_name = "FILE")]
+    skeleton: Option<PathBuf>,
+    /// Frames per second of a motion file that does not say it (AMC: 120 where absent), Hz
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    motion_rate: Option<f64>,
+    /// Which marker is where: plug_in_gait, or a YAML file
+    #[arg(long, value_name = "SET")]
+    marker_set: Option<String>,
+    /// Whose markers are taken, where the labels name several people
+    #[arg(long, value_name = "NAME")]
+    subject: Option<String>,
+    /// Take markers to be stuck exactly where the marker set says, instead of about a centimetre around it
+    #[arg(long)]
+    placements_as_given: bool,
+}
+
+impl MotionArguments {
+    /// The options, checked.
+    pub fn options(&self) -> anyhow::Result<MotionOptions> {
+        let up_axis = match self.up_axis.as_str() {
+            "auto" => UpAxis::Detect,
+            "x" => UpAxis::X,
+            "y" => UpAxis::Y,
+            "z" => UpAxis::Z,
+            other => bail!("--up-axis {other}: expected auto, x, y or z"),
+        };
+        if let Some(rate) = self.motion_rate.filter(|rate| !(*rate > 0.0 && rate.is_finite())) {
+            bail!("--motion-rate {rate}: expected a positive number of frames a second");
+        }
+        Ok(MotionOptions {
+            up_axis,
+            unit_scale_m: self.unit,
+            start_s: self.start,
+            duration_s: self.duration,
+            skeleton: self.skeleton.clone(),
+            rate_hz: self.motion_rate,
+            marker_set: self.marker_set.clone(),
+            subject: self.subject.clone(),
+            placements_as_given: self.placements_as_given,
+            ..MotionOptions::default()
+        })
+    }
+}

@@ -1,0 +1,249 @@
+//! `cromosim convert` and what goes with it: files there and back through the command, refusals, robots and props.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+
+use common::{cromosim_in, succeed, text};
+use cromosim_bag::{BagOptions, BagReader, BagWriter};
+use cromosim_body::{BodyModel, ShapedBody};
+use cromosim_motion::rigid::{PoseTrajectory, parse_euroc_imu, parse_tum, write_tum};
+use cromosim_motion::{MotionOptions, embedded_walk, read_motion, write_bvh};
+use cromosim_msgs::geometry_msgs::{PoseStamped, Transform, TransformStamped};
+use cromosim_msgs::sensor_msgs::Imu;
+use cromosim_msgs::std_msgs::Header;
+use cromosim_msgs::tf2_msgs::TFMessage;
+use cromosim_spatial::Stamp;
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+
+/// The embedded walk as walk.bvh.
+fn walk(folder: &Path, seconds: f64) {
+    let motion = embedded_walk().slice(2.0, Some(seconds)).unwrap();
+    let body = ShapedBody::new(BodyModel::embedded(), &motion.betas).unwrap();
+    fs::write(folder.join("walk.bvh"), write_bvh(&motion, &body)).unwrap();
+}
+
+/// A body that swings and turns, at 200 Hz.
+fn swing(seconds: f64) -> PoseTrajectory {
+    let mut trajectory = PoseTrajectory::default();
+    for index in 0..(200.0 * seconds) as i64 {
+        let time = index as f64 / 200.0;
+        trajectory.stamps.push(Stamp::from_nanos(1_700_000_000_000_000_000 + index * 5_000_000));
+        trajectory.positions.push(Vector3::new(0.3 * (2.1 * time).sin(), 0.2 * (3.3 * time).cos(), 1.0 + 0.1 * (1.3 * time).sin()));
+        let axis = Vector3::new((0.7 * time).sin(), (1.9 * time).cos(), 0.5 * (1.1 * time).sin());
+        trajectory.rotations.push(UnitQuaternion::from_scaled_axis(axis));
+    }
+    trajectory
+}
+
+fn refuses(folder: &Path, arguments: &[&str], words: &[&str]) {
+    let output = cromosim_in(folder, arguments);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", text(&output));
+    assert_eq!(said.trim_end().lines().count(), 1, "{said}");
+    assert!(words.iter().all(|word| said.contains(word)), "{arguments:?}: {said}");
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> =
+        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+/// Rows without comments, in which formats differ.
+fn rows(path: &Path) -> Vec<String> {
+    fs::read_to_string(path).unwrap().lines().filter(|line| !line.starts_with('#')).map(str::to_owned).collect()
+}
+
+#[test]
+fn a_motion_becomes_bvh_npz_and_markers() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    walk(folder.path(), 1.0);
+    let said = succeed(folder.path(), &["convert", "walk.bvh", "again.bvh"]);
+    assert!(said.contains("a BVH file of 101 frames"), "{said}");
+    let [first, again] = ["walk.bvh", "again.bvh"].map(|name| read_motion(&at(name), &MotionOptions::default()).unwrap());
+    for (a, b) in first.frames.iter().zip(&again.frames) {
+        assert!((a.root_position - b.root_position).norm() < 1e-4);
+        assert!(a.world_rotations().iter().zip(&b.world_rotations()).all(|(a, b)| a.angle_to(b) < 1e-4));
+    }
+    succeed(folder.path(), &["convert", "walk.bvh", "walk.npz"]);
+    let mut npz = cromosim_arrays::NpzReader::open(&at("walk.npz")).unwrap();
+    assert_eq!(npz.keys(), ["betas", "body", "gender", "mocap_framerate", "poses", "surface_model_type", "trans"]);
+    assert_eq!(npz.header("poses").unwrap().unwrap().shape, [101, 72]);
+    // Markers are placed on the walk, and the fit to them finds the walk again.
+    succeed(folder.path(), &["convert", "walk.bvh", "markers.trc"]);
+    let said = succeed(folder.path(), &["inspect", "markers.trc", "--placements-as-given"]);
+    assert!(said.contains("marker set plug_in_gait") && said.contains("mm (root mean square)"), "{said}");
+    succeed(folder.path(), &["convert", "markers.trc", "fitted.tum", "--joint", "left_wrist", "--placements-as-given"]);
+    succeed(folder.path(), &["convert", "walk.bvh", "known.tum", "--joint", "left_wrist"]);
+    let [fitted, known] = ["fitted.tum", "known.tum"].map(|name| parse_tum(&fs::read(at(name)).unwrap(), name).unwrap());
+    assert_eq!(fitted.stamps, known.stamps);
+    let mut errors: Vec<f64> = fitted.positions.iter().zip(&known.positions).map(|(a, b)| (a - b).norm()).collect();
+    errors.sort_by(f64::total_cmp);
+    println!("left wrist by exact markers: median {:.2} mm, largest {:.2} mm", 1e3 * errors[50], 1e3 * errors[100]);
+    assert!(errors[100] < 8e-3, "{errors:?}");
+}
+
+#[test]
+fn trajectories_go_round_through_every_format() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    walk(folder.path(), 0.5);
+    succeed(folder.path(), &["convert", "walk.bvh", "watch.tum", "--site", "left_watch"]);
+    succeed(folder.path(), &["convert", "watch.tum", "watch.csv"]);
+    succeed(folder.path(), &["convert", "watch.csv", "data.csv", "--to", "euroc"]);
+    succeed(folder.path(), &["convert", "data.csv", "watch.mcap", "--name", "wrist"]);
+    succeed(folder.path(), &["convert", "watch.mcap", "again.tum"]);
+    succeed(folder.path(), &["convert", "data.csv", "exact.tum"]);
+    assert!(rows(&at("watch.tum")) == rows(&at("exact.tum")));
+    // Quaternions of messages are brought to length 1 once more.
+    let [first, again] = ["watch.tum", "again.tum"].map(|name| parse_tum(&fs::read(at(name)).unwrap(), name).unwrap());
+    assert!(first.stamps == again.stamps && first.positions == again.positions);
+    assert!(first.rotations.iter().zip(&again.rotations).all(|(a, b)| (a.coords - b.coords).norm() < 1e-15));
+    for (name, kind) in [("watch.tum", "TUM"), ("watch.csv", "table"), ("data.csv", "EuRoC")] {
+        let said = succeed(folder.path(), &["inspect", name]);
+        assert!(said.contains("trajectory (") && said.contains(kind) && said.contains("51 rows"), "{said}");
+    }
+    // EuRoC's velocities and biases survive what can hold them.
+    let full = "#timestamp, p_RS_R_x [m]\n5,1,2,3,1,0,0,0,4,5,6,7,8,9,10,11,12\n7,1,2,3,1,0,0,0,4,5,6,7,8,9,10,11,12\n";
+    fs::write(at("full.csv"), full).unwrap();
+    succeed(folder.path(), &["convert", "full.csv", "same.csv", "--to", "euroc"]);
+    assert_eq!(rows(&at("full.csv")), rows(&at("same.csv")));
+}
+
+#[test]
+fn a_rigid_body_carries_an_imu_and_its_files_become_a_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let swing = swing(20.0);
+    fs::write(at("robot.tum"), write_tum(&swing)).unwrap();
+    let said = succeed(
+        folder.path(),
+        &[
+            "simulate",
+            "--rigid",
+            "robot.tum",
+            "--placement",
+            "gripper",
+            "--rate",
+            "100",
+            "--device",
+            "consumer_mems",
+            "--out",
+            "robot.mcap",
+        ],
+    );
+    assert!(said.contains("gripper"), "{said}");
+    succeed(folder.path(), &["simulate", "--rigid", "robot.tum", "--placement", "gripper", "--rate", "100", "--out", "ideal.mcap"]);
+    let [real, ideal] =
+        ["robot.mcap", "ideal.mcap"].map(|name| BagReader::open(&at(name)).unwrap().read::<Imu>("/imu/gripper/data_raw").unwrap());
+    assert_eq!((real.len(), ideal.len()), (2000, 2000));
+    // What the trajectory's second derivative says, in its middle.
+    for (_, imu) in &ideal[200..1800] {
+        let index = swing.stamps.iter().position(|stamp| stamp.nanos >= imu.header.stamp.nanos()).unwrap();
+        let time = (imu.header.stamp.nanos() - swing.stamps[0].nanos) as f64 * 1e-9;
+        let acceleration = Vector3::new(
+            -0.3 * 2.1 * 2.1 * (2.1 * time).sin(),
+            -0.2 * 3.3 * 3.3 * (3.3 * time).cos(),
+            -0.1 * 1.3 * 1.3 * (1.3 * time).sin(),
+        );
+        let expected = swing.rotations[index].inverse() * (acceleration + Vector3::new(0.0, 0.0, 9.80665));
+        let found: Vector3<f64> = imu.linear_acceleration.into();
+        assert!((found - expected).norm() < 0.02, "{time}: {found} {expected}");
+    }
+    assert!(real.iter().zip(&ideal).any(|((_, a), (_, b))| a.linear_acceleration != b.linear_acceleration), "the device adds noise");
+
+    // Out of the bag as EuRoC has it, and into a bag again.
+    succeed(folder.path(), &["convert", "robot.mcap", "imu.csv", "--to", "euroc", "--topic", "/imu/gripper/data_raw"]);
+    assert_eq!(parse_euroc_imu(&fs::read(at("imu.csv")).unwrap(), "imu.csv").unwrap().stamps.len(), 2000);
+    succeed(folder.path(), &["convert", "imu.csv", "table.csv"]);
+    succeed(folder.path(), &["convert", "table.csv", "back.csv", "--to", "euroc"]);
+    assert!(fs::read(at("imu.csv")).unwrap() == fs::read(at("back.csv")).unwrap());
+    let said = succeed(folder.path(), &["inspect", "imu.csv", "table.csv"]);
+    assert!(said.contains("IMU series (EuRoC), 2000 rows at 100.000 Hz") && said.contains("IMU series (table"), "{said}");
+    succeed(folder.path(), &["convert", "robot.tum", "made.mcap", "--name", "gripper", "--imu", "imu.csv"]);
+    let made = BagReader::open(&at("made.mcap")).unwrap();
+    assert_eq!(made.read::<PoseStamped>("/reference/gripper").unwrap().len(), swing.stamps.len());
+    let messages = made.read::<Imu>("/imu/gripper/data_raw").unwrap();
+    assert_eq!(messages.len(), 2000);
+    assert_eq!(messages[7].1.linear_acceleration, real[7].1.linear_acceleration);
+    succeed(folder.path(), &["diagnose", "made.mcap", "--out", "diagnosis"]);
+    let diagnosis = fs::read_to_string(at("diagnosis/diagnosis.json")).unwrap();
+    assert!(diagnosis.contains("\"gripper\""), "{diagnosis}");
+}
+
+#[test]
+fn frames_of_tf_become_a_trajectory() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut bag = BagWriter::create(&folder.path().join("tf.mcap"), BagOptions::default()).unwrap();
+    let transform = |nanos: i64, parent: &str, child: &str, pose: Isometry3<f64>| TransformStamped {
+        header: Header::new(nanos, parent),
+        child_frame_id: child.to_owned(),
+        transform: Transform::from(pose),
+    };
+    let turned = Isometry3::new(Vector3::new(0.0, 0.0, 0.5), Vector3::new(0.0, 0.0, std::f64::consts::FRAC_PI_2));
+    let fixed = TFMessage { transforms: vec![transform(0, "arm", "tool", turned)] };
+    bag.write("/tf_static", Stamp::from_nanos(1_000_000_000), &fixed).unwrap();
+    for index in 0..11_i64 {
+        let (nanos, x) = (1_000_000_000 + index * 100_000_000, 0.1 * index as f64);
+        // The cart comes half as often as the arm, which hangs on it.
+        let mut transforms = vec![transform(nanos, "cart", "arm", Isometry3::translation(0.0, x, 0.0))];
+        if index % 2 == 0 {
+            transforms.push(transform(nanos, "world", "cart", Isometry3::translation(x, 0.0, 0.0)));
+        }
+        bag.write("/tf", Stamp::from_nanos(nanos), &TFMessage { transforms }).unwrap();
+    }
+    bag.finish().unwrap();
+    succeed(folder.path(), &["convert", "tf.mcap", "tool.tum", "--frame", "tool"]);
+    let tool = parse_tum(&fs::read(folder.path().join("tool.tum")).unwrap(), "tool.tum").unwrap();
+    assert_eq!(tool.stamps.len(), 11);
+    for (index, (position, rotation)) in tool.positions.iter().zip(&tool.rotations).enumerate() {
+        let x = 0.1 * index as f64;
+        assert!((position - Vector3::new(x, x, 0.5)).norm() < 1e-12, "{index}: {position}");
+        assert!(rotation.angle_to(&turned.rotation) < 1e-12);
+    }
+    succeed(folder.path(), &["convert", "tf.mcap", "arm.tum", "--frame", "tool", "--fixed-frame", "cart"]);
+    let arm = parse_tum(&fs::read(folder.path().join("arm.tum")).unwrap(), "arm.tum").unwrap();
+    assert!((arm.positions[3] - Vector3::new(0.0, 0.3, 0.5)).norm() < 1e-12);
+    refuses(folder.path(), &["convert", "tf.mcap", "x.tum", "--frame", "hand"], &["no frame hand", "arm, cart, tool"]);
+    refuses(folder.path(), &["convert", "tf.mcap", "x.tum", "--frame", "cart", "--fixed-frame", "tool"], &["does not hang on tool"]);
+    refuses(folder.path(), &["convert", "tf.mcap", "x.tum"], &["no topic of geometry_msgs/msg/PoseStamped", "--frame"]);
+}
+
+#[test]
+fn what_cannot_be_converted_is_said_and_leaves_nothing_behind() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    walk(folder.path(), 0.2);
+    fs::write(at("robot.tum"), write_tum(&swing(0.1))).unwrap();
+    fs::write(at("taken.csv"), "mine").unwrap();
+    fs::write(at("prose.txt"), "once upon a time").unwrap();
+    let before = names(folder.path());
+    let here = folder.path();
+    refuses(here, &["convert", "robot.tum", "taken.csv"], &["taken.csv: exists already", "--force"]);
+    refuses(here, &["convert", "robot.tum", "robot.xyz"], &["robot.xyz: the ending", "--to"]);
+    refuses(here, &["convert", "robot.tum", "robot.bvh"], &["robot.tum: a trajectory cannot become a BVH file"]);
+    refuses(here, &["convert", "robot.tum", "x.csv", "--joint", "head"], &["a trajectory has no joint or site head"]);
+    refuses(here, &["convert", "robot.tum", "x.csv", "--topic", "/a"], &["--topic chooses from a bag"]);
+    refuses(here, &["convert", "robot.tum", "x.mcap", "--name", "a b"], &["--name a b"]);
+    refuses(here, &["convert", "robot.tum", "x.mcap", "--imu", "robot.tum"], &["robot.tum: a trajectory; --imu takes an IMU series"]);
+    refuses(here, &["convert", "walk.bvh", "x.tum"], &["walk.bvh: a motion has 24 joints", "--joint"]);
+    refuses(here, &["convert", "walk.bvh", "x.tum", "--joint", "tail"], &["--joint tail", "left_wrist"]);
+    refuses(here, &["convert", "walk.bvh", "x.tum", "--site", "tail"], &["--site tail"]);
+    refuses(here, &["convert", "walk.bvh", "x.mcap"], &["simulate"]);
+    refuses(here, &["convert", "prose.txt", "x.bvh"], &["prose.txt: not a motion file"]);
+    refuses(here, &["convert", "absent.bvh", "x.bvh"], &["absent.bvh: cannot be read"]);
+    refuses(here, &["convert", "robot.tum", "nowhere/x.csv"], &["nowhere/x.csv: cannot be written"]);
+    refuses(here, &["simulate", "--rigid", "walk.bvh", "--rate", "100", "--out", "x.mcap"], &["walk.bvh: not a trajectory"]);
+    refuses(here, &["simulate", "--rigid", "robot.tum", "--rate", "100", "--out", "x.mcap", "--placement", "a b"], &["--placement a b"]);
+    refuses(here, &["inspect", "walk.bvh", "--motion-rate", "-1"], &["--motion-rate -1"]);
+    assert_eq!(names(here), before);
+    assert_eq!(fs::read_to_string(at("taken.csv")).unwrap(), "mine");
+    succeed(here, &["convert", "robot.tum", "taken.csv", "--force"]);
+    assert_eq!(names(here), before);
+    assert!(fs::read_to_string(at("taken.csv")).unwrap().starts_with("stamp_ns"));
+}
