@@ -22,6 +22,7 @@ mod recorded;
 mod reference;
 mod simulate;
 mod summary;
+mod trajectory;
 
 /// Virtual IMUs from body motion: ROS 2 nodes in Rust, offline simulation, bags and pictures.
 #[derive(Parser)]
@@ -43,6 +44,8 @@ enum Command {
     Compare(compare::Arguments),
     /// Convert motions, trajectories, IMU series and recordings into each other's files
     Convert(Box<convert::Arguments>),
+    /// Place in-place poses of a video in the world, by keypoints, depth maps and cameras
+    Trajectory(Box<trajectory::Arguments>),
     /// Say what is in a motion, body, trajectory or bag file
     Inspect(Box<inspect::Arguments>),
     /// Work on bags: mend an unfinished one, export IMU topics as CSV
@@ -83,6 +86,7 @@ fn main() -> ExitCode {
         Command::Diagnose(arguments) => diagnose::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Convert(arguments) => convert::run(&arguments),
+        Command::Trajectory(arguments) => trajectory::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Bag { command } => bag::run(&command),
         Command::Body { command } => body::run(&command),

@@ -12,6 +12,7 @@ use cromosim_motion::rigid::{write_euroc_ground_truth, write_euroc_imu, write_im
 use cromosim_motion::{SmplMotion, place_markers, write_amass, write_bvh, write_trc};
 
 use super::{Arguments, Content};
+use crate::motion_arguments::MotionArguments;
 
 /// What can be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -82,7 +83,7 @@ impl Target {
 pub fn written(content: &Content, target: Target, model: &Arc<BodyModel>, arguments: &Arguments) -> anyhow::Result<Written> {
     let text = match (content, target) {
         (_, Target::Bag) => return Ok(Written::Bag),
-        (Content::Motion(motion), _) => return motion_bytes(motion, target, model, arguments).map(Written::Bytes),
+        (Content::Motion(motion), _) => return motion_bytes(motion, target, model, &arguments.motion).map(Written::Bytes),
         (Content::Poses(poses), Target::Tum) => write_tum(&poses.trajectory),
         (Content::Poses(poses), Target::Euroc) => write_euroc_ground_truth(poses),
         (Content::Poses(poses), Target::Csv) => write_pose_csv(&poses.trajectory),
@@ -98,13 +99,14 @@ fn with_article(content: &Content) -> String {
     format!("{} {name}", if name.starts_with('I') { "an" } else { "a" })
 }
 
-fn motion_bytes(motion: &SmplMotion, target: Target, model: &Arc<BodyModel>, arguments: &Arguments) -> anyhow::Result<Vec<u8>> {
+/// A motion of `model`'s body as bytes; `options` names the marker set.
+pub fn motion_bytes(motion: &SmplMotion, target: Target, model: &Arc<BodyModel>, options: &MotionArguments) -> anyhow::Result<Vec<u8>> {
     let shaped = || ShapedBody::new(model.clone(), &motion.betas);
     Ok(match target {
         Target::Amass => write_amass(motion, &shaped()?, Cursor::new(Vec::new()))?.into_inner(),
         Target::Bvh => write_bvh(motion, &shaped()?).into_bytes(),
         Target::Trc => {
-            let set = arguments.motion.options()?.markers_set()?;
+            let set = options.options()?.markers_set()?;
             write_trc(&place_markers(motion, model, &set)?).into_bytes()
         }
         _ => bail!("{}: a motion cannot become {}; give --joint or --site", motion.name, target.describe()),

@@ -89,7 +89,7 @@ pub enum Source {
     /// A motion.
     Motion {
         /// What to play.
-        motion: MotionSource,
+        motion: Box<MotionSource>,
         /// The next frame.
         next: usize,
     },
@@ -121,7 +121,7 @@ impl Source {
     /// What is wrong with the file or the settings.
     pub fn open(config: &Config) -> anyhow::Result<Self> {
         if config.bag.is_empty() {
-            return Ok(Self::Motion { motion: MotionSource::open(config)?, next: 0 });
+            return Ok(Self::Motion { motion: Box::new(MotionSource::open(config)?), next: 0 });
         }
         anyhow::ensure!(config.motion.is_empty(), "parameters 'motion' and 'bag' are both given; play one of them");
         // The iterator borrows the reader, and both live as long as the process plays.

@@ -1,0 +1,160 @@
+//! `cromosim trajectory`: in-place poses of a video become a motion in the world, by keypoints, depth maps and cameras.
+
+use std::path::PathBuf;
+
+use anyhow::bail;
+use clap::Args;
+use cromosim_motion::camera::{
+    CameraAxes, CameraClip, CameraFolder, DepthEncoding, FolderLayout, ScaleSource, Trajectory, TrajectoryOptions, global_trajectory,
+};
+use cromosim_motion::{SmplMotion, read_motion_for};
+use nalgebra::{UnitQuaternion, Vector2, Vector3};
+
+use crate::body;
+use crate::convert::write::{self, Target};
+use crate::motion_arguments::MotionArguments;
+
+/// Place in-place poses of a video in the world, by keypoints, depth maps and cameras
+#[derive(Args)]
+#[command(group = clap::ArgGroup::new("size").args(["body_height", "scale"]).multiple(false))]
+pub struct Arguments {
+    /// The in-place poses: a motion whose root orientation is that against a level camera which looks along the world's y axis
+    poses: PathBuf,
+    /// The motion to write; the ending decides where --to does not: .npz, .bvh or .trc
+    out: PathBuf,
+    /// The format to write: amass, bvh or trc
+    #[arg(long, value_enum, value_name = "FORMAT")]
+    to: Option<Target>,
+    /// Folder of OpenPose's *_keypoints.json (BODY_25)
+    #[arg(long, value_name = "DIR")]
+    keypoints: PathBuf,
+    /// Folder of depth maps, frame_NNNNNN.raw, .npy or .png
+    #[arg(long, value_name = "DIR")]
+    depth: PathBuf,
+    /// Folder of cameras, frame_NNNNNN.npz
+    #[arg(long, value_name = "DIR")]
+    cameras: PathBuf,
+    /// What the depth maps hold; Robust CVD's hold disparity
+    #[arg(long, value_parser = ["depth", "disparity"])]
+    depth_encoding: String,
+    /// Which way the cameras' axes point: y down and z forward (opencv), or y up and z backward (opengl)
+    #[arg(long, value_parser = ["opencv", "opengl"])]
+    camera_axes: String,
+    /// Width and height of the video, in which the keypoints are, px
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    image: [usize; 2],
+    /// Width and height of the image that the intrinsics are for, px; default: the video's
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    camera_image: Option<[usize; 2]>,
+    /// Width and height of depth maps without a header, px
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    plain_depth: Option<[usize; 2]>,
+    /// Number of the first frame in the files' names
+    #[arg(long, value_name = "NUMBER", default_value_t = 0)]
+    first_number: usize,
+    /// Whether the root moves: depth (the paper's CROMOSim), or none (its Lite)
+    #[arg(long, value_parser = ["depth", "none"], default_value = "depth")]
+    trajectory: String,
+    /// The person's standing height, m: gives the scale of depth maps and cameras
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
+    body_height: Option<f64>,
+    /// Metres per unit of depth maps and cameras; 1 where they are metric
+    #[arg(long, value_name = "FACTOR", allow_negative_numbers = true)]
+    scale: Option<f64>,
+    /// Body model as npz or pickle rather than the embedded one
+    #[arg(long, value_name = "FILE")]
+    body: Option<PathBuf>,
+    /// Replace OUT where it exists
+    #[arg(long)]
+    force: bool,
+    #[command(flatten)]
+    motion: MotionArguments,
+}
+
+/// `1920x1080`.
+fn size(text: &str) -> Result<[usize; 2], String> {
+    let parts = text.split_once('x').and_then(|(width, height)| Some([width.parse().ok()?, height.parse().ok()?]));
+    parts
+        .filter(|[width, height]| (1..=1 << 16).contains(width) && (1..=1 << 16).contains(height))
+        .ok_or("expected WIDTHxHEIGHT in pixels".to_owned())
+}
+
+/// Runs the command.
+pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let target = Target::of(arguments.to, &arguments.out)?;
+    if !target.takes_motions() {
+        bail!("{}: {} holds no motion of a body; give .npz, .bvh or .trc", arguments.out.display(), target.describe());
+    }
+    if arguments.out.exists() && !arguments.force {
+        bail!("{}: exists already; --force replaces it", arguments.out.display());
+    }
+    let options = options(arguments)?;
+    let model = body::model(arguments.body.as_ref())?;
+    let poses = read_motion_for(&arguments.poses, &model, &arguments.motion.options()?)?;
+    let folder = CameraFolder {
+        keypoints: arguments.keypoints.clone(),
+        depth: arguments.depth.clone(),
+        cameras: arguments.cameras.clone(),
+        layout: layout(arguments),
+    };
+    let mut files = folder.read(poses.frames.len(), options.least_confidence)?;
+    let mut clip = in_place(&poses, pixels(arguments.image));
+    (clip.keypoints, clip.cameras) = (files.keypoints, files.cameras);
+    let placed = global_trajectory(&clip, &mut files.depth, &model, &options)?;
+    let bytes = write::motion_bytes(&placed.motion, target, &model, &arguments.motion)?;
+    write::file(&arguments.out, &bytes, arguments.force)?;
+    println!("{}: {} of {} frames", arguments.out.display(), target.describe(), placed.motion.frames.len());
+    println!("  {}", placed.report);
+    Ok(())
+}
+
+fn options(arguments: &Arguments) -> anyhow::Result<TrajectoryOptions> {
+    let trajectory = if arguments.trajectory == "none" { Trajectory::None } else { Trajectory::Depth };
+    let scale = match (arguments.body_height, arguments.scale, trajectory) {
+        (Some(metres), ..) => ScaleSource::BodyHeight(metres),
+        (None, Some(factor), _) => ScaleSource::Given(factor),
+        // In place there is nothing to scale.
+        (None, None, Trajectory::None) => ScaleSource::Given(1.0),
+        (None, None, Trajectory::Depth) => {
+            bail!("no scale of depth maps and cameras; give --body-height, or --scale (1 where they are metric)")
+        }
+    };
+    Ok(TrajectoryOptions { trajectory, ..TrajectoryOptions::new(scale) })
+}
+
+fn layout(arguments: &Arguments) -> FolderLayout {
+    FolderLayout {
+        encoding: if arguments.depth_encoding == "disparity" { DepthEncoding::Disparity } else { DepthEncoding::Depth },
+        axes: if arguments.camera_axes == "opengl" { CameraAxes::OpenGl } else { CameraAxes::OpenCv },
+        keypoint_image_px: pixels(arguments.image),
+        intrinsics_image_px: pixels(arguments.camera_image.unwrap_or(arguments.image)),
+        first_number: arguments.first_number,
+        plain_depth_px: arguments.plain_depth,
+    }
+}
+
+fn pixels([width, height]: [usize; 2]) -> Vector2<f64> {
+    Vector2::new(width as f64, height as f64)
+}
+
+/// The motion as an estimator would give it: before a level camera that looks along the world's y axis, so that the camera's x is the
+/// world's, its y down and its z the world's y.
+fn in_place(motion: &SmplMotion, keypoint_image_px: Vector2<f64>) -> CameraClip {
+    let camera_from_world = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2);
+    let count = motion.frames.len();
+    let mut poses = motion.frames.clone();
+    for pose in &mut poses {
+        pose.local_rotations[0] = camera_from_world * pose.local_rotations[0];
+    }
+    CameraClip {
+        name: motion.name.clone(),
+        rate_hz: motion.rate_hz,
+        gender: motion.gender,
+        poses,
+        pose_confidence: motion.confidence.clone().unwrap_or_else(|| vec![1.0; count]),
+        betas: vec![motion.betas.clone(); count],
+        keypoints: Vec::new(),
+        keypoint_image_px,
+        cameras: Vec::new(),
+    }
+}
