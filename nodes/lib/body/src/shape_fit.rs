@@ -52,14 +52,7 @@ impl BodyModel {
     /// person whom a motion file describes by betas of another body, or not at all, comes to this body.
     pub fn fit_bone_lengths(&self, joint: impl Fn(Joint) -> Option<Vector3<f64>>, metres_per_unit: f64) -> ShapeFit {
         let (mean, directions) = self.joint_shape_directions();
-        let targets: Vec<Target> = LENGTHS
-            .into_iter()
-            .filter_map(|(from, to)| {
-                let middle = |[left, right]: [Joint; 2]| Some((joint(left)? + joint(right)?) / 2.0);
-                Some(((from, to), (middle(to)? - middle(from)?).norm() * metres_per_unit))
-            })
-            .collect();
-        let targets = without_conventions(targets, &mean);
+        let targets = targets(joint, metres_per_unit, &mean);
         let shaped = |betas: &DVector<f64>| -> [Vector3<f64>; JOINT_COUNT] {
             std::array::from_fn(|joint| {
                 mean[joint] + directions.iter().zip(betas.iter()).map(|(d, beta)| d[joint] * *beta).sum::<Vector3<f64>>()
@@ -70,11 +63,30 @@ impl BodyModel {
             let joints = shaped(&betas);
             step(&mut betas, &joints, &directions, &targets);
         }
-        let joints = shaped(&betas);
-        let squares: f64 = targets.iter().map(|&(length, target)| (span(&joints, length).norm() - target).powi(2)).sum();
-        let length_rms_m = (squares / targets.len().max(1) as f64).sqrt();
-        ShapeFit { betas: betas.iter().copied().collect(), length_rms_m }
+        ShapeFit { length_rms_m: remaining(&shaped(&betas), &targets), betas: betas.iter().copied().collect() }
     }
+
+    /// The mean body for that person, all betas 0, and the differences that remain; arguments as of [`Self::fit_bone_lengths`].
+    pub fn mean_for_bone_lengths(&self, joint: impl Fn(Joint) -> Option<Vector3<f64>>, metres_per_unit: f64) -> ShapeFit {
+        let (mean, directions) = self.joint_shape_directions();
+        let length_rms_m = remaining(&mean, &targets(joint, metres_per_unit, &mean));
+        ShapeFit { betas: vec![0.0; directions.len()], length_rms_m }
+    }
+}
+
+/// The person's lengths, m.
+fn targets(joint: impl Fn(Joint) -> Option<Vector3<f64>>, metres_per_unit: f64, mean: &[Vector3<f64>; JOINT_COUNT]) -> Vec<Target> {
+    let lengths = LENGTHS.into_iter().filter_map(|(from, to)| {
+        let middle = |[left, right]: [Joint; 2]| Some((joint(left)? + joint(right)?) / 2.0);
+        Some(((from, to), (middle(to)? - middle(from)?).norm() * metres_per_unit))
+    });
+    without_conventions(lengths.collect(), mean)
+}
+
+/// Root mean square of the lengths' differences, m.
+fn remaining(joints: &[Vector3<f64>; JOINT_COUNT], targets: &[Target]) -> f64 {
+    let squares: f64 = targets.iter().map(|&(length, target)| (span(joints, length).norm() - target).powi(2)).sum();
+    (squares / targets.len().max(1) as f64).sqrt()
 }
 
 /// One Gauss-Newton step.

@@ -3,6 +3,7 @@
 use std::io;
 use std::path::PathBuf;
 
+use cromosim_arrays::ArraysError;
 use cromosim_body::BodyError;
 
 /// An error of this crate: one line that names the file, the place and what to do.
@@ -28,7 +29,10 @@ pub enum MotionError {
         limit: u64,
     },
     /// The content is no known motion format.
-    #[error("{}: not a motion file: expected BVH (first word HIERARCHY), AMC, C3D or TRC, found {found}", path.display())]
+    #[error(
+        "{}: not a motion file: expected BVH (first word HIERARCHY), AMC, C3D, TRC or SMPL parameters (npz, pickle, pt), found {found}",
+        path.display()
+    )]
     UnknownFormat {
         /// The file.
         path: PathBuf,
@@ -278,6 +282,60 @@ pub enum MotionError {
         frame: usize,
         /// Which quantity.
         what: &'static str,
+    },
+    /// A file of arrays that cannot be read, or an array in it that does not suit.
+    #[error(transparent)]
+    Arrays(#[from] ArraysError),
+    /// What stands under a key contradicts itself or the rest.
+    #[error("{}: key {key}: {problem}", path.display())]
+    Key {
+        /// The file.
+        path: PathBuf,
+        /// The key.
+        key: String,
+        /// What is wrong with it, and what to do.
+        problem: String,
+    },
+    /// A body model is given for a motion.
+    #[error("{}: an SMPL body model, not a motion; give it as the body (--body FILE)", path.display())]
+    BodyFile {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The keys are those of no known pose file.
+    #[error(
+        "{}: no known motion in it (found {found}); known are AMASS (poses, trans), VIBE (pose), WHAM (pose_world), GVHMR (smpl_params_global), TRAM (pred_rotmat), PHALP (tid, smpl), SLAHMR (root_orient, cam_R)",
+        path.display()
+    )]
+    UnknownPoses {
+        /// The file.
+        path: PathBuf,
+        /// Its first keys.
+        found: String,
+    },
+    /// Nobody of that name.
+    #[error("{}: person {person} is not in it; there are {known}; choose one by person", path.display())]
+    UnknownPerson {
+        /// The file.
+        path: PathBuf,
+        /// What was asked for.
+        person: String,
+        /// The people, with their numbers of frames.
+        known: String,
+    },
+    /// The motion's betas are those of another kind of body.
+    #[error("{}: {source}: set source_body to the file of their body for that, or shape to mean", path.display())]
+    ForeignShape {
+        /// The file.
+        path: PathBuf,
+        /// Whose betas, and which body.
+        source: BodyError,
+    },
+    /// A shape is asked of a file that holds none.
+    #[error("{name}: shape file asked for, but a skeleton has no betas; set shape to fit or mean")]
+    NoBetas {
+        /// The file.
+        name: String,
     },
     /// The body refuses.
     #[error(transparent)]

@@ -8,6 +8,10 @@
 //! [`camera`] places in-place poses that were estimated from video in the world; [`rigid`] reads and writes trajectories and IMU files of rigid
 //! bodies; [`datasets`] imports recordings with real IMUs.
 //!
+//! Files of SMPL parameters (AMASS, and estimates from video: VIBE, WHAM, GVHMR, TRAM, PHALP, SLAHMR) need no retargeting; the [`PoseReport`]
+//! says what was taken. Betas of another kind of body than the one at hand are left out or fitted ([`ShapeChoice`]). [`read_people`] takes
+//! everybody in a file, [`read_camera_poses`] leaves poses in the camera's axes.
+//!
 //! ```
 //! let walk = cromosim_motion::embedded_walk();
 //! assert_eq!(walk.duration_s().round(), 10.0);
@@ -28,6 +32,7 @@ mod format;
 mod markers;
 mod motion;
 mod options;
+mod poses;
 mod read;
 mod report;
 mod retarget;
@@ -46,6 +51,10 @@ pub use format::MotionFormat;
 pub use markers::{MarkerClip, MarkerFit, MarkerOptions, MarkerPlace, MarkerReport, MarkerSet, SetMarker, fit_markers, place_markers};
 pub use motion::SmplMotion;
 pub use options::{MotionOptions, RestChoice, UpAxis};
+pub use poses::{
+    CameraPoses, MAX_POSES, PoseAxes, PoseFile, PoseFormat, PoseReport, PoseTrack, PoseView, RateOrigin, ShapeChoice, ShapeOrigin,
+    VIDEO_RATE_HZ, open_poses, read_camera_poses, read_people,
+};
 pub use read::{read_motion, read_motion_for};
 pub use report::RetargetReport;
 pub use retarget::retarget;

@@ -1,9 +1,9 @@
 //! A motion in SMPL's joints, whatever file it came from.
 
-use cromosim_body::{BodyPose, Gender, JOINT_COUNT};
+use cromosim_body::{BodyPose, Gender, JOINT_COUNT, ShapeSpace};
 use nalgebra::{UnitQuaternion, Vector3};
 
-use crate::{MarkerReport, MotionError, RetargetReport};
+use crate::{MarkerReport, MotionError, PoseReport, RetargetReport};
 
 /// A clip: poses at a constant rate, in a world with z up.
 #[derive(Clone, Debug)]
@@ -16,6 +16,8 @@ pub struct SmplMotion {
     pub gender: Gender,
     /// Shape coefficients (standard deviations) for the body that the motion was made for; 10 for the embedded body.
     pub betas: Vec<f64>,
+    /// Whose shapes they tell: that body's.
+    pub shape_space: ShapeSpace,
     /// Frame `i` stands at `i / rate_hz` seconds.
     pub frames: Vec<BodyPose>,
     /// One value in [0, 1] per frame where the source says how sure it is.
@@ -24,6 +26,8 @@ pub struct SmplMotion {
     pub report: Option<RetargetReport>,
     /// How the markers were fitted, where it comes from markers.
     pub markers: Option<MarkerReport>,
+    /// How SMPL parameters were read, where it comes from such.
+    pub poses: Option<PoseReport>,
 }
 
 impl SmplMotion {
@@ -113,10 +117,12 @@ impl SmplMotion {
             rate_hz: self.rate_hz,
             gender: self.gender,
             betas: self.betas.clone(),
+            shape_space: self.shape_space,
             frames: Vec::new(),
             confidence: None,
             report: self.report.clone(),
             markers: self.markers.clone(),
+            poses: self.poses.clone(),
         }
     }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::Vector3;
 use serde::Deserialize;
 
-use crate::{MarkerOptions, MarkerSet, MotionError, SkeletonMap};
+use crate::{MarkerOptions, MarkerSet, MotionError, ShapeChoice, SkeletonMap};
 
 /// The direction that points up in the source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Deserialize)]
@@ -65,14 +65,20 @@ pub struct MotionOptions {
     pub keep_lead_in: bool,
     /// An AMC file's skeleton (ASF); the one beside it where absent.
     pub skeleton: Option<PathBuf>,
-    /// An AMC file's frames per second, which it does not say; 120 Hz where absent.
-    pub rate_hz: Option<f64>,
     /// An embedded marker set's name or a YAML file; plug_in_gait where absent.
     pub marker_set: Option<String>,
     /// Whose markers are taken; needed where the labels name several people.
     pub subject: Option<String>,
     /// Takes markers to be stuck exactly where the marker set says, instead of about a centimetre around it.
     pub placements_as_given: bool,
+    /// Where the body's shape comes from.
+    pub shape: ShapeChoice,
+    /// The body file that the motion's betas are for, so that another body can be fitted to that person's bones (SMPL parameters only).
+    pub source_body: Option<PathBuf>,
+    /// Which person of a file of several, by its name or number there; who is in it for the longest time, where absent.
+    pub person: Option<String>,
+    /// Frames per second, Hz, of AMC files (120 where absent) and video estimates (30 where absent), which do not say it; else instead of the file's.
+    pub rate_hz: Option<f64>,
     /// Where to begin, s after the first frame that is kept.
     pub start_s: f64,
     /// How much to take, s; all where absent.

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use cromosim_body::BodyModel;
 
 use crate::bvh::shortened;
+use crate::poses::read_poses;
 use crate::{
     AMC_RATE_HZ, BvhClip, MarkerClip, MotionError, MotionFormat, MotionOptions, SmplMotion, fit_markers, parse_amc, parse_asf, parse_bvh,
     parse_c3d, parse_trc, retarget,
@@ -19,6 +20,7 @@ const MAX_BYTES: u64 = 4 << 30;
 /// Reads a motion file and retargets or fits it to the embedded body. What the file is, is told by its content ([`MotionFormat::of`]), not by
 /// its name's ending. BVH and ASF/AMC are retargeted; an AMC file takes its skeleton from [`MotionOptions::skeleton`] or from the ASF file
 /// beside it. To C3D and TRC a body is fitted ([`fit_markers`]).
+/// SMPL parameters are packed as npz, pickle, joblib, torch or npy and told by their keys.
 ///
 /// # Errors
 /// One line that names the file and the place: unreadable, no motion file, wrong content ([`MotionError`]).
@@ -31,6 +33,9 @@ pub fn read_motion(path: &Path, options: &MotionOptions) -> Result<SmplMotion, M
 /// # Errors
 /// As [`read_motion`].
 pub fn read_motion_for(path: &Path, body: &Arc<BodyModel>, options: &MotionOptions) -> Result<SmplMotion, MotionError> {
+    if let Some(motion) = read_poses(path, body, options)? {
+        return motion.slice(options.start_s, options.duration_s);
+    }
     let bytes = read_bytes(path)?;
     let name = path.display().to_string();
     let text = || String::from_utf8_lossy(&bytes);

@@ -53,7 +53,7 @@ const SAME_FLOOR_M: f64 = 0.03;
 /// Raises all frames so that standing soles are at z = 0, and says by how much, m. The floor is the lowest level on which soles stand (who
 /// climbs stairs stands on several): the median of the heights near their lowest tenth. Where hardly a foot stands still, the floor is
 /// where the lowest twentieth of all soles ends.
-pub(super) fn stand_on_floor(shaped: &ShapedBody, frames: &mut [BodyPose], rate_hz: f64) -> f64 {
+pub(crate) fn stand_on_floor(shaped: &ShapedBody, frames: &mut [BodyPose], rate_hz: f64) -> f64 {
     let soles = Sole::both(shaped);
     let ankles: Vec<[Vector3<f64>; 2]> = frames
         .iter()

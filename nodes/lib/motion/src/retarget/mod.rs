@@ -8,10 +8,10 @@
 
 mod alignment;
 mod errors;
-mod floor;
+pub(crate) mod floor;
 mod lead_in;
 mod rest;
-mod scale;
+pub(crate) mod scale;
 mod segments;
 
 use std::sync::Arc;
@@ -21,6 +21,7 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use crate::axes::{axis_name, minimal_rotation};
 use crate::motion::continuous;
+use crate::poses::skeleton_betas;
 use crate::skeleton_map::BoundMap;
 use crate::{BvhClip, MotionError, MotionOptions, RetargetReport, SkeletonMap, SmplMotion};
 
@@ -47,7 +48,8 @@ pub fn retarget(clip: &BvhClip, body: &Arc<BodyModel>, options: &MotionOptions) 
     let up_in_file = scale::up_axis(clip, &map, options.up_axis)?;
     let rest = rest::choose(clip, &map, options.rest, up_in_file)?;
     let (unit_scale_m, source_height_m) = scale::unit_scale(clip.name(), &map, &rest, body, options.unit_scale_m)?;
-    let ShapeFit { betas, length_rms_m: bone_length_rms_m } = body.fit_bone_lengths(|joint| rest.joint(&map, joint), unit_scale_m);
+    let joint = |joint: Joint| rest.joint(&map, joint);
+    let ShapeFit { betas, length_rms_m: bone_length_rms_m } = skeleton_betas(clip.name(), options.shape, body, joint, unit_scale_m)?;
     let shaped = ShapedBody::new(body.clone(), &betas)?;
     let leg_ratio = scale::leg_length(&|joint| Some(shaped.joints_in_model()[joint.index()]))
         / (unit_scale_m * scale::leg_length(&|joint| rest.joint(&map, joint)));
@@ -78,10 +80,12 @@ pub fn retarget(clip: &BvhClip, body: &Arc<BodyModel>, options: &MotionOptions) 
         rate_hz: clip.rate_hz(),
         gender: body.gender().unwrap_or(Gender::Neutral),
         betas,
+        shape_space: body.shape_space(),
         frames,
         confidence: None,
         report: Some(report),
         markers: None,
+        poses: None,
     })
 }
 

@@ -87,7 +87,7 @@ fn height_in_units(map: &BoundMap, rest: &Rest, body: &Arc<BodyModel>) -> f64 {
 }
 
 /// Thigh and shin, mean of both sides; 0 where a joint is missing.
-pub(super) fn leg_length(at: &dyn Fn(Joint) -> Option<Vector3<f64>>) -> f64 {
+pub(crate) fn leg_length(at: &dyn Fn(Joint) -> Option<Vector3<f64>>) -> f64 {
     let bone = |from: Joint, to: Joint| at(from).zip(at(to)).map_or(0.0, |(from, to)| (to - from).norm());
     let left = bone(Joint::LeftHip, Joint::LeftKnee) + bone(Joint::LeftKnee, Joint::LeftAnkle);
     (left + bone(Joint::RightHip, Joint::RightKnee) + bone(Joint::RightKnee, Joint::RightAnkle)) / 2.0

@@ -49,9 +49,11 @@ fn make() -> SmplMotion {
         rate_hz: RATE_HZ,
         gender: body.gender().unwrap_or(Gender::Neutral),
         betas: vec![0.0; body.beta_count()],
+        shape_space: body.shape_space(),
         frames: continuous(frames),
         confidence: None,
         report: None,
         markers: None,
+        poses: None,
     }
 }

@@ -1,0 +1,37 @@
+//! GVHMR: `smpl_params_global` with `global_orient` (N, 3), `body_pose` (N, 63), `transl` (N, 3) and `betas` of SMPL-X, in a world with y up;
+//! `smpl_params_incam` is the same in the camera's axes.
+
+use cromosim_arrays::Entry;
+use cromosim_body::ShapeSpace;
+use nalgebra::Vector3;
+
+use super::file::PoseView;
+use super::track::{PoseAxes, PoseTrack};
+use super::values::{Budget, betas, body_angles, numbers, of_root_and_body, vectors};
+use crate::MotionError;
+
+pub(super) fn track(root: &Entry, view: PoseView, budget: &mut Budget) -> Result<PoseTrack, MotionError> {
+    let parameters = root.at(if view == PoseView::Camera { "smpl_params_incam" } else { "smpl_params_global" })?;
+    let orient = parameters.at("global_orient")?;
+    let count = orient.shape()?.first().copied().unwrap_or(0);
+    budget.take(orient.key(), count)?;
+    let orient = numbers(&orient, &[None, Some(3)], "(N, 3)")?;
+    let body = body_angles(&parameters.at("body_pose")?, count)?;
+    let (trans, axes) = match view {
+        PoseView::Camera => (None, PoseAxes::Camera),
+        PoseView::World => (Some(vectors(&parameters.at("transl")?, count)?), PoseAxes::Up(Vector3::y())),
+    };
+    Ok(PoseTrack {
+        person: "0".to_owned(),
+        gender: None,
+        shape_space: ShapeSpace::SmplX,
+        betas: betas(parameters.get("betas").as_ref(), count)?,
+        frame_ids: None,
+        rotations: of_root_and_body(&orient.values, &body.values),
+        trans,
+        pelvis_turns: None,
+        axes,
+        rate_hz: None,
+        confidence: None,
+    })
+}

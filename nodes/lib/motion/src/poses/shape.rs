@@ -1,0 +1,101 @@
+//! Whose shape a motion has on a body.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use cromosim_body::{BodyModel, JOINT_COUNT, Joint, ShapeFit, ShapedBody};
+use nalgebra::Vector3;
+use serde::Deserialize;
+
+use super::report::ShapeOrigin;
+use super::track::PoseTrack;
+use crate::MotionError;
+
+/// Where the body's shape comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ShapeChoice {
+    /// Of skeletons, the fit. Of SMPL parameters: the file's betas where they are those of the body; else a fit where `source_body` is
+    /// given; else the mean body, and the report says so.
+    #[default]
+    Detect,
+    /// The file's betas; an error where they are those of another kind of body, or where there are none.
+    File,
+    /// Fitted to the person's bone lengths: of a skeleton, or of `source_body` with the file's betas.
+    Fit,
+    /// The mean body.
+    Mean,
+}
+
+/// A shape, and the body that the file's `trans` goes with.
+pub(super) struct Shape {
+    pub betas: Vec<f64>,
+    pub origin: ShapeOrigin,
+    /// The person's joints on the file's own body, m, where that is another than the one at hand.
+    pub source_joints: Option<[Vector3<f64>; JOINT_COUNT]>,
+    /// Betas of the file that the body does not have.
+    pub betas_left_out: usize,
+}
+
+impl Shape {
+    pub fn choose(
+        path: &Path,
+        track: &PoseTrack,
+        body: &BodyModel,
+        source_body: Option<&Arc<BodyModel>>,
+        choice: ShapeChoice,
+    ) -> Result<Self, MotionError> {
+        let betas = track.mean_betas();
+        let checked = body.check_betas(track.shape_space, track.gender, &betas);
+        let own = checked.is_ok() && track.shape_space == body.shape_space();
+        let mean = || Self { betas: vec![0.0; body.beta_count()], origin: ShapeOrigin::Mean, source_joints: None, betas_left_out: 0 };
+        match choice {
+            ShapeChoice::Mean => Ok(mean()),
+            _ if own => Ok(Self::of_file(betas, body)),
+            ShapeChoice::File | ShapeChoice::Fit if checked.is_ok() && source_body.is_none() => Ok(mean()),
+            ShapeChoice::Detect | ShapeChoice::Fit if source_body.is_some() => Self::fitted(path, track, &betas, body, source_body),
+            ShapeChoice::Detect => Ok(mean()),
+            ShapeChoice::File | ShapeChoice::Fit => match checked {
+                Err(source) => Err(MotionError::ForeignShape { path: path.to_owned(), source }),
+                Ok(()) => Ok(mean()),
+            },
+        }
+    }
+
+    fn of_file(mut betas: Vec<f64>, body: &BodyModel) -> Self {
+        let betas_left_out = betas.iter().skip(body.beta_count()).filter(|&&beta| beta != 0.0).count();
+        betas.truncate(body.beta_count());
+        Self { betas, origin: ShapeOrigin::File, source_joints: None, betas_left_out }
+    }
+
+    fn fitted(
+        path: &Path,
+        track: &PoseTrack,
+        betas: &[f64],
+        body: &BodyModel,
+        source_body: Option<&Arc<BodyModel>>,
+    ) -> Result<Self, MotionError> {
+        let Some(source_body) = source_body else { return Err(MotionError::NoBetas { name: path.display().to_string() }) };
+        let foreign = |source| MotionError::ForeignShape { path: path.to_owned(), source };
+        source_body.check_betas(track.shape_space, track.gender, betas).map_err(foreign)?;
+        let Self { betas, betas_left_out, .. } = Self::of_file(betas.to_vec(), source_body);
+        let joints = *ShapedBody::new(source_body.clone(), &betas)?.joints_in_model();
+        let ShapeFit { betas, length_rms_m } = body.fit_bone_lengths(|joint| Some(joints[joint.index()]), 1.0);
+        Ok(Self { betas, origin: ShapeOrigin::Fit { length_rms_m }, source_joints: Some(joints), betas_left_out })
+    }
+}
+
+/// The shape for a skeleton whose rest joints are known.
+pub(crate) fn skeleton_betas(
+    name: &str,
+    choice: ShapeChoice,
+    body: &BodyModel,
+    joint: impl Fn(Joint) -> Option<Vector3<f64>>,
+    metres_per_unit: f64,
+) -> Result<ShapeFit, MotionError> {
+    match choice {
+        ShapeChoice::Detect | ShapeChoice::Fit => Ok(body.fit_bone_lengths(joint, metres_per_unit)),
+        ShapeChoice::Mean => Ok(body.mean_for_bone_lengths(joint, metres_per_unit)),
+        ShapeChoice::File => Err(MotionError::NoBetas { name: name.to_owned() }),
+    }
+}
