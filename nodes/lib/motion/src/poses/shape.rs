@@ -49,16 +49,13 @@ impl Shape {
         let checked = body.check_betas(track.shape_space, track.gender, &betas);
         let own = checked.is_ok() && track.shape_space == body.shape_space();
         let mean = || Self { betas: vec![0.0; body.beta_count()], origin: ShapeOrigin::Mean, source_joints: None, betas_left_out: 0 };
-        match choice {
-            ShapeChoice::Mean => Ok(mean()),
+        match (choice, source_body, checked) {
+            (ShapeChoice::Mean, ..) => Ok(mean()),
             _ if own => Ok(Self::of_file(betas, body)),
-            ShapeChoice::File | ShapeChoice::Fit if checked.is_ok() && source_body.is_none() => Ok(mean()),
-            ShapeChoice::Detect | ShapeChoice::Fit if source_body.is_some() => Self::fitted(path, track, &betas, body, source_body),
-            ShapeChoice::Detect => Ok(mean()),
-            ShapeChoice::File | ShapeChoice::Fit => match checked {
-                Err(source) => Err(MotionError::ForeignShape { path: path.to_owned(), source }),
-                Ok(()) => Ok(mean()),
-            },
+            (ShapeChoice::Detect | ShapeChoice::Fit, Some(source_body), _) => Self::fitted(path, track, &betas, body, source_body),
+            (ShapeChoice::File | ShapeChoice::Fit, _, Err(source)) => Err(MotionError::ForeignShape { path: path.to_owned(), source }),
+            // The mean of any body is said by zeros, or by no betas at all.
+            _ => Ok(mean()),
         }
     }
 
@@ -68,14 +65,7 @@ impl Shape {
         Self { betas, origin: ShapeOrigin::File, source_joints: None, betas_left_out }
     }
 
-    fn fitted(
-        path: &Path,
-        track: &PoseTrack,
-        betas: &[f64],
-        body: &BodyModel,
-        source_body: Option<&Arc<BodyModel>>,
-    ) -> Result<Self, MotionError> {
-        let Some(source_body) = source_body else { return Err(MotionError::NoBetas { name: path.display().to_string() }) };
+    fn fitted(path: &Path, track: &PoseTrack, betas: &[f64], body: &BodyModel, source_body: &Arc<BodyModel>) -> Result<Self, MotionError> {
         let foreign = |source| MotionError::ForeignShape { path: path.to_owned(), source };
         source_body.check_betas(track.shape_space, track.gender, betas).map_err(foreign)?;
         let Self { betas, betas_left_out, .. } = Self::of_file(betas.to_vec(), source_body);

@@ -2,6 +2,7 @@
 #![allow(dead_code, clippy::unwrap_used)]
 
 pub mod acclaim;
+pub mod containers;
 pub mod export;
 pub mod known;
 pub mod marker_files;
