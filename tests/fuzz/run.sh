@@ -17,6 +17,7 @@ for target in "$@"; do
         npz) find nodes -path '*/tests/data/*.npz' -size -100k -exec cp {} "$seeds" \; ;;
         pickle) cp nodes/lib/arrays/tests/data/* "$seeds" ;;
         model) cp nodes/lib/body/tests/data/model_* "$seeds" ;;
+        poses) find nodes/lib/motion/tests/data/poses nodes/lib/arrays/tests/data -type f -exec cp {} "$seeds" \; ;;
         bvh | c3d) cp nodes/lib/motion/tests/data/*."$target" "$seeds" ;;
         *) cp tests/fuzz/samples/"$target"/* "$seeds" ;;
     esac

@@ -8,11 +8,11 @@ use std::sync::Arc;
 
 use common::containers::{Arrays, Py, npz, parsed};
 use common::own_file;
-use cromosim_arrays::{Container, Limits, NpzWriter};
+use cromosim_arrays::{Container, NpzWriter};
 use cromosim_body::{BodyModel, BodyPose, Gender, Joint, ShapeSpace, ShapedBody};
 use cromosim_motion::{
-    MotionOptions, PoseAxes, PoseFile, PoseFormat, PoseReport, PoseView, RateOrigin, ShapeChoice, ShapeOrigin, SmplMotion, embedded_walk,
-    open_poses, read_camera_poses, read_motion, read_motion_for, read_people,
+    MotionOptions, PoseAxes, PoseFormat, PoseReport, PoseView, RateOrigin, ShapeChoice, ShapeOrigin, SmplMotion, embedded_walk, open_poses,
+    read_camera_poses, read_motion, read_motion_for, read_people,
 };
 use nalgebra::{UnitQuaternion, Vector3};
 

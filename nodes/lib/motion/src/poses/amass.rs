@@ -9,7 +9,8 @@ use nalgebra::Vector3;
 
 use super::track::{PoseAxes, PoseTrack, Rotations};
 use super::values::{
-    Budget, RATES_HZ, RATES_TEXT, SHARED_JOINTS, betas, body_angles, gender, numbers, of_axis_angles, of_root_and_body, vectors, wrong,
+    Budget, RATES_HZ, RATES_TEXT, SHARED_JOINTS, betas, body_angles, frame_count, gender, numbers, of_axis_angles, of_root_and_body,
+    vectors, wrong,
 };
 use crate::MotionError;
 
@@ -71,7 +72,7 @@ fn poses<R: Read + Seek>(container: &mut Container<R>, budget: &mut Budget) -> R
         return Ok((of_axis_angles(&rows.values, width, if width == 72 { 24 } else { SHARED_JOINTS }), width));
     }
     let root = container.at("root_orient")?;
-    let count = root.shape()?.first().copied().unwrap_or(0);
+    let count = frame_count(&root);
     budget.take("root_orient", count)?;
     let root = numbers(&root, &[Some(count), Some(3)], "(N, 3)")?;
     let body = body_angles(&container.at("pose_body")?, count)?;

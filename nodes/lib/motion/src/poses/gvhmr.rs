@@ -7,13 +7,13 @@ use nalgebra::Vector3;
 
 use super::file::PoseView;
 use super::track::{PoseAxes, PoseTrack};
-use super::values::{Budget, betas, body_angles, numbers, of_root_and_body, vectors};
+use super::values::{Budget, betas, body_angles, frame_count, numbers, of_root_and_body, vectors};
 use crate::MotionError;
 
 pub(super) fn track(root: &Entry, view: PoseView, budget: &mut Budget) -> Result<PoseTrack, MotionError> {
     let parameters = root.at(if view == PoseView::Camera { "smpl_params_incam" } else { "smpl_params_global" })?;
     let orient = parameters.at("global_orient")?;
-    let count = orient.shape()?.first().copied().unwrap_or(0);
+    let count = frame_count(&orient);
     budget.take(orient.key(), count)?;
     let orient = numbers(&orient, &[None, Some(3)], "(N, 3)")?;
     let body = body_angles(&parameters.at("body_pose")?, count)?;

@@ -7,7 +7,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::file::PoseView;
 use super::track::{PoseAxes, PoseTrack};
-use super::values::{Budget, betas, frame_ids, in_frames, numbers, of_matrices, vectors, wrong};
+use super::values::{Budget, betas, frame_count, frame_ids, in_frames, numbers, of_matrices, vectors, wrong};
 use crate::MotionError;
 
 /// Frames of the longest camera track.
@@ -15,7 +15,7 @@ const MAX_CAMERAS: usize = super::MAX_POSES;
 
 pub(super) fn track(root: &Entry, camera: Option<&Entry>, view: PoseView, budget: &mut Budget) -> Result<PoseTrack, MotionError> {
     let matrices = root.at("pred_rotmat")?;
-    let count = matrices.shape()?.first().copied().unwrap_or(0);
+    let count = frame_count(&matrices);
     budget.take(matrices.key(), count)?;
     let values = numbers(&matrices, &[None, Some(24), Some(3), Some(3)], "(N, 24, 3, 3)")?;
     let track = PoseTrack {
@@ -39,7 +39,7 @@ pub(super) fn track(root: &Entry, camera: Option<&Entry>, view: PoseView, budget
 
 fn in_world(mut track: PoseTrack, root: &Entry, camera: &Entry) -> Result<PoseTrack, MotionError> {
     let turns = camera.at("world_cam_R")?;
-    let cameras = turns.shape()?.first().copied().unwrap_or(0);
+    let cameras = frame_count(&turns);
     if cameras > MAX_CAMERAS {
         return Err(wrong(&turns, format!("{cameras} frames, expected at most {MAX_CAMERAS}")));
     }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use cromosim_arrays::{Array, ArraysError, Entry};
+use cromosim_arrays::{Array, ArraysError, Entry, Value};
 use cromosim_body::{Gender, JOINT_COUNT};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
@@ -51,6 +51,15 @@ pub(super) fn problem(path: &Path, key: &str, problem: impl Into<String>) -> Mot
 
 pub(super) fn wrong(entry: &Entry, text: impl Into<String>) -> MotionError {
     problem(entry.path(), entry.key(), text)
+}
+
+/// How many frames an array has, without decoding it; what is no array has one, and decoding it says what is wrong.
+pub(super) fn frame_count(entry: &Entry) -> usize {
+    match entry.value() {
+        Value::Array(array) => array.shape().first().copied().unwrap_or(1),
+        Value::List(items) | Value::Tuple(items) => items.len(),
+        _ => 1,
+    }
 }
 
 /// Finite numbers of sane size.

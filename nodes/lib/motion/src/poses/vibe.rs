@@ -5,7 +5,7 @@ use cromosim_arrays::Entry;
 use cromosim_body::ShapeSpace;
 
 use super::track::{PoseAxes, PoseTrack};
-use super::values::{Budget, betas, frame_ids, gender, numbers, of_axis_angles};
+use super::values::{Budget, betas, frame_count, frame_ids, gender, numbers, of_axis_angles};
 use crate::MotionError;
 
 pub(super) fn track(person: &Entry, budget: &mut Budget) -> Result<PoseTrack, MotionError> {
@@ -15,7 +15,7 @@ pub(super) fn track(person: &Entry, budget: &mut Budget) -> Result<PoseTrack, Mo
 /// A person whose pose stands under `key`, without a place.
 pub(super) fn in_camera(person: &Entry, budget: &mut Budget, key: &str) -> Result<PoseTrack, MotionError> {
     let pose = person.at(key)?;
-    let count = pose.shape()?.first().copied().unwrap_or(0);
+    let count = frame_count(&pose);
     budget.take(pose.key(), count)?;
     let rows = numbers(&pose, &[None, Some(72)], "(N, 72)")?;
     Ok(PoseTrack {
