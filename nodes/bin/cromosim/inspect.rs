@@ -7,7 +7,9 @@ use clap::Args;
 use cromosim_bag::BagReader;
 use cromosim_body::{BodyModel, Joint, ShapedBody};
 use cromosim_motion::rigid::{RigidFormat, sniff_rigid};
-use cromosim_motion::{MotionFormat, MotionOptions, SmplMotion, read_motion};
+use cromosim_motion::{
+    MotionError, MotionFormat, MotionOptions, PoseAxes, PoseFile, PoseTrack, PoseView, SmplMotion, open_poses, read_motion,
+};
 use cromosim_spatial::Stamp;
 
 use crate::convert::{Content, source};
@@ -16,7 +18,8 @@ use crate::motion_arguments::MotionArguments;
 /// Say what is in a file
 #[derive(Args)]
 pub struct Arguments {
-    /// Motion (BVH, ASF/AMC, C3D, TRC), body (SMPL), trajectory or IMU series (TUM, EuRoC, CSV), or bag (.mcap, rosbag2 directory)
+    /// Motion (BVH, ASF/AMC, C3D, TRC, AMASS, video estimates), body (SMPL npz or pickle), trajectory or IMU series (TUM, EuRoC, CSV), or bag
+    /// (.mcap, rosbag2 directory)
     #[arg(required = true)]
     files: Vec<PathBuf>,
     #[command(flatten)]
@@ -39,11 +42,15 @@ fn inspect(path: &Path, options: &MotionOptions) -> anyhow::Result<()> {
     let head = source::head(path)?;
     match head.as_slice() {
         [0x89, b'M', b'C', b'A', b'P', ..] => inspect_bag(path),
-        [b'P', b'K', ..] => inspect_body(path),
         [] => bail!("{}: the file is empty", path.display()),
-        _ => match sniff_rigid(&head).filter(|_| MotionFormat::of(&head).is_none()) {
-            Some(format) => inspect_rigid(path, format),
-            None => inspect_motion(path, options),
+        _ => match open_poses(path, PoseView::World) {
+            Err(MotionError::BodyFile { .. }) => inspect_body(path),
+            Err(error) => Err(error.into()),
+            Ok(Some(file)) => inspect_poses(file, options),
+            Ok(None) => match sniff_rigid(&head).filter(|_| MotionFormat::of(&head).is_none()) {
+                Some(format) => inspect_rigid(path, format),
+                None => inspect_motion(path, options),
+            },
         },
     }
 }
@@ -119,6 +126,51 @@ fn inspect_body(path: &Path) -> anyhow::Result<()> {
         high - low
     );
     Ok(())
+}
+
+fn inspect_poses(file: PoseFile, options: &MotionOptions) -> anyhow::Result<()> {
+    println!("{}: motion, {} in SMPL's joints, {}", file.path.display(), file.format, people(file.tracks.len()));
+    for track in &file.tracks {
+        println!("  {}", person(track));
+    }
+    match file.into_motion(&BodyModel::embedded(), None, options) {
+        Ok(motion) => {
+            if let Some(report) = &motion.poses {
+                println!("  played: person {}, {:.3} s at {:.4} Hz, {report}", report.person, motion.duration_s(), motion.rate_hz);
+            }
+            println!("  {}", extent(&motion));
+        }
+        // What it is, is said; that it lacks a rate, for instance, is for whoever plays it to settle.
+        Err(error) => println!("  not played as it is: {error}"),
+    }
+    Ok(())
+}
+
+fn people(count: usize) -> String {
+    if count == 1 { "one person".to_owned() } else { format!("{count} people") }
+}
+
+/// A line about one person of a pose file.
+fn person(track: &PoseTrack) -> String {
+    let betas = track.mean_betas();
+    let up = match track.axes {
+        PoseAxes::Camera => "camera axes (x right, y down, z forward)".to_owned(),
+        PoseAxes::Up(up) => format!("up ({:.2}, {:.2}, {:.2})", up.x, up.y, up.z),
+        PoseAxes::Detect => "world axes, up not stated".to_owned(),
+    };
+    let ids = track.frame_ids.as_ref().and_then(|ids| Some(format!(" ({} to {})", ids.first()?, ids.last()?)));
+    format!(
+        "person {}: {} frames{}, {}, gender {}, {up}{}, {} betas of {}{}",
+        track.person,
+        track.rotations.len(),
+        ids.unwrap_or_default(),
+        track.rate_hz.map_or_else(|| "rate not stated".to_owned(), |rate_hz| format!("{rate_hz} Hz")),
+        track.gender.map_or("not stated", |gender| gender.name()),
+        if track.trans.is_some() { "" } else { ", no trajectory" },
+        betas.len(),
+        track.shape_space,
+        if betas.is_empty() { String::new() } else { format!(" {betas:.2?}") },
+    )
 }
 
 fn inspect_motion(path: &Path, options: &MotionOptions) -> anyhow::Result<()> {

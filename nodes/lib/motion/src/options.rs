@@ -77,7 +77,8 @@ pub struct MotionOptions {
     pub source_body: Option<PathBuf>,
     /// Which person of a file of several, by its name or number there; who is in it for the longest time, where absent.
     pub person: Option<String>,
-    /// Frames per second, Hz, of AMC files (120 where absent) and video estimates (30 where absent), which do not say it; else instead of the file's.
+    /// Frames per second, Hz, of AMC files (120 where absent) and SMPL parameters (video estimates do not say it: 30 where absent; where a file
+    /// does, this one counts). Not of BVH and markers.
     pub rate_hz: Option<f64>,
     /// Where to begin, s after the first frame that is kept.
     pub start_s: f64,
