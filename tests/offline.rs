@@ -81,6 +81,27 @@ fn a_real_bvh_file_becomes_imu_messages() {
     assert!(folder.path().join("bags/13_07.mcap").exists());
 }
 
+/// Files of SMPL parameters: said by their content, and simulated on the embedded body.
+#[test]
+fn files_of_smpl_parameters_become_imu_messages() {
+    let samples = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("nodes/lib/motion/tests/data/poses");
+    let folder = tempfile::tempdir().unwrap();
+    let cases = [
+        ("amass.npz", ["AMASS", "6 frames", "120 Hz", "gender female", "betas of SMPL"]),
+        ("vibe.joblib", ["VIBE", "2 people", "rate not stated", "no trajectory", "person 7: 6 frames (10 to 16)"]),
+        ("wham.pkl", ["WHAM", "2 people", "up (0.00, 1.00, 0.00)", "mean body instead of betas of SMPL", "rate assumed"]),
+    ];
+    for (name, parts) in cases {
+        let path = samples.join(name);
+        let said = succeed(folder.path(), &["inspect", path.to_str().unwrap()]);
+        assert!(parts.iter().all(|part| said.contains(part)), "{parts:?} should be in: {said}");
+        succeed(folder.path(), &["simulate", path.to_str().unwrap(), "--out", "out.mcap", "--no-noise", "--force"]);
+    }
+    let body = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("nodes/lib/body/tests/data/model_smplh_female.pkl");
+    let said = succeed(folder.path(), &["inspect", body.to_str().unwrap()]);
+    assert!(said.contains("body") && said.contains("24 joints"), "{said}");
+}
+
 #[test]
 fn a_recording_is_simulated_again_from_its_reference() {
     let folder = tempfile::tempdir().unwrap();

@@ -329,7 +329,7 @@ pub enum MotionError {
         /// The file.
         path: PathBuf,
         /// Whose betas, and which body.
-        source: BodyError,
+        source: Box<BodyError>,
     },
     /// A shape is asked of a file that holds none.
     #[error("{name}: shape file asked for, but a skeleton has no betas; set shape to fit or mean")]

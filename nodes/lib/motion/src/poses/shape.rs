@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use cromosim_body::{BodyModel, JOINT_COUNT, Joint, ShapeFit, ShapedBody};
+use cromosim_body::{BodyError, BodyModel, JOINT_COUNT, Joint, ShapeFit, ShapedBody};
 use nalgebra::Vector3;
 use serde::Deserialize;
 
@@ -53,7 +53,7 @@ impl Shape {
             (ShapeChoice::Mean, ..) => Ok(mean()),
             _ if own => Ok(Self::of_file(betas, body)),
             (ShapeChoice::Detect | ShapeChoice::Fit, Some(source_body), _) => Self::fitted(path, track, &betas, body, source_body),
-            (ShapeChoice::File | ShapeChoice::Fit, _, Err(source)) => Err(MotionError::ForeignShape { path: path.to_owned(), source }),
+            (ShapeChoice::File | ShapeChoice::Fit, _, Err(source)) => Err(foreign(path, source)),
             // The mean of any body is said by zeros, or by no betas at all.
             _ => Ok(mean()),
         }
@@ -66,13 +66,16 @@ impl Shape {
     }
 
     fn fitted(path: &Path, track: &PoseTrack, betas: &[f64], body: &BodyModel, source_body: &Arc<BodyModel>) -> Result<Self, MotionError> {
-        let foreign = |source| MotionError::ForeignShape { path: path.to_owned(), source };
-        source_body.check_betas(track.shape_space, track.gender, betas).map_err(foreign)?;
+        source_body.check_betas(track.shape_space, track.gender, betas).map_err(|source| foreign(path, source))?;
         let Self { betas, betas_left_out, .. } = Self::of_file(betas.to_vec(), source_body);
         let joints = *ShapedBody::new(source_body.clone(), &betas)?.joints_in_model();
         let ShapeFit { betas, length_rms_m } = body.fit_bone_lengths(|joint| Some(joints[joint.index()]), 1.0);
         Ok(Self { betas, origin: ShapeOrigin::Fit { length_rms_m }, source_joints: Some(joints), betas_left_out })
     }
+}
+
+fn foreign(path: &Path, source: BodyError) -> MotionError {
+    MotionError::ForeignShape { path: path.to_owned(), source: Box::new(source) }
 }
 
 /// The shape for a skeleton whose rest joints are known.
