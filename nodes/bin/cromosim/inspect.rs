@@ -155,7 +155,7 @@ fn person(track: &PoseTrack) -> String {
     let betas = track.mean_betas();
     let up = match track.axes {
         PoseAxes::Camera => "camera axes (x right, y down, z forward)".to_owned(),
-        PoseAxes::Up(up) => format!("up ({:.2}, {:.2}, {:.2})", up.x, up.y, up.z),
+        PoseAxes::Up(up) => format!("up ({:.2}, {:.2}, {:.2})", up.x + 0.0, up.y + 0.0, up.z + 0.0),
         PoseAxes::Detect => "world axes, up not stated".to_owned(),
     };
     let ids = track.frame_ids.as_ref().and_then(|ids| Some(format!(" ({} to {})", ids.first()?, ids.last()?)));

@@ -9,7 +9,7 @@ use common::containers::{Arrays, Py, npz, parsed};
 use common::own_file;
 use cromosim_arrays::{Container, Limits};
 use cromosim_body::BodyModel;
-use cromosim_motion::{MotionError, MotionOptions, PoseFile, PoseFormat, PoseView, SmplMotion, open_poses, read_motion};
+use cromosim_motion::{MotionError, MotionOptions, PoseFile, PoseFormat, PoseView, SmplMotion, UpAxis, open_poses, read_motion};
 
 /// The samples of the container crate, which hold no sane motion throughout, are at least told apart.
 #[test]
@@ -185,15 +185,17 @@ fn faults_of_other_tools_files_are_named() {
     one_line(slahmr(&|arrays| drop(arrays.insert("trans", (vec![3, 3], vec![0.0; 9])))), &["key trans", "(2, 3, 3)"]);
     one_line(slahmr(&|arrays| drop(arrays.insert("floor_plane", (vec![3], vec![0.0; 3])))), &["key floor_plane: it has no direction"]);
     one_line(slahmr(&|arrays| drop(arrays.insert("track_mask", (vec![2, 3], vec![0.0; 6])))), &["key track_mask: nobody is seen"]);
-    // Bodies that lie tell no upward axis.
-    let lying = slahmr(&|arrays| drop(arrays.insert("root_orient", (vec![2, 3, 3], [0.8, 0.0, 0.0].repeat(6))))).unwrap();
-    one_line(
-        lying
-            .into_motion(&BodyModel::embedded(), None, &MotionOptions::default())
-            .map(|_| ())
-            .and(motion(npz(&amass(0)), &MotionOptions::default())),
-        &["no frames"],
+    // Who turns over tells no upward axis.
+    let upright = || slahmr(&|arrays| drop(arrays.insert("root_orient", (vec![2, 3, 3], [0.0, 0.0, 0.0].repeat(6)))));
+    assert_eq!(
+        upright().unwrap().into_motion(&BodyModel::embedded(), None, &MotionOptions::default()).unwrap().poses.unwrap().up_axis,
+        "+y"
     );
+    let spinning = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 3.0, 0.0, 0.0].repeat(2);
+    let spinning = slahmr(&|arrays| drop(arrays.insert("root_orient", (vec![2, 3, 3], spinning.clone())))).unwrap();
+    one_line(spinning.clone().into_motion(&BodyModel::embedded(), None, &MotionOptions::default()), &["up axis unclear", "set up_axis"]);
+    let told = MotionOptions { up_axis: UpAxis::Z, ..Default::default() };
+    assert_eq!(spinning.into_motion(&BodyModel::embedded(), None, &told).unwrap().poses.unwrap().up_axis, "+z");
     let tram = Py::named(&[("pred_rotmat", Py::List(vec![Py::List(vec![Py::rows(&[2.0; 9], 3); 24])]))]);
     one_line(parsed(tram.pickle()), &["key pred_rotmat: matrix 0 is no rotation"]);
     let missing = Py::named(&[("smpl_params_global", Py::named(&[("global_orient", Py::rows(&[0.0; 3], 3))]))]);

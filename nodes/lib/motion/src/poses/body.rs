@@ -65,7 +65,11 @@ impl OnBody<'_> {
         let shape = Shape::choose(self.path, &track, self.body, self.source_body, self.options.shape)?;
         let shaped = ShapedBody::new(self.body.clone(), &shape.betas)?;
         let (world_from_file, up_axis) = self.world_from_file(&track)?;
-        let joints = shape.source_joints.as_ref().unwrap_or(shaped.joints_in_model());
+        let pelvis_in_model = match &shape.source_joints {
+            Some(joints) => joints[0],
+            None if track.shape_space != self.body.shape_space() => usual_pelvis(track.shape_space),
+            None => shaped.joints_in_model()[0],
+        };
         let metres = shape.source_joints.as_ref().map_or(1.0, |source| leg_length(shaped.joints_in_model()) / leg_length(source));
         let pose = |frame: usize| {
             let mut local_rotations = track.rotations[frame];
@@ -73,7 +77,7 @@ impl OnBody<'_> {
             let root_position = match &track.trans {
                 Some(trans) => {
                     let turn = track.pelvis_turns.as_ref().map_or_else(UnitQuaternion::identity, |turns| turns[frame]);
-                    world_from_file * (turn * joints[0] + trans[frame]) * metres
+                    world_from_file * (turn * pelvis_in_model + trans[frame]) * metres
                 }
                 None => Vector3::zeros(),
             };
@@ -194,6 +198,16 @@ fn between(from: &BodyPose, to: &BodyPose, fraction: f64) -> BodyPose {
     BodyPose {
         root_position: from.root_position.lerp(&to.root_position, fraction),
         local_rotations: std::array::from_fn(|joint| slerp(&from.local_rotations[joint], &to.local_rotations[joint], fraction)),
+    }
+}
+
+/// Where the mean body's pelvis joint stands in its model frame, m, to a centimetre: for files whose body is not at hand. Errors of it, a few
+/// centimetres by the betas, move a whole motion; only where a camera turns (TRAM) do they turn with it.
+fn usual_pelvis(space: ShapeSpace) -> Vector3<f64> {
+    match space {
+        ShapeSpace::Cromosim => Vector3::new(0.0, -0.22, 0.0),
+        ShapeSpace::Smpl => Vector3::new(0.0, -0.22, 0.03),
+        ShapeSpace::SmplX => Vector3::new(0.0, -0.35, 0.01),
     }
 }
 
