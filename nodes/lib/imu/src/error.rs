@@ -53,7 +53,7 @@ pub enum ImuError {
         /// The placement's name.
         placement: String,
         /// Why.
-        source: BodyError,
+        source: Box<BodyError>,
     },
     /// A triangle without area cannot carry a sensor.
     #[error("placement `{placement}`: triangle {triangle} has no area; choose a neighbour")]

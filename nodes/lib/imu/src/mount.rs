@@ -50,7 +50,7 @@ impl MountedSite {
     /// # Errors
     /// [`ImuError::Site`] for a site that this body does not have, [`ImuError::FlatTriangle`].
     pub fn new(body: &ShapedBody, placement: &Placement) -> Result<Self, ImuError> {
-        let refuse = |source| ImuError::Site { placement: placement.name().to_owned(), source };
+        let refuse = |source| ImuError::Site { placement: placement.name().to_owned(), source: Box::new(source) };
         let model = body.model();
         let site = match placement.site() {
             SiteChoice::Named(name) => model.site(name),
@@ -145,7 +145,7 @@ impl MountedSites {
     pub fn new(body: &ShapedBody, placements: &[Placement]) -> Result<Self, ImuError> {
         let sites = placements.iter().map(|placement| MountedSite::new(body, placement)).collect::<Result<Vec<_>, _>>()?;
         let vertices: Vec<u32> = sites.iter().flat_map(|site| site.subset.vertices()).collect();
-        let refuse = |source| ImuError::Site { placement: "(all)".to_owned(), source };
+        let refuse = |source| ImuError::Site { placement: "(all)".to_owned(), source: Box::new(source) };
         let subset = if sites.is_empty() { None } else { Some(body.subset(&vertices).map_err(refuse)?) };
         Ok(Self { sites, subset })
     }
