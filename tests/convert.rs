@@ -229,6 +229,7 @@ fn what_cannot_be_converted_is_said_and_leaves_nothing_behind() {
     refuses(here, &["convert", "robot.tum", "robot.bvh"], &["robot.tum: a trajectory cannot become a BVH file"]);
     refuses(here, &["convert", "robot.tum", "x.csv", "--joint", "head"], &["a trajectory has no joint or site head"]);
     refuses(here, &["convert", "robot.tum", "x.csv", "--topic", "/a"], &["--topic chooses from a bag"]);
+    refuses(here, &["convert", "robot.tum", "x.csv", "--start", "1"], &["--start is for motions"]);
     refuses(here, &["convert", "robot.tum", "x.mcap", "--name", "a b"], &["--name a b"]);
     refuses(here, &["convert", "robot.tum", "x.mcap", "--imu", "robot.tum"], &["robot.tum: a trajectory; --imu takes an IMU series"]);
     refuses(here, &["convert", "walk.bvh", "x.tum"], &["walk.bvh: a motion has 24 joints", "--joint"]);

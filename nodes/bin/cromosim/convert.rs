@@ -70,12 +70,12 @@ pub enum Content {
 }
 
 impl Content {
-    /// Its kind.
+    /// Its kind, with the article.
     pub const fn name(&self) -> &'static str {
         match self {
-            Self::Motion(_) => "motion",
-            Self::Poses(_) => "trajectory",
-            Self::Imu(_) => "IMU series",
+            Self::Motion(_) => "a motion",
+            Self::Poses(_) => "a trajectory",
+            Self::Imu(_) => "an IMU series",
         }
     }
 
@@ -100,12 +100,12 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let model = body::model(arguments.body.as_ref())?;
     let content = followed(source::read(arguments, &model)?, arguments, &model, target)?;
-    let (kind, count) = (content.name(), content.count());
+    let (is_motion, count) = (matches!(content, Content::Motion(_)), content.count());
     match write::written(&content, target, &model, arguments)? {
         Written::Bytes(bytes) => write::file(&arguments.out, &bytes, arguments.force)?,
         Written::Bag => bag::write(&content, imu(arguments)?.as_ref(), arguments)?,
     }
-    println!("{}: {} of {count} {}", arguments.out.display(), target.describe(), if kind == "motion" { "frames" } else { "rows" });
+    println!("{}: {} of {count} {}", arguments.out.display(), target.describe(), if is_motion { "frames" } else { "rows" });
     Ok(())
 }
 
@@ -113,7 +113,10 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
 fn followed(content: Content, arguments: &Arguments, model: &Arc<BodyModel>, target: Target) -> anyhow::Result<Content> {
     let Content::Motion(motion) = content else {
         if let Some(name) = arguments.joint.as_ref().or(arguments.site.as_ref()) {
-            bail!("{}: a {} has no joint or site {name}; leave --joint and --site out", arguments.input.display(), content.name());
+            bail!("{}: {} has no joint or site {name}; leave --joint and --site out", arguments.input.display(), content.name());
+        }
+        if let Some(option) = arguments.motion.given() {
+            bail!("{}: {option} is for motions, and this is {}; leave it out", arguments.input.display(), content.name());
         }
         return Ok(content);
     };

@@ -68,6 +68,7 @@ fn inspect_rigid(path: &Path, format: RigidFormat) -> anyhow::Result<()> {
     let (stamps, more) = match &content {
         Content::Poses(poses) => {
             let length: f64 = poses.trajectory.positions.windows(2).map(|pair| (pair[1] - pair[0]).norm()).sum();
+            let length = length.abs(); // the sum of nothing is -0
             (&poses.trajectory.stamps, format!("path of {length:.2} m"))
         }
         Content::Imu(series) => {

@@ -39,6 +39,22 @@ pub struct MotionArguments {
 }
 
 impl MotionArguments {
+    /// The first option that was given.
+    pub fn given(&self) -> Option<&'static str> {
+        let given = [
+            (self.up_axis != "auto", "--up-axis"),
+            (self.unit.is_some(), "--unit"),
+            (self.start != 0.0, "--start"),
+            (self.duration.is_some(), "--duration"),
+            (self.skeleton.is_some(), "--skeleton"),
+            (self.motion_rate.is_some(), "--motion-rate"),
+            (self.marker_set.is_some(), "--marker-set"),
+            (self.subject.is_some(), "--subject"),
+            (self.placements_as_given, "--placements-as-given"),
+        ];
+        given.into_iter().find_map(|(given, option)| given.then_some(option))
+    }
+
     /// The options, checked.
     pub fn options(&self) -> anyhow::Result<MotionOptions> {
         let up_axis = match self.up_axis.as_str() {

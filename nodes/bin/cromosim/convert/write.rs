@@ -89,14 +89,9 @@ pub fn written(content: &Content, target: Target, model: &Arc<BodyModel>, argume
         (Content::Poses(poses), Target::Csv) => write_pose_csv(&poses.trajectory),
         (Content::Imu(series), Target::Euroc) => write_euroc_imu(series),
         (Content::Imu(series), Target::Csv) => write_imu_csv(series),
-        (other, target) => bail!("{}: {} cannot become {}", arguments.input.display(), with_article(other), target.describe()),
+        (other, target) => bail!("{}: {} cannot become {}", arguments.input.display(), other.name(), target.describe()),
     };
     Ok(Written::Bytes(text.into_bytes()))
-}
-
-fn with_article(content: &Content) -> String {
-    let name = content.name();
-    format!("{} {name}", if name.starts_with('I') { "an" } else { "a" })
 }
 
 /// A motion of `model`'s body as bytes; `options` names the marker set.
