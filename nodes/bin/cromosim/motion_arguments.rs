@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::bail;
 use clap::Args;
-use cromosim_motion::{MotionOptions, UpAxis};
+use cromosim_motion::{MotionOptions, ShapeChoice, UpAxis};
 
 /// Options of reading motion files.
 #[derive(Args)]
@@ -24,7 +24,7 @@ pub struct MotionArguments {
     /// An AMC file's skeleton (ASF) rather than the one beside it
     #[arg(long, value_name = "FILE")]
     skeleton: Option<PathBuf>,
-    /// Frames per second of a motion file that does not say it (AMC: 120 where absent), Hz
+    /// Frames per second of a motion file that does not say it (AMC: 120 where absent; video estimates: 30), Hz
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     motion_rate: Option<f64>,
     /// Which marker is where: plug_in_gait, or a YAML file
@@ -36,6 +36,15 @@ pub struct MotionArguments {
     /// Take markers to be stuck exactly where the marker set says, instead of about a centimetre around it
     #[arg(long)]
     placements_as_given: bool,
+    /// Which person of a file of several; default: who is in it for the longest time
+    #[arg(long, value_name = "NAME")]
+    person: Option<String>,
+    /// Where the body's shape comes from: detect, file, fit (to bone lengths) or mean
+    #[arg(long, default_value = "detect", value_parser = ["detect", "file", "fit", "mean"])]
+    shape: String,
+    /// The body file that the motion's betas are for, to fit another body to that person's bones
+    #[arg(long, value_name = "FILE")]
+    source_body: Option<PathBuf>,
 }
 
 impl MotionArguments {
@@ -51,6 +60,9 @@ impl MotionArguments {
             (self.marker_set.is_some(), "--marker-set"),
             (self.subject.is_some(), "--subject"),
             (self.placements_as_given, "--placements-as-given"),
+            (self.person.is_some(), "--person"),
+            (self.shape != "detect", "--shape"),
+            (self.source_body.is_some(), "--source-body"),
         ];
         given.into_iter().find_map(|(given, option)| given.then_some(option))
     }
@@ -77,6 +89,14 @@ impl MotionArguments {
             marker_set: self.marker_set.clone(),
             subject: self.subject.clone(),
             placements_as_given: self.placements_as_given,
+            person: self.person.clone(),
+            shape: match self.shape.as_str() {
+                "file" => ShapeChoice::File,
+                "fit" => ShapeChoice::Fit,
+                "mean" => ShapeChoice::Mean,
+                _ => ShapeChoice::Detect,
+            },
+            source_body: self.source_body.clone(),
             ..MotionOptions::default()
         })
     }

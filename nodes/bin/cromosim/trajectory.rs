@@ -1,13 +1,15 @@
 //! `cromosim trajectory`: in-place poses of a video become a motion in the world, by keypoints, depth maps and cameras.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use anyhow::bail;
 use clap::Args;
+use cromosim_body::BodyModel;
 use cromosim_motion::camera::{
     CameraAxes, CameraClip, CameraFolder, DepthEncoding, FolderLayout, ScaleSource, Trajectory, TrajectoryOptions, global_trajectory,
 };
-use cromosim_motion::{SmplMotion, read_motion_for};
+use cromosim_motion::{MotionOptions, PoseView, SmplMotion, open_poses, read_camera_poses, read_motion_for};
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
 
 use crate::body;
@@ -18,7 +20,8 @@ use crate::motion_arguments::MotionArguments;
 #[derive(Args)]
 #[command(group = clap::ArgGroup::new("size").args(["body_height", "scale"]).multiple(false))]
 pub struct Arguments {
-    /// The in-place poses: a motion whose root orientation is that against a level camera which looks along the world's y axis
+    /// The in-place poses: what VIBE, PHALP, WHAM, GVHMR or TRAM wrote; or any motion whose root orientation is that against a level camera
+    /// which looks along the world's y axis
     poses: PathBuf,
     /// The motion to write; the ending decides where --to does not: .npz, .bvh or .trc
     out: PathBuf,
@@ -90,15 +93,14 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let options = options(arguments)?;
     let model = body::model(arguments.body.as_ref())?;
-    let poses = read_motion_for(&arguments.poses, &model, &arguments.motion.options()?)?;
+    let (mut clip, first_frame) = clip(arguments, &model, &arguments.motion.options()?)?;
     let folder = CameraFolder {
         keypoints: arguments.keypoints.clone(),
         depth: arguments.depth.clone(),
         cameras: arguments.cameras.clone(),
-        layout: layout(arguments),
+        layout: layout(arguments, first_frame),
     };
-    let mut files = folder.read(poses.frames.len(), options.least_confidence)?;
-    let mut clip = in_place(&poses, pixels(arguments.image));
+    let mut files = folder.read(clip.poses.len(), options.least_confidence)?;
     (clip.keypoints, clip.cameras) = (files.keypoints, files.cameras);
     let placed = global_trajectory(&clip, &mut files.depth, &model, &options)?;
     let bytes = write::motion_bytes(&placed.motion, target, &model, &arguments.motion)?;
@@ -122,19 +124,55 @@ fn options(arguments: &Arguments) -> anyhow::Result<TrajectoryOptions> {
     Ok(TrajectoryOptions { trajectory, ..TrajectoryOptions::new(scale) })
 }
 
-fn layout(arguments: &Arguments) -> FolderLayout {
+fn layout(arguments: &Arguments, first_frame: usize) -> FolderLayout {
     FolderLayout {
         encoding: if arguments.depth_encoding == "disparity" { DepthEncoding::Disparity } else { DepthEncoding::Depth },
         axes: if arguments.camera_axes == "opengl" { CameraAxes::OpenGl } else { CameraAxes::OpenCv },
         keypoint_image_px: pixels(arguments.image),
         intrinsics_image_px: pixels(arguments.camera_image.unwrap_or(arguments.image)),
-        first_number: arguments.first_number,
+        first_number: arguments.first_number + first_frame,
         plain_depth_px: arguments.plain_depth,
     }
 }
 
 fn pixels([width, height]: [usize; 2]) -> Vector2<f64> {
     Vector2::new(width as f64, height as f64)
+}
+
+/// The poses, and the video's frame of the first of them.
+fn clip(arguments: &Arguments, model: &Arc<BodyModel>, options: &MotionOptions) -> anyhow::Result<(CameraClip, usize)> {
+    let image = pixels(arguments.image);
+    let has_camera_axes = open_poses(&arguments.poses, PoseView::Camera)?.is_some_and(|file| file.format.is_video());
+    if !has_camera_axes {
+        return Ok((in_place(&read_motion_for(&arguments.poses, model, options)?, image), 0));
+    }
+    let people = read_camera_poses(&arguments.poses, model, options)?;
+    let names: Vec<String> = people.iter().map(|poses| poses.person.clone()).collect();
+    let chosen = match &options.person {
+        Some(person) => people.into_iter().find(|poses| poses.person == *person),
+        // Of equal length the first, as everywhere.
+        None => people.into_iter().rev().max_by_key(|poses| poses.poses.len()),
+    };
+    let Some(poses) = chosen else {
+        bail!(
+            "{}: nobody is called {}; there are: {}",
+            arguments.poses.display(),
+            options.person.as_deref().unwrap_or_default(),
+            names.join(", ")
+        )
+    };
+    let clip = CameraClip {
+        name: poses.name,
+        rate_hz: poses.rate_hz,
+        gender: poses.gender,
+        poses: poses.poses,
+        pose_confidence: poses.pose_confidence,
+        betas: poses.betas,
+        keypoints: Vec::new(),
+        keypoint_image_px: image,
+        cameras: Vec::new(),
+    };
+    Ok((clip, usize::try_from(poses.first_frame).unwrap_or(0)))
 }
 
 /// The motion as an estimator would give it: before a level camera that looks along the world's y axis, so that the camera's x is the

@@ -33,7 +33,7 @@ node_config! {
         pub skeleton_map: String = String::new(),
         /// An AMC file's skeleton (ASF); empty: the one beside it.
         pub skeleton: String = String::new(),
-        /// Frames per second of a motion file that does not say it, Hz; 0: 120 for AMC.
+        /// Frames per second of a motion file that does not say it, Hz; 0: 120 for AMC, 30 for video estimates.
         pub motion_rate_hz: f64 = 0.0,
         /// Which marker is where: plug_in_gait, or a YAML file; empty: plug_in_gait.
         pub marker_set: String = String::new(),
@@ -41,6 +41,10 @@ node_config! {
         pub subject: String = String::new(),
         /// Take markers to be stuck exactly where the marker set says.
         pub placements_as_given: bool = false,
+        /// Which person of a file of several; empty: who is in it for the longest time.
+        pub person: String = String::new(),
+        /// The body file that the motion's betas are for, to fit another body to that person's bones; empty: none.
+        pub source_body: String = String::new(),
         /// Tells several people apart.
         pub body_id: String = "0".to_owned(),
         /// Frame of the root pose.

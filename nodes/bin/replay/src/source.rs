@@ -49,6 +49,8 @@ impl MotionSource {
                 marker_set: Some(config.marker_set.clone()).filter(|set| !set.is_empty()),
                 subject: Some(config.subject.clone()).filter(|name| !name.is_empty()),
                 placements_as_given: config.placements_as_given,
+                person: Some(config.person.clone()).filter(|name| !name.is_empty()),
+                source_body: Some(&config.source_body).filter(|file| !file.is_empty()).map(PathBuf::from),
                 ..MotionOptions::default()
             };
             let body = if config.body.is_empty() { BodyModel::embedded() } else { BodyModel::read(Path::new(&config.body))? };
@@ -60,8 +62,7 @@ impl MotionSource {
     /// A line about what is played.
     pub fn describe(&self) -> String {
         let motion = &self.motion;
-        let retargeted = motion.report.as_ref().map(|report| format!("; {report}"));
-        let report = retargeted.or_else(|| motion.markers.as_ref().map(|report| format!("; {report}"))).unwrap_or_default();
+        let report = motion.how_read().map(|report| format!("; {report}")).unwrap_or_default();
         format!("{}: {} frames at {:.2} Hz, {:.2} s{report}", motion.name, motion.frames.len(), motion.rate_hz, motion.duration_s())
     }
 

@@ -29,7 +29,7 @@ pub fn write_amass<W: Write + Seek>(motion: &SmplMotion, shaped: &ShapedBody, wr
     npz.floats("mocap_framerate", &[], &[motion.rate_hz])?;
     npz.text(
         "surface_model_type",
-        match body.shape_space() {
+        match motion.shape_space {
             ShapeSpace::Cromosim => "cromosim",
             ShapeSpace::Smpl => "smpl",
             ShapeSpace::SmplX => "smplx",

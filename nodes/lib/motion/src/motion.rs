@@ -36,6 +36,12 @@ impl SmplMotion {
         self.frames.len().saturating_sub(1) as f64 / self.rate_hz
     }
 
+    /// How the source was read, in a line, where it has a report.
+    pub fn how_read(&self) -> Option<String> {
+        let skeleton = self.report.as_ref().map(ToString::to_string);
+        skeleton.or_else(|| Some(self.markers.as_ref()?.to_string())).or_else(|| Some(self.poses.as_ref()?.to_string()))
+    }
+
     /// The part from `start_s` on, `duration_s` long (to the end where absent), frames on or after the start.
     ///
     /// # Errors

@@ -65,7 +65,10 @@ fn files_that_cannot_be_read_are_named() {
     let path = folder.path().join("motion.bvh");
     std::fs::write(&path, b"# a table").unwrap();
     let found = message(read_motion(&path, &MotionOptions::default()));
-    assert!(found.contains("motion.bvh: not a motion file: expected BVH (first word HIERARCHY), AMC, C3D, TRC or SMPL parameters"), "{found}");
+    assert!(
+        found.contains("motion.bvh: not a motion file: expected BVH (first word HIERARCHY), AMC, C3D, TRC or SMPL parameters"),
+        "{found}"
+    );
     assert!(found.ends_with("found \"# a table\""), "{found}");
     std::fs::write(&path, b"PK\x03\x04 an archive").unwrap();
     assert!(message(read_motion(&path, &MotionOptions::default())).contains("motion.bvh: "));

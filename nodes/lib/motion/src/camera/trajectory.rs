@@ -130,10 +130,12 @@ pub fn global_trajectory(
         name: clip.name.clone(),
         rate_hz: clip.rate_hz,
         gender: clip.gender,
+        shape_space: body.shape_space(),
         betas,
         frames: continuous(upright.poses),
         confidence,
         report: None,
+        poses: None,
         markers: None,
     };
     Ok(GlobalTrajectory { motion, states: upright.states, track, world_from_source: upright.world_from_source, report })

@@ -104,10 +104,12 @@ pub fn fit_markers(
         name: clip.name.clone(),
         rate_hz: clip.rate_hz,
         gender: body.gender().unwrap_or(Gender::Neutral),
+        shape_space: body.shape_space(),
         betas: person.betas,
         confidence: Some(bound.frames.iter().map(seen).collect()),
         frames,
         report: None,
+        poses: None,
         markers: Some(report.clone()),
     };
     Ok((motion, report))

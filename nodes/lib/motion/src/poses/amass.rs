@@ -22,7 +22,13 @@ pub(super) fn tracks<R: Read + Seek>(container: &mut Container<R>, budget: &mut 
     let count = rotations.len();
     let trans = vectors(&container.at("trans")?, count)?;
     let kind = container.get("surface_model_type")?.and_then(|entry| entry.text().ok());
-    let is_smplx = kind.map_or(width == 165, |kind| kind.eq_ignore_ascii_case("smplx"));
+    let shape_space = match kind.map(|kind| kind.to_ascii_lowercase()).as_deref() {
+        // As our own writer marks the embedded body's.
+        Some("cromosim") => ShapeSpace::Cromosim,
+        Some("smplx") => ShapeSpace::SmplX,
+        None if width == 165 => ShapeSpace::SmplX,
+        _ => ShapeSpace::Smpl,
+    };
     let details = container.get("stageii_debug_details")?;
     let of_details = |key: &str| details.as_ref().and_then(|details| details.get(key));
     let rate = match container.get("mocap_framerate")? {
@@ -33,7 +39,7 @@ pub(super) fn tracks<R: Read + Seek>(container: &mut Container<R>, budget: &mut 
     Ok(vec![PoseTrack {
         person: "0".to_owned(),
         gender,
-        shape_space: if is_smplx { ShapeSpace::SmplX } else { ShapeSpace::Smpl },
+        shape_space,
         betas: betas(container.get("betas")?.as_ref(), count)?,
         frame_ids: None,
         rotations,

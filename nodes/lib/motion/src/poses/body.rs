@@ -113,6 +113,7 @@ impl OnBody<'_> {
             frames,
             confidence: self.format.is_video().then_some(confidence),
             report: None,
+            markers: None,
             poses: Some(report),
         })
     }
