@@ -351,16 +351,15 @@ fn verdict(causes: &[Cause], before: &Metrics, after: &Metrics) -> String {
         );
     };
     let percent = |share: f64| (100.0 * share).round();
-    let mut text = format!("{} explains {} % of the gap", words(&first.effect), percent(first.gap_share));
+    let share = |cause: &Cause| if cause.gap_share < 0.005 { "below 1 %".to_owned() } else { format!("{} %", percent(cause.gap_share)) };
+    let first_words = if first.effect == "unknown" { "Something outside the library (unknown)" } else { &first.effect };
+    let mut text = format!("{first_words} explains {} of the gap", share(first));
     for cause in &causes[1..] {
-        text += &format!(", {} {} %", words(&cause.effect), percent(cause.gap_share));
+        let words = if cause.effect == "unknown" { "something outside the library (unknown)" } else { &cause.effect };
+        text += &format!(", {words} {}", share(cause));
     }
     format!(
         "{text}; the accelerometer's falls from {:.3} to {:.3} m/s2, the gyroscope's from {:.4} to {:.4} rad/s.",
         before.accel_rmse, after.accel_rmse, before.gyro_rmse, after.gyro_rmse
     )
-}
-
-fn words(effect: &str) -> String {
-    if effect == "unknown" { "Something outside the library (unknown)".to_owned() } else { effect.to_owned() }
 }

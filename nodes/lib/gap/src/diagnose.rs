@@ -158,7 +158,10 @@ impl Findings<'_> {
             };
         }
         let margins = std::mem::take(&mut self.state.margins);
+        let covariance = found.fit.linear.covariance;
         self.state = State { margins, ..self.context.state_as_it_is(found.fit.set) };
+        // The values are no surer than what is left there allows.
+        self.state.fit.linear.covariance = covariance;
     }
 
     /// Takes out the effects that only imitate what is unknown, and fits the others again.
