@@ -1,6 +1,6 @@
 //! `cromosim trajectory`: in-place poses of a video become a motion in the world, by keypoints, depth maps and cameras.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::bail;
@@ -9,7 +9,7 @@ use cromosim_body::BodyModel;
 use cromosim_motion::camera::{
     CameraAxes, CameraClip, CameraFolder, DepthEncoding, FolderLayout, ScaleSource, Trajectory, TrajectoryOptions, global_trajectory,
 };
-use cromosim_motion::{MotionOptions, PoseView, SmplMotion, open_poses, read_camera_poses, read_motion_for};
+use cromosim_motion::{MotionOptions, PoseView, SmplMotion, open_poses, read_motion_for};
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
 
 use crate::body;
@@ -93,7 +93,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let options = options(arguments)?;
     let model = body::model(arguments.body.as_ref())?;
-    let (mut clip, first_frame) = clip(arguments, &model, &arguments.motion.options()?)?;
+    let (mut clip, first_frame) = clip(&arguments.poses, pixels(arguments.image), &model, &arguments.motion.options()?)?;
     let folder = CameraFolder {
         keypoints: arguments.keypoints.clone(),
         depth: arguments.depth.clone(),
@@ -140,13 +140,14 @@ fn pixels([width, height]: [usize; 2]) -> Vector2<f64> {
 }
 
 /// The poses, and the video's frame of the first of them.
-fn clip(arguments: &Arguments, model: &Arc<BodyModel>, options: &MotionOptions) -> anyhow::Result<(CameraClip, usize)> {
-    let image = pixels(arguments.image);
-    let has_camera_axes = open_poses(&arguments.poses, PoseView::Camera)?.is_some_and(|file| file.format.is_video());
-    if !has_camera_axes {
-        return Ok((in_place(&read_motion_for(&arguments.poses, model, options)?, image), 0));
+fn clip(path: &Path, image: Vector2<f64>, model: &Arc<BodyModel>, options: &MotionOptions) -> anyhow::Result<(CameraClip, usize)> {
+    let Some(file) = open_poses(path, PoseView::Camera)?.filter(|file| file.format.is_video()) else {
+        return Ok((in_place(&read_motion_for(path, model, options)?, image), 0));
+    };
+    let people = file.into_camera_poses(model, options)?;
+    if people.is_empty() {
+        bail!("{}: no poses in a camera's axes; VIBE, PHALP, WHAM, GVHMR and TRAM have such", path.display());
     }
-    let people = read_camera_poses(&arguments.poses, model, options)?;
     let names: Vec<String> = people.iter().map(|poses| poses.person.clone()).collect();
     let chosen = match &options.person {
         Some(person) => people.into_iter().find(|poses| poses.person == *person),
@@ -154,12 +155,7 @@ fn clip(arguments: &Arguments, model: &Arc<BodyModel>, options: &MotionOptions) 
         None => people.into_iter().rev().max_by_key(|poses| poses.poses.len()),
     };
     let Some(poses) = chosen else {
-        bail!(
-            "{}: nobody is called {}; there are: {}",
-            arguments.poses.display(),
-            options.person.as_deref().unwrap_or_default(),
-            names.join(", ")
-        )
+        bail!("{}: nobody is called {}; there are: {}", path.display(), options.person.as_deref().unwrap_or_default(), names.join(", "))
     };
     let clip = CameraClip {
         name: poses.name,
@@ -194,5 +190,30 @@ fn in_place(motion: &SmplMotion, keypoint_image_px: Vector2<f64>) -> CameraClip 
         keypoints: Vec::new(),
         keypoint_image_px,
         cameras: Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_videos_own_estimates_are_taken_in_the_cameras_axes() -> anyhow::Result<()> {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("nodes/lib/motion/tests/data/poses");
+        let (model, image) = (BodyModel::embedded(), Vector2::new(1920.0, 1080.0));
+        let read = |name: &str, options: &MotionOptions| clip(&folder.join(name), image, &model, options);
+        for name in ["vibe.joblib", "wham.pkl", "phalp.pkl", "gvhmr.pt"] {
+            let (clip, _) = read(name, &MotionOptions::default())?;
+            assert!(clip.poses.len() >= 4 && clip.poses.iter().all(|pose| pose.root_position.norm() == 0.0), "{name}");
+        }
+        // A person who stands before a level camera has the head towards the image's top: up is -y.
+        let (vibe, _) = read("vibe.joblib", &MotionOptions::default())?;
+        assert!((vibe.poses[0].local_rotations[0] * Vector3::y()).y < -0.5);
+        let nobody = MotionOptions { person: Some("17".to_owned()), ..MotionOptions::default() };
+        let error = read("wham.pkl", &nobody).err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(error.contains("nobody is called 17") && error.contains("0, 3"), "{error}");
+        let error = read("slahmr.npz", &MotionOptions::default()).err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(error.contains("slahmr.npz: no poses in a camera's axes"), "{error}");
+        Ok(())
     }
 }

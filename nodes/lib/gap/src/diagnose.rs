@@ -225,6 +225,9 @@ fn analyse<'a>(
     let mut findings = Findings { context, state, digital, found, named, without, unknown: None, mostly_explained };
     for calibrations in [false, true] {
         findings.unknown = unknown::look(&findings, calibrations);
+        if findings.unknown.is_none() {
+            break;
+        }
         findings.drop_imitations();
     }
     findings.refit_beside_unknown(&library);
