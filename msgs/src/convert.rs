@@ -142,8 +142,8 @@ impl TryFrom<Transform> for Isometry3<f64> {
 impl From<SmplPose> for SmplState {
     /// Takes the fields over as they are.
     fn from(source: SmplPose) -> Self {
-        let SmplPose { header, body_id, gender, betas, world_from_pelvis, local_rotations, confidence } = source;
-        Self { header, body_id, gender, betas, world_from_pelvis, local_rotations, confidence }
+        let SmplPose { header, body_id, gender, betas, shape_space, world_from_pelvis, local_rotations, confidence } = source;
+        Self { header, body_id, gender, betas, shape_space, world_from_pelvis, local_rotations, confidence }
     }
 }
 

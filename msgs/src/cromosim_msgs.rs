@@ -14,13 +14,15 @@ ros_message! {
         pub body_id: String,
         /// `neutral`, `female` or `male`.
         pub gender: String,
-        /// Shape coefficients of SMPL; empty where unknown.
+        /// Shape coefficients; empty where unknown.
         pub betas: Vec<f64>,
+        /// Whose shapes they tell: `smpl`, `smplx` or `cromosim`.
+        pub shape_space: String,
         /// Pose of the pelvis joint, m.
         pub world_from_pelvis: Pose,
         /// Element 0 repeats `world_from_pelvis.orientation`, the others are parent_from_joint, in SMPL's order of joints.
         pub local_rotations: [Quaternion; 24],
-        /// 0 to 1.
+        /// 0 to 1; 1 or NaN where the source cannot say.
         pub confidence: f64,
     }
 }
@@ -36,13 +38,15 @@ ros_message! {
         pub body_id: String,
         /// `neutral`, `female` or `male`.
         pub gender: String,
-        /// Shape coefficients of SMPL.
+        /// Shape coefficients.
         pub betas: Vec<f64>,
+        /// Whose shapes they tell: `smpl`, `smplx` or `cromosim`.
+        pub shape_space: String,
         /// Pose of the pelvis joint, m.
         pub world_from_pelvis: Pose,
         /// Element 0 repeats `world_from_pelvis.orientation`, the others are parent_from_joint, in SMPL's order of joints.
         pub local_rotations: [Quaternion; 24],
-        /// 0 to 1.
+        /// 0 to 1; 1 or NaN where the source cannot say.
         pub confidence: f64,
     }
 }

@@ -36,7 +36,7 @@ pub struct MotionArguments {
     /// Take markers to be stuck exactly where the marker set says, instead of about a centimetre around it
     #[arg(long)]
     placements_as_given: bool,
-    /// Which person of a file of several; default: who is in it for the longest time
+    /// Which person of a file of several; default: who is in it for the longest time. `simulate` also takes all, or names with commas between: topics and frames then begin with person_NAME
     #[arg(long, value_name = "NAME")]
     person: Option<String>,
     /// Where the body's shape comes from: detect, file, fit (to bone lengths) or mean

@@ -1,6 +1,6 @@
 //! What a recording holds of its placements: reference poses and the messages of the real IMUs.
 
-use anyhow::{anyhow, bail};
+use anyhow::{Context, anyhow, bail};
 use cromosim_bag::BagReader;
 use cromosim_body::{BodyModel, BodyPose, ShapedBody};
 use cromosim_gap::{ImuSeries, PlacementRecord, PoseSeries};
@@ -102,6 +102,9 @@ fn from_states(reader: &BagReader) -> anyhow::Result<Vec<(String, Vec<SensorFram
     states.sort_by_key(|(_, state)| state.header.stamp.nanos());
     states.dedup_by_key(|(_, state)| state.header.stamp.nanos());
     let Some((_, last)) = states.last() else { bail!("{path}: /smpl/state holds no message") };
+    BodyModel::embedded()
+        .check_named_betas(&last.shape_space, &last.gender, &last.betas)
+        .with_context(|| format!("{path}, /smpl/state"))?;
     let shaped = ShapedBody::new(BodyModel::embedded(), &last.betas)?;
     let sites = MountedSites::new(&shaped, placements.placements())?;
     let stamps: Vec<Stamp> = states.iter().map(|(_, state)| Stamp::from_nanos(state.header.stamp.nanos())).collect();

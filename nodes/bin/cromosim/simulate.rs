@@ -8,15 +8,14 @@ use std::sync::Arc;
 
 use anyhow::{Context, bail};
 use clap::Args;
-use cromosim_bag::{BagOptions, BagWriter, Compression, write_imu_csv};
+use cromosim_bag::{BagOptions, BagWriter, Compression};
 use cromosim_body::{BodyModel, ShapedBody};
 use cromosim_imu::{
-    Covariances, Device, MAX_RATE_HZ, MountedSites, PlacementSet, Scheme, SensorTrajectory, StreamingEffects, simulate_kinematics_on,
+    Covariances, Device, MAX_RATE_HZ, MountedSites, PlacementSet, PoseStd, Scheme, SensorTrajectory, StreamingEffects,
+    simulate_kinematics_on,
 };
-use cromosim_motion::{MotionOptions, SmplMotion, embedded_walk, read_motion_for};
-use cromosim_msgs::cromosim_msgs::SmplState;
+use cromosim_motion::{MotionOptions, SmplMotion, embedded_walk, read_motion_for, read_people};
 use cromosim_msgs::geometry_msgs::PoseStamped;
-use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_msgs::std_msgs::Header;
 use cromosim_spatial::{PoseTimes, Stamp, uniform_stamps};
 use cromosim_virtual_imu::imu_message;
@@ -26,6 +25,10 @@ use rayon::prelude::*;
 use crate::motion_arguments::MotionArguments;
 use crate::progress::Interrupt;
 use crate::{body, progress, reference};
+
+mod played;
+
+use played::{Played, Simulated, write_csv, write_in_order_of_time};
 
 /// Stamp of the first frame: not zero, which TF takes for "the latest".
 pub const BEGINS: Stamp = Stamp::from_nanos(1_000_000_000);
@@ -72,6 +75,9 @@ pub struct Arguments {
     /// Leave out the random part of the sensor errors
     #[arg(long)]
     pub no_noise: bool,
+    /// How long errors of the poses hold, for the covariances that follow from a motion's confidence, s; 0: new with each pose
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, allow_negative_numbers = true)]
+    pose_error_correlation: f64,
     /// Write the samples of each placement as CSV into this directory too
     #[arg(long, value_name = "DIR")]
     csv: Option<PathBuf>,
@@ -90,23 +96,19 @@ struct Setup {
     motion: MotionOptions,
     seed: u64,
     noise: bool,
+    pose_error_correlation_s: f64,
     force: bool,
     csv: Option<PathBuf>,
     interrupt: Interrupt,
-}
-
-/// One placement's results.
-struct Simulated {
-    name: String,
-    reference: Vec<PoseStamped>,
-    raw: Vec<Imu>,
-    full: Vec<Imu>,
 }
 
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if let Some(rate) = arguments.rate.filter(|rate| !(*rate > 0.0 && *rate <= MAX_RATE_HZ)) {
         bail!("--rate {rate}: expected a positive number of messages a second, at most {MAX_RATE_HZ}");
+    }
+    if !(arguments.pose_error_correlation >= 0.0 && arguments.pose_error_correlation.is_finite()) {
+        bail!("--pose-error-correlation {}: expected 0 s or more", arguments.pose_error_correlation);
     }
     if let Some(trajectory) = &arguments.rigid {
         return reference::run_rigid(trajectory, arguments);
@@ -116,9 +118,10 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let setup = Setup::new(arguments)?;
     if arguments.motions.len() <= 1 {
-        let motion = setup.read(arguments.motions.first())?;
-        let bar = progress::bar(setup.placements.placements().len() as u64 + 1, "simulating, placements");
-        let line = simulate_one(&setup, &motion, &arguments.out, &bar);
+        let people = setup.read(arguments.motions.first())?;
+        let steps = people.len() * (setup.placements.placements().len() + 1);
+        let bar = progress::bar(steps as u64, "simulating, placements");
+        let line = simulate_one(&setup, &people, &arguments.out, &bar);
         bar.finish_and_clear();
         println!("{}", line?);
         return Ok(());
@@ -131,7 +134,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .par_iter()
         .zip(&outs)
         .map(|(path, out)| {
-            let result = setup.read(Some(path)).and_then(|motion| simulate_one(&setup, &motion, out, &ProgressBar::hidden()));
+            let result = setup.read(Some(path)).and_then(|people| simulate_one(&setup, &people, out, &ProgressBar::hidden()));
             bar.inc(1);
             result
         })
@@ -187,49 +190,66 @@ impl Setup {
             motion: arguments.motion.options()?,
             seed: arguments.seed,
             noise: !arguments.no_noise,
+            pose_error_correlation_s: arguments.pose_error_correlation,
             force: arguments.force,
             csv: arguments.csv.clone(),
             interrupt: Interrupt::watch()?,
         })
     }
 
-    fn read(&self, path: Option<&PathBuf>) -> anyhow::Result<SmplMotion> {
+    fn read(&self, path: Option<&PathBuf>) -> anyhow::Result<Vec<Played>> {
+        let several = self.motion.asks_for_several();
         Ok(match path {
-            Some(path) => read_motion_for(path, &self.model, &self.motion)?,
-            None => embedded_walk().slice(self.motion.start_s, self.motion.duration_s)?,
+            Some(path) if several => read_people(path, &self.model, &self.motion)?.into_iter().map(Played::of_several).collect(),
+            Some(path) => vec![Played::alone(read_motion_for(path, &self.model, &self.motion)?)],
+            None if several => bail!("--person: the embedded walk has one person; name a motion file"),
+            None => vec![Played::alone(embedded_walk().slice(self.motion.start_s, self.motion.duration_s)?)],
         })
     }
 
-    /// All placements of a motion, each on whatever core is free.
-    fn simulate(&self, motion: &SmplMotion, stamps: &[Stamp], bar: &ProgressBar) -> anyhow::Result<Vec<Simulated>> {
+    /// All placements of a person, each on whatever core is free.
+    fn simulate(&self, person: &Played, bar: &ProgressBar) -> anyhow::Result<Vec<Simulated>> {
+        let Played { motion, stamps, .. } = person;
         let shaped = ShapedBody::new(self.model.clone(), &motion.betas)?;
         let sites = MountedSites::new(&shaped, self.placements.placements())?;
         if motion.frames.len() < 2 {
             bail!("{}: {} frame is no motion; at least 2 are needed", motion.name, motion.frames.len());
         }
-        let trajectories = sites.trajectories(stamps, &motion.frames)?;
+        let confidences = motion.confidence.as_deref().unwrap_or_default();
+        let stds: Vec<PoseStd> =
+            confidences.iter().map(|&confidence| PoseStd::of_confidence(confidence, self.pose_error_correlation_s)).collect();
+        let trajectories: Vec<SensorTrajectory> =
+            sites.trajectories(stamps, &motion.frames)?.into_iter().map(|trajectory| trajectory.with_pose_stds(&stds)).collect();
         let times = PoseTimes::new(stamps)?;
         bar.inc(1);
         let one = |(index, trajectory): (usize, &SensorTrajectory)| {
             self.interrupt.check()?;
-            let simulated = self.simulate_placement(index, trajectory, &times);
+            let simulated = self.simulate_placement(person, index, trajectory, &times);
             bar.inc(1);
             simulated
         };
         trajectories.par_iter().enumerate().map(one).collect()
     }
 
-    fn simulate_placement(&self, index: usize, trajectory: &SensorTrajectory, times: &PoseTimes) -> anyhow::Result<Simulated> {
+    fn simulate_placement(
+        &self,
+        person: &Played,
+        index: usize,
+        trajectory: &SensorTrajectory,
+        times: &PoseTimes,
+    ) -> anyhow::Result<Simulated> {
         let (placement, device) = (&self.placements.placements()[index], &self.devices[index]);
         let (name, rate_hz) = (placement.name(), placement.rate_hz());
         let output = uniform_stamps(trajectory.start(), trajectory.end(), rate_hz)?;
-        let effects = StreamingEffects::new(device, rate_hz, self.seed, name)?;
+        // Several people's devices err each on its own, as those of nodes with a prefix do.
+        let effects = StreamingEffects::new(device, rate_hz, self.seed, &person.frame(name))?;
         let mut effects = if self.noise { effects } else { effects.without_noise() };
         let covariances = Covariances::of(device, rate_hz);
-        let frame_id = format!("{name}_imu");
+        let frame_id = person.frame(&format!("{name}_imu"));
         let (mut raw, mut full) = (Vec::with_capacity(output.len()), Vec::with_capacity(output.len()));
         for kinematic in simulate_kinematics_on(times, trajectory, placement.scheme(), &output)? {
             let Some(sample) = effects.step(&kinematic) else { continue };
+            let covariances = covariances.with_motion(&kinematic.variance, &sample);
             raw.push(imu_message(&sample, &frame_id, &covariances.without_orientation(), false));
             full.push(imu_message(&sample, &frame_id, &covariances, true));
         }
@@ -258,84 +278,21 @@ impl Setup {
     }
 }
 
-fn simulate_one(setup: &Setup, motion: &SmplMotion, out: &Path, bar: &ProgressBar) -> anyhow::Result<String> {
-    let last = motion.frames.len().saturating_sub(1) as f64 / motion.rate_hz;
-    let stamps: Vec<Stamp> = (0..motion.frames.len()).map(|frame| BEGINS.plus_seconds(frame as f64 / motion.rate_hz)).collect();
-    let simulated = setup.simulate(motion, &stamps, bar)?;
+fn simulate_one(setup: &Setup, people: &[Played], out: &Path, bar: &ProgressBar) -> anyhow::Result<String> {
+    let simulated = people.iter().map(|person| setup.simulate(person, bar)).collect::<anyhow::Result<Vec<_>>>()?;
+    let motion = &people[0].motion;
     let mut bag = BagWriter::create(out, BagOptions { compression: Compression::Zstd, replace: setup.force, ..BagOptions::default() })?;
     bag.write_metadata("cromosim", setup.metadata(motion))?;
     bag.attach("placements.yaml", "application/yaml", BEGINS, setup.placements.to_yaml().as_bytes())?;
-    write_in_order_of_time(&mut bag, motion, &stamps, &simulated, &setup.interrupt)?;
+    write_in_order_of_time(&mut bag, people, &simulated, &setup.interrupt)?;
     let summary = bag.finish()?;
     if let Some(folder) = &setup.csv {
-        write_csv(out, folder, &simulated)?;
-    }
-    Ok(format!("{}: {} messages, {} placements, {last:.2} s of {}", out.display(), summary.message_count(), simulated.len(), motion.name))
-}
-
-/// Messages of one time: the state first, then each placement's.
-fn write_in_order_of_time(
-    bag: &mut BagWriter,
-    motion: &SmplMotion,
-    stamps: &[Stamp],
-    simulated: &[Simulated],
-    interrupt: &Interrupt,
-) -> anyhow::Result<()> {
-    enum What {
-        State,
-        Reference(usize),
-        Samples(usize),
-    }
-    let mut schedule: Vec<(i64, What, usize)> = Vec::new();
-    schedule.extend(stamps.iter().enumerate().map(|(index, stamp)| (stamp.nanos, What::State, index)));
-    for (number, placement) in simulated.iter().enumerate() {
-        let references = placement.reference.iter().enumerate();
-        schedule.extend(references.map(|(index, message)| (message.header.stamp.nanos(), What::Reference(number), index)));
-        schedule
-            .extend(placement.raw.iter().enumerate().map(|(index, message)| (message.header.stamp.nanos(), What::Samples(number), index)));
-    }
-    schedule.sort_by_key(|(nanos, ..)| *nanos);
-    let topics = |ending: &str| simulated.iter().map(|placement| format!("/imu/{}/{ending}", placement.name)).collect::<Vec<_>>();
-    let (raw, full) = (topics("data_raw"), topics("data"));
-    let references: Vec<String> = simulated.iter().map(|placement| format!("/reference/{}", placement.name)).collect();
-    for (nanos, what, index) in schedule {
-        let stamp = Stamp::from_nanos(nanos);
-        interrupt.check()?;
-        match what {
-            What::State => bag.write("/smpl/state", stamp, &state(motion, index, stamp))?,
-            What::Reference(number) => bag.write(&references[number], stamp, &simulated[number].reference[index])?,
-            What::Samples(number) => {
-                bag.write(&raw[number], stamp, &simulated[number].raw[index])?;
-                bag.write(&full[number], stamp, &simulated[number].full[index])?;
-            }
+        for (person, simulated) in people.iter().zip(&simulated) {
+            write_csv(out, folder, person, simulated)?;
         }
     }
-    Ok(())
-}
-
-fn state(motion: &SmplMotion, frame: usize, stamp: Stamp) -> SmplState {
-    let body = &motion.frames[frame];
-    let mut state = SmplState {
-        header: Header::new(stamp.nanos, "world"),
-        body_id: "0".to_owned(),
-        gender: motion.gender.name().to_owned(),
-        betas: motion.betas.clone(),
-        confidence: motion.confidence.as_ref().map_or(1.0, |values| values[frame]),
-        ..SmplState::default()
-    };
-    state.set_root_and_rotations(body.root_position, &body.local_rotations);
-    state
-}
-
-/// DIR/NAME_PLACEMENT.csv with the samples of `data`.
-fn write_csv(bag: &Path, folder: &Path, simulated: &[Simulated]) -> anyhow::Result<()> {
-    fs::create_dir_all(folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
-    let reader = cromosim_bag::BagReader::open(bag)?;
-    let stem = bag.file_stem().unwrap_or_default().to_string_lossy();
-    for placement in simulated {
-        let path = folder.join(format!("{stem}_{}.csv", placement.name));
-        let file = fs::File::create(&path).with_context(|| format!("{}: cannot be written", path.display()))?;
-        write_imu_csv(&reader, &format!("/imu/{}/data", placement.name), std::io::BufWriter::new(file), &path)?;
-    }
-    Ok(())
+    let last = people.iter().filter_map(|person| person.stamps.last()).max().map_or(0.0, |last| *last - BEGINS);
+    let placements = setup.placements.placements().len();
+    let who = if people.len() > 1 { format!("{} people, ", people.len()) } else { String::new() };
+    Ok(format!("{}: {} messages, {who}{placements} placements, {last:.2} s of {}", out.display(), summary.message_count(), motion.name))
 }

@@ -5,7 +5,7 @@ use cromosim_ros::node_config;
 node_config! {
     /// ROS parameters of `replay`.
     pub struct Config {
-        /// Motion file (BVH, ASF/AMC, C3D, TRC) to play; empty, with no bag either: the embedded walk.
+        /// Motion file (BVH, ASF/AMC, C3D, TRC, SMPL parameters) to play; empty, with no bag either: the embedded walk.
         pub motion: String = String::new(),
         /// Recording to play: everything in it, with its times; a .mcap file or a rosbag2 directory.
         pub bag: String = String::new(),
@@ -41,11 +41,14 @@ node_config! {
         pub subject: String = String::new(),
         /// Take markers to be stuck exactly where the marker set says.
         pub placements_as_given: bool = false,
-        /// Which person of a file of several; empty: who is in it for the longest time.
+        /// Which person of a file of several; empty: who is in it for the longest time. `all`, or names with commas between: each as
+        /// `person_NAME/smpl/pose`, in step; run the other nodes once for each, with `-r __ns:=/person_NAME -p prefix:=person_NAME`.
         pub person: String = String::new(),
+        /// Where the body's shape comes from: detect, file (an error where the file's betas are another body's), fit (to bone lengths) or mean.
+        pub shape: String = "detect".to_owned(),
         /// The body file that the motion's betas are for, to fit another body to that person's bones; empty: none.
         pub source_body: String = String::new(),
-        /// Tells several people apart.
+        /// Tells several people apart; each has the file's own name where `person` asks for several.
         pub body_id: String = "0".to_owned(),
         /// Frame of the root pose.
         pub frame_id: String = "world".to_owned(),

@@ -1,6 +1,7 @@
-//! The node `replay`: plays a motion file as `smpl/pose`, or a bag with all its topics, with `/clock` and rosbag2's playback services.
+//! The node `replay`: plays a motion file as `smpl/pose` (several people as `person_NAME/smpl/pose`), or a bag with all its topics, with `/clock` and rosbag2's playback services.
 
 mod config;
+mod motion;
 mod outlet;
 mod player;
 mod services;
@@ -13,13 +14,15 @@ use cromosim_ros::{Bell, ClockPublisher, Node, Periodic, prepare};
 use cromosim_spatial::Stamp;
 
 pub use config::Config;
+pub use motion::MotionSource;
 pub use player::Player;
-pub use source::{Item, MotionSource, Source};
+pub use source::{Item, Source};
 
 use outlet::Outlet;
 use services::Remote;
 
-const ABOUT: &str = "replay: plays a motion file as smpl/pose, or a bag with everything in it";
+const ABOUT: &str =
+    "replay: plays a motion file as smpl/pose, each of several people as person_NAME/smpl/pose, or a bag with everything in it";
 /// From ready to the first message, ns.
 const LEAD: i64 = 20_000_000;
 /// Silence between two rounds of a loop, ns: longer than any gap that a node bridges.
@@ -33,7 +36,9 @@ pub fn run(arguments: &[String]) -> anyhow::Result<()> {
     let Some(prepared) = prepare("replay", ABOUT, arguments, check)? else { return Ok(()) };
     let source = Source::open(&prepared.config)?;
     let (node, config) = prepared.start()?;
-    log::info!("{}", source.describe());
+    for line in source.describe().lines() {
+        log::info!("{line}");
+    }
     let outlet = Outlet::new(&node, &source)?;
     let clock = if config.clock_rate_hz > 0.0 { Some(node.clock_publisher()?) } else { None };
     let connected = |count| outlet.wait_for_subscriptions(count, Duration::from_secs_f64(config.ready_timeout_seconds));

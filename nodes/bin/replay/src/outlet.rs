@@ -11,7 +11,8 @@ use crate::source::{Item, Source};
 
 /// The publishers of a run.
 pub struct Outlet {
-    poses: Option<Publisher<SmplPose>>,
+    /// One a person.
+    poses: Vec<Publisher<SmplPose>>,
     topics: BTreeMap<String, RawPublisher>,
 }
 
@@ -22,7 +23,10 @@ impl Outlet {
     /// What DDS refuses.
     pub fn new(node: &Node, source: &Source) -> Result<Self, RosError> {
         match source {
-            Source::Motion { .. } => Ok(Self { poses: Some(node.publisher("smpl/pose", Qos::reliable())?), topics: BTreeMap::new() }),
+            Source::Motion(motion) => {
+                let poses = motion.topics().map(|topic| node.publisher(topic, Qos::reliable())).collect::<Result<_, _>>()?;
+                Ok(Self { poses, topics: BTreeMap::new() })
+            }
             Source::Bag { reader, selection, .. } => {
                 let mut topics = BTreeMap::new();
                 for counted in &reader.summary().topics {
@@ -32,7 +36,7 @@ impl Outlet {
                     }
                     topics.insert(topic.name.clone(), node.raw_publisher(&topic.name, &topic.type_name, offered(topic))?);
                 }
-                Ok(Self { poses: None, topics })
+                Ok(Self { poses: Vec::new(), topics })
             }
         }
     }
@@ -58,7 +62,7 @@ impl Outlet {
     /// Publishes one thing; what does not get out is worth a line, and no more.
     pub fn publish(&self, item: &Item) {
         let sent = match item {
-            Item::Pose(message) => self.poses.as_ref().map(|poses| poses.publish(message)),
+            Item::Pose(person, message) => self.poses.get(*person).map(|poses| poses.publish(message)),
             Item::Raw(message) => self.topics.get(&message.topic.name).map(|publisher| {
                 let raw = RawMessage::from_cdr(message.payload.clone())?;
                 publisher.publish(raw)

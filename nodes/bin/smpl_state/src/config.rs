@@ -7,6 +7,9 @@ node_config! {
     pub struct Config {
         /// Body model file (SMPL, SMPL-H, SMPL-X; npz or pickle); empty: the embedded body.
         pub body: String = String::new(),
+        /// The body file that betas of another shape space are for: this node's body is then fitted to that person's bones; empty: such
+        /// betas are refused.
+        pub source_body: String = String::new(),
         /// Name of the world frame (z up).
         pub world_frame: String = "world".to_owned(),
         /// Put before every frame but the world's, with a slash: `alice` makes `alice/pelvis`.

@@ -66,7 +66,8 @@ fn logic(config: &Config) -> anyhow::Result<SmplStateNode> {
         anyhow::ensure!(values.iter().all(|value| value.is_finite()), "parameter '{name}': expected finite numbers, found {values:?}");
     }
     let model = if config.body.is_empty() { BodyModel::embedded() } else { BodyModel::read(Path::new(&config.body))? };
-    Ok(SmplStateNode::new(config.clone(), model)?)
+    let source_body = if config.source_body.is_empty() { None } else { Some(BodyModel::read(Path::new(&config.source_body))?) };
+    Ok(SmplStateNode::new(config.clone(), model, source_body)?)
 }
 
 fn now(node: &Node) -> Time {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use cromosim_body::{BodyError, BodyModel, BodyPose, Joint, ShapedBody};
+use cromosim_body::{BodyError, BodyModel, BodyPose, Joint};
 use cromosim_msgs::NotABody;
 use cromosim_msgs::builtin_interfaces::Time;
 use cromosim_msgs::cromosim_msgs::{SmplPose, SmplState};
@@ -13,7 +13,7 @@ use cromosim_msgs::tf2_msgs::TFMessage;
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use crate::config::Config;
-use crate::shape::ShapeAverage;
+use crate::shape::PersonShape;
 use crate::smooth::Smoother;
 
 /// What one pose leads to.
@@ -33,6 +33,9 @@ pub enum Refusal {
     /// The shape does not suit the body.
     #[error(transparent)]
     Shape(#[from] BodyError),
+    /// No number that the message allows.
+    #[error("confidence is {0}; expected 0 to 1, or NaN where the source cannot say")]
+    Confidence(f64),
 }
 
 /// The node: a function of the poses so far.
@@ -40,8 +43,7 @@ pub struct SmplStateNode {
     config: Config,
     model: Arc<BodyModel>,
     world_from_source: Isometry3<f64>,
-    shape: ShapeAverage,
-    shaped: ShapedBody,
+    shape: PersonShape,
     smoother: Smoother,
     counts: Counts,
 }
@@ -63,15 +65,18 @@ pub fn pelvis_from_base_link() -> UnitQuaternion<f64> {
 }
 
 impl SmplStateNode {
-    /// A node for bodies of this model.
-    pub fn new(config: Config, model: Arc<BodyModel>) -> Result<Self, BodyError> {
+    /// A node for bodies of this model; `source_body` is the one that betas of another shape space are for.
+    ///
+    /// # Errors
+    /// None that a sound model gives.
+    pub fn new(config: Config, model: Arc<BodyModel>, source_body: Option<Arc<BodyModel>>) -> Result<Self, BodyError> {
         let world_from_source = Isometry3::from_parts(
             Translation3::from(Vector3::from(config.source_position)),
             UnitQuaternion::from_scaled_axis(Vector3::from(config.source_rotvec)),
         );
-        let shaped = ShapedBody::new(model.clone(), &[])?;
+        let shape = PersonShape::new(model.clone(), source_body)?;
         let smoother = Smoother::new(config.smoothing_cutoff_hz);
-        Ok(Self { config, model, world_from_source, shape: ShapeAverage::default(), shaped, smoother, counts: Counts::default() })
+        Ok(Self { config, model, world_from_source, shape, smoother, counts: Counts::default() })
     }
 
     /// The state and the frames that follow from one pose.
@@ -91,18 +96,14 @@ impl SmplStateNode {
         let nanos = source.header.stamp.nanos();
         self.watch_time(nanos);
         let (root_position, local_rotations) = source.root_and_rotations()?;
-        let root_position = (self.world_from_source * nalgebra::Point3::from(root_position)).coords;
+        if !(source.confidence.is_nan() || (0.0..=1.0).contains(&source.confidence)) {
+            return Err(Refusal::Confidence(source.confidence));
+        }
+        self.shape.take(source)?;
+        let root_position = (self.world_from_source * nalgebra::Point3::from(root_position * self.shape.metres())).coords;
         let mut body = BodyPose { root_position, local_rotations };
         body.local_rotations[0] = self.world_from_source.rotation * body.local_rotations[0];
         let body = self.smoother.smooth(nanos, body);
-        let betas = &source.betas;
-        if betas.len() > self.model.beta_count() || !betas.iter().all(|beta| beta.is_finite()) {
-            // Says what is wrong, before the average takes it in for good.
-            ShapedBody::new(self.model.clone(), betas)?;
-        }
-        if self.shape.add(betas) {
-            self.shaped = ShapedBody::new(self.model.clone(), self.shape.betas())?;
-        }
         let header = Header { stamp: source.header.stamp, frame_id: self.config.world_frame.clone() };
         let frames = self.frames(&header, &body);
         let mut state = SmplState {
@@ -110,6 +111,7 @@ impl SmplStateNode {
             body_id: source.body_id.clone(),
             gender: source.gender.clone(),
             betas: self.shape.betas().to_vec(),
+            shape_space: self.model.shape_space().name().to_owned(),
             confidence: source.confidence,
             ..SmplState::default()
         };
@@ -132,7 +134,7 @@ impl SmplStateNode {
     }
 
     fn frames(&self, header: &Header, body: &BodyPose) -> TFMessage {
-        let joints = self.shaped.joints_in_model();
+        let joints = self.shape.shaped().joints_in_model();
         let transforms = Joint::ALL.into_iter().map(|joint| {
             let (parent, translation) = match joint.parent() {
                 None => (self.config.world_frame.clone(), body.root_position),

@@ -64,6 +64,7 @@ impl ViewerNode {
         let (root_position, local_rotations) = state.root_and_rotations()?;
         let body = BodyPose { root_position, local_rotations };
         if state.betas != self.betas {
+            self.model.check_named_betas(&state.shape_space, &state.gender, &state.betas)?;
             self.shaped = ShapedBody::new(self.model.clone(), &state.betas)?;
             self.betas.clone_from(&state.betas);
         }

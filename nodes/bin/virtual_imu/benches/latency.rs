@@ -90,7 +90,13 @@ fn measure(set: &PlacementSet, file: &str) -> Vec<f64> {
             continue;
         }
         let body = &walk.frames[sent.len() % walk.frames.len()];
-        let mut state = SmplState { header: Header::new(due, "world"), betas: walk.betas.clone(), ..SmplState::default() };
+        let mut state = SmplState {
+            header: Header::new(due, "world"),
+            betas: walk.betas.clone(),
+            shape_space: "cromosim".to_owned(),
+            confidence: 1.0,
+            ..SmplState::default()
+        };
         state.set_root_and_rotations(body.root_position, &body.local_rotations);
         sent.push(Clock::system_now().nanos);
         states.publish(&state).expect("the state gets out");

@@ -23,6 +23,9 @@ node_config! {
         pub prefix: String = String::new(),
         /// Publish the site's pose of every state as `reference/NAME` too.
         pub publish_reference: bool = false,
+        /// How long errors of the poses hold, s: their correlation is exp(-(dt / this)^2 / 2). 0: they are new with each pose, the worst case;
+        /// the covariances that follow from SmplState's confidence are then far too large for poses that were smoothed.
+        pub pose_error_correlation_s: f64 = 0.0,
         /// Silence of the states after which the schemes begin anew, s.
         pub gap_seconds: f64 = 0.25,
         /// How often /diagnostics is published, Hz; 0: never.

@@ -135,7 +135,12 @@ pub fn placements(config: &Config) -> anyhow::Result<PlacementSet> {
 }
 
 fn logic(config: &Config) -> anyhow::Result<(VirtualImuNode, PlacementSet)> {
-    for (name, value) in [("state_rate_hz", config.state_rate_hz), ("diagnostics_rate_hz", config.diagnostics_rate_hz)] {
+    let not_negative = [
+        ("state_rate_hz", config.state_rate_hz),
+        ("diagnostics_rate_hz", config.diagnostics_rate_hz),
+        ("pose_error_correlation_s", config.pose_error_correlation_s),
+    ];
+    for (name, value) in not_negative {
         anyhow::ensure!(value.is_finite() && value >= 0.0, "parameter '{name}': expected 0 or more, found {value}");
     }
     anyhow::ensure!(config.gap_seconds > 0.0, "parameter 'gap_seconds': expected more than 0, found {}", config.gap_seconds);

@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use cromosim_body::{BodyError, BodyModel, BodyPose, Joint, ShapedBody};
 use cromosim_imu::{
-    Covariances, Device, Follow, ImuError, ImuSample, MountedSites, Placement, PlacementSet, StreamOptions, StreamingEffects, StreamingImu,
+    Covariances, Device, Follow, ImuError, ImuSample, MountedSites, Placement, PlacementSet, PoseStd, StreamOptions, StreamingEffects,
+    StreamingImu,
 };
 use cromosim_msgs::NotABody;
 use cromosim_msgs::builtin_interfaces::Time;
@@ -82,7 +83,7 @@ pub struct VirtualImuNode {
     shaped: ShapedBody,
     sites: MountedSites,
     /// States that wait until their rate is known.
-    early: Vec<(Stamp, BodyPose)>,
+    early: Vec<(Stamp, BodyPose, PoseStd)>,
     last: Option<Stamp>,
     counts: Counts,
 }
@@ -92,6 +93,7 @@ struct Counts {
     states: u64,
     refused: u64,
     readings: u64,
+    without_estimate: u64,
     restarts: u64,
     last_refusal: String,
 }
@@ -128,7 +130,9 @@ impl VirtualImuNode {
         let channel = |(placement, device): (&Placement, &Device)| {
             let rate_hz = placement.rate_hz();
             let seed = self.config.seed as u64;
-            let effects = if self.config.noise { Some(StreamingEffects::new(device, rate_hz, seed, placement.name())?) } else { None };
+            // Several bodies' devices err each on its own.
+            let name = self.config.frame(placement.name());
+            let effects = if self.config.noise { Some(StreamingEffects::new(device, rate_hz, seed, &name)?) } else { None };
             let covariances = Covariances::of(device, rate_hz);
             Ok(Channel { stream: None, effects, covariances, frame_id: self.config.frame(&format!("{}_imu", placement.name())) })
         };
@@ -155,6 +159,8 @@ impl VirtualImuNode {
             Ok(step) => {
                 self.counts.states += 1;
                 self.counts.readings += step.readings.len() as u64;
+                let without = |reading: &&Reading| reading.raw.linear_acceleration_covariance[0] < 0.0;
+                self.counts.without_estimate += step.readings.iter().filter(without).count() as u64;
             }
             Err(refusal) => {
                 self.counts.refused += 1;
@@ -171,24 +177,26 @@ impl VirtualImuNode {
         if self.last == Some(stamp) {
             return Err(Refusal::Repeated(stamp));
         }
+        self.model.check_named_betas(&state.shape_space, &state.gender, &state.betas)?;
         self.watch_time(stamp);
         if state.betas != self.betas {
             self.shaped = ShapedBody::new(self.model.clone(), &state.betas)?;
             self.sites = MountedSites::new(&self.shaped, &self.placements)?;
             self.betas.clone_from(&state.betas);
         }
+        let pose_std = PoseStd::of_confidence(state.confidence, self.config.pose_error_correlation_s);
         let mut step = self.frames_of(state, &body);
         self.last = Some(stamp);
         if self.channels.iter().all(|channel| channel.stream.is_some()) {
-            self.push(stamp, &body, &mut step.readings)?;
+            self.push((stamp, &body, pose_std), &mut step.readings)?;
             return Ok(step);
         }
-        self.early.push((stamp, body));
+        self.early.push((stamp, body, pose_std));
         if self.config.state_rate_hz > 0.0 || self.early.len() >= RATE_STATES {
             let rate_hz = if self.config.state_rate_hz > 0.0 { self.config.state_rate_hz } else { median_rate(&self.early) };
             self.open_streams(rate_hz)?;
-            for (stamp, body) in std::mem::take(&mut self.early) {
-                self.push(stamp, &body, &mut step.readings)?;
+            for (stamp, body, pose_std) in std::mem::take(&mut self.early) {
+                self.push((stamp, &body, pose_std), &mut step.readings)?;
             }
         }
         Ok(step)
@@ -205,15 +213,16 @@ impl VirtualImuNode {
         Ok(())
     }
 
-    fn push(&mut self, stamp: Stamp, body: &BodyPose, readings: &mut Vec<Reading>) -> Result<(), ImuError> {
+    fn push(&mut self, (stamp, body, pose_std): (Stamp, &BodyPose, PoseStd), readings: &mut Vec<Reading>) -> Result<(), ImuError> {
         for (placement, (channel, frame)) in self.channels.iter_mut().zip(self.sites.frames(body)).enumerate() {
             let Some(stream) = &mut channel.stream else { continue };
-            for motion in stream.push_kinematics(frame.at(stamp))? {
+            for motion in stream.push_kinematics(frame.at(stamp).with_pose_std(pose_std))? {
                 let sample = channel.effects.as_mut().map_or_else(|| Some(motion.imu()), |effects| effects.step(&motion));
                 // None: the device loses it.
                 let Some(sample) = sample else { continue };
-                let raw = imu_message(&sample, &channel.frame_id, &channel.covariances.without_orientation(), false);
-                let full = imu_message(&sample, &channel.frame_id, &channel.covariances, true);
+                let covariances = channel.covariances.with_motion(&motion.variance, &sample);
+                let raw = imu_message(&sample, &channel.frame_id, &covariances.without_orientation(), false);
+                let full = imu_message(&sample, &channel.frame_id, &covariances, true);
                 readings.push(Reading { placement, raw, full });
             }
         }
@@ -280,6 +289,7 @@ impl VirtualImuNode {
             value("states".to_owned(), counts.states.to_string()),
             value("states left out".to_owned(), counts.refused.to_string()),
             value("readings".to_owned(), counts.readings.to_string()),
+            value("readings without an estimate (confidence 0)".to_owned(), counts.without_estimate.to_string()),
             value("restarts of the source's time".to_owned(), counts.restarts.to_string()),
         ];
         for (placement, delay) in self.placements.iter().zip(self.delays_seconds()) {
@@ -312,7 +322,7 @@ pub fn imu_message(sample: &ImuSample, frame_id: &str, covariances: &Covariances
 }
 
 /// Rate of states by the median of their intervals, Hz.
-fn median_rate(states: &[(Stamp, BodyPose)]) -> f64 {
+fn median_rate(states: &[(Stamp, BodyPose, PoseStd)]) -> f64 {
     let mut intervals: Vec<f64> = states.windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
     intervals.sort_unstable_by(f64::total_cmp);
     intervals.get(intervals.len() / 2).map_or(f64::NAN, |interval| interval.recip())

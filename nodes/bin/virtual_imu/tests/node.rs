@@ -23,7 +23,13 @@ fn quiet() -> Config {
 
 fn state(motion: &SmplMotion, frame: usize, nanos: i64) -> SmplState {
     let body = &motion.frames[frame];
-    let mut state = SmplState { header: Header::new(nanos, "world"), betas: motion.betas.clone(), ..SmplState::default() };
+    let mut state = SmplState {
+        header: Header::new(nanos, "world"),
+        betas: motion.betas.clone(),
+        shape_space: "cromosim".to_owned(),
+        confidence: 1.0,
+        ..SmplState::default()
+    };
     state.set_root_and_rotations(body.root_position, &body.local_rotations);
     state
 }
@@ -116,6 +122,81 @@ fn nonsense_is_refused_and_the_node_goes_on() {
     assert!(readings >= 5 * 185, "{readings}");
     let report = node.diagnostics(Header::new(START, "").stamp, "/virtual_imu");
     assert!(report.status[0].message.contains("left out"), "{report:?}");
+}
+
+/// The readings of the walk's first second with this confidence, without those that rest on its ends.
+fn with_confidence(config: Config, confidence: f64) -> Vec<Reading> {
+    let motion = embedded_walk().slice(0.0, Some(1.0)).unwrap();
+    let mut node = node(config);
+    let step = |frame: usize| {
+        let state = SmplState { confidence, ..state(&motion, frame, START + frame as i64 * 10_000_000) };
+        node.step(&state).unwrap().readings
+    };
+    (0..motion.frames.len()).flat_map(step).collect()
+}
+
+#[test]
+fn confidence_grows_the_covariances() {
+    let scheme = || Config { scheme: "second_difference".to_owned(), ..Config::default() };
+    let certain = with_confidence(scheme(), 1.0);
+    assert!(certain == with_confidence(scheme(), f64::NAN), "where the source cannot say, nothing is added");
+    // 1 mm: (6 / h4) (1 mm)2 and (1 / 2 h2) (2 mrad)2, more where gravity tilts.
+    let doubtful = with_confidence(scheme(), 1.0 / (1.0 + 1e-4));
+    assert_eq!(certain.len(), doubtful.len());
+    for (certain, doubtful) in certain.iter().zip(&doubtful).skip(100) {
+        assert_eq!(certain.raw.linear_acceleration, doubtful.raw.linear_acceleration, "the reading stays as it is");
+        let grown = |pick: fn(&Reading) -> [f64; 9]| (pick(doubtful)[0] - pick(certain)[0]).sqrt();
+        let (force, rate) = (grown(|r| r.raw.linear_acceleration_covariance), grown(|r| r.raw.angular_velocity_covariance));
+        assert!((24.0..25.0).contains(&force), "{force} m/s2");
+        assert!((0.14..0.15).contains(&rate), "{rate} rad/s");
+        assert!((grown(|r| r.full.orientation_covariance) - 0.002).abs() < 1e-6);
+        assert_eq!(doubtful.raw.orientation_covariance[0], -1.0);
+    }
+    let holding = with_confidence(Config { pose_error_correlation_s: 0.5, ..scheme() }, 0.5);
+    let force = holding[200].raw.linear_acceleration_covariance[0].sqrt();
+    assert!((0.5..5.0).contains(&force), "0.1 m that hold for half a second are sqrt(3) 0.1 / 0.25 m/s2, and 0.2 rad of gravity: {force}");
+}
+
+#[test]
+fn at_confidence_0_there_is_no_estimate() {
+    let motion = embedded_walk();
+    let mut node = node(quiet());
+    let mut lost = Vec::new();
+    for frame in 0..300 {
+        let confidence = if (100..130).contains(&frame) { 0.0 } else { 1.0 };
+        let state = SmplState { confidence, ..state(&motion, frame, START + frame as i64 * 10_000_000) };
+        for reading in node.step(&state).unwrap().readings {
+            let covariances =
+                [reading.raw.linear_acceleration_covariance, reading.raw.angular_velocity_covariance, reading.full.orientation_covariance];
+            let at = (reading.raw.header.stamp.nanos() - START) / 10_000_000;
+            if (105..125).contains(&at) {
+                assert!(covariances.iter().all(|covariance| covariance[0] == -1.0), "frame {at}");
+            }
+            if at < 85 || at > 145 {
+                assert!(covariances.iter().all(|covariance| covariance[0] >= 0.0), "frame {at}");
+            }
+            lost.extend((reading.raw.linear_acceleration_covariance[0] < 0.0).then_some(at));
+        }
+    }
+    let report = node.diagnostics(Header::new(START, "").stamp, "/virtual_imu");
+    let told = report.status[0].values.iter().find(|value| value.key.contains("without an estimate")).unwrap();
+    assert_eq!(told.value, lost.len().to_string());
+}
+
+#[test]
+fn betas_of_another_body_are_refused() {
+    let motion = embedded_walk();
+    let foreign = SmplState { betas: vec![0.5], shape_space: "smpl".to_owned(), ..state(&motion, 0, START) };
+    assert!(node(quiet()).step(&foreign).unwrap_err().to_string().contains("belong to SMPL"));
+}
+
+#[test]
+fn two_people_have_errors_of_their_own() {
+    let motion = embedded_walk();
+    let run = |prefix: &str| walk(&mut node(Config { prefix: prefix.to_owned(), ..Config::default() }), &motion, START);
+    let (one, other) = (run("person_1"), run("person_2"));
+    assert_eq!(one[0].raw.header.frame_id, format!("person_1/{}_imu", node(quiet()).placements()[one[0].placement].name()));
+    assert!(one.iter().zip(&other).all(|(one, other)| one.raw.linear_acceleration != other.raw.linear_acceleration));
 }
 
 /// A node with one placement, whose device has these effects.

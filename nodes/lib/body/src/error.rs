@@ -66,7 +66,7 @@ pub enum BodyError {
     },
     /// Shape coefficients of one kind of body are given to another.
     #[error(
-        "betas belong to {betas_of}, but body {body} has the shapes of {body_of}; name the file of their body (--body FILE), or fit this one to bone lengths"
+        "betas belong to {betas_of}, but body {body} has the shapes of {body_of}; name the file of their body (--body FILE, parameter `body`), or fit this one to their bone lengths (--source-body FILE, parameter `source_body`)"
     )]
     ForeignBetas {
         /// The body's id.
@@ -75,6 +75,12 @@ pub enum BodyError {
         body_of: String,
         /// Whose shapes the betas tell.
         betas_of: String,
+    },
+    /// Shape coefficients that do not say whose they are.
+    #[error("betas of shape space '{given}'; say whose they are: smpl (SMPL and SMPL-H), smplx or cromosim (the embedded body)")]
+    UnknownShapeSpace {
+        /// What was given, maybe nothing.
+        given: String,
     },
     /// More shape coefficients than the body has.
     #[error("{given} betas given, but body {body} has {available}; fewer are allowed, the rest is 0")]

@@ -22,6 +22,24 @@ pub enum ShapeSpace {
     SmplX,
 }
 
+impl ShapeSpace {
+    const ALL: [Self; 3] = [Self::Cromosim, Self::Smpl, Self::SmplX];
+
+    /// The word in messages and files (AMASS' `surface_model_type`): `cromosim`, `smpl`, `smplx`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Cromosim => "cromosim",
+            Self::Smpl => "smpl",
+            Self::SmplX => "smplx",
+        }
+    }
+
+    /// The space of a word.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|space| space.name() == name)
+    }
+}
+
 impl fmt::Display for ShapeSpace {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.write_str(match self {
@@ -52,6 +70,20 @@ impl BodyModel {
         };
         let (body_of, betas_of) = (named(self.space, self.gender), named(space, gender));
         Err(BodyError::ForeignBetas { body: self.id.clone(), body_of, betas_of })
+    }
+}
+
+impl BodyModel {
+    /// As [`Self::check_betas`], of the words that a message carries. Betas other than 0 need the word: nobody can tell from the numbers.
+    ///
+    /// # Errors
+    /// [`BodyError::ForeignBetas`], and [`BodyError::UnknownShapeSpace`] for betas other than 0 whose space is missing or unknown.
+    pub fn check_named_betas(&self, shape_space: &str, gender: &str, betas: &[f64]) -> Result<(), BodyError> {
+        match ShapeSpace::from_name(shape_space) {
+            Some(space) => self.check_betas(space, Gender::from_name(gender), betas),
+            None if betas.iter().all(|&beta| beta == 0.0) => Ok(()),
+            None => Err(BodyError::UnknownShapeSpace { given: shape_space.to_owned() }),
+        }
     }
 }
 

@@ -185,3 +185,15 @@ fn bone_lengths_of_a_person_give_the_persons_shape() {
     println!("lengths within {:.2} mm, RMS {:.2} mm", 1e3 * worst, 1e3 * fit.length_rms_m);
     assert!(worst < 0.003 && fit.length_rms_m < 0.003, "{worst} m, {} m", fit.length_rms_m);
 }
+
+#[test]
+fn betas_are_told_by_the_words_of_a_message() {
+    let embedded = BodyModel::embedded();
+    assert!(embedded.check_named_betas("cromosim", "female", &[1.0]).is_ok());
+    assert!(embedded.check_named_betas("smpl", "", &[1.0]).unwrap_err().to_string().contains("belong to SMPL"));
+    for unknown in ["", "SMPL", "star"] {
+        let message = embedded.check_named_betas(unknown, "neutral", &[1.0]).unwrap_err().to_string();
+        assert!(message.contains(&format!("'{unknown}'")) && message.contains("smplx"), "{message}");
+        assert!(embedded.check_named_betas(unknown, "neutral", &[0.0]).is_ok(), "the mean of any body is said by zeros");
+    }
+}

@@ -52,6 +52,7 @@ mod simulate;
 mod stream;
 mod stream_spline;
 mod trajectory;
+mod uncertainty;
 
 #[cfg(test)]
 mod test_motions;
@@ -71,3 +72,4 @@ pub use schemes::Scheme;
 pub use simulate::{simulate, simulate_kinematics, simulate_kinematics_on};
 pub use stream::{StreamOptions, StreamingImu};
 pub use trajectory::{SensorFrame, SensorTrajectory};
+pub use uncertainty::{PoseStd, SampleVariance};

@@ -4,7 +4,7 @@ use cromosim_body::{BodyPose, Joint, ShapedBody, Site, VertexSubset};
 use cromosim_spatial::Stamp;
 use nalgebra::{Isometry3, Matrix2, Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-use crate::{Follow, ImuError, Placement, SensorFrame, SensorTrajectory, SiteChoice};
+use crate::{Follow, ImuError, Placement, PoseStd, SensorFrame, SensorTrajectory, SiteChoice};
 
 /// Where a sensor is for one pose of the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,7 +20,7 @@ pub struct SiteFrame {
 impl SiteFrame {
     /// The frame with its time.
     pub fn at(&self, stamp: Stamp) -> SensorFrame {
-        SensorFrame { stamp, world_from_sensor: self.world_from_sensor, normal_in_world: self.normal_in_world }
+        SensorFrame { stamp, world_from_sensor: self.world_from_sensor, normal_in_world: self.normal_in_world, pose_std: PoseStd::NONE }
     }
 }
 

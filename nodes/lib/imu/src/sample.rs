@@ -3,6 +3,8 @@
 use cromosim_spatial::Stamp;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
+use crate::SampleVariance;
+
 /// Standard gravity, m/s2 (CGPM 1901).
 pub const STANDARD_GRAVITY: f64 = 9.80665;
 
@@ -22,6 +24,8 @@ pub struct KinematicSample {
     pub angular_velocity: Vector3<f64>,
     /// Its derivative, rad/s2; none from schemes that do not give it.
     pub angular_acceleration: Option<Vector3<f64>>,
+    /// What errors of the poses leave in it.
+    pub variance: SampleVariance,
 }
 
 /// One reading of an IMU, in sensor axes.

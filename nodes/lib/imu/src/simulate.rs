@@ -3,8 +3,9 @@
 use cromosim_spatial::{PoseTimes, Stamp, derivative_weights, so3};
 use nalgebra::{Isometry3, Vector3};
 
-use crate::schemes::spline;
-use crate::{ImuError, ImuSample, KinematicSample, Scheme, SensorFrame, SensorTrajectory};
+use crate::schemes::spline::{self, SplineVariance};
+use crate::uncertainty::{FrameWeights, any_error};
+use crate::{ImuError, ImuSample, KinematicSample, SampleVariance, Scheme, SensorFrame, SensorTrajectory};
 
 /// The error-free readings at `output` stamps, in any order. Stamps before the first or after the last frame read what the end reads.
 ///
@@ -46,9 +47,11 @@ pub fn simulate_kinematics_on(
         return Ok(by_differences(trajectory, scheme, output));
     }
     let fitted = spline::fit(times, trajectory.frames())?;
+    let errors = SplineVariance::new(times, &fitted, trajectory.frames())?;
     let sample = |&stamp: &Stamp| {
         let held = stamp.clamp(trajectory.start(), trajectory.end());
-        KinematicSample { stamp, ..spline::sample(&fitted, held) }
+        let variance = errors.as_ref().map(|errors| errors.at(held)).unwrap_or_default();
+        KinematicSample { stamp, variance, ..spline::sample(&fitted, held) }
     };
     Ok(output.iter().map(sample).collect())
 }
@@ -58,9 +61,17 @@ fn by_differences(trajectory: &SensorTrajectory, scheme: Scheme, output: &[Stamp
     let at_frames: Vec<_> = (0..frames.len()).map(|k| at_frame(scheme, frames, k)).collect();
     let sample = |&stamp: &Stamp| {
         let held = stamp.clamp(trajectory.start(), trajectory.end());
-        KinematicSample { stamp, ..between_frames(&at_frames, held) }
+        KinematicSample { stamp, variance: stencil_variance(scheme, frames, held), ..between_frames(&at_frames, held) }
     };
     output.iter().map(sample).collect()
+}
+
+/// What errors of the frames leave in a stencil's sample.
+pub(crate) fn stencil_variance(scheme: Scheme, frames: &[SensorFrame], stamp: Stamp) -> SampleVariance {
+    // A sample rests on the frames within two estimates and their reach.
+    let after = frames.partition_point(|frame| frame.stamp < stamp);
+    let near = &frames[after.saturating_sub(8)..(after + 8).min(frames.len())];
+    if any_error(near) { FrameWeights::of_stencil(scheme, frames, stamp).variance(frames) } else { SampleVariance::default() }
 }
 
 /// The estimate of a scheme with a stencil at one of its frames.
@@ -72,6 +83,7 @@ pub(crate) fn at_frame(scheme: Scheme, frames: &[SensorFrame], k: usize) -> Kine
         acceleration,
         angular_velocity,
         angular_acceleration: None,
+        variance: SampleVariance::default(),
     }
 }
 
@@ -101,6 +113,7 @@ pub(crate) fn between_frames(at_frames: &[KinematicSample], stamp: Stamp) -> Kin
         acceleration: sum(&|sample| sample.acceleration),
         angular_velocity: sum(&|sample| sample.angular_velocity),
         angular_acceleration: None,
+        variance: SampleVariance::default(),
     }
 }
 

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use cromosim_spatial::{SpatialError, Stamp};
 
-use crate::simulate::{at_frame, between_frames};
+use crate::simulate::{at_frame, between_frames, stencil_variance};
 use crate::stream_spline::{FixedLag, LAG_FRAMES};
 use crate::{ImuError, ImuSample, KinematicSample, Scheme, SensorFrame};
 
@@ -189,7 +189,8 @@ impl StreamingImu {
             return self.fixed_lag.sample(&self.window, &due, released);
         }
         for stamp in due {
-            released.push(self.by_stencil(stamp));
+            let variance = stencil_variance(self.scheme, &self.window, stamp);
+            released.push(KinematicSample { variance, ..self.by_stencil(stamp) });
         }
         Ok(())
     }

@@ -5,7 +5,7 @@ use cromosim_spatial::{
 };
 use nalgebra::Isometry3;
 
-use crate::schemes::spline::sample;
+use crate::schemes::spline::{SplineVariance, sample};
 use crate::{ImuError, KinematicSample, SensorFrame};
 
 /// Frames between a sample and the frame that releases it.
@@ -87,8 +87,11 @@ impl FixedLag {
             }
             None => PoseSmoothing { position: Smoothing::Interpolate, rotation: Smoothing::Interpolate },
         };
-        let spline = PoseSpline::fit_on(&PoseTimes::new(&stamps)?, &poses, smoothing)?;
-        samples.extend(due.iter().map(|stamp| sample(&spline, *stamp)));
+        let times = PoseTimes::new(&stamps)?;
+        let spline = PoseSpline::fit_on(&times, &poses, smoothing)?;
+        let errors = SplineVariance::new(&times, &spline, frames)?;
+        let variance = |stamp| errors.as_ref().map(|errors| errors.at(stamp)).unwrap_or_default();
+        samples.extend(due.iter().map(|&stamp| KinematicSample { variance: variance(stamp), ..sample(&spline, stamp) }));
         Ok(())
     }
 

@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 
-use crate::{ImuSample, KinematicSample, SensorFrame, SensorTrajectory};
+use crate::{ImuSample, KinematicSample, SampleVariance, SensorFrame, SensorTrajectory};
 
 pub(crate) const START: Stamp = Stamp::from_nanos(1_700_000_000_123_456_789);
 
@@ -31,6 +31,7 @@ pub(crate) fn wrist(t: f64) -> KinematicSample {
         acceleration: Vector3::new(x[2], y[2], z[2]),
         angular_velocity: Vector3::z() * yaw[1] + about_z * Vector3::y() * pitch[1] + about_zy * Vector3::x() * roll[1],
         angular_acceleration: None,
+        variance: SampleVariance::default(),
     }
 }
 
@@ -46,6 +47,7 @@ pub(crate) fn spin(t: f64) -> KinematicSample {
         acceleration: angular_velocity.cross(&angular_velocity.cross(&lever_arm)),
         angular_velocity,
         angular_acceleration: Some(Vector3::zeros()),
+        variance: SampleVariance::default(),
     }
 }
 

@@ -3,7 +3,7 @@
 use cromosim_spatial::{SpatialError, Stamp, check_times, relative_seconds};
 use nalgebra::{Isometry3, Vector3};
 
-use crate::ImuError;
+use crate::{ImuError, PoseStd};
 
 /// A sensor's frame at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,12 +14,20 @@ pub struct SensorFrame {
     pub world_from_sensor: Isometry3<f64>,
     /// The skin's outward unit normal, which [`crate::Scheme::NormalTracking`] follows.
     pub normal_in_world: Vector3<f64>,
+    /// How far the frame may be off.
+    pub pose_std: PoseStd,
 }
 
 impl SensorFrame {
     /// A frame without a skin: its own z axis stands for the normal.
     pub fn new(stamp: Stamp, world_from_sensor: Isometry3<f64>) -> Self {
-        Self { stamp, world_from_sensor, normal_in_world: world_from_sensor * Vector3::z() }
+        Self { stamp, world_from_sensor, normal_in_world: world_from_sensor * Vector3::z(), pose_std: PoseStd::NONE }
+    }
+
+    /// The same frame, off by so much.
+    #[must_use]
+    pub fn with_pose_std(self, pose_std: PoseStd) -> Self {
+        Self { pose_std, ..self }
     }
 
     pub(crate) fn is_finite(&self) -> bool {
@@ -50,6 +58,13 @@ impl SensorTrajectory {
             return Err(SpatialError::NotFinite { index, what: "pose" }.into());
         }
         Ok(Self { frames })
+    }
+
+    /// The same frames, off by so much; frames beyond `pose_stds` are taken as they are.
+    #[must_use]
+    pub fn with_pose_stds(mut self, pose_stds: &[PoseStd]) -> Self {
+        self.frames.iter_mut().zip(pose_stds).for_each(|(frame, pose_std)| frame.pose_std = *pose_std);
+        self
     }
 
     /// The frames, in order of time.

@@ -195,7 +195,38 @@ def gvhmr():
     expected["gvhmr.pt"] = posed(rest, root, flat_hands(body), pelvis)
 
 
+def chains():
+    """Two seconds of smooth motion, long enough for derivatives and for the nodes: chain_amass.npz at 60 Hz, chain_wham.pkl at 30 Hz with two people."""
+    rest = rest_joints("model_smplh_female.npz", betas)
+
+    def motion(times, phase):
+        n = len(times)
+        swing = lambda amplitude, hz, shift: amplitude * np.sin(2 * np.pi * hz * times + phase + shift)
+        root = Rotation.from_euler("z", 0.4 * times[:, None] + phase) * Rotation.from_euler("x", 90 + 3 * swing(1, 1.1, 0.5)[:, None], degrees=True)
+        body = np.zeros((n, 23, 3))
+        # Hips and knees, spine, shoulders and elbows, in the order of SMPL's joints less one.
+        body[:, 0, 0], body[:, 1, 0] = swing(0.4, 1, 0), swing(0.4, 1, np.pi)
+        body[:, 3, 0], body[:, 4, 0] = 0.3 + swing(0.25, 1, 1), 0.3 + swing(0.25, 1, 1 + np.pi)
+        body[:, 2, 1] = swing(0.1, 1, 0.3)
+        body[:, 15, 2], body[:, 16, 2] = -1.2 + swing(0.2, 1, 2), 1.2 + swing(0.2, 1, 2)
+        body[:, 17, 1], body[:, 18, 1] = -0.4 + swing(0.3, 1.3, 0), 0.4 + swing(0.3, 1.3, 1)
+        pelvis = np.stack([0.9 * times + 2 * phase, swing(0.03, 1, 0), 0.93 + swing(0.02, 2, 0)], 1)
+        return root, body, pelvis
+
+    root, body, pelvis = motion(np.arange(121) / 60, 0.0)
+    fullpose = np.concatenate([root.as_rotvec(), body[:, :21].reshape(-1, 63), np.zeros((121, 90))], 1)
+    np.savez_compressed(DATA / "chain_amass.npz", poses=fullpose, trans=pelvis - rest[0], betas=np.concatenate([betas, np.zeros(6)]), gender=np.array(b"female"), mocap_framerate=np.array(60.0))
+    people = {}
+    for person, (first, count), phase in [(0, (0, 61), 0.0), (3, (6, 50), 1.0)]:
+        root, body, pelvis = motion((first + np.arange(count)) / 30, phase)
+        pose = lambda axes: f4(np.concatenate([(axes * root).as_rotvec(), body.reshape(-1, 69)], 1))
+        people[person] = {"pose": pose(camera_from_world), "trans": np.zeros((count, 3), "f4"), "pose_world": pose(y_up_from_world),
+                          "trans_world": f4(y_up_from_world.apply(pelvis) - rest[0]), "betas": np.tile(f4(betas), (count, 1)), "frame_ids": first + np.arange(count)}
+    joblib.dump(people, DATA / "chain_wham.pkl", compress=3)
+
+
 DATA.mkdir(parents=True, exist_ok=True)
+chains()
 amass()
 video()
 gvhmr()

@@ -3,7 +3,7 @@
 use std::io::{self, Seek, Write};
 
 use cromosim_arrays::NpzWriter;
-use cromosim_body::{ShapeSpace, ShapedBody};
+use cromosim_body::ShapedBody;
 
 use crate::SmplMotion;
 
@@ -27,14 +27,7 @@ pub fn write_amass<W: Write + Seek>(motion: &SmplMotion, shaped: &ShapedBody, wr
     npz.floats("betas", &[motion.betas.len()], &motion.betas)?;
     npz.text("gender", motion.gender.name())?;
     npz.floats("mocap_framerate", &[], &[motion.rate_hz])?;
-    npz.text(
-        "surface_model_type",
-        match motion.shape_space {
-            ShapeSpace::Cromosim => "cromosim",
-            ShapeSpace::Smpl => "smpl",
-            ShapeSpace::SmplX => "smplx",
-        },
-    )?;
+    npz.text("surface_model_type", motion.shape_space.name())?;
     npz.text("body", body.id())?;
     npz.finish()
 }

@@ -10,7 +10,7 @@
 //!
 //! Files of SMPL parameters (AMASS, and estimates from video: VIBE, WHAM, GVHMR, TRAM, PHALP, SLAHMR) need no retargeting; the [`PoseReport`]
 //! says what was taken. Betas of another kind of body than the one at hand are left out or fitted ([`ShapeChoice`]). [`read_people`] takes
-//! everybody in a file, [`read_camera_poses`] leaves poses in the camera's axes.
+//! several people of a file, or everybody, [`read_camera_poses`] leaves poses in the camera's axes.
 //!
 //! ```
 //! let walk = cromosim_motion::embedded_walk();
@@ -52,7 +52,7 @@ pub use markers::{MarkerClip, MarkerFit, MarkerOptions, MarkerPlace, MarkerRepor
 pub use motion::SmplMotion;
 pub use options::{MotionOptions, RestChoice, UpAxis};
 pub use poses::{
-    CameraPoses, MAX_POSES, PoseAxes, PoseFile, PoseFormat, PoseReport, PoseTrack, PoseView, RateOrigin, ShapeChoice, ShapeOrigin,
+    CameraPoses, MAX_POSES, Person, PoseAxes, PoseFile, PoseFormat, PoseReport, PoseTrack, PoseView, RateOrigin, ShapeChoice, ShapeOrigin,
     VIDEO_RATE_HZ, open_poses, read_camera_poses, read_people,
 };
 pub use read::{read_motion, read_motion_for};

@@ -75,7 +75,8 @@ pub struct MotionOptions {
     pub shape: ShapeChoice,
     /// The body file that the motion's betas are for, so that another body can be fitted to that person's bones (SMPL parameters only).
     pub source_body: Option<PathBuf>,
-    /// Which person of a file of several, by its name or number there; who is in it for the longest time, where absent.
+    /// Which person of a file of several, by its name or number there; who is in it for the longest time, where absent. For
+    /// [`crate::read_people`] also `all`, or several with commas between.
     pub person: Option<String>,
     /// Frames per second, Hz, of AMC files (120 where absent) and SMPL parameters (video estimates do not say it: 30 where absent; where a file
     /// does, this one counts). Not of BVH and markers.

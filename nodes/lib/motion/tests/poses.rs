@@ -120,11 +120,35 @@ fn people_are_listed_and_chosen() {
     assert!(message.ends_with("wham.pkl: person 7 is not in it; there are 0 (6 frames), 3 (2 frames); choose one by person"), "{message}");
     for (name, lengths) in [("vibe.joblib", vec![2, 7]), ("wham.pkl", vec![6, 2]), ("phalp.pkl", vec![6, 3]), ("slahmr.npz", vec![6, 2])] {
         let everybody = read_people(&sample(name), &BodyModel::embedded(), &MotionOptions::default()).unwrap();
-        assert_eq!(everybody.iter().map(|motion| motion.frames.len()).collect::<Vec<_>>(), lengths, "{name}");
-        assert_eq!(report(&everybody[0]).people.len(), 2);
-        let late = MotionOptions { start_s: 0.15, ..Default::default() };
-        assert_eq!(read_people(&sample(name), &BodyModel::embedded(), &late).unwrap().len(), 1, "{name}: one is there so late");
+        assert_eq!(everybody.iter().map(|person| person.motion.frames.len()).collect::<Vec<_>>(), lengths, "{name}");
+        assert_eq!(report(&everybody[0].motion).people.len(), 2);
+        assert!(everybody.iter().all(|person| person.name == report(&person.motion).person));
     }
+}
+
+#[test]
+fn people_of_one_file_are_in_step() {
+    let read = |name: &str, options: MotionOptions| read_people(&sample(name), &BodyModel::embedded(), &options);
+    let person = |names: &str| MotionOptions { person: Some(names.to_owned()), ..Default::default() };
+    let labels = |people: &[cromosim_motion::Person]| people.iter().map(|person| person.label.clone()).collect::<Vec<_>>();
+    // VIBE's person 1 is in frames 0 and 1 of the video, 7 in 10 to 16; SLAHMR's second one in 4 and 5.
+    let both = read("vibe.joblib", person("all")).unwrap();
+    assert_eq!((labels(&both), both[0].begins_s), (vec!["person_1".to_owned(), "person_7".to_owned()], 0.0));
+    assert!((both[1].begins_s - 10.0 / 30.0).abs() < 1e-12, "{}", both[1].begins_s);
+    assert!((read("slahmr.npz", MotionOptions::default()).unwrap()[1].begins_s - 4.0 / 30.0).abs() < 1e-12);
+    // The clock is that of those who are chosen, in the order asked for.
+    assert_eq!(labels(&read("vibe.joblib", person("7, 1,7")).unwrap()), ["person_7", "person_1"]);
+    assert_eq!(read("vibe.joblib", person("7,")).unwrap_err().to_string().matches("person  is not in it").count(), 1);
+    assert_eq!(read("vibe.joblib", person("7")).unwrap()[0].begins_s, 0.0);
+    let window = |start_s, duration_s| read("vibe.joblib", MotionOptions { start_s, duration_s, ..Default::default() });
+    let late = window(0.15, None).unwrap();
+    assert_eq!((labels(&late), late[0].motion.frames.len()), (vec!["person_7".to_owned()], 7), "one is gone by then");
+    assert!((late[0].begins_s - (10.0 / 30.0 - 0.15)).abs() < 1e-12);
+    let within = window(0.35, Some(0.1)).unwrap();
+    assert!(within.len() == 1 && within[0].motion.frames.len() == 3 && (within[0].begins_s - (11.0 / 30.0 - 0.35)).abs() < 1e-9);
+    assert!(window(0.15, Some(0.05)).is_err() && window(5.0, None).is_err(), "nobody is there");
+    // A file of another format holds one person.
+    assert_eq!(labels(&read("../b_6ch.bvh", person("all")).unwrap()), ["person_0"]);
 }
 
 #[test]

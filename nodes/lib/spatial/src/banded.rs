@@ -96,7 +96,50 @@ impl Factor {
             right[i] = solved;
         }
     }
+
+    /// The part that counts of `M^-1 right`, for a right side that is zero but for the rows from `first` on: rows and their first index. The
+    /// solution falls off geometrically on both sides; it is followed to `SMALL` of its largest entry, so that this costs its width and not N.
+    pub(crate) fn solve_near<const C: usize>(&self, first: usize, right: &[[f64; C]]) -> (usize, Vec<[f64; C]>) {
+        let mut forward: Vec<[f64; C]> = Vec::new();
+        let mut most = [0.0_f64; C];
+        for i in first..self.rows.len() {
+            let mut x = right.get(i - first).copied().unwrap_or([0.0; C]);
+            for k in 1..=BANDWIDTH.min(i - first) {
+                let (l, other) = (self.rows[i][k], forward[i - k - first]);
+                (0..C).for_each(|c| x[c] -= l * other[c]);
+            }
+            (0..C).for_each(|c| most[c] = most[c].max(x[c].abs()));
+            forward.push(x);
+            let fallen = |row: &[f64; C]| (0..C).all(|c| row[c].abs() <= SMALL * most[c]);
+            if forward.len() > right.len() + BANDWIDTH && forward[forward.len() - BANDWIDTH..].iter().all(fallen) {
+                break;
+            }
+        }
+        let end = first + forward.len();
+        // Newest first: row i stands at `end - 1 - i`.
+        let mut solved: Vec<[f64; C]> = Vec::with_capacity(2 * forward.len());
+        let mut most = [0.0_f64; C];
+        for i in (0..end).rev() {
+            let below = solved.len();
+            let mut x = if i >= first { forward[i - first].map(|z| z * self.rows[i][0]) } else { [0.0; C] };
+            for k in 1..=BANDWIDTH.min(below) {
+                let (l, other) = (self.rows[i + k][k], solved[below - k]);
+                (0..C).for_each(|c| x[c] -= l * other[c]);
+            }
+            (0..C).for_each(|c| most[c] = most[c].max(x[c].abs()));
+            solved.push(x);
+            let fallen = |row: &[f64; C]| (0..C).all(|c| row[c].abs() <= SMALL * most[c]);
+            if i < first && solved[solved.len() - BANDWIDTH.min(solved.len())..].iter().all(fallen) {
+                break;
+            }
+        }
+        solved.reverse();
+        (end - solved.len(), solved)
+    }
 }
+
+/// Where a solution is cut off, as a part of its largest entry.
+const SMALL: f64 = 1e-7;
 
 #[cfg(test)]
 mod tests {
@@ -129,6 +172,29 @@ mod tests {
         for c in 0..2 {
             let product = &dense * DMatrix::from_iterator(size, 1, x.iter().map(|v| v[c]));
             assert!((0..size).all(|i| (product[i] - given[i][c]).abs() < 1e-12));
+        }
+    }
+
+    #[test]
+    fn a_local_solution_is_the_whole_one_where_it_counts() {
+        let size = 400;
+        let (mut left, zero) = (Banded::zeros(size), Banded::zeros(size));
+        for row in &mut left.rows {
+            *row = [9.0, -2.0, 0.7, -0.5, 0.3, -0.2];
+        }
+        let mut factor = Factor::default();
+        factor.factor_sum(&left, 0.0, &zero).unwrap();
+        let right = [[1.0, 0.0], [-0.5, 2.0], [0.25, 1.0]];
+        for first in [0, 3, 200, 397] {
+            let mut whole = vec![[0.0; 2]; size];
+            whole[first..first + 3].copy_from_slice(&right);
+            factor.solve(&mut whole);
+            let (start, near) = factor.solve_near(first, &right);
+            assert!(near.len() < 200, "{} rows of {size}", near.len());
+            for (i, row) in whole.iter().enumerate() {
+                let found = i.checked_sub(start).and_then(|i| near.get(i)).copied().unwrap_or([0.0; 2]);
+                assert!((0..2).all(|c| (found[c] - row[c]).abs() < 1e-6), "row {i} from {first}: {found:?} {row:?}");
+            }
         }
     }
 

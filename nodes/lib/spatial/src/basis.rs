@@ -1,7 +1,7 @@
 //! Quintic B-splines with knots at the samples' own times.
 
 /// Degree of the splines.
-const DEGREE: usize = 5;
+pub(crate) const DEGREE: usize = 5;
 
 /// Basis functions that overlap one point.
 pub(crate) const ORDER: usize = DEGREE + 1;

@@ -24,6 +24,7 @@
 
 mod banded;
 mod basis;
+mod confidence;
 mod derivative_risk;
 mod difference;
 mod error;
@@ -31,6 +32,7 @@ mod estimate;
 mod floor;
 mod grid;
 mod holes;
+mod influence;
 mod pose_spline;
 mod raster;
 mod segments;
@@ -42,11 +44,13 @@ mod stamp;
 mod system;
 mod track;
 
+pub use confidence::{CONFIDENCE_LENGTH_M, HALF_CONFIDENCE_STD_M, confidence_of_std, std_of_confidence};
 pub use derivative_risk::Derivative;
 pub use difference::{MAX_STENCIL, derivative_weights};
 pub use error::SpatialError;
 pub use estimate::{PoseEstimate, PoseNoise};
 pub use grid::{check_times, relative_seconds, uniform_stamps};
+pub use influence::{Influence, SampleWeights};
 pub use pose_spline::{Motion, PoseSmoothing, PoseSpline, PoseTimes, position_channels, rotation_channels};
 pub use rustfft::num_complex::Complex64;
 pub use select::WeightSearch;

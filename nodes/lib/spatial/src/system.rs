@@ -4,8 +4,8 @@ use std::ops::Range;
 use std::sync::OnceLock;
 
 use crate::SpatialError;
-use crate::banded::Banded;
-use crate::basis::{Basis, ORDER};
+use crate::banded::{Banded, Factor};
+use crate::basis::{Basis, DEGREE, ORDER};
 use crate::derivative_risk::{Derivative, SplitRun};
 use crate::difference::{MAX_STENCIL, derivative_weights};
 use crate::grid::check_times;
@@ -164,6 +164,39 @@ impl SplineSystem {
             }
         }
         Ok(())
+    }
+
+    /// `B^T B + weight P`, factored.
+    pub(crate) fn factor(&self, weight: f64) -> Result<Factor, SpatialError> {
+        let mut factor = Factor::default();
+        factor.factor_sum(&self.gram, weight, &self.penalty)?;
+        Ok(factor)
+    }
+
+    /// What the samples are multiplied with in `x^T B^T y`, the derivatives at the ends included, for coefficients x that are zero but from
+    /// `start` on: one row a sample, and the first sample.
+    pub(crate) fn transposed<const C: usize>(&self, start: usize, x: &[[f64; C]]) -> (usize, Vec<[f64; C]>) {
+        let last_interval = self.basis.interval_count() - 1;
+        let dot = |first: usize, row: &[f64; ORDER]| -> [f64; C] {
+            let entry = |j: usize| (first + j).checked_sub(start).and_then(|i| x.get(i)).copied().unwrap_or([0.0; C]);
+            (0..ORDER).fold([0.0; C], |sum, j| std::array::from_fn(|c| sum[c] + row[j] * entry(j)[c]))
+        };
+        let (mut low, mut high) = (start.saturating_sub(DEGREE), (start + x.len()).min(self.sample_count));
+        let reached = self.ends.iter().filter(|end| end.first < start + x.len() && start < end.first + ORDER);
+        let reached: Vec<&EndDerivative> = reached.collect();
+        for end in &reached {
+            low = low.min(end.start);
+            high = high.max((end.start + MAX_STENCIL).min(self.sample_count));
+        }
+        low = low.min(high);
+        let mut rows: Vec<[f64; C]> = (low..high).map(|k| dot(k.min(last_interval), &self.collocation[k])).collect();
+        for end in reached {
+            let weighted = dot(end.first, &end.row).map(|d| d * end.weight);
+            for (row, w) in rows[end.start - low..].iter_mut().zip(end.stencil) {
+                (0..C).for_each(|c| row[c] += w * weighted[c]);
+            }
+        }
+        (low, rows)
     }
 
     /// `B^T (y - B c) - weight P c` of the coefficients in `scratch`, into its correction; returns `|y - B c|^2 + weight c^T P c`, over all

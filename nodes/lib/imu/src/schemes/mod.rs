@@ -1,6 +1,7 @@
 //! Ways to differentiate a sensor's frames, one file each.
 
 use std::fmt;
+use std::ops::Range;
 use std::str::FromStr;
 
 use cromosim_spatial::derivative_weights;
@@ -85,6 +86,15 @@ impl FromStr for Scheme {
     }
 }
 
+/// The frames that an estimate at frame `k` of `count` takes.
+pub(crate) fn stencil_range(count: usize, k: usize, reach: usize) -> Range<usize> {
+    // A one-sided second derivative needs one frame more to have the same order of error.
+    let inside = k >= reach && k + reach < count;
+    let width = (2 * reach + if inside { 1 } else { 2 }).min(count);
+    let start = k.saturating_sub(reach).min(count - width);
+    start..start + width
+}
+
 /// The frames around one frame, with the weights of their differences.
 pub(crate) struct Stencil<'a> {
     frames: &'a [SensorFrame],
@@ -94,11 +104,9 @@ pub(crate) struct Stencil<'a> {
 
 impl<'a> Stencil<'a> {
     fn new(frames: &'a [SensorFrame], k: usize, reach: usize) -> Self {
-        // A one-sided second derivative needs one frame more to have the same order of error.
-        let inside = k >= reach && k + reach < frames.len();
-        let width = (2 * reach + if inside { 1 } else { 2 }).min(frames.len());
-        let start = k.saturating_sub(reach).min(frames.len() - width);
-        let (centre, frames) = (&frames[k], &frames[start..start + width]);
+        let range = stencil_range(frames.len(), k, reach);
+        let (centre, width) = (&frames[k], range.len());
+        let frames = &frames[range];
         let mut seconds = [0.0; cromosim_spatial::MAX_STENCIL];
         for (seconds, frame) in seconds.iter_mut().zip(frames) {
             *seconds = frame.stamp - centre.stamp;

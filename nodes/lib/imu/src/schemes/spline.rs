@@ -1,9 +1,10 @@
 //! Smoothing quintic splines of position and quaternion, see [`cromosim_spatial::PoseSpline`].
 
-use cromosim_spatial::{PoseSmoothing, PoseSpline, PoseTimes, Stamp};
+use cromosim_spatial::{Influence, PoseSmoothing, PoseSpline, PoseTimes, Stamp};
 use nalgebra::Isometry3;
 
-use crate::{ImuError, KinematicSample, SensorFrame};
+use crate::uncertainty::{FrameWeights, any_error};
+use crate::{ImuError, KinematicSample, SampleVariance, SensorFrame};
 
 /// The spline of a series of frames, smoothed as the frames themselves ask for.
 pub(crate) fn fit(times: &PoseTimes, frames: &[SensorFrame]) -> Result<PoseSpline, ImuError> {
@@ -20,5 +21,31 @@ pub(crate) fn sample(spline: &PoseSpline, stamp: Stamp) -> KinematicSample {
         acceleration: motion.acceleration,
         angular_velocity: motion.angular_velocity,
         angular_acceleration: Some(motion.angular_acceleration),
+        variance: SampleVariance::default(),
+    }
+}
+
+/// What errors of a spline's frames leave in its samples.
+pub(crate) struct SplineVariance<'a> {
+    frames: &'a [SensorFrame],
+    position: Influence,
+    rotation: Influence,
+}
+
+impl<'a> SplineVariance<'a> {
+    /// For a spline through or near `frames`; `None` where no errors are known of.
+    pub(crate) fn new(times: &PoseTimes, spline: &PoseSpline, frames: &'a [SensorFrame]) -> Result<Option<Self>, ImuError> {
+        if !any_error(frames) {
+            return Ok(None);
+        }
+        let influence = |weight| Influence::new(times.system(), weight);
+        let (position, rotation) = (influence(spline.position().weight())?, influence(spline.rotation().weight())?);
+        Ok(Some(Self { frames, position, rotation }))
+    }
+
+    /// At a stamp within the frames.
+    pub(crate) fn at(&self, stamp: Stamp) -> SampleVariance {
+        let seconds = stamp - self.frames[0].stamp;
+        FrameWeights::of_spline(&self.position, &self.rotation, seconds).variance(self.frames)
     }
 }

@@ -8,7 +8,6 @@
 //! beside them; [`CameraFolder`] finds their files.
 
 mod clip;
-mod confidence;
 mod depth_map;
 mod error;
 mod filter;
@@ -29,7 +28,7 @@ mod torso;
 mod trajectory;
 
 pub use clip::{CameraClip, DepthProvider, average_betas};
-pub use confidence::{HALF_CONFIDENCE_STD_M, confidence_of_std, std_of_confidence};
+pub use cromosim_spatial::{HALF_CONFIDENCE_STD_M, confidence_of_std, std_of_confidence};
 pub use depth_map::{
     DepthEncoding, DepthMap, MAX_DEPTH_PIXELS, parse_depth, parse_npy_depth, parse_plain_depth, parse_png_depth, parse_raw_depth,
     write_raw_depth,

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use cromosim_body::{BodyModel, Gender, Joint, Site};
+use cromosim_spatial::confidence_of_std;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -51,7 +52,7 @@ impl Default for MarkerOptions {
 /// beyond 3 mm, the marker `m_i` on the skin by linear blend skinning with pose corrections, the prior's weight w falling from 4 to 0.25
 /// where a frame starts from nothing, and what the frames around it promise; elbows and knees that bend the wrong way cost more. Markers that
 /// are not seen count nothing; frames with fewer than six are interpolated. The world has z up, the recording's origin and floor. The
-/// motion's `confidence` is the share of the set's markers that were seen.
+/// motion's `confidence` follows from the joints' median standard deviation and from how many markers were seen.
 ///
 /// # Errors
 /// [`MotionError`] where labels, subject, unit or up axis do not fit; the message says which option helps.
@@ -83,9 +84,9 @@ pub fn fit_markers(
     let frames = continuous(tracker.track(&bound.frames));
     crate::retarget::check_finite(&clip.name, &frames)?;
     let (markers, rms_m) = marker_fits(&bound, &shaped, &person, &stuck_at, &frames);
-    let seen = |frame: &Vec<Option<Vector3<f64>>>| frame.iter().flatten().count() as f64 / set.markers().len() as f64;
     let missing = bound.frames.iter().flatten().filter(|point| point.is_none()).count();
     let sigmas = joint_sigmas(&shaped, &prior, &keyframes, rms_m / f64::sqrt(3.0));
+    let confidence = bound.frames.iter().map(|frame| confidence(&sigmas, frame, set.markers().len())).collect();
     let report = MarkerReport {
         marker_set: set.name().to_owned(),
         subjects: clip.subjects(),
@@ -106,13 +107,21 @@ pub fn fit_markers(
         gender: body.gender().unwrap_or(Gender::Neutral),
         shape_space: body.shape_space(),
         betas: person.betas,
-        confidence: Some(bound.frames.iter().map(seen).collect()),
+        confidence: Some(confidence),
         frames,
         report: None,
         poses: None,
         markers: Some(report.clone()),
     };
     Ok((motion, report))
+}
+
+/// Of a frame, by the joints' median standard deviation along an axis; it grows as the root of the set's markers over those seen.
+fn confidence(joint_sigmas_m: &[f64], frame: &[Option<Vector3<f64>>], markers: usize) -> f64 {
+    let mut sigmas = joint_sigmas_m.to_vec();
+    sigmas.sort_unstable_by(f64::total_cmp);
+    let median_m = sigmas.get(sigmas.len() / 2).copied().unwrap_or(f64::INFINITY) / f64::sqrt(3.0);
+    confidence_of_std(median_m * (markers as f64 / frame.iter().flatten().count() as f64).sqrt())
 }
 
 /// Each marker's error, worst first, and that of all together, m.

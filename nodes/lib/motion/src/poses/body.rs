@@ -100,6 +100,7 @@ impl OnBody<'_> {
             betas_left_out: shape.betas_left_out,
             up_axis,
             has_trajectory: track.trans.is_some(),
+            first_frame: first_frame(&track, &played),
             bridged_frames: played.length - played.frames.len(),
             left_out_frames: track.rotations.len() - played.frames.len(),
             floor_shift_m,
@@ -135,7 +136,7 @@ impl OnBody<'_> {
             person: track.person.clone(),
             rate_hz,
             gender: track.gender.unwrap_or(Gender::Neutral),
-            first_frame: track.frame_ids.as_ref().map_or(0, |ids| ids[played.frames.start]),
+            first_frame: first_frame(track, &played),
             poses: continuous(poses),
             pose_confidence: confidence,
             betas: if own { places.into_iter().map(|(frame, _)| betas_at(frame)).collect() } else { Vec::new() },
@@ -193,6 +194,11 @@ impl OnBody<'_> {
         };
         Ok((minimal_rotation(up, Vector3::z()), axis_name(up)))
     }
+}
+
+/// Number of the first frame that is played.
+fn first_frame(track: &PoseTrack, played: &Played) -> i64 {
+    track.frame_ids.as_ref().map_or(0, |ids| ids[played.frames.start])
 }
 
 fn between(from: &BodyPose, to: &BodyPose, fraction: f64) -> BodyPose {

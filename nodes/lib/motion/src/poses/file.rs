@@ -133,8 +133,8 @@ impl PoseFile {
         self.on_body(&people, body, source_body, options).motion(track)
     }
 
-    /// As [`Self::into_motion`] for everybody; [`MotionOptions::person`] is passed over. [`PoseReport::person`](super::PoseReport) tells
-    /// them apart.
+    /// As [`Self::into_motion`] for the people that [`MotionOptions::person`] names (`all` or nothing: everybody; else names with commas
+    /// between), in that order and each once. [`PoseReport::person`](super::PoseReport) tells them apart.
     ///
     /// # Errors
     /// As [`Self::into_motion`].
@@ -145,7 +145,13 @@ impl PoseFile {
         options: &MotionOptions,
     ) -> Result<Vec<SmplMotion>, MotionError> {
         let people = self.people();
-        let tracks = std::mem::take(&mut self.tracks);
+        let mut chosen: Vec<usize> = match options.people() {
+            Some(names) => names.into_iter().map(|name| self.choose(Some(name))).collect::<Result<_, _>>()?,
+            None => (0..people.len()).collect(),
+        };
+        let mut seen = vec![false; people.len()];
+        chosen.retain(|&index| !std::mem::replace(&mut seen[index], true));
+        let mut tracks: Vec<Option<PoseTrack>> = std::mem::take(&mut self.tracks).into_iter().map(Some).collect();
         let on_body = self.on_body(&people, body, source_body, options);
         let mut left = super::MAX_POSES;
         let mut motion = |track: PoseTrack| {
@@ -153,7 +159,7 @@ impl PoseFile {
             left = left.checked_sub(motion.frames.len()).ok_or_else(|| too_long(&self.path))?;
             Ok(motion)
         };
-        tracks.into_iter().map(&mut motion).collect()
+        chosen.into_iter().filter_map(|index| tracks[index].take()).map(&mut motion).collect()
     }
 
     /// Everybody in the camera's axes, in place; people whose poses are in a world are left out. Betas are given where they are those of

@@ -38,7 +38,7 @@ fn camera_beside(path: &Path) -> Result<Option<Entry>, ArraysError> {
     found.map(|camera| Container::open(&camera)?.root()).transpose()
 }
 
-fn source_body(options: &MotionOptions) -> Result<Option<Arc<BodyModel>>, MotionError> {
+pub(super) fn source_body(options: &MotionOptions) -> Result<Option<Arc<BodyModel>>, MotionError> {
     Ok(options.source_body.as_deref().map(BodyModel::read).transpose()?)
 }
 
@@ -46,18 +46,6 @@ fn source_body(options: &MotionOptions) -> Result<Option<Arc<BodyModel>>, Motion
 pub(crate) fn read_poses(path: &Path, body: &Arc<BodyModel>, options: &MotionOptions) -> Result<Option<SmplMotion>, MotionError> {
     let Some(file) = open_poses(path, PoseView::World)? else { return Ok(None) };
     file.into_motion(body, source_body(options)?.as_ref(), options).map(Some)
-}
-
-/// Everybody in a motion file: of SMPL parameters each person, of any other format its one motion. [`MotionOptions::person`] is passed
-/// over; `start_s` and `duration_s` cut each motion, whoever is not there at `start_s` is left out.
-///
-/// # Errors
-/// As [`read_motion_for`](crate::read_motion_for); [`MotionError::Setting`] where nobody is left.
-pub fn read_people(path: &Path, body: &Arc<BodyModel>, options: &MotionOptions) -> Result<Vec<SmplMotion>, MotionError> {
-    let Some(file) = open_poses(path, PoseView::World)? else { return Ok(vec![crate::read_motion_for(path, body, options)?]) };
-    let motions = file.into_motions(body, source_body(options)?.as_ref(), options)?;
-    let cuts: Vec<_> = motions.iter().map(|motion| motion.slice(options.start_s, options.duration_s)).collect();
-    if cuts.iter().any(Result::is_ok) { Ok(cuts.into_iter().flatten().collect()) } else { cuts.into_iter().collect() }
 }
 
 /// Everybody in a file of video estimates in the camera's axes, in place: what a global trajectory is made from. WHAM's and GVHMR's

@@ -56,6 +56,8 @@ pub struct PoseReport {
     pub up_axis: String,
     /// Whether the file says where the body goes; else it stays in place.
     pub has_trajectory: bool,
+    /// Number of the motion's first frame in the file or its video: people of one file are in step by it.
+    pub first_frame: i64,
     /// Frames in gaps of the track, made by interpolation, with confidence 0.
     pub bridged_frames: usize,
     /// Frames of the track beyond a gap that is too long.

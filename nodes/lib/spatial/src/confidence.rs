@@ -3,6 +3,9 @@
 /// Standard deviation per axis at which the confidence is one half, m: an error as long as a wrist is wide.
 pub const HALF_CONFIDENCE_STD_M: f64 = 0.1;
 
+/// What a position's standard deviation is divided by for that of a rotation, m: a limb turned by so much misses by the one at its end.
+pub const CONFIDENCE_LENGTH_M: f64 = 0.5;
+
 /// Confidence in [0, 1] of a position whose standard deviation per axis is `std_m` (root of a third of the covariance's trace):
 /// `c = 1 / (1 + (s / 0.1 m)^2)`. 1 is exact, 0.5 is 10 cm, 0.2 is 20 cm, 0 is unknown.
 pub fn confidence_of_std(std_m: f64) -> f64 {

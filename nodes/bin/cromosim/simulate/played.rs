@@ -1,0 +1,143 @@
+//! The people of a motion, and their messages in a bag.
+
+use std::fs;
+use std::path::Path;
+
+use anyhow::Context;
+use cromosim_bag::{BagReader, BagWriter, write_imu_csv};
+use cromosim_motion::{Person, SmplMotion};
+use cromosim_msgs::cromosim_msgs::SmplState;
+use cromosim_msgs::geometry_msgs::PoseStamped;
+use cromosim_msgs::sensor_msgs::Imu;
+use cromosim_msgs::std_msgs::Header;
+use cromosim_spatial::Stamp;
+
+use super::BEGINS;
+use crate::progress::Interrupt;
+
+/// One person of a motion file.
+pub(super) struct Played {
+    pub motion: SmplMotion,
+    /// Before topics (`/person_7`) and frames; empty for a file's only or chosen person.
+    pub label: String,
+    pub body_id: String,
+    /// Of the motion's frames.
+    pub stamps: Vec<Stamp>,
+}
+
+/// One placement's results.
+pub(super) struct Simulated {
+    pub name: String,
+    pub reference: Vec<PoseStamped>,
+    pub raw: Vec<Imu>,
+    pub full: Vec<Imu>,
+}
+
+impl Played {
+    /// A file's only person, or the chosen one.
+    pub fn alone(motion: SmplMotion) -> Self {
+        Self { stamps: stamps(&motion, 0.0), motion, label: String::new(), body_id: "0".to_owned() }
+    }
+
+    /// One of several people.
+    pub fn of_several(person: Person) -> Self {
+        let Person { name, label, begins_s, motion } = person;
+        Self { stamps: stamps(&motion, begins_s), motion, label, body_id: name }
+    }
+
+    /// The name of a frame, or of anything that is this person's own.
+    pub fn frame(&self, name: &str) -> String {
+        if self.label.is_empty() { name.to_owned() } else { format!("{}/{name}", self.label) }
+    }
+
+    /// The name of a topic.
+    fn topic(&self, name: &str) -> String {
+        format!("/{}", self.frame(name))
+    }
+
+    fn state(&self, frame: usize) -> SmplState {
+        let motion = &self.motion;
+        let body = &motion.frames[frame];
+        let mut state = SmplState {
+            header: Header::new(self.stamps[frame].nanos, "world"),
+            body_id: self.body_id.clone(),
+            gender: motion.gender.name().to_owned(),
+            betas: motion.betas.clone(),
+            shape_space: motion.shape_space.name().to_owned(),
+            confidence: motion.confidence.as_ref().map_or(1.0, |values| values[frame]),
+            ..SmplState::default()
+        };
+        state.set_root_and_rotations(body.root_position, &body.local_rotations);
+        state
+    }
+}
+
+fn stamps(motion: &SmplMotion, begins_s: f64) -> Vec<Stamp> {
+    (0..motion.frames.len()).map(|frame| BEGINS.plus_seconds(begins_s + frame as f64 / motion.rate_hz)).collect()
+}
+
+/// Messages of one time: of each person the state first, then each placement's.
+pub(super) fn write_in_order_of_time(
+    bag: &mut BagWriter,
+    people: &[Played],
+    simulated: &[Vec<Simulated>],
+    interrupt: &Interrupt,
+) -> anyhow::Result<()> {
+    enum What<'a> {
+        State(&'a Played, usize),
+        Reference(&'a str, &'a PoseStamped),
+        Sample(&'a [String; 2], [&'a Imu; 2]),
+    }
+    let topics: Vec<Vec<(String, [String; 2])>> =
+        people.iter().zip(simulated).map(|(person, simulated)| topics(person, simulated)).collect();
+    let states: Vec<String> = people.iter().map(|person| person.topic("smpl/state")).collect();
+    let mut schedule: Vec<(i64, usize, What)> = Vec::new();
+    for (number, (person, simulated)) in people.iter().zip(simulated).enumerate() {
+        schedule.extend(person.stamps.iter().enumerate().map(|(frame, stamp)| (stamp.nanos, number, What::State(person, frame))));
+        for (placement, (reference, samples)) in simulated.iter().zip(&topics[number]) {
+            let references = placement.reference.iter();
+            schedule.extend(references.map(|message| (message.header.stamp.nanos(), number, What::Reference(reference, message))));
+            let both = placement.raw.iter().zip(&placement.full);
+            schedule.extend(both.map(|(raw, full)| (raw.header.stamp.nanos(), number, What::Sample(samples, [raw, full]))));
+        }
+    }
+    schedule.sort_by_key(|(nanos, ..)| *nanos);
+    for (nanos, number, what) in schedule {
+        let stamp = Stamp::from_nanos(nanos);
+        interrupt.check()?;
+        match what {
+            What::State(person, frame) => bag.write(&states[number], stamp, &person.state(frame))?,
+            What::Reference(topic, message) => bag.write(topic, stamp, message)?,
+            What::Sample([raw_topic, full_topic], [raw, full]) => {
+                bag.write(raw_topic, stamp, raw)?;
+                bag.write(full_topic, stamp, full)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Of each placement: of its reference; of `data_raw` and `data`.
+fn topics(person: &Played, simulated: &[Simulated]) -> Vec<(String, [String; 2])> {
+    let of = |placement: &Simulated| {
+        let name = &placement.name;
+        let imu = ["data_raw", "data"].map(|ending| person.topic(&format!("imu/{name}/{ending}")));
+        (person.topic(&format!("reference/{name}")), imu)
+    };
+    simulated.iter().map(of).collect()
+}
+
+/// DIR/NAME_PLACEMENT.csv with the samples of `data`; of several people NAME_person_ID_PLACEMENT.csv.
+pub(super) fn write_csv(bag: &Path, folder: &Path, person: &Played, simulated: &[Simulated]) -> anyhow::Result<()> {
+    fs::create_dir_all(folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
+    let reader = BagReader::open(bag)?;
+    let stem = bag.file_stem().unwrap_or_default().to_string_lossy();
+    let label = if person.label.is_empty() { String::new() } else { format!("_{}", person.label) };
+    for placement in simulated {
+        let path = folder.join(format!("{stem}{label}_{}.csv", placement.name));
+        let file = fs::File::create(&path).with_context(|| format!("{}: cannot be written", path.display()))?;
+        let topic = person.topic(&format!("imu/{}/data", placement.name));
+        write_imu_csv(&reader, &topic, std::io::BufWriter::new(file), &path)?;
+    }
+    Ok(())
+}
