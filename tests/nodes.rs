@@ -319,7 +319,7 @@ fn shipped_parameter_files_and_scripts_are_valid() {
         let parameter = format!("placements:='{}'", file.display());
         common::succeed(folder.path(), &["node", "virtual_imu", "--check-config", "--ros-args", "-p", &parameter]);
     }
-    for script in ["demo.sh", "live.sh", "nodes.sh"] {
+    for script in ["demo.sh", "live.sh", "nodes.sh", "people.sh"] {
         assert!(Command::new("bash").arg("-n").arg(root().join("launch_scripts").join(script)).status().unwrap().success(), "{script}");
     }
     for launch in ["demo.launch.py", "live.launch.py"] {

@@ -227,3 +227,39 @@ fn an_interrupt_leaves_nothing_half_written() {
     let left: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
     assert_eq!(left, ["long.bvh"]);
 }
+
+/// Each person's topics, frames and CSV files; and errors that name who is there.
+#[test]
+fn several_people_become_one_bag() {
+    let file = root().join("nodes/lib/motion/tests/data/poses/chain_wham.pkl");
+    let file = file.to_str().unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let said = succeed(folder.path(), &["simulate", file, "--person", "all", "--out", "people.mcap", "--csv", "csv"]);
+    assert!(said.contains("2 people"), "{said}");
+    let people = BagReader::open(&folder.path().join("people.mcap")).unwrap();
+    for (label, frames, id) in [("person_0", 61, "0"), ("person_3", 50, "3")] {
+        let states = people.read::<SmplState>(&format!("/{label}/smpl/state")).unwrap();
+        assert_eq!((states.len(), states[0].1.body_id.as_str()), (frames, id));
+        let raw = people.read::<Imu>(&format!("/{label}/imu/head/data_raw")).unwrap();
+        assert_eq!(raw[0].1.header.frame_id, format!("{label}/head_imu"));
+        assert_eq!(people.read::<PoseStamped>(&format!("/{label}/reference/head")).unwrap().len(), frames);
+        assert!(folder.path().join(format!("csv/people_{label}_head.csv")).exists());
+    }
+    // Alone, a person reads the same, but for noise: a device of its own, and a clock of its own.
+    succeed(folder.path(), &["simulate", file, "--person", "3", "--out", "alone.mcap", "--no-noise"]);
+    succeed(folder.path(), &["simulate", file, "--person", "3,0", "--out", "both.mcap", "--no-noise"]);
+    let read = |name: &str, topic: &str| BagReader::open(&folder.path().join(name)).unwrap().read::<Imu>(topic).unwrap();
+    let (alone, both) = (read("alone.mcap", "/imu/head/data_raw"), read("both.mcap", "/person_3/imu/head/data_raw"));
+    assert_eq!(alone.len(), both.len());
+    for ((_, alone), (_, both)) in alone.iter().zip(&both) {
+        assert_eq!(both.header.stamp.nanos() - alone.header.stamp.nanos(), 200_000_000);
+        let apart = nalgebra::Vector3::from(alone.linear_acceleration) - nalgebra::Vector3::from(both.linear_acceleration);
+        assert!(apart.norm() < 1e-5, "{apart}");
+    }
+    for arguments in [["simulate", file, "--person", "0,5", "--out", "x.mcap"], ["convert", file, "x.bvh", "--person", "all"]] {
+        let output = cromosim_in(folder.path(), &arguments);
+        assert_eq!(output.status.code(), Some(2));
+        assert!(text(&output).contains("is not in it; there are 0 (61 frames), 3 (50 frames)"), "{}", text(&output));
+    }
+    assert!(!folder.path().join("x.mcap").exists() && !folder.path().join("x.bvh").exists());
+}

@@ -26,7 +26,7 @@ pub struct Person {
 }
 
 impl MotionOptions {
-    /// Whether [`Self::person`] asks for several people: `all`, or names with commas between.
+    /// Whether [`Self::person`] asks for several people: `all`, or names with commas between (`7,` is several that are one).
     pub fn asks_for_several(&self) -> bool {
         self.person.as_deref().is_some_and(|person| person == EVERYBODY || person.contains(','))
     }
@@ -34,7 +34,8 @@ impl MotionOptions {
     /// The names asked for; none for everybody.
     pub(crate) fn people(&self) -> Option<Vec<&str>> {
         let person = self.person.as_deref().filter(|&person| person != EVERYBODY)?;
-        Some(person.split(',').map(str::trim).collect())
+        let names: Vec<&str> = person.split(',').map(str::trim).filter(|name| !name.is_empty()).collect();
+        Some(if names.is_empty() { vec![person] } else { names })
     }
 }
 
