@@ -127,7 +127,8 @@ fn nonsense_is_refused_and_the_node_goes_on() {
 /// The readings of the walk's first second with this confidence, without those that rest on its ends.
 fn with_confidence(config: Config, confidence: f64) -> Vec<Reading> {
     let motion = embedded_walk().slice(0.0, Some(1.0)).unwrap();
-    let mut node = node(config);
+    let placements = cromosim_virtual_imu::placements(&config).unwrap();
+    let mut node = VirtualImuNode::new(config, BodyModel::embedded(), &placements, Path::new(".")).unwrap();
     let step = |frame: usize| {
         let state = SmplState { confidence, ..state(&motion, frame, START + frame as i64 * 10_000_000) };
         node.step(&state).unwrap().readings
