@@ -263,4 +263,8 @@ fn several_people_become_one_bag() {
         assert!(text(&output).contains("is not in it; there are 0 (61 frames), 3 (50 frames)"), "{}", text(&output));
     }
     assert!(!folder.path().join("x.mcap").exists() && !folder.path().join("x.bvh").exists());
+    // A skeleton's file holds one person.
+    succeed(folder.path(), &["convert", file, "walk.bvh", "--person", "3"]);
+    succeed(folder.path(), &["simulate", "walk.bvh", "--person", "all", "--out", "one.mcap"]);
+    assert!(!read("one.mcap", "/person_0/imu/head/data_raw").is_empty());
 }

@@ -173,7 +173,7 @@ fn at_confidence_0_there_is_no_estimate() {
             if (105..125).contains(&at) {
                 assert!(covariances.iter().all(|covariance| covariance[0] == -1.0), "frame {at}");
             }
-            if at < 85 || at > 145 {
+            if !(85..=145).contains(&at) {
                 assert!(covariances.iter().all(|covariance| covariance[0] >= 0.0), "frame {at}");
             }
             lost.extend((reading.raw.linear_acceleration_covariance[0] < 0.0).then_some(at));

@@ -150,8 +150,7 @@ fn people_of_one_file_are_in_step() {
     let within = window(0.35, Some(0.1)).unwrap();
     assert!(within.len() == 1 && within[0].motion.frames.len() == 3 && (within[0].begins_s - (11.0 / 30.0 - 0.35)).abs() < 1e-9);
     assert!(window(0.15, Some(0.05)).is_err() && window(5.0, None).is_err(), "nobody is there");
-    // A file of another format holds one person.
-    assert_eq!(labels(&read("../b_6ch.bvh", person("all")).unwrap()), ["person_0"]);
+    assert_eq!(labels(&read("amass.npz", person("all")).unwrap()), ["person_0"]);
 }
 
 #[test]

@@ -25,7 +25,8 @@ pub(crate) fn sample(spline: &PoseSpline, stamp: Stamp) -> KinematicSample {
     }
 }
 
-/// What errors of a spline's frames leave in its samples.
+/// What errors of a spline's frames leave in its samples, its smoothing taken as given. That the smoothing is chosen from the same frames adds
+/// to it: 12 % of the acceleration's variance and 28 % of the angular velocity's on the tests' jittered second at 100 Hz.
 pub(crate) struct SplineVariance<'a> {
     frames: &'a [SensorFrame],
     position: Influence,

@@ -83,7 +83,7 @@ fn nobody_there(path: &Path, options: &MotionOptions) -> MotionError {
 /// The part of a motion that begins at `arrives_s` inside the window of the options, and when it begins after the window's start; none where
 /// the person comes after the window.
 fn within(motion: &SmplMotion, arrives_s: f64, options: &MotionOptions) -> Result<Option<(f64, SmplMotion)>, MotionError> {
-    if !(options.start_s >= 0.0) {
+    if options.start_s.is_nan() || options.start_s < 0.0 {
         motion.slice(options.start_s, options.duration_s)?;
     }
     let lead_s = arrives_s - options.start_s;
