@@ -171,3 +171,17 @@ pub fn place_markers(motion: &SmplMotion, body: &Arc<BodyModel>, set: &MarkerSet
         frames: motion.frames.iter().map(frame).collect(),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn confidence_is_that_of_the_joints_and_falls_with_markers_lost() {
+        let seen = |count: usize| -> Vec<Option<Vector3<f64>>> { (0..40).map(|marker| (marker < count).then(Vector3::zeros)).collect() };
+        let of = |count: usize| cromosim_spatial::std_of_confidence(confidence(&[0.001, 0.003, 0.002, 0.009, 0.001], &seen(count), 40));
+        let median_m = 0.002 / f64::sqrt(3.0);
+        assert!((of(40) - median_m).abs() < 1e-9 && (of(10) - 2.0 * median_m).abs() < 1e-9);
+        assert_eq!(confidence(&[0.002], &seen(0), 40), 0.0);
+    }
+}
