@@ -1,7 +1,8 @@
 //! From a placement on a body to an inertial measurement unit.
 //!
 //! A [`Placement`] says where a sensor sits; a [`MountedSite`] gives its frame for any [`cromosim_body::BodyPose`]; a [`Scheme`]
-//! differentiates the frames, offline by [`simulate`] or live by [`StreamingImu`]; a [`Device`] adds noise and further [`effects`]; [`SampleVariance`] is what
+//! differentiates the frames, offline by [`simulate`] or live by [`StreamingImu`]; a [`Device`] adds noise and further [`effects`];
+//! [`SampleVariance`] is what
 //! errors of the poses ([`PoseStd`]) leave in a sample.
 //!
 //! The sensor reads, in its own axes (S sensor, B site on the body, G world; R_BG turns site axes into world axes),
