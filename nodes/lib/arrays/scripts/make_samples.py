@@ -5,6 +5,7 @@ expected.txt holds, for every sample beside it, one line an array: file, key pat
 import collections, gzip, io, pickle, struct, sys, types, zipfile
 from pathlib import Path
 import joblib, numpy as np, scipy.sparse as sp
+from scipy.io import loadmat, savemat
 
 DATA = Path(__file__).resolve().parent.parent / "tests" / "data"
 rng = np.random.default_rng(4)
@@ -155,6 +156,17 @@ def many():
     }
 
 
+def mat_files(thing):
+    keys = ["bool", "half", "big", "fortran", "uint", "int", "empty", "number", "real", "truth", "matrix_rows"]
+    arrays = {key: np.asarray(thing[key], "f4") if key == "half" else thing[key] for key in keys}
+    more = {"words": "none \u00e9", "struct": {"inner": 1.0}, "cells": np.array([1, "a"], dtype=object), "complex": thing["complex"], "sparse": thing["csc"]}
+    for name, compress in ("many_v6.mat", False), ("many_v7.mat", True):
+        savemat(DATA / name, {**arrays, **more}, do_compression=compress)
+        # The day of their making would make them differ.
+        content = (DATA / name).read_bytes()
+        (DATA / name).write_bytes(b"MATLAB 5.0 MAT-file".ljust(116) + content[116:])
+
+
 def weighted(array):
     values = np.asarray(array, dtype=float).ravel()
     return float(np.sum((np.arange(values.size) + 1) * values))
@@ -194,6 +206,9 @@ def loaded(path):
             return unpickler.load()
     if path.suffix == ".pt":
         return legacy_load(content)
+    if path.suffix == ".mat":
+        # What is passed over here is left out there too.
+        return {key: value for key, value in loadmat(path).items() if key[0] != "_" and key not in ("struct", "cells", "complex", "sparse")}
     if path.suffix in (".npz", ".npy"):
         read = np.load(path, allow_pickle=True)
         return dict(read) if path.suffix == ".npz" else read
@@ -211,6 +226,7 @@ def main():
     joblib.dump(thing, DATA / "many_gzip.joblib", compress=("gzip", 3))
     np.savez_compressed(DATA / "many.npz", **{key: value for key, value in thing.items() if isinstance(value, np.ndarray)})
     torch_files()
+    mat_files(thing)
     with open(DATA / "expected.txt", "w") as expected:
         for path in sorted(DATA.iterdir()):
             if path.suffix != ".txt":

@@ -13,10 +13,14 @@ use crate::ArraysError;
 use crate::blob::Blob;
 use crate::entry::Entry;
 use crate::limits::{Budget, Limits};
+use crate::mat;
 use crate::npy::{self, NpyHeader};
 use crate::npz::{NpzReader, io_error, names, read_entry};
 use crate::pickle::{self, Fault, LEGACY_START, Reason};
 use crate::value::Value;
+
+/// How HDF5 begins.
+const HDF5_START: &[u8] = b"\x89HDF\r\n\x1a\n";
 
 /// How a file of arrays is packed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,6 +37,8 @@ pub enum Format {
     Zlib,
     /// A pickle within a gzip stream.
     Gzip,
+    /// MATLAB's `.mat` of versions 5 to 7.
+    Mat,
 }
 
 impl Format {
@@ -55,6 +61,7 @@ impl Format {
         match *start {
             _ if start.starts_with(npy::MAGIC) => Some(Self::Npy),
             _ if start.starts_with(b"PK\x03\x04") || start.starts_with(b"PK\x05\x06") => Some(Self::Zip),
+            _ if start.starts_with(mat::START) => Some(Self::Mat),
             _ if start.starts_with(LEGACY_START) => Some(Self::TorchLegacy),
             [0x1f, 0x8b, ..] => Some(Self::Gzip),
             // zlib's two header bytes are a multiple of 31.
@@ -108,11 +115,23 @@ impl<R: Read + Seek> Container<R> {
     ///
     /// # Errors
     /// Any [`ArraysError`] but those of accessors.
-    pub fn new(mut reader: R, path: &Path, limits: Limits) -> Result<Self, ArraysError> {
+    pub fn new(reader: R, path: &Path, limits: Limits) -> Result<Self, ArraysError> {
+        Self::without(reader, path, limits, &[])
+    }
+
+    /// As [`Self::new`], but of a pickle the entries `skipped` (keys from the root on) are left out unread: there, and only there, it may
+    /// hold objects that this reader does not rebuild. They are not interpreted, and nothing of them can be asked for.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn without(mut reader: R, path: &Path, limits: Limits, skipped: &'static [&'static [&'static str]]) -> Result<Self, ArraysError> {
         let cannot_read = |source| ArraysError::Read { path: path.to_owned(), source };
         let path: Arc<Path> = Arc::from(path);
         let Some(format) = Format::of(&mut reader).map_err(cannot_read)? else {
             let start = first_bytes(&mut reader).map_err(cannot_read)?;
+            if start.starts_with(HDF5_START) || start.starts_with(b"MATLAB 7.") {
+                return Err(ArraysError::Hdf5 { path: path.to_path_buf() });
+            }
             let start = if start.is_empty() { "nothing".to_owned() } else { start.escape_ascii().to_string() };
             return Err(ArraysError::Unrecognised { path: path.to_path_buf(), start });
         };
@@ -133,7 +152,12 @@ impl<R: Read + Seek> Container<R> {
         }
         let mut bytes = Vec::new();
         reader.take(limits.decoded_bytes).read_to_end(&mut bytes).map_err(cannot_read)?;
-        let value = read_whole(bytes, format, limits).map_err(|fault| pickle_error(&path, "", fault))?;
+        let value = read_whole(bytes, format, limits, skipped).map_err(|fault| match fault.reason {
+            Reason::Unsound(reason) if format == Format::Mat => {
+                ArraysError::Unreadable { path: path.to_path_buf(), key: String::new(), source: crate::error::invalid(reason) }
+            }
+            _ => pickle_error(&path, "", fault),
+        })?;
         Ok(Self { path, format, content: Content::Whole(value) })
     }
 
@@ -225,7 +249,7 @@ pub(crate) fn pickle_error(path: &Path, key: &str, fault: Fault) -> ArraysError 
     }
 }
 
-fn read_whole(bytes: Vec<u8>, format: Format, limits: Limits) -> Result<Value, Fault> {
+fn read_whole(bytes: Vec<u8>, format: Format, limits: Limits, skipped: &'static [&'static [&'static str]]) -> Result<Value, Fault> {
     let bytes = match format {
         Format::Zlib => inflated(&bytes, limits).map_err(|message| Fault::new(0, message))?,
         Format::Gzip => unzipped(&bytes, limits).map_err(|message| Fault::new(0, message))?,
@@ -235,13 +259,14 @@ fn read_whole(bytes: Vec<u8>, format: Format, limits: Limits) -> Result<Value, F
     let content = Blob::from(bytes);
     match format {
         Format::Npy => npy::read(&content, &mut budget),
+        Format::Mat => mat::read(&content, &mut budget).map_err(|message| Fault::new(0, message)),
         _ if content.starts_with(LEGACY_START) => pickle::read_legacy(&content, &mut budget),
-        _ => pickle::read(&content, &mut budget),
+        _ => pickle::read(&content, &mut Budget { skipped, ..budget }),
     }
 }
 
 /// A zlib stream's content; flate2's reader would take a cut one for whole.
-fn inflated(bytes: &[u8], limits: Limits) -> Result<Vec<u8>, String> {
+pub(crate) fn inflated(bytes: &[u8], limits: Limits) -> Result<Vec<u8>, String> {
     let (mut stream, mut content, mut part) = (Decompress::new(true), Vec::new(), vec![0; 64 << 10]);
     loop {
         let (read, written) = (stream.total_in(), stream.total_out());

@@ -24,12 +24,21 @@ pub enum ArraysError {
         source: io::Error,
     },
     /// No container of arrays begins like this.
-    #[error("{}: begins with {start}, which no .npy, .npz, pickle, joblib or torch file does", path.display())]
+    #[error("{}: begins with {start}, which no .npy, .npz, pickle, joblib, torch or .mat file does", path.display())]
     Unrecognised {
         /// The file.
         path: PathBuf,
         /// Its first bytes.
         start: String,
+    },
+    /// HDF5, which this reader does not know.
+    #[error(
+        "{}: HDF5 (as MATLAB 7.3 writes it too), which is not read; save it by MATLAB's `save -v7`, or as npz by h5py and numpy.savez",
+        path.display()
+    )]
+    Hdf5 {
+        /// The file.
+        path: PathBuf,
     },
     /// The file's zip directory is unsound.
     #[error("{}: not a zip archive (.npz, .pt) ({source}); it may be cut short", path.display())]

@@ -34,6 +34,8 @@ pub(crate) struct Budget {
     pub expanded_bytes: u64,
     pub depth: usize,
     pub limits: Limits,
+    /// Entries of dictionaries that are left out, by their keys from the root on.
+    pub skipped: &'static [&'static [&'static str]],
 }
 
 impl Budget {
@@ -44,6 +46,7 @@ impl Budget {
             expanded_bytes: EXPANDED_BYTES.saturating_add(EXPANSION.saturating_mul(container_bytes)),
             depth: limits.depth,
             limits,
+            skipped: &[],
         }
     }
 

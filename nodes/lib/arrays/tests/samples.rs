@@ -88,12 +88,51 @@ fn formats_are_told_by_content() {
         ("many_gzip.joblib", Format::Gzip),
         ("phalp.joblib", Format::Zlib),
         ("many_p0.pkl", Format::Pickle),
+        ("many_v7.mat", Format::Mat),
     ];
     for (name, expected) in cases.into_iter().chain(more).chain([("joblib.pkl", Format::Pickle), ("py2_style.pkl", Format::Pickle)]) {
         assert_eq!(format(name), Some(expected), "{name}");
     }
     for other in ["", "HIERARCHY\nROOT hips.", "PathFileType\t4", "<xml>", "{\"a\": 1}", "x,y\n1,2\n"] {
         assert_eq!(Format::of(&mut Cursor::new(other)).unwrap(), None, "{other}");
+    }
+}
+
+#[test]
+fn matlabs_files_give_numbers_and_text_and_pass_over_the_rest() {
+    for name in ["many_v6.mat", "many_v7.mat"] {
+        let mut file = Container::open(&sample(name)).unwrap();
+        let keys = ["bool", "half", "big", "fortran", "uint", "int", "empty", "number", "real", "truth", "matrix_rows", "words"];
+        assert_eq!(file.keys(), keys, "{name}");
+        assert_eq!(file.at("words").unwrap().text().unwrap(), "none é");
+        assert_eq!(file.at("fortran").unwrap().shape().unwrap(), [3, 4, 2]);
+        assert_eq!(file.at("real").unwrap().float().unwrap(), 0.1);
+    }
+    // As MATLAB writes it, most significant byte first: doubles that fit into bytes, in the tag itself.
+    let word = |value: u32| value.to_be_bytes();
+    let element = [
+        &word(6)[..],
+        &word(8),
+        &word(6),
+        &word(0),
+        &word(5),
+        &word(8),
+        &word(2),
+        &word(1),
+        &[0, 1, 0, 1],
+        b"x\0\0\0",
+        &[0, 2, 0, 2, 3, 250, 0, 0],
+    ];
+    let element = element.concat();
+    let mut bytes = b"MATLAB 5.0 MAT-file".to_vec();
+    bytes.resize(124, b' ');
+    bytes.extend([1, 0, b'M', b'I']);
+    bytes.extend([&word(14)[..], &word(element.len() as u32), &element].concat());
+    let mut file = Container::new(Cursor::new(bytes), Path::new("big.mat"), Limits::default()).unwrap();
+    assert_eq!(file.at("x").unwrap().floats(&[Some(2), Some(1)], "(2, 1)").unwrap().values, [3.0, 250.0]);
+    for start in [&b"\x89HDF\r\n\x1a\n\0\0"[..], b"MATLAB 7.3 MAT-file, Platform", b"MATLAB 7.0 MAT-file, Platform"] {
+        let error = Container::new(Cursor::new(start.to_vec()), Path::new("new.mat"), Limits::default()).unwrap_err().to_string();
+        assert!(error.starts_with("new.mat: HDF5") && error.contains("save -v7"), "{error}");
     }
 }
 

@@ -1,4 +1,4 @@
-"""Makes tests/data/poses/: one motion as each tool writes it, and expected.npz: `python3 make_poses.py` (numpy, scipy, joblib; torch is imitated).
+"""Makes tests/data/poses/: one motion as each tool writes it, and expected.npz: `python3 make_poses.py` (numpy, scipy, joblib, omegaconf; torch is imitated).
 
 The motion is of the SMPL-H and SMPL-X bodies of ../body/tests/data. expected.npz holds for every file the joints (N, 24, 3), m, in a world with
 z up, by SMPL's equations written anew here; of files without a trajectory relative to the pelvis, seen by a level camera along x.
@@ -6,6 +6,7 @@ z up, by SMPL's equations written anew here; of files without a trajectory relat
 import collections, io, pickle, sys, types, zipfile
 from pathlib import Path
 import joblib, numpy as np
+from omegaconf import OmegaConf
 from scipy.spatial.transform import Rotation
 
 HERE = Path(__file__).resolve().parent.parent
@@ -123,6 +124,11 @@ def amass():
     expected["amass.npz"] = expected["stageii.pkl"] = posed(rest, root, flat_hands(body), pelvis)
     rest = rest_joints("model_smplx.npz", betas)
     parts = dict(root_orient=root.as_rotvec(), pose_body=body[:, :21].reshape(N, 63), pose_hand=rng.normal(size=(N, 90)), pose_jaw=rng.normal(size=(N, 3)))
+    # As MoSh++ writes it: its settings are OmegaConf's objects, which lie in circles through their parents.
+    details = {**details, "cfg": OmegaConf.create({"surface_model": {"type": "smplh", "gender": "${mocap.gender}"}, "mocap": {"gender": "female", "tags": [1, None]}})}
+    with open(DATA / "stageii_settings.pkl", "wb") as file:
+        pickle.dump({"fullpose": fullpose, "stageii_debug_details": details, "labels": ["LFHD"], **common}, file)
+    expected["stageii_settings.pkl"] = expected["stageii.pkl"]
     np.savez_compressed(DATA / "stageii_smplx.npz", surface_model_type="smplx", gender="neutral", mocap_frame_rate=50, trans=pelvis - rest[0], betas=betas,
                         num_betas=16, markers=np.zeros((N, 3, 3)), labels=np.array(["a", "b", "c"]), **parts)
     expected["stageii_smplx.npz"] = posed(rest, root, flat_hands(body), pelvis)

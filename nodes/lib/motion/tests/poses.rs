@@ -57,6 +57,8 @@ fn every_tools_file_gives_the_joints_that_python_finds() {
     let cases = [
         ("amass.npz", PoseFormat::Amass, &smplh, 120.0, 1e-12),
         ("stageii.pkl", PoseFormat::Amass, &smplh, 60.0, 1e-12),
+        // Its settings are OmegaConf's objects, which nothing here rebuilds.
+        ("stageii_settings.pkl", PoseFormat::Amass, &smplh, 60.0, 1e-12),
         ("stageii_smplx.npz", PoseFormat::Amass, &smplx, 50.0, 1e-12),
         // Video tools write float32.
         ("wham.pkl", PoseFormat::Wham, &smplh, 30.0, 1e-6),

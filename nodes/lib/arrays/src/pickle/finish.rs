@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use super::Fault;
 use super::machine::Machine;
-use super::node::{Id, Node, Source, Tensor};
+use super::node::{Id, Node, Opaque, Source, Tensor};
 use super::torch::tensor_array;
+use super::{Fault, Reason};
 use crate::array::ArrayData;
 use crate::blob::Blob;
 use crate::dtype::{DType, Kind};
@@ -22,8 +22,12 @@ pub(super) fn finish(machine: Machine<'_>, root: Id, storage: &mut dyn FnMut(&st
     let offset = machine.position;
     let mut done = Vec::new();
     done.resize_with(machine.nodes.len(), || State::Untouched);
-    let mut finisher = Finisher { machine, done, storage, depth_limit, offset };
-    finisher.value(root, 0).map(|(value, _)| value).map_err(|message| Fault::new(finisher.offset, message))
+    let mut finisher = Finisher { machine, done, storage, depth_limit, offset, refused: None };
+    let value = finisher.value(root, 0);
+    value.map(|(value, _)| value).map_err(|message| {
+        let refused = finisher.refused.take().map(|name| Reason::Refused(name.to_string()));
+        Fault { offset: finisher.offset, reason: refused.unwrap_or(Reason::Unsound(message)) }
+    })
 }
 
 enum State {
@@ -40,6 +44,8 @@ struct Finisher<'a, 'b> {
     depth_limit: usize,
     /// Where a fault is to be looked for: the pickle's end, unless an object knows better.
     offset: usize,
+    /// The name of an opaque object that is asked for.
+    refused: Option<Arc<str>>,
 }
 
 impl Finisher<'_, '_> {
@@ -101,6 +107,8 @@ impl Finisher<'_, '_> {
                 let ((keys, key_height), (values, height)) = (self.items(&keys, depth)?, self.items(&values, depth)?);
                 return Ok((Value::Dict(Arc::new(Dict::new(keys.into_iter().zip(values)))), height.max(key_height)));
             }
+            // It also lies where nothing is skipped.
+            Node::Opaque(opaque) => return Err(self.refuse(*opaque)),
             Node::Sparse(kind, state) => self.sparse(kind, state.ok_or("a sparse matrix has no content")?, depth)?,
             Node::ChumpyArray(state) => self.attribute(state.ok_or("a chumpy array has no content")?, "x", depth)?,
             Node::ChumpySelect(state) => self.select(state.ok_or("a chumpy array has no content")?, depth)?,
@@ -117,6 +125,11 @@ impl Finisher<'_, '_> {
             values.push(value);
         }
         Ok((values, height + 1))
+    }
+
+    fn refuse(&mut self, opaque: Opaque) -> String {
+        self.offset = opaque.offset;
+        self.refused.insert(opaque.name).to_string()
     }
 
     fn copied(&mut self, bytes: &[u8]) -> Result<Arc<[u8]>, String> {

@@ -1,7 +1,7 @@
 //! The stack machine.
 
 use super::known::known;
-use super::node::{Id, Node};
+use super::node::{Id, Node, Opaque};
 use super::{Fault, NESTING_LIMIT, Reason, text};
 use crate::blob::Blob;
 use crate::limits::Budget;
@@ -15,6 +15,8 @@ pub(super) struct Machine<'a> {
     pub nodes: Vec<Node>,
     pub budget: &'a mut Budget,
     pub nesting: usize,
+    /// Where the opcode stands that is carried out.
+    opcode_at: usize,
     stack: Vec<Id>,
     marks: Vec<usize>,
     memo: Vec<Option<Id>>,
@@ -28,7 +30,7 @@ impl<'a> Machine<'a> {
             return Err(Fault::new(0, format!("pickles lie within pickles more than {NESTING_LIMIT} levels deep")));
         }
         let (nodes, stack, marks, memo) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Ok(Self { bytes, position: 0, nodes, budget, nesting, stack, marks, memo, memo_count: 0, opcodes: 0 })
+        Ok(Self { bytes, position: 0, nodes, budget, nesting, opcode_at: 0, stack, marks, memo, memo_count: 0, opcodes: 0 })
     }
 
     /// Runs to the end of the pickle; the result is what is left on the stack.
@@ -40,6 +42,7 @@ impl<'a> Machine<'a> {
         self.marks.clear();
         loop {
             let offset = self.position;
+            self.opcode_at = offset;
             let fault = |reason: Reason| Fault { offset, reason };
             self.opcodes += 1;
             self.budget.opcodes = self.budget.opcodes.checked_sub(1).ok_or_else(|| {
@@ -265,6 +268,7 @@ impl<'a> Machine<'a> {
         let list = self.top()?;
         match self.nodes.get_mut(list as usize) {
             Some(Node::List(list)) => list.extend(items),
+            Some(Node::Opaque(opaque)) => opaque.parts.extend(items),
             _ => return Err("items are added to what is no list".into()),
         }
         Ok(())
@@ -275,6 +279,7 @@ impl<'a> Machine<'a> {
         let (dict, pairs) = (self.top()?, pairs(&items)?);
         match self.nodes.get_mut(dict as usize) {
             Some(Node::Dict(dict)) => dict.extend(pairs),
+            Some(Node::Opaque(opaque)) => opaque.parts.extend(items),
             _ => return Err("keys are set in what is no dictionary".into()),
         }
         Ok(())
@@ -323,8 +328,19 @@ impl<'a> Machine<'a> {
 
     pub fn global(&mut self, module: &str, name: &str) -> Result<(), Reason> {
         let full = format!("{}.{}", shortened(module.as_bytes()), shortened(name.as_bytes()));
-        let known = known(module, name).ok_or_else(|| Reason::Refused(full.clone()))?;
-        self.push(Node::Known(known, full.into()))
+        match known(module, name) {
+            Some(known) => self.push(Node::Known(known, full.into())),
+            // Whether it lies under a key that is skipped shows at the end.
+            None if self.skips() => {
+                self.push(Node::Opaque(Box::new(Opaque { name: full.into(), offset: self.opcode_at, parts: Vec::new() })))
+            }
+            None => Err(Reason::Refused(full)),
+        }
+    }
+
+    /// Whether some of this pickle may be skipped; a pickle within has no keys of the file.
+    pub fn skips(&self) -> bool {
+        self.nesting == 0 && !self.budget.skipped.is_empty()
     }
 }
 

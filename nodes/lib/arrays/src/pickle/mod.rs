@@ -11,6 +11,7 @@ mod machine;
 mod node;
 mod numpy;
 mod object;
+mod skip;
 mod text;
 pub(crate) mod torch;
 
@@ -78,6 +79,7 @@ pub(crate) fn read(content: &Blob, budget: &mut Budget) -> Result<Value, Fault> 
 fn read_nested(content: &Blob, budget: &mut Budget, nesting: usize) -> Result<(Value, usize), Fault> {
     let mut machine = machine::Machine::new(content.clone(), budget, nesting)?;
     let root = machine.run()?;
+    skip::skip(&mut machine, root)?;
     let end = machine.position;
     let value = finish::finish(machine, root, &mut |key| Err(format!("storage {key} lies outside this file")))?;
     Ok((value, end))

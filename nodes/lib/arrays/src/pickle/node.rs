@@ -39,8 +39,20 @@ pub(super) enum Node {
     JoblibArray,
     Storage(Arc<Storage>),
     Tensor(Box<Tensor>),
+    /// What an unknown name stands for or makes, with all that it was given. Nothing is made of it: it can only be skipped.
+    Opaque(Box<Opaque>),
     /// Out of a nested pickle.
     Value(Value),
+}
+
+/// See [`Node::Opaque`].
+#[derive(Clone, Debug)]
+pub(super) struct Opaque {
+    pub name: Arc<str>,
+    /// Where the pickle names it.
+    pub offset: usize,
+    /// Arguments, state, items.
+    pub parts: Vec<Id>,
 }
 
 /// The memory behind torch tensors.

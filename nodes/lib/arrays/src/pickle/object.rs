@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::Reason;
 use super::known::Known;
 use super::machine::{Machine, shortened};
-use super::node::{Id, Node};
+use super::node::{Id, Node, Opaque};
 use crate::blob::Blob;
 
 /// What a shallow copy of one item takes.
@@ -57,12 +57,15 @@ impl Machine<'_> {
     /// What `name` finds in a dictionary whose keys are text.
     pub(super) fn lookup(&self, dict: Id, name: &str) -> Option<Id> {
         let Node::Dict(pairs) = self.node(dict) else { return None };
-        let named = |key: Id| match self.node(key) {
-            Node::Text(text) => **text == *name,
-            Node::OldText(bytes) | Node::Bytes(bytes) => **bytes == *name.as_bytes(),
+        pairs.iter().rev().find(|(key, _)| self.is_text(*key, name)).map(|&(_, value)| value)
+    }
+
+    pub(super) fn is_text(&self, id: Id, expected: &str) -> bool {
+        match self.node(id) {
+            Node::Text(text) => **text == *expected,
+            Node::OldText(bytes) | Node::Bytes(bytes) => **bytes == *expected.as_bytes(),
             _ => false,
-        };
-        pairs.iter().rev().find(|(key, _)| named(*key)).map(|&(_, value)| value)
+        }
     }
 
     /// `REDUCE`: calls a known name with a tuple of arguments.
@@ -92,6 +95,10 @@ impl Machine<'_> {
     }
 
     fn call(&mut self, callable: Id, arguments: &[Id]) -> Result<(), Reason> {
+        if let Node::Opaque(class) = self.node(callable) {
+            let made = Opaque { parts: [&[callable], arguments].concat(), ..Opaque::clone(class) };
+            return self.push(Node::Opaque(Box::new(made)));
+        }
         let Node::Known(known, name) = self.node(callable).clone() else { return Err("what is called is no name".into()) };
         let made = self.called(known, arguments)?;
         // The argument itself is handed on where nothing is to be made of it.
@@ -138,6 +145,9 @@ impl Machine<'_> {
 
     /// `copyreg._reconstructor(class, base, start)`: an empty object, or a subclass of a builtin with its content.
     fn reconstructed(&mut self, class: Id, start: Id) -> Result<Made, Reason> {
+        if let Node::Opaque(class) = self.node(class) {
+            return Ok(Made::Node(Node::Opaque(class.clone())));
+        }
         let Node::Known(known, _) = self.node(class).clone() else { return Ok(Made::Unsuitable) };
         match (known, self.node(start)) {
             (Known::List | Known::Dict | Known::Tuple, Node::None) => Ok(Made::Node(empty(known))),
@@ -202,6 +212,10 @@ impl Machine<'_> {
             Node::Sparse(kind, None) => Node::Sparse(kind, Some(state)),
             Node::ChumpyArray(None) => Node::ChumpyArray(Some(state)),
             Node::ChumpySelect(None) => Node::ChumpySelect(Some(state)),
+            Node::Opaque(mut opaque) => {
+                opaque.parts.push(state);
+                Node::Opaque(opaque)
+            }
             // Attributes of a subclass, such as torch's `_metadata` of an OrderedDict.
             Node::Dict(_) | Node::List(_) | Node::Tensor(_) => return Ok(()),
             _ => return Err("state is given to what has none".into()),

@@ -14,6 +14,8 @@ use super::values::{
 };
 use crate::MotionError;
 
+/// Where MoSh++'s pickles hold its settings as OmegaConf's objects, which are passed over: gender and kind of body stand in them alone.
+pub(super) const SKIPPED: &[&[&str]] = &[&["stageii_debug_details", "cfg"], &["stagei_debug_details"]];
 /// Values in a row of `poses`: SMPL, its 22 shared joints alone, SMPL-H, SMPL-X.
 const WIDTHS: [usize; 4] = [72, 66, 156, 165];
 

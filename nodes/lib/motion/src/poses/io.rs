@@ -28,7 +28,7 @@ pub fn open_poses(path: &Path, view: PoseView) -> Result<Option<PoseFile>, Motio
     if Format::of(&mut reader).map_err(unreadable)?.is_none() {
         return Ok(None);
     }
-    let mut container = Container::new(reader, path, Limits::default())?;
+    let mut container = Container::without(reader, path, Limits::default(), super::amass::SKIPPED)?;
     PoseFile::parse(&mut container, view, || camera_beside(path)).map(Some)
 }
 
