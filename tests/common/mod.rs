@@ -78,3 +78,24 @@ Frame Time: 0.01
 0 90 0 0 0 0 0 0 0
 0 90 0 0 0 0 0 0 0
 ";
+
+/// Writes a body file again with every length `factor` times as long.
+pub fn taller(from: &Path, to: &Path, factor: f64) {
+    let mut npz = cromosim_arrays::NpzReader::open(from).expect("a body");
+    let mut writer = cromosim_arrays::NpzWriter::new(std::fs::File::create(to).expect("writable"));
+    for key in npz.keys() {
+        let shape = npz.header(&key).expect("sound").expect("there").shape;
+        let any = vec![None; shape.len()];
+        if matches!(key.as_str(), "f" | "kintree_table") {
+            let array = npz.integers(&key, &any, "integers").expect("integers").expect("there");
+            let values: Vec<u32> = array.values.iter().map(|value| *value as u32).collect();
+            writer.integers(&key, &array.shape, &values).expect("writable");
+            continue;
+        }
+        let Ok(Some(array)) = npz.floats(&key, &any, "numbers") else { continue };
+        let scale = if matches!(key.as_str(), "v_template" | "shapedirs" | "posedirs") { factor } else { 1.0 };
+        let values: Vec<f64> = array.values.iter().map(|value| value * scale).collect();
+        writer.floats(&key, &array.shape, &values).expect("writable");
+    }
+    writer.finish().expect("writable");
+}

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use anyhow::{Context, bail};
 use clap::Subcommand;
+use cromosim_bag::BagReader;
 use cromosim_body::{BodyModel, ShapedBody, write_obj};
 
 /// Commands on bodies.
@@ -16,7 +17,7 @@ pub enum Command {
     Export {
         /// Where to; the ending decides: .npz or .obj
         out: PathBuf,
-        /// Body model as npz rather than the embedded one
+        /// Body model as npz or pickle rather than the embedded one
         #[arg(long, value_name = "FILE")]
         body: Option<PathBuf>,
         /// Shape coefficients of the mesh, separated by commas
@@ -40,6 +41,20 @@ pub fn model(path: Option<&PathBuf>) -> anyhow::Result<Arc<BodyModel>> {
         Some(path) => BodyModel::read(path)?,
         None => BodyModel::embedded(),
     })
+}
+
+/// The body that what a bag holds of SMPL is for: `given`, or the embedded one, unless the bag says that it was made on another.
+pub fn of_bag(reader: &BagReader, given: Option<&Arc<BodyModel>>) -> anyhow::Result<Arc<BodyModel>> {
+    if let Some(model) = given {
+        return Ok(model.clone());
+    }
+    let model = BodyModel::embedded();
+    match reader.metadata("cromosim").and_then(|values| values.get("body")) {
+        Some(body) if body != model.id() => {
+            bail!("{}: its poses are of the body {body}, not of the embedded one; give --body FILE", reader.path().display())
+        }
+        _ => Ok(model),
+    }
 }
 
 /// Runs the command.

@@ -7,24 +7,29 @@ use anyhow::bail;
 use clap::Args;
 use cromosim_body::BodyModel;
 use cromosim_motion::SmplMotion;
+use cromosim_motion::datasets::DatasetRecording;
 use cromosim_motion::rigid::{EurocGroundTruth, ImuSeries};
 
 use crate::body;
 use crate::motion_arguments::MotionArguments;
 
-mod bag;
+pub mod bag;
+mod dataset;
 mod follow;
 mod frames;
 mod recording;
 pub mod source;
+mod states;
 pub mod write;
 
+use dataset::DatasetArguments;
 use write::{Target, Written};
 
 /// Convert a motion, a trajectory of a rigid body, an IMU series or a recording into another format
 #[derive(Args)]
 pub struct Arguments {
-    /// A motion, a trajectory (TUM, EuRoC, CSV), an IMU series (EuRoC, CSV) or a bag; its content tells
+    /// A motion, a trajectory (TUM, EuRoC, CSV), an IMU series (EuRoC, CSV), a recording of a data set (BROAD, TotalCapture, PAMAP2,
+    /// RealWorld) or a bag; its content tells
     input: PathBuf,
     /// What to write; the ending decides where --to does not: .npz, .bvh, .trc, .tum or .txt, .csv, .mcap
     out: PathBuf,
@@ -40,7 +45,7 @@ pub struct Arguments {
     /// Of a motion: the trajectory of a sensor at this named site of the skin
     #[arg(long, value_name = "NAME")]
     site: Option<String>,
-    /// Of a bag: the topic to take (PoseStamped, TFMessage or Imu); needed where there are several
+    /// Of a bag: the topic to take (SmplState, SmplPose, PoseStamped, TFMessage or Imu); needed where there are several
     #[arg(long, value_name = "TOPIC")]
     topic: Option<String>,
     /// Of a bag's TF: the frame whose motion to take
@@ -49,15 +54,17 @@ pub struct Arguments {
     /// Of a bag's TF: the frame that stands still; default: the root of the tree
     #[arg(long, value_name = "FRAME", requires = "frame")]
     fixed_frame: Option<String>,
-    /// Into a bag: name of the placement in /reference/NAME and /imu/NAME/data_raw
-    #[arg(long, value_name = "NAME", default_value = "body")]
-    name: String,
+    /// Into a bag: name of the placement in /reference/NAME and /imu/NAME/data_raw; default: body, or as the data set says
+    #[arg(long, value_name = "NAME")]
+    name: Option<String>,
     /// Into a bag: the IMU series (EuRoC, CSV) that was measured along the trajectory
     #[arg(long, value_name = "FILE")]
     imu: Option<PathBuf>,
     /// Body model as npz or pickle rather than the embedded one
     #[arg(long, value_name = "FILE")]
     body: Option<PathBuf>,
+    #[command(flatten)]
+    dataset: DatasetArguments,
     #[command(flatten)]
     motion: MotionArguments,
 }
@@ -67,6 +74,7 @@ pub enum Content {
     Motion(Box<SmplMotion>),
     Poses(EurocGroundTruth),
     Imu(ImuSeries),
+    Recording(Box<DatasetRecording>),
 }
 
 impl Content {
@@ -76,6 +84,7 @@ impl Content {
             Self::Motion(_) => "a motion",
             Self::Poses(_) => "a trajectory",
             Self::Imu(_) => "an IMU series",
+            Self::Recording(_) => "a recording of a data set",
         }
     }
 
@@ -85,6 +94,7 @@ impl Content {
             Self::Motion(motion) => motion.frames.len(),
             Self::Poses(poses) => poses.trajectory.stamps.len(),
             Self::Imu(series) => series.stamps.len(),
+            Self::Recording(recording) => recording.imus.iter().map(|imu| imu.series.stamps.len()).sum(),
         }
     }
 }
@@ -99,11 +109,11 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         bail!("--imu goes into a bag; OUT is {}", target.describe());
     }
     let model = body::model(arguments.body.as_ref())?;
-    let content = followed(source::read(arguments, &model)?, arguments, &model, target)?;
+    let content = followed(source::read(arguments, &model, target)?, arguments, &model, target)?;
     let (is_motion, count) = (matches!(content, Content::Motion(_)), content.count());
     match write::written(&content, target, &model, arguments)? {
         Written::Bytes(bytes) => write::file(&arguments.out, &bytes, arguments.force)?,
-        Written::Bag => bag::write(&content, imu(arguments)?.as_ref(), arguments)?,
+        Written::Bag => bag::write(&content, imu(arguments)?.as_ref(), &model, arguments)?,
     }
     println!("{}: {} of {count} {}", arguments.out.display(), target.describe(), if is_motion { "frames" } else { "rows" });
     Ok(())

@@ -10,11 +10,11 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
 use clap::Args;
-use cromosim_body::{BodyModel, ShapedBody};
+use cromosim_body::ShapedBody;
 use cromosim_imu::{Device, MountedSites, PlacementSet};
 
 use crate::progress::Interrupt;
-use crate::{progress, summary};
+use crate::{body, progress, summary};
 
 /// What is left behind by a node that does not end when asked to.
 const PATIENCE: Duration = Duration::from_secs(15);
@@ -27,12 +27,15 @@ const READY: &str = "ready";
 /// Arguments of `cromosim demo`.
 #[derive(Args)]
 pub struct Arguments {
-    /// Play this file (BVH) from its beginning to its end rather than 10 s of the embedded walk
+    /// Play this motion file from its beginning to its end rather than 10 s of the embedded walk
     #[arg(long, value_name = "FILE")]
     motion: Option<PathBuf>,
     /// Stop after so many seconds of the motion
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     duration: Option<f64>,
+    /// Body model (SMPL, SMPL-H, SMPL-X; npz or pickle) for all nodes rather than the embedded one
+    #[arg(long, value_name = "FILE")]
+    body: Option<PathBuf>,
     /// Sensor placements (YAML) rather than left_wrist, right_ankle, pelvis, sternum and head
     #[arg(long, value_name = "FILE")]
     placements: Option<PathBuf>,
@@ -232,13 +235,14 @@ impl Arguments {
         {
             bail!("--duration {seconds}: expected a positive number of seconds");
         }
+        let model = body::model(self.body.as_ref())?;
         let motion = match &self.motion {
-            Some(path) => cromosim_motion::read_motion(path, &Default::default())?,
+            Some(path) => cromosim_motion::read_motion_for(path, &model, &Default::default())?,
             None => cromosim_motion::embedded_walk(),
         };
         if let Some(path) = &self.placements {
             let placements = PlacementSet::read(path)?;
-            MountedSites::new(&ShapedBody::new(BodyModel::embedded(), &[])?, placements.placements())?;
+            MountedSites::new(&ShapedBody::new(model, &[])?, placements.placements())?;
             for placement in placements.placements() {
                 Device::resolve(placement.device(), path.parent().unwrap_or(Path::new(".")))?;
             }
@@ -250,17 +254,21 @@ impl Arguments {
     fn listeners(&self, places: &Places) -> anyhow::Result<Vec<NodeProcess>> {
         let viewers = i64::from(!self.no_viewer);
         let path = |path: &Path| -> anyhow::Result<String> { Ok(quoted(&std::path::absolute(path)?.display().to_string())) };
+        let body = self.body.as_deref().map(path).transpose()?.map(|file| ("body", file));
         let recorder = [("bag_path", path(&places.bag)?), ("seed", self.seed.to_string()), ("run", quoted(&self.describe()))];
+        // Whoever needs a body is told of the same one.
+        let parameters = |own: &[(&'static str, String)]| own.iter().cloned().chain(body.clone()).collect::<Vec<_>>();
         let mut nodes = vec![NodeProcess::start("recorder", &recorder, &places.logs)?];
         if !self.no_viewer {
-            nodes.push(NodeProcess::start("viewer", &[("recording", path(&places.recording)?)], &places.logs)?);
+            nodes.push(NodeProcess::start("viewer", &parameters(&[("recording", path(&places.recording)?)]), &places.logs)?);
         }
-        let mut imu = vec![("seed", self.seed.to_string()), ("ready_subscriptions", (1 + viewers + i64::from(self.listeners)).to_string())];
+        let listeners = 1 + viewers + i64::from(self.listeners);
+        let mut imu = parameters(&[("seed", self.seed.to_string()), ("ready_subscriptions", listeners.to_string())]);
         if let Some(file) = &self.placements {
             imu.push(("placements", path(file)?));
         }
         nodes.push(NodeProcess::start("virtual_imu", &imu, &places.logs)?);
-        nodes.push(NodeProcess::start("smpl_state", &[("ready_subscriptions", (2 + viewers).to_string())], &places.logs)?);
+        nodes.push(NodeProcess::start("smpl_state", &parameters(&[("ready_subscriptions", (2 + viewers).to_string())]), &places.logs)?);
         Ok(nodes)
     }
 
@@ -271,8 +279,9 @@ impl Arguments {
         };
         let duration = self.duration.map_or_else(|| "whole".to_owned(), |seconds| format!("{seconds} s"));
         format!(
-            "demo; motion: {}; duration: {duration}; placements: {}; seed: {}; all else as the nodes' defaults",
+            "demo; motion: {}; body: {}; duration: {duration}; placements: {}; seed: {}; all else as the nodes' defaults",
             name(&self.motion, "embedded walk"),
+            name(&self.body, "embedded"),
             name(&self.placements, "demo.yaml"),
             self.seed
         )
@@ -283,6 +292,10 @@ impl Arguments {
         if let Some(motion) = &self.motion {
             let motion = std::path::absolute(motion).unwrap_or_else(|_| motion.clone());
             parameters.push(("motion", quoted(&motion.display().to_string())));
+        }
+        if let Some(body) = &self.body {
+            let body = std::path::absolute(body).unwrap_or_else(|_| body.clone());
+            parameters.push(("body", quoted(&body.display().to_string())));
         }
         if let Some(seconds) = self.duration {
             parameters.push(("duration_seconds", format!("{seconds:?}")));

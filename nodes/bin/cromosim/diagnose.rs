@@ -3,10 +3,12 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use cromosim_bag::BagReader;
+use cromosim_body::BodyModel;
 use cromosim_gap::{Cause, DiagnoseOptions, Diagnosis, Evidence, PlacementAnswer, PlacementDiagnosis, SCHEMA};
 use cromosim_imu::{EffectKind, EffectsFile};
 use rayon::prelude::*;
@@ -42,6 +44,9 @@ pub struct Arguments {
     /// Take an effect out of the library; may be given again
     #[arg(long, value_name = "EFFECT")]
     without: Vec<String>,
+    /// Body model (npz or pickle) of a recording of SMPL states, rather than the embedded one
+    #[arg(long, value_name = "FILE")]
+    body: Option<PathBuf>,
     /// Seed of the noise in comparisons with the noisy simulation [default: 0]
     #[arg(long)]
     seed: Option<u64>,
@@ -58,7 +63,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let options = DiagnoseOptions { without, seed: arguments.seed.or(config.seed).unwrap_or(0) };
     check_folder(&arguments.out)?;
     let reader = BagReader::open(&arguments.recording)?;
-    let (recorded, mut notes, mut failures) = select(&reader, &config.placements)?;
+    let body = arguments.body.as_deref().map(BodyModel::read).transpose()?;
+    let (recorded, mut notes, mut failures) = select(&reader, body.as_ref(), &config.placements)?;
 
     // Until the files are written a signal may end the process as it likes: there is nothing to clear away.
     let bar = progress::bar(recorded.len() as u64, "diagnosing, placements");
@@ -97,9 +103,13 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
 }
 
 /// The placements to diagnose, what a user should know of the others, and which cannot be read.
-fn select(reader: &BagReader, only: &[String]) -> anyhow::Result<(Vec<Recorded>, Vec<String>, Vec<String>)> {
+fn select(
+    reader: &BagReader,
+    body: Option<&Arc<BodyModel>>,
+    only: &[String],
+) -> anyhow::Result<(Vec<Recorded>, Vec<String>, Vec<String>)> {
     let file = reader.path().display();
-    let mut found = recorded::read(reader)?;
+    let mut found = recorded::read(reader, body)?;
     let names: Vec<&str> = found.iter().map(|(name, _)| name.as_str()).collect();
     if let Some(name) = only.iter().find(|name| !names.contains(&name.as_str())) {
         bail!("{file}: placement `{name}` of the config: the recording has no such placement; it has {}", names.join(", "));

@@ -1,27 +1,34 @@
 //! `cromosim inspect`: what is in a motion, body, trajectory or bag file, found out from its content.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use anyhow::bail;
 use clap::Args;
 use cromosim_bag::BagReader;
 use cromosim_body::{BodyModel, Joint, ShapedBody};
+use cromosim_motion::datasets::{DatasetFiles, DatasetFormat, DatasetRecording, open_dataset};
 use cromosim_motion::rigid::{RigidFormat, sniff_rigid};
 use cromosim_motion::{
-    MotionError, MotionFormat, MotionOptions, PoseAxes, PoseFile, PoseTrack, PoseView, SmplMotion, open_poses, read_motion,
+    MotionError, MotionFormat, MotionOptions, PoseAxes, PoseFile, PoseTrack, PoseView, SmplMotion, open_poses, read_motion_for,
 };
 use cromosim_spatial::Stamp;
 
+use crate::body;
 use crate::convert::{Content, source};
 use crate::motion_arguments::MotionArguments;
 
 /// Say what is in a file
 #[derive(Args)]
 pub struct Arguments {
-    /// Motion (BVH, ASF/AMC, C3D, TRC, AMASS, video estimates), body (SMPL npz or pickle), trajectory or IMU series (TUM, EuRoC, CSV), or bag
-    /// (.mcap, rosbag2 directory)
+    /// Motion (BVH, ASF/AMC, C3D, TRC, AMASS, video estimates), body (SMPL npz or pickle), trajectory or IMU series (TUM, EuRoC, CSV), recording of
+    /// a data set (BROAD, TotalCapture, PAMAP2, RealWorld), or bag (.mcap, rosbag2 directory)
     #[arg(required = true)]
     files: Vec<PathBuf>,
+    /// Body model (npz or pickle) that motions are read for, rather than the embedded one
+    #[arg(long, value_name = "FILE")]
+    body: Option<PathBuf>,
     #[command(flatten)]
     motion: MotionArguments,
 }
@@ -29,13 +36,14 @@ pub struct Arguments {
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let options = arguments.motion.options()?;
+    let model = body::model(arguments.body.as_ref())?;
     for path in &arguments.files {
-        inspect(path, &options)?;
+        inspect(path, &model, &options)?;
     }
     Ok(())
 }
 
-fn inspect(path: &Path, options: &MotionOptions) -> anyhow::Result<()> {
+fn inspect(path: &Path, model: &Arc<BodyModel>, options: &MotionOptions) -> anyhow::Result<()> {
     if path.is_dir() {
         return inspect_bag(path);
     }
@@ -43,13 +51,17 @@ fn inspect(path: &Path, options: &MotionOptions) -> anyhow::Result<()> {
     match head.as_slice() {
         [0x89, b'M', b'C', b'A', b'P', ..] => inspect_bag(path),
         [] => bail!("{}: the file is empty", path.display()),
+        _ if let Some((format, recording)) = open_dataset(path, &DatasetFiles::default())? => {
+            inspect_recording(path, format, &recording);
+            Ok(())
+        }
         _ => match open_poses(path, PoseView::World) {
             Err(MotionError::BodyFile { .. }) => inspect_body(path),
             Err(error) => Err(error.into()),
-            Ok(Some(file)) => inspect_poses(file, options),
+            Ok(Some(file)) => inspect_poses(file, model, options),
             Ok(None) => match sniff_rigid(&head).filter(|_| MotionFormat::of(&head).is_none()) {
                 Some(format) => inspect_rigid(path, format),
-                None => inspect_motion(path, options),
+                None => inspect_motion(path, model, options),
             },
         },
     }
@@ -76,13 +88,34 @@ fn inspect_rigid(path: &Path, format: RigidFormat) -> anyhow::Result<()> {
             let (force, rate) = (mean(&series.specific_force), mean(&series.angular_velocity));
             (&series.stamps, format!("mean specific force {force:.3} m/s2, mean angular velocity {rate:.4} rad/s"))
         }
-        Content::Motion(_) => return Ok(()),
+        Content::Motion(_) | Content::Recording(_) => return Ok(()),
     };
     let [first, last] = [stamps[0], stamps[stamps.len() - 1]];
     let rate = median_rate(stamps).map_or_else(String::new, |rate| format!(" at {rate:.3} Hz (median)"));
     println!("{}: {kind}, {} rows{rate}, {:.3} s from {:.6} s on", path.display(), stamps.len(), last - first, first.as_seconds());
     println!("  {more}");
     Ok(())
+}
+
+fn inspect_recording(path: &Path, format: DatasetFormat, recording: &DatasetRecording) {
+    let many = if recording.imus.len() == 1 { "" } else { "s" };
+    println!("{}: recording of {format}, {} IMU{many} at {:.3} Hz", path.display(), recording.imus.len(), recording.rate_hz);
+    for imu in &recording.imus {
+        let stamps = &imu.series.stamps;
+        let seconds = stamps.first().zip(stamps.last()).map_or(0.0, |(first, last)| *last - *first);
+        let reference = recording.references.iter().find(|(name, _)| *name == imu.placement);
+        let reference = reference.map_or_else(String::new, |(_, poses)| format!(", reference of {} poses", poses.stamps.len()));
+        let left_out = if imu.rows_left_out > 0 { format!(", {} rows left out", imu.rows_left_out) } else { String::new() };
+        println!("  {}: {} readings, {seconds:.3} s{reference}{left_out}", imu.placement, stamps.len());
+    }
+    let mut lengths: BTreeMap<&str, f64> = BTreeMap::new();
+    for span in &recording.activities {
+        *lengths.entry(&span.activity).or_default() += span.end - span.start;
+    }
+    if !lengths.is_empty() {
+        let lengths: Vec<String> = lengths.iter().map(|(activity, seconds)| format!("{activity} {seconds:.1} s")).collect();
+        println!("  {}", lengths.join(", "));
+    }
 }
 
 fn median_rate(stamps: &[Stamp]) -> Option<f64> {
@@ -129,12 +162,13 @@ fn inspect_body(path: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn inspect_poses(file: PoseFile, options: &MotionOptions) -> anyhow::Result<()> {
+fn inspect_poses(file: PoseFile, model: &Arc<BodyModel>, options: &MotionOptions) -> anyhow::Result<()> {
     println!("{}: motion, {} in SMPL's joints, {}", file.path.display(), file.format, people(file.tracks.len()));
     for track in &file.tracks {
         println!("  {}", person(track));
     }
-    match file.into_motion(&BodyModel::embedded(), None, options) {
+    let source = options.source_body.as_deref().map(BodyModel::read).transpose()?;
+    match file.into_motion(model, source.as_ref(), options) {
         Ok(motion) => {
             if let Some(report) = &motion.poses {
                 println!("  played: person {}, {:.3} s at {:.4} Hz, {report}", report.person, motion.duration_s(), motion.rate_hz);
@@ -174,8 +208,8 @@ fn person(track: &PoseTrack) -> String {
     )
 }
 
-fn inspect_motion(path: &Path, options: &MotionOptions) -> anyhow::Result<()> {
-    let motion = read_motion(path, options)?;
+fn inspect_motion(path: &Path, model: &Arc<BodyModel>, options: &MotionOptions) -> anyhow::Result<()> {
+    let motion = read_motion_for(path, model, options)?;
     println!("{}: motion, {} frames at {:.4} Hz, {:.3} s", path.display(), motion.frames.len(), motion.rate_hz, motion.duration_s());
     if let Some(report) = &motion.report {
         println!("  {report}");

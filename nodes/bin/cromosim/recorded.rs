@@ -1,5 +1,7 @@
 //! What a recording holds of its placements: reference poses and the messages of the real IMUs.
 
+use std::sync::Arc;
+
 use anyhow::{Context, anyhow, bail};
 use cromosim_bag::BagReader;
 use cromosim_body::{BodyModel, BodyPose, ShapedBody};
@@ -10,6 +12,8 @@ use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_spatial::Stamp;
+
+use crate::body;
 
 /// A placement of a recording: its reference, and its real IMU where there is one.
 pub struct Recorded {
@@ -23,11 +27,12 @@ pub struct Recorded {
     pub notes: Vec<String>,
 }
 
-/// The placements with a reference, each on its own: what is wrong with one does not hide the others.
-pub fn read(reader: &BagReader) -> anyhow::Result<Vec<(String, anyhow::Result<Recorded>)>> {
+/// The placements with a reference, each on its own: what is wrong with one does not hide the others. `body` is for a recording of SMPL
+/// states.
+pub fn read(reader: &BagReader, body: Option<&Arc<BodyModel>>) -> anyhow::Result<Vec<(String, anyhow::Result<Recorded>)>> {
     let references = names(reader, "/reference/", "", PoseStamped::TYPE_NAME);
     if references.is_empty() {
-        let trajectories = from_states(reader)?.into_iter();
+        let trajectories = from_states(reader, body)?.into_iter();
         return Ok(trajectories.map(|(name, frames)| (name.clone(), with_imu(reader, name, frames, Vec::new()))).collect());
     }
     let read = |name: String| {
@@ -90,7 +95,7 @@ pub fn poses(reader: &BagReader, topic: &str, notes: &mut Vec<String>) -> anyhow
 }
 
 /// The sites' poses from the recording's states and its attachment `placements.yaml`.
-fn from_states(reader: &BagReader) -> anyhow::Result<Vec<(String, Vec<SensorFrame>)>> {
+fn from_states(reader: &BagReader, body: Option<&Arc<BodyModel>>) -> anyhow::Result<Vec<(String, Vec<SensorFrame>)>> {
     let path = reader.path().display();
     let Some(placements) = reader.attachment("placements.yaml") else {
         bail!(
@@ -102,10 +107,9 @@ fn from_states(reader: &BagReader) -> anyhow::Result<Vec<(String, Vec<SensorFram
     states.sort_by_key(|(_, state)| state.header.stamp.nanos());
     states.dedup_by_key(|(_, state)| state.header.stamp.nanos());
     let Some((_, last)) = states.last() else { bail!("{path}: /smpl/state holds no message") };
-    BodyModel::embedded()
-        .check_named_betas(&last.shape_space, &last.gender, &last.betas)
-        .with_context(|| format!("{path}, /smpl/state"))?;
-    let shaped = ShapedBody::new(BodyModel::embedded(), &last.betas)?;
+    let model = body::of_bag(reader, body)?;
+    model.check_named_betas(&last.shape_space, &last.gender, &last.betas).with_context(|| format!("{path}, /smpl/state"))?;
+    let shaped = ShapedBody::new(model, &last.betas)?;
     let sites = MountedSites::new(&shaped, placements.placements())?;
     let stamps: Vec<Stamp> = states.iter().map(|(_, state)| Stamp::from_nanos(state.header.stamp.nanos())).collect();
     let pose =

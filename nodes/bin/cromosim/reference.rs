@@ -5,6 +5,7 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 use cromosim_bag::{BagOptions, BagReader, BagSummary, BagWriter, Compression};
+use cromosim_body::BodyModel;
 use cromosim_imu::{
     Covariances, DeclaredNoise, Device, Dropouts, EffectKind, EffectSet, EffectsFile, ImuSample, NoiseSource, Placement, PlacementEffects,
     Reading, Scheme, SensorFrame, SensorModel, SensorTrajectory, simulate_kinematics,
@@ -31,7 +32,8 @@ pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
     }
     let scheme: Option<Scheme> = arguments.scheme.as_deref().map(str::parse).transpose().context("--scheme")?;
     let reader = BagReader::open(recording)?;
-    let recorded = recorded::read(&reader)?.into_iter().map(|(_, placement)| placement).collect::<anyhow::Result<Vec<_>>>()?;
+    let body = arguments.body.as_deref().map(BodyModel::read).transpose()?;
+    let recorded = recorded::read(&reader, body.as_ref())?.into_iter().map(|(_, placement)| placement).collect::<anyhow::Result<Vec<_>>>()?;
     let effects = arguments.effects.as_deref().map(|file| read_effects(file, &recorded)).transpose()?.unwrap_or_default();
     let (recorded, without_stamps) = with_stamps(recorded, arguments.rate);
     let simulated = simulate_all(&recorded, scheme, arguments, |name| effects.placements.get(name))?;

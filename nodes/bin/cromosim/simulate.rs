@@ -40,7 +40,7 @@ pub struct Arguments {
     /// Motion files (BVH, ASF/AMC, C3D, TRC); none: the embedded walk
     motions: Vec<PathBuf>,
     /// Re-simulate the IMUs of this recording from its reference motion instead
-    #[arg(long, value_name = "RECORDING", conflicts_with_all = ["motions", "placements", "body", "csv", "up_axis", "unit", "start", "duration", "skeleton", "motion_rate", "marker_set", "subject", "placements_as_given"])]
+    #[arg(long, value_name = "RECORDING", conflicts_with_all = ["motions", "placements", "csv", "up_axis", "unit", "start", "duration", "skeleton", "motion_rate", "marker_set", "subject", "placements_as_given"])]
     pub reference: Option<PathBuf>,
     /// Simulate an IMU on a rigid body (robot, prop) that moves along this trajectory (TUM, EuRoC or CSV) instead
     #[arg(long, value_name = "FILE", requires = "rate", conflicts_with_all = ["motions", "placements", "body", "csv", "up_axis", "unit", "start", "duration", "skeleton", "motion_rate", "marker_set", "subject", "placements_as_given"])]
@@ -66,9 +66,9 @@ pub struct Arguments {
     /// Messages per second rather than the placements' own rate, Hz
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub rate: Option<f64>,
-    /// Body model as npz rather than the embedded one
+    /// Body model as npz or pickle rather than the embedded one; with --reference that of the recording's SMPL states
     #[arg(long, value_name = "FILE")]
-    body: Option<PathBuf>,
+    pub body: Option<PathBuf>,
     /// Seed of the sensor noise
     #[arg(long, default_value_t = 0)]
     pub seed: u64,

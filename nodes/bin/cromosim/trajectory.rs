@@ -13,6 +13,7 @@ use cromosim_motion::{MotionOptions, PoseView, SmplMotion, open_poses, read_moti
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
 
 use crate::body;
+use crate::convert::bag;
 use crate::convert::write::{self, Target};
 use crate::motion_arguments::MotionArguments;
 
@@ -23,9 +24,9 @@ pub struct Arguments {
     /// The in-place poses: what VIBE, PHALP, WHAM, GVHMR or TRAM wrote; or any motion whose root orientation is that against a level camera
     /// which looks along the world's y axis
     poses: PathBuf,
-    /// The motion to write; the ending decides where --to does not: .npz, .bvh or .trc
+    /// The motion to write; the ending decides where --to does not: .npz, .bvh, .trc, or .mcap, which keeps the frames' confidence
     out: PathBuf,
-    /// The format to write: amass, bvh or trc
+    /// The format to write: amass, bvh, trc or bag
     #[arg(long, value_enum, value_name = "FORMAT")]
     to: Option<Target>,
     /// Folder of OpenPose's *_keypoints.json (BODY_25)
@@ -86,7 +87,7 @@ fn size(text: &str) -> Result<[usize; 2], String> {
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let target = Target::of(arguments.to, &arguments.out)?;
     if !target.takes_motions() {
-        bail!("{}: {} holds no motion of a body; give .npz, .bvh or .trc", arguments.out.display(), target.describe());
+        bail!("{}: {} holds no motion of a body; give .npz, .bvh, .trc or .mcap", arguments.out.display(), target.describe());
     }
     if arguments.out.exists() && !arguments.force {
         bail!("{}: exists already; --force replaces it", arguments.out.display());
@@ -103,8 +104,12 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let mut files = folder.read(clip.poses.len(), options.least_confidence)?;
     (clip.keypoints, clip.cameras) = (files.keypoints, files.cameras);
     let placed = global_trajectory(&clip, &mut files.depth, &model, &options)?;
-    let bytes = write::motion_bytes(&placed.motion, target, &model, &arguments.motion)?;
-    write::file(&arguments.out, &bytes, arguments.force)?;
+    if target == Target::Bag {
+        bag::motion_bag(&placed.motion, &model, "trajectory", &arguments.out, arguments.force)?;
+    } else {
+        let bytes = write::motion_bytes(&placed.motion, target, &model, &arguments.motion)?;
+        write::file(&arguments.out, &bytes, arguments.force)?;
+    }
     println!("{}: {} of {} frames", arguments.out.display(), target.describe(), placed.motion.frames.len());
     println!("  {}", placed.report);
     Ok(())

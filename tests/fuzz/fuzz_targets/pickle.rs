@@ -32,4 +32,11 @@ fuzz_target!(|bytes: &[u8]| {
     {
         walk(&root, &mut 100);
     }
+    // With entries that are skipped, whatever they hold.
+    let skipped: &[&[&str]] = &[&["a", "b"], &["stageii_debug_details", "cfg"]];
+    if let Ok(mut container) = Container::without(Cursor::new(bytes), Path::new("fuzz.pkl"), limits, skipped)
+        && let Ok(root) = container.root()
+    {
+        walk(&root, &mut 100);
+    }
 });

@@ -1,9 +1,11 @@
 //! A topic of a bag as a trajectory or an IMU series.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use anyhow::{anyhow, bail};
 use cromosim_bag::BagReader;
+use cromosim_body::BodyModel;
 use cromosim_motion::rigid::{EurocGroundTruth, ImuSeries, PoseTrajectory};
 use cromosim_msgs::RosMessage;
 use cromosim_msgs::geometry_msgs::PoseStamped;
@@ -14,24 +16,32 @@ use nalgebra::Vector3;
 
 use super::frames::Tree;
 use super::write::Target;
-use super::{Arguments, Content};
+use super::{Arguments, Content, states};
 use crate::recorded;
 
 /// Reads the chosen topic.
-pub fn read(path: &Path, arguments: &Arguments) -> anyhow::Result<Content> {
+pub fn read(path: &Path, arguments: &Arguments, model: &Arc<BodyModel>, target: Target) -> anyhow::Result<Content> {
     let reader = BagReader::open(path)?;
     let poses = |trajectory| Content::Poses(EurocGroundTruth { trajectory, ..EurocGroundTruth::default() });
     if let Some(frame) = &arguments.frame {
         return tree_trajectory(&reader, frame, arguments).map(poses);
     }
-    let (topic, type_name) = choose(&reader, arguments)?;
+    let (topic, type_name) = choose(&reader, arguments, target)?;
     match type_name.as_str() {
         name if name == PoseStamped::TYPE_NAME => trajectory(&reader, &topic).map(poses),
         name if name == Imu::TYPE_NAME => series(&reader, &topic).map(Content::Imu),
+        name if states::types().contains(&name) => {
+            let options = arguments.motion.options()?;
+            let given = arguments.body.as_ref().map(|_| model);
+            let motion = states::motion(&reader, &topic, options.person.as_deref(), given)?;
+            Ok(Content::Motion(Box::new(motion.slice(options.start_s, options.duration_s)?)))
+        }
         name if name == TFMessage::TYPE_NAME => bail!("{topic}: a tree of frames; give --frame, one of {}", Tree::read(&reader)?.known()),
         other => bail!(
-            "{}, {topic}: a topic of {other}; {}, {} and {} (with --frame) are converted",
+            "{}, {topic}: a topic of {other}; {}, {}, {}, {} and {} (with --frame) are converted",
             path.display(),
+            states::types()[0],
+            states::types()[1],
             PoseStamped::TYPE_NAME,
             Imu::TYPE_NAME,
             TFMessage::TYPE_NAME
@@ -40,17 +50,30 @@ pub fn read(path: &Path, arguments: &Arguments) -> anyhow::Result<Content> {
 }
 
 /// The given topic, or the only one that suits.
-fn choose(reader: &BagReader, arguments: &Arguments) -> anyhow::Result<(String, String)> {
+fn choose(reader: &BagReader, arguments: &Arguments, target: Target) -> anyhow::Result<(String, String)> {
     if let Some(topic) = &arguments.topic {
         return Ok((topic.clone(), reader.topic(topic)?.type_name.clone()));
     }
     // A TUM file holds no readings.
-    let takes_readings = !matches!(arguments.to, Some(Target::Tum)) && arguments.out.extension().is_none_or(|ending| ending != "tum");
-    let suits = |name: &str| name == PoseStamped::TYPE_NAME || (name == Imu::TYPE_NAME && takes_readings);
-    let topics = reader.summary().topics.iter().map(|counted| &counted.topic);
-    let found: Vec<_> = topics.filter(|topic| suits(&topic.type_name)).map(|topic| (topic.name.clone(), topic.type_name.clone())).collect();
+    let takes_readings = target != Target::Tum;
+    let wants_motion = (target.takes_motions() && target != Target::Bag) || arguments.joint.is_some() || arguments.site.is_some();
+    let of_types = |types: &[&str]| {
+        let topics = reader.summary().topics.iter().map(|counted| &counted.topic);
+        let suits = topics.filter(|topic| types.contains(&topic.type_name.as_str()));
+        suits.map(|topic| (topic.name.clone(), topic.type_name.clone())).collect::<Vec<_>>()
+    };
+    let found = if wants_motion {
+        // The state is what became of the pose.
+        let [states, poses] = states::types().map(|name| of_types(&[name]));
+        if states.is_empty() { poses } else { states }
+    } else if takes_readings {
+        of_types(&[PoseStamped::TYPE_NAME, Imu::TYPE_NAME])
+    } else {
+        of_types(&[PoseStamped::TYPE_NAME])
+    };
     match found.as_slice() {
         [only] => Ok(only.clone()),
+        [] if wants_motion => bail!("{}: no topic of {} or {}", reader.path().display(), states::types()[0], states::types()[1]),
         [] => {
             bail!("{}: no topic of {} or {}; --frame takes a frame of TF", reader.path().display(), PoseStamped::TYPE_NAME, Imu::TYPE_NAME)
         }

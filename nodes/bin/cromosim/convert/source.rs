@@ -7,11 +7,13 @@ use std::sync::Arc;
 
 use anyhow::{Context, bail};
 use cromosim_body::BodyModel;
+use cromosim_motion::datasets::open_dataset;
 use cromosim_motion::rigid::{
     EurocGroundTruth, RigidFormat, parse_euroc_ground_truth, parse_euroc_imu, parse_imu_csv, parse_pose_csv, parse_tum, sniff_rigid,
 };
 use cromosim_motion::{MotionFormat, read_motion_for};
 
+use super::write::Target;
 use super::{Arguments, Content, name, recording};
 
 /// Larger tables are refused: a day of readings at 1 kHz is about as large.
@@ -21,11 +23,12 @@ const HEAD_BYTES: u64 = 1 << 16;
 const MCAP: &[u8] = b"\x89MCAP";
 
 /// Reads whatever the input is.
-pub fn read(arguments: &Arguments, model: &Arc<BodyModel>) -> anyhow::Result<Content> {
+pub fn read(arguments: &Arguments, model: &Arc<BodyModel>, target: Target) -> anyhow::Result<Content> {
     let path = &arguments.input;
     let head = if path.is_dir() { MCAP.to_vec() } else { head(path)? };
     if head.starts_with(MCAP) {
-        return recording::read(path, arguments);
+        refuse_dataset_options(arguments)?;
+        return recording::read(path, arguments, model, target);
     }
     if let Some(option) = [(&arguments.topic, "--topic"), (&arguments.frame, "--frame")].iter().find(|(value, _)| value.is_some()) {
         bail!("{}: {} chooses from a bag, which this file is not", path.display(), option.1);
@@ -33,6 +36,10 @@ pub fn read(arguments: &Arguments, model: &Arc<BodyModel>) -> anyhow::Result<Con
     if head.is_empty() {
         bail!("{}: the file is empty", path.display());
     }
+    if let Some((_, recording)) = open_dataset(path, &arguments.dataset.files())? {
+        return arguments.dataset.chosen(recording, arguments.name.as_deref(), target, path);
+    }
+    refuse_dataset_options(arguments)?;
     // Motions first: an AMC's frame can look like a row of numbers.
     if MotionFormat::of(&head).is_none()
         && sniff_rigid(&head).is_some()
@@ -41,6 +48,13 @@ pub fn read(arguments: &Arguments, model: &Arc<BodyModel>) -> anyhow::Result<Con
         return Ok(content);
     }
     Ok(Content::Motion(Box::new(read_motion_for(path, model, &arguments.motion.options()?)?)))
+}
+
+fn refuse_dataset_options(arguments: &Arguments) -> anyhow::Result<()> {
+    match arguments.dataset.given() {
+        Some(option) => bail!("{}: {option} is for recordings of data sets, which this file is not; leave it out", arguments.input.display()),
+        None => Ok(()),
+    }
 }
 
 /// The beginning of a file.

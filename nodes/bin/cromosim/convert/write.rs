@@ -29,7 +29,7 @@ pub enum Target {
     Euroc,
     /// Table with a header: poses, or readings
     Csv,
-    /// rosbag2 MCAP with /reference/NAME and /imu/NAME/data_raw
+    /// rosbag2 MCAP with /reference/NAME and /imu/NAME/data_raw; of a motion /smpl/pose with its confidence
     Bag,
 }
 
@@ -62,7 +62,7 @@ impl Target {
 
     /// Whether it holds whole bodies.
     pub const fn takes_motions(self) -> bool {
-        matches!(self, Self::Amass | Self::Bvh | Self::Trc)
+        matches!(self, Self::Amass | Self::Bvh | Self::Trc | Self::Bag)
     }
 
     /// What it is, in a few words.

@@ -39,6 +39,8 @@ pub enum Format {
     Gzip,
     /// MATLAB's `.mat` of versions 5 to 7.
     Mat,
+    /// HDF5, as MATLAB 7.3 writes it too: told, but not read.
+    Hdf5,
 }
 
 impl Format {
@@ -62,6 +64,7 @@ impl Format {
             _ if start.starts_with(npy::MAGIC) => Some(Self::Npy),
             _ if start.starts_with(b"PK\x03\x04") || start.starts_with(b"PK\x05\x06") => Some(Self::Zip),
             _ if start.starts_with(mat::START) => Some(Self::Mat),
+            _ if start.starts_with(HDF5_START) || start.starts_with(b"MATLAB 7.") => Some(Self::Hdf5),
             _ if start.starts_with(LEGACY_START) => Some(Self::TorchLegacy),
             [0x1f, 0x8b, ..] => Some(Self::Gzip),
             // zlib's two header bytes are a multiple of 31.
@@ -129,12 +132,12 @@ impl<R: Read + Seek> Container<R> {
         let path: Arc<Path> = Arc::from(path);
         let Some(format) = Format::of(&mut reader).map_err(cannot_read)? else {
             let start = first_bytes(&mut reader).map_err(cannot_read)?;
-            if start.starts_with(HDF5_START) || start.starts_with(b"MATLAB 7.") {
-                return Err(ArraysError::Hdf5 { path: path.to_path_buf() });
-            }
             let start = if start.is_empty() { "nothing".to_owned() } else { start.escape_ascii().to_string() };
             return Err(ArraysError::Unrecognised { path: path.to_path_buf(), start });
         };
+        if format == Format::Hdf5 {
+            return Err(ArraysError::Hdf5 { path: path.to_path_buf() });
+        }
         if format == Format::Zip {
             let archive = ZipArchive::new(reader);
             let archive = archive.map_err(|error| ArraysError::Archive { path: path.to_path_buf(), source: io_error(error) })?;

@@ -1,10 +1,11 @@
 //! Importers of the data sets that people have: TotalCapture, PAMAP2, RealWorld (HAR), BROAD, and the structure of DIP-IMU. Each gives the
 //! IMUs by placement, and references where there are.
 //!
-//! Parsers work over bytes and open nothing. What a data set does not say (gyroscopes in DIP-IMU) is not made up.
+//! [`open_dataset`] tells a file by its content and looks for what belongs to it. Parsers work over bytes and open nothing. What a data set does not say (gyroscopes in DIP-IMU) is not made up.
 
 mod broad;
 mod dip;
+mod open;
 mod pamap2;
 mod realworld;
 mod recording;
@@ -12,6 +13,7 @@ mod totalcapture;
 
 pub use broad::parse_broad;
 pub use dip::{DIP_RATE_HZ, DIP_SENSORS, DipArray, DipRecording};
+pub use open::{DatasetFiles, DatasetFormat, open_dataset, sniff_dataset};
 pub use pamap2::{PAMAP2_RATE_HZ, pamap2_activity, parse_pamap2};
 pub use realworld::parse_realworld;
 pub use recording::{ActivitySpan, DatasetRecording, PlacedImu};

@@ -80,6 +80,15 @@ pub fn parse_realworld<R: Read + Seek>(accelerometer: R, gyroscope: R, names: [&
     Ok(recording)
 }
 
+/// Whether a zip holds tables of the data set.
+pub(super) fn is_realworld(reader: impl Read + Seek) -> bool {
+    let Ok(archive) = ZipArchive::new(reader) else { return false };
+    archive.file_names().filter_map(Result::ok).any(|member| {
+        let file = member.rsplit('/').next().unwrap_or_default().to_lowercase();
+        file.ends_with(".csv") && (file.starts_with("acc_") || file.starts_with("gyroscope_"))
+    })
+}
+
 /// Between the readings before and at `after`.
 fn interpolated(readings: &[Reading], after: usize, stamp: Stamp) -> Option<Vector3<f64>> {
     let (to, later) = readings.get(after)?;

@@ -89,6 +89,26 @@ fn segment(placement: &str) -> Option<Joint> {
     })
 }
 
+/// The joint of the data set's skeleton that a sensor moves with.
+pub(super) fn joint(placement: &str) -> Option<&'static str> {
+    Some(match placement {
+        "Head" => "Head",
+        "Sternum" => "Spine3",
+        "Pelvis" => "Hips",
+        "L_UpArm" => "LeftArm",
+        "R_UpArm" => "RightArm",
+        "L_LowArm" => "LeftForeArm",
+        "R_LowArm" => "RightForeArm",
+        "L_UpLeg" => "LeftUpLeg",
+        "R_UpLeg" => "RightUpLeg",
+        "L_LowLeg" => "LeftLeg",
+        "R_LowLeg" => "RightLeg",
+        "L_Foot" => "LeftFoot",
+        "R_Foot" => "RightFoot",
+        _ => return None,
+    })
+}
+
 /// Reads the skeleton's reference from its two files: a line with the joints' names, then per frame x y z (inches, y up) or x y z w of each
 /// joint. Comes out in metres with z up, world_from_joint, one trajectory a joint. The files may differ by the frames at their ends.
 ///

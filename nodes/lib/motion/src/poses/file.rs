@@ -11,7 +11,7 @@ use super::body::{CameraPoses, OnBody};
 use super::report::people_text;
 use super::track::PoseTrack;
 use super::values::{Budget, problem};
-use super::{PoseFormat, amass, gvhmr, phalp, slahmr, tram, vibe, wham};
+use super::{PoseFormat, amass, dip, gvhmr, phalp, slahmr, tram, vibe, wham};
 use crate::{MotionError, MotionOptions, SmplMotion};
 
 /// Which of its estimates is taken of a file that holds both.
@@ -72,6 +72,9 @@ impl PoseFile {
         }
         if has(&["trans"]) && (has(&["poses"]) || has(&["fullpose"]) || has(&["root_orient", "pose_body"])) {
             return found(PoseFormat::Amass, amass::tracks(container, &mut budget)?);
+        }
+        if has(&["gt", "imu_ori", "imu_acc"]) {
+            return found(PoseFormat::Dip, vec![dip::track(container, &mut budget)?]);
         }
         let is_npz = keys.first().is_some_and(|key| !matches!(container.header(key), Ok(None)));
         let unknown = |found: String| Err(MotionError::UnknownPoses { path: path.clone(), found });

@@ -14,12 +14,14 @@
 //! | TRAM | `pred_rotmat`; `world_cam_R`, `world_cam_T` beside it | found; camera without those | one |
 //! | PHALP (4D-Humans) | frame: `tid`, `smpl` | camera | several |
 //! | SLAHMR | `root_orient`, `pose_body`, `trans`, `cam_R` | of `floor_plane`, else found | several |
+//! | DIP-IMU | `gt`, `imu_ori`, `imu_acc` | found | one |
 //!
 //! Camera axes are x right, y down, z forward.
 
 mod amass;
 mod body;
 mod bridge;
+mod dip;
 mod file;
 mod gvhmr;
 mod io;
@@ -68,12 +70,14 @@ pub enum PoseFormat {
     Phalp,
     /// SLAHMR (Ye et al. 2023).
     Slahmr,
+    /// DIP-IMU's reference poses (Huang et al. 2018).
+    Dip,
 }
 
 impl PoseFormat {
     /// Whether it comes from video, and so knows neither the frame rate nor the floor.
     pub fn is_video(self) -> bool {
-        self != Self::Amass
+        !matches!(self, Self::Amass | Self::Dip)
     }
 }
 
@@ -87,6 +91,7 @@ impl fmt::Display for PoseFormat {
             Self::Tram => "TRAM",
             Self::Phalp => "PHALP",
             Self::Slahmr => "SLAHMR",
+            Self::Dip => "DIP-IMU",
         })
     }
 }
