@@ -11,6 +11,7 @@ use cromosim_bag::{BagOptions, BagReader, BagWriter};
 use cromosim_body::{BodyModel, ShapedBody};
 use cromosim_motion::rigid::{PoseTrajectory, parse_euroc_imu, parse_tum, write_tum};
 use cromosim_motion::{MotionOptions, embedded_walk, read_motion, write_bvh};
+use cromosim_msgs::cromosim_msgs::SmplPose;
 use cromosim_msgs::geometry_msgs::{PoseStamped, Transform, TransformStamped};
 use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_msgs::std_msgs::Header;
@@ -214,6 +215,136 @@ fn frames_of_tf_become_a_trajectory() {
     refuses(folder.path(), &["convert", "tf.mcap", "x.tum"], &["no topic of geometry_msgs/msg/PoseStamped", "--frame"]);
 }
 
+/// A file that the tests of the library read, too.
+fn sample(name: &str) -> String {
+    let folder = if name.ends_with(".mat") { "nodes/lib/motion/tests/data" } else { "tests/fuzz/samples/datasets" };
+    common::root().join(folder).join(name).display().to_string()
+}
+
+#[test]
+fn recordings_of_data_sets_become_bags() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let at = |name: &str| here.join(name);
+    // BROAD, as it is published: reference and IMU from a second on, and when it moved.
+    succeed(here, &["convert", &sample("broad.mat"), "broad.mcap", "--name", "tool"]);
+    let bag = BagReader::open(&at("broad.mcap")).unwrap();
+    let (poses, imus) = (bag.read::<PoseStamped>("/reference/tool").unwrap(), bag.read::<Imu>("/imu/tool/data_raw").unwrap());
+    assert_eq!((poses.len(), imus.len(), imus[0].1.header.stamp.nanos()), (37, 40, 1_000_000_000));
+    assert_eq!((imus[3].1.linear_acceleration.z, imus[3].1.angular_velocity.z), (9.8, 0.5));
+    let activities = String::from_utf8(bag.attachment("activities.csv").unwrap().to_vec()).unwrap();
+    assert_eq!(activities, "start_ns,end_ns,activity\n1000000000,1066500000,rest\n1070000000,1136500000,movement\n");
+    succeed(here, &["convert", &sample("broad.mat"), "part.tum", "--start", "0.05", "--duration", "0.02"]);
+    let part = parse_tum(&fs::read(at("part.tum")).unwrap(), "part.tum").unwrap();
+    assert_eq!((part.stamps.len(), part.stamps[0].nanos), (6, 52_500_000));
+    let said = succeed(here, &["inspect", &sample("broad.mat")]);
+    assert!(said.contains("recording of BROAD, 1 IMU at 285.714 Hz") && said.contains("reference of 37 poses"), "{said}");
+
+    // TotalCapture with its skeleton in the folder of the trial: a reference for each sensor that has a joint.
+    fs::copy(sample("totalcapture.sensors"), at("acting1_Xsens_AuxFields.sensors")).unwrap();
+    fs::create_dir(at("acting1")).unwrap();
+    fs::write(at("acting1/gt_skel_gbl_pos.txt"), "Hips\tHead\n0 40 0\t0 70 10\n10 40 0\t0 70 10\n").unwrap();
+    fs::write(at("acting1/gt_skel_gbl_ori.txt"), "Hips\tHead\n0 0 0 1\t0 0.6 0 0.8\n0 0 0 1\t0 0 0 1\n").unwrap();
+    succeed(here, &["convert", "acting1_Xsens_AuxFields.sensors", "acting.mcap"]);
+    let bag = BagReader::open(&at("acting.mcap")).unwrap();
+    let poses = bag.read::<PoseStamped>("/reference/Head").unwrap();
+    assert!(poses.len() == 2 && (poses[0].1.pose.position.z - 1.778).abs() < 1e-12, "inches, y up: {:?}", poses[0]);
+    let full = bag.read::<Imu>("/imu/L_LowArm/data").unwrap();
+    assert!((full.len(), full[0].1.orientation.w, full[0].1.orientation.y) == (3, 0.8, 0.6), "the device's own orientation");
+    assert_eq!(bag.read::<Imu>("/imu/L_LowArm/data_raw").unwrap()[2].1.linear_acceleration.x, 3.0);
+    assert!(bag.topic("/reference/L_LowArm").is_err());
+
+    // PAMAP2: one placement of three, its stamps as they are.
+    succeed(here, &["convert", &sample("pamap2.dat"), "hand.csv", "--to", "euroc", "--placement", "hand"]);
+    let hand = parse_euroc_imu(&fs::read(at("hand.csv")).unwrap(), "hand.csv").unwrap();
+    assert_eq!(hand.stamps.iter().map(|stamp| stamp.nanos).collect::<Vec<_>>(), [5_000_000_000, 5_020_000_000]);
+    refuses(here, &["convert", &sample("pamap2.dat"), "x.csv"], &["several placements; give --placement, one of hand, chest, ankle"]);
+    refuses(here, &["convert", &sample("pamap2.dat"), "x.mcap", "--placement", "head"], &["--placement head: no such placement"]);
+    refuses(here, &["convert", &sample("pamap2.dat"), "x.tum", "--placement", "hand"], &["no reference of hand"]);
+    refuses(here, &["convert", &sample("pamap2.dat"), "x.mcap", "--up-axis", "y"], &["--up-axis is for motions"]);
+
+    // RealWorld: the gyroscope's zip beside the accelerometer's, or named.
+    fs::copy(sample("realworld.zip"), at("acc_walking_csv.zip")).unwrap();
+    refuses(here, &["convert", "acc_walking_csv.zip", "x.mcap"], &["the gyroscope's is not beside"]);
+    fs::copy(sample("realworld.zip"), at("gyr_walking_csv.zip")).unwrap();
+    succeed(here, &["convert", "acc_walking_csv.zip", "walking.mcap"]);
+    succeed(here, &["convert", "acc_walking_csv.zip", "same.mcap", "--gyroscope", "gyr_walking_csv.zip"]);
+    let bag = BagReader::open(&at("walking.mcap")).unwrap();
+    let chest = bag.read::<Imu>("/imu/chest/data_raw").unwrap();
+    assert_eq!((chest.len(), chest[0].1.header.stamp.nanos()), (6, 1_435_995_800_000_000_000));
+    let said = succeed(here, &["compare", "walking.mcap", "same.mcap"]);
+    assert!(said.contains("chest") && said.contains("forearm"), "{said}");
+
+    // DIP-IMU's reference poses are a motion.
+    succeed(here, &["convert", &sample("dip.pkl"), "dip.npz"]);
+    let dip = read_motion(&at("dip.npz"), &MotionOptions::default()).unwrap();
+    assert_eq!((dip.frames.len(), dip.rate_hz), (2, 60.0));
+    assert!(!names(here).iter().any(|name| name.starts_with("x.")));
+}
+
+#[test]
+fn a_real_trial_of_broad_becomes_a_recording_that_is_diagnosed() {
+    let Some(folder) = common::shared_data() else { return };
+    let trial = folder.join("paired_broad/21_undisturbed_fast_combined.npz").display().to_string();
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    // A few seconds of movement: all of it takes minutes.
+    succeed(here, &["convert", &trial, "trial.mcap", "--start", "60", "--duration", "12"]);
+    let said = succeed(here, &["inspect", "trial.mcap"]);
+    assert!(said.contains("/reference/body") && said.contains("/imu/body/data_raw"), "{said}");
+    let said = succeed(here, &["diagnose", "trial.mcap", "--out", "diagnosis"]);
+    println!("{said}");
+    let diagnosis = fs::read_to_string(here.join("diagnosis/diagnosis.json")).unwrap();
+    assert!(diagnosis.contains("\"body\"") && said.starts_with("body: "), "{said}");
+}
+
+#[test]
+fn poses_of_a_body_in_a_bag_become_a_motion_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let at = |name: &str| here.join(name);
+    walk(here, 1.0);
+    let read = |name: &str| read_motion(&at(name), &MotionOptions::default()).unwrap();
+    let same = |a: &str, b: &str, within: f64| {
+        let (a, b) = (read(a), read(b));
+        assert_eq!((a.frames.len(), (a.rate_hz * 1e3).round()), (b.frames.len(), (b.rate_hz * 1e3).round()));
+        for (a, b) in a.frames.iter().zip(&b.frames) {
+            assert!((a.root_position - b.root_position).norm() < within);
+            assert!(a.world_rotations().iter().zip(&b.world_rotations()).all(|(a, b)| a.angle_to(b) < within));
+        }
+    };
+    // From the states that simulate writes beside the IMUs, and from poses alone.
+    succeed(here, &["convert", "walk.bvh", "walk.npz"]);
+    succeed(here, &["simulate", "walk.bvh", "--out", "whole.mcap"]);
+    succeed(here, &["convert", "whole.mcap", "states.npz"]);
+    same("walk.npz", "states.npz", 1e-6);
+    let said = succeed(here, &["convert", "walk.bvh", "poses.mcap"]);
+    assert!(said.contains("a bag of 101 frames"), "{said}");
+    succeed(here, &["convert", "poses.mcap", "again.npz", "--start", "0.2"]);
+    assert_eq!(read("again.npz").frames.len(), 81);
+    succeed(here, &["convert", "poses.mcap", "wrist.tum", "--joint", "left_wrist"]);
+    succeed(here, &["convert", "walk.bvh", "known.tum", "--joint", "left_wrist"]);
+    let [wrist, known] = ["wrist.tum", "known.tum"].map(|name| parse_tum(&fs::read(at(name)).unwrap(), name).unwrap());
+    assert!(wrist.positions.iter().zip(&known.positions).all(|(a, b)| (a - b).norm() < 1e-9));
+
+    // Uneven stamps, with a gap of 0.3 s: the rate is the median's, and the gap is not to be trusted.
+    let reader = BagReader::open(&at("poses.mcap")).unwrap();
+    let mut bag = BagWriter::create(&at("uneven.mcap"), BagOptions::default()).unwrap();
+    for (index, (stamp, pose)) in reader.read::<SmplPose>("/smpl/pose").unwrap().into_iter().enumerate() {
+        let jitter = [0, 300_000, -200_000][index % 3];
+        let stamp = Stamp::from_nanos(stamp.nanos + jitter);
+        if !(40..70).contains(&index) {
+            bag.write("/smpl/pose", stamp, &SmplPose { header: Header::new(stamp.nanos, "world"), ..pose }).unwrap();
+        }
+    }
+    bag.finish().unwrap();
+    succeed(here, &["convert", "uneven.mcap", "even.mcap", "--to", "amass"]);
+    let even = read("even.mcap");
+    assert!((even.rate_hz - 100.0).abs() < 6.0 && (even.duration_s() - 1.0).abs() < 0.02, "{} Hz, {} s", even.rate_hz, even.duration_s());
+    refuses(here, &["convert", "uneven.mcap", "x.npz", "--person", "7"], &["/smpl/pose: no pose of 7; there are bodies 0"]);
+    refuses(here, &["convert", "uneven.mcap", "x.npz", "--up-axis", "y"], &["--up-axis is for motion files"]);
+}
+
 #[test]
 fn what_cannot_be_converted_is_said_and_leaves_nothing_behind() {
     let folder = tempfile::tempdir().unwrap();
@@ -235,7 +366,10 @@ fn what_cannot_be_converted_is_said_and_leaves_nothing_behind() {
     refuses(here, &["convert", "walk.bvh", "x.tum"], &["walk.bvh: a motion has 24 joints", "--joint"]);
     refuses(here, &["convert", "walk.bvh", "x.tum", "--joint", "tail"], &["--joint tail", "left_wrist"]);
     refuses(here, &["convert", "walk.bvh", "x.tum", "--site", "tail"], &["--site tail"]);
-    refuses(here, &["convert", "walk.bvh", "x.mcap"], &["simulate"]);
+    refuses(here, &["convert", "walk.bvh", "x.mcap", "--placement", "hand"], &["--placement is for recordings of data sets"]);
+    fs::write(at("trial.hdf5"), b"\x89HDF\r\n\x1a\n\0\0\0\0").unwrap();
+    refuses(here, &["convert", "trial.hdf5", "x.mcap"], &["trial.hdf5: HDF5", "save -v7"]);
+    fs::remove_file(at("trial.hdf5")).unwrap();
     refuses(here, &["convert", "prose.txt", "x.bvh"], &["prose.txt: not a motion file"]);
     refuses(here, &["convert", "absent.bvh", "x.bvh"], &["absent.bvh: cannot be read"]);
     refuses(here, &["convert", "robot.tum", "nowhere/x.csv"], &["nowhere/x.csv: cannot be written"]);

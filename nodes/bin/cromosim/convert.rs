@@ -125,9 +125,6 @@ fn followed(content: Content, arguments: &Arguments, model: &Arc<BodyModel>, tar
         if let Some(name) = arguments.joint.as_ref().or(arguments.site.as_ref()) {
             bail!("{}: {} has no joint or site {name}; leave --joint and --site out", arguments.input.display(), content.name());
         }
-        if let Some(option) = arguments.motion.given() {
-            bail!("{}: {option} is for motions, and this is {}; leave it out", arguments.input.display(), content.name());
-        }
         return Ok(content);
     };
     let trajectory = match (&arguments.joint, &arguments.site) {

@@ -103,11 +103,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
 }
 
 /// The placements to diagnose, what a user should know of the others, and which cannot be read.
-fn select(
-    reader: &BagReader,
-    body: Option<&Arc<BodyModel>>,
-    only: &[String],
-) -> anyhow::Result<(Vec<Recorded>, Vec<String>, Vec<String>)> {
+fn select(reader: &BagReader, body: Option<&Arc<BodyModel>>, only: &[String]) -> anyhow::Result<(Vec<Recorded>, Vec<String>, Vec<String>)> {
     let file = reader.path().display();
     let mut found = recorded::read(reader, body)?;
     let names: Vec<&str> = found.iter().map(|(name, _)| name.as_str()).collect();

@@ -48,13 +48,24 @@ pub struct MotionArguments {
 }
 
 impl MotionArguments {
-    /// The first option that was given.
-    pub fn given(&self) -> Option<&'static str> {
+    /// The part that is asked for: its beginning and its length, s, checked.
+    pub fn part(&self) -> anyhow::Result<(f64, Option<f64>)> {
+        if !(self.start >= 0.0 && self.start.is_finite()) {
+            bail!("--start {}: expected 0 or more seconds", self.start);
+        }
+        if let Some(seconds) = self.duration.filter(|seconds| !(*seconds > 0.0 && seconds.is_finite())) {
+            bail!("--duration {seconds}: expected a positive number of seconds");
+        }
+        Ok((self.start, self.duration))
+    }
+
+    /// The first option that was given; `--start` and `--duration`, which other things than motions may have too, on demand.
+    pub fn given(&self, with_part: bool) -> Option<&'static str> {
         let given = [
             (self.up_axis != "auto", "--up-axis"),
             (self.unit.is_some(), "--unit"),
-            (self.start != 0.0, "--start"),
-            (self.duration.is_some(), "--duration"),
+            (with_part && self.start != 0.0, "--start"),
+            (with_part && self.duration.is_some(), "--duration"),
             (self.skeleton.is_some(), "--skeleton"),
             (self.motion_rate.is_some(), "--motion-rate"),
             (self.marker_set.is_some(), "--marker-set"),

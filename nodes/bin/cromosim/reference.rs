@@ -33,7 +33,8 @@ pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
     let scheme: Option<Scheme> = arguments.scheme.as_deref().map(str::parse).transpose().context("--scheme")?;
     let reader = BagReader::open(recording)?;
     let body = arguments.body.as_deref().map(BodyModel::read).transpose()?;
-    let recorded = recorded::read(&reader, body.as_ref())?.into_iter().map(|(_, placement)| placement).collect::<anyhow::Result<Vec<_>>>()?;
+    let recorded =
+        recorded::read(&reader, body.as_ref())?.into_iter().map(|(_, placement)| placement).collect::<anyhow::Result<Vec<_>>>()?;
     let effects = arguments.effects.as_deref().map(|file| read_effects(file, &recorded)).transpose()?.unwrap_or_default();
     let (recorded, without_stamps) = with_stamps(recorded, arguments.rate);
     let simulated = simulate_all(&recorded, scheme, arguments, |name| effects.placements.get(name))?;

@@ -167,7 +167,11 @@ impl Topics {
                 bag.write(&self.raw, stamp, &message)?;
                 if let Some(orientation) = placement.orientations.get(index) {
                     let covariance = [0.0; 9];
-                    bag.write(&self.full, stamp, &Imu { orientation: (*orientation).into(), orientation_covariance: covariance, ..message })?;
+                    bag.write(
+                        &self.full,
+                        stamp,
+                        &Imu { orientation: (*orientation).into(), orientation_covariance: covariance, ..message },
+                    )?;
                 }
             }
             _ => {}

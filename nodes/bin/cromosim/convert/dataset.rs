@@ -1,14 +1,14 @@
 //! A data set's recording: what belongs to it, and which of its placements is taken.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::bail;
 use clap::Args;
-use cromosim_motion::datasets::{DatasetFiles, DatasetRecording};
+use cromosim_motion::datasets::{DatasetFiles, DatasetRecording, PlacedImu};
 use cromosim_motion::rigid::EurocGroundTruth;
 
-use super::Content;
 use super::write::Target;
+use super::{Arguments, Content};
 
 /// Options of data sets.
 #[derive(Args)]
@@ -32,13 +32,28 @@ impl DatasetArguments {
 
     /// The first option that was given.
     pub fn given(&self) -> Option<&'static str> {
-        let given = [(self.placement.is_some(), "--placement"), (self.reference.is_some(), "--reference"), (self.gyroscope.is_some(), "--gyroscope")];
+        let given = [
+            (self.placement.is_some(), "--placement"),
+            (self.reference.is_some(), "--reference"),
+            (self.gyroscope.is_some(), "--gyroscope"),
+        ];
         given.into_iter().find_map(|(given, option)| given.then_some(option))
     }
 
-    /// The chosen placements, under `name` where it is one and a name is given; of one placement what the target holds.
-    pub fn chosen(&self, mut recording: DatasetRecording, name: Option<&str>, target: Target, path: &Path) -> anyhow::Result<Content> {
-        let path = path.display();
+    /// The chosen part and placements, under another name where it is one and a name is given; of one placement what the target holds.
+    pub fn chosen(&self, mut recording: DatasetRecording, target: Target, arguments: &Arguments) -> anyhow::Result<Content> {
+        let (path, name) = (arguments.input.display(), arguments.name.as_deref());
+        if let Some(option) = arguments.motion.given(false) {
+            bail!("{path}: {option} is for motions, and this is a recording of a data set; leave it out");
+        }
+        let (start, duration) = arguments.motion.part()?;
+        if let Some((first, last)) = recording.span() {
+            let from = first.plus_seconds(start);
+            if from > last {
+                bail!("{path}: --start {start}: the recording ends after {:.3} s", last - first);
+            }
+            recording.between(from, duration.map_or(last, |seconds| from.plus_seconds(seconds)));
+        }
         let known = recording.imus.iter().map(|imu| imu.placement.as_str()).collect::<Vec<_>>().join(", ");
         if let Some(placement) = &self.placement {
             if !recording.imus.iter().any(|imu| imu.placement == *placement) {
@@ -56,10 +71,8 @@ impl DatasetArguments {
             let old = std::mem::replace(&mut recording.imus[0].placement, name.to_owned());
             recording.references.iter_mut().filter(|(of, _)| *of == old).for_each(|(of, _)| name.clone_into(of));
         }
-        for imu in recording.imus.iter().filter(|imu| imu.rows_left_out > 0) {
-            eprintln!("{path}: {}: {} rows without readings, or out of the order of time, are left out", imu.placement, imu.rows_left_out);
-        }
-        Ok(match target {
+        let left_out: Vec<String> = recording.imus.iter().filter(|imu| imu.rows_left_out > 0).map(left_out).collect();
+        let content = match target {
             Target::Bag => Content::Recording(Box::new(recording)),
             Target::Tum => {
                 let of = recording.imus[0].placement.clone();
@@ -69,6 +82,12 @@ impl DatasetArguments {
                 Content::Poses(EurocGroundTruth { trajectory, ..EurocGroundTruth::default() })
             }
             _ => Content::Imu(recording.imus.swap_remove(0).series),
-        })
+        };
+        left_out.iter().for_each(|line| eprintln!("{path}: {line}"));
+        Ok(content)
     }
+}
+
+fn left_out(imu: &PlacedImu) -> String {
+    format!("{}: {} rows of the file without readings, or out of the order of time, are left out", imu.placement, imu.rows_left_out)
 }

@@ -31,6 +31,12 @@ pub fn read(path: &Path, arguments: &Arguments, model: &Arc<BodyModel>, target: 
         name if name == PoseStamped::TYPE_NAME => trajectory(&reader, &topic).map(poses),
         name if name == Imu::TYPE_NAME => series(&reader, &topic).map(Content::Imu),
         name if states::types().contains(&name) => {
+            if let Some(option) = arguments.motion.given(false).filter(|option| *option != "--person") {
+                bail!(
+                    "{}, {topic}: {option} is for motion files, and these are poses in SMPL's joints already; leave it out",
+                    path.display()
+                );
+            }
             let options = arguments.motion.options()?;
             let given = arguments.body.as_ref().map(|_| model);
             let motion = states::motion(&reader, &topic, options.person.as_deref(), given)?;

@@ -28,7 +28,7 @@ pub fn read(arguments: &Arguments, model: &Arc<BodyModel>, target: Target) -> an
     let head = if path.is_dir() { MCAP.to_vec() } else { head(path)? };
     if head.starts_with(MCAP) {
         refuse_dataset_options(arguments)?;
-        return recording::read(path, arguments, model, target);
+        return recording::read(path, arguments, model, target).and_then(|content| without_motion_options(content, arguments));
     }
     if let Some(option) = [(&arguments.topic, "--topic"), (&arguments.frame, "--frame")].iter().find(|(value, _)| value.is_some()) {
         bail!("{}: {} chooses from a bag, which this file is not", path.display(), option.1);
@@ -37,7 +37,7 @@ pub fn read(arguments: &Arguments, model: &Arc<BodyModel>, target: Target) -> an
         bail!("{}: the file is empty", path.display());
     }
     if let Some((_, recording)) = open_dataset(path, &arguments.dataset.files())? {
-        return arguments.dataset.chosen(recording, arguments.name.as_deref(), target, path);
+        return arguments.dataset.chosen(recording, target, arguments);
     }
     refuse_dataset_options(arguments)?;
     // Motions first: an AMC's frame can look like a row of numbers.
@@ -45,14 +45,25 @@ pub fn read(arguments: &Arguments, model: &Arc<BodyModel>, target: Target) -> an
         && sniff_rigid(&head).is_some()
         && let Some(content) = rigid(path, &bytes(path)?)?
     {
-        return Ok(content);
+        return without_motion_options(content, arguments);
     }
     Ok(Content::Motion(Box::new(read_motion_for(path, model, &arguments.motion.options()?)?)))
 }
 
+fn without_motion_options(content: Content, arguments: &Arguments) -> anyhow::Result<Content> {
+    match arguments.motion.given(true) {
+        Some(option) if !matches!(content, Content::Motion(_)) => {
+            bail!("{}: {option} is for motions, and this is {}; leave it out", arguments.input.display(), content.name())
+        }
+        _ => Ok(content),
+    }
+}
+
 fn refuse_dataset_options(arguments: &Arguments) -> anyhow::Result<()> {
     match arguments.dataset.given() {
-        Some(option) => bail!("{}: {option} is for recordings of data sets, which this file is not; leave it out", arguments.input.display()),
+        Some(option) => {
+            bail!("{}: {option} is for recordings of data sets, which this file is not; leave it out", arguments.input.display())
+        }
         None => Ok(()),
     }
 }

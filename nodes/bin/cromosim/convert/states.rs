@@ -50,7 +50,11 @@ pub fn motion(reader: &BagReader, topic: &str, person: Option<&str>, given: Opti
     states.sort_by_key(|state| state.header.stamp.nanos());
     states.dedup_by_key(|state| state.header.stamp.nanos());
     let Some(last) = states.last() else {
-        bail!("{place}: no pose{}; there are bodies {}", person.map(|person| format!(" of {person}")).unwrap_or_default(), people.join(", "))
+        bail!(
+            "{place}: no pose{}; there are bodies {}",
+            person.map(|person| format!(" of {person}")).unwrap_or_default(),
+            people.join(", ")
+        )
     };
     let model = body::of_bag(reader, given)?;
     let (gender, betas) = (Gender::from_name(&last.gender).unwrap_or_default(), last.betas.clone());
@@ -105,11 +109,7 @@ fn at_constant_rate(motion: SmplMotion, moments: &[Moment]) -> anyhow::Result<Sm
         let pair = [&moments[after - 1], &moments[after]];
         let width = times[after] - times[after - 1];
         let fraction = ((time - times[after - 1]) / width).clamp(0.0, 1.0);
-        let between = SmplMotion {
-            rate_hz: 1.0,
-            frames: pair.iter().map(|moment| moment.pose.clone()).collect(),
-            ..motion.clone()
-        };
+        let between = SmplMotion { rate_hz: 1.0, frames: pair.iter().map(|moment| moment.pose.clone()).collect(), ..motion.clone() };
         frames.extend(between.pose_at(fraction));
         let seen = width <= GAP * interval || fraction == 0.0 || fraction == 1.0;
         confidence.push(if seen { pair[0].confidence.min(pair[1].confidence) } else { 0.0 });

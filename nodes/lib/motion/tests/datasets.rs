@@ -8,9 +8,10 @@ use std::io::{Cursor, Write as _};
 
 use cromosim_body::Joint;
 use cromosim_motion::datasets::{
-    DIP_SENSORS, DipArray, DipRecording, parse_broad, parse_pamap2, parse_realworld, parse_totalcapture_calibration,
-    parse_totalcapture_reference, parse_totalcapture_sensors,
+    DIP_SENSORS, DatasetFiles, DatasetFormat, DipArray, DipRecording, open_dataset, parse_broad, parse_pamap2, parse_realworld,
+    parse_totalcapture_calibration, parse_totalcapture_reference, parse_totalcapture_sensors,
 };
+use cromosim_spatial::Stamp;
 use nalgebra::{UnitQuaternion, Vector3};
 use zip::write::SimpleFileOptions;
 
@@ -166,6 +167,32 @@ fn broad_keeps_the_imu_where_the_cameras_lose_the_body() {
     assert_eq!((imu.series.stamps.len(), body.stamps.len(), imu.series.stamps[1].nanos), (10, 9, 3_500_000));
     assert_eq!(body.positions[4], Vector3::new(15.0, 16.0, 17.0));
     assert!((body.rotations[0].k - 0.6).abs() < 1e-15);
+    common::damaged(&bytes, 200, |bytes| drop(parse_broad(Cursor::new(bytes), "x")));
+}
+
+#[test]
+fn broad_as_published_is_told_read_and_cut() {
+    let path = common::own_file("broad.mat");
+    let (format, mut recording) = open_dataset(&path, &DatasetFiles::default()).unwrap().unwrap();
+    assert_eq!((format, (recording.rate_hz * 7.0).round()), (DatasetFormat::Broad, 2000.0));
+    let (imu, (name, body)) = (&recording.imus[0], &recording.references[0]);
+    assert_eq!((imu.series.stamps.len(), body.stamps.len(), name.as_str()), (40, 37, "body"));
+    assert_eq!(imu.magnetic_field[7], Vector3::new(20.0, 0.0, -40.0));
+    // Rows of MATLAB's columns: the body turns about z by 0.5 rad/s and goes along x by 0.1 m/s.
+    let (last, time) = (body.rotations.len() - 1, 39.0 * 3.5e-3);
+    assert!((body.rotations[last].scaled_axis() - Vector3::new(0.0, 0.0, 0.5 * time)).norm() < 1e-12);
+    assert!((body.positions[last] - Vector3::new(0.1 * time, 0.0, 1.0)).norm() < 1e-12);
+    let spans: Vec<_> = recording.activities.iter().map(|span| (span.activity.as_str(), span.end.nanos)).collect();
+    assert_eq!(spans, [("rest", 66_500_000), ("movement", 136_500_000)]);
+    recording.between(Stamp::from_nanos(35_000_000), Stamp::from_nanos(70_000_000));
+    let (imu, (_, body)) = (&recording.imus[0], &recording.references[0]);
+    assert_eq!(
+        (imu.series.stamps.len(), imu.series.specific_force.len(), imu.magnetic_field.len(), imu.world_from_sensor.len()),
+        (11, 11, 11, 0)
+    );
+    assert_eq!((body.stamps.len(), body.stamps[0].nanos, recording.activities.len()), (8, 45_500_000, 2));
+    assert_eq!(recording.span().map(|(first, last)| (first.nanos, last.nanos)), Some((35_000_000, 70_000_000)));
+    let bytes = std::fs::read(path).unwrap();
     common::damaged(&bytes, 200, |bytes| drop(parse_broad(Cursor::new(bytes), "x")));
 }
 

@@ -27,8 +27,7 @@ struct Keys {
 }
 
 const SHORT: Keys = Keys { rate: "fs", acc: "acc", gyr: "gyr", mag: "mag", pos: "pos", quat: "quat_wxyz" };
-const PUBLISHED: Keys =
-    Keys { rate: "sampling_rate", acc: "imu_acc", gyr: "imu_gyr", mag: "imu_mag", pos: "opt_pos", quat: "opt_quat" };
+const PUBLISHED: Keys = Keys { rate: "sampling_rate", acc: "imu_acc", gyr: "imu_gyr", mag: "imu_mag", pos: "opt_pos", quat: "opt_quat" };
 
 /// Whether these are the keys of a trial.
 pub(super) fn is_broad(keys: &[String]) -> bool {

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use cromosim_arrays::{Container, Format, Limits};
 
 use super::{
-    DatasetRecording, broad, parse_broad, parse_pamap2, parse_realworld, parse_totalcapture_reference, parse_totalcapture_sensors, realworld,
-    totalcapture,
+    DatasetRecording, broad, parse_broad, parse_pamap2, parse_realworld, parse_totalcapture_reference, parse_totalcapture_sensors,
+    realworld, totalcapture,
 };
 use crate::rigid::RigidError;
 

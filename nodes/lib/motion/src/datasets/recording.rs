@@ -1,5 +1,7 @@
 //! What every importer gives.
 
+use std::ops::Range;
+
 use cromosim_body::Joint;
 use cromosim_spatial::Stamp;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -34,6 +36,12 @@ pub struct ActivitySpan {
     pub activity: String,
 }
 
+/// Keeps a range; what is empty stays so.
+fn cut<T>(values: &mut Vec<T>, range: &Range<usize>) {
+    values.truncate(range.end);
+    values.drain(..range.start.min(values.len()));
+}
+
 /// One recording of a data set.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DatasetRecording {
@@ -50,6 +58,37 @@ pub struct DatasetRecording {
 }
 
 impl DatasetRecording {
+    /// From its first reading or pose to its last; `None` where there is none.
+    pub fn span(&self) -> Option<(Stamp, Stamp)> {
+        let imus = self.imus.iter().map(|imu| &imu.series.stamps);
+        let stamps = || imus.clone().chain(self.references.iter().map(|(_, poses)| &poses.stamps));
+        let first = stamps().filter_map(|stamps| stamps.first()).min()?;
+        Some((*first, *stamps().filter_map(|stamps| stamps.last()).max()?))
+    }
+
+    /// What lies between two times, ends included; the count of rows left out stays that of the file.
+    pub fn between(&mut self, from: Stamp, to: Stamp) {
+        let inside = |stamps: &[Stamp]| stamps.partition_point(|stamp| *stamp < from)..stamps.partition_point(|stamp| *stamp <= to);
+        for imu in &mut self.imus {
+            let range = inside(&imu.series.stamps);
+            cut(&mut imu.series.stamps, &range);
+            cut(&mut imu.series.specific_force, &range);
+            cut(&mut imu.series.angular_velocity, &range);
+            cut(&mut imu.world_from_sensor, &range);
+            cut(&mut imu.magnetic_field, &range);
+        }
+        for (_, poses) in &mut self.references {
+            let range = inside(&poses.stamps);
+            cut(&mut poses.stamps, &range);
+            cut(&mut poses.positions, &range);
+            cut(&mut poses.rotations, &range);
+        }
+        self.activities.retain(|span| span.end >= from && span.start <= to);
+        for span in &mut self.activities {
+            (span.start, span.end) = (span.start.max(from), span.end.min(to));
+        }
+    }
+
     /// Adds a row's activity: the last span goes on, or a new one begins.
     pub(super) fn mark(&mut self, stamp: Stamp, activity: &str) {
         match self.activities.last_mut().filter(|span| span.activity == activity) {
