@@ -74,6 +74,7 @@ pub fn motion_bag(motion: &SmplMotion, model: &BodyModel, command: &str, out: &P
             body_id: "0".to_owned(),
             gender: motion.gender.name().to_owned(),
             betas: motion.betas.clone(),
+            shape_space: motion.shape_space.name().to_owned(),
             confidence: motion.confidence.as_ref().map_or(1.0, |values| values[index]),
             ..SmplPose::default()
         };
