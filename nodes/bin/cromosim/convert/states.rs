@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use anyhow::bail;
+use anyhow::{Context, bail};
 use cromosim_bag::BagReader;
 use cromosim_body::{BodyModel, BodyPose, Gender};
 use cromosim_motion::SmplMotion;
@@ -57,6 +57,7 @@ pub fn motion(reader: &BagReader, topic: &str, person: Option<&str>, given: Opti
         )
     };
     let model = body::of_bag(reader, given)?;
+    model.check_named_betas(&last.shape_space, &last.gender, &last.betas).with_context(|| place.clone())?;
     let (gender, betas) = (Gender::from_name(&last.gender).unwrap_or_default(), last.betas.clone());
     let moment = |state: &SmplState| {
         let (root_position, local_rotations) = state.root_and_rotations()?;
