@@ -63,6 +63,7 @@ fn imports_run_one_way() {
         ("nodes/lib/body", &["spatial", "arrays"]),
         ("nodes/lib/motion", &["spatial", "body", "arrays"]),
         ("nodes/lib/imu", &["spatial", "body"]),
+        ("nodes/lib/learned", &["spatial", "body", "imu", "arrays"]),
         ("nodes/lib/gap", &["spatial", "imu"]),
         ("nodes/lib/bag", &["msgs", "spatial"]),
         ("nodes/lib/ros", &["msgs", "spatial"]),
