@@ -9,6 +9,7 @@ mod open;
 mod pamap2;
 mod realworld;
 mod recording;
+mod skeleton_npz;
 mod totalcapture;
 
 pub use broad::parse_broad;
@@ -17,4 +18,5 @@ pub use open::{DatasetFiles, DatasetFormat, open_dataset, sniff_dataset};
 pub use pamap2::{PAMAP2_RATE_HZ, pamap2_activity, parse_pamap2};
 pub use realworld::parse_realworld;
 pub use recording::{ActivitySpan, DatasetRecording, PlacedImu};
+pub use skeleton_npz::{LabelledClip, parse_skeleton_npz};
 pub use totalcapture::{TOTALCAPTURE_RATE_HZ, parse_totalcapture_calibration, parse_totalcapture_reference, parse_totalcapture_sensors};
