@@ -3,6 +3,10 @@
 use std::io;
 use std::path::PathBuf;
 
+use cromosim_body::BodyError;
+use cromosim_imu::{EffectError, ImuError};
+use cromosim_spatial::SpatialError;
+
 /// Errors of this crate; the message names the file, the place and what to do.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -132,4 +136,64 @@ pub enum LearnedError {
         /// What it is.
         value: f32,
     },
+    /// A file that is not YAML, or has wrong or unknown fields.
+    #[error("{file}: {source}")]
+    Yaml {
+        /// The file's name.
+        file: String,
+        /// Why, with line and column.
+        source: serde_norway::Error,
+    },
+    /// A file of another kind or version.
+    #[error("{file}: schema: expected `{expected}`, found `{found}`")]
+    Schema {
+        /// The file's name.
+        file: String,
+        /// The schema that is read here.
+        expected: &'static str,
+        /// The schema the file names.
+        found: String,
+    },
+    /// A mapping whose knots do not rise.
+    #[error("{file}: placement `{placement}`, {channel}: {problem}")]
+    Knots {
+        /// The file's name.
+        file: String,
+        /// The placement's name.
+        placement: String,
+        /// accel_x to gyro_z.
+        channel: &'static str,
+        /// What is wrong.
+        problem: &'static str,
+    },
+    /// Too little to fit something to.
+    #[error("{what}: {found} samples, at least {needed} are needed")]
+    TooFew {
+        /// What is fitted.
+        what: String,
+        /// Samples that are there.
+        found: usize,
+        /// Samples that are needed.
+        needed: usize,
+    },
+    /// A mesh on which no patch can be laid.
+    #[error("body `{body}`: fewer than three triangles without common corners around triangle {triangle}")]
+    NoPatch {
+        /// The body.
+        body: String,
+        /// The site's triangle.
+        triangle: u32,
+    },
+    /// A site or pose that the body does not have.
+    #[error(transparent)]
+    Body(#[from] BodyError),
+    /// An effect beyond its bounds.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
+    /// Kinematics that cannot be had.
+    #[error(transparent)]
+    Imu(#[from] ImuError),
+    /// Times that make no sense.
+    #[error(transparent)]
+    Spatial(#[from] SpatialError),
 }

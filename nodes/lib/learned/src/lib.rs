@@ -1,14 +1,38 @@
-//! Networks that learn the gap between simulated and real IMUs: inference over windows, step by step, and training.
+//! What the analytic simulation cannot know, learned from pairs of motion and measured IMU (CROMOSim, Hao, Wang, Zheng): networks, what they
+//! are fed, training, and the mapping of distributions.
+//!
+//! A [`Patch`] is three triangles of the skin around a site; a [`SiteMotion`] their nine points over time, with the analytic kinematics
+//! beside them. [`Input`] says what of it a [`Network`] sees. [`Pair`] adds what a real IMU measured, turned into the world by the reference
+//! orientation. [`RankMapping`] maps distributions after the simulation. [`DeviceRanges`] and [`SourceErrors`] make devices and sources of
+//! motion that nobody has seen.
 
+mod align;
+mod degrade;
+mod device_draw;
 mod error;
+mod features;
 pub mod kernels;
 mod layers;
+mod mapping;
 mod network;
+mod pairs;
+mod patch;
 mod shape;
+mod site_motion;
 mod streaming;
 mod weights;
+mod windows;
 
+pub use align::{Alignment, align};
+pub use degrade::SourceErrors;
+pub use device_draw::{DeviceRanges, DrawnDevice};
 pub use error::LearnedError;
+pub use features::{Input, Quantity};
+pub use mapping::{MappingFile, PlacementMapping, RankMapping};
 pub use network::{Network, PreparedNetwork};
+pub use pairs::{Pair, PairNames, Target};
+pub use patch::{PATCH_POINTS, Patch};
 pub use shape::{Direction, MOST_PARAMETERS, NetworkShape, Tensor};
+pub use site_motion::{NETWORK_RATE_HZ, SiteMotion};
 pub use streaming::{StreamingBatch, StreamingNetwork};
+pub use windows::{Blend, HOP, WINDOW, window_starts};

@@ -1,0 +1,120 @@
+//! What a network is told of a motion.
+
+use cromosim_body::{BodyPose, ShapedBody};
+use cromosim_imu::{KinematicSample, MountedSite, Placement, Scheme, SensorTrajectory, simulate_kinematics};
+use cromosim_spatial::{Stamp, derivative_weights, uniform_stamps};
+use nalgebra::Vector3;
+
+use crate::{LearnedError, PATCH_POINTS, Patch};
+
+/// Samples per second of every network, Hz.
+pub const NETWORK_RATE_HZ: f64 = 100.0;
+
+/// A patch of skin over time, with the analytic kinematics of the sensor on it; sample k stands at `start + k / NETWORK_RATE_HZ`.
+#[derive(Clone, Debug)]
+pub struct SiteMotion {
+    /// The nine points, m, world.
+    pub points: Vec<[Vector3<f64>; PATCH_POINTS]>,
+    /// The sensor's frame and its analytic derivatives, world axes; as many as points.
+    pub kinematics: Vec<KinematicSample>,
+}
+
+impl SiteMotion {
+    /// A placement on a body that moves: frames in between are found by cubics through the four around.
+    ///
+    /// # Errors
+    /// [`LearnedError::Imu`] for fewer than two frames or times that go backwards, [`LearnedError::NoPatch`].
+    pub fn on_body(body: &ShapedBody, placement: &Placement, stamps: &[Stamp], poses: &[BodyPose]) -> Result<Self, LearnedError> {
+        let mounted = MountedSite::new(body, placement)?;
+        let trajectory = mounted.trajectory(stamps, poses)?;
+        let patch = Patch::new(body, mounted.site())?;
+        let frames: Vec<_> = poses.iter().map(|pose| patch.points(pose)).collect();
+        Self::new(&trajectory, placement.scheme(), &frames)
+    }
+
+    /// A sensor on a rigid body; a flat patch in its xy plane stands for the skin.
+    ///
+    /// # Errors
+    /// [`LearnedError::Imu`] where the scheme cannot differentiate it.
+    pub fn rigid(trajectory: &SensorTrajectory, scheme: Scheme) -> Result<Self, LearnedError> {
+        let frames: Vec<_> = trajectory.frames().iter().map(|frame| Patch::rigid(&frame.world_from_sensor)).collect();
+        Self::new(trajectory, scheme, &frames)
+    }
+
+    /// `frames` are the patch's points at the trajectory's frames.
+    fn new(trajectory: &SensorTrajectory, scheme: Scheme, frames: &[[Vector3<f64>; PATCH_POINTS]]) -> Result<Self, LearnedError> {
+        let grid = uniform_stamps(trajectory.start(), trajectory.end(), NETWORK_RATE_HZ)?;
+        let stamps: Vec<Stamp> = trajectory.frames().iter().map(|frame| frame.stamp).collect();
+        let points = grid.iter().map(|stamp| points_at(&stamps, frames, *stamp)).collect();
+        Ok(Self { points, kinematics: simulate_kinematics(trajectory, scheme, &grid)? })
+    }
+
+    /// Samples.
+    pub fn len(&self) -> usize {
+        self.kinematics.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.kinematics.is_empty()
+    }
+}
+
+/// Cubic through the four frames around `stamp`.
+fn points_at(stamps: &[Stamp], frames: &[[Vector3<f64>; PATCH_POINTS]], stamp: Stamp) -> [Vector3<f64>; PATCH_POINTS] {
+    let after = stamps.partition_point(|other| *other < stamp).min(stamps.len() - 1);
+    if stamps[after] == stamp {
+        return frames[after];
+    }
+    let width = stamps.len().min(4);
+    let first = after.saturating_sub(2).min(stamps.len() - width);
+    let mut seconds = [0.0; 4];
+    for (seconds, other) in seconds.iter_mut().zip(&stamps[first..first + width]) {
+        *seconds = *other - stamp;
+    }
+    let weights = derivative_weights(&seconds[..width], 0.0)[0];
+    std::array::from_fn(|point| frames[first..first + width].iter().zip(weights).map(|(frame, weight)| frame[point] * weight).sum())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use cromosim_body::BodyModel;
+    use cromosim_imu::{PlacementSet, SensorFrame};
+    use nalgebra::Isometry3;
+
+    use super::*;
+
+    #[test]
+    fn a_motion_between_frames_is_cubic() {
+        let at = |seconds: f64| Vector3::new(seconds.powi(3), 1.0 - seconds, seconds * seconds);
+        let frame = |k: u32| {
+            let seconds = f64::from(k) / 37.0;
+            SensorFrame::new(Stamp::from_seconds(seconds), Isometry3::new(at(seconds), Vector3::zeros()))
+        };
+        let trajectory = SensorTrajectory::new((0..38).map(frame).collect()).unwrap();
+        let motion = SiteMotion::rigid(&trajectory, Scheme::Richardson).unwrap();
+        assert_eq!(motion.len(), 101);
+        let origin = Patch::rigid(&Isometry3::identity());
+        for (k, points) in motion.points.iter().enumerate() {
+            for (point, rest) in points.iter().zip(&origin) {
+                assert!((point - rest - at(k as f64 / 100.0)).norm() < 1e-9, "sample {k}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_patch_surrounds_the_sensor_on_a_body() {
+        let body = ShapedBody::new(BodyModel::embedded(), &[]).unwrap();
+        let placements = PlacementSet::demo();
+        let stamps = uniform_stamps(Stamp::from_seconds(0.0), Stamp::from_seconds(0.5), 120.0).unwrap();
+        let poses = vec![BodyPose::rest(Vector3::new(0.0, 0.0, 1.0)); stamps.len()];
+        for placement in placements.placements() {
+            let motion = SiteMotion::on_body(&body, placement, &stamps, &poses).unwrap();
+            assert_eq!((motion.len(), motion.points.len()), (51, 51));
+            let centre: Vector3<f64> = motion.points[7].iter().sum::<Vector3<f64>>() / 9.0;
+            let away = (centre - motion.kinematics[7].world_from_sensor.translation.vector).norm();
+            assert!(away < 0.06, "{}: {away}", placement.name());
+        }
+    }
+}
