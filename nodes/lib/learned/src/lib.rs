@@ -20,6 +20,7 @@ mod patch;
 mod shape;
 mod site_motion;
 mod streaming;
+mod virtual_pairs;
 mod weights;
 mod windows;
 
@@ -35,4 +36,5 @@ pub use patch::{PATCH_POINTS, Patch};
 pub use shape::{Direction, MOST_PARAMETERS, NetworkShape, Tensor};
 pub use site_motion::{NETWORK_RATE_HZ, SiteMotion};
 pub use streaming::{StreamingBatch, StreamingNetwork};
+pub use virtual_pairs::Wearing;
 pub use windows::{Blend, HOP, WINDOW, window_starts};
