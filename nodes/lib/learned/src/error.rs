@@ -184,6 +184,14 @@ pub enum LearnedError {
         /// The site's triangle.
         triangle: u32,
     },
+    /// A network that cannot be what it is used for.
+    #[error("{network} network: {problem}")]
+    WrongNetwork {
+        /// acceleration or angular_velocity.
+        network: &'static str,
+        /// What is wrong.
+        problem: String,
+    },
     /// A site or pose that the body does not have.
     #[error(transparent)]
     Body(#[from] BodyError),
@@ -196,4 +204,44 @@ pub enum LearnedError {
     /// Times that make no sense.
     #[error(transparent)]
     Spatial(#[from] SpatialError),
+    /// A batch is not sound.
+    #[error("batch {number}: {reason}")]
+    Batch {
+        /// Its number.
+        number: u64,
+        /// The reason.
+        reason: String,
+    },
+    /// An option of the training is out of range.
+    #[error("training options: {field}: {reason}")]
+    Options {
+        /// Which.
+        field: &'static str,
+        /// The reason.
+        reason: String,
+    },
+    /// The loss is no number any more.
+    #[error(
+        "training, step {step}: loss {loss}, gradient's length {gradient_norm}: it has diverged; choose a smaller learning rate, or clip the gradient"
+    )]
+    Diverged {
+        /// Steps taken before.
+        step: u64,
+        /// The loss.
+        loss: f64,
+        /// The gradient's length.
+        gradient_norm: f64,
+    },
+    /// A checkpoint was written by another training.
+    #[error("{}: {field} is {in_file} in the checkpoint, {wished} is asked for; ask for the same, or begin anew with another file", path.display())]
+    OtherTraining {
+        /// The file.
+        path: PathBuf,
+        /// What differs.
+        field: String,
+        /// There.
+        in_file: String,
+        /// Here.
+        wished: String,
+    },
 }

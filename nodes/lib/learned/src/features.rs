@@ -55,6 +55,20 @@ pub enum Input {
 }
 
 impl Input {
+    /// As in files and configurations.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Points => "points",
+            Self::Residual => "residual",
+            Self::Streaming => "streaming",
+        }
+    }
+
+    /// The input of a name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        [Self::Points, Self::Residual, Self::Streaming].into_iter().find(|input| input.name() == name)
+    }
+
     /// Channels.
     pub fn channels(self) -> usize {
         match self {

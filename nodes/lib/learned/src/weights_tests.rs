@@ -1,3 +1,5 @@
+use std::fs;
+
 use super::*;
 use crate::Direction;
 
@@ -56,7 +58,7 @@ fn errors_name_file_tensor_and_shapes() {
     let misspelt = message(&with_header(&bytes, |header| header.replace("kernel", "colonel")));
     assert!(misspelt.starts_with("net.safetensors: metadata `cromosim`: unknown field `colonel`"), "{misspelt}");
     let bare = message(&with_header(&bytes, |header| header.replace("cromosim", "somebody")));
-    assert!(bare.contains("missing, so that the network's shape is unknown"), "{bare}");
+    assert!(bare.contains("missing, so that it is unknown what the tensors are"), "{bare}");
     let missing = Network::read(Path::new("nowhere/net.safetensors")).unwrap_err().to_string();
     assert!(missing.starts_with("nowhere/net.safetensors: cannot be read"), "{missing}");
     let unwritable = network().write(Path::new("nowhere/net.safetensors"), &notes()).unwrap_err().to_string();

@@ -1,0 +1,15 @@
+//! Training: batches by number, a masked loss, Adam, validation, early stopping, checkpoints from which it goes on to the same bits.
+
+mod adam;
+mod batch;
+mod checkpoint;
+mod engine;
+mod loss;
+mod options;
+mod training;
+
+pub use batch::{Batch, Batches};
+pub use engine::{Engine, KernelEngine};
+pub use loss::Loss;
+pub use options::{Schedule, TrainOptions};
+pub use training::{Best, Data, Hooks, Progress, Stop, Training};
