@@ -15,6 +15,7 @@ mod diagnose;
 #[cfg(feature = "view")]
 mod diagnose_view;
 mod inspect;
+mod map;
 mod motion_arguments;
 mod node;
 mod progress;
@@ -22,6 +23,7 @@ mod recorded;
 mod reference;
 mod simulate;
 mod summary;
+mod train;
 mod trajectory;
 
 /// Virtual IMUs from body motion: ROS 2 nodes in Rust, offline simulation, bags and pictures.
@@ -46,6 +48,10 @@ enum Command {
     Convert(Box<convert::Arguments>),
     /// Place in-place poses of a video in the world, by keypoints, depth maps and cameras
     Trajectory(Box<trajectory::Arguments>),
+    /// Train networks that simulate IMUs, on pairs of motion and measured IMU
+    Train(train::Arguments),
+    /// Fit a distribution mapping from simulated to real IMUs
+    Map(map::Arguments),
     /// Say what is in a motion, body, trajectory or bag file
     Inspect(Box<inspect::Arguments>),
     /// Work on bags: mend an unfinished one, export IMU topics as CSV
@@ -87,6 +93,8 @@ fn main() -> ExitCode {
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Convert(arguments) => convert::run(&arguments),
         Command::Trajectory(arguments) => trajectory::run(&arguments),
+        Command::Train(arguments) => train::run(&arguments),
+        Command::Map(arguments) => map::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Bag { command } => bag::run(&command),
         Command::Body { command } => body::run(&command),

@@ -40,6 +40,11 @@ impl Interrupt {
         self.0.load(Ordering::Relaxed)
     }
 
+    /// The flag itself, for libraries that look at it.
+    pub fn flag(&self) -> &AtomicBool {
+        &self.0
+    }
+
     /// An error once a signal has come: whoever writes a file gives it up.
     pub fn check(&self) -> anyhow::Result<()> {
         if self.is_set() {

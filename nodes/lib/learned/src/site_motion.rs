@@ -41,8 +41,15 @@ impl SiteMotion {
         Self::new(trajectory, scheme, &frames)
     }
 
-    /// `frames` are the patch's points at the trajectory's frames.
-    fn new(trajectory: &SensorTrajectory, scheme: Scheme, frames: &[[Vector3<f64>; PATCH_POINTS]]) -> Result<Self, LearnedError> {
+    /// A sensor's trajectory with the patch's points at each of its frames.
+    ///
+    /// # Errors
+    /// [`LearnedError::Imu`] where the scheme cannot differentiate it, [`LearnedError::TooFew`] for another number of points than frames.
+    pub fn new(trajectory: &SensorTrajectory, scheme: Scheme, frames: &[[Vector3<f64>; PATCH_POINTS]]) -> Result<Self, LearnedError> {
+        let (found, needed) = (frames.len(), trajectory.frames().len());
+        if found != needed {
+            return Err(LearnedError::TooFew { what: "points of a patch".to_owned(), found, needed });
+        }
         let grid = uniform_stamps(trajectory.start(), trajectory.end(), NETWORK_RATE_HZ)?;
         let stamps: Vec<Stamp> = trajectory.frames().iter().map(|frame| frame.stamp).collect();
         let points = grid.iter().map(|stamp| points_at(&stamps, frames, *stamp)).collect();

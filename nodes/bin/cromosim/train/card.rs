@@ -1,0 +1,90 @@
+//! What stands beside the weights: data, licences, sizes, scores.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use cromosim_learned::{LearnedSimulator, NETWORK_RATE_HZ, Pair};
+
+use super::config::Config;
+
+/// Seconds with a target.
+pub fn seconds<'a>(pairs: impl Iterator<Item = &'a Pair>) -> f64 {
+    pairs.map(|pair| pair.targets.iter().flatten().count() as f64 / NETWORK_RATE_HZ).sum()
+}
+
+/// Notes in the weights' files.
+pub fn notes(config: &Config) -> BTreeMap<String, String> {
+    let mut licences: Vec<&str> = config.data.iter().map(|source| source.licence.as_str()).collect();
+    licences.sort_unstable();
+    licences.dedup();
+    BTreeMap::from([("version".to_owned(), env!("CARGO_PKG_VERSION").to_owned()), ("licences of the data".to_owned(), licences.join("; "))])
+}
+
+/// Root mean square error per axis of analytic and learned simulation by position, world axes.
+pub fn scores(simulator: &LearnedSimulator, pairs: &[Pair]) -> anyhow::Result<String> {
+    let mut sums: BTreeMap<&str, ([f64; 2], [f64; 2], f64)> = BTreeMap::new();
+    for pair in pairs {
+        let learned = simulator.simulate(&pair.motion)?;
+        let analytic = &pair.motion.kinematics;
+        let count = pair.targets.iter().flatten().count() as f64;
+        let of_analytic = pair.rms(|sample| (analytic[sample].acceleration, analytic[sample].angular_velocity));
+        let of_learned = pair.rms(|sample| (learned[sample].acceleration, learned[sample].angular_velocity));
+        if let (Some(before), Some(after)) = (of_analytic, of_learned) {
+            let (old, new, all) = sums.entry(&pair.position).or_default();
+            for channel in 0..2 {
+                old[channel] += before[channel].powi(2) * count;
+                new[channel] += after[channel].powi(2) * count;
+            }
+            *all += count;
+        }
+    }
+    let mut text =
+        "| position | acceleration, m/s2: analytic | learned | angular velocity, rad/s: analytic | learned |\n|---|---|---|---|---|\n"
+            .to_owned();
+    for (position, (old, new, count)) in sums {
+        let root = |sum: f64| (sum / count).sqrt();
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "| {position} | {:.3} | {:.3} | {:.3} | {:.3} |", root(old[0]), root(new[0]), root(old[1]), root(new[1]));
+    }
+    Ok(text)
+}
+
+/// The card.
+pub fn text(config: &Config, simulator: &LearnedSimulator, training: &[Pair], validation: &[Pair]) -> anyhow::Result<String> {
+    let shape = config.shape();
+    let mut text = format!(
+        "# Model card\n\nMade by cromosim {}, `cromosim train`, seed {}.\n\nInput `{}`, {} convolutions of {} channels and {} taps, {} LSTM layers of {} ({:?}), {} parameters a network; one for acceleration, one for angular velocity, at {NETWORK_RATE_HZ} Hz.\n\n## Data\n\n| subject | what | seconds | licence |\n|---|---|---|---|\n",
+        env!("CARGO_PKG_VERSION"),
+        config.training.seed,
+        config.input.name(),
+        shape.convolutions,
+        shape.channels,
+        shape.kernel,
+        shape.layers,
+        shape.hidden,
+        shape.direction,
+        simulator.networks()[0].parameters().len(),
+    );
+    for source in &config.data {
+        let what = if source.motions.is_empty() {
+            format!("real devices: {}", source.recordings.join(", "))
+        } else {
+            format!(
+                "drawn people and devices on {}, {:?}, at {}, {} draws each",
+                source.motions.join(", "),
+                source.source,
+                source.sites.join(", "),
+                source.repeats
+            )
+        };
+        let own = training.iter().chain(validation).filter(|pair| pair.subject == source.subject);
+        let held = if config.validation.contains(&source.subject) { " (validation)" } else { "" };
+        let _ = writeln!(text, "| {}{held} | {what} | {:.0} | {} |", source.subject, seconds(own), source.licence);
+    }
+    let _ = write!(
+        text,
+        "\n## Scores on the validation subjects\n\nRoot mean square error per axis against the measured IMU turned into the world. These subjects chose when the training stopped; for others see `cromosim evaluate`.\n\n{}",
+        scores(simulator, validation)?
+    );
+    Ok(text)
+}
