@@ -17,7 +17,9 @@ fn check(recording: &DatasetRecording) {
         assert!(stamps.windows(2).all(|pair| pair[0] < pair[1]), "stamps rise");
         assert_eq!([imu.series.specific_force.len(), imu.series.angular_velocity.len()], [count; 2]);
         assert!(imu.world_from_sensor.is_empty() || imu.world_from_sensor.len() == count);
-        assert!(imu.series.specific_force.iter().chain(&imu.series.angular_velocity).all(|vector| vector.iter().all(|value| value.is_finite())));
+        assert!(
+            imu.series.specific_force.iter().chain(&imu.series.angular_velocity).all(|vector| vector.iter().all(|value| value.is_finite()))
+        );
     }
     for (_, poses) in &recording.references {
         assert!(poses.rotations.iter().all(|rotation| (rotation.norm() - 1.0).abs() < 1e-6));
