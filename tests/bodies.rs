@@ -6,9 +6,16 @@ mod common;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
+use std::process::Command;
 
-use common::{cromosim_in, root, succeed, text};
+use common::{CROMOSIM, cromosim_in, root, succeed, text};
 use cromosim_bag::{BagOptions, BagReader, BagWriter, Selection};
+use cromosim_body::{BodyModel, Joint, ShapedBody};
+use cromosim_imu::{MountedSites, PlacementSet};
+use cromosim_motion::embedded_walk;
+use cromosim_msgs::tf2_msgs::TFMessage;
+use cromosim_ros::testing::{environment, in_private_network};
+use cromosim_spatial::Stamp;
 
 /// Commands that take poses or shapes of a body, and those that never see one.
 const WITH_BODY: [&str; 7] = ["demo", "simulate", "diagnose", "convert", "trajectory", "inspect", "body export"];
@@ -142,4 +149,41 @@ fn a_recording_of_states_is_simulated_again_on_its_own_body() {
     let (own, other) = (apart("tall.npz", "own.mcap"), apart("body.npz", "other.mcap"));
     println!("left wrist, simulated again: on its own body {own:.1e} m/s2 apart, on the embedded one {other:.4} m/s2");
     assert!(own < 1e-6 && other > 0.2, "{own} {other}");
+}
+
+#[test]
+fn the_demo_tells_every_node_of_its_body() {
+    in_private_network("the_demo_tells_every_node_of_its_body", || {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        succeed(folder.path(), &["body", "export", "body.npz"]);
+        common::taller(&at("body.npz"), &at("tall.npz"), 1.2);
+        let mut demo = Command::new(CROMOSIM);
+        demo.args(["demo", "--body", "tall.npz", "--duration", "1", "--no-viewer", "--out", "out"]);
+        let output = demo.current_dir(folder.path()).envs(environment()).output().unwrap();
+        assert!(output.status.success(), "{}", text(&output));
+        let bag = BagReader::open(&at("out/bag")).unwrap();
+        let frames: Vec<_> = bag.read::<TFMessage>("/tf").unwrap().into_iter().flat_map(|(_, message)| message.transforms).collect();
+        let distances = |child: &str| -> Vec<f64> {
+            let of = frames.iter().filter(|frame| frame.child_frame_id == child);
+            of.map(|frame| nalgebra::Vector3::from(frame.transform.translation).norm()).collect()
+        };
+        let body = ShapedBody::new(BodyModel::embedded(), &[]).unwrap();
+        let standing = embedded_walk().frames[0].clone();
+        let segments = body.world_from_segments(&standing);
+        // smpl_state's shin, and the watch of virtual_imu, whose place changes as the skin bends.
+        let shin = (segments[Joint::LeftKnee.index()].inverse() * segments[Joint::LeftAnkle.index()]).translation.vector.norm();
+        let placements = PlacementSet::demo();
+        let sites = MountedSites::new(&body, placements.placements()).unwrap();
+        let stamps = [Stamp::from_nanos(0), Stamp::from_nanos(10_000_000)];
+        let watch = sites.trajectories(&stamps, &[standing.clone(), standing.clone()]).unwrap()[0].frames()[0].world_from_sensor;
+        let arm = (segments[Joint::LeftElbow.index()].inverse() * watch).translation.vector.norm();
+        for (frame, expected, within) in [("left_ankle", shin, 1e-6), ("left_wrist_imu", arm, 0.02)] {
+            let found = distances(frame);
+            assert!(!found.is_empty(), "no frame {frame}");
+            let off = found.iter().map(|distance| (distance / (1.2 * expected) - 1.0).abs()).fold(0.0, f64::max);
+            println!("{frame}: {:.4} m from its parent, on the embedded body {expected:.4} m, largest difference {off:.1e}", found[0]);
+            assert!(off < within, "{frame}: {off}");
+        }
+    });
 }
