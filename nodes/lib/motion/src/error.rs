@@ -304,7 +304,7 @@ pub enum MotionError {
     },
     /// The keys are those of no known pose file.
     #[error(
-        "{}: no known motion in it (found {found}); known are AMASS (poses, trans), VIBE (pose), WHAM (pose_world), GVHMR (smpl_params_global), TRAM (pred_rotmat), PHALP (tid, smpl), SLAHMR (root_orient, cam_R)",
+        "{}: no known motion in it (found {found}); known are AMASS (poses, trans), VIBE (pose), WHAM (pose_world), GVHMR (smpl_params_global), TRAM (pred_rotmat), PHALP (tid, smpl), SLAHMR (root_orient, cam_R), DIP-IMU (gt, imu_ori, imu_acc)",
         path.display()
     )]
     UnknownPoses {
