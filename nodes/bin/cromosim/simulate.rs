@@ -11,9 +11,10 @@ use clap::Args;
 use cromosim_bag::{BagOptions, BagWriter, Compression};
 use cromosim_body::{BodyModel, ShapedBody};
 use cromosim_imu::{
-    Covariances, Device, MAX_RATE_HZ, MountedSites, PlacementSet, PoseStd, Scheme, SensorTrajectory, StreamingEffects,
-    simulate_kinematics_on,
+    Covariances, Device, MAX_RATE_HZ, MountedSite, MountedSites, PlacementSet, PoseStd, Reading, Scheme, SensorTrajectory,
+    StreamingEffects, simulate_kinematics_on,
 };
+use cromosim_learned::{LearnedSimulator, MappingFile, Patch, SiteMotion};
 use cromosim_motion::{MotionOptions, SmplMotion, embedded_walk, read_motion_for, read_people};
 use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_msgs::std_msgs::Header;
@@ -83,6 +84,12 @@ pub struct Arguments {
     csv: Option<PathBuf>,
     #[command(flatten)]
     motion: MotionArguments,
+    /// Networks (a folder that `cromosim train` wrote) that correct acceleration and angular velocity before the device's effects
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["reference", "rigid"])]
+    learned: Option<PathBuf>,
+    /// A distribution mapping (a file that `cromosim map` wrote), applied last to the placements that it names
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["reference", "rigid"])]
+    mapping: Option<PathBuf>,
     /// Replace OUT where it exists
     #[arg(long)]
     pub force: bool,
@@ -99,6 +106,8 @@ struct Setup {
     pose_error_correlation_s: f64,
     force: bool,
     csv: Option<PathBuf>,
+    learned: Option<LearnedSimulator>,
+    mapping: MappingFile,
     interrupt: Interrupt,
 }
 
@@ -185,7 +194,6 @@ impl Setup {
             placements.placements().iter().map(|placement| Device::resolve(placement.device(), folder)).collect::<Result<_, _>>()?;
         Ok(Self {
             model: body::model(arguments.body.as_ref())?,
-            placements,
             devices,
             motion: arguments.motion.options()?,
             seed: arguments.seed,
@@ -193,6 +201,9 @@ impl Setup {
             pose_error_correlation_s: arguments.pose_error_correlation,
             force: arguments.force,
             csv: arguments.csv.clone(),
+            learned: arguments.learned.as_deref().map(LearnedSimulator::read).transpose()?,
+            mapping: read_mapping(arguments.mapping.as_deref(), &placements)?,
+            placements,
             interrupt: Interrupt::watch()?,
         })
     }
@@ -224,7 +235,7 @@ impl Setup {
         bar.inc(1);
         let one = |(index, trajectory): (usize, &SensorTrajectory)| {
             self.interrupt.check()?;
-            let simulated = self.simulate_placement(person, index, trajectory, &times);
+            let simulated = self.simulate_placement(person, &shaped, index, trajectory, &times);
             bar.inc(1);
             simulated
         };
@@ -234,6 +245,7 @@ impl Setup {
     fn simulate_placement(
         &self,
         person: &Played,
+        shaped: &ShapedBody,
         index: usize,
         trajectory: &SensorTrajectory,
         times: &PoseTimes,
@@ -247,8 +259,19 @@ impl Setup {
         let covariances = Covariances::of(device, rate_hz);
         let frame_id = person.frame(&format!("{name}_imu"));
         let (mut raw, mut full) = (Vec::with_capacity(output.len()), Vec::with_capacity(output.len()));
-        for kinematic in simulate_kinematics_on(times, trajectory, placement.scheme(), &output)? {
-            let Some(sample) = effects.step(&kinematic) else { continue };
+        let mut kinematics = simulate_kinematics_on(times, trajectory, placement.scheme(), &output)?;
+        if let Some(networks) = &self.learned {
+            let patch = Patch::new(shaped, MountedSite::new(shaped, placement)?.site())?;
+            let points: Vec<_> = person.motion.frames.iter().map(|pose| patch.points(pose)).collect();
+            kinematics = networks.correct(&SiteMotion::new(trajectory, placement.scheme(), &points)?, &kinematics)?;
+        }
+        let mapping = self.mapping.placements.get(name);
+        for kinematic in kinematics {
+            let Some(mut sample) = effects.step(&kinematic) else { continue };
+            if let Some(mapping) = mapping {
+                let mapped = mapping.apply(&Reading { force: sample.specific_force, rate: sample.angular_velocity });
+                (sample.specific_force, sample.angular_velocity) = (mapped.force, mapped.rate);
+            }
             let covariances = covariances.with_motion(&kinematic.variance, &sample);
             raw.push(imu_message(&sample, &frame_id, &covariances.without_orientation(), false));
             full.push(imu_message(&sample, &frame_id, &covariances, true));
@@ -274,8 +297,25 @@ impl Setup {
             entry("seed", self.seed.to_string()),
             entry("noise", self.noise.to_string()),
             entry("placements", self.placements.to_yaml()),
+            entry("learned", self.learned.as_ref().map_or("none", |networks| networks.input().name()).to_owned()),
+            entry("mapping", self.mapping.placements.keys().cloned().collect::<Vec<_>>().join(", ")),
         ])
     }
+}
+
+/// A mapping of these placements at least in part.
+fn read_mapping(path: Option<&Path>, placements: &PlacementSet) -> anyhow::Result<MappingFile> {
+    let Some(path) = path else { return Ok(MappingFile::default()) };
+    let mapping = MappingFile::read(path)?;
+    let names = |names: &mut dyn Iterator<Item = &str>| names.collect::<Vec<_>>().join(", ");
+    if !placements.placements().iter().any(|placement| mapping.placements.contains_key(placement.name())) {
+        let (known, wanted) = (
+            names(&mut mapping.placements.keys().map(String::as_str)),
+            names(&mut placements.placements().iter().map(cromosim_imu::Placement::name)),
+        );
+        bail!("{}: maps {known}; none of the placements {wanted}", path.display());
+    }
+    Ok(mapping)
 }
 
 fn simulate_one(setup: &Setup, people: &[Played], out: &Path, bar: &ProgressBar) -> anyhow::Result<String> {

@@ -19,6 +19,11 @@ node_config! {
         pub noise: bool = true,
         /// Seed of the noise and of lost samples.
         pub seed: i64 = 0,
+        /// Folder of streaming networks, as `cromosim train` writes it, that correct acceleration and angular velocity before the device's
+        /// effects; placements then run at 100 Hz. Empty: none.
+        pub learned: String = String::new(),
+        /// Distribution mapping (YAML), as `cromosim map` writes it, applied last to the placements that it names. Empty: none.
+        pub mapping: String = String::new(),
         /// Put before every frame but the world's, with a slash; as for smpl_state.
         pub prefix: String = String::new(),
         /// Publish the site's pose of every state as `reference/NAME` too.

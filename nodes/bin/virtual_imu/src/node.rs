@@ -8,6 +8,7 @@ use cromosim_imu::{
     Covariances, Device, Follow, ImuError, ImuSample, MountedSites, Placement, PlacementSet, PoseStd, StreamOptions, StreamingEffects,
     StreamingImu,
 };
+use cromosim_learned::{LearnedError, LearnedSimulator, LivePlacement, MappingFile, PlacementMapping};
 use cromosim_msgs::NotABody;
 use cromosim_msgs::builtin_interfaces::Time;
 use cromosim_msgs::cromosim_msgs::SmplState;
@@ -61,6 +62,17 @@ pub enum Refusal {
     /// A frame cannot be used.
     #[error(transparent)]
     Imu(#[from] ImuError),
+    /// Networks or a mapping that cannot be used.
+    #[error(transparent)]
+    Learned(#[from] LearnedError),
+    /// A mapping for other placements.
+    #[error("mapping {file}: it names {known}, none of the placements")]
+    Unmapped {
+        /// The file.
+        file: String,
+        /// The placements that it names.
+        known: String,
+    },
 }
 
 /// One placement's way from frames to messages.
@@ -70,6 +82,9 @@ struct Channel {
     effects: Option<StreamingEffects>,
     covariances: Covariances,
     frame_id: String,
+    /// The networks' state, where there are such.
+    live: Option<LivePlacement>,
+    mapping: Option<PlacementMapping>,
 }
 
 /// The node: a function of the states so far.
@@ -86,6 +101,8 @@ pub struct VirtualImuNode {
     early: Vec<(Stamp, BodyPose, PoseStd)>,
     last: Option<Stamp>,
     counts: Counts,
+    learned: Option<LearnedSimulator>,
+    mapping: MappingFile,
 }
 
 #[derive(Default)]
@@ -109,6 +126,12 @@ impl VirtualImuNode {
         let devices = placements.iter().map(resolve).collect::<Result<Vec<_>, _>>()?;
         let shaped = ShapedBody::new(model.clone(), &[])?;
         let sites = MountedSites::new(&shaped, &placements)?;
+        let learned = if config.learned.is_empty() { None } else { Some(LearnedSimulator::read(Path::new(&config.learned))?) };
+        let mapping = if config.mapping.is_empty() { MappingFile::default() } else { MappingFile::read(Path::new(&config.mapping))? };
+        if !config.mapping.is_empty() && !placements.iter().any(|placement| mapping.placements.contains_key(placement.name())) {
+            let known = mapping.placements.keys().cloned().collect::<Vec<_>>().join(", ");
+            return Err(Refusal::Unmapped { file: config.mapping, known });
+        }
         let mut node = Self {
             config,
             model,
@@ -121,12 +144,14 @@ impl VirtualImuNode {
             early: Vec::new(),
             last: None,
             counts: Counts::default(),
+            learned,
+            mapping,
         };
         node.channels = node.fresh_channels()?;
         Ok(node)
     }
 
-    fn fresh_channels(&self) -> Result<Vec<Channel>, ImuError> {
+    fn fresh_channels(&self) -> Result<Vec<Channel>, Refusal> {
         let channel = |(placement, device): (&Placement, &Device)| {
             let rate_hz = placement.rate_hz();
             let seed = self.config.seed as u64;
@@ -134,7 +159,10 @@ impl VirtualImuNode {
             let name = self.config.frame(placement.name());
             let effects = if self.config.noise { Some(StreamingEffects::new(device, rate_hz, seed, &name)?) } else { None };
             let covariances = Covariances::of(device, rate_hz);
-            Ok(Channel { stream: None, effects, covariances, frame_id: self.config.frame(&format!("{}_imu", placement.name())) })
+            let frame_id = self.config.frame(&format!("{}_imu", placement.name()));
+            let live = self.learned.as_ref().map(|networks| LivePlacement::new(networks, &self.shaped, placement)).transpose()?;
+            let mapping = self.mapping.placements.get(placement.name()).cloned();
+            Ok(Channel { stream: None, effects, covariances, frame_id, live, mapping })
         };
         self.placements.iter().zip(&self.devices).map(channel).collect()
     }
@@ -183,6 +211,9 @@ impl VirtualImuNode {
             self.shaped = ShapedBody::new(self.model.clone(), &state.betas)?;
             self.sites = MountedSites::new(&self.shaped, &self.placements)?;
             self.betas.clone_from(&state.betas);
+            for (channel, placement) in self.channels.iter_mut().zip(&self.placements) {
+                channel.live = self.learned.as_ref().map(|networks| LivePlacement::new(networks, &self.shaped, placement)).transpose()?;
+            }
         }
         let pose_std = PoseStd::of_confidence(state.confidence, self.config.pose_error_correlation_s);
         let mut step = self.frames_of(state, &body);
@@ -213,13 +244,19 @@ impl VirtualImuNode {
         Ok(())
     }
 
-    fn push(&mut self, (stamp, body, pose_std): (Stamp, &BodyPose, PoseStd), readings: &mut Vec<Reading>) -> Result<(), ImuError> {
+    fn push(&mut self, (stamp, body, pose_std): (Stamp, &BodyPose, PoseStd), readings: &mut Vec<Reading>) -> Result<(), Refusal> {
         for (placement, (channel, frame)) in self.channels.iter_mut().zip(self.sites.frames(body)).enumerate() {
             let Some(stream) = &mut channel.stream else { continue };
+            channel.live.iter_mut().for_each(|live| live.push(stamp, body));
             for motion in stream.push_kinematics(frame.at(stamp).with_pose_std(pose_std))? {
+                let motion = channel.live.as_mut().map_or_else(|| Ok(motion), |live| live.correct(&motion))?;
                 let sample = channel.effects.as_mut().map_or_else(|| Some(motion.imu()), |effects| effects.step(&motion));
                 // None: the device loses it.
-                let Some(sample) = sample else { continue };
+                let Some(mut sample) = sample else { continue };
+                if let Some(mapping) = &channel.mapping {
+                    let mapped = mapping.apply(&cromosim_imu::Reading { force: sample.specific_force, rate: sample.angular_velocity });
+                    (sample.specific_force, sample.angular_velocity) = (mapped.force, mapped.rate);
+                }
                 let covariances = channel.covariances.with_motion(&motion.variance, &sample);
                 let raw = imu_message(&sample, &channel.frame_id, &covariances.without_orientation(), false);
                 let full = imu_message(&sample, &channel.frame_id, &covariances, true);
@@ -237,6 +274,7 @@ impl VirtualImuNode {
             for channel in &mut self.channels {
                 channel.stream.iter_mut().for_each(StreamingImu::reset);
                 channel.effects.iter_mut().for_each(StreamingEffects::reset);
+                channel.live.iter_mut().for_each(LivePlacement::reset);
             }
         }
     }

@@ -1,6 +1,7 @@
 //! The node as a function of states, without DDS.
 #![allow(clippy::unwrap_used)]
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use cromosim_body::BodyModel;
@@ -232,4 +233,55 @@ fn a_devices_effects_act_live() {
 fn effects_of_a_reference_are_none_of_a_live_device() {
     let refusal = with_device("tilted.yaml", "- {effect: reference_tilt, rotvec: [0.01, 0.0, 0.0]}").err().unwrap();
     assert!(refusal.contains("tilted.yaml: `reference_tilt` is an effect of a recording's reference"), "{refusal}");
+}
+
+/// Networks whose last layer is zero but for its bias: what they add is known.
+fn constant_networks(folder: &std::path::Path, acceleration: [f32; 3], angular_velocity: [f32; 3]) {
+    use cromosim_learned::{Direction, Input, LearnedSimulator, Network, NetworkShape};
+    let shape = NetworkShape {
+        inputs: 30,
+        channels: 4,
+        kernel: 3,
+        convolutions: 3,
+        hidden: 4,
+        layers: 2,
+        direction: Direction::Forward,
+        outputs: 3,
+    };
+    let constant = |values: [f32; 3]| {
+        let mut network = Network::new(shape.clone(), 1).unwrap();
+        let tensors = network.shape().tensors();
+        for tensor in tensors.iter().filter(|tensor| tensor.name.starts_with("linear.")) {
+            let place = &mut network.parameters_mut()[tensor.range.clone()];
+            place.fill(0.0);
+            if tensor.name == "linear.bias" {
+                place.copy_from_slice(&values);
+            }
+        }
+        network
+    };
+    let networks = [constant(acceleration), constant(angular_velocity)];
+    LearnedSimulator::new(Input::Streaming, networks).unwrap().write(folder, &BTreeMap::new()).unwrap();
+}
+
+#[test]
+fn networks_correct_what_the_scheme_says_before_the_device() {
+    let folder = tempfile::tempdir().unwrap();
+    constant_networks(folder.path(), [0.1, 0.0, 0.0], [0.0, 0.5, 0.0]);
+    let motion = embedded_walk();
+    let read = |learned: String| {
+        let mut node = node(Config { noise: false, learned, ..Config::default() });
+        let states = (0..200).map(|frame| state(&motion, frame, START + frame as i64 * 10_000_000));
+        states.flat_map(|state| node.step(&state).unwrap().readings).collect::<Vec<_>>()
+    };
+    let (plain, learned) = (read(String::new()), read(folder.path().display().to_string()));
+    assert_eq!(plain.len(), learned.len());
+    for (before, after) in plain.iter().zip(&learned) {
+        let difference = |a: cromosim_msgs::geometry_msgs::Vector3, b: cromosim_msgs::geometry_msgs::Vector3| {
+            (Vector3::from(a) - Vector3::from(b)).norm()
+        };
+        // 0.1 of 5 m/s2 and 0.5 of 2 rad/s, whatever way the sensor is turned.
+        assert!((difference(after.raw.linear_acceleration, before.raw.linear_acceleration) - 0.5).abs() < 1e-5);
+        assert!((difference(after.raw.angular_velocity, before.raw.angular_velocity) - 1.0).abs() < 1e-5);
+    }
 }

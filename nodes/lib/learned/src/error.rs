@@ -184,6 +184,14 @@ pub enum LearnedError {
         /// The site's triangle.
         triangle: u32,
     },
+    /// A placement that is read at another rate than the networks know.
+    #[error("placement `{placement}`: {rate_hz} Hz; the networks run live at 100 Hz: set its rate_hz to 100")]
+    WrongRate {
+        /// The placement's name.
+        placement: String,
+        /// Its rate, Hz.
+        rate_hz: f64,
+    },
     /// A network that cannot be what it is used for.
     #[error("{network} network: {problem}")]
     WrongNetwork {

@@ -68,7 +68,7 @@ impl SiteMotion {
 }
 
 /// Cubic through the four frames around `stamp`.
-fn points_at(stamps: &[Stamp], frames: &[[Vector3<f64>; PATCH_POINTS]], stamp: Stamp) -> [Vector3<f64>; PATCH_POINTS] {
+pub(crate) fn points_at(stamps: &[Stamp], frames: &[[Vector3<f64>; PATCH_POINTS]], stamp: Stamp) -> [Vector3<f64>; PATCH_POINTS] {
     let after = stamps.partition_point(|other| *other < stamp).min(stamps.len() - 1);
     if stamps[after] == stamp {
         return frames[after];
