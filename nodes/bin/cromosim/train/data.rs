@@ -127,7 +127,7 @@ fn recorded(source: &Source, folder: &Path) -> anyhow::Result<Vec<Pair>> {
                 pairs.extend(pieces(&name, &source.subject, position, frames.collect(), &imu.series.stamps, &readings)?);
             }
         } else {
-            for (position, recorded) in recorded::read(&BagReader::open(&path)?)? {
+            for (position, recorded) in recorded::read(&BagReader::open(&path)?, None)? {
                 let recorded = recorded.with_context(|| format!("{}: {position}", path.display()))?;
                 let record = recorded.record();
                 let (stamps, readings) = (&record.imu.stamps, &record.imu.readings);
