@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::adam::Adam;
@@ -98,8 +99,10 @@ impl Training {
 }
 
 /// Refuses where file and wish differ, by the name of the first field that does.
-fn same<T: Serialize + PartialEq>(path: &Path, what: &'static str, in_file: &T, wished: &T) -> Result<(), LearnedError> {
-    if in_file == wished {
+fn same<T: Serialize + DeserializeOwned + PartialEq>(path: &Path, what: &'static str, in_file: &T, wished: &T) -> Result<(), LearnedError> {
+    // Through text as the file's was, since a number may come back from text with another last bit.
+    let through_text = serde_json::to_string(wished).and_then(|text| serde_json::from_str::<T>(&text));
+    if through_text.as_ref().is_ok_and(|wished| wished == in_file) {
         return Ok(());
     }
     let value = |value: &T| serde_json::to_value(value).unwrap_or_default();

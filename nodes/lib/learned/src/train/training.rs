@@ -189,6 +189,9 @@ impl Training {
             weight += batch.total_weight();
         }
         let loss = sum / (weight * self.network.shape().outputs as f64);
+        if !loss.is_finite() {
+            return Err(LearnedError::Diverged { step: self.step, loss, gradient_norm: f64::NAN });
+        }
         if self.best.as_ref().is_none_or(|best| loss < best.loss) {
             self.best = Some(Best { network: self.network.clone(), step: self.step, loss });
             self.stale = 0;
