@@ -252,4 +252,10 @@ pub enum LearnedError {
         /// Here.
         wished: String,
     },
+    /// Burn failed.
+    #[error("burn: {reason}")]
+    Burn {
+        /// What it says.
+        reason: String,
+    },
 }

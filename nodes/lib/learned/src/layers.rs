@@ -36,7 +36,7 @@ fn lstm_weights<'a>(parameters: &'a [f32], place: &LstmPlace) -> LstmWeights<'a>
 }
 
 /// Rows of both parts beside each other.
-fn join(parts: &[&[f32]], width: usize) -> Vec<f32> {
+pub(crate) fn join(parts: &[&[f32]], width: usize) -> Vec<f32> {
     if let [only] = parts {
         return only.to_vec();
     }
@@ -48,7 +48,7 @@ fn join(parts: &[&[f32]], width: usize) -> Vec<f32> {
 }
 
 /// What [`join`] joined.
-fn part(joined: &[f32], width: usize, parts: usize, index: usize) -> Vec<f32> {
+pub(crate) fn part(joined: &[f32], width: usize, parts: usize, index: usize) -> Vec<f32> {
     joined.chunks_exact(width * parts).flat_map(|row| &row[index * width..][..width]).copied().collect()
 }
 

@@ -11,5 +11,7 @@ mod training;
 pub use batch::{Batch, Batches};
 pub use engine::{Engine, KernelEngine};
 pub use loss::Loss;
+#[cfg(feature = "burn")]
+pub(crate) use loss::weighted_loss;
 pub use options::{Schedule, TrainOptions};
 pub use training::{Best, Data, Hooks, Progress, Stop, Training};

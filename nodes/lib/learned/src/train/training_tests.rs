@@ -136,7 +136,8 @@ fn batches_and_options_that_cannot_be_are_refused() {
             Ok(batch)
         }
     }
-    let changes: [(fn(&mut Batch), &str); 5] = [
+    type Change = fn(&mut Batch);
+    let changes: [(Change, &str); 5] = [
         (|batch| batch.inputs[5] = f32::NAN, "batch 0: input 5 is NaN"),
         (|batch| batch.targets[3] = f32::INFINITY, "batch 0: row 1 counts, but its targets are"),
         (|batch| batch.weights[2] = -1.0, "batch 0: weight 2 is -1"),
