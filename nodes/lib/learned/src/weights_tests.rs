@@ -89,3 +89,28 @@ fn damaged_files_are_refused() {
     infinite[end - 4..].copy_from_slice(&f32::INFINITY.to_le_bytes());
     assert!(message(&infinite).contains("is inf; weights are finite"), "{}", message(&infinite));
 }
+
+#[test]
+fn bytes_changed_at_random_are_read_or_refused() {
+    use rand::{RngExt, SeedableRng};
+    let bytes = network().to_bytes(&notes(), name()).unwrap();
+    let header = u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize;
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+    let (mut read, mut refused) = (0, 0);
+    for _ in 0..3000 {
+        let mut changed = bytes.clone();
+        for _ in 0..random.random_range(1..4) {
+            // Most of them within the header, where a change means something.
+            let end = if random.random_bool(0.9) { 8 + header } else { bytes.len() };
+            changed[random.random_range(0..end)] = random.random();
+        }
+        match Network::from_bytes(&changed, name()) {
+            Ok((changed, _)) => {
+                assert_eq!(changed.parameters().len(), changed.shape().parameters());
+                read += 1;
+            }
+            Err(_) => refused += 1,
+        }
+    }
+    assert!(read > 50 && refused > 1000, "{read} read, {refused} refused");
+}
