@@ -49,7 +49,7 @@ impl BurnEngine {
 fn numbers<const D: usize>(tensor: Tensor<D>) -> Result<Vec<f32>, LearnedError> {
     let failed = |reason: String| LearnedError::Burn { reason };
     let data = tensor.try_into_data().map_err(|error| failed(format!("{error:?}")))?;
-    data.into_vec::<f32>().map_err(|error| failed(format!("{error:?}")))
+    data.try_into_vec::<f32>().map_err(|error| failed(format!("{error:?}")))
 }
 
 impl Engine for BurnEngine {
