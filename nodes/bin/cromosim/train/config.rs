@@ -195,6 +195,7 @@ fn files(patterns: &[String], folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
             continue;
         }
         let (parent, name) = (path.parent().unwrap_or(folder), path.file_name().unwrap_or_default().to_string_lossy().into_owned());
+        let parent = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
         let entries = std::fs::read_dir(parent).with_context(|| format!("{}: cannot be read", parent.display()))?;
         let mut matching: Vec<PathBuf> = entries
             .filter_map(|entry| Some(entry.ok()?.path()))

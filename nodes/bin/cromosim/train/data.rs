@@ -163,7 +163,7 @@ pub fn pieces(
     let pair = |(number, piece): (usize, Vec<SensorFrame>)| -> anyhow::Result<Pair> {
         let motion = SiteMotion::rigid(&SensorTrajectory::new(piece)?, Scheme::Spline)?;
         let names = PairNames { name: format!("{name} {number}"), subject: subject.to_owned(), position: position.to_owned() };
-        Ok(Pair::new(names, motion.clone(), &motion, stamps, readings).with_context(|| format!("{name}, {position}"))?)
+        Pair::new(names, motion.clone(), &motion, stamps, readings).with_context(|| format!("{name}, {position}"))
     };
     pieces.into_iter().filter(long).enumerate().map(pair).collect()
 }

@@ -127,9 +127,13 @@ mod tests {
     #[test]
     fn angles_give_the_rotation_again() {
         let axes = [Vector3::z(), Vector3::x(), Vector3::y()];
-        for (a, b, c) in
-            [(0.3, -0.9, 2.0), (-3.0, 1.2, 0.1), (0.0, 0.0, 0.0), (0.4, std::f64::consts::FRAC_PI_2, 0.7), (1.0, -1.5707963, 0.2)]
-        {
+        for (a, b, c) in [
+            (0.3, -0.9, 2.0),
+            (-3.0, 1.2, 0.1),
+            (0.0, 0.0, 0.0),
+            (0.4, std::f64::consts::FRAC_PI_2, 0.7),
+            (1.0, -std::f64::consts::FRAC_PI_2, 0.2),
+        ] {
             let rotation = UnitQuaternion::from_scaled_axis(axes[0] * a)
                 * UnitQuaternion::from_scaled_axis(axes[1] * b)
                 * UnitQuaternion::from_scaled_axis(axes[2] * c);
