@@ -68,7 +68,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Seconds by subject and position.
+/// Seconds by subject and position, and what the analytic simulation leaves.
 fn summary(pairs: &[Pair]) -> Vec<String> {
     let mut subjects: Vec<&str> = pairs.iter().map(|pair| pair.subject.as_str()).collect();
     subjects.sort_unstable();
@@ -78,7 +78,13 @@ fn summary(pairs: &[Pair]) -> Vec<String> {
         let mut positions: Vec<&str> = own.iter().map(|pair| pair.position.as_str()).collect();
         positions.sort_unstable();
         positions.dedup();
-        format!("subject {subject}: {} pairs, {:.0} s, {}", own.len(), card::seconds(own.iter().copied()), positions.join(", "))
+        let [acceleration, rate] = card::analytic(&own);
+        format!(
+            "subject {subject}: {} pairs, {:.0} s, {}; the analytic simulation leaves {acceleration:.3} m/s2, {rate:.4} rad/s",
+            own.len(),
+            card::seconds(own.iter().copied()),
+            positions.join(", ")
+        )
     };
     subjects.into_iter().map(line).collect()
 }

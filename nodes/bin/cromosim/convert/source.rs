@@ -8,16 +8,14 @@ use std::sync::Arc;
 use anyhow::{Context, bail};
 use cromosim_body::BodyModel;
 use cromosim_motion::datasets::open_dataset;
-use cromosim_motion::rigid::{
-    EurocGroundTruth, RigidFormat, parse_euroc_ground_truth, parse_euroc_imu, parse_imu_csv, parse_pose_csv, parse_tum, sniff_rigid,
-};
+use cromosim_motion::rigid::sniff_rigid;
 use cromosim_motion::{MotionFormat, read_motion_for};
+pub use cromosim_replay::recording::bytes;
+use cromosim_replay::recording::{Rigid, parse_rigid};
 
 use super::write::Target;
 use super::{Arguments, Content, name, recording};
 
-/// Larger tables are refused: a day of readings at 1 kHz is about as large.
-const MAX_BYTES: u64 = 16 << 30;
 /// What is looked at to tell what a file is.
 const HEAD_BYTES: u64 = 1 << 16;
 const MCAP: &[u8] = b"\x89MCAP";
@@ -76,27 +74,10 @@ pub fn head(path: &Path) -> anyhow::Result<Vec<u8>> {
     Ok(head)
 }
 
-/// A whole file.
-pub fn bytes(path: &Path) -> anyhow::Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    let read = File::open(path).and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes));
-    read.with_context(|| format!("{}: cannot be read", path.display()))?;
-    if bytes.len() as u64 > MAX_BYTES {
-        bail!("{}: more than {MAX_BYTES} bytes; cut the file into parts", path.display());
-    }
-    Ok(bytes)
-}
-
 /// A trajectory or an IMU series; `None` for anything else.
 pub fn rigid(path: &Path, bytes: &[u8]) -> anyhow::Result<Option<Content>> {
-    let name = name(path);
-    let poses = |trajectory| Content::Poses(EurocGroundTruth { trajectory, ..EurocGroundTruth::default() });
-    let Some(format) = sniff_rigid(bytes) else { return Ok(None) };
-    Ok(Some(match format {
-        RigidFormat::Tum => poses(parse_tum(bytes, &name)?),
-        RigidFormat::PoseCsv => poses(parse_pose_csv(bytes, &name)?),
-        RigidFormat::EurocGroundTruth => Content::Poses(parse_euroc_ground_truth(bytes, &name)?),
-        RigidFormat::EurocImu => Content::Imu(parse_euroc_imu(bytes, &name)?),
-        RigidFormat::ImuCsv => Content::Imu(parse_imu_csv(bytes, &name)?),
+    Ok(parse_rigid(bytes, &name(path))?.map(|rigid| match rigid {
+        Rigid::Poses(poses) => Content::Poses(poses),
+        Rigid::Imu(series) => Content::Imu(series),
     }))
 }

@@ -12,6 +12,20 @@ pub fn seconds<'a>(pairs: impl Iterator<Item = &'a Pair>) -> f64 {
     pairs.map(|pair| pair.targets.iter().flatten().count() as f64 / NETWORK_RATE_HZ).sum()
 }
 
+/// Root mean square per axis of what the analytic simulation leaves, m/s2 and rad/s.
+pub fn analytic(pairs: &[&Pair]) -> [f64; 2] {
+    let (mut sums, mut all) = ([0.0; 2], 0.0);
+    for pair in pairs {
+        let count = pair.targets.iter().flatten().count() as f64;
+        let kinematics = &pair.motion.kinematics;
+        let left = pair.rms(|sample| (kinematics[sample].acceleration, kinematics[sample].angular_velocity));
+        let left = left.unwrap_or_default();
+        sums = [sums[0] + left[0].powi(2) * count, sums[1] + left[1].powi(2) * count];
+        all += count;
+    }
+    sums.map(|sum: f64| (sum / all.max(1.0)).sqrt())
+}
+
 /// Notes in the weights' files.
 pub fn notes(config: &Config) -> BTreeMap<String, String> {
     let mut licences: Vec<&str> = config.data.iter().map(|source| source.licence.as_str()).collect();

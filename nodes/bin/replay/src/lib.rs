@@ -4,6 +4,7 @@ mod config;
 mod motion;
 mod outlet;
 mod player;
+pub mod recording;
 mod services;
 mod source;
 

@@ -1,13 +1,20 @@
 //! What is played: motions as poses, or everything in a bag.
 
-use std::path::Path;
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
 
 use cromosim_bag::{BagReader, Message, Messages, Selection};
 use cromosim_msgs::cromosim_msgs::SmplPose;
 use cromosim_spatial::Stamp;
+use tempfile::TempDir;
 
 use crate::config::Config;
 use crate::motion::MotionSource;
+use crate::recording;
+
+/// How an MCAP file begins.
+const MCAP: [u8; 5] = *b"\x89MCAP";
 
 /// Everything that is played, in order of recorded time.
 pub enum Source {
@@ -23,6 +30,8 @@ pub enum Source {
         next: Option<Message>,
         /// What to play of it.
         selection: Selection,
+        /// Where the bag lies that another file was made into; gone with the source.
+        _folder: Option<TempDir>,
     },
 }
 
@@ -45,7 +54,8 @@ impl Source {
         }
         anyhow::ensure!(config.motion.is_empty(), "parameters 'motion' and 'bag' are both given; play one of them");
         // The iterator borrows the reader, and both live as long as the process plays.
-        let reader: &'static BagReader = Box::leak(Box::new(BagReader::open(Path::new(&config.bag))?));
+        let (path, folder) = as_bag(Path::new(&config.bag))?;
+        let reader: &'static BagReader = Box::leak(Box::new(BagReader::open(&path)?));
         let Some((first, last)) = reader.summary().time_range else { anyhow::bail!("{}: the bag holds no messages", config.bag) };
         let from = first.plus_seconds(config.start_seconds);
         anyhow::ensure!(
@@ -59,7 +69,7 @@ impl Source {
         let selection = Selection { topics, from: Some(from), until };
         let mut messages = reader.messages(&selection)?;
         let next = messages.next().transpose()?;
-        Ok(Self::Bag { reader, messages, next, selection })
+        Ok(Self::Bag { reader, messages, next, selection, _folder: folder })
     }
 
     /// Recorded time of the beginning, ns.
@@ -108,7 +118,7 @@ impl Source {
     pub fn seek(&mut self, recorded: i64) -> anyhow::Result<()> {
         match self {
             Self::Motion(motion) => motion.seek(recorded),
-            Self::Bag { reader, messages, next, selection } => {
+            Self::Bag { reader, messages, next, selection, .. } => {
                 let from = Stamp::from_nanos(recorded).max(selection.from.unwrap_or_default());
                 *messages = reader.messages(&Selection { from: Some(from), ..selection.clone() })?;
                 *next = messages.next().transpose()?;
@@ -132,5 +142,59 @@ impl Source {
                 )
             }
         }
+    }
+}
+
+/// A bag stays as it is; what else can be played as one is made into a bag in a folder of its own.
+fn as_bag(path: &Path) -> anyhow::Result<(PathBuf, Option<TempDir>)> {
+    let mut magic = [0; MCAP.len()];
+    let other = path.is_file() && File::open(path).and_then(|mut file| file.read_exact(&mut magic)).is_ok() && magic != MCAP;
+    if other {
+        let folder = tempfile::tempdir()?;
+        let bag = folder.path().join("recording.mcap");
+        if recording::to_bag(path, &bag)? {
+            return Ok((bag, Some(folder)));
+        }
+    }
+    Ok((path.to_owned(), None))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn played(file: &str) -> Vec<(String, i64)> {
+        let config =
+            Config { bag: concat!(env!("CARGO_MANIFEST_DIR"), "/../../../tests/fuzz/samples/").to_owned() + file, ..Config::default() };
+        let mut source = Source::open(&config).unwrap();
+        let mut topics = Vec::new();
+        while let Some(Item::Raw(message)) = source.take(Stamp::default()).unwrap() {
+            topics.push((message.topic.name.clone(), message.log_time.nanos));
+        }
+        topics
+    }
+
+    #[test]
+    fn trajectories_readings_and_data_sets_play_as_recordings() {
+        let poses = played("tum/three_poses.txt");
+        assert_eq!(poses.len(), 3);
+        assert!(poses.iter().all(|(topic, _)| topic == "/reference/body") && poses.is_sorted_by_key(|(_, nanos)| *nanos), "{poses:?}");
+        let readings = played("euroc/imu.csv");
+        assert!(!readings.is_empty() && readings.iter().all(|(topic, _)| topic == "/imu/body/data_raw"), "{readings:?}");
+        let placements = played("datasets/pamap2.dat");
+        assert!(
+            placements.iter().any(|(topic, _)| topic == "/imu/hand/data_raw")
+                && placements.iter().all(|(_, nanos)| *nanos >= 1_000_000_000)
+        );
+    }
+
+    #[test]
+    fn what_is_none_of_these_is_said_to_be_no_bag() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("notes.txt");
+        std::fs::write(&path, "nothing that moves").unwrap();
+        let error = Source::open(&Config { bag: path.display().to_string(), ..Config::default() }).err().unwrap().to_string();
+        assert!(error.contains("notes.txt"), "{error}");
     }
 }
