@@ -6,7 +6,7 @@ mod common;
 use std::fs;
 use std::path::Path;
 
-use common::{cromosim_in, succeed, text};
+use common::{refuses, succeed};
 use cromosim_bag::{BagOptions, BagReader, BagWriter};
 use cromosim_body::{BodyModel, ShapedBody};
 use cromosim_motion::rigid::{PoseTrajectory, parse_euroc_imu, parse_tum, write_tum};
@@ -37,14 +37,6 @@ fn swing(seconds: f64) -> PoseTrajectory {
         trajectory.rotations.push(UnitQuaternion::from_scaled_axis(axis));
     }
     trajectory
-}
-
-fn refuses(folder: &Path, arguments: &[&str], words: &[&str]) {
-    let output = cromosim_in(folder, arguments);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", text(&output));
-    assert_eq!(said.trim_end().lines().count(), 1, "{said}");
-    assert!(words.iter().all(|word| said.contains(word)), "{arguments:?}: {said}");
 }
 
 fn names(folder: &Path) -> Vec<String> {

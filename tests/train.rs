@@ -6,7 +6,7 @@ mod common;
 use std::fs;
 use std::path::Path;
 
-use common::{cromosim_in, succeed, text};
+use common::{refuses, succeed};
 use cromosim_bag::BagReader;
 use cromosim_body::{BodyModel, ShapedBody};
 use cromosim_motion::{embedded_walk, write_bvh};
@@ -30,14 +30,6 @@ fn prepare(folder: &Path, input: &str) {
     let body = ShapedBody::new(BodyModel::embedded(), &motion.betas).unwrap();
     fs::write(folder.join("walk.bvh"), write_bvh(&motion, &body)).unwrap();
     fs::write(folder.join("train.yaml"), CONFIG.replace("INPUT", input)).unwrap();
-}
-
-fn refuses(folder: &Path, arguments: &[&str], words: &[&str]) {
-    let output = cromosim_in(folder, arguments);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", text(&output));
-    assert_eq!(said.trim_end().lines().count(), 1, "{said}");
-    assert!(words.iter().all(|word| said.contains(word)), "{arguments:?}: {said}");
 }
 
 fn forces(bag: &Path, placement: &str) -> Vec<[f64; 3]> {
