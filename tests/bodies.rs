@@ -18,8 +18,8 @@ use cromosim_ros::testing::{environment, in_private_network};
 use cromosim_spatial::Stamp;
 
 /// Commands that take poses or shapes of a body, and those that never see one.
-const WITH_BODY: [&str; 7] = ["demo", "simulate", "diagnose", "convert", "trajectory", "inspect", "body export"];
-const WITHOUT_BODY: [&str; 5] = ["compare", "bag recover", "bag csv", "completion", "node"];
+const WITH_BODY: [&str; 8] = ["demo", "simulate", "train", "diagnose", "convert", "trajectory", "inspect", "body export"];
+const WITHOUT_BODY: [&str; 6] = ["compare", "map", "bag recover", "bag csv", "completion", "node"];
 const NODES_WITH_BODY: [&str; 4] = ["replay", "smpl_state", "virtual_imu", "viewer"];
 const NODES_WITHOUT_BODY: [&str; 2] = ["recorder", "gap_monitor"];
 

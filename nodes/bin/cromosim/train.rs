@@ -9,6 +9,7 @@ use clap::Args;
 use cromosim_learned::train::{Data, Hooks, KernelEngine, Progress, Stop, Training};
 use cromosim_learned::{LearnedSimulator, Network, Pair, PairBatches, Quantity, Windows};
 
+use crate::body;
 use crate::progress::{self, Interrupt};
 
 mod card;
@@ -28,6 +29,9 @@ pub struct Arguments {
     /// Where the configuration's files are looked for; default: the folder of the configuration
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
+    /// Body model (SMPL, SMPL-H, SMPL-X; npz or pickle) that motions are played on, rather than the embedded one
+    #[arg(long, value_name = "FILE")]
+    body: Option<PathBuf>,
     /// Begin anew where DIR holds a training already, rather than go on with it
     #[arg(long)]
     force: bool,
@@ -41,7 +45,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let config = Config::read(&arguments.config)?;
     let folder = arguments.data.as_deref().or(arguments.config.parent()).unwrap_or(Path::new("."));
     let interrupt = Interrupt::watch()?;
-    let pairs = data::pairs(&config, folder, &interrupt)?;
+    let given = arguments.body.as_ref().map(|path| body::model(Some(path))).transpose()?;
+    let pairs = data::pairs(&config, folder, given.as_ref(), &interrupt)?;
     for line in summary(&pairs) {
         println!("{line}");
     }

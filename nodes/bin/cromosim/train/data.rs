@@ -48,13 +48,17 @@ pub fn read_motion(path: &Path, model: &Arc<BodyModel>) -> anyhow::Result<Motion
     Ok(Motion { name, rate_hz: motion.rate_hz, poses: motion.frames })
 }
 
-/// All pairs of a training, in the order of its file.
-pub fn pairs(config: &Config, folder: &Path, interrupt: &Interrupt) -> anyhow::Result<Vec<Pair>> {
-    let model = BodyModel::embedded();
+/// All pairs of a training, in the order of its file; motions are played on the body that is given, or the embedded one.
+pub fn pairs(config: &Config, folder: &Path, given: Option<&Arc<BodyModel>>, interrupt: &Interrupt) -> anyhow::Result<Vec<Pair>> {
+    let model = given.cloned().unwrap_or_else(BodyModel::embedded);
     let mut all = Vec::new();
     for (index, source) in config.data.iter().enumerate() {
         let seed = config.training.seed.wrapping_mul(1_000_003).wrapping_add(index as u64);
-        all.extend(if source.motions.is_empty() { recorded(source, folder)? } else { drawn(source, folder, &model, seed, interrupt)? });
+        all.extend(if source.motions.is_empty() {
+            recorded(source, folder, given)?
+        } else {
+            drawn(source, folder, &model, seed, interrupt)?
+        });
     }
     Ok(all)
 }
@@ -109,7 +113,7 @@ pub fn mix(numbers: &[u64]) -> u64 {
 }
 
 /// Pairs of real devices.
-fn recorded(source: &Source, folder: &Path) -> anyhow::Result<Vec<Pair>> {
+fn recorded(source: &Source, folder: &Path, given: Option<&Arc<BodyModel>>) -> anyhow::Result<Vec<Pair>> {
     let mut pairs = Vec::new();
     for path in source.recording_files(folder)? {
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -127,7 +131,7 @@ fn recorded(source: &Source, folder: &Path) -> anyhow::Result<Vec<Pair>> {
                 pairs.extend(pieces(&name, &source.subject, position, frames.collect(), &imu.series.stamps, &readings)?);
             }
         } else {
-            for (position, recorded) in recorded::read(&BagReader::open(&path)?, None)? {
+            for (position, recorded) in recorded::read(&BagReader::open(&path)?, given)? {
                 let recorded = recorded.with_context(|| format!("{}: {position}", path.display()))?;
                 let record = recorded.record();
                 let (stamps, readings) = (&record.imu.stamps, &record.imu.readings);

@@ -17,6 +17,8 @@ const FINE_RATE_HZ: f64 = 400.0;
 /// A joint that flips (uncleaned motion capture) accelerates like no limb, m/s2; nothing is learned within [`AROUND`] samples of it.
 const FASTEST: f64 = 150.0;
 const AROUND: usize = 15;
+/// Coefficients of shape that are drawn.
+const SHAPES: usize = 10;
 /// Coefficients of shape beyond so many standard deviations are nobody's.
 const WIDEST_SHAPE: f64 = 2.5;
 
@@ -79,7 +81,7 @@ impl Wearing {
             let draw = |beta: &f64| (beta + sigma * normal_pair(random)[0]).clamp(-WIDEST_SHAPE, WIDEST_SHAPE);
             around.iter().map(draw).collect()
         };
-        let shape = betas(&mut random, &[0.0; 10], self.shape);
+        let shape = betas(&mut random, &vec![0.0; model.beta_count().min(SHAPES)], self.shape);
         let told = ShapedBody::new(model.clone(), &betas(&mut random, &shape, self.shape_error))?;
         let worn = ShapedBody::new(model.clone(), &shape)?;
         let stamps = stamps(poses.len(), rate_hz);
