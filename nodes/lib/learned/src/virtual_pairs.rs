@@ -15,7 +15,7 @@ use crate::{DeviceRanges, LearnedError, NETWORK_RATE_HZ, Pair, PairNames, SiteMo
 /// The device's grid of true time, Hz.
 const FINE_RATE_HZ: f64 = 400.0;
 /// A joint that flips (uncleaned motion capture) accelerates like no limb, m/s2; nothing is learned within [`AROUND`] samples of it.
-const FASTEST: f64 = 150.0;
+const FASTEST: f64 = 60.0;
 const AROUND: usize = 15;
 /// Coefficients of shape that are drawn.
 const SHAPES: usize = 10;
