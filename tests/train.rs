@@ -63,6 +63,10 @@ fn networks_learn_and_simulate_takes_them() {
         assert!(one == other, "{name} differs");
     }
 
+    // Other data are another training.
+    fs::write(here.join("other.yaml"), CONFIG.replace("INPUT", "residual").replace("repeats: 2", "repeats: 1")).unwrap();
+    refuses(here, &["train", "other.yaml", "--out", "model"], &["model/training.yaml", "other.yaml", "--force"]);
+
     succeed(here, &["simulate", "walk.bvh", "--no-noise", "--out", "plain.mcap"]);
     succeed(here, &["simulate", "walk.bvh", "--no-noise", "--learned", "model", "--out", "learned.mcap"]);
     let [plain, learned] = ["plain.mcap", "learned.mcap"].map(|bag| forces(&here.join(bag), "left_wrist"));

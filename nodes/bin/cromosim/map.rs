@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 use clap::Args;
 use cromosim_bag::BagReader;
 use cromosim_imu::Reading;
@@ -50,7 +50,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     for name in names {
         file.placements.insert(name.clone(), PlacementMapping::fit(&simulated[name], &measured[name], name)?);
     }
-    std::fs::write(&arguments.out, file.to_yaml()).with_context(|| format!("{out}: cannot be written"))?;
+    file.write(&arguments.out)?;
     println!("{out}: {}", file.placements.keys().cloned().collect::<Vec<_>>().join(", "));
     Ok(())
 }

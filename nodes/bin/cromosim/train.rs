@@ -55,6 +55,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         return Ok(());
     }
     fs::create_dir_all(&arguments.out).with_context(|| format!("{}: cannot be made", arguments.out.display()))?;
+    keep_configuration(arguments)?;
     let mut networks = Vec::new();
     for quantity in Quantity::BOTH {
         match learn(&config, quantity, &training, &validation, arguments, &interrupt)? {
@@ -64,13 +65,24 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let Ok(networks) = <[Network; 2]>::try_from(networks) else { bail!("expected two networks") };
     let simulator = LearnedSimulator::new(config.input, networks)?;
-    let text = card::text(&config, &simulator, &training, &validation)?;
+    let scores = card::scores(&simulator, &validation)?;
+    let text = card::text(&config, &simulator, &training, &validation, &scores);
     simulator.write(&arguments.out, &card::notes(&config))?;
     let place = arguments.out.join("card.md");
     fs::write(&place, &text).with_context(|| format!("{}: cannot be written", place.display()))?;
     println!("{}: weights and card.md", arguments.out.display());
-    print!("{}", card::scores(&simulator, &validation)?);
+    print!("{scores}");
     Ok(())
+}
+
+/// DIR/training.yaml is what the training in DIR was begun with: weights that come of another file would not be what their card says.
+fn keep_configuration(arguments: &Arguments) -> anyhow::Result<()> {
+    let place = arguments.out.join("training.yaml");
+    let text = fs::read(&arguments.config).with_context(|| format!("{}: cannot be read", arguments.config.display()))?;
+    if !arguments.force && fs::read(&place).is_ok_and(|begun_with| begun_with != text) {
+        bail!("{}: differs from {}; give another --out, or --force to begin anew", place.display(), arguments.config.display());
+    }
+    fs::write(&place, text).with_context(|| format!("{}: cannot be written", place.display()))
 }
 
 /// Seconds by subject and position, and what the analytic simulation leaves.

@@ -1,4 +1,4 @@
-//! Recordings of data sets: TotalCapture, PAMAP2, RealWorld, BROAD and DIP-IMU. No panic, and what comes out is in order.
+//! Recordings of data sets (TotalCapture, PAMAP2, RealWorld, BROAD, DIP-IMU) and labelled skeleton clips. No panic, and what comes out is in order.
 #![no_main]
 
 use std::io::Cursor;
@@ -6,8 +6,8 @@ use std::path::Path;
 
 use cromosim_arrays::{Container, Entry, Limits};
 use cromosim_motion::datasets::{
-    DatasetRecording, DipArray, DipRecording, parse_broad, parse_pamap2, parse_realworld, parse_totalcapture_calibration,
-    parse_totalcapture_reference, parse_totalcapture_sensors, sniff_dataset,
+    DatasetRecording, DipArray, DipRecording, parse_broad, parse_pamap2, parse_realworld, parse_skeleton_npz,
+    parse_totalcapture_calibration, parse_totalcapture_reference, parse_totalcapture_sensors, sniff_dataset,
 };
 use libfuzzer_sys::fuzz_target;
 
@@ -53,4 +53,9 @@ fuzz_target!(|bytes: &[u8]| {
         check(&recording);
     }
     let _ = dip(bytes);
+    if let Ok(labelled) = parse_skeleton_npz(Cursor::new(bytes), "fuzz") {
+        let frames = labelled.clip.frame_count();
+        assert!(labelled.labels.is_empty() || labelled.labels.len() == frames);
+        assert_eq!(labelled.clip.world_from_joints(frames - 1).len(), labelled.clip.joints().len());
+    }
 });

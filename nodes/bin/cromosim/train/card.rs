@@ -64,7 +64,7 @@ pub fn scores(simulator: &LearnedSimulator, pairs: &[Pair]) -> anyhow::Result<St
 }
 
 /// The card.
-pub fn text(config: &Config, simulator: &LearnedSimulator, training: &[Pair], validation: &[Pair]) -> anyhow::Result<String> {
+pub fn text(config: &Config, simulator: &LearnedSimulator, training: &[Pair], validation: &[Pair], scores: &str) -> String {
     let shape = config.shape();
     let mut text = format!(
         "# Model card\n\nMade by cromosim {}, `cromosim train`, seed {}.\n\nInput `{}`, {} convolutions of {} channels and {} taps, {} LSTM layers of {} ({:?}), {} parameters a network; one for acceleration, one for angular velocity, at {NETWORK_RATE_HZ} Hz.\n\n## Data\n\n| subject | what | seconds | licence |\n|---|---|---|---|\n",
@@ -97,8 +97,7 @@ pub fn text(config: &Config, simulator: &LearnedSimulator, training: &[Pair], va
     }
     let _ = write!(
         text,
-        "\n## Scores on the validation subjects\n\nRoot mean square error per axis against the measured IMU turned into the world. These subjects chose when the training stopped; for others see `cromosim evaluate`.\n\n{}",
-        scores(simulator, validation)?
+        "\n## Scores on the validation subjects\n\nRoot mean square error per axis against the measured IMU turned into the world. These subjects chose when the training stopped, so they are no test.\n\n{scores}"
     );
-    Ok(text)
+    text
 }

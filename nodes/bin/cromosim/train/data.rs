@@ -9,8 +9,9 @@ use cromosim_bag::BagReader;
 use cromosim_body::{BodyModel, BodyPose};
 use cromosim_imu::{Placement, Reading, Scheme, SensorFrame, SensorTrajectory};
 use cromosim_learned::{Pair, PairNames, SiteMotion};
-use cromosim_motion::datasets::{parse_broad, parse_skeleton_npz};
+use cromosim_motion::datasets::{DatasetFiles, open_dataset, parse_skeleton_npz};
 use cromosim_motion::{MotionOptions, read_motion_for, retarget};
+use cromosim_replay::recording::of_dataset;
 use cromosim_spatial::Stamp;
 use nalgebra::Isometry3;
 use rayon::prelude::*;
@@ -41,7 +42,7 @@ pub fn read_motion(path: &Path, model: &Arc<BodyModel>) -> anyhow::Result<Motion
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let options = MotionOptions { keep_lead_in: true, ..MotionOptions::default() };
     let skeleton = || File::open(path).ok().and_then(|file| parse_skeleton_npz(file, &path.display().to_string()).ok());
-    let motion = match path.extension().is_some_and(|ending| ending == "npz").then(skeleton).flatten() {
+    let motion = match skeleton() {
         Some(labelled) => retarget(&labelled.clip, model, &options)?,
         None => read_motion_for(path, model, &options)?,
     };
@@ -118,17 +119,16 @@ fn recorded(source: &Source, folder: &Path, given: Option<&Arc<BodyModel>>) -> a
     for path in source.recording_files(folder)? {
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let before = pairs.len();
-        if path.extension().is_some_and(|ending| ending == "npz") {
-            let file = File::open(&path).with_context(|| format!("{}: cannot be read", path.display()))?;
-            let recording = parse_broad(file, &path.display().to_string())?;
-            for ((position, poses), imu) in recording.references.iter().zip(&recording.imus) {
+        if let Some((_, recording)) = open_dataset(&path, &DatasetFiles::default())? {
+            for placed in of_dataset(&recording) {
+                let (Some(poses), Some(series)) = (placed.poses, placed.series) else { continue };
                 let frames =
                     poses.stamps.iter().zip(&poses.positions).zip(&poses.rotations).map(|((stamp, position), rotation)| {
                         SensorFrame::new(*stamp, Isometry3::from_parts((*position).into(), *rotation))
                     });
-                let both = imu.series.specific_force.iter().zip(&imu.series.angular_velocity);
+                let both = series.specific_force.iter().zip(&series.angular_velocity);
                 let readings: Vec<Reading> = both.map(|(force, rate)| Reading { force: *force, rate: *rate }).collect();
-                pairs.extend(pieces(&name, &source.subject, position, frames.collect(), &imu.series.stamps, &readings)?);
+                pairs.extend(pieces(&name, &source.subject, placed.name, frames.collect(), &series.stamps, &readings)?);
             }
         } else {
             for (position, recorded) in recorded::read(&BagReader::open(&path)?, given)? {

@@ -12,6 +12,7 @@ use cromosim_imu::Reading;
 use serde::Deserialize;
 
 use crate::LearnedError;
+use crate::tensors::write_whole;
 
 const SCHEMA: &str = "cromosim/mapping/1";
 /// More knots than this a channel are thinned to as many quantiles.
@@ -208,6 +209,14 @@ impl MappingFile {
     pub fn read(path: &Path) -> Result<Self, LearnedError> {
         let text = std::fs::read_to_string(path).map_err(|source| LearnedError::Read { path: path.to_owned(), source })?;
         Self::parse(&text, &path.display().to_string())
+    }
+
+    /// Writes a file, whole or not at all.
+    ///
+    /// # Errors
+    /// [`LearnedError::Write`].
+    pub fn write(&self, path: &Path) -> Result<(), LearnedError> {
+        write_whole(path, self.to_yaml().as_bytes())
     }
 
     /// The file's text; parsed again it is the same to the last digit.

@@ -78,5 +78,12 @@ def dip():
     (SAMPLES / "dip.pkl").write_bytes(pickle.dumps({key: value.astype("f4") for key, value in arrays.items()}, protocol=2))
 
 
+def skeleton():
+    turn = np.tile([1.0, 0.0, 0.0, 0.0], (3, 2, 1)).astype("f4")
+    npz(SAMPLES / "skeleton.npz", dict(fps=np.float64(120.0), joints=np.array(["hip", "chest"]), parents=np.array([-1, 0]),
+        offsets=np.array([[0.0, 0.9, 0.0], [0.0, 0.3, 0.0]], "f4"), local_quat_wxyz=turn, pos=np.zeros((3, 2, 3), "f4"),
+        label=np.array([0, -1, 0], "i1"), label_names=np.array(["WALKING"]), subject=np.array("02"), atypical=np.array("")))
+
+
 SAMPLES.mkdir(parents=True, exist_ok=True)
-broad(); totalcapture(); pamap2(); realworld(); dip()
+broad(); totalcapture(); pamap2(); realworld(); dip(); skeleton()

@@ -13,8 +13,8 @@ use crate::bvh::{BvhClip, BvhJoint, Channel, MAX_JOINTS};
 use crate::rigid::RigidError;
 use crate::rigid::table::unit_quaternion;
 
-/// An hour at 120 Hz with 60 joints.
-const LIMITS: Limits = Limits { decoded_bytes: 2 << 30, opcodes: 10_000, depth: 10 };
+/// An hour at 120 Hz with 21 joints.
+const LIMITS: Limits = Limits { decoded_bytes: 256 << 20, opcodes: 10_000, depth: 10 };
 
 /// A skeleton's motion with what its frames show.
 #[derive(Clone, Debug)]
