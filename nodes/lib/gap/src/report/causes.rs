@@ -2,7 +2,9 @@
 
 use std::fmt::Write;
 
-use super::text::{escape, parameter, percent, significant, spec, summary};
+use cromosim_charts::text::{escape, percent, significant};
+
+use super::text::{parameter, spec, summary};
 use crate::{Cause, Metrics, PlacementDiagnosis};
 
 /// One row a cause, the largest share first.

@@ -1,10 +1,9 @@
 //! The pictures of one placement: curves of the worst seconds, the residual over time, spectra.
 
+use cromosim_charts::{Axis, Panel, Series};
 use cromosim_spatial::Stamp;
 
-use super::plot::{Panel, Series};
 use super::text::axis_name;
-use super::ticks::Axis;
 use crate::{AXES, CoursePoint, Evidence, PlacementDiagnosis};
 
 /// Shown of the curves, s.

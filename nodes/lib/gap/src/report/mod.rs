@@ -4,11 +4,9 @@ mod causes;
 mod figures;
 mod page;
 mod place;
-mod plot;
 #[cfg(test)]
 mod tests;
 mod text;
-mod ticks;
 
 use std::collections::BTreeMap;
 

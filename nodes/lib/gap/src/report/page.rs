@@ -3,31 +3,23 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
+use cromosim_charts::text::{escape, percent, significant, trimmed};
+use cromosim_charts::{document, write_panels};
+
 use super::figures::{self, Window};
-use super::plot::Panel;
-use super::text::{escape, percent, significant, trimmed};
 use super::{State, causes, place};
 use crate::{Evidence, Metrics, PlacementDiagnosis};
 
-const STYLE: &str = include_str!("style.css");
-
 /// The whole document.
 pub(super) fn page(placements: &[(&String, &PlacementDiagnosis)], evidence: &BTreeMap<String, Evidence>, title: &str) -> String {
-    let title = escape(title);
     let mut page = String::new();
-    let _ = write!(
-        page,
-        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
-         <title>{title}</title><style>\n{STYLE}</style></head><body><main>\n<h1>{title}</h1>\n"
-    );
     page.push_str("<p class=\"soft\">Where simulated and real IMUs differ, which effect causes it, and how far the gap shrinks once that effect is added.</p>\n");
     write_summary(&mut page, placements);
     for (number, (name, placement)) in placements.iter().enumerate() {
         write_placement(&mut page, number, name, placement, evidence.get(name.as_str()));
     }
     page.push_str(NOTES);
-    page.push_str("</main></body></html>\n");
-    page
+    document(title, "", &page)
 }
 
 const NOTES: &str = "<section><h3 style=\"margin-top:0\">How to read this</h3><ul class=\"plain note\">\
@@ -106,15 +98,6 @@ fn legend(page: &mut String, entries: &[(&str, &str)]) {
         let _ = write!(page, "<li>{style}{words}</li>");
     }
     page.push_str("</ul>\n");
-}
-
-fn write_panels(page: &mut String, panels: &[Panel]) {
-    page.push_str("<div class=\"panels\">\n");
-    for panel in panels {
-        page.push_str(&panel.svg());
-        page.push('\n');
-    }
-    page.push_str("</div>\n");
 }
 
 fn write_curves(page: &mut String, evidence: &Evidence, window: Window) {

@@ -2,8 +2,10 @@
 
 use std::fmt::Write;
 
+use cromosim_charts::text::{decimals, escape, percent};
+
 use super::causes::bar;
-use super::text::{axis_name, decimals, escape, percent};
+use super::text::axis_name;
 use crate::{Interval, Place};
 
 /// Intervals of time beyond these are left out, the smallest shares first.

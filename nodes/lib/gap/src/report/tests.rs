@@ -152,7 +152,7 @@ fn the_page_names_everything_and_loads_nothing() {
         std::fs::write(path, &page).unwrap();
     }
     for placement in diagnosis.placements.values() {
-        assert!(page.contains(&text::escape(&placement.verdict)));
+        assert!(page.contains(&cromosim_charts::text::escape(&placement.verdict)));
         for cause in &placement.causes {
             assert!(page.contains(&format!(">{}<", cause.effect)), "{}", cause.effect);
         }

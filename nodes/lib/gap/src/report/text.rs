@@ -1,80 +1,10 @@
-//! Numbers and words for people.
+//! Effects and their parameters for people.
 
 use std::fmt::Write;
 
+use cromosim_charts::text::{decimals, escape, significant, trimmed};
 use cromosim_imu::effects::{EffectKind, EffectSpec};
 use serde_json::Value;
-
-/// Text with the five characters of markup replaced.
-pub(super) fn escape(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for character in text.chars() {
-        match character {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
-            '\'' => escaped.push_str("&#39;"),
-            // Not allowed in XML, in any form.
-            control if control.is_control() && !matches!(control, '\n' | '\t') => escaped.push('\u{FFFD}'),
-            other => escaped.push(other),
-        }
-    }
-    escaped
-}
-
-/// A number with so many significant digits; `–` for none.
-pub(super) fn significant(value: f64, digits: usize) -> String {
-    if !value.is_finite() {
-        return "–".to_owned();
-    }
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    let exponent = value.abs().log10().floor() as i32;
-    if !(-5..=6).contains(&exponent) {
-        return minus(&format!("{value:.*e}", digits.saturating_sub(1)));
-    }
-    decimals(value, (digits as i32 - 1 - exponent).max(0) as usize)
-}
-
-/// The same without zeros at its end.
-pub(super) fn trimmed(value: f64, digits: usize) -> String {
-    let text = significant(value, digits);
-    match text.split_once('.') {
-        Some((whole, fraction)) if !text.contains('e') => {
-            let fraction = fraction.trim_end_matches('0');
-            if fraction.is_empty() { whole.to_owned() } else { format!("{whole}.{fraction}") }
-        }
-        _ => text,
-    }
-}
-
-/// A number with so many decimals.
-pub(super) fn decimals(value: f64, decimals: usize) -> String {
-    if !value.is_finite() {
-        return "–".to_owned();
-    }
-    let text = format!("{value:.decimals$}");
-    // -0.00 is 0.00.
-    let is_zero = text.chars().all(|character| matches!(character, '-' | '0' | '.'));
-    minus(text.strip_prefix('-').filter(|_| is_zero).unwrap_or(&text))
-}
-
-/// The typographic minus, as wide as a digit.
-fn minus(text: &str) -> String {
-    text.replacen('-', "−", 1)
-}
-
-/// `62 %`; small shares are not rounded to nothing.
-pub(super) fn percent(share: f64) -> String {
-    match 100.0 * share {
-        value if !value.is_finite() => "–".to_owned(),
-        value if value > 0.0 && value < 1.0 => "&lt; 1 %".to_owned(),
-        value if value < 100.0 && value > 99.0 => "&gt; 99 %".to_owned(),
-        value => format!("{} %", decimals(value, 0)),
-    }
-}
 
 /// What the library knows of an effect; nothing of `unknown`.
 pub(super) fn spec(effect: &str) -> Option<&'static EffectSpec> {
@@ -204,13 +134,10 @@ mod tests {
         assert_eq!((plain(4.0, None).as_str(), plain(0.25, None).as_str(), plain(1200.0, None).as_str()), ("4", "0.25", "1200"));
         assert_eq!(plain(1.7e-7, None), "1.700e-7".replace('-', "−"));
         assert_eq!(plain(f64::NAN, None), "–");
-        assert_eq!((percent(0.004).as_str(), percent(0.62).as_str(), percent(1.0).as_str()), ("&lt; 1 %", "62 %", "100 %"));
-        assert_eq!(decimals(-0.0001, 2), "0.00");
     }
 
     #[test]
     fn markup_cannot_come_in() {
-        assert_eq!(escape("<a href='x'>&\"\u{1}"), "&lt;a href=&#39;x&#39;&gt;&amp;&quot;\u{FFFD}");
         let text = parameter("unknown", "<b>", &serde_json::json!(["<i>", {"<u>": "<s>"}]), None);
         assert!(!text.contains("<b>") && !text.contains("<i>") && !text.contains("<u>") && !text.contains("<s>"), "{text}");
     }

@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
-use super::text::escape;
-use super::ticks::Axis;
+use crate::Axis;
+use crate::text::escape;
 
 /// Room for labels around the curves, in the picture's own units.
 const LEFT: f64 = 58.0;
@@ -14,26 +14,36 @@ const BOTTOM: f64 = 36.0;
 const TOLERANCE: f64 = 0.3;
 
 /// A line of a panel.
-pub(super) struct Series {
-    /// CSS class: `measured`, `before`, `after` or `predicted`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Series {
+    /// CSS class, which gives its colour: `measured`, `before`, `after` or `predicted`.
     pub class: &'static str,
     /// x and y; what is not finite interrupts the line.
     pub points: Vec<(f64, f64)>,
 }
 
-/// A panel.
-pub(super) struct Panel {
+/// A panel of curves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Panel {
+    /// Above the curves.
     pub title: String,
+    /// In the picture's own units; letters are 11.5 high.
     pub width: f64,
+    /// In the same units.
     pub height: f64,
+    /// How x becomes a place.
     pub x: Axis,
+    /// How y becomes a place.
     pub y: Axis,
+    /// Below, with its unit.
     pub x_label: String,
+    /// At the left, with its unit.
     pub y_label: String,
-    /// Ranges of x that are shaded: class, from, to.
+    /// Ranges of x that are shaded: class (`window` or `left-out`), from, to.
     pub shades: Vec<(&'static str, f64, f64)>,
     /// A dashed line across, at this y.
     pub level: Option<f64>,
+    /// In the order in which they are drawn.
     pub series: Vec<Series>,
 }
 
@@ -51,7 +61,7 @@ impl Panel {
     }
 
     /// The panel as an `svg` element.
-    pub(super) fn svg(&self) -> String {
+    pub fn svg(&self) -> String {
         let mut svg = String::new();
         let (width, height, (inner_width, inner_height)) = (self.width, self.height, self.inner());
         let described = format!("{}: {} over {}", self.title, self.y_label, self.x_label);

@@ -1,10 +1,10 @@
 //! Axes: where a value stands, and round numbers beside them.
 
-use super::text::{decimals, significant};
+use crate::text::{decimals, significant};
 
 /// How values become lengths.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Axis {
+pub struct Axis {
     low: f64,
     high: f64,
     logarithmic: bool,
@@ -12,7 +12,8 @@ pub(super) struct Axis {
 
 /// A mark on an axis.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Tick {
+pub struct Tick {
+    /// Where.
     pub value: f64,
     /// Empty for a mark between others.
     pub label: String,
@@ -20,7 +21,7 @@ pub(super) struct Tick {
 
 impl Axis {
     /// From the least to the greatest of the values, and a little beyond on both sides.
-    pub(super) fn linear(values: impl Iterator<Item = f64>) -> Self {
+    pub fn linear(values: impl Iterator<Item = f64>) -> Self {
         let (low, high) = extent(values).unwrap_or((0.0, 1.0));
         // A flat series is no picture of its rounding errors.
         let margin = (0.06 * (high - low)).max(1e-3 * low.abs().max(high.abs())).max(1e-9);
@@ -28,20 +29,32 @@ impl Axis {
     }
 
     /// Between exactly these values.
-    pub(super) fn exact(low: f64, high: f64) -> Self {
+    pub fn exact(low: f64, high: f64) -> Self {
         let high = if high > low { high } else { low + 1.0 };
         Self { low, high, logarithmic: false }
     }
 
+    /// From the least to the greatest of the values and of nothing: for bars, whose lengths are compared.
+    pub fn from_zero(values: impl Iterator<Item = f64>) -> Self {
+        let (low, high) = extent(values.chain([0.0])).unwrap_or((0.0, 1.0));
+        let margin = 0.06 * (high - low);
+        match (low < 0.0, high > 0.0) {
+            (false, false) => Self::exact(0.0, 1.0),
+            (below, above) => {
+                Self { low: if below { low - margin } else { 0.0 }, high: if above { high + margin } else { 0.0 }, logarithmic: false }
+            }
+        }
+    }
+
     /// Logarithmic, over at most `decades` below the greatest value; values that are not positive are left out.
-    pub(super) fn logarithmic(values: impl Iterator<Item = f64>, decades: f64) -> Self {
+    pub fn logarithmic(values: impl Iterator<Item = f64>, decades: f64) -> Self {
         let (low, high) = extent(values.filter(|value| *value > 0.0)).unwrap_or((0.1, 10.0));
         let low = low.max(high * 10_f64.powf(-decades));
         Self { low: low * 0.8, high: high * 1.25, logarithmic: true }
     }
 
     /// Where a value stands: 0 at the lower end, 1 at the upper; held within; none for what cannot be drawn.
-    pub(super) fn place(&self, value: f64) -> Option<f64> {
+    pub fn place(&self, value: f64) -> Option<f64> {
         let place = if self.logarithmic {
             if value.is_nan() {
                 return None;
@@ -53,16 +66,18 @@ impl Axis {
         place.is_finite().then(|| place.clamp(-0.02, 1.02))
     }
 
-    pub(super) fn contains(&self, value: f64) -> bool {
+    /// Whether a value lies between the ends.
+    pub fn contains(&self, value: f64) -> bool {
         (self.low..=self.high).contains(&value)
     }
 
-    pub(super) fn is_logarithmic(&self) -> bool {
+    /// Whether equal ratios are equally long.
+    pub fn is_logarithmic(&self) -> bool {
         self.logarithmic
     }
 
     /// Marks at round numbers, about `count` of them with labels.
-    pub(super) fn ticks(&self, count: usize) -> Vec<Tick> {
+    pub fn ticks(&self, count: usize) -> Vec<Tick> {
         if self.logarithmic {
             return self.decades(count);
         }
