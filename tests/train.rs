@@ -6,11 +6,15 @@ mod common;
 use std::fs;
 use std::path::Path;
 
-use common::{refuses, succeed};
+use common::{refuses, succeed, write_networks};
 use cromosim_bag::BagReader;
 use cromosim_body::{BodyModel, ShapedBody};
+use cromosim_imu::{Scheme, SensorFrame, SensorTrajectory};
+use cromosim_learned::{Input, LearnedSimulator, SiteMotion};
+use cromosim_motion::rigid::parse_tum;
 use cromosim_motion::{embedded_walk, write_bvh};
 use cromosim_msgs::sensor_msgs::Imu;
+use nalgebra::{Isometry3, UnitQuaternion};
 
 /// A device that filters and rings much, so that a short training finds something.
 const CONFIG: &str = "\
@@ -110,4 +114,51 @@ fn what_cannot_be_used_is_named() {
     succeed(here, &["simulate", "walk.bvh", "--out", "walk.mcap", "--duration", "0.1"]);
     refuses(here, &["map", "--simulated", "walk.mcap", "--measured", "walk.mcap", "--out", "m.yaml"], &["11 samples, at least 20"]);
     assert!(!here.join("x.mcap").exists() && !here.join("m.yaml").exists());
+}
+
+#[test]
+fn a_rigid_body_takes_networks_and_a_mapping() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    write_networks(Input::Residual, &here.join("model"));
+    let mut tum = String::new();
+    for k in 0..600 {
+        let t = f64::from(k) / 120.0;
+        let turn = UnitQuaternion::from_euler_angles(0.4 * (2.0 * t).sin(), 0.1 * t, 0.3 * (3.0 * t).cos());
+        let q = turn.quaternion();
+        let (x, y, z) = (0.3 * (2.1 * t).sin(), 0.2 * (3.3 * t).cos(), 1.0);
+        tum += &format!("{:.9} {x} {y} {z} {} {} {} {}\n", 100.0 + t, q.i, q.j, q.k, q.w);
+    }
+    fs::write(here.join("robot.tum"), &tum).unwrap();
+    let channel = "{simulated: [-50.0, 50.0], measured: [-99.0, 101.0]}";
+    let channels: String =
+        ["accel_x", "accel_y", "accel_z", "gyro_x", "gyro_y", "gyro_z"].iter().map(|name| format!("    {name}: {channel}\n")).collect();
+    fs::write(here.join("map.yaml"), format!("schema: cromosim/mapping/1\nplacements:\n  body:\n{channels}")).unwrap();
+    let simulate = ["simulate", "--rigid", "robot.tum", "--rate", "100", "--learned", "model"];
+    succeed(here, &[&simulate[..], &["--out", "learned.mcap"]].concat());
+    succeed(here, &[&simulate[..], &["--mapping", "map.yaml", "--out", "mapped.mcap"]].concat());
+
+    // What the library says of the same trajectory.
+    let poses = parse_tum(tum.as_bytes(), "robot.tum").unwrap();
+    let frame = |k: usize| SensorFrame::new(poses.stamps[k], Isometry3::from_parts(poses.positions[k].into(), poses.rotations[k]));
+    let trajectory = SensorTrajectory::new((0..poses.stamps.len()).map(frame).collect()).unwrap();
+    let motion = SiteMotion::rigid(&trajectory, Scheme::Spline).unwrap();
+    let expected = LearnedSimulator::read(&here.join("model")).unwrap().simulate(&motion).unwrap();
+    let (learned, mapped) = (forces(&here.join("learned.mcap"), "body"), forces(&here.join("mapped.mcap"), "body"));
+    assert!(learned.len() >= 499 && learned.len() == mapped.len());
+    // The last sample lies beyond the networks' grid, where what they add is held.
+    for (k, ((learned, mapped), expected)) in learned.iter().zip(&mapped).zip(&expected).enumerate().take(498) {
+        let force = expected.imu().specific_force;
+        let analytic = motion.kinematics[k].imu().specific_force;
+        assert!((force - analytic).norm() > 0.01, "the networks say something");
+        for axis in 0..3 {
+            assert!((learned[axis] - force[axis]).abs() < 1e-3, "sample {k}: {} {}", learned[axis], force[axis]);
+            assert!((mapped[axis] - (1.0 + 2.0 * learned[axis])).abs() < 1e-9, "sample {k}: {} {}", mapped[axis], learned[axis]);
+        }
+    }
+    refuses(
+        here,
+        &[&simulate[..], &["--placement", "gripper", "--mapping", "map.yaml", "--out", "x.mcap"]].concat(),
+        &["none of the placements gripper"],
+    );
 }

@@ -1,9 +1,12 @@
 //! What the tests of the whole suite share.
 #![allow(dead_code)]
 
+use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+
+use cromosim_learned::{Direction, Input, LearnedSimulator, Network, NetworkShape};
 
 /// The command line program under test.
 pub const CROMOSIM: &str = env!("CARGO_BIN_EXE_cromosim");
@@ -27,6 +30,17 @@ pub fn refuses(folder: &Path, arguments: &[&str], words: &[&str]) {
     assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", text(&output));
     assert_eq!(said.trim_end().lines().count(), 1, "{said}");
     assert!(words.iter().all(|word| said.contains(word)), "{arguments:?}: {said}");
+}
+
+/// Random networks that say much, in a new folder.
+pub fn write_networks(input: Input, folder: &Path) {
+    let direction = if input == Input::Streaming { Direction::Forward } else { Direction::Both };
+    let inputs = input.channels();
+    let shape = NetworkShape { inputs, channels: 12, kernel: 5, convolutions: 3, hidden: 16, layers: 2, direction, outputs: 3 };
+    let network = |seed| Network::new(shape.clone(), seed).expect("a sound shape");
+    std::fs::create_dir(folder).expect("a new folder");
+    let simulator = LearnedSimulator::new(input, [network(1), network(2)]).expect("networks that fit");
+    simulator.write(folder, &BTreeMap::new()).expect("files that can be written");
 }
 
 /// Both outputs.

@@ -10,6 +10,7 @@ use cromosim_imu::{
     Covariances, DeclaredNoise, Device, Dropouts, EffectKind, EffectSet, EffectsFile, ImuSample, NoiseSource, Placement, PlacementEffects,
     Reading, Scheme, SensorFrame, SensorModel, SensorTrajectory, simulate_kinematics,
 };
+use cromosim_learned::{LearnedSimulator, MappingFile, SiteMotion};
 use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_msgs::std_msgs::Header;
@@ -21,7 +22,17 @@ use rayon::prelude::*;
 use crate::convert::{Content, source};
 use crate::progress::{self, Interrupt};
 use crate::recorded::{self, Recorded};
-use crate::simulate::Arguments;
+use crate::simulate::{Arguments, read_mapping};
+
+/// How the placements of a recording are simulated.
+#[derive(Default)]
+struct How {
+    /// None: the estimate that a diagnosis uses.
+    scheme: Option<Scheme>,
+    effects: EffectsFile,
+    learned: Option<LearnedSimulator>,
+    mapping: MappingFile,
+}
 
 /// Runs `simulate --reference RECORDING`.
 pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
@@ -37,8 +48,9 @@ pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
         recorded::read(&reader, body.as_ref())?.into_iter().map(|(_, placement)| placement).collect::<anyhow::Result<Vec<_>>>()?;
     let effects = arguments.effects.as_deref().map(|file| read_effects(file, &recorded)).transpose()?.unwrap_or_default();
     let (recorded, without_stamps) = with_stamps(recorded, arguments.rate);
-    let simulated = simulate_all(&recorded, scheme, arguments, |name| effects.placements.get(name))?;
-    let summary = write(&arguments.out, metadata(recording, scheme, arguments, &effects), &recorded, &simulated, false, arguments)?;
+    let how = How { scheme, effects, ..How::default() };
+    let simulated = simulate_all(&recorded, &how, arguments)?;
+    let summary = write(&arguments.out, metadata(recording, &how, arguments), &recorded, &simulated, false, arguments)?;
     println!(
         "{}: {} messages of {} placements, from the reference in {}",
         arguments.out.display(),
@@ -86,24 +98,24 @@ pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()>
         let of_device = PlacementEffects { epoch: recorded[0].span().0, declared_noise, effects: device.effects().clone() };
         effects.placements.insert(name.clone(), of_device);
     }
-    let simulated = simulate_all(&recorded, scheme, arguments, |name| effects.placements.get(name))?;
-    let summary = write(&arguments.out, metadata(trajectory, scheme, arguments, &effects), &recorded, &simulated, true, arguments)?;
+    let learned = arguments.learned.as_deref().map(LearnedSimulator::read).transpose()?;
+    // What the networks learned on top of.
+    let scheme = scheme.or(learned.as_ref().map(|_| Scheme::Spline));
+    let mapping = read_mapping(arguments.mapping.as_deref(), &[name.as_str()])?;
+    let how = How { scheme, effects, learned, mapping };
+    let simulated = simulate_all(&recorded, &how, arguments)?;
+    let summary = write(&arguments.out, metadata(trajectory, &how, arguments), &recorded, &simulated, true, arguments)?;
     println!("{}: {} messages of {name}, along {}", arguments.out.display(), summary.message_count(), trajectory.display());
     Ok(())
 }
 
 /// Each placement on whatever core is free.
-fn simulate_all<'a>(
-    recorded: &[Recorded],
-    scheme: Option<Scheme>,
-    arguments: &Arguments,
-    effects: impl Fn(&str) -> Option<&'a PlacementEffects> + Sync,
-) -> anyhow::Result<Vec<Vec<Imu>>> {
+fn simulate_all(recorded: &[Recorded], how: &How, arguments: &Arguments) -> anyhow::Result<Vec<Vec<Imu>>> {
     let interrupt = Interrupt::watch()?;
     let bar = progress::bar(recorded.len() as u64, "simulating, placements");
     let one = |placement: &Recorded| {
         interrupt.check()?;
-        let messages = resimulate(placement, scheme, arguments, effects(&placement.name));
+        let messages = resimulate(placement, how, arguments);
         bar.inc(1);
         messages
     };
@@ -149,18 +161,24 @@ fn write(
     Ok(bag.finish()?)
 }
 
-fn metadata(recording: &Path, scheme: Option<Scheme>, arguments: &Arguments, effects: &EffectsFile) -> BTreeMap<String, String> {
+fn metadata(recording: &Path, how: &How, arguments: &Arguments) -> BTreeMap<String, String> {
     let entry = |key: &str, value: String| (key.to_owned(), value);
     let mut entries = BTreeMap::from([
         entry("version", env!("CARGO_PKG_VERSION").to_owned()),
         entry("command", if arguments.rigid.is_some() { "simulate --rigid" } else { "simulate --reference" }.to_owned()),
         entry("reference", recording.file_name().unwrap_or_default().to_string_lossy().into_owned()),
-        entry("scheme", scheme.map_or_else(|| "estimate".to_owned(), |scheme| scheme.to_string())),
+        entry("scheme", how.scheme.map_or_else(|| "estimate".to_owned(), |scheme| scheme.to_string())),
         entry("seed", arguments.seed.to_string()),
         entry("noise", (!arguments.no_noise).to_string()),
     ]);
     if arguments.effects.is_some() || arguments.device.is_some() {
-        entries.insert("effects".to_owned(), effects.to_yaml());
+        entries.insert("effects".to_owned(), how.effects.to_yaml());
+    }
+    if let Some(networks) = &how.learned {
+        entries.insert("learned".to_owned(), networks.input().name().to_owned());
+    }
+    if arguments.mapping.is_some() {
+        entries.insert("mapping".to_owned(), how.mapping.placements.keys().cloned().collect::<Vec<_>>().join(", "));
     }
     entries
 }
@@ -185,12 +203,7 @@ fn read_effects(file: &Path, recorded: &[Recorded]) -> anyhow::Result<EffectsFil
 }
 
 /// One Imu for each measured message, with its stamp; where nothing was measured, at `--rate`.
-fn resimulate(
-    placement: &Recorded,
-    scheme: Option<Scheme>,
-    arguments: &Arguments,
-    effects: Option<&PlacementEffects>,
-) -> anyhow::Result<Vec<Imu>> {
+fn resimulate(placement: &Recorded, how: &How, arguments: &Arguments) -> anyhow::Result<Vec<Imu>> {
     let (name, (start, end), seed) = (&placement.name, placement.span(), arguments.seed);
     let stamps = match (placement.measured.as_slice(), arguments.rate) {
         ([], Some(rate_hz)) => uniform_stamps(start, end, rate_hz)?,
@@ -199,9 +212,9 @@ fn resimulate(
     };
     let rate_hz = rate(&stamps);
     let nominal = PlacementEffects { epoch: stamps[0], declared_noise: declared(placement, rate_hz), effects: EffectSet::new() };
-    let PlacementEffects { epoch, declared_noise, effects } = effects.unwrap_or(&nominal);
+    let PlacementEffects { epoch, declared_noise, effects } = how.effects.placements.get(name).unwrap_or(&nominal);
     let model = SensorModel::new(effects, *epoch);
-    let track = track(placement, scheme, rate_hz, effects).with_context(|| name.clone())?;
+    let track = track(placement, how, rate_hz, effects).with_context(|| name.clone())?;
     let mut readings = model.read(&model.sensor(model.tissue(model.segment(&track))), &stamps);
     model.linear(&mut readings, &stamps);
     let mut dropouts = None;
@@ -220,6 +233,9 @@ fn resimulate(
         }
     }
     model.digital(&mut readings);
+    if let Some(mapping) = how.mapping.placements.get(name) {
+        readings.iter_mut().for_each(|reading| *reading = mapping.apply(reading));
+    }
     let device = Device::white(declared_noise.accel_density, declared_noise.gyro_density);
     let covariances = Covariances::of(&device, rate_hz).without_orientation();
     let frame_id = placement.measured.first().map_or_else(|| format!("{name}_imu"), |message| message.header.frame_id.clone());
@@ -233,10 +249,10 @@ fn resimulate(
 }
 
 /// The reference's motion as the diagnosis estimates it, or by a scheme, at least at 200 Hz and twice the IMU's rate.
-fn track(placement: &Recorded, scheme: Option<Scheme>, imu_rate_hz: f64, effects: &EffectSet) -> anyhow::Result<KinematicTrack> {
+fn track(placement: &Recorded, how: &How, imu_rate_hz: f64, effects: &EffectSet) -> anyhow::Result<KinematicTrack> {
     let undone_hz = effects.get(EffectKind::ReferenceSmoothing).and_then(|smoothing| smoothing.values().first().copied());
     let rate_hz = (2.0 * imu_rate_hz).max(200.0);
-    let Some(scheme) = scheme else {
+    let Some(scheme) = how.scheme else {
         let poses = placement.poses();
         let estimate = PoseEstimate::fit(&poses.stamps, &poses.positions, &poses.rotations)
             .context("the reference's motion cannot be estimated (--scheme spline does with two poses)")?;
@@ -245,15 +261,23 @@ fn track(placement: &Recorded, scheme: Option<Scheme>, imu_rate_hz: f64, effects
     if undone_hz.is_some() {
         bail!("--scheme {scheme} cannot undo reference_smoothing; leave --scheme out");
     }
-    differentiated(&placement.trajectory()?, scheme, rate_hz)
+    differentiated(&placement.trajectory()?, scheme, rate_hz, how.learned.as_ref())
 }
 
-/// The motion by a scheme, on a grid from the first frame to the last.
-fn differentiated(trajectory: &SensorTrajectory, scheme: Scheme, least_rate_hz: f64) -> anyhow::Result<KinematicTrack> {
+/// The motion by a scheme and what networks add to it, on a grid from the first frame to the last.
+fn differentiated(
+    trajectory: &SensorTrajectory,
+    scheme: Scheme,
+    least_rate_hz: f64,
+    networks: Option<&LearnedSimulator>,
+) -> anyhow::Result<KinematicTrack> {
     let (start, seconds) = (trajectory.start(), trajectory.end() - trajectory.start());
     // A whole number of intervals, so that the grid ends where the reference does.
     let rate_hz = (seconds * least_rate_hz).ceil().max(1.0) / seconds;
-    let motion = simulate_kinematics(trajectory, scheme, &uniform_stamps(start, trajectory.end(), rate_hz)?)?;
+    let mut motion = simulate_kinematics(trajectory, scheme, &uniform_stamps(start, trajectory.end(), rate_hz)?)?;
+    if let Some(networks) = networks {
+        motion = networks.correct(&SiteMotion::rigid(trajectory, scheme)?, &motion)?;
+    }
     let mut track = KinematicTrack { start, rate_hz, ..KinematicTrack::default() };
     for (k, sample) in motion.iter().enumerate() {
         let world_from_segment = sample.world_from_sensor.rotation;

@@ -84,12 +84,12 @@ pub struct Arguments {
     csv: Option<PathBuf>,
     #[command(flatten)]
     motion: MotionArguments,
-    /// Networks (a folder that `cromosim train` wrote) that correct acceleration and angular velocity before the device's effects
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["reference", "rigid"])]
-    learned: Option<PathBuf>,
+    /// Networks (a folder that `cromosim train` wrote) that correct acceleration and angular velocity before the device's effects; with --rigid the scheme is then spline unless --scheme names one, as in training
+    #[arg(long, value_name = "DIR", conflicts_with = "reference")]
+    pub learned: Option<PathBuf>,
     /// A distribution mapping (a file that `cromosim map` wrote), applied last to the placements that it names
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["reference", "rigid"])]
-    mapping: Option<PathBuf>,
+    #[arg(long, value_name = "FILE", conflicts_with = "reference")]
+    pub mapping: Option<PathBuf>,
     /// Replace OUT where it exists
     #[arg(long)]
     pub force: bool,
@@ -202,7 +202,7 @@ impl Setup {
             force: arguments.force,
             csv: arguments.csv.clone(),
             learned: arguments.learned.as_deref().map(LearnedSimulator::read).transpose()?,
-            mapping: read_mapping(arguments.mapping.as_deref(), &placements)?,
+            mapping: read_mapping(arguments.mapping.as_deref(), &names(&placements))?,
             placements,
             interrupt: Interrupt::watch()?,
         })
@@ -235,7 +235,7 @@ impl Setup {
         bar.inc(1);
         let one = |(index, trajectory): (usize, &SensorTrajectory)| {
             self.interrupt.check()?;
-            let simulated = self.simulate_placement(person, &shaped, index, trajectory, &times);
+            let simulated = self.simulate_placement(person, (&shaped, &sites.sites()[index]), index, trajectory, &times);
             bar.inc(1);
             simulated
         };
@@ -245,7 +245,7 @@ impl Setup {
     fn simulate_placement(
         &self,
         person: &Played,
-        shaped: &ShapedBody,
+        (shaped, mounted): (&ShapedBody, &MountedSite),
         index: usize,
         trajectory: &SensorTrajectory,
         times: &PoseTimes,
@@ -261,7 +261,7 @@ impl Setup {
         let (mut raw, mut full) = (Vec::with_capacity(output.len()), Vec::with_capacity(output.len()));
         let mut kinematics = simulate_kinematics_on(times, trajectory, placement.scheme(), &output)?;
         if let Some(networks) = &self.learned {
-            let patch = Patch::new(shaped, MountedSite::new(shaped, placement)?.site())?;
+            let patch = Patch::new(shaped, mounted.site())?;
             let points: Vec<_> = person.motion.frames.iter().map(|pose| patch.points(pose)).collect();
             kinematics = networks.correct(&SiteMotion::new(trajectory, placement.scheme(), &points)?, &kinematics)?;
         }
@@ -303,17 +303,17 @@ impl Setup {
     }
 }
 
+fn names(placements: &PlacementSet) -> Vec<&str> {
+    placements.placements().iter().map(cromosim_imu::Placement::name).collect()
+}
+
 /// A mapping of these placements at least in part.
-fn read_mapping(path: Option<&Path>, placements: &PlacementSet) -> anyhow::Result<MappingFile> {
+pub fn read_mapping(path: Option<&Path>, placements: &[&str]) -> anyhow::Result<MappingFile> {
     let Some(path) = path else { return Ok(MappingFile::default()) };
     let mapping = MappingFile::read(path)?;
-    let names = |names: &mut dyn Iterator<Item = &str>| names.collect::<Vec<_>>().join(", ");
-    if !placements.placements().iter().any(|placement| mapping.placements.contains_key(placement.name())) {
-        let (known, wanted) = (
-            names(&mut mapping.placements.keys().map(String::as_str)),
-            names(&mut placements.placements().iter().map(cromosim_imu::Placement::name)),
-        );
-        bail!("{}: maps {known}; none of the placements {wanted}", path.display());
+    if !placements.iter().any(|name| mapping.placements.contains_key(*name)) {
+        let known: Vec<&str> = mapping.placements.keys().map(String::as_str).collect();
+        bail!("{}: maps {}; none of the placements {}", path.display(), known.join(", "), placements.join(", "));
     }
     Ok(mapping)
 }

@@ -8,7 +8,7 @@ use cromosim_imu::{
     Covariances, Device, Follow, ImuError, ImuSample, MountedSites, Placement, PlacementSet, PoseStd, StreamOptions, StreamingEffects,
     StreamingImu,
 };
-use cromosim_learned::{LearnedError, LearnedSimulator, LivePlacement, MappingFile, PlacementMapping};
+use cromosim_learned::{LearnedError, LearnedSimulator, LivePlacements, MappingFile, PlacementMapping};
 use cromosim_msgs::NotABody;
 use cromosim_msgs::builtin_interfaces::Time;
 use cromosim_msgs::cromosim_msgs::SmplState;
@@ -82,8 +82,6 @@ struct Channel {
     effects: Option<StreamingEffects>,
     covariances: Covariances,
     frame_id: String,
-    /// The networks' state, where there are such.
-    live: Option<LivePlacement>,
     mapping: Option<PlacementMapping>,
 }
 
@@ -102,6 +100,8 @@ pub struct VirtualImuNode {
     last: Option<Stamp>,
     counts: Counts,
     learned: Option<LearnedSimulator>,
+    /// The networks' states.
+    live: Option<LivePlacements>,
     mapping: MappingFile,
 }
 
@@ -145,9 +145,11 @@ impl VirtualImuNode {
             last: None,
             counts: Counts::default(),
             learned,
+            live: None,
             mapping,
         };
         node.channels = node.fresh_channels()?;
+        node.live = node.fresh_networks()?;
         Ok(node)
     }
 
@@ -160,11 +162,14 @@ impl VirtualImuNode {
             let effects = if self.config.noise { Some(StreamingEffects::new(device, rate_hz, seed, &name)?) } else { None };
             let covariances = Covariances::of(device, rate_hz);
             let frame_id = self.config.frame(&format!("{}_imu", placement.name()));
-            let live = self.learned.as_ref().map(|networks| LivePlacement::new(networks, &self.shaped, placement)).transpose()?;
             let mapping = self.mapping.placements.get(placement.name()).cloned();
-            Ok(Channel { stream: None, effects, covariances, frame_id, live, mapping })
+            Ok(Channel { stream: None, effects, covariances, frame_id, mapping })
         };
         self.placements.iter().zip(&self.devices).map(channel).collect()
+    }
+
+    fn fresh_networks(&self) -> Result<Option<LivePlacements>, LearnedError> {
+        self.learned.as_ref().map(|networks| LivePlacements::new(networks, &self.shaped, &self.placements)).transpose()
     }
 
     /// The placements, in the order of [`Reading::placement`].
@@ -211,9 +216,7 @@ impl VirtualImuNode {
             self.shaped = ShapedBody::new(self.model.clone(), &state.betas)?;
             self.sites = MountedSites::new(&self.shaped, &self.placements)?;
             self.betas.clone_from(&state.betas);
-            for (channel, placement) in self.channels.iter_mut().zip(&self.placements) {
-                channel.live = self.learned.as_ref().map(|networks| LivePlacement::new(networks, &self.shaped, placement)).transpose()?;
-            }
+            self.live = self.fresh_networks()?;
         }
         let pose_std = PoseStd::of_confidence(state.confidence, self.config.pose_error_correlation_s);
         let mut step = self.frames_of(state, &body);
@@ -245,11 +248,17 @@ impl VirtualImuNode {
     }
 
     fn push(&mut self, (stamp, body, pose_std): (Stamp, &BodyPose, PoseStd), readings: &mut Vec<Reading>) -> Result<(), Refusal> {
-        for (placement, (channel, frame)) in self.channels.iter_mut().zip(self.sites.frames(body)).enumerate() {
-            let Some(stream) = &mut channel.stream else { continue };
-            channel.live.iter_mut().for_each(|live| live.push(stamp, body));
-            for motion in stream.push_kinematics(frame.at(stamp).with_pose_std(pose_std))? {
-                let motion = channel.live.as_mut().map_or_else(|| Ok(motion), |live| live.correct(&motion))?;
+        let mut released = Vec::with_capacity(self.channels.len());
+        for (channel, frame) in self.channels.iter_mut().zip(self.sites.frames(body)) {
+            let stream = channel.stream.as_mut();
+            released.push(stream.map_or_else(|| Ok(Vec::new()), |stream| stream.push_kinematics(frame.at(stamp).with_pose_std(pose_std)))?);
+        }
+        if let Some(live) = &mut self.live {
+            live.push(stamp, body);
+            live.correct(&mut released)?;
+        }
+        for (placement, (channel, motions)) in self.channels.iter_mut().zip(released).enumerate() {
+            for motion in motions {
                 let sample = channel.effects.as_mut().map_or_else(|| Some(motion.imu()), |effects| effects.step(&motion));
                 // None: the device loses it.
                 let Some(mut sample) = sample else { continue };
@@ -274,8 +283,8 @@ impl VirtualImuNode {
             for channel in &mut self.channels {
                 channel.stream.iter_mut().for_each(StreamingImu::reset);
                 channel.effects.iter_mut().for_each(StreamingEffects::reset);
-                channel.live.iter_mut().for_each(LivePlacement::reset);
             }
+            self.live.iter_mut().for_each(LivePlacements::reset);
         }
     }
 

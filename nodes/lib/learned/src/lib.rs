@@ -4,7 +4,7 @@
 //! A [`Patch`] is three triangles of the skin around a site; a [`SiteMotion`] their nine points over time, with the analytic kinematics
 //! beside them. [`Input`] says what of it a [`Network`] sees. [`Pair`] adds what a real IMU measured, turned into the world by the reference
 //! orientation; [`PairBatches`] are windows of pairs, [`train::Training`] learns from them, and a [`LearnedSimulator`] applies what was learned,
-//! a [`LivePlacement`] sample by sample. [`RankMapping`] maps distributions after the simulation. [`DeviceRanges`] and [`SourceErrors`] make
+//! [`LivePlacements`] sample by sample. [`RankMapping`] maps distributions after the simulation. [`DeviceRanges`] and [`SourceErrors`] make
 //! devices and sources of motion that nobody has seen.
 //!
 //! The [`kernels`] give the same bits on any number of threads and at any vector width. The feature `burn` adds an engine for Burn's backends,
@@ -44,7 +44,7 @@ pub use device_draw::{DeviceRanges, DrawnDevice};
 pub use error::LearnedError;
 pub use features::{Input, Quantity};
 pub use learning::{PairBatches, Turns, Windows};
-pub use live::LivePlacement;
+pub use live::LivePlacements;
 pub use mapping::{MappingFile, PlacementMapping, RankMapping};
 pub use network::{Network, PreparedNetwork};
 pub use pairs::{Pair, PairNames, Target};

@@ -55,6 +55,11 @@ impl Patch {
         Ok(Self { subset: body.subset(&chosen)? })
     }
 
+    /// The nine corners' vertices.
+    pub fn vertices(&self) -> impl Iterator<Item = u32> {
+        self.subset.vertices()
+    }
+
     /// The nine points for one pose, m, world.
     pub fn points(&self, pose: &BodyPose) -> [Vector3<f64>; PATCH_POINTS] {
         let positions = self.subset.positions(pose);

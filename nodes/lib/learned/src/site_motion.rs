@@ -2,7 +2,7 @@
 
 use cromosim_body::{BodyPose, ShapedBody};
 use cromosim_imu::{KinematicSample, MountedSite, Placement, Scheme, SensorTrajectory, simulate_kinematics};
-use cromosim_spatial::{Stamp, derivative_weights, uniform_stamps};
+use cromosim_spatial::{MAX_STENCIL, Stamp, derivative_weights, uniform_stamps};
 use nalgebra::Vector3;
 
 use crate::{LearnedError, PATCH_POINTS, Patch};
@@ -52,7 +52,7 @@ impl SiteMotion {
         }
         let grid = uniform_stamps(trajectory.start(), trajectory.end(), NETWORK_RATE_HZ)?;
         let stamps: Vec<Stamp> = trajectory.frames().iter().map(|frame| frame.stamp).collect();
-        let points = grid.iter().map(|stamp| points_at(&stamps, frames, *stamp)).collect();
+        let points = grid.iter().map(|stamp| Around::new(&stamps, *stamp).blend(|frame| &frames[frame])).collect();
         Ok(Self { points, kinematics: simulate_kinematics(trajectory, scheme, &grid)? })
     }
 
@@ -67,20 +67,37 @@ impl SiteMotion {
     }
 }
 
-/// Cubic through the four frames around `stamp`.
-pub(crate) fn points_at(stamps: &[Stamp], frames: &[[Vector3<f64>; PATCH_POINTS]], stamp: Stamp) -> [Vector3<f64>; PATCH_POINTS] {
-    let after = stamps.partition_point(|other| *other < stamp).min(stamps.len() - 1);
-    if stamps[after] == stamp {
-        return frames[after];
+/// How the frames around a stamp make up what was there: a cubic through four, or one frame of that very stamp.
+#[derive(Clone, Copy)]
+pub(crate) struct Around {
+    first: usize,
+    width: usize,
+    weights: [f64; MAX_STENCIL],
+}
+
+impl Around {
+    /// Frames at these stamps (at least one, in order).
+    pub(crate) fn new(stamps: &[Stamp], stamp: Stamp) -> Self {
+        let after = stamps.partition_point(|other| *other < stamp).min(stamps.len() - 1);
+        if stamps[after] == stamp {
+            return Self { first: after, width: 1, weights: [1.0; MAX_STENCIL] };
+        }
+        let width = stamps.len().min(4);
+        let first = after.saturating_sub(2).min(stamps.len() - width);
+        let mut seconds = [0.0; 4];
+        for (seconds, other) in seconds.iter_mut().zip(&stamps[first..first + width]) {
+            *seconds = *other - stamp;
+        }
+        Self { first, width, weights: derivative_weights(&seconds[..width], 0.0)[0] }
     }
-    let width = stamps.len().min(4);
-    let first = after.saturating_sub(2).min(stamps.len() - width);
-    let mut seconds = [0.0; 4];
-    for (seconds, other) in seconds.iter_mut().zip(&stamps[first..first + width]) {
-        *seconds = *other - stamp;
+
+    /// The points there, from those of each frame.
+    pub(crate) fn blend<'a>(&self, frame: impl Fn(usize) -> &'a [Vector3<f64>; PATCH_POINTS]) -> [Vector3<f64>; PATCH_POINTS] {
+        if self.width == 1 {
+            return *frame(self.first);
+        }
+        std::array::from_fn(|point| (0..self.width).map(|k| frame(self.first + k)[point] * self.weights[k]).sum())
     }
-    let weights = derivative_weights(&seconds[..width], 0.0)[0];
-    std::array::from_fn(|point| frames[first..first + width].iter().zip(weights).map(|(frame, weight)| frame[point] * weight).sum())
 }
 
 #[cfg(test)]

@@ -23,6 +23,7 @@ pub struct StreamingBatch {
 #[derive(Debug, Clone)]
 struct ConvolutionState {
     ring: Vec<f32>,
+    taps: usize,
     /// Where the newest lies.
     newest: usize,
     output: Vec<f32>,
@@ -40,6 +41,29 @@ impl ConvolutionState {
         }
         relu(&mut self.output);
     }
+
+    /// Where one sequence's input of some steps ago lies.
+    fn place(&self, age: usize, sequence: usize, sequences: usize) -> std::ops::Range<usize> {
+        let taps = self.taps;
+        let wide = self.ring.len() / taps;
+        let start = (self.newest + taps - age) % taps * wide + sequence * (wide / sequences);
+        start..start + wide / sequences
+    }
+
+    /// Undoes the last step for one sequence. Its oldest input, which that step overwrote, is not read again.
+    fn undo(&mut self, sequence: usize, sequences: usize) {
+        for age in 1..self.taps {
+            let (newer, older) = (self.place(age - 1, sequence, sequences), self.place(age, sequence, sequences));
+            self.ring.copy_within(older, newer.start);
+        }
+    }
+
+    fn reset_sequence(&mut self, sequence: usize, sequences: usize) {
+        for age in 0..self.taps {
+            let place = self.place(age, sequence, sequences);
+            self.ring[place].fill(0.0);
+        }
+    }
 }
 
 impl StreamingBatch {
@@ -56,7 +80,7 @@ impl StreamingBatch {
         let convolution = |index: usize| {
             let inputs = if index == 0 { shape.inputs } else { shape.channels };
             let ring = vec![0.0; shape.kernel * sequences * inputs];
-            ConvolutionState { ring, newest: 0, output: vec![0.0; sequences * shape.channels] }
+            ConvolutionState { ring, taps: shape.kernel, newest: 0, output: vec![0.0; sequences * shape.channels] }
         };
         Ok(Self {
             layers: Layers::new(&shape, network.parameters()),
@@ -78,6 +102,38 @@ impl StreamingBatch {
     pub fn reset(&mut self) {
         self.convolutions.iter_mut().for_each(|state| state.ring.fill(0.0));
         self.lstm.iter_mut().for_each(LstmState::reset);
+    }
+
+    /// One sequence's states back to zero.
+    ///
+    /// # Panics
+    /// For a sequence that is not there.
+    pub fn reset_sequence(&mut self, sequence: usize) {
+        assert!(sequence < self.sequences, "sequence {sequence} of {}", self.sequences);
+        self.convolutions.iter_mut().for_each(|state| state.reset_sequence(sequence, self.sequences));
+        self.lstm.iter_mut().for_each(|state| state.reset_sequence(sequence, self.sequences));
+    }
+
+    /// One step of the sequences that `advance` marks; the states of the others, and of those without a mark, stay as they are, and their rows
+    /// of the output mean nothing.
+    /// It costs as much as a step of all, and more than that where some stay.
+    ///
+    /// # Errors
+    /// Where the input's length does not fit; the states stay as they were.
+    pub fn step_some(&mut self, input: &[f32], advance: &[bool]) -> Result<&[f32], LearnedError> {
+        let stays = |sequence: &usize| !advance.get(*sequence).is_some_and(|advances| *advances);
+        if !(0..self.sequences).any(|sequence| stays(&sequence)) {
+            return self.step(input);
+        }
+        let before = self.lstm.clone();
+        self.step(input)?;
+        for sequence in (0..self.sequences).filter(stays) {
+            self.convolutions.iter_mut().for_each(|state| state.undo(sequence, self.sequences));
+            for (state, before) in self.lstm.iter_mut().zip(&before) {
+                state.restore_sequence(before, sequence, self.sequences);
+            }
+        }
+        Ok(&self.output)
     }
 
     /// One step of every sequence; input: (sequences, inputs), output: (sequences, outputs).
@@ -168,6 +224,27 @@ mod tests {
                 }
                 batch.reset();
                 single.reset();
+            }
+        }
+    }
+
+    #[test]
+    fn sequences_pause_and_begin_anew_each_on_its_own() {
+        for (convolutions, kernel) in [(3, 5), (1, 1), (0, 3)] {
+            let network = network(convolutions, kernel);
+            let mut batch = StreamingBatch::new(&network, SEQUENCES).unwrap();
+            let mut singles = vec![StreamingNetwork::new(&network).unwrap(); SEQUENCES];
+            let input = values(SEQUENCES * STEPS * 9, 2);
+            for (step, input) in input.chunks(SEQUENCES * 9).enumerate() {
+                let advance: Vec<bool> = (0..SEQUENCES).map(|sequence| (step * 5 + sequence * 3) % 7 > 2 || step % 4 == 0).collect();
+                if step % 9 == 5 {
+                    batch.reset_sequence(step % SEQUENCES);
+                    singles[step % SEQUENCES].reset();
+                }
+                let found = batch.step_some(input, &advance).unwrap();
+                for (sequence, single) in singles.iter_mut().enumerate().filter(|(sequence, _)| advance[*sequence]) {
+                    assert_eq!(single.step(&input[9 * sequence..][..9]).unwrap(), &found[3 * sequence..][..3], "step {step}");
+                }
             }
         }
     }

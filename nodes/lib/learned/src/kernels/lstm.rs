@@ -236,6 +236,22 @@ impl LstmState {
         self.cells.fill(0.0);
         self.hidden.fill(0.0);
     }
+
+    /// One sequence of `batch` back to zeros.
+    pub fn reset_sequence(&mut self, sequence: usize, batch: usize) {
+        let wide = self.hidden.len() / batch;
+        let row = sequence * wide..(sequence + 1) * wide;
+        self.cells[row.clone()].fill(0.0);
+        self.hidden[row].fill(0.0);
+    }
+
+    /// One sequence of `batch` as it was in another state of the same size.
+    pub fn restore_sequence(&mut self, before: &Self, sequence: usize, batch: usize) {
+        let wide = self.hidden.len() / batch;
+        let row = sequence * wide..(sequence + 1) * wide;
+        self.cells[row.clone()].copy_from_slice(&before.cells[row.clone()]);
+        self.hidden[row.clone()].copy_from_slice(&before.hidden[row]);
+    }
 }
 
 /// gates before their functions -> after; cells of the step before -> of this step.
