@@ -3,6 +3,9 @@
 //!
 //! Ours and PyTorch's runs alternate, so that other work on the machine falls on both; the least of all is the one to compare. Batches of
 //! 64 windows of 128 steps x 27 channels, three convolutions of 64 channels with five taps, two LSTM layers of 128 units.
+//!
+//! With `--features burn` the training step runs on Burn's CPU backend too, with our LSTM as one operation (`Burn`) and with one made of
+//! Burn's own (`Burn's LSTM`).
 #![allow(missing_docs)]
 
 use std::path::Path;
@@ -10,7 +13,7 @@ use std::process::Command;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use cromosim_learned::train::{Batch, Batches, Data, Hooks, KernelEngine, Loss, Schedule, TrainOptions, Training};
+use cromosim_learned::train::{Batch, Batches, Data, Engine, Hooks, KernelEngine, Loss, Schedule, TrainOptions, Training};
 use cromosim_learned::{Direction, LearnedError, Network, NetworkShape};
 
 const BATCH: usize = 64;
@@ -32,8 +35,8 @@ impl Batches for Noise {
     }
 }
 
-/// Milliseconds of each of our steps.
-fn training(shape: &NetworkShape) -> Vec<f64> {
+/// Milliseconds of each of an engine's steps.
+fn training(shape: &NetworkShape, engine: &mut dyn Engine) -> Vec<f64> {
     let options = TrainOptions {
         losses: vec![Loss::SquaredError],
         learning_rate: 1e-3,
@@ -50,7 +53,7 @@ fn training(shape: &NetworkShape) -> Vec<f64> {
     let mut progress = |_: &_| stamps.push(Instant::now());
     let mut hooks = Hooks { progress: &mut progress, interrupt: &AtomicBool::new(false), checkpoint: None };
     let data = Data { training: &Noise(shape.clone()), validation: None };
-    training.run(&mut KernelEngine, data, &mut hooks).expect("a training");
+    training.run(engine, data, &mut hooks).expect("a training");
     stamps.windows(2).map(|pair| 1e3 * (pair[1] - pair[0]).as_secs_f64()).collect()
 }
 
@@ -70,7 +73,13 @@ fn ours(shape: &NetworkShape, threads: usize) -> Vec<(String, f64)> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
     let least = |times: Vec<f64>| times.into_iter().fold(f64::INFINITY, f64::min);
     pool.install(|| {
-        let mut found = vec![("training".to_owned(), least(training(shape)))];
+        let mut found = vec![("training".to_owned(), least(training(shape, &mut KernelEngine)))];
+        #[cfg(feature = "burn")]
+        for (name, mut engine) in
+            [("Burn", cromosim_learned::BurnEngine::cpu()), ("Burn's LSTM", cromosim_learned::BurnEngine::cpu_composed())]
+        {
+            found.push((format!("training by {name}"), least(training(shape, &mut engine))));
+        }
         found.extend([1, 16, 64].map(|batch| (format!("inference {batch}"), least(inference(shape, batch)))));
         found
     })
@@ -94,7 +103,10 @@ fn main() {
                 let found = ours(&shape, threads);
                 let theirs = pytorch(name, threads);
                 for (index, (what, milliseconds)) in found.into_iter().enumerate() {
-                    let of_pytorch = theirs.as_ref().and_then(|theirs| theirs[&what]["least"].as_f64()).unwrap_or(f64::NAN);
+                    let of_pytorch = theirs
+                        .as_ref()
+                        .and_then(|theirs| theirs[what.split(" by ").next().unwrap_or_default()]["least"].as_f64())
+                        .unwrap_or(f64::NAN);
                     match least.get_mut(index) {
                         Some(entry) => (entry.1, entry.2) = (entry.1.min(milliseconds), entry.2.min(of_pytorch)),
                         None => least.push((what, milliseconds, of_pytorch)),
