@@ -14,6 +14,7 @@
 mod align;
 #[cfg(feature = "burn")]
 mod autodiff;
+mod classifier;
 mod degrade;
 mod device_draw;
 mod error;
@@ -29,6 +30,7 @@ mod patch;
 mod shape;
 mod simulator;
 mod site_motion;
+mod stacks;
 mod streaming;
 mod tensors;
 pub mod train;
@@ -39,6 +41,7 @@ mod windows;
 pub use align::{Alignment, align};
 #[cfg(feature = "burn")]
 pub use autodiff::BurnEngine;
+pub use classifier::{Classifier, ClassifierOptions, ClassifierShape, Examples, cross_entropy, train_classifier};
 pub use degrade::SourceErrors;
 pub use device_draw::{DeviceRanges, DrawnDevice};
 pub use error::LearnedError;

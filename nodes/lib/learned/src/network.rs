@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use crate::LearnedError;
 use crate::kernels::swap_leading_axes;
 use crate::layers::Layers;
-use crate::shape::NetworkShape;
+use crate::shape::{NetworkShape, Tensor};
 
 /// Sequences that one thread takes at a time; a fixed number, so that the bits do not depend on how many threads there are.
 pub(crate) const SHARD: usize = 16;
@@ -27,12 +27,7 @@ impl Network {
     /// Where the shape is not sound.
     pub fn new(shape: NetworkShape, seed: u64) -> Result<Self, LearnedError> {
         shape.check()?;
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let mut parameters = Vec::with_capacity(shape.parameters());
-        for tensor in shape.tensors() {
-            let bound = tensor.initial_bound;
-            parameters.extend((0..tensor.range.len()).map(|_| bound * random.random_range(-1.0_f32..1.0)));
-        }
+        let parameters = initial_weights(&shape.tensors(), seed);
         Ok(Self { shape, parameters })
     }
 
@@ -114,6 +109,17 @@ impl PreparedNetwork {
         });
         Ok(output)
     }
+}
+
+/// Each tensor uniform within its bound.
+pub(crate) fn initial_weights(tensors: &[Tensor], seed: u64) -> Vec<f32> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut parameters = Vec::new();
+    for tensor in tensors {
+        let bound = tensor.initial_bound;
+        parameters.extend((0..tensor.range.len()).map(|_| bound * random.random_range(-1.0_f32..1.0)));
+    }
+    parameters
 }
 
 pub(crate) fn check_input(input: &[f32], batch: usize, steps: usize, inputs: usize) -> Result<(), LearnedError> {

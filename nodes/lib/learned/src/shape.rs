@@ -127,36 +127,27 @@ impl NetworkShape {
     #[must_use]
     pub fn tensors(&self) -> Vec<Tensor> {
         let mut list = TensorList::default();
-        for index in 0..self.convolutions {
-            let inputs = if index == 0 { self.inputs } else { self.channels };
-            let bound = bound(inputs * self.kernel);
-            list.push(format!("conv.{index}.weight"), &[self.channels, inputs, self.kernel], bound);
-            list.push(format!("conv.{index}.bias"), &[self.channels], bound);
-        }
-        for layer in 0..self.layers {
-            let inputs = if layer == 0 { self.lstm_inputs() } else { self.hidden * self.directions() };
-            for suffix in ["", "_reverse"].into_iter().take(self.directions()) {
-                let (gates, bound) = (4 * self.hidden, bound(self.hidden));
-                list.push(format!("lstm.weight_ih_l{layer}{suffix}"), &[gates, inputs], bound);
-                list.push(format!("lstm.weight_hh_l{layer}{suffix}"), &[gates, self.hidden], bound);
-                list.push(format!("lstm.bias_ih_l{layer}{suffix}"), &[gates], bound);
-                list.push(format!("lstm.bias_hh_l{layer}{suffix}"), &[gates], bound);
-            }
-        }
-        let inputs = self.hidden * self.directions();
-        list.push("linear.weight".to_owned(), &[self.outputs, inputs], bound(inputs));
-        list.push("linear.bias".to_owned(), &[self.outputs], bound(inputs));
+        list.convolutions(self.inputs, self.channels, self.kernel, self.convolutions);
+        list.recurrent(self.lstm_inputs(), self.hidden, self.layers, self.directions());
+        list.linear(self.hidden * self.directions(), self.outputs);
         list.0
     }
 
     pub(crate) fn places(&self) -> Places {
-        let mut ranges = self.tensors().into_iter().map(|tensor| tensor.range);
+        Places::of(self.tensors(), self.convolutions, self.layers, self.directions())
+    }
+}
+
+impl Places {
+    /// Of tensors in the order of convolutions, LSTM layers, linear layer.
+    pub fn of(tensors: Vec<Tensor>, convolutions: usize, layers: usize, directions: usize) -> Self {
+        let mut ranges = tensors.into_iter().map(|tensor| tensor.range);
         let mut next = || ranges.next().unwrap_or_default();
-        Places {
-            convolutions: (0..self.convolutions).map(|_| (next(), next())).collect(),
-            lstm: (0..self.layers)
+        Self {
+            convolutions: (0..convolutions).map(|_| (next(), next())).collect(),
+            lstm: (0..layers)
                 .map(|_| {
-                    (0..self.directions())
+                    (0..directions)
                         .map(|_| LstmPlace { input: next(), recurrent: next(), input_bias: next(), recurrent_bias: next() })
                         .collect()
                 })
@@ -170,14 +161,45 @@ fn bound(inputs: usize) -> f32 {
     1.0 / (inputs as f32).sqrt()
 }
 
+/// The tensors of a network in the making.
 #[derive(Default)]
-struct TensorList(Vec<Tensor>);
+pub(crate) struct TensorList(pub Vec<Tensor>);
 
 impl TensorList {
     fn push(&mut self, name: String, shape: &[usize], initial_bound: f32) {
         let start = self.0.last().map_or(0, |tensor| tensor.range.end);
         let range = start..start + shape.iter().product::<usize>();
         self.0.push(Tensor { name, shape: shape.to_vec(), range, initial_bound });
+    }
+
+    /// `conv`: Conv1d layers.
+    pub fn convolutions(&mut self, inputs: usize, channels: usize, kernel: usize, count: usize) {
+        for index in 0..count {
+            let inputs = if index == 0 { inputs } else { channels };
+            let bound = bound(inputs * kernel);
+            self.push(format!("conv.{index}.weight"), &[channels, inputs, kernel], bound);
+            self.push(format!("conv.{index}.bias"), &[channels], bound);
+        }
+    }
+
+    /// `lstm`: one LSTM of several layers.
+    pub fn recurrent(&mut self, inputs: usize, hidden: usize, layers: usize, directions: usize) {
+        for layer in 0..layers {
+            let inputs = if layer == 0 { inputs } else { hidden * directions };
+            for suffix in ["", "_reverse"].into_iter().take(directions) {
+                let (gates, bound) = (4 * hidden, bound(hidden));
+                self.push(format!("lstm.weight_ih_l{layer}{suffix}"), &[gates, inputs], bound);
+                self.push(format!("lstm.weight_hh_l{layer}{suffix}"), &[gates, hidden], bound);
+                self.push(format!("lstm.bias_ih_l{layer}{suffix}"), &[gates], bound);
+                self.push(format!("lstm.bias_hh_l{layer}{suffix}"), &[gates], bound);
+            }
+        }
+    }
+
+    /// `linear`: a Linear layer.
+    pub fn linear(&mut self, inputs: usize, outputs: usize) {
+        self.push("linear.weight".to_owned(), &[outputs, inputs], bound(inputs));
+        self.push("linear.bias".to_owned(), &[outputs], bound(inputs));
     }
 }
 

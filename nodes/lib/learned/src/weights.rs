@@ -4,9 +4,10 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::shape::NetworkShape;
+use crate::shape::{NetworkShape, Tensor};
 use crate::tensors::{Named, TensorFile, read_bounded, to_bytes, write_whole};
 use crate::{LearnedError, Network};
 
@@ -15,8 +16,8 @@ const KEY: &str = "cromosim";
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Header {
-    shape: NetworkShape,
+struct Header<S> {
+    shape: S,
     #[serde(default)]
     notes: BTreeMap<String, String>,
 }
@@ -27,10 +28,7 @@ impl Network {
     /// # Errors
     /// Where they cannot be made; the message names `path`, under which they are meant to lie.
     pub fn to_bytes(&self, notes: &BTreeMap<String, String>, path: &Path) -> Result<Vec<u8>, LearnedError> {
-        let header = Header { shape: self.shape().clone(), notes: notes.clone() };
-        let tensors = self.shape().tensors().into_iter();
-        let named = tensors.map(|tensor| Named { name: tensor.name, shape: tensor.shape, values: &self.parameters()[tensor.range] });
-        to_bytes(named.collect(), KEY, &header, path)
+        weights_to_bytes((self.shape(), self.shape().tensors()), self.parameters(), notes, path)
     }
 
     /// Writes a safetensors file, whole or not at all.
@@ -54,19 +52,41 @@ impl Network {
     /// # Errors
     /// Where the bytes are not such a file, or its tensors are not those of the shape in its metadata.
     pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<(Self, BTreeMap<String, String>), LearnedError> {
-        let file = TensorFile::parse(bytes, path)?;
-        let Header { shape, notes } = file.header(KEY)?;
-        shape.check().map_err(|error| LearnedError::Metadata { path: path.into(), key: KEY, reason: error.to_string() })?;
-        let tensors = shape.tensors();
-        file.refuse_others(|name| tensors.iter().any(|tensor| tensor.name == name))?;
-        // Every tensor is checked before memory is taken for any.
-        tensors.iter().try_for_each(|tensor| file.check(&tensor.name, &tensor.shape))?;
-        let mut parameters = Vec::with_capacity(shape.parameters());
-        for tensor in &tensors {
-            parameters.extend(file.values(&tensor.name, &tensor.shape)?);
-        }
+        let sound = |shape: &NetworkShape| shape.check().map(|()| shape.tensors());
+        let (shape, parameters, notes) = read_weights(bytes, path, sound)?;
         Ok((Self::from_parameters(shape, parameters), notes))
     }
+}
+
+/// The bytes of a file; shape: with its tensors.
+pub(crate) fn weights_to_bytes<S: Serialize + Clone>(
+    (shape, tensors): (&S, Vec<Tensor>),
+    parameters: &[f32],
+    notes: &BTreeMap<String, String>,
+    path: &Path,
+) -> Result<Vec<u8>, LearnedError> {
+    let header = Header { shape: shape.clone(), notes: notes.clone() };
+    let named = tensors.into_iter().map(|tensor| Named { name: tensor.name, shape: tensor.shape, values: &parameters[tensor.range] });
+    to_bytes(named.collect(), KEY, &header, path)
+}
+
+/// Shape, all parameters in the order of its tensors, and notes; sound: the tensors of a shape that can be.
+pub(crate) fn read_weights<S: DeserializeOwned>(
+    bytes: &[u8],
+    path: &Path,
+    sound: impl Fn(&S) -> Result<Vec<Tensor>, LearnedError>,
+) -> Result<(S, Vec<f32>, BTreeMap<String, String>), LearnedError> {
+    let file = TensorFile::parse(bytes, path)?;
+    let Header { shape, notes } = file.header(KEY)?;
+    let tensors = sound(&shape).map_err(|error| LearnedError::Metadata { path: path.into(), key: KEY, reason: error.to_string() })?;
+    file.refuse_others(|name| tensors.iter().any(|tensor| tensor.name == name))?;
+    // Every tensor is checked before memory is taken for any.
+    tensors.iter().try_for_each(|tensor| file.check(&tensor.name, &tensor.shape))?;
+    let mut parameters = Vec::new();
+    for tensor in &tensors {
+        parameters.extend(file.values(&tensor.name, &tensor.shape)?);
+    }
+    Ok((shape, parameters, notes))
 }
 
 #[cfg(test)]

@@ -96,14 +96,14 @@ impl Layer {
 
     fn output(&self, tapes: &[LstmTape]) -> Values {
         let outputs: Vec<&[f32]> = tapes.iter().map(LstmTape::output).collect();
-        let joined = crate::layers::join(&outputs, self.hidden);
+        let joined = crate::stacks::join(&outputs, self.hidden);
         tensor(joined, &[self.steps, self.batch, self.directions * self.hidden])
     }
 
     /// Gradients of x, input, recurrent, bias.
     fn backward(&self, tapes: &[LstmTape], output_gradient: &[f32]) -> [Values; 4] {
         let found = self.each(|direction| {
-            let gradient = crate::layers::part(output_gradient, self.hidden, self.directions, direction);
+            let gradient = crate::stacks::part(output_gradient, self.hidden, self.directions, direction);
             let mut of_input = vec![0.0; self.input.len() / self.directions];
             let mut of_recurrent = vec![0.0; self.recurrent.len() / self.directions];
             let mut of_bias = vec![0.0; 4 * self.hidden];

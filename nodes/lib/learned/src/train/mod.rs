@@ -1,6 +1,6 @@
 //! Training: batches by number, a masked loss, Adam, validation, early stopping, checkpoints from which it goes on to the same bits.
 
-mod adam;
+pub(crate) mod adam;
 mod batch;
 mod checkpoint;
 mod engine;

@@ -18,6 +18,20 @@ pub enum Schedule {
     },
 }
 
+impl Schedule {
+    /// The learning rate of a step, from 0 on, of so many steps.
+    #[must_use]
+    pub fn rate(self, learning_rate: f64, step: u64, steps: u64) -> f64 {
+        match self {
+            Self::Constant => learning_rate,
+            Self::Cosine { floor } => {
+                let share = step.min(steps) as f64 / steps as f64;
+                learning_rate * (floor + (1.0 - floor) * 0.5 * (1.0 + (std::f64::consts::PI * share).cos()))
+            }
+        }
+    }
+}
+
 /// How a training runs; all of it stands in a checkpoint, and a training goes on only with the same.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -81,12 +95,6 @@ impl TrainOptions {
     /// The learning rate of a step, from 0 on.
     #[must_use]
     pub fn rate(&self, step: u64) -> f64 {
-        match self.schedule {
-            Schedule::Constant => self.learning_rate,
-            Schedule::Cosine { floor } => {
-                let share = step.min(self.steps) as f64 / self.steps as f64;
-                self.learning_rate * (floor + (1.0 - floor) * 0.5 * (1.0 + (std::f64::consts::PI * share).cos()))
-            }
-        }
+        self.schedule.rate(self.learning_rate, step, self.steps)
     }
 }
