@@ -70,12 +70,15 @@ pub(crate) fn weights_to_bytes<S: Serialize + Clone>(
     to_bytes(named.collect(), KEY, &header, path)
 }
 
-/// Shape, all parameters in the order of its tensors, and notes; sound: the tensors of a shape that can be.
+/// Shape, all parameters in the order of its tensors, and notes.
+type Weights<S> = (S, Vec<f32>, BTreeMap<String, String>);
+
+/// sound: the tensors of a shape that can be.
 pub(crate) fn read_weights<S: DeserializeOwned>(
     bytes: &[u8],
     path: &Path,
     sound: impl Fn(&S) -> Result<Vec<Tensor>, LearnedError>,
-) -> Result<(S, Vec<f32>, BTreeMap<String, String>), LearnedError> {
+) -> Result<Weights<S>, LearnedError> {
     let file = TensorFile::parse(bytes, path)?;
     let Header { shape, notes } = file.header(KEY)?;
     let tensors = sound(&shape).map_err(|error| LearnedError::Metadata { path: path.into(), key: KEY, reason: error.to_string() })?;

@@ -8,7 +8,7 @@ use std::process::Command;
 use std::sync::atomic::AtomicBool;
 
 use cromosim_learned::train::{Batch, Batches, Data, Engine, Hooks, KernelEngine, Loss, Schedule, TrainOptions, Training};
-use cromosim_learned::{Direction, LearnedError, Network, NetworkShape, StreamingBatch};
+use cromosim_learned::{Classifier, ClassifierShape, Direction, LearnedError, Network, NetworkShape, StreamingBatch};
 use safetensors::tensor::{Dtype, TensorView};
 use safetensors::{SafeTensors, serialize};
 
@@ -59,6 +59,15 @@ fn outputs_are_those_of_pytorch() {
         let found = network(direction).forward(&batch.inputs, batch.sequences, batch.steps).unwrap();
         assert_close(direction, &found, &passes["output"].1, 1e-5);
     }
+}
+
+#[test]
+fn a_classifier_says_what_pytorch_does() {
+    let passes = passes("classifier");
+    let (shape, input) = &passes["input"];
+    let (classifier, _) = Classifier::read(&here("tests/data/torch_classifier.safetensors")).unwrap();
+    let found = classifier.logits(input, shape[0], shape[1]).unwrap();
+    assert_close("logits", &found, &passes["output"].1, 1e-5);
 }
 
 #[test]
@@ -122,18 +131,26 @@ fn pytorch_reads_our_files_and_computes_the_same() {
         return;
     };
     let folder = tempfile::tempdir().unwrap();
+    let (weights, passes) = (folder.path().join("weights.safetensors"), folder.path().join("passes.safetensors"));
+    let compare = |input: (Vec<usize>, Vec<f32>), output: (Vec<usize>, Vec<f32>)| {
+        let bytes = [&input, &output].map(|(_, values)| values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>());
+        let view = |index: usize, shape: &Vec<usize>| TensorView::new(Dtype::F32, shape.clone(), &bytes[index]).unwrap();
+        fs::write(&passes, serialize([("input", view(0, &input.0)), ("output", view(1, &output.0))], None).unwrap()).unwrap();
+        let run = Command::new(&python).arg(here("scripts/torch_exchange.py")).arg("compare").args([&weights, &passes]).output().unwrap();
+        assert!(run.status.success(), "{}{}", String::from_utf8_lossy(&run.stdout), String::from_utf8_lossy(&run.stderr));
+    };
+    let numbers = |count: usize| -> Vec<f32> { (0..count).map(|index| (index as f32 * 0.7).sin()).collect() };
     for (direction, kernel) in [(Direction::Both, 5), (Direction::Forward, 3)] {
         let shape = NetworkShape { inputs: 27, channels: 16, kernel, convolutions: 3, hidden: 32, layers: 2, direction, outputs: 3 };
         let network = Network::new(shape, 5).unwrap();
-        let (weights, passes) = (folder.path().join("weights.safetensors"), folder.path().join("passes.safetensors"));
         network.write(&weights, &BTreeMap::new()).unwrap();
-        let input: Vec<f32> = (0..3 * 50 * 27).map(|index| (index as f32 * 0.7).sin()).collect();
+        let input = numbers(3 * 50 * 27);
         let output = network.forward(&input, 3, 50).unwrap();
-        let bytes = [input, output].map(|values| values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>());
-        let view = |index: usize, width| TensorView::new(Dtype::F32, vec![3, 50, width], &bytes[index]).unwrap();
-        fs::write(&passes, serialize([("input", view(0, 27)), ("output", view(1, 3))], None).unwrap()).unwrap();
-        let script = here("scripts/torch_exchange.py");
-        let run = Command::new(&python).arg(script).arg("compare").args([&weights, &passes]).output().unwrap();
-        assert!(run.status.success(), "{}{}", String::from_utf8_lossy(&run.stdout), String::from_utf8_lossy(&run.stderr));
+        compare((vec![3, 50, 27], input), (vec![3, 50, 3], output));
     }
+    let classifier = Classifier::new(ClassifierShape::published(12, 5), 5).unwrap();
+    classifier.write(&weights, &BTreeMap::new()).unwrap();
+    let input = numbers(70 * 30 * 12);
+    let output = classifier.logits(&input, 70, 30).unwrap();
+    compare((vec![70, 30, 12], input), (vec![70, 5], output));
 }

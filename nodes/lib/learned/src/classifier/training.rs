@@ -115,7 +115,9 @@ pub fn train_classifier(
         if interrupt.load(Ordering::Relaxed) {
             return Ok(None);
         }
-        (windows.clear(), labels.clear(), weights.clear());
+        windows.clear();
+        labels.clear();
+        weights.clear();
         for place in 0..options.batch {
             let pool = place % pools.len();
             let index = decks[pool].draw(&mut order);

@@ -88,3 +88,37 @@ fn what_is_unsound_is_named_and_an_interrupt_ends_it() {
     assert!(message(diverged, &[&pool]).contains("it has diverged"));
     assert_eq!(train_classifier(&shape(), &options(), &[&pool], 1, &AtomicBool::new(true)).unwrap(), None);
 }
+
+#[test]
+fn loss_gradients_and_adam_are_those_of_pytorch() {
+    let here = |name: &str| std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name);
+    let bytes = std::fs::read(here("torch_classifier_passes.safetensors")).unwrap();
+    let tensors = safetensors::SafeTensors::deserialize(&bytes).unwrap();
+    let of = |name: &str| -> Vec<f32> {
+        tensors.tensor(name).unwrap().data().as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect()
+    };
+    let close = |what: &str, found: &[f32], tolerance: f32| {
+        let worst = found.iter().zip(of(what)).map(|(found, expected)| (found - expected).abs()).fold(0.0, f32::max);
+        assert!(found.len() == of(what).len() && worst <= tolerance, "{what}: greatest difference {worst}");
+    };
+    let (mut classifier, _) = Classifier::read(&here("torch_classifier.safetensors")).unwrap();
+    let labels: Vec<u8> = of("target").iter().map(|label| *label as u8).collect();
+    let (input, weights, mut unused) = (of("input"), of("weight"), random(0, 0));
+    let mut gradients = vec![0.0; classifier.parameters.len()];
+    let mut adam = Adam::new(gradients.len());
+    for step in 0..5 {
+        let nothing = Dropout { probability: 0.0, random: &mut unused };
+        let loss = gradients_of(&classifier, (&input, &labels, &weights), 11, nothing, &mut gradients);
+        if step == 0 {
+            close("loss", &[loss as f32], 1e-6);
+            for tensor in classifier.shape().tensors() {
+                close(&format!("gradient.{}", tensor.name), &gradients[tensor.range], 1e-6);
+            }
+        }
+        adam.step(&mut classifier.parameters, &gradients, 1e-2, step + 1);
+    }
+    for tensor in classifier.shape().tensors() {
+        // Adam divides by the gradient's size: where that is near its epsilon, the last bits of a gradient show.
+        close(&format!("trained.{}", tensor.name), &classifier.parameters[tensor.range], 1e-4);
+    }
+}
