@@ -29,7 +29,7 @@ use write::{Target, Written};
 #[derive(Args)]
 pub struct Arguments {
     /// A motion, a trajectory (TUM, EuRoC, CSV), an IMU series (EuRoC, CSV), a recording of a data set (BROAD, TotalCapture, PAMAP2,
-    /// RealWorld) or a bag; its content tells
+    /// RealWorld, phone and watch) or a bag; its content tells
     input: PathBuf,
     /// What to write; the ending decides where --to does not: .npz, .bvh, .trc, .tum or .txt, .csv, .mcap
     out: PathBuf,

@@ -23,7 +23,7 @@ use crate::motion_arguments::MotionArguments;
 #[derive(Args)]
 pub struct Arguments {
     /// Motion (BVH, ASF/AMC, C3D, TRC, AMASS, video estimates), body (SMPL npz or pickle), trajectory or IMU series (TUM, EuRoC, CSV), recording of
-    /// a data set (BROAD, TotalCapture, PAMAP2, RealWorld), or bag (.mcap, rosbag2 directory)
+    /// a data set (BROAD, TotalCapture, PAMAP2, RealWorld, phone and watch), or bag (.mcap, rosbag2 directory)
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// Body model (npz or pickle) that motions are read for, rather than the embedded one

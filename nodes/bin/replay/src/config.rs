@@ -8,7 +8,7 @@ node_config! {
         /// Motion file (BVH, ASF/AMC, C3D, TRC, SMPL parameters) to play; empty, with no bag either: the embedded walk.
         pub motion: String = String::new(),
         /// Recording to play: everything in it, with its times; a .mcap file or a rosbag2 directory, or as one a trajectory (TUM, EuRoC,
-        /// table), an IMU's series, or a data set's recording (TotalCapture, PAMAP2, RealWorld, BROAD).
+        /// table), an IMU's series, or a data set's recording (TotalCapture, PAMAP2, RealWorld, BROAD, phone and watch).
         pub bag: String = String::new(),
         /// Topics of the bag to play; empty: all.
         pub topics: Vec<String> = Vec::new(),

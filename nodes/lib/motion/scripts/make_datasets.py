@@ -85,5 +85,19 @@ def skeleton():
         label=np.array([0, -1, 0], "i1"), label_names=np.array(["WALKING"]), subject=np.array("02"), atypical=np.array("")))
 
 
+def har_spsw():
+    """Two executions; the phone repeats a stamp, the watch has no second execution."""
+    arrays = {}
+    for execution, device, start in (("01", "sp", 0), ("01", "sw", 3), ("02", "sp", 5000)):
+        count = 6
+        prefix = f"{execution}_{device}__"
+        arrays[prefix + "acc"] = np.tile([0.5, 9.75, -0.25], (count, 1)).astype("f4") + np.arange(count, dtype="f4")[:, None]
+        arrays[prefix + "gyr"] = np.tile([0.25, 0.0, -0.5], (count, 1)).astype("f4")
+        arrays[prefix + "t_ms"] = 1657533977800 + start + np.array([0, 10, 10, 21, 85, 95])
+        arrays[prefix + "label"] = np.array(["SEATED"] * 3 + ["STANDING_UP"] * 2 + ["SEATED"])
+    npz(DATA / "har_spsw.npz", arrays)
+    npz(SAMPLES / "har_spsw.npz", arrays)
+
+
 SAMPLES.mkdir(parents=True, exist_ok=True)
-broad(); totalcapture(); pamap2(); realworld(); dip(); skeleton()
+broad(); totalcapture(); pamap2(); realworld(); dip(); skeleton(); har_spsw()

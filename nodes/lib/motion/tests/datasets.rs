@@ -8,8 +8,8 @@ use std::io::{Cursor, Write as _};
 
 use cromosim_body::Joint;
 use cromosim_motion::datasets::{
-    DIP_SENSORS, DatasetFiles, DatasetFormat, DipArray, DipRecording, open_dataset, parse_broad, parse_pamap2, parse_realworld,
-    parse_totalcapture_calibration, parse_totalcapture_reference, parse_totalcapture_sensors,
+    DIP_SENSORS, DatasetFiles, DatasetFormat, DipArray, DipRecording, open_dataset, parse_broad, parse_har_spsw, parse_pamap2,
+    parse_realworld, parse_totalcapture_calibration, parse_totalcapture_reference, parse_totalcapture_sensors,
 };
 use cromosim_spatial::Stamp;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -209,6 +209,63 @@ fn broad_itself() {
     let up = body.rotations[100] * mean;
     println!("gravity at rest {:.3} m/s2, up in the world by {:.2} deg", mean.norm(), up.angle(&Vector3::z()).to_degrees());
     assert!((mean.norm() - 9.81).abs() < 0.1 && up.angle(&Vector3::z()).to_degrees() < 3.0);
+}
+
+#[test]
+fn phone_and_watch_are_told_and_read() {
+    let path = common::own_file("har_spsw.npz");
+    let (format, recording) = open_dataset(&path, &DatasetFiles::default()).unwrap().unwrap();
+    assert_eq!((format, recording.imus.len()), (DatasetFormat::HarSpsw, 2));
+    let [phone, watch] = &recording.imus[..] else { panic!("two devices") };
+    assert_eq!((phone.placement.as_str(), watch.placement.as_str(), phone.segment), ("pocket", "wrist", None));
+    // One stamp of each execution comes twice.
+    let milliseconds = |index: usize| phone.series.stamps[index].nanos / 1_000_000 - 1_657_533_977_800;
+    assert_eq!((0..10).map(milliseconds).collect::<Vec<_>>(), [0, 10, 21, 85, 95, 5000, 5010, 5021, 5085, 5095]);
+    assert_eq!((phone.rows_left_out, watch.rows_left_out, watch.series.stamps.len()), (2, 1, 5));
+    assert_eq!(phone.series.specific_force[2], Vector3::new(3.5, 12.75, 2.75));
+    assert_eq!(watch.series.angular_velocity[4], Vector3::new(0.25, 0.0, -0.5));
+    // The last span of an execution does not go on in the next.
+    let spans: Vec<_> =
+        recording.activities.iter().map(|span| (span.activity.as_str(), (span.end.nanos - span.start.nanos) / 1_000_000)).collect();
+    let one = [("SEATED", 10), ("STANDING_UP", 64), ("SEATED", 0)];
+    assert_eq!(spans, [one, one].concat());
+    let bytes = std::fs::read(path).unwrap();
+    common::damaged(&bytes, 300, |bytes| drop(parse_har_spsw(Cursor::new(bytes), "x")));
+}
+
+#[test]
+fn a_wrong_array_of_phone_and_watch_is_named() {
+    let file = |times: &[u32]| {
+        let mut writer = cromosim_arrays::NpzWriter::new(Cursor::new(Vec::new()));
+        for key in ["07_sp__acc", "07_sp__gyr"] {
+            writer.floats(key, &[2, 3], &[0.5; 6]).unwrap();
+        }
+        writer.integers("07_sp__t_ms", &[times.len()], times).unwrap();
+        writer.text("07_sp__label", "SEATED").unwrap();
+        writer.finish().unwrap().into_inner()
+    };
+    let read = |bytes: Vec<u8>| parse_har_spsw(Cursor::new(bytes), "s07.npz");
+    let message = read(file(&[1, 2])).unwrap_err().to_string();
+    assert!(message.contains("s07.npz") && message.contains("07_sp__label: 1 rows, but 07_sp__acc has 2"), "{message}");
+    let message = read(file(&[1])).unwrap_err().to_string();
+    assert!(message.contains("07_sp__t_ms: 1 rows"), "{message}");
+}
+
+#[test]
+fn phone_and_watch_themselves() {
+    let Some(folder) = common::shared_data("har_spsw") else { return };
+    let (format, recording) = open_dataset(&folder.join("s01.npz"), &DatasetFiles::default()).unwrap().unwrap();
+    assert_eq!(format, DatasetFormat::HarSpsw);
+    let (phone, labels) = (&recording.imus[0], recording.activities.iter().map(|span| span.activity.as_str()));
+    println!("{} readings, {} left out, {} spans", phone.series.stamps.len(), phone.rows_left_out, recording.activities.len());
+    let labels: std::collections::BTreeSet<&str> = labels.collect();
+    assert_eq!(labels.into_iter().collect::<Vec<_>>(), ["SEATED", "SITTING_DOWN", "STANDING_UP", "TURNING", "WALKING"]);
+    // Two turns an execution, six executions.
+    assert_eq!(recording.activities.iter().filter(|span| span.activity == "TURNING").count(), 12);
+    let mut lengths: Vec<f64> = phone.series.specific_force.iter().map(|force| force.norm()).collect();
+    lengths.sort_by(f64::total_cmp);
+    let median = lengths[lengths.len() / 2];
+    assert!((median - 9.81).abs() < 0.5, "{median}");
 }
 
 #[test]

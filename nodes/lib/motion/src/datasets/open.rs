@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use cromosim_arrays::{Container, Format, Limits};
 
 use super::{
-    DatasetRecording, broad, parse_broad, parse_pamap2, parse_realworld, parse_totalcapture_reference, parse_totalcapture_sensors,
-    realworld, totalcapture,
+    DatasetRecording, broad, har_spsw, parse_broad, parse_har_spsw, parse_pamap2, parse_realworld, parse_totalcapture_reference,
+    parse_totalcapture_sensors, realworld, totalcapture,
 };
 use crate::rigid::RigidError;
 
@@ -30,6 +30,8 @@ pub enum DatasetFormat {
     RealWorld,
     /// [`parse_broad`].
     Broad,
+    /// [`parse_har_spsw`].
+    HarSpsw,
 }
 
 impl std::fmt::Display for DatasetFormat {
@@ -39,6 +41,7 @@ impl std::fmt::Display for DatasetFormat {
             Self::Pamap2 => "PAMAP2",
             Self::RealWorld => "RealWorld (HAR)",
             Self::Broad => "BROAD",
+            Self::HarSpsw => "smartphone and smartwatch (HAR)",
         })
     }
 }
@@ -85,7 +88,11 @@ pub fn open_dataset(path: &Path, beside: &DatasetFiles) -> Result<Option<(Datase
     let recording = match Format::of(&mut reader).map_err(unreadable)? {
         None => return text(path, &name, beside),
         Some(Format::Zip) if realworld::is_realworld(open(path)?) => (DatasetFormat::RealWorld, realworld(path, &name, beside)?),
-        Some(Format::Zip | Format::Mat) if is_broad(path)? => (DatasetFormat::Broad, parse_broad(reader, &name)?),
+        Some(Format::Zip | Format::Mat) => match arrays(path)? {
+            Some(DatasetFormat::Broad) => (DatasetFormat::Broad, parse_broad(reader, &name)?),
+            Some(DatasetFormat::HarSpsw) => (DatasetFormat::HarSpsw, parse_har_spsw(reader, &name)?),
+            _ => return Ok(None),
+        },
         Some(_) => return Ok(None),
     };
     Ok(Some(recording))
@@ -103,10 +110,14 @@ fn text(path: &Path, name: &str, beside: &DatasetFiles) -> Result<Option<(Datase
     Ok(Some((format, recording)))
 }
 
-fn is_broad(path: &Path) -> Result<bool, RigidError> {
-    // What is no archive of arrays is none of BROAD's, whatever else it is.
+/// Whose an archive of arrays is, by its keys.
+fn arrays(path: &Path) -> Result<Option<DatasetFormat>, RigidError> {
     let limits = Limits { decoded_bytes: broad::MAX_BYTES, ..Limits::default() };
-    Ok(Container::new(BufReader::new(open(path)?), path, limits).is_ok_and(|file| broad::is_broad(&file.keys())))
+    // What is no archive of arrays is of no data set, whatever else it is.
+    let Ok(file) = Container::new(BufReader::new(open(path)?), path, limits) else { return Ok(None) };
+    let keys = file.keys();
+    let known = [(broad::is_broad(&keys), DatasetFormat::Broad), (har_spsw::is_har_spsw(&keys), DatasetFormat::HarSpsw)];
+    Ok(known.into_iter().find_map(|(told, format)| told.then_some(format)))
 }
 
 fn totalcapture(path: &Path, name: &str, beside: &DatasetFiles) -> Result<DatasetRecording, RigidError> {
