@@ -14,6 +14,7 @@ mod demo;
 mod diagnose;
 #[cfg(feature = "view")]
 mod diagnose_view;
+mod evaluate;
 mod inspect;
 mod map;
 mod motion_arguments;
@@ -52,6 +53,11 @@ enum Command {
     Train(train::Arguments),
     /// Fit a distribution mapping from simulated to real IMUs
     Map(map::Arguments),
+    /// Measure what the simulation is worth: on the recognition of activities
+    Evaluate {
+        #[command(subcommand)]
+        command: evaluate::Command,
+    },
     /// Say what is in a motion, body, trajectory or bag file
     Inspect(Box<inspect::Arguments>),
     /// Work on bags: mend an unfinished one, export IMU topics as CSV
@@ -95,6 +101,7 @@ fn main() -> ExitCode {
         Command::Trajectory(arguments) => trajectory::run(&arguments),
         Command::Train(arguments) => train::run(&arguments),
         Command::Map(arguments) => map::run(&arguments),
+        Command::Evaluate { command } => evaluate::run(&command),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Bag { command } => bag::run(&command),
         Command::Body { command } => body::run(&command),

@@ -105,6 +105,12 @@ impl Placement {
         Self { rate_hz, ..self }
     }
 
+    /// The same placement turned otherwise: site_from_sensor.
+    #[must_use]
+    pub fn with_mount(self, mount: UnitQuaternion<f64>) -> Self {
+        Self { mount, ..self }
+    }
+
     /// The same placement by another scheme.
     #[must_use]
     pub fn with_scheme(self, scheme: Scheme) -> Self {

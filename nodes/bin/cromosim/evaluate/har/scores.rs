@@ -1,0 +1,91 @@
+//! How right a classifier is.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha12Rng;
+use serde::Serialize;
+
+/// Resamples of an interval.
+const RESAMPLES: usize = 10_000;
+
+/// Windows by true class (rows) and said class (columns).
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(transparent)]
+pub struct Confusion(pub Vec<Vec<u32>>);
+
+impl Confusion {
+    /// Of true and said classes.
+    pub fn new(truth: &[u8], said: &[u8], classes: usize) -> Self {
+        let mut counts = vec![vec![0; classes]; classes];
+        truth.iter().zip(said).for_each(|(truth, said)| counts[usize::from(*truth)][usize::from(*said)] += 1);
+        Self(counts)
+    }
+
+    /// Both together.
+    pub fn add(&mut self, other: &Self) {
+        if self.0.is_empty() {
+            self.0.clone_from(&other.0);
+            return;
+        }
+        self.0.iter_mut().zip(&other.0).for_each(|(own, other)| own.iter_mut().zip(other).for_each(|(own, other)| *own += other));
+    }
+
+    /// F1 = 2 TP / (2 TP + FP + FN) of a class; none where neither the truth has it nor anything was said to be it.
+    pub fn f1(&self, class: usize) -> Option<f64> {
+        let hits = f64::from(self.0[class][class]);
+        let truth: u32 = self.0[class].iter().sum();
+        let said: u32 = self.0.iter().map(|row| row[class]).sum();
+        (truth + said > 0).then(|| 2.0 * hits / f64::from(truth + said))
+    }
+
+    /// Mean F1 of the classes that the truth has.
+    pub fn macro_f1(&self) -> f64 {
+        let there = |class: &usize| self.0[*class].iter().sum::<u32>() > 0;
+        let scores: Vec<f64> = (0..self.0.len()).filter(there).filter_map(|class| self.f1(class)).collect();
+        mean(&scores)
+    }
+}
+
+/// 0 of nothing.
+pub fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+/// 95 % interval of the mean, by resampling the values (subjects) with replacement (Efron 1979, percentiles); the same seed gives the same.
+pub fn interval(values: &[f64], seed: u64) -> [f64; 2] {
+    let mut random = ChaCha12Rng::seed_from_u64(seed);
+    let mut means: Vec<f64> = (0..RESAMPLES)
+        .map(|_| values.iter().map(|_| values[random.random_range(0..values.len())]).sum::<f64>() / values.len() as f64)
+        .collect();
+    means.sort_by(f64::total_cmp);
+    let at = |share: f64| means[((RESAMPLES as f64 * share) as usize).min(RESAMPLES - 1)];
+    [at(0.025), at(0.975)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn f1_is_its_definition() {
+        let confusion = Confusion::new(&[0, 0, 0, 1, 1, 1], &[0, 0, 1, 1, 1, 2], 4);
+        assert_eq!(confusion.0, [vec![2, 1, 0, 0], vec![0, 2, 1, 0], vec![0; 4], vec![0; 4]]);
+        // Class 0: precision 1, recall 2/3. Class 1: both 2/3. Class 2 is said but not there, class 3 is neither.
+        assert!((confusion.f1(0).unwrap_or_default() - 0.8).abs() < 1e-12);
+        assert_eq!((confusion.f1(2), confusion.f1(3)), (Some(0.0), None));
+        assert!((confusion.macro_f1() - (0.8 + 2.0 / 3.0) / 2.0).abs() < 1e-12);
+        let mut both = Confusion::default();
+        both.add(&confusion);
+        both.add(&confusion);
+        assert_eq!(both.0[0], [4, 2, 0, 0]);
+    }
+
+    #[test]
+    fn the_interval_is_that_of_the_mean() {
+        // Of n equal halves at 0 and 1 the mean's standard error is 0.5 / sqrt n.
+        let values: Vec<f64> = (0..100).map(|k| f64::from(k % 2)).collect();
+        let [low, high] = interval(&values, 1);
+        assert!((low - 0.402).abs() < 0.02 && (high - 0.598).abs() < 0.02, "{low} {high}");
+        assert_eq!(interval(&values, 1), interval(&values, 1));
+        assert_eq!(interval(&[0.7; 5], 3).map(|value| (value * 1e9).round() / 1e9), [0.7, 0.7]);
+    }
+}
