@@ -57,6 +57,11 @@ impl Activities {
         self.by_name.get(activity).copied()
     }
 
+    /// The class of this very name.
+    pub fn class_named(&self, name: &str) -> Option<u8> {
+        self.classes.iter().position(|class| class == name).map(|class| class as u8)
+    }
+
     /// Without the classes that nobody shows; `there`: whether each is there.
     pub fn without_absent(&self, there: &[bool]) -> Self {
         let kept = self.by_name.iter().filter(|(_, class)| there[usize::from(**class)]);
@@ -79,7 +84,8 @@ mod tests {
         std::fs::write(&path, "{lying: LYING, cycling: CYCLING, sitting: SEATED, walking: WALKING, running: WALKING}").unwrap();
         let own = Activities::read(&path).unwrap();
         assert_eq!(own.classes(), ["SEATED", "WALKING", "CYCLING", "LYING"]);
-        assert_eq!((own.class("running"), own.class("lying")), (Some(1), Some(3)));
+        assert_eq!((own.class("running"), own.class("lying"), own.class("SEATED")), (Some(1), Some(3), None));
+        assert_eq!((own.class_named("SEATED"), own.class_named("sitting")), (Some(0), None));
         assert_eq!(own.without_absent(&[true, false, true, true]).classes(), ["SEATED", "CYCLING", "LYING"]);
         std::fs::write(&path, "{lying: LYING}").unwrap();
         assert!(Activities::read(&path).unwrap_err().to_string().contains("map.yaml: 1 classes"));

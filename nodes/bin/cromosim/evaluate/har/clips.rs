@@ -49,7 +49,7 @@ pub fn read(
         }
         let options = MotionOptions { keep_lead_in: true, ..MotionOptions::default() };
         let motion = retarget(&labelled.clip, model, &options)?;
-        let labels = labelled.labels.iter().map(|label| label.as_ref().and_then(|label| activities.class(label))).collect();
+        let labels = labelled.labels.iter().map(|label| label.as_ref().and_then(|label| activities.class_named(label))).collect();
         clips.push(Clip { poses: motion.frames, rate_hz: motion.rate_hz, labels });
     }
     Ok((clips, left_out))

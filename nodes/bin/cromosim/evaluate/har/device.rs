@@ -182,7 +182,7 @@ mod tests {
     /// A device of known noise and bias that rests, turns, and rests; every twentieth interval is three times as long.
     fn recorded(seed: u64) -> Series {
         let mut noise = NoiseSource::white((0.003, 0.0004), 0.0, 100.0, seed, "test").unwrap();
-        let (mut series, mut seconds) = (Series::default(), 0.0);
+        let (mut series, mut seconds) = (Series::default(), 0.0_f64);
         for k in 0..3000 {
             let added = noise.draw();
             let turning = if (1000..2000).contains(&k) { (seconds * 7.0).sin() } else { 0.0 };
