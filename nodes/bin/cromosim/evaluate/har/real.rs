@@ -137,9 +137,10 @@ fn cut(recording: &DatasetRecording, placements: &[String]) -> Vec<(Stamp, Vec<S
         let of = |imu: &&cromosim_motion::datasets::PlacedImu| {
             let mut own = Series::default();
             let stamps = &imu.series.stamps;
-            for k in stamps.partition_point(|stamp| *stamp < from)..stamps.partition_point(|stamp| *stamp <= to) {
-                let reading = Reading { force: imu.series.specific_force[k], rate: imu.series.angular_velocity[k] };
-                own.push(stamps[k] - from, &reading);
+            let inside = stamps.partition_point(|stamp| *stamp < from)..stamps.partition_point(|stamp| *stamp <= to);
+            let both = imu.series.specific_force[inside.clone()].iter().zip(&imu.series.angular_velocity[inside.clone()]);
+            for (stamp, (force, rate)) in stamps[inside].iter().zip(both) {
+                own.push(*stamp - from, &Reading { force: *force, rate: *rate });
             }
             own
         };

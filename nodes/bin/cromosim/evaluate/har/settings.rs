@@ -43,10 +43,10 @@ impl Settings {
         Self {
             seed,
             seeds: 3,
-            rate_hz: 30,
-            low_pass_hz: 10.0,
-            window: 30,
-            hop: 15,
+            rate_hz: 24,
+            low_pass_hz: 8.0,
+            window: 24,
+            hop: 12,
             virtual_windows: 400,
             shape_std: 1.0,
             speed: [0.8, 1.25],
@@ -59,7 +59,7 @@ impl Settings {
             training: ClassifierOptions {
                 steps: 300,
                 batch: 64,
-                learning_rate: 3e-3,
+                learning_rate: 4e-3,
                 schedule: Schedule::Cosine { floor: 0.02 },
                 clip: Some(1.0),
                 dropout: 0.5,

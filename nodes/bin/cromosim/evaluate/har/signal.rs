@@ -88,17 +88,17 @@ impl Grid {
     }
 }
 
+/// Boyer and Moore's vote, and a count of whoever is left.
 fn majority(labels: &[Option<u8>]) -> Option<u8> {
-    let candidate = labels[labels.len() / 2..].iter().chain(labels).flatten().copied();
-    let mut seen = [false; 256];
-    for label in candidate {
-        if !std::mem::replace(&mut seen[usize::from(label)], true)
-            && 2 * labels.iter().filter(|other| **other == Some(label)).count() > labels.len()
-        {
-            return Some(label);
+    let (mut candidate, mut ahead) = (None, 0);
+    for label in labels {
+        match ahead {
+            0 => (candidate, ahead) = (*label, 1),
+            _ if *label == candidate => ahead += 1,
+            _ => ahead -= 1,
         }
     }
-    None
+    candidate.filter(|_| 2 * labels.iter().filter(|label| **label == candidate).count() > labels.len())
 }
 
 fn resampled(series: &Series, start: f64, count: usize, rate_hz: f64) -> Vec<[f64; PER_DEVICE]> {
