@@ -11,7 +11,7 @@ fn clip() -> Clip {
 }
 
 fn draw(seed: u64) -> Draw {
-    Draw { clip: 0, seed, speed: 1.0, samples: 120, windows: vec![(15, 2), (45, 2)] }
+    Draw { clip: 0, seed, speed: 1.0, samples: 90, windows: vec![(15, 2), (45, 2)] }
 }
 
 fn mean_norm(examples: &Examples, channels: std::ops::Range<usize>) -> f32 {
@@ -28,7 +28,7 @@ fn people_and_devices_differ_and_gravity_stays() {
         windows(&[draw(seed)], &[stage.play(&draw(seed), simulator, in_place).unwrap()], None, &settings).unwrap()
     };
     let (one, other) = (of(1, Simulator::Analytic, false), of(2, Simulator::Analytic, false));
-    assert_eq!((one.len(), one.channels, one.steps), (2, 12, 30));
+    assert_eq!((one.len(), one.channels, one.steps), (2, 12, settings.window));
     assert_ne!(one.values, other.values);
     assert_eq!(one, of(1, Simulator::Analytic, false));
     // Walking shakes a phone and a watch about the g that both feel.
