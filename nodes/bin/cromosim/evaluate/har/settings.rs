@@ -70,7 +70,7 @@ impl Settings {
     /// A look at whether all of it runs; its scores say little.
     pub fn quick(seed: u64) -> Self {
         let full = Self::full(seed);
-        let training = ClassifierOptions { steps: 30, batch: 32, learning_rate: 5e-3, ..full.training };
+        let training = ClassifierOptions { steps: 30, batch: 16, learning_rate: 5e-3, ..full.training };
         Self { seeds: 1, virtual_windows: 20, shares: vec![0.5, 1.0], maps: 8, hidden: 16, training, ..full }
     }
 
