@@ -109,6 +109,25 @@ impl SplineSystem {
         Ok(C as f64 * (free * mean_square.ln() + scratch.factor.log_determinant() - free * weight.ln()))
     }
 
+    /// The largest weight that leaves at most `std` per channel, root mean square: what it leaves grows with the weight, so halving finds it.
+    pub(crate) fn weight_of_residual<const C: usize>(&self, values: &[[f64; C]], std: f64) -> Result<f64, SpatialError> {
+        let (_, centred) = centred(values);
+        let mut scratch = Scratch::default();
+        let mut leaves = |log: f64| -> Result<f64, SpatialError> {
+            self.solve(&centred, 10f64.powf(log), &mut scratch)?;
+            Ok((self.distance(&centred, &scratch.coefficients) / (C * values.len()) as f64).sqrt())
+        };
+        let (mut low, mut high) = (LOWEST_LOG_WEIGHT, HIGHEST_LOG_WEIGHT);
+        if leaves(high)? <= std {
+            return Ok(10f64.powf(high));
+        }
+        while high - low > 0.01 {
+            let middle = 0.5 * (low + high);
+            if leaves(middle)? <= std { low = middle } else { high = middle }
+        }
+        Ok(10f64.powf(low))
+    }
+
     /// The weight that suits these samples best: of the greatest likelihood, or near it that of the least error of a derivative.
     pub(crate) fn search<const C: usize>(&self, values: &[[f64; C]], derivative: Option<Derivative>) -> Result<f64, SpatialError> {
         let lowest = 10f64.powf(LOWEST_LOG_WEIGHT);

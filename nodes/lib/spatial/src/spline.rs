@@ -23,6 +23,9 @@ pub enum Smoothing {
     CutoffHz(f64),
     /// The penalty's weight itself, for times counted in median sample intervals; no unit.
     Weight(f64),
+    /// As smooth as can be within this root mean square distance per channel from the samples, in their unit (Reinsch 1967): for samples whose
+    /// errors are known to be so large. IMUSim's splines choose so, with 1 mm.
+    ResidualStd(f64),
 }
 
 impl Smoothing {
@@ -40,6 +43,8 @@ impl Smoothing {
             Self::CutoffHz(cutoff_hz) => Ok(system.weight_of_cutoff(cutoff_hz).max(lowest)),
             Self::Weight(weight) if !(weight >= 0.0 && weight.is_finite()) => Err(SpatialError::BadWeight { weight }),
             Self::Weight(weight) => Ok(weight.max(lowest)),
+            Self::ResidualStd(std) if !(std >= 0.0 && std.is_finite()) => Err(SpatialError::BadWeight { weight: std }),
+            Self::ResidualStd(std) => system.weight_of_residual(values, std),
         }
     }
 }

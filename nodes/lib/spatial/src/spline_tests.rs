@@ -128,3 +128,21 @@ fn bad_input_is_refused_with_its_index() {
     assert_eq!(fit(&[0.0, 1.0], &[[1.0]; 2], Smoothing::CutoffHz(0.0)), SpatialError::BadRate { rate_hz: 0.0 });
     assert_eq!(fit(&[0.0, 1.0], &[[1.0]; 2], Smoothing::Weight(-1.0)), SpatialError::BadWeight { weight: -1.0 });
 }
+
+#[test]
+fn the_residual_asked_for_is_left() {
+    let seconds = seconds(600, 0.01);
+    let errors = noise(600, 0.02);
+    let noisy: Vec<[f64; 1]> = samples(&seconds).iter().zip(&errors).map(|(value, error)| [value[0] + error]).collect();
+    let left = |std: f64| {
+        let spline = SmoothingSpline::fit(&seconds, &noisy, Smoothing::ResidualStd(std)).unwrap();
+        let square: f64 = seconds.iter().zip(&noisy).map(|(t, value)| (spline.evaluate(*t)[0][0] - value[0]).powi(2)).sum();
+        (square / 600.0).sqrt()
+    };
+    for std in [0.005, 0.02, 0.05] {
+        assert!(left(std) <= std && left(std) > 0.98 * std, "{} of {std}", left(std));
+    }
+    // No straight enough line: the series lies within a great distance of a polynomial.
+    assert!(left(10.0) < 1.0);
+    assert!(SmoothingSpline::fit(&seconds, &noisy, Smoothing::ResidualStd(f64::NAN)).is_err());
+}

@@ -220,6 +220,16 @@ impl SplineSystem {
         }
         sum
     }
+
+    /// `|y - B c|^2` over the samples and channels alone.
+    pub(crate) fn distance<const C: usize>(&self, values: &[[f64; C]], coefficients: &[[f64; C]]) -> f64 {
+        let last_interval = self.basis.interval_count() - 1;
+        let square = |(k, (value, row)): (usize, (&[f64; C], &[f64; ORDER]))| -> f64 {
+            let near = &coefficients[k.min(last_interval)..];
+            (0..C).map(|c| (value[c] - row.iter().zip(near).map(|(w, near)| w * near[c]).sum::<f64>()).powi(2)).sum()
+        };
+        values.iter().zip(&self.collocation).enumerate().map(square).sum()
+    }
 }
 
 impl EndDerivative {
