@@ -6,7 +6,7 @@ use std::path::Path;
 
 use cromosim_arrays::{Container, Entry, Limits};
 use cromosim_motion::datasets::{
-    DatasetRecording, DipArray, DipRecording, parse_broad, parse_har_spsw, parse_pamap2, parse_realworld, parse_skeleton_npz,
+    DatasetRecording, DipArray, DipRecording, parse_broad, parse_har_spsw, parse_marked_imu, parse_pamap2, parse_realworld, parse_skeleton_npz,
     parse_totalcapture_calibration, parse_totalcapture_reference, parse_totalcapture_sensors, sniff_dataset,
 };
 use libfuzzer_sys::fuzz_target;
@@ -46,6 +46,9 @@ fuzz_target!(|bytes: &[u8]| {
     let (positions, orientations) = bytes.split_at(bytes.len() / 2);
     let _ = parse_totalcapture_reference(positions, orientations, ["fuzz", "fuzz"]);
     if let Ok(recording) = parse_broad(Cursor::new(bytes), "fuzz") {
+        check(&recording);
+    }
+    if let Ok(recording) = parse_marked_imu(Cursor::new(bytes), "fuzz") {
         check(&recording);
     }
     if let Ok(recording) = parse_har_spsw(Cursor::new(bytes), "fuzz") {

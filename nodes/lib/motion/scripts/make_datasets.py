@@ -46,6 +46,16 @@ def npz(path, arrays):
             archive.writestr(zipfile.ZipInfo(f"{key}.npy"), stream.getvalue())
 
 
+def marked_imu():
+    time = np.arange(30) / 100
+    shape = np.array([[0.1, 0, 0], [-0.1, 0.05, 0], [0, -0.1, 0.02]])
+    seen = np.einsum("nij,mj->mni", Rotation.from_rotvec(np.stack([0 * time, 0.8 * time, 0 * time], 1)).as_matrix(), shape) + [1.0, 2.0, 0.5]
+    seen[1, 4:6] = np.nan
+    still = np.tile([0.0, 0.0, 9.8], (60, 1))
+    npz(SAMPLES / "marked_imu.npz", dict(fs_imu=np.asarray(200.0), fs_mocap=np.asarray(100.0), acc=still, gyr=0.1 * still,
+                                         marker_a=seen[0], marker_b=seen[1], marker_c=seen[2]))
+
+
 def totalcapture():
     names = ["Head", "L_LowArm"]
     lines = ["2 3"]
@@ -100,4 +110,4 @@ def har_spsw():
 
 
 SAMPLES.mkdir(parents=True, exist_ok=True)
-broad(); totalcapture(); pamap2(); realworld(); dip(); skeleton(); har_spsw()
+broad(); marked_imu(); totalcapture(); pamap2(); realworld(); dip(); skeleton(); har_spsw()

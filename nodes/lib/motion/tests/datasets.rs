@@ -8,8 +8,8 @@ use std::io::{Cursor, Write as _};
 
 use cromosim_body::Joint;
 use cromosim_motion::datasets::{
-    DIP_SENSORS, DatasetFiles, DatasetFormat, DipArray, DipRecording, open_dataset, parse_broad, parse_har_spsw, parse_pamap2,
-    parse_realworld, parse_totalcapture_calibration, parse_totalcapture_reference, parse_totalcapture_sensors,
+    DIP_SENSORS, DatasetFiles, DatasetFormat, DipArray, DipRecording, open_dataset, parse_broad, parse_har_spsw, parse_marked_imu,
+    parse_pamap2, parse_realworld, parse_totalcapture_calibration, parse_totalcapture_reference, parse_totalcapture_sensors,
 };
 use cromosim_spatial::Stamp;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -209,6 +209,55 @@ fn broad_itself() {
     let up = body.rotations[100] * mean;
     println!("gravity at rest {:.3} m/s2, up in the world by {:.2} deg", mean.norm(), up.angle(&Vector3::z()).to_degrees());
     assert!((mean.norm() - 9.81).abs() < 0.1 && up.angle(&Vector3::z()).to_degrees() < 3.0);
+}
+
+#[test]
+fn markers_on_a_segment_give_its_pose() {
+    let mut writer = zip::ZipWriter::new(Cursor::new(Vec::new()));
+    let shape = [[0.1, 0.0, 0.0], [-0.1, 0.05, 0.0], [0.0, -0.1, 0.02]].map(Vector3::from);
+    let centre = shape.iter().sum::<Vector3<f64>>() / 3.0;
+    let turn = |frame: usize| nalgebra::UnitQuaternion::from_scaled_axis(Vector3::y() * (0.08 * frame as f64));
+    // The second marker is hidden in one frame: two are no pose.
+    let seen = |marker: usize| -> Vec<f64> {
+        let at =
+            |frame: usize| if (marker, frame) == (1, 4) { Vector3::repeat(f64::NAN) } else { turn(frame) * shape[marker] + Vector3::z() };
+        (0..10).flat_map(|frame| <[f64; 3]>::from(at(frame))).collect()
+    };
+    let still: Vec<f64> = (0..20).flat_map(|_| [0.0, 0.0, 9.8]).collect();
+    let markers = [0, 1, 2].map(|marker| npy("(10, 3)", &seen(marker)));
+    let [a, b, c] = markers;
+    for (name, content) in [
+        ("fs_imu", npy("()", &[200.0])),
+        ("fs_mocap", npy("()", &[100.0])),
+        ("acc", npy("(20, 3)", &still)),
+        ("gyr", npy("(20, 3)", &still)),
+        ("marker_a", a),
+        ("marker_b", b),
+        ("marker_c", c),
+    ] {
+        writer.start_file(format!("{name}.npy"), SimpleFileOptions::default()).unwrap();
+        writer.write_all(&content).unwrap();
+    }
+    let bytes = writer.finish().unwrap().into_inner();
+    let recording = parse_marked_imu(Cursor::new(&bytes), "shoe.npz").unwrap();
+    let (imu, (_, segment)) = (&recording.imus[0], &recording.references[0]);
+    assert_eq!((imu.series.stamps.len(), segment.stamps.len(), segment.stamps[4].nanos), (20, 9, 50_000_000));
+    for (stamp, (position, rotation)) in segment.stamps.iter().zip(segment.positions.iter().zip(&segment.rotations)) {
+        let expected = turn((stamp.as_seconds() * 100.0).round() as usize);
+        assert!(rotation.angle_to(&expected) < 1e-9 && (position - expected * centre - Vector3::z()).norm() < 1e-9);
+    }
+    common::damaged(&bytes, 200, |bytes| drop(parse_marked_imu(Cursor::new(bytes), "x")));
+}
+
+#[test]
+fn a_shoe_of_gaitmap_is_told_and_read() {
+    let Some(folder) = common::shared_data("paired_gaitmap_foot") else { return };
+    let (format, recording) = open_dataset(&folder.join("left_sensor.npz"), &DatasetFiles::default()).unwrap().unwrap();
+    let (_, foot) = &recording.references[0];
+    assert_eq!((format, foot.stamps.len()), (DatasetFormat::MarkedImu, 3870));
+    // A foot that walks turns by more than a radian, and comes nowhere near the ground's other side.
+    let turned = foot.rotations.iter().map(|rotation| rotation.angle_to(&foot.rotations[0])).fold(0.0, f64::max);
+    assert!(turned > 1.0 && foot.positions.iter().all(|position| position.z > 0.0 && position.z < 0.6));
 }
 
 #[test]

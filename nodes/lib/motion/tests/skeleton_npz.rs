@@ -39,6 +39,8 @@ fn labels_name_frames_and_the_clip_can_be_retargeted() {
     let motion =
         retarget(&labelled.clip, &BodyModel::embedded(), &MotionOptions { keep_lead_in: true, ..MotionOptions::default() }).unwrap();
     assert_eq!(motion.frames.len(), labelled.labels.len());
+    let flips = parse_skeleton_npz(File::open(folder.join("03_02.npz")).unwrap(), "03_02").unwrap().suspect;
+    assert!(flips.len() > 100 && flips.contains(&true) && flips.contains(&false));
     let report = motion.report.unwrap();
     assert!(report.bone_direction_median_deg < 1.0, "{report}");
 }

@@ -1,4 +1,5 @@
-//! Importers of the data sets that people have: TotalCapture, PAMAP2, RealWorld (HAR), BROAD, smartphone and smartwatch, and the structure of DIP-IMU. Each gives the
+//! Importers of the data sets that people have: TotalCapture, PAMAP2, RealWorld (HAR), BROAD, smartphone and smartwatch, IMUs on segments with
+//! markers, and the structure of DIP-IMU. Each gives the
 //! IMUs by placement, and references where there are.
 //!
 //! [`open_dataset`] tells a file by its content and looks for what belongs to it. Parsers work over bytes and open nothing. What a data set does not say (gyroscopes in DIP-IMU) is not made up.
@@ -6,6 +7,7 @@
 mod broad;
 mod dip;
 mod har_spsw;
+mod marked_imu;
 mod open;
 mod pamap2;
 mod realworld;
@@ -16,6 +18,7 @@ mod totalcapture;
 pub use broad::parse_broad;
 pub use dip::{DIP_RATE_HZ, DIP_SENSORS, DipArray, DipRecording};
 pub use har_spsw::{HAR_SPSW_RATE_HZ, parse_har_spsw};
+pub use marked_imu::parse_marked_imu;
 pub use open::{DatasetFiles, DatasetFormat, open_dataset, sniff_dataset};
 pub use pamap2::{PAMAP2_RATE_HZ, pamap2_activity, parse_pamap2};
 pub use realworld::parse_realworld;

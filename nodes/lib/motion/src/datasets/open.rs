@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use cromosim_arrays::{Container, Format, Limits};
 
 use super::{
-    DatasetRecording, broad, har_spsw, parse_broad, parse_har_spsw, parse_pamap2, parse_realworld, parse_totalcapture_reference,
-    parse_totalcapture_sensors, realworld, totalcapture,
+    DatasetRecording, broad, har_spsw, marked_imu, parse_broad, parse_har_spsw, parse_marked_imu, parse_pamap2, parse_realworld,
+    parse_totalcapture_reference, parse_totalcapture_sensors, realworld, totalcapture,
 };
 use crate::rigid::RigidError;
 
@@ -30,6 +30,8 @@ pub enum DatasetFormat {
     RealWorld,
     /// [`parse_broad`].
     Broad,
+    /// [`parse_marked_imu`].
+    MarkedImu,
     /// [`parse_har_spsw`].
     HarSpsw,
 }
@@ -41,6 +43,7 @@ impl std::fmt::Display for DatasetFormat {
             Self::Pamap2 => "PAMAP2",
             Self::RealWorld => "RealWorld (HAR)",
             Self::Broad => "BROAD",
+            Self::MarkedImu => "IMU on a segment with markers",
             Self::HarSpsw => "smartphone and smartwatch (HAR)",
         })
     }
@@ -91,6 +94,7 @@ pub fn open_dataset(path: &Path, beside: &DatasetFiles) -> Result<Option<(Datase
         Some(Format::Zip | Format::Mat) => match arrays(path)? {
             Some(DatasetFormat::Broad) => (DatasetFormat::Broad, parse_broad(reader, &name)?),
             Some(DatasetFormat::HarSpsw) => (DatasetFormat::HarSpsw, parse_har_spsw(reader, &name)?),
+            Some(DatasetFormat::MarkedImu) => (DatasetFormat::MarkedImu, parse_marked_imu(reader, &name)?),
             _ => return Ok(None),
         },
         Some(_) => return Ok(None),
@@ -112,11 +116,15 @@ fn text(path: &Path, name: &str, beside: &DatasetFiles) -> Result<Option<(Datase
 
 /// Whose an archive of arrays is, by its keys.
 fn arrays(path: &Path) -> Result<Option<DatasetFormat>, RigidError> {
-    let limits = Limits { decoded_bytes: broad::MAX_BYTES, ..Limits::default() };
+    let limits = Limits { decoded_bytes: broad::MAX_BYTES.max(marked_imu::MAX_BYTES), ..Limits::default() };
     // What is no archive of arrays is of no data set, whatever else it is.
     let Ok(file) = Container::new(BufReader::new(open(path)?), path, limits) else { return Ok(None) };
     let keys = file.keys();
-    let known = [(broad::is_broad(&keys), DatasetFormat::Broad), (har_spsw::is_har_spsw(&keys), DatasetFormat::HarSpsw)];
+    let known = [
+        (broad::is_broad(&keys), DatasetFormat::Broad),
+        (har_spsw::is_har_spsw(&keys), DatasetFormat::HarSpsw),
+        (marked_imu::is_marked_imu(&keys), DatasetFormat::MarkedImu),
+    ];
     Ok(known.into_iter().find_map(|(told, format)| told.then_some(format)))
 }
 

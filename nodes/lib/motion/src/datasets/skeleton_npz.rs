@@ -1,5 +1,6 @@
 //! Skeleton clips as npz with a label for every frame: `fps`, `joints`, `parents`, `offsets` (J, 3) m, `local_quat_wxyz` (N, J, 4) and `pos`
-//! (N, J, 3) m, as the project's own conversion of CMU clips has them; `label` (N) and `label_names` where it is labelled.
+//! (N, J, 3) m, as the project's own conversion of CMU clips has them; `label` (N) and `label_names` where it is labelled, `suspect` (N) where
+//! joints flip.
 //!
 //! Offsets and local rotations are a BVH file's (y up), positions have z up; so the clip comes out as that BVH file had it, in metres.
 
@@ -25,6 +26,8 @@ pub struct LabelledClip {
     pub subject: String,
     /// One per frame: the label's name, or none where the frame shows nothing of them. Empty where the file has no labels.
     pub labels: Vec<Option<String>>,
+    /// One per frame: whether a joint flips there or moves like none. Empty where the file does not say.
+    pub suspect: Vec<bool>,
     /// Why a clip is unlike everyday motion; empty where it is not.
     pub atypical: String,
 }
@@ -74,7 +77,9 @@ pub fn parse_skeleton_npz<R: Read + Seek>(reader: R, name: &str) -> Result<Label
     let clip = BvhClip { name: name.to_owned(), joints, frame_time_s: rate_hz.recip(), values, channel_count: 3 * (count + 1) };
     let subject = npz.text("subject")?.unwrap_or_default();
     let atypical = npz.text("atypical")?.unwrap_or_default();
-    Ok(LabelledClip { clip, subject, labels: labels(&mut npz, frames, &content)?, atypical })
+    let suspect = npz.integers("suspect", &[Some(frames)], "(N)")?.map_or_else(Vec::new, |flags| flags.values);
+    let suspect = suspect.iter().map(|flag| *flag != 0).collect();
+    Ok(LabelledClip { clip, subject, labels: labels(&mut npz, frames, &content)?, suspect, atypical })
 }
 
 fn labels<R: Read + Seek>(

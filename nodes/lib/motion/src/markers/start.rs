@@ -37,7 +37,7 @@ pub(super) fn placed(skin: &ShapedSkin<'_>, observed: &[Option<Vector3<f64>>], t
 }
 
 /// The rotation R and shift t that minimise the squares of `R a + t - b` (Kabsch 1976).
-pub(super) fn rigid(pairs: &[(Vector3<f64>, Vector3<f64>)]) -> Option<(UnitQuaternion<f64>, Vector3<f64>)> {
+pub(crate) fn rigid(pairs: &[(Vector3<f64>, Vector3<f64>)]) -> Option<(UnitQuaternion<f64>, Vector3<f64>)> {
     let count = pairs.len() as f64;
     let middle_a = pairs.iter().map(|pair| pair.0).sum::<Vector3<f64>>() / count;
     let middle_b = pairs.iter().map(|pair| pair.1).sum::<Vector3<f64>>() / count;
