@@ -126,7 +126,7 @@ impl VirtualImuNode {
         let devices = placements.iter().map(resolve).collect::<Result<Vec<_>, _>>()?;
         let shaped = ShapedBody::new(model.clone(), &[])?;
         let sites = MountedSites::new(&shaped, &placements)?;
-        let learned = if config.learned.is_empty() { None } else { Some(LearnedSimulator::read(Path::new(&config.learned))?) };
+        let learned = if config.learned.is_empty() { None } else { Some(LearnedSimulator::find(Path::new(&config.learned))?) };
         let mapping = if config.mapping.is_empty() { MappingFile::default() } else { MappingFile::read(Path::new(&config.mapping))? };
         if !config.mapping.is_empty() && !placements.iter().any(|placement| mapping.placements.contains_key(placement.name())) {
             let known = mapping.placements.keys().cloned().collect::<Vec<_>>().join(", ");

@@ -11,6 +11,14 @@ use cromosim_spatial::SpatialError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LearnedError {
+    /// No model of this name comes with the suite.
+    #[error("{name}: neither a folder with networks nor a model that comes with the suite ({known})")]
+    UnknownModel {
+        /// What was asked for.
+        name: String,
+        /// Those there are.
+        known: String,
+    },
     /// A number of a network's shape is out of range.
     #[error("network shape: {field} is {found}, it may be {least} to {most}")]
     Shape {

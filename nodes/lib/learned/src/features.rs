@@ -8,6 +8,8 @@ use crate::{PATCH_POINTS, SiteMotion};
 /// Sizes that bring every channel near 1: travel within a window and the patch's own size, m.
 const TRAVEL: f64 = 0.3;
 const PATCH_SIZE: f64 = 0.03;
+/// Of unsmoothed acceleration, m/s2, which is mostly noise.
+const UNSMOOTHED: f64 = 15.0;
 
 /// What a network predicts, world axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -49,6 +51,9 @@ pub enum Input {
     Points,
     /// The same and the analytic acceleration and angular velocity, 33 channels; the network says what is to be added to these.
     Residual,
+    /// The same and acceleration and angular velocity by plain differences, 39 channels: for motion whose scatter makes the analytic simulation
+    /// smooth much, video above all.
+    Differences,
     /// Eight points less their mean, and the analytic acceleration and angular velocity, 30 channels: nothing that needs a window. The
     /// network says what is to be added.
     Streaming,
@@ -60,13 +65,14 @@ impl Input {
         match self {
             Self::Points => "points",
             Self::Residual => "residual",
+            Self::Differences => "differences",
             Self::Streaming => "streaming",
         }
     }
 
     /// The input of a name.
     pub fn from_name(name: &str) -> Option<Self> {
-        [Self::Points, Self::Residual, Self::Streaming].into_iter().find(|input| input.name() == name)
+        [Self::Points, Self::Residual, Self::Differences, Self::Streaming].into_iter().find(|input| input.name() == name)
     }
 
     /// Channels.
@@ -74,6 +80,7 @@ impl Input {
         match self {
             Self::Points => 27,
             Self::Residual => 33,
+            Self::Differences => 39,
             Self::Streaming => 30,
         }
     }
@@ -93,6 +100,12 @@ impl Input {
         };
         for k in 0..count {
             self.sample(&motion.points[at(k)], &motion.kinematics[at(k)], &origin, turn, features);
+            if self == Self::Differences {
+                // How much to smooth changes within a motion, and the analytic simulation smooths all of it alike.
+                let [acceleration, angular_velocity] = motion.unsmoothed[at(k)];
+                push_turned(turn, acceleration, UNSMOOTHED, features);
+                push_turned(turn, angular_velocity, Quantity::AngularVelocity.scale(), features);
+            }
         }
     }
 
@@ -105,7 +118,7 @@ impl Input {
         turn: &UnitQuaternion<f64>,
         features: &mut Vec<f32>,
     ) {
-        let mut push = |value: Vector3<f64>, scale: f64| features.extend((turn * value / scale).iter().map(|x| *x as f32));
+        let mut push = |value: Vector3<f64>, scale: f64| push_turned(turn, value, scale, features);
         let centre = mean(points);
         if self != Self::Streaming {
             push(centre - origin, TRAVEL);
@@ -118,6 +131,10 @@ impl Input {
             push(kinematic.angular_velocity, Quantity::AngularVelocity.scale());
         }
     }
+}
+
+fn push_turned(turn: &UnitQuaternion<f64>, value: Vector3<f64>, scale: f64, features: &mut Vec<f32>) {
+    features.extend((turn * value / scale).iter().map(|x| *x as f32));
 }
 
 fn mean(points: &[Vector3<f64>; PATCH_POINTS]) -> Vector3<f64> {
@@ -159,7 +176,7 @@ mod tests {
         let here = motion(Vector3::zeros(), none);
         let there = motion(Vector3::new(12.0, -7.0, 3.0), none);
         let turned = motion(Vector3::zeros(), turn);
-        for input in [Input::Points, Input::Residual, Input::Streaming] {
+        for input in [Input::Points, Input::Residual, Input::Differences, Input::Streaming] {
             let own = features(input, &here, &none);
             assert!(largest_difference(&own, &features(input, &there, &none)) < 1e-5, "{input:?}");
             // Turning the features is turning the motion.

@@ -1,7 +1,7 @@
 //! A pair of networks as a simulator.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use cromosim_imu::KinematicSample;
 use cromosim_spatial::{Stamp, derivative_weights};
@@ -49,33 +49,32 @@ impl LearnedSimulator {
     /// # Errors
     /// Those of [`Network::read`] and [`LearnedSimulator::new`]; a note on input or quantity that is absent or differs.
     pub fn read(folder: &Path) -> Result<Self, LearnedError> {
-        let mut inputs = Vec::new();
-        let mut read = |quantity: Quantity| {
+        let [acceleration, angular_velocity] = Quantity::BOTH.map(|quantity| {
             let path = folder.join(format!("{}.safetensors", quantity.name()));
-            let (network, notes) = Network::read(&path)?;
-            let note = |key: &'static str| {
-                let reason = format!("no note `{key}`");
-                notes.get(key).cloned().ok_or_else(|| LearnedError::Metadata { path: path.clone(), key: "cromosim", reason })
-            };
+            Network::read(&path).map(|(network, notes)| (path, network, notes))
+        });
+        Self::of_files([acceleration?, angular_velocity?])
+    }
+
+    /// Files in the order of [`Quantity::BOTH`], with their notes.
+    pub(crate) fn of_files(files: [(PathBuf, Network, BTreeMap<String, String>); 2]) -> Result<Self, LearnedError> {
+        let mut inputs = Vec::new();
+        for ((path, _, notes), quantity) in files.iter().zip(Quantity::BOTH) {
+            let wrong = |reason: String| LearnedError::Metadata { path: path.clone(), key: "cromosim", reason };
+            let note = |key: &str| notes.get(key).ok_or_else(|| wrong(format!("no note `{key}`")));
             let stated = note(QUANTITY)?;
             if stated != quantity.name() {
-                let reason = format!("it predicts `{stated}`, not `{}`", quantity.name());
-                return Err(LearnedError::Metadata { path: path.clone(), key: "cromosim", reason });
+                return Err(wrong(format!("it predicts `{stated}`, not `{}`", quantity.name())));
             }
             let stated = note(INPUT)?;
-            let input = Input::from_name(&stated).ok_or_else(|| {
-                let reason = format!("input `{stated}`, known are points, residual and streaming");
-                LearnedError::Metadata { path: path.clone(), key: "cromosim", reason }
-            })?;
-            inputs.push(input);
-            Ok(network)
-        };
-        let networks = [read(Quantity::Acceleration)?, read(Quantity::AngularVelocity)?];
+            let known = || wrong(format!("input `{stated}`, known are points, residual, differences and streaming"));
+            inputs.push(Input::from_name(stated).ok_or_else(known)?);
+        }
         if inputs[0] != inputs[1] {
             let problem = format!("its input is {:?}, the other's {:?}", inputs[1], inputs[0]);
             return Err(LearnedError::WrongNetwork { network: Quantity::AngularVelocity.name(), problem });
         }
-        Self::new(inputs[0], networks)
+        Self::new(inputs[0], files.map(|(_, network, _)| network))
     }
 
     /// Writes both files into a folder that exists.

@@ -2,7 +2,7 @@
 
 use cromosim_body::{BodyPose, ShapedBody};
 use cromosim_imu::{KinematicSample, MountedSite, Placement, Scheme, SensorTrajectory, simulate_kinematics};
-use cromosim_spatial::{MAX_STENCIL, Stamp, derivative_weights, uniform_stamps};
+use cromosim_spatial::{MAX_STENCIL, Stamp, derivative_weights, so3, uniform_stamps};
 use nalgebra::Vector3;
 
 use crate::{LearnedError, PATCH_POINTS, Patch};
@@ -17,6 +17,9 @@ pub struct SiteMotion {
     pub points: Vec<[Vector3<f64>; PATCH_POINTS]>,
     /// The sensor's frame and its analytic derivatives, world axes; as many as points.
     pub kinematics: Vec<KinematicSample>,
+    /// Acceleration, m/s2, and angular velocity, rad/s, by plain differences of the frames at neighbouring samples, world axes: noisy, but little
+    /// is smoothed away. As many as points.
+    pub unsmoothed: Vec<[Vector3<f64>; 2]>,
 }
 
 impl SiteMotion {
@@ -53,7 +56,9 @@ impl SiteMotion {
         let grid = uniform_stamps(trajectory.start(), trajectory.end(), NETWORK_RATE_HZ)?;
         let stamps: Vec<Stamp> = trajectory.frames().iter().map(|frame| frame.stamp).collect();
         let points = grid.iter().map(|stamp| Around::new(&stamps, *stamp).blend(|frame| &frames[frame])).collect();
-        Ok(Self { points, kinematics: simulate_kinematics(trajectory, scheme, &grid)? })
+        let plain = simulate_kinematics(trajectory, Scheme::SecondDifference, &grid)?;
+        let unsmoothed = differences(&plain);
+        Ok(Self { points, kinematics: simulate_kinematics(trajectory, scheme, &grid)?, unsmoothed })
     }
 
     /// Samples.
@@ -65,6 +70,24 @@ impl SiteMotion {
     pub fn is_empty(&self) -> bool {
         self.kinematics.is_empty()
     }
+}
+
+/// Second difference of the position, and the turn between the neighbours; at the ends those of the sample beside. The rate of the samples, not
+/// that of the source, so that scatter of the same size looks alike.
+fn differences(samples: &[KinematicSample]) -> Vec<[Vector3<f64>; 2]> {
+    let last = samples.len().saturating_sub(1);
+    let at = |k: usize| {
+        let Some([before, own, after]) =
+            k.checked_sub(1).and_then(|first| samples.get(first..first + 3)).and_then(|three| three.as_array())
+        else {
+            return [Vector3::zeros(); 2];
+        };
+        let [before, own, after] = [before, own, after].map(|sample| sample.world_from_sensor);
+        let second = before.translation.vector - 2.0 * own.translation.vector + after.translation.vector;
+        let turn = so3::log(&(after.rotation * before.rotation.inverse()));
+        [second * NETWORK_RATE_HZ.powi(2), turn * (0.5 * NETWORK_RATE_HZ)]
+    };
+    (0..samples.len()).map(|k| at(k.clamp(1, last.saturating_sub(1).max(1)))).collect()
 }
 
 /// How the frames around a stamp make up what was there: a cubic through four, or one frame of that very stamp.
@@ -108,6 +131,24 @@ mod tests {
     use nalgebra::Isometry3;
 
     use super::*;
+
+    #[test]
+    fn differences_are_those_of_a_steady_turn_and_fall() {
+        let frame = |k: u32| {
+            let seconds = f64::from(k) / 60.0;
+            let at = Isometry3::new(Vector3::new(0.0, 1.0, -4.9 * seconds * seconds), Vector3::new(0.0, 2.0 * seconds, 0.0));
+            SensorFrame::new(Stamp::from_seconds(seconds), at)
+        };
+        let trajectory = SensorTrajectory::new((0..60).map(frame).collect()).unwrap();
+        let motion = SiteMotion::rigid(&trajectory, Scheme::Richardson).unwrap();
+        assert_eq!(motion.unsmoothed.len(), motion.len());
+        for [acceleration, angular_velocity] in motion.unsmoothed {
+            let (fall, turn) = (Vector3::new(0.0, 0.0, -9.8), Vector3::new(0.0, 2.0, 0.0));
+            // Stamps are whole nanoseconds, which second differences multiply by 1e4.
+            assert!((acceleration - fall).norm() < 1e-3 && (angular_velocity - turn).norm() < 1e-5);
+        }
+        assert_eq!(differences(&motion.kinematics[..2]), [[Vector3::zeros(); 2]; 2]);
+    }
 
     #[test]
     fn a_motion_between_frames_is_cubic() {

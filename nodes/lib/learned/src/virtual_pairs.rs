@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use cromosim_body::{BodyModel, BodyPose, ShapedBody};
-use cromosim_imu::{MountedSite, Placement, Scheme, normal_pair, simulate_kinematics};
+use cromosim_imu::{
+    KinematicSample, MountedSite, Placement, Reading, Scheme, SensorFrame, SensorTrajectory, normal_pair, simulate_kinematics,
+};
 use cromosim_spatial::{Stamp, uniform_stamps};
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
@@ -17,6 +19,8 @@ const FINE_RATE_HZ: f64 = 400.0;
 /// A joint that flips (uncleaned motion capture) accelerates like no limb, m/s2; nothing is learned within [`AROUND`] samples of it.
 const FASTEST: f64 = 60.0;
 const AROUND: usize = 15;
+/// Samples at each end.
+const END: usize = 10;
 /// Coefficients of shape that are drawn.
 const SHAPES: usize = 10;
 /// Coefficients of shape beyond so many standard deviations are nobody's.
@@ -61,22 +65,14 @@ impl Wearing {
         [1.0, 1.0]
     }
 
-    /// The pair of a motion (frames at `rate_hz`) and a placement; each seed another person, device and error. The clock and mount of the
-    /// device are fitted as a real one's would be, to the motion without the errors of a source worse than motion capture.
+    /// A person and a device in a motion; each seed another person, device and errors of the source.
     ///
     /// # Errors
-    /// Those of the site, of kinematics and of [`crate::align()`].
-    pub fn pair(
-        &self,
-        model: &Arc<BodyModel>,
-        names: PairNames,
-        (poses, rate_hz): (&[BodyPose], f64),
-        placement: &Placement,
-        seed: u64,
-    ) -> Result<Pair, LearnedError> {
+    /// Those of the site, of kinematics and of effects.
+    pub fn draw(&self, model: &Arc<BodyModel>, motion: &KnownMotion<'_>, placement: &Placement, seed: u64) -> Result<Worn, LearnedError> {
         let mut random = ChaCha12Rng::seed_from_u64(seed);
         let speed = self.speed[0] + (self.speed[1] - self.speed[0]) * random.random::<f64>();
-        let rate_hz = rate_hz * speed;
+        let (poses, rate_hz) = (motion.poses, motion.rate_hz * speed);
         let betas = |random: &mut ChaCha12Rng, around: &[f64], sigma: f64| -> Vec<f64> {
             let draw = |beta: &f64| (beta + sigma * normal_pair(random)[0]).clamp(-WIDEST_SHAPE, WIDEST_SHAPE);
             around.iter().map(draw).collect()
@@ -94,26 +90,119 @@ impl Wearing {
 
         let [near, far] = [random.random(), random.random()];
         let mocap = SourceErrors { rate_hz, ..SourceErrors::MOCAP }.degrade(&told, poses, near);
-        let reference = SiteMotion::on_body(&told, placement, &stamps, &mocap)?;
-        let motion = if self.source.rate_hz < 0.9 * rate_hz {
+        let best = placement.clone().with_scheme(Scheme::Spline);
+        let reference = SiteMotion::on_body(&told, &best, &stamps, &mocap)?;
+        let (stamps, poses) = if self.source.rate_hz < 0.9 * rate_hz {
             let sampled = sampled(poses, rate_hz, self.source.rate_hz);
             let degraded = self.source.degrade(&told, &sampled, far);
-            SiteMotion::on_body(&told, placement, &self::stamps(degraded.len(), self.source.rate_hz), &degraded)?
+            (self::stamps(degraded.len(), self.source.rate_hz), degraded)
         } else {
-            let source = SourceErrors { rate_hz, ..self.source };
-            SiteMotion::on_body(&told, placement, &stamps, &source.degrade(&told, poses, near))?
+            (stamps, SourceErrors { rate_hz, ..self.source }.degrade(&told, poses, near))
         };
-        let mut pair = Pair::new(names, motion, &reference, &read_at, &readings)?;
-        let wild: Vec<bool> = read_at
-            .iter()
-            .map(|stamp| {
-                let at = (((*stamp - fine[0]) * FINE_RATE_HZ).round() as usize).min(truth.len() - 1);
-                truth[at].acceleration.norm() > FASTEST
-            })
-            .collect();
-        pair.leave_out(|sample| wild[sample.saturating_sub(AROUND).min(wild.len())..(sample + AROUND).min(wild.len())].contains(&true));
+        let doubtful = doubtful(motion, rate_hz, &truth, &read_at);
+        Ok(Worn { told, placement: placement.clone(), stamps, poses, reference, read_at, readings, doubtful })
+    }
+
+    /// The pair of a motion and a placement, see [`Wearing::draw`] and [`Worn::pair`].
+    ///
+    /// # Errors
+    /// As those.
+    pub fn pair(
+        &self,
+        model: &Arc<BodyModel>,
+        names: PairNames,
+        motion: &KnownMotion<'_>,
+        placement: &Placement,
+        seed: u64,
+    ) -> Result<Pair, LearnedError> {
+        let worn = self.draw(model, motion, placement, seed)?;
+        worn.pair(names, worn.motion(placement.scheme())?)
+    }
+}
+
+/// A motion that is known.
+#[derive(Clone, Copy, Debug)]
+pub struct KnownMotion<'a> {
+    /// Its frames.
+    pub poses: &'a [BodyPose],
+    /// Frames per second, Hz.
+    pub rate_hz: f64,
+    /// Frames in which it is not a person's, such as joints that flip; empty where nothing is known of that.
+    pub suspect: &'a [bool],
+}
+
+/// A drawn person with a drawn device in a motion, and what a simulation is told of it.
+#[derive(Clone, Debug)]
+pub struct Worn {
+    told: ShapedBody,
+    placement: Placement,
+    /// The motion with the errors of its source.
+    stamps: Vec<Stamp>,
+    poses: Vec<BodyPose>,
+    /// The best motion that is known.
+    reference: SiteMotion,
+    read_at: Vec<Stamp>,
+    readings: Vec<Reading>,
+    /// For each reading: whether the motion there is no person's.
+    doubtful: Vec<bool>,
+}
+
+impl Worn {
+    /// The motion as the source gives it, differentiated by a scheme.
+    ///
+    /// # Errors
+    /// As [`SiteMotion::on_body`].
+    pub fn motion(&self, scheme: Scheme) -> Result<SiteMotion, LearnedError> {
+        SiteMotion::on_body(&self.told, &self.placement.clone().with_scheme(scheme), &self.stamps, &self.poses)
+    }
+
+    /// The sensor's frames as the source gives them.
+    ///
+    /// # Errors
+    /// As [`MountedSite::trajectory`].
+    pub fn trajectory(&self) -> Result<SensorTrajectory, LearnedError> {
+        Ok(MountedSite::new(&self.told, &self.placement)?.trajectory(&self.stamps, &self.poses)?)
+    }
+
+    /// The frames of the joint that carries the sensor, in the sensor's axes at rest: what a simulation without skin takes for the sensor.
+    ///
+    /// # Errors
+    /// As [`MountedSite::trajectory`].
+    pub fn joint_trajectory(&self) -> Result<SensorTrajectory, LearnedError> {
+        let mounted = MountedSite::new(&self.told, &self.placement)?;
+        let (joint, turn) = (mounted.joint().index(), mounted.segment_from_sensor().rotation);
+        let frame = |(stamp, pose): (&Stamp, &BodyPose)| SensorFrame::new(*stamp, self.told.world_from_segments(pose)[joint] * turn);
+        Ok(SensorTrajectory::new(self.stamps.iter().zip(&self.poses).map(frame).collect())?)
+    }
+
+    /// The pair of a motion of [`Worn::motion`]. The clock and mount of the device are fitted as a real one's would be, to the motion without
+    /// the errors of a source worse than motion capture.
+    ///
+    /// # Errors
+    /// As [`Pair::new`].
+    pub fn pair(&self, names: PairNames, motion: SiteMotion) -> Result<Pair, LearnedError> {
+        let mut pair = Pair::new(names, motion, &self.reference, &self.read_at, &self.readings)?;
+        pair.leave_out(|sample| self.doubtful.get(sample).is_none_or(|doubtful| *doubtful));
         Ok(pair)
     }
+}
+
+/// Which readings stand near a frame that is suspect, or where a limb accelerates like none, or so near an end that the true motion is itself
+/// extrapolated.
+fn doubtful(motion: &KnownMotion<'_>, rate_hz: f64, truth: &[KinematicSample], read_at: &[Stamp]) -> Vec<bool> {
+    let start = truth[0].stamp;
+    let wild: Vec<bool> = read_at
+        .iter()
+        .map(|stamp| {
+            let seconds = *stamp - start;
+            let at = ((seconds * FINE_RATE_HZ).round() as usize).min(truth.len() - 1);
+            let frame = (seconds * rate_hz).round() as usize;
+            truth[at].acceleration.norm() > FASTEST || motion.suspect.get(frame).copied().unwrap_or(false)
+        })
+        .collect();
+    let at_end = |sample: usize| sample < END || sample + END >= wild.len();
+    let near = |sample: usize| at_end(sample) || wild[sample.saturating_sub(AROUND)..(sample + AROUND + 1).min(wild.len())].contains(&true);
+    (0..wild.len()).map(near).collect()
 }
 
 fn stamps(count: usize, rate_hz: f64) -> Vec<Stamp> {
@@ -186,6 +275,10 @@ mod tests {
         (0..(rate_hz * seconds) as usize).map(pose).collect()
     }
 
+    fn known(poses: &[BodyPose]) -> KnownMotion<'_> {
+        KnownMotion { poses, rate_hz: 120.0, suspect: &[] }
+    }
+
     fn names() -> PairNames {
         PairNames { name: "test".to_owned(), subject: "s".to_owned(), position: "left_wrist".to_owned() }
     }
@@ -196,7 +289,7 @@ mod tests {
         let placement = Placement::at_site("left_wrist", "left_watch", 100.0).unwrap();
         let analytic = |source, scheme| {
             let placement = placement.clone().with_scheme(scheme);
-            let pair = Wearing::of(source).pair(&model, names(), (&poses, 120.0), &placement, 7).unwrap();
+            let pair = Wearing::of(source).pair(&model, names(), &known(&poses), &placement, 7).unwrap();
             assert_eq!((pair.targets.len(), pair.measured.len()), (pair.motion.len(), pair.motion.len()));
             let none = pair.rms(|_| (Vector3::zeros(), Vector3::zeros())).unwrap();
             let kinematics = &pair.motion.kinematics;
@@ -214,7 +307,7 @@ mod tests {
         let (model, poses) = (BodyModel::embedded(), poses(120.0, 3.0));
         let placement = Placement::at_site("left_wrist", "left_watch", 100.0).unwrap();
         let wearing = Wearing { speed: [0.8, 1.25], ..Wearing::of(SourceErrors::WHAM) };
-        let pair = |seed| wearing.pair(&model, names(), (&poses, 120.0), &placement, seed).unwrap();
+        let pair = |seed| wearing.pair(&model, names(), &known(&poses), &placement, seed).unwrap();
         let (one, again, other) = (pair(1), pair(1), pair(2));
         assert_eq!(one.targets, again.targets);
         assert_eq!(one.motion.points, again.motion.points);
