@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
+use cromosim_imu::SensorFrame;
 use cromosim_learned::train::{Loss, Schedule, TrainOptions};
 use cromosim_learned::{DeviceRanges, Direction, Input, NetworkShape, SourceErrors, Turns, Wearing};
 use serde::Deserialize;
@@ -14,7 +15,7 @@ const SCHEMA: &str = "cromosim/training/1";
 #[serde(deny_unknown_fields)]
 pub struct Config {
     schema: String,
-    /// What the networks see: points, residual or streaming.
+    /// What the networks see: points, residual, differences or streaming.
     pub input: Input,
     /// Sizes of the networks.
     pub network: Sizes,
@@ -53,7 +54,7 @@ pub struct Source {
     pub subject: String,
     /// Under which licence, for the model card.
     pub licence: String,
-    /// With motions: the body's sites.
+    /// With motions: the body's sites. With recordings: only IMUs of these names; all where none is named.
     #[serde(default)]
     pub sites: Vec<String>,
     /// With motions: draws of device and person for each motion and site.
@@ -62,12 +63,18 @@ pub struct Source {
     /// With motions: errors of the source.
     #[serde(default)]
     pub source: SourceChoice,
+    /// With motions: frames per second that the source gives, Hz, rather than its own; a motion of fewer keeps its own.
+    #[serde(default)]
+    pub rate_hz: Option<f64>,
     /// With motions: what devices differ by.
     #[serde(default)]
     pub devices: DeviceRanges,
     /// With motions: played so many times as fast.
     #[serde(default = "as_recorded")]
     pub speed: [f64; 2],
+    /// With recordings: this part of their time, from 0 to 1.
+    #[serde(default = "whole")]
+    pub part: [f64; 2],
 }
 
 /// Errors by the name of their source.
@@ -117,6 +124,10 @@ fn as_recorded() -> [f64; 2] {
     [1.0, 1.0]
 }
 
+fn whole() -> [f64; 2] {
+    [0.0, 1.0]
+}
+
 impl Config {
     /// Reads a file.
     pub fn read(path: &Path) -> anyhow::Result<Self> {
@@ -126,16 +137,7 @@ impl Config {
             bail!("{}: schema: expected `{SCHEMA}`, found `{}`", path.display(), config.schema);
         }
         for source in &config.data {
-            let subject = &source.subject;
-            if source.motions.is_empty() == source.recordings.is_empty() {
-                bail!("{}: data of subject {subject}: expected either motions or recordings", path.display());
-            }
-            if !source.motions.is_empty() && source.sites.is_empty() {
-                bail!("{}: data of subject {subject}: motions need sites, such as [right_watch]", path.display());
-            }
-            if !(source.speed[0] > 0.1 && source.speed[0] <= source.speed[1] && source.speed[1] < 10.0) {
-                bail!("{}: data of subject {subject}: speed {:?}: expected a range within 0.1 to 10", path.display(), source.speed);
-            }
+            source.check().with_context(|| path.display().to_string())?;
         }
         if let Some(unknown) = config.validation.iter().find(|subject| !config.data.iter().any(|source| source.subject == **subject)) {
             bail!("{}: validation: no data of subject {unknown}", path.display());
@@ -171,7 +173,37 @@ impl Config {
 impl Source {
     /// How drawn people wear drawn devices.
     pub fn wearing(&self) -> Wearing {
-        Wearing { devices: self.devices.clone(), speed: self.speed, ..Wearing::of(self.source.errors()) }
+        let errors = self.source.errors();
+        let errors = SourceErrors { rate_hz: self.rate_hz.unwrap_or(errors.rate_hz), ..errors };
+        Wearing { devices: self.devices.clone(), speed: self.speed, ..Wearing::of(errors) }
+    }
+
+    /// Whether everything that is needed is there and in its range.
+    pub fn check(&self) -> anyhow::Result<()> {
+        let Self { subject, speed, part, .. } = self;
+        if self.motions.is_empty() == self.recordings.is_empty() {
+            bail!("data of subject {subject}: expected either motions or recordings");
+        }
+        if !self.motions.is_empty() && self.sites.is_empty() {
+            bail!("data of subject {subject}: motions need sites, such as [right_watch]");
+        }
+        if !(speed[0] > 0.1 && speed[0] <= speed[1] && speed[1] < 10.0) {
+            bail!("data of subject {subject}: speed {speed:?}: expected a range within 0.1 to 10");
+        }
+        if let Some(rate_hz) = self.rate_hz.filter(|rate_hz| !(5.0..=1000.0).contains(rate_hz)) {
+            bail!("data of subject {subject}: rate_hz {rate_hz}: expected 5 to 1000");
+        }
+        if !(part[0] >= 0.0 && part[0] < part[1] && part[1] <= 1.0) {
+            bail!("data of subject {subject}: part {part:?}: expected a range within 0 to 1");
+        }
+        Ok(())
+    }
+
+    /// The frames of a recording's reference within its part of the time.
+    pub fn part_of(&self, frames: Vec<SensorFrame>) -> Vec<SensorFrame> {
+        let (Some(first), Some(last)) = (frames.first(), frames.last()) else { return frames };
+        let [from, to] = self.part.map(|part| first.stamp.plus_seconds(part * (last.stamp - first.stamp)));
+        frames.into_iter().filter(|frame| frame.stamp >= from && frame.stamp <= to).collect()
     }
 
     /// The motion files, in order; relative to a folder.
@@ -223,7 +255,20 @@ fn matches(pattern: &str, name: &str) -> bool {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
     use super::*;
+
+    #[test]
+    fn files_that_come_with_the_suite_are_sound() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("config/training");
+        let mut count = 0;
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let config = Config::read(&entry.unwrap().path()).unwrap();
+            assert!(config.data.iter().any(|source| !config.validation.contains(&source.subject)));
+            count += 1;
+        }
+        assert_eq!(count, 5);
+    }
 
     #[test]
     fn patterns_match_names() {

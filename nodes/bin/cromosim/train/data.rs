@@ -8,8 +8,8 @@ use anyhow::{Context, bail};
 use cromosim_bag::BagReader;
 use cromosim_body::{BodyModel, BodyPose};
 use cromosim_imu::{Placement, Reading, Scheme, SensorFrame, SensorTrajectory};
-use cromosim_learned::{Pair, PairNames, SiteMotion};
-use cromosim_motion::datasets::{DatasetFiles, open_dataset, parse_skeleton_npz};
+use cromosim_learned::{KnownMotion, Pair, PairNames, SiteMotion, Worn};
+use cromosim_motion::datasets::{DatasetFiles, LabelledClip, open_dataset, parse_skeleton_npz};
 use cromosim_motion::{MotionOptions, read_motion_for, retarget};
 use cromosim_replay::recording::of_dataset;
 use cromosim_spatial::Stamp;
@@ -27,6 +27,9 @@ const LONGEST_GAP: f64 = 0.1;
 /// Shorter pieces between gaps, s, are left out.
 const SHORTEST: f64 = 2.0;
 
+/// Skeleton clips as npz begin with what is left of a blend out of the T-pose: hands come down with 300 m/s2.
+pub const BLEND_FRAMES: usize = 6;
+
 /// A motion as its frames.
 pub struct Motion {
     /// The file's name without its ending.
@@ -35,6 +38,15 @@ pub struct Motion {
     pub poses: Vec<BodyPose>,
     /// Frames per second, Hz.
     pub rate_hz: f64,
+    /// Frames with joints that flip; empty where the file does not say.
+    pub suspect: Vec<bool>,
+}
+
+impl Motion {
+    /// As the drawing of devices takes it.
+    pub fn known(&self) -> KnownMotion<'_> {
+        KnownMotion { poses: &self.poses, rate_hz: self.rate_hz, suspect: &self.suspect }
+    }
 }
 
 /// Reads a motion of any kind, skeleton clips as npz among them.
@@ -42,11 +54,14 @@ pub fn read_motion(path: &Path, model: &Arc<BodyModel>) -> anyhow::Result<Motion
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let options = MotionOptions { keep_lead_in: true, ..MotionOptions::default() };
     let skeleton = || File::open(path).ok().and_then(|file| parse_skeleton_npz(file, &path.display().to_string()).ok());
-    let motion = match skeleton() {
-        Some(labelled) => retarget(&labelled.clip, model, &options)?,
-        None => read_motion_for(path, model, &options)?,
+    let Some(LabelledClip { clip, mut suspect, .. }) = skeleton() else {
+        let motion = read_motion_for(path, model, &options)?;
+        return Ok(Motion { name, rate_hz: motion.rate_hz, poses: motion.frames, suspect: Vec::new() });
     };
-    Ok(Motion { name, rate_hz: motion.rate_hz, poses: motion.frames })
+    let motion = retarget(&clip, model, &options)?;
+    let begin = BLEND_FRAMES.min(motion.frames.len());
+    suspect.drain(..begin.min(suspect.len()));
+    Ok(Motion { name, rate_hz: motion.rate_hz, poses: motion.frames[begin..].to_vec(), suspect })
 }
 
 /// All pairs of a training, in the order of its file; motions are played on the body that is given, or the embedded one.
@@ -54,27 +69,36 @@ pub fn pairs(config: &Config, folder: &Path, given: Option<&Arc<BodyModel>>, int
     let model = given.cloned().unwrap_or_else(BodyModel::embedded);
     let mut all = Vec::new();
     for (index, source) in config.data.iter().enumerate() {
-        let seed = config.training.seed.wrapping_mul(1_000_003).wrapping_add(index as u64);
-        all.extend(if source.motions.is_empty() {
-            recorded(source, folder, given)?
+        if source.motions.is_empty() {
+            for piece in recorded(source, folder, given)? {
+                all.push(piece.pair(&source.subject)?);
+            }
         } else {
-            drawn(source, folder, &model, seed, interrupt)?
-        });
+            let seed = config.training.seed.wrapping_mul(1_000_003).wrapping_add(index as u64);
+            let pair = |worn: Worn, names| Ok(worn.pair(names, worn.motion(Scheme::Spline)?)?);
+            all.extend(draw(source, folder, &model, seed, interrupt, pair)?);
+        }
     }
     Ok(all)
 }
 
-/// Pairs of drawn people and devices.
-fn drawn(source: &Source, folder: &Path, model: &Arc<BodyModel>, seed: u64, interrupt: &Interrupt) -> anyhow::Result<Vec<Pair>> {
+/// Drawn people and devices of a source, each made into something.
+pub fn draw<T: Send>(
+    source: &Source,
+    folder: &Path,
+    model: &Arc<BodyModel>,
+    seed: u64,
+    interrupt: &Interrupt,
+    make: impl Fn(Worn, PairNames) -> anyhow::Result<T> + Sync,
+) -> anyhow::Result<Vec<T>> {
     let files = source.motion_files(folder)?;
-    let scheme = if source.wearing().source.rate_hz < 60.0 { Scheme::Richardson } else { Scheme::Spline };
-    let placements = source.sites.iter().map(|site| placement(site, scheme)).collect::<anyhow::Result<Vec<_>>>()?;
+    let placements = source.sites.iter().map(|site| placement(site, Scheme::Spline)).collect::<anyhow::Result<Vec<_>>>()?;
     let wearing = source.wearing();
     let bar = progress::bar(files.len() as u64, &format!("subject {}, motions", source.subject));
-    let one = |(number, path): (usize, &std::path::PathBuf)| -> anyhow::Result<Vec<Pair>> {
+    let one = |(number, path): (usize, &std::path::PathBuf)| -> anyhow::Result<Vec<T>> {
         interrupt.check()?;
         let motion = read_motion(path, model)?;
-        let mut pairs = Vec::new();
+        let mut made = Vec::new();
         for (place, placement) in placements.iter().enumerate() {
             for repeat in 0..source.repeats {
                 let names = PairNames {
@@ -83,16 +107,17 @@ fn drawn(source: &Source, folder: &Path, model: &Arc<BodyModel>, seed: u64, inte
                     position: placement.name().to_owned(),
                 };
                 let draw = mix(&[seed, number as u64, place as u64, repeat]);
-                let pair = wearing.pair(model, names, (&motion.poses, motion.rate_hz), placement, draw);
-                pairs.push(pair.with_context(|| format!("{}, site {}", path.display(), placement.name()))?);
+                let worn = wearing.draw(model, &motion.known(), placement, draw);
+                let worn = worn.with_context(|| format!("{}, site {}", path.display(), placement.name()))?;
+                made.push(make(worn, names).with_context(|| path.display().to_string())?);
             }
         }
         bar.inc(1);
-        Ok(pairs)
+        Ok(made)
     };
-    let pairs: anyhow::Result<Vec<Vec<Pair>>> = files.par_iter().enumerate().map(one).collect();
+    let made: anyhow::Result<Vec<Vec<T>>> = files.par_iter().enumerate().map(one).collect();
     bar.finish_and_clear();
-    Ok(pairs?.into_iter().flatten().collect())
+    Ok(made?.into_iter().flatten().collect())
 }
 
 /// A placement named as its site.
@@ -113,12 +138,42 @@ pub fn mix(numbers: &[u64]) -> u64 {
     })
 }
 
-/// Pairs of real devices.
-fn recorded(source: &Source, folder: &Path, given: Option<&Arc<BodyModel>>) -> anyhow::Result<Vec<Pair>> {
-    let mut pairs = Vec::new();
+/// A real device beside its reference, where the reference has no gap.
+pub struct Piece {
+    /// The recording, and which of its pieces.
+    pub name: String,
+    /// Where the device was.
+    pub position: String,
+    /// The reference.
+    pub trajectory: SensorTrajectory,
+    /// Of all readings of the recording.
+    stamps: Arc<Vec<Stamp>>,
+    readings: Arc<Vec<Reading>>,
+}
+
+impl Piece {
+    /// The pair, its motion by the spline.
+    pub fn pair(&self, subject: &str) -> anyhow::Result<Pair> {
+        let motion = SiteMotion::rigid(&self.trajectory, Scheme::Spline)?;
+        let names = PairNames { name: self.name.clone(), subject: subject.to_owned(), position: self.position.clone() };
+        let pair = Pair::new(names, motion.clone(), &motion, &self.stamps, &self.readings);
+        pair.with_context(|| format!("{}, {}", self.name, self.position))
+    }
+}
+
+/// The real devices of a source.
+pub fn recorded(source: &Source, folder: &Path, given: Option<&Arc<BodyModel>>) -> anyhow::Result<Vec<Piece>> {
+    let mut all = Vec::new();
     for path in source.recording_files(folder)? {
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let before = pairs.len();
+        let before = all.len();
+        let mut add = |position: &str, frames, stamps, readings| -> anyhow::Result<()> {
+            if !source.sites.is_empty() && !source.sites.iter().any(|site| site == position) {
+                return Ok(());
+            }
+            all.extend(pieces(&name, position, source.part_of(frames), stamps, readings)?);
+            Ok(())
+        };
         if let Some((_, recording)) = open_dataset(&path, &DatasetFiles::default())? {
             for placed in of_dataset(&recording) {
                 let (Some(poses), Some(series)) = (placed.poses, placed.series) else { continue };
@@ -127,33 +182,27 @@ fn recorded(source: &Source, folder: &Path, given: Option<&Arc<BodyModel>>) -> a
                         SensorFrame::new(*stamp, Isometry3::from_parts((*position).into(), *rotation))
                     });
                 let both = series.specific_force.iter().zip(&series.angular_velocity);
-                let readings: Vec<Reading> = both.map(|(force, rate)| Reading { force: *force, rate: *rate }).collect();
-                pairs.extend(pieces(&name, &source.subject, placed.name, frames.collect(), &series.stamps, &readings)?);
+                let readings = both.map(|(force, rate)| Reading { force: *force, rate: *rate }).collect();
+                add(placed.name, frames.collect(), series.stamps.clone(), readings)?;
             }
         } else {
             for (position, recorded) in recorded::read(&BagReader::open(&path)?, given)? {
                 let recorded = recorded.with_context(|| format!("{}: {position}", path.display()))?;
                 let record = recorded.record();
-                let (stamps, readings) = (&record.imu.stamps, &record.imu.readings);
-                pairs.extend(pieces(&name, &source.subject, &position, recorded.frames, stamps, readings)?);
+                let (stamps, readings) = (record.imu.stamps.clone(), record.imu.readings.clone());
+                add(&position, recorded.frames, stamps, readings)?;
             }
         }
-        if pairs.len() == before {
-            bail!("{}: no reference of {SHORTEST} s without a gap beside an IMU", path.display());
+        if all.len() == before {
+            let named = if source.sites.is_empty() { String::new() } else { format!(" called {}", source.sites.join(" or ")) };
+            bail!("{}: no reference of {SHORTEST} s without a gap beside an IMU{named}", path.display());
         }
     }
-    Ok(pairs)
+    Ok(all)
 }
 
-/// One pair for each piece of the reference without a gap.
-pub fn pieces(
-    name: &str,
-    subject: &str,
-    position: &str,
-    frames: Vec<SensorFrame>,
-    stamps: &[Stamp],
-    readings: &[Reading],
-) -> anyhow::Result<Vec<Pair>> {
+/// One for each piece of the reference without a gap.
+fn pieces(name: &str, position: &str, frames: Vec<SensorFrame>, stamps: Vec<Stamp>, readings: Vec<Reading>) -> anyhow::Result<Vec<Piece>> {
     let mut pieces: Vec<Vec<SensorFrame>> = vec![Vec::new()];
     for frame in frames {
         let piece = pieces.len() - 1;
@@ -163,11 +212,11 @@ pub fn pieces(
             pieces[piece].push(frame);
         }
     }
+    let (stamps, readings) = (Arc::new(stamps), Arc::new(readings));
     let long = |piece: &Vec<SensorFrame>| piece.len() > 10 && piece[piece.len() - 1].stamp - piece[0].stamp >= SHORTEST;
-    let pair = |(number, piece): (usize, Vec<SensorFrame>)| -> anyhow::Result<Pair> {
-        let motion = SiteMotion::rigid(&SensorTrajectory::new(piece)?, Scheme::Spline)?;
-        let names = PairNames { name: format!("{name} {number}"), subject: subject.to_owned(), position: position.to_owned() };
-        Pair::new(names, motion.clone(), &motion, stamps, readings).with_context(|| format!("{name}, {position}"))
+    let piece = |(number, frames): (usize, Vec<SensorFrame>)| -> anyhow::Result<Piece> {
+        let (name, position) = (format!("{name} {number}"), position.to_owned());
+        Ok(Piece { name, position, trajectory: SensorTrajectory::new(frames)?, stamps: stamps.clone(), readings: readings.clone() })
     };
-    pieces.into_iter().filter(long).enumerate().map(pair).collect()
+    pieces.into_iter().filter(long).enumerate().map(piece).collect()
 }
