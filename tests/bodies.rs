@@ -18,7 +18,8 @@ use cromosim_ros::testing::{environment, in_private_network};
 use cromosim_spatial::Stamp;
 
 /// Commands that take poses or shapes of a body, and those that never see one.
-const WITH_BODY: [&str; 9] = ["demo", "simulate", "train", "evaluate har", "diagnose", "convert", "trajectory", "inspect", "body export"];
+const WITH_BODY: [&str; 10] =
+    ["demo", "simulate", "train", "evaluate fidelity", "evaluate har", "diagnose", "convert", "trajectory", "inspect", "body export"];
 const WITHOUT_BODY: [&str; 6] = ["compare", "map", "bag recover", "bag csv", "completion", "node"];
 const NODES_WITH_BODY: [&str; 4] = ["replay", "smpl_state", "virtual_imu", "viewer"];
 const NODES_WITHOUT_BODY: [&str; 2] = ["recorder", "gap_monitor"];
@@ -76,7 +77,7 @@ fn a_file_that_is_no_body_is_refused_by_every_command() {
         ["--keypoints", ".", "--depth", ".", "--cameras", ".", "--image", "8x8", "--camera-axes", "opencv", "--depth-encoding", "depth"];
     let trajectory: Vec<&str> = ["trajectory", "walk.bvh", "x.bvh", "--scale", "1"].into_iter().chain(shot).collect();
     succeed(folder.path(), &["simulate", "--out", "walk.mcap", "--duration", "0.5"]);
-    let calls: [&[&str]; 9] = [
+    let calls: [&[&str]; 10] = [
         &["demo"],
         &["simulate", "--out", "x.mcap"],
         &["simulate", "--reference", "walk.mcap", "--out", "x.mcap"],
@@ -86,6 +87,7 @@ fn a_file_that_is_no_body_is_refused_by_every_command() {
         &["inspect", "walk.bvh"],
         &["body", "export", "x.obj"],
         &["evaluate", "har", "--out", "evaluation"],
+        &["evaluate", "fidelity", "--out", "evaluation"],
     ];
     for call in calls {
         let output = cromosim_in(folder.path(), &[call, &["--body", "no.npz"]].concat());

@@ -161,7 +161,7 @@ fn what_cannot_be_used_is_named() {
         fs::write(here.join(format!("s{person}.dat")), pamap2(person)).unwrap();
     }
     run(&["--real", "s1.dat", "s2.dat"], &["s1.dat", "at least 3 people"]);
-    run(&["--real", "s1.dat", "--learned", "nowhere"], &["nowhere/acceleration.safetensors"]);
+    run(&["--real", "s1.dat", "--learned", "nowhere"], &["nowhere: neither a folder", "motion_capture"]);
     fs::write(here.join("map.yaml"), "{sitting: SEATED}").unwrap();
     run(&["--real", "s1.dat", "--activities", "map.yaml"], &["map.yaml: 1 classes"]);
     fs::write(here.join("s3.dat"), pamap2(3)).unwrap();

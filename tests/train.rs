@@ -108,7 +108,7 @@ fn what_cannot_be_used_is_named() {
         refuses(here, &["train", "bad.yaml", "--out", "model"], &words);
         assert!(!here.join("model").exists(), "{to}");
     }
-    refuses(here, &["simulate", "walk.bvh", "--learned", "nowhere", "--out", "x.mcap"], &["nowhere", "acceleration.safetensors"]);
+    refuses(here, &["simulate", "walk.bvh", "--learned", "nowhere", "--out", "x.mcap"], &["nowhere: neither a folder", "motion_capture"]);
     fs::write(here.join("map.yaml"), "schema: cromosim/mapping/1\nplacements: {}\n").unwrap();
     refuses(here, &["simulate", "walk.bvh", "--mapping", "map.yaml", "--out", "x.mcap"], &["map.yaml", "none of the placements"]);
     succeed(here, &["simulate", "walk.bvh", "--out", "walk.mcap", "--duration", "0.1"]);

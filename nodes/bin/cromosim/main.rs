@@ -53,7 +53,7 @@ enum Command {
     Train(train::Arguments),
     /// Fit a distribution mapping from simulated to real IMUs
     Map(map::Arguments),
-    /// Measure what the simulation is worth: on the recognition of activities
+    /// Measure what simulated IMUs are worth: against measured ones, and on the recognition of activities
     Evaluate {
         #[command(subcommand)]
         command: evaluate::Command,

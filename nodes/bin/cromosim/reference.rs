@@ -98,7 +98,7 @@ pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()>
         let of_device = PlacementEffects { epoch: recorded[0].span().0, declared_noise, effects: device.effects().clone() };
         effects.placements.insert(name.clone(), of_device);
     }
-    let learned = arguments.learned.as_deref().map(LearnedSimulator::read).transpose()?;
+    let learned = arguments.learned.as_deref().map(LearnedSimulator::find).transpose()?;
     // What the networks learned on top of.
     let scheme = scheme.or(learned.as_ref().map(|_| Scheme::Spline));
     let mapping = read_mapping(arguments.mapping.as_deref(), &[name.as_str()])?;

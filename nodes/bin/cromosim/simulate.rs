@@ -84,8 +84,8 @@ pub struct Arguments {
     csv: Option<PathBuf>,
     #[command(flatten)]
     motion: MotionArguments,
-    /// Networks (a folder that `cromosim train` wrote) that correct acceleration and angular velocity before the device's effects; with --rigid the scheme is then spline unless --scheme names one, as in training
-    #[arg(long, value_name = "DIR", conflicts_with = "reference")]
+    /// Networks (motion_capture, motion_capture_60, video, streaming, or a folder that `cromosim train` wrote) that correct acceleration and angular velocity before the device's effects; with --rigid the scheme is then spline unless --scheme names one, as in training
+    #[arg(long, value_name = "MODEL", conflicts_with = "reference")]
     pub learned: Option<PathBuf>,
     /// A distribution mapping (a file that `cromosim map` wrote), applied last to the placements that it names
     #[arg(long, value_name = "FILE", conflicts_with = "reference")]
@@ -201,7 +201,7 @@ impl Setup {
             pose_error_correlation_s: arguments.pose_error_correlation,
             force: arguments.force,
             csv: arguments.csv.clone(),
-            learned: arguments.learned.as_deref().map(LearnedSimulator::read).transpose()?,
+            learned: arguments.learned.as_deref().map(LearnedSimulator::find).transpose()?,
             mapping: read_mapping(arguments.mapping.as_deref(), &names(&placements))?,
             placements,
             interrupt: Interrupt::watch()?,

@@ -2,7 +2,6 @@
 //! on real devices of people it has not seen.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -14,6 +13,7 @@ use cromosim_learned::LearnedSimulator;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::{data_folder, output};
 use crate::body;
 use crate::progress::{self, Interrupt};
 use crate::train::data::mix;
@@ -48,7 +48,7 @@ const QUICK_SUBJECTS: usize = 3;
 /// Train a classifier of activities on real, virtual and mixed IMU data, and test it on real people held out one by one
 #[derive(Args)]
 pub struct Arguments {
-    /// The folder to write results.json, tables.md and elapsed.json into
+    /// The folder to write report.html, its pictures as PNG, tables.md, results.json and elapsed.json into
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// The folder that holds har_spsw and mocap_cmu_har; default: the environment's CROMOSIM_DATA, else ../shared/data
@@ -64,8 +64,8 @@ pub struct Arguments {
     /// Which class an activity counts as (YAML: {sitting: SEATED, ...}); default: the five of the virtual side, by their usual names
     #[arg(long, value_name = "FILE")]
     activities: Option<PathBuf>,
-    /// Networks of `cromosim train` for the learned simulator; without, it is left out
-    #[arg(long, value_name = "DIR")]
+    /// Networks for the learned simulator: motion_capture, or a folder that `cromosim train` wrote; without, it is left out
+    #[arg(long, value_name = "MODEL")]
     learned: Option<PathBuf>,
     /// Body model (SMPL, SMPL-H, SMPL-X; npz or pickle) that motions are played on, rather than the embedded one
     #[arg(long, value_name = "FILE")]
@@ -103,7 +103,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let interrupt = Interrupt::watch()?;
     let settings = if arguments.quick { Settings::quick(arguments.seed) } else { Settings::full(arguments.seed) };
     let model = body::model(arguments.body.as_ref())?;
-    let learned = arguments.learned.as_deref().map(LearnedSimulator::read).transpose()?;
+    let learned = arguments.learned.as_deref().map(LearnedSimulator::find).transpose()?;
     let real = read_real(arguments, &settings)?;
     let (clips, left_out) = read_clips(arguments, &model, &real.activities)?;
     let draws: Vec<Vec<Draw>> = (0..settings.seeds)
@@ -140,13 +140,17 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
 
 fn read_real(arguments: &Arguments, settings: &Settings) -> anyhow::Result<Real> {
     let activities = arguments.activities.as_deref().map_or_else(|| Ok(Activities::five()), Activities::read)?;
-    let files = if arguments.real.is_empty() { real::default_files(&folder(arguments).join("har_spsw"))? } else { arguments.real.clone() };
+    let files = if arguments.real.is_empty() {
+        real::default_files(&data_folder(arguments.data.as_deref()).join("har_spsw"))?
+    } else {
+        arguments.real.clone()
+    };
     real::read(&files, &activities, &settings.grid(), if arguments.quick { QUICK_SUBJECTS } else { usize::MAX })
 }
 
 fn read_clips(arguments: &Arguments, model: &Arc<BodyModel>, activities: &Activities) -> anyhow::Result<(Vec<Clip>, Vec<String>)> {
     let files = if arguments.motions.is_empty() {
-        real::default_files(&folder(arguments).join("mocap_cmu_har"))?
+        real::default_files(&data_folder(arguments.data.as_deref()).join("mocap_cmu_har"))?
     } else {
         arguments.motions.clone()
     };
@@ -155,11 +159,6 @@ fn read_clips(arguments: &Arguments, model: &Arc<BodyModel>, activities: &Activi
         bail!("{}: no clip shows any of {}", files[0].display(), activities.classes().join(", "));
     }
     Ok((clips, left_out))
-}
-
-fn folder(arguments: &Arguments) -> PathBuf {
-    let usual = || std::env::var_os("CROMOSIM_DATA").map_or_else(|| PathBuf::from("../shared/data"), PathBuf::from);
-    arguments.data.clone().unwrap_or_else(usual)
 }
 
 fn announce(real: &Real, clips: &[Clip], draws: &[Vec<Draw>]) {
@@ -223,7 +222,7 @@ fn results(real: &Real, settings: Settings, virtual_side: VirtualSide, planned: 
     let skipped = if learned {
         Vec::new()
     } else {
-        vec![Skipped { what: "the learned simulator".to_owned(), reason: "no networks were given (--learned DIR)".to_owned() }]
+        vec![Skipped { what: "the learned simulator".to_owned(), reason: "no networks were given (--learned MODEL)".to_owned() }]
     };
     Results {
         schema: SCHEMA,
@@ -242,18 +241,12 @@ fn results(real: &Real, settings: Settings, virtual_side: VirtualSide, planned: 
 }
 
 fn write(out: &Path, results: &Results, elapsed: &Elapsed) -> anyhow::Result<()> {
-    let cannot = |path: &Path| format!("{}: cannot be written", path.display());
     let tables = tables::markdown(results);
     let json = |value: serde_json::Result<String>| value.map(|text| text + "\n").context("results");
     let texts = [json(serde_json::to_string_pretty(results))?, tables.clone(), json(serde_json::to_string_pretty(elapsed))?];
-    fs::create_dir_all(out).with_context(|| cannot(out))?;
-    for (name, text) in FILES.iter().zip(texts) {
-        let path = out.join(name);
-        let partial = out.join(format!(".{name}.partial"));
-        let written = fs::write(&partial, text).and_then(|()| fs::rename(&partial, &path));
-        written.with_context(|| cannot(&path))?;
-    }
+    let named: Vec<(&str, String)> = FILES.into_iter().zip(texts).collect();
+    output::write(out, &named, &tables::page(results), &tables::charts(results))?;
     print!("{tables}");
-    println!("{}: {}; {:.0} s", out.display(), FILES.join(", "), elapsed.seconds);
+    println!("{}: report.html, pictures, {}; {:.0} s", out.display(), FILES.join(", "), elapsed.seconds);
     Ok(())
 }

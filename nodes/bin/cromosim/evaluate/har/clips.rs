@@ -14,7 +14,7 @@ use rand_chacha::ChaCha12Rng;
 use super::activities::Activities;
 use super::settings::Settings;
 use super::signal::Grid;
-use crate::train::data::mix;
+use crate::train::data::{BLEND_FRAMES, mix};
 
 /// No class needs so many rounds through all clips, unless a clip gives it no window.
 const MOST_ROUNDS: u64 = 500;
@@ -49,8 +49,9 @@ pub fn read(
         }
         let options = MotionOptions { keep_lead_in: true, ..MotionOptions::default() };
         let motion = retarget(&labelled.clip, model, &options)?;
-        let labels = labelled.labels.iter().map(|label| label.as_ref().and_then(|label| activities.class_named(label))).collect();
-        clips.push(Clip { poses: motion.frames, rate_hz: motion.rate_hz, labels });
+        let begin = BLEND_FRAMES.min(motion.frames.len());
+        let labels = labelled.labels[begin..].iter().map(|label| label.as_ref().and_then(|label| activities.class_named(label))).collect();
+        clips.push(Clip { poses: motion.frames[begin..].to_vec(), rate_hz: motion.rate_hz, labels });
     }
     Ok((clips, left_out))
 }

@@ -106,8 +106,10 @@ impl Stage<'_> {
         stamps: &[Stamp],
         poses: &[BodyPose],
     ) -> anyhow::Result<GridTrace> {
+        // The networks that come with the suite stand on the spline.
+        let scheme = if simulator == Simulator::Learned { Scheme::Spline } else { Scheme::Richardson };
         let placement = match Placement::at_site(worn.site, worn.site, NETWORK_RATE_HZ) {
-            Ok(placement) => placement.with_scheme(Scheme::Richardson).with_mount(worn.mount),
+            Ok(placement) => placement.with_scheme(scheme).with_mount(worn.mount),
             Err((field, problem)) => bail!("site {}: {field}: {problem}", worn.site),
         };
         let on_grid = |trajectory: &SensorTrajectory| -> anyhow::Result<Vec<KinematicSample>> {
