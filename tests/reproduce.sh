@@ -14,7 +14,8 @@ data=${CROMOSIM_DATA:-../shared/data}
 [ -d "$data" ] || { echo "error: no data at $data; name their folder in CROMOSIM_DATA" >&2; exit 2; }
 python=${CROMOSIM_PYTHON:-python3}
 
-cargo build --release
+# Without Rerun: no table needs it.
+cargo build --release --no-default-features
 cromosim=${CARGO_TARGET_DIR:-target}/release/cromosim
 for part in "$@"; do
     printf '\n== %s (%s)\n' "$part" "$(date +%T)"

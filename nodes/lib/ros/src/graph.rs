@@ -148,6 +148,10 @@ impl Graph {
             if done() {
                 return true;
             }
+            // Only after the generation was read: a request from here on changes it, and one before would change nothing any more.
+            if self.shutdown.is_requested() {
+                return false;
+            }
             let mut state = lock(&self.state);
             while state.generation == seen {
                 let left = deadline.saturating_duration_since(Instant::now());
@@ -155,10 +159,6 @@ impl Graph {
                     return false;
                 }
                 state = self.changed.wait_timeout(state, left).unwrap_or_else(PoisonError::into_inner).0;
-            }
-            drop(state);
-            if self.shutdown.is_requested() {
-                return done();
             }
         }
     }
@@ -206,4 +206,22 @@ pub(crate) fn count_topics(endpoints: &[Endpoint]) -> Vec<TopicInfo> {
             subscriptions,
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn a_wait_that_begins_after_the_shutdown_ends_too() {
+        let shutdown = Shutdown::new();
+        let graph = Graph::new(shutdown.clone());
+        shutdown.request();
+        // The node's thread has seen the request, and will not wake anybody again.
+        graph.wake();
+        let (ended, end) = std::sync::mpsc::channel();
+        std::thread::spawn(move || ended.send(graph.wait_until(Duration::from_secs(3600), || false)));
+        assert!(!end.recv_timeout(Duration::from_secs(20)).unwrap());
+    }
 }
