@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Subcommand;
 
+mod bootstrap;
 mod fidelity;
 mod har;
 mod output;

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow, bail};
 use cromosim_bag::BagReader;
 use cromosim_body::{BodyModel, BodyPose};
 use cromosim_imu::{Placement, Reading, Scheme, SensorFrame, SensorTrajectory};
@@ -27,9 +27,6 @@ const LONGEST_GAP: f64 = 0.1;
 /// Shorter pieces between gaps, s, are left out.
 const SHORTEST: f64 = 2.0;
 
-/// Skeleton clips as npz begin with what is left of a blend out of the T-pose: hands come down with 300 m/s2.
-pub const BLEND_FRAMES: usize = 6;
-
 /// A motion as its frames.
 pub struct Motion {
     /// The file's name without its ending.
@@ -49,19 +46,55 @@ impl Motion {
     }
 }
 
+/// A skeleton clip with what its frames show.
+pub struct Skeleton {
+    /// On the body.
+    pub motion: Motion,
+    /// One a frame, or none at all.
+    pub labels: Vec<Option<String>>,
+    /// Why it is unlike everyday motion; empty where it is not.
+    pub atypical: String,
+}
+
+/// Skeleton clips as npz begin with what is left of a blend out of the T-pose: hands come down with 300 m/s2.
+const BLEND_FRAMES: usize = 6;
+
+/// Reads a skeleton clip (npz) without the blend that it begins with.
+pub fn read_skeleton(path: &Path, model: &Arc<BodyModel>) -> anyhow::Result<Skeleton> {
+    played(parse_skeleton(path)?, path, model)
+}
+
 /// Reads a motion of any kind, skeleton clips as npz among them.
 pub fn read_motion(path: &Path, model: &Arc<BodyModel>) -> anyhow::Result<Motion> {
-    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let options = MotionOptions { keep_lead_in: true, ..MotionOptions::default() };
-    let skeleton = || File::open(path).ok().and_then(|file| parse_skeleton_npz(file, &path.display().to_string()).ok());
-    let Some(LabelledClip { clip, mut suspect, .. }) = skeleton() else {
-        let motion = read_motion_for(path, model, &options)?;
-        return Ok(Motion { name, rate_hz: motion.rate_hz, poses: motion.frames, suspect: Vec::new() });
-    };
-    let motion = retarget(&clip, model, &options)?;
+    if let Ok(clip) = parse_skeleton(path) {
+        return Ok(played(clip, path, model)?.motion);
+    }
+    let motion = read_motion_for(path, model, &options())?;
+    Ok(Motion { name: name_of(path), rate_hz: motion.rate_hz, poses: motion.frames, suspect: Vec::new() })
+}
+
+fn parse_skeleton(path: &Path) -> anyhow::Result<LabelledClip> {
+    let place = path.display().to_string();
+    let file = File::open(path).with_context(|| format!("{place}: cannot be read"))?;
+    Ok(parse_skeleton_npz(file, &place)?)
+}
+
+fn played(clip: LabelledClip, path: &Path, model: &Arc<BodyModel>) -> anyhow::Result<Skeleton> {
+    let LabelledClip { clip, mut suspect, mut labels, atypical, .. } = clip;
+    let motion = retarget(&clip, model, &options())?;
     let begin = BLEND_FRAMES.min(motion.frames.len());
     suspect.drain(..begin.min(suspect.len()));
-    Ok(Motion { name, rate_hz: motion.rate_hz, poses: motion.frames[begin..].to_vec(), suspect })
+    labels.drain(..begin.min(labels.len()));
+    let motion = Motion { name: name_of(path), rate_hz: motion.rate_hz, poses: motion.frames[begin..].to_vec(), suspect };
+    Ok(Skeleton { motion, labels, atypical })
+}
+
+fn options() -> MotionOptions {
+    MotionOptions { keep_lead_in: true, ..MotionOptions::default() }
+}
+
+fn name_of(path: &Path) -> String {
+    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// All pairs of a training, in the order of its file; motions are played on the body that is given, or the embedded one.
@@ -92,7 +125,7 @@ pub fn draw<T: Send>(
     make: impl Fn(Worn, PairNames) -> anyhow::Result<T> + Sync,
 ) -> anyhow::Result<Vec<T>> {
     let files = source.motion_files(folder)?;
-    let placements = source.sites.iter().map(|site| placement(site, Scheme::Spline)).collect::<anyhow::Result<Vec<_>>>()?;
+    let placements = source.sites.iter().map(|site| placement(site)).collect::<anyhow::Result<Vec<_>>>()?;
     let wearing = source.wearing();
     let bar = progress::bar(files.len() as u64, &format!("subject {}, motions", source.subject));
     let one = |(number, path): (usize, &std::path::PathBuf)| -> anyhow::Result<Vec<T>> {
@@ -121,11 +154,8 @@ pub fn draw<T: Send>(
 }
 
 /// A placement named as its site.
-pub fn placement(site: &str, scheme: Scheme) -> anyhow::Result<Placement> {
-    match Placement::at_site(site, site, RATE_HZ) {
-        Ok(placement) => Ok(placement.with_scheme(scheme)),
-        Err((field, problem)) => bail!("site {site}: {field}: {problem}"),
-    }
+fn placement(site: &str) -> anyhow::Result<Placement> {
+    Placement::at_site(site, site, RATE_HZ).map_err(|(field, problem)| anyhow!("site {site}: {field}: {problem}"))
 }
 
 /// One seed of several numbers (SplitMix64, Steele et al. 2014).
@@ -165,7 +195,7 @@ impl Piece {
 pub fn recorded(source: &Source, folder: &Path, given: Option<&Arc<BodyModel>>) -> anyhow::Result<Vec<Piece>> {
     let mut all = Vec::new();
     for path in source.recording_files(folder)? {
-        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let name = name_of(&path);
         let before = all.len();
         let mut add = |position: &str, frames, stamps, readings| -> anyhow::Result<()> {
             if !source.sites.is_empty() && !source.sites.iter().any(|site| site == position) {

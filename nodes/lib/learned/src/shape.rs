@@ -104,17 +104,7 @@ impl NetworkShape {
             ("layers", self.layers, 1, 64),
             ("outputs", self.outputs, 1, 65_536),
         ];
-        for (field, found, least, most) in numbers {
-            if !(least..=most).contains(&found) {
-                return Err(LearnedError::Shape { field, found, least, most });
-            }
-        }
-        // Within the ranges above, no sum or product overflows.
-        let found: u64 = self.tensors().iter().map(|tensor| tensor.range.len() as u64).sum();
-        if found > MOST_PARAMETERS {
-            return Err(LearnedError::TooLarge { found, most: MOST_PARAMETERS });
-        }
-        Ok(())
+        check(&numbers, || self.tensors())
     }
 
     /// All parameters.
@@ -155,6 +145,21 @@ impl Places {
             linear: (next(), next()),
         }
     }
+}
+
+/// Numbers (name, found, least, most) within their ranges, and no more parameters than [`MOST_PARAMETERS`]; within the ranges no sum or product
+/// of the tensors' sizes may overflow.
+pub(crate) fn check(numbers: &[(&'static str, usize, usize, usize)], tensors: impl FnOnce() -> Vec<Tensor>) -> Result<(), LearnedError> {
+    for &(field, found, least, most) in numbers {
+        if !(least..=most).contains(&found) {
+            return Err(LearnedError::Shape { field, found, least, most });
+        }
+    }
+    let found: u64 = tensors().iter().map(|tensor| tensor.range.len() as u64).sum();
+    if found > MOST_PARAMETERS {
+        return Err(LearnedError::TooLarge { found, most: MOST_PARAMETERS });
+    }
+    Ok(())
 }
 
 fn bound(inputs: usize) -> f32 {

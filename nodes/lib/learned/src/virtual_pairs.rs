@@ -102,22 +102,6 @@ impl Wearing {
         let doubtful = doubtful(motion, rate_hz, &truth, &read_at);
         Ok(Worn { told, placement: placement.clone(), stamps, poses, reference, read_at, readings, doubtful })
     }
-
-    /// The pair of a motion and a placement, see [`Wearing::draw`] and [`Worn::pair`].
-    ///
-    /// # Errors
-    /// As those.
-    pub fn pair(
-        &self,
-        model: &Arc<BodyModel>,
-        names: PairNames,
-        motion: &KnownMotion<'_>,
-        placement: &Placement,
-        seed: u64,
-    ) -> Result<Pair, LearnedError> {
-        let worn = self.draw(model, motion, placement, seed)?;
-        worn.pair(names, worn.motion(placement.scheme())?)
-    }
 }
 
 /// A motion that is known.
@@ -288,8 +272,8 @@ mod tests {
         let (model, poses) = (BodyModel::embedded(), poses(120.0, 6.0));
         let placement = Placement::at_site("left_wrist", "left_watch", 100.0).unwrap();
         let analytic = |source, scheme| {
-            let placement = placement.clone().with_scheme(scheme);
-            let pair = Wearing::of(source).pair(&model, names(), &known(&poses), &placement, 7).unwrap();
+            let worn = Wearing::of(source).draw(&model, &known(&poses), &placement, 7).unwrap();
+            let pair = worn.pair(names(), worn.motion(scheme).unwrap()).unwrap();
             assert_eq!((pair.targets.len(), pair.measured.len()), (pair.motion.len(), pair.motion.len()));
             let none = pair.rms(|_| (Vector3::zeros(), Vector3::zeros())).unwrap();
             let kinematics = &pair.motion.kinematics;
@@ -307,7 +291,10 @@ mod tests {
         let (model, poses) = (BodyModel::embedded(), poses(120.0, 3.0));
         let placement = Placement::at_site("left_wrist", "left_watch", 100.0).unwrap();
         let wearing = Wearing { speed: [0.8, 1.25], ..Wearing::of(SourceErrors::WHAM) };
-        let pair = |seed| wearing.pair(&model, names(), &known(&poses), &placement, seed).unwrap();
+        let pair = |seed| {
+            let worn = wearing.draw(&model, &known(&poses), &placement, seed).unwrap();
+            worn.pair(names(), worn.motion(Scheme::Spline).unwrap()).unwrap()
+        };
         let (one, again, other) = (pair(1), pair(1), pair(2));
         assert_eq!(one.targets, again.targets);
         assert_eq!(one.motion.points, again.motion.points);

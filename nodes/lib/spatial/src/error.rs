@@ -73,6 +73,12 @@ pub enum SpatialError {
         /// The weight given.
         weight: f64,
     },
+    /// A distance from the samples that is negative or not finite.
+    #[error("a distance of {std} from the samples; give zero or a positive number")]
+    BadDistance {
+        /// The distance given, in the samples' unit.
+        std: f64,
+    },
     /// The normal equations are numerically singular: the times are too unevenly spaced.
     #[error("the spline's equations are singular at sample {index}: intervals of very different lengths; split the series at its gaps")]
     Singular {

@@ -32,7 +32,8 @@ impl Smoothing {
     /// The weight for samples on these times.
     ///
     /// # Errors
-    /// [`SpatialError::BadRate`] for a cutoff, [`SpatialError::BadWeight`] for a weight that is negative or not finite, zero cutoffs too.
+    /// [`SpatialError::BadRate`], [`SpatialError::BadWeight`] or [`SpatialError::BadDistance`] for numbers that are negative or not finite, zero
+    /// cutoffs too.
     pub fn weight<const C: usize>(self, system: &SplineSystem, values: &[[f64; C]]) -> Result<f64, SpatialError> {
         let lowest = 10f64.powf(LOWEST_LOG_WEIGHT);
         match self {
@@ -43,7 +44,7 @@ impl Smoothing {
             Self::CutoffHz(cutoff_hz) => Ok(system.weight_of_cutoff(cutoff_hz).max(lowest)),
             Self::Weight(weight) if !(weight >= 0.0 && weight.is_finite()) => Err(SpatialError::BadWeight { weight }),
             Self::Weight(weight) => Ok(weight.max(lowest)),
-            Self::ResidualStd(std) if !(std >= 0.0 && std.is_finite()) => Err(SpatialError::BadWeight { weight: std }),
+            Self::ResidualStd(std) if !(std >= 0.0 && std.is_finite()) => Err(SpatialError::BadDistance { std }),
             Self::ResidualStd(std) => system.weight_of_residual(values, std),
         }
     }

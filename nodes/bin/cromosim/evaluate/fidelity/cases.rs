@@ -105,9 +105,7 @@ impl Case {
         let mapping = mapping.placements.get(&self.pair.position);
         Ok(mapping.map(|mapping| readings.iter().map(|reading| mapping.apply(reading)).collect()))
     }
-}
 
-impl Case {
     /// The frames as the source gives them, moved as was measured.
     fn perfect(&self) -> Vec<KinematicSample> {
         let moved = |(sample, target): (&KinematicSample, &Option<Target>)| match target {

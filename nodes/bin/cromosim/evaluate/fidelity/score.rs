@@ -1,15 +1,11 @@
 //! Errors, summed over recordings.
 
 use cromosim_imu::Reading;
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha12Rng;
 use serde::{Deserialize, Serialize};
 
 use super::cases::{Case, Simulator};
 use super::protocol::{Protocol, Study};
-
-/// Draws of the bootstrap.
-const DRAWS: usize = 2000;
+use crate::evaluate::bootstrap::intervals;
 
 /// Squared errors of the six channels: specific force x, y, z (m/s2)^2, angular velocity x, y, z (rad/s)^2.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -146,17 +142,22 @@ impl PositionResults {
         let results = |(index, simulator): (usize, &Simulator)| {
             let own = pooled(kept, index);
             (own.count > 0.0).then(|| {
-                let ratio = |draw: &[usize]| {
-                    let (own, other) = (pooled(draw, index).both(), pooled(draw, analytic).both());
-                    [own[0] / other[0], own[1] / other[1]]
+                // Errors, then their ratios.
+                let values = |draw: &[usize]| {
+                    let kept: Vec<usize> = draw.iter().map(|place| kept[*place]).collect();
+                    let ([a, b], [c, d]) = (pooled(&kept, index).both(), pooled(&kept, analytic).both());
+                    [a, b, a / c, b / d]
                 };
+                let all: Vec<usize> = (0..kept.len()).collect();
+                let [.., first, second] = values(&all);
+                let [rmse_first, rmse_second, ratio_first, ratio_second] = intervals(kept.len(), seed, values);
                 SimulatorResults {
                     simulator: *simulator,
                     channels: own.channels(),
                     rmse: own.both(),
-                    ratio: ratio(kept),
-                    rmse_interval: interval(kept, seed, |draw| pooled(draw, index).both()),
-                    ratio_interval: interval(kept, seed, ratio),
+                    ratio: [first, second],
+                    rmse_interval: [rmse_first, rmse_second],
+                    ratio_interval: [ratio_first, ratio_second],
                 }
             })
         };
@@ -180,21 +181,6 @@ fn signal<'a>(readings: impl Iterator<Item = &'a Reading> + Clone) -> [f64; 2] {
     sums.map(|sum: f64| (sum / (3.0 * count)).sqrt())
 }
 
-/// 2.5 and 97.5 % of a pair of numbers over draws of recordings with replacement.
-fn interval(kept: &[usize], seed: u64, of: impl Fn(&[usize]) -> [f64; 2]) -> [[f64; 2]; 2] {
-    let mut random = ChaCha12Rng::seed_from_u64(seed);
-    let mut drawn: [Vec<f64>; 2] = Default::default();
-    for _ in 0..DRAWS {
-        let draw: Vec<usize> = kept.iter().map(|_| kept[random.random_range(0..kept.len())]).collect();
-        let values = of(&draw);
-        drawn.iter_mut().zip(values).for_each(|(all, value)| all.push(value));
-    }
-    drawn.map(|mut values| {
-        values.sort_by(f64::total_cmp);
-        [values[DRAWS / 40], values[DRAWS - 1 - DRAWS / 40]]
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use nalgebra::Vector3;
@@ -212,17 +198,5 @@ mod tests {
         let sums = Sums::of(&simulated, &measured);
         assert_eq!(sums.channels(), [12.5f64.sqrt(), 0.0, 0.0, 0.0, 50f64.sqrt(), 0.0]);
         assert_eq!(sums.both(), [(25.0f64 / 6.0).sqrt(), (100.0f64 / 6.0).sqrt()]);
-    }
-
-    #[test]
-    fn the_interval_holds_the_value_and_shrinks_with_recordings() {
-        let width = |count: usize| {
-            let kept: Vec<usize> = (0..count).collect();
-            let mean = |draw: &[usize]| [draw.iter().map(|k| (k % 2) as f64).sum::<f64>() / draw.len() as f64, 1.0];
-            let [own, constant] = interval(&kept, 3, mean);
-            assert!(own[0] < 0.5 && own[1] > 0.5 && constant == [1.0, 1.0], "{own:?}");
-            own[1] - own[0]
-        };
-        assert!(width(400) < 0.6 * width(100));
     }
 }

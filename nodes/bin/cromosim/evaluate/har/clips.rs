@@ -1,20 +1,17 @@
 //! The virtual side's motions, and which of them are played how often.
 
-use std::fs::File;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 use cromosim_body::{BodyModel, BodyPose};
-use cromosim_motion::datasets::parse_skeleton_npz;
-use cromosim_motion::{MotionOptions, retarget};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 
 use super::activities::Activities;
 use super::settings::Settings;
 use super::signal::Grid;
-use crate::train::data::{BLEND_FRAMES, mix};
+use crate::train::data::{Motion, Skeleton, mix, read_skeleton};
 
 /// No class needs so many rounds through all clips, unless a clip gives it no window.
 const MOST_ROUNDS: u64 = 500;
@@ -38,20 +35,16 @@ pub fn read(
 ) -> anyhow::Result<(Vec<Clip>, Vec<String>)> {
     let (mut clips, mut left_out) = (Vec::new(), Vec::new());
     for path in files {
-        let name = path.display().to_string();
-        let labelled = parse_skeleton_npz(File::open(path).with_context(|| format!("{name}: cannot be read"))?, &name)?;
-        if labelled.labels.is_empty() {
-            bail!("{name}: no labels; a clip of the virtual side needs `label` and `label_names`");
+        let Skeleton { motion: Motion { name, poses, rate_hz, .. }, labels, atypical: why } = read_skeleton(path, model)?;
+        if labels.is_empty() {
+            bail!("{}: no labels; a clip of the virtual side needs `label` and `label_names`", path.display());
         }
-        if !atypical && !labelled.atypical.is_empty() {
-            left_out.push(path.file_stem().unwrap_or_default().to_string_lossy().into_owned());
+        if !atypical && !why.is_empty() {
+            left_out.push(name);
             continue;
         }
-        let options = MotionOptions { keep_lead_in: true, ..MotionOptions::default() };
-        let motion = retarget(&labelled.clip, model, &options)?;
-        let begin = BLEND_FRAMES.min(motion.frames.len());
-        let labels = labelled.labels[begin..].iter().map(|label| label.as_ref().and_then(|label| activities.class_named(label))).collect();
-        clips.push(Clip { poses: motion.frames[begin..].to_vec(), rate_hz: motion.rate_hz, labels });
+        let labels = labels.iter().map(|label| label.as_ref().and_then(|label| activities.class_named(label))).collect();
+        clips.push(Clip { poses, rate_hz, labels });
     }
     Ok((clips, left_out))
 }

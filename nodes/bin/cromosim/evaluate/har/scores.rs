@@ -1,11 +1,8 @@
 //! How right a classifier is.
 
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha12Rng;
 use serde::Serialize;
 
-/// Resamples of an interval.
-const RESAMPLES: usize = 10_000;
+use crate::evaluate::bootstrap::intervals;
 
 /// Windows by true class (rows) and said class (columns).
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
@@ -50,15 +47,10 @@ pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
-/// 95 % interval of the mean, by resampling the values (subjects) with replacement (Efron 1979, percentiles); the same seed gives the same.
+/// 95 % interval of the mean over values (subjects).
 pub fn interval(values: &[f64], seed: u64) -> [f64; 2] {
-    let mut random = ChaCha12Rng::seed_from_u64(seed);
-    let mut means: Vec<f64> = (0..RESAMPLES)
-        .map(|_| values.iter().map(|_| values[random.random_range(0..values.len())]).sum::<f64>() / values.len() as f64)
-        .collect();
-    means.sort_by(f64::total_cmp);
-    let at = |share: f64| means[((RESAMPLES as f64 * share) as usize).min(RESAMPLES - 1)];
-    [at(0.025), at(0.975)]
+    let mean = |places: &[usize]| [places.iter().map(|place| values[*place]).sum::<f64>() / values.len() as f64];
+    intervals(values.len(), seed, mean)[0]
 }
 
 #[cfg(test)]
@@ -77,15 +69,5 @@ mod tests {
         both.add(&confusion);
         both.add(&confusion);
         assert_eq!(both.0[0], [4, 2, 0, 0]);
-    }
-
-    #[test]
-    fn the_interval_is_that_of_the_mean() {
-        // Of n equal halves at 0 and 1 the mean's standard error is 0.5 / sqrt n.
-        let values: Vec<f64> = (0..100).map(|k| f64::from(k % 2)).collect();
-        let [low, high] = interval(&values, 1);
-        assert!((low - 0.402).abs() < 0.02 && (high - 0.598).abs() < 0.02, "{low} {high}");
-        assert_eq!(interval(&values, 1), interval(&values, 1));
-        assert_eq!(interval(&[0.7; 5], 3).map(|value| (value * 1e9).round() / 1e9), [0.7, 0.7]);
     }
 }

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::LearnedError;
-use crate::shape::{MOST_PARAMETERS, Places, Tensor, TensorList};
+use crate::shape::{Places, Tensor, TensorList, check};
 
 /// A DeepConvLSTM: (batch, steps, inputs) -> (batch, classes).
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -32,7 +32,7 @@ impl ClassifierShape {
         Self { inputs, maps: 64, kernel: 5, convolutions: 4, hidden: 128, layers: 2, classes }
     }
 
-    /// All numbers within their ranges, and no more parameters than [`MOST_PARAMETERS`].
+    /// All numbers within their ranges, and no more parameters than [`crate::MOST_PARAMETERS`].
     ///
     /// # Errors
     /// Where they are not; the message names the number.
@@ -46,17 +46,7 @@ impl ClassifierShape {
             ("layers", self.layers, 1, 64),
             ("classes", self.classes, 2, 65_536),
         ];
-        for (field, found, least, most) in numbers {
-            if !(least..=most).contains(&found) {
-                return Err(LearnedError::Shape { field, found, least, most });
-            }
-        }
-        // Within the ranges above, no sum or product overflows.
-        let found: u64 = self.tensors().iter().map(|tensor| tensor.range.len() as u64).sum();
-        if found > MOST_PARAMETERS {
-            return Err(LearnedError::TooLarge { found, most: MOST_PARAMETERS });
-        }
-        Ok(())
+        check(&numbers, || self.tensors())
     }
 
     /// Steps that a window must have at least, so that one is left behind the convolutions.
