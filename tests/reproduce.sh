@@ -15,7 +15,7 @@ data=${CROMOSIM_DATA:-../shared/data}
 python=${CROMOSIM_PYTHON:-python3}
 
 # Without Rerun: no table needs it.
-cargo build --release --no-default-features
+cargo build --release -p cromosim --no-default-features
 cromosim=${CARGO_TARGET_DIR:-target}/release/cromosim
 for part in "$@"; do
     printf '\n== %s (%s)\n' "$part" "$(date +%T)"
