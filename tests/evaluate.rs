@@ -31,11 +31,14 @@ fn the_quick_form_tests_everybody_and_gives_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     let said = quick(here, &data, "one", "1", &[]);
-    assert!(said.contains("| real (R2R) |") && said.contains("no networks were given"), "{said}");
+    assert!(
+        said.contains("| real (R2R) |") && said.contains("| real, turned copies |") && said.contains("no networks were given"),
+        "{said}"
+    );
     let results = results(&here.join("one"));
     let cells = results["cells"].as_array().unwrap();
-    // R2R and the chosen Mix2R at both shares; V2R and Mix2R with mapping and with effects.
-    assert_eq!(cells.len(), 2 + 2 + 4);
+    // R2R without and with turned copies, and the chosen Mix2R at both shares; V2R and Mix2R with mapping and with effects.
+    assert_eq!(cells.len(), 3 * 2 + 4);
     for cell in cells {
         let tested: Vec<&str> = cell["subjects"].as_array().unwrap().iter().map(|score| score["subject"].as_str().unwrap()).collect();
         assert_eq!(tested, ["s01", "s02", "s03"]);

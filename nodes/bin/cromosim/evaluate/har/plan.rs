@@ -62,7 +62,8 @@ pub fn run(ground: &Ground<'_>, simulators: &[Simulator], quick: bool) -> anyhow
     let seed_of = |seed: usize| mix(&[settings.seed, 13, seed as u64]);
     let of_way = |way: Way| jobs(way, people, settings.seeds, seed_of);
     let variants = variants(simulators, quick);
-    let mut ways: Vec<Way> = settings.shares.iter().map(|share| (Training::Real, None, *share)).collect();
+    let mut ways: Vec<Way> =
+        settings.shares.iter().flat_map(|share| [Training::Real, Training::Turned].map(|training| (training, None, *share))).collect();
     ways.extend(variants.iter().flat_map(|variant| [Training::Virtual, Training::Mixed].map(|training| (training, Some(*variant), 1.0))));
     let first: Vec<Job> = ways.iter().flat_map(|way| of_way(*way)).collect();
     let curve = settings.shares.iter().filter(|share| **share < 1.0).count() * people * settings.seeds;
@@ -127,13 +128,14 @@ fn choose(cells: &[Cell], without: &str) -> Option<Variant> {
     best.map(|(_, variant)| variant)
 }
 
-/// Each Mix2R over R2R of the same share; of V2R, each variant over its simulator's plain one, and over the analytic simulator's alike.
+/// Each Mix2R over R2R of the same share, without turned copies and with them; of V2R, each variant over its simulator's plain one, and over the analytic simulator's alike.
 fn comparisons(cells: &[Cell], seed: u64) -> Vec<Comparison> {
     let find = |training: Training, variant: Option<Variant>, share: f64| {
         cells.iter().find(|cell| !cell.chosen && cell.training == training && cell.variant == variant && cell.share == share)
     };
     let over = |cell: &Cell| match (cell.training, cell.variant) {
-        (Training::Mixed, _) => vec![find(Training::Real, None, cell.share)],
+        (Training::Mixed, _) => vec![find(Training::Real, None, cell.share), find(Training::Turned, None, cell.share)],
+        (Training::Turned, _) => vec![find(Training::Real, None, cell.share)],
         (Training::Virtual, Some(variant)) => {
             let others = [Variant::plain(variant.simulator), Variant { simulator: Simulator::Analytic, ..variant }];
             others.into_iter().filter(|other| *other != variant).map(|other| find(Training::Virtual, Some(other), cell.share)).collect()

@@ -16,6 +16,9 @@ pub enum Training {
     /// Real windows.
     #[serde(rename = "R2R")]
     Real,
+    /// Real windows and the same turned, half of every batch each: what drawn ways of wearing devices give without any virtual ones.
+    #[serde(rename = "R2R, turned")]
+    Turned,
     /// Virtual windows.
     #[serde(rename = "V2R")]
     Virtual,
@@ -29,6 +32,7 @@ impl Training {
     pub fn name(self) -> &'static str {
         match self {
             Self::Real => "R2R",
+            Self::Turned => "R2R, turned",
             Self::Virtual => "V2R",
             Self::Mixed => "Mix2R",
         }

@@ -87,12 +87,14 @@ fn ways(results: &Results) -> Table {
     let real = results.cell(Training::Real, None, false, 1.0);
     let columns = [Column::text("learned from"), Column::text("simulator"), Column::text("with")];
     let scores = ["virtual alone (V2R)", "real and virtual (Mix2R)", "Mix2R over R2R"].map(Column::numbers);
-    let first = ["real (R2R)".to_owned(), String::new(), String::new(), score(real), String::new(), String::new()].to_vec();
+    let alone = |name: &str, cell| [name, "", "", &score(cell), "", ""].map(str::to_owned).to_vec();
+    let turned = results.cell(Training::Turned, None, false, 1.0);
+    let first = [alone("real (R2R)", real), alone("real, turned copies", turned)];
     let row = |(variant, alone, mixed): (Variant, Option<&Cell>, Option<&Cell>)| {
         let (simulator, further) = (variant.simulator.name().to_owned(), variant.further().to_owned());
         vec!["virtual".to_owned(), simulator, further, score(alone), score(mixed), gain(compared(results, mixed, real))]
     };
-    let rows = [first].into_iter().chain(tried(results).into_iter().map(row)).collect();
+    let rows = first.into_iter().chain(tried(results).into_iter().map(row)).collect();
     Table { columns: columns.into_iter().chain(scores).collect(), rows }
 }
 
@@ -115,19 +117,24 @@ fn bar(series: &str, cell: &Cell) -> Bar {
     Bar { series: series.to_owned(), value: 100.0 * cell.mean, interval: Some((100.0 * cell.interval[0], 100.0 * cell.interval[1])) }
 }
 
-/// Share, real alone, and mixed by the chosen variant.
-type Share<'a> = (f64, Option<&'a Cell>, Option<&'a Cell>);
+/// Share, real alone, real with turned copies, and mixed by the chosen variant.
+type Share<'a> = (f64, [Option<&'a Cell>; 3]);
 
 fn shares(results: &Results) -> impl Iterator<Item = Share<'_>> {
-    let of = |share| (share, results.cell(Training::Real, None, false, share), results.cell(Training::Mixed, None, true, share));
+    let ways = [(Training::Real, false), (Training::Turned, false), (Training::Mixed, true)];
+    let of = move |share| (share, ways.map(|(training, chosen)| results.cell(training, None, chosen, share)));
     results.settings.shares.iter().copied().map(of)
 }
 
 fn curve(results: &Results) -> Table {
-    let heads = ["R2R", "Mix2R, variant chosen by the other people's scores", "Mix2R over R2R"].map(Column::numbers);
-    let row = |(share, real, mixed): Share<'_>| {
+    let scores = ["R2R", "R2R, turned", "Mix2R, variant chosen by the other people's scores"];
+    let heads = scores.into_iter().chain(["Mix2R over R2R", "over R2R, turned"]).map(Column::numbers);
+    let row = |(share, cells): Share<'_>| {
+        let [real, turned, mixed] = cells;
         let known = real.or(mixed).and_then(|cell| cell.runs.first()).map_or(0, |run| run.known.len());
-        vec![format!("{:.0} % ({known})", 100.0 * share), score(real), score(mixed), gain(compared(results, mixed, real))]
+        let share = format!("{:.0} % ({known})", 100.0 * share);
+        let gains = [real, turned].map(|other| gain(compared(results, mixed, other)));
+        [share].into_iter().chain(cells.map(score)).chain(gains).collect()
     };
     let columns = [Column::text("training subjects")].into_iter().chain(heads).collect();
     Table { columns, rows: shares(results).map(row).collect() }
@@ -138,15 +145,16 @@ fn curve_chart(results: &Results) -> LineChart {
         let Bar { value, interval, .. } = bar("", cell?);
         Some(Point { x: 100.0 * share, y: value, interval })
     };
-    let line = |label: &str, points: Vec<Point>| Line { label: label.to_owned(), points };
-    let real = shares(results).filter_map(|(share, real, _)| point(share, real)).collect();
-    let mixed = shares(results).filter_map(|(share, _, mixed)| point(share, mixed)).collect();
+    let line = |(way, label): (usize, &str)| {
+        let points = shares(results).filter_map(|(share, cells)| point(share, cells[way])).collect();
+        Line { label: label.to_owned(), points }
+    };
     LineChart {
         title: "Macro F1 on people held out, by how many people's real data are learned from".to_owned(),
         x_label: "training subjects, %".to_owned(),
         y_label: "macro F1, %".to_owned(),
         logarithmic_x: true,
-        lines: vec![line("R2R", real), line("Mix2R (chosen)", mixed)],
+        lines: ["R2R", "R2R, turned", "Mix2R (chosen)"].into_iter().enumerate().map(line).collect(),
         level: None,
     }
 }

@@ -15,9 +15,12 @@ use super::scores::Confusion;
 use super::settings::Settings;
 use super::signal::PER_DEVICE;
 use super::simulated::{self, Played, Simulator};
+use super::wear;
 use crate::progress::Interrupt;
 use crate::train::data::mix;
 
+/// Turned copies of a window.
+const COPIES: usize = 4;
 /// Windows of each class that a mapping is fitted to, on both sides.
 const MAPPED_WINDOWS: usize = 60;
 
@@ -82,6 +85,11 @@ impl Ground<'_> {
         if job.training != Training::Virtual {
             pools.push(together(&known));
         }
+        // The same for all that is compared.
+        let seed = mix(&[self.settings.seed, 12, job.seed as u64, job.tested[0] as u64]);
+        if job.training == Training::Turned {
+            pools.push(turned(&pools[0], &self.real.placements, mix(&[seed, 1])));
+        }
         if let Some(variant) = job.variant {
             pools.push(self.virtual_windows(variant, job.seed, &known)?);
         }
@@ -89,8 +97,6 @@ impl Ground<'_> {
         pools.iter_mut().for_each(|pool| scale.apply(&mut pool.values));
         let classes = self.real.activities.classes().len();
         let shape = self.settings.shape(self.real.placements.len() * PER_DEVICE, classes);
-        // The same for all that is compared.
-        let seed = mix(&[self.settings.seed, 12, job.seed as u64, job.tested[0] as u64]);
         let pools: Vec<&Examples> = pools.iter().collect();
         let classifier = train_classifier(&shape, &self.settings.training, &pools, seed, self.interrupt.flag())?;
         let Some(classifier) = classifier else {
@@ -159,9 +165,8 @@ fn map(windows: &mut Examples, real: &Examples, placements: &[String], classes: 
     let maps = maps.collect::<Result<Vec<_>, _>>()?;
     for row in windows.values.chunks_exact_mut(windows.channels.max(1)) {
         for (device, map) in maps.iter().enumerate() {
-            let Reading { force, rate } = map.apply(&reading(row, device));
-            let mapped = force.iter().chain(rate.iter()).map(|value| *value as f32);
-            row[device * PER_DEVICE..(device + 1) * PER_DEVICE].iter_mut().zip(mapped).for_each(|(value, mapped)| *value = mapped);
+            let mapped = map.apply(&reading(row, device));
+            write(row, device, &mapped);
         }
     }
     Ok(())
@@ -171,6 +176,30 @@ fn map(windows: &mut Examples, real: &Examples, placements: &[String], classes: 
 fn picked(examples: &Examples, class: usize) -> Vec<usize> {
     let own: Vec<usize> = (0..examples.len()).filter(|index| usize::from(examples.labels[*index]) == class).collect();
     (0..MAPPED_WINDOWS).map(|k| own[k * own.len() / MAPPED_WINDOWS]).collect()
+}
+
+/// Copies of windows whose devices are worn another way, drawn for each copy as the virtual people's are.
+fn turned(real: &Examples, placements: &[String], seed: u64) -> Examples {
+    let wears: Vec<_> = placements.iter().filter_map(|name| wear::wear(name)).collect();
+    let mut random = ChaCha12Rng::seed_from_u64(seed);
+    let mut all = Examples::new(real.steps, real.channels);
+    for window in (0..COPIES).flat_map(|_| 0..real.len()) {
+        let mut values = real.window(window).to_vec();
+        let turns: Vec<_> = wears.iter().map(|wear| wear.turn(&mut random)).collect();
+        for row in values.chunks_exact_mut(real.channels.max(1)) {
+            for (device, turn) in turns.iter().enumerate() {
+                let Reading { force, rate } = reading(row, device);
+                write(row, device, &Reading { force: turn * force, rate: turn * rate });
+            }
+        }
+        all.push(&values, real.labels[window]);
+    }
+    all
+}
+
+fn write(row: &mut [f32], device: usize, Reading { force, rate }: &Reading) {
+    let values = force.iter().chain(rate.iter()).map(|value| *value as f32);
+    row[device * PER_DEVICE..(device + 1) * PER_DEVICE].iter_mut().zip(values).for_each(|(old, value)| *old = value);
 }
 
 fn reading(row: &[f32], device: usize) -> Reading {

@@ -38,6 +38,25 @@ fn channels_are_brought_to_mean_0_and_deviation_1_each_pool_counting_alike() {
 }
 
 #[test]
+fn turned_copies_are_the_same_motion_otherwise_worn() {
+    let real = examples(noise, &[0, 1]);
+    let copies = turned(&real, &["wrist".to_owned()], 1);
+    assert_eq!((copies.len(), copies.counts(2)), (2 * COPIES, vec![COPIES; 2]));
+    let rows = |examples: &Examples, window: usize| examples.window(window).chunks(6).map(|row| reading(row, 0)).collect::<Vec<_>>();
+    for window in 0..copies.len() {
+        let (own, copied) = (rows(&real, window % 2), rows(&copies, window));
+        for (one, other) in own.iter().zip(&copied) {
+            assert!((one.force.norm() - other.force.norm()).abs() < 1e-5 && (one.force - other.force).norm() > 1e-3);
+            // Both sensors turn together, and all of a window does.
+            assert!((one.force.dot(&one.rate) - other.force.dot(&other.rate)).abs() < 1e-5);
+            assert!((one.force.dot(&own[0].force) - other.force.dot(&copied[0].force)).abs() < 1e-5);
+        }
+    }
+    assert_ne!(copies.window(0), copies.window(2));
+    assert_eq!(copies, turned(&real, &["wrist".to_owned()], 1));
+}
+
+#[test]
 fn mapped_windows_have_the_real_distribution_whatever_the_mixture_of_classes() {
     // The same two classes, in other units and in another mixture.
     let mut windows = examples(noise, &[0, 0, 0, 0, 0, 0, 0, 0, 0, 1]);

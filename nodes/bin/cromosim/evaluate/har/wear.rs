@@ -99,6 +99,12 @@ impl Wear {
         };
         Worn { site, joint, mount: lying * UnitQuaternion::from_scaled_axis(turn) }
     }
+
+    /// From one drawn way of wearing it to another: other_sensor_from_sensor.
+    pub fn turn(&self, random: &mut ChaCha12Rng) -> UnitQuaternion<f64> {
+        let [one, other] = [self.draw(random), self.draw(random)];
+        other.mount.inverse() * one.mount
+    }
 }
 
 fn sign(random: &mut ChaCha12Rng) -> f64 {
@@ -144,6 +150,7 @@ mod tests {
     fn a_watch_shows_its_face() {
         let (watch, mut random) = (wear("wrist").unwrap(), ChaCha12Rng::seed_from_u64(2));
         assert!((0..100).all(|_| (watch.draw(&mut random).mount * Vector3::z()).z > 0.7));
+        assert!((0..100).all(|_| (watch.turn(&mut random) * Vector3::z()).z > 0.4));
         assert!(wear("nose").is_none() && known().contains("pocket"));
     }
 }
