@@ -103,6 +103,9 @@ fn what_cannot_be_used_is_named() {
         ("wal*.bvh", "run*.bvh", vec!["no file matches run*.bvh"]),
         ("learning_rate: 0.01", "learning_rate: -1.0", vec!["bad.yaml", "learning_rate"]),
         ("training/1", "training/9", vec!["bad.yaml", "cromosim/training/1"]),
+        ("steps: 240", "engine: torch, steps: 240", vec!["bad.yaml", "torch", "kernels"]),
+        #[cfg(not(feature = "cuda"))]
+        ("steps: 240", "engine: cuda, steps: 240", vec!["bad.yaml", "engine cuda", "--features cuda"]),
     ] {
         config(from, to);
         refuses(here, &["train", "bad.yaml", "--out", "model"], &words);

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::Args;
-use cromosim_learned::train::{Data, Hooks, KernelEngine, Progress, Stop, Training};
+use cromosim_learned::train::{Data, Engine, Hooks, Progress, Stop, Training};
 use cromosim_learned::{LearnedSimulator, Network, Pair, PairBatches, Quantity, Windows};
 
 use crate::body;
@@ -15,6 +15,7 @@ use crate::progress::{self, Interrupt};
 mod card;
 pub mod config;
 pub mod data;
+mod engine;
 
 use config::Config;
 
@@ -43,6 +44,7 @@ pub struct Arguments {
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let config = Config::read(&arguments.config)?;
+    let mut engine = config.training.engine.open().with_context(|| arguments.config.display().to_string())?;
     let folder = arguments.data.as_deref().or(arguments.config.parent()).unwrap_or(Path::new("."));
     let interrupt = Interrupt::watch()?;
     let given = arguments.body.as_ref().map(|path| body::model(Some(path))).transpose()?;
@@ -58,7 +60,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     keep_configuration(arguments)?;
     let mut networks = Vec::new();
     for quantity in Quantity::BOTH {
-        match learn(&config, quantity, &training, &validation, arguments, &interrupt)? {
+        match learn(&config, engine.as_mut(), quantity, [&training, &validation], arguments, &interrupt)? {
             Some(network) => networks.push(network),
             None => bail!("interrupted; the same command goes on from {}", checkpoint(&arguments.out, quantity).display()),
         }
@@ -113,9 +115,9 @@ fn checkpoint(out: &Path, quantity: Quantity) -> PathBuf {
 /// Trains one network, from its checkpoint on where there is one; none where it was interrupted.
 fn learn(
     config: &Config,
+    engine: &mut dyn Engine,
     quantity: Quantity,
-    training: &[Pair],
-    validation: &[Pair],
+    [training, validation]: [&[Pair]; 2],
     arguments: &Arguments,
     interrupt: &Interrupt,
 ) -> anyhow::Result<Option<Network>> {
@@ -142,7 +144,7 @@ fn learn(
     };
     let data = Data { training: &batches, validation: Some((&judged, judged.count())) };
     let mut hooks = Hooks { progress: &mut tell, interrupt: interrupt.flag(), checkpoint: Some(&place) };
-    let stop = state.run(&mut KernelEngine, data, &mut hooks)?;
+    let stop = state.run(engine, data, &mut hooks)?;
     bar.finish_and_clear();
     if let Some(error) = failure {
         return Err(error).with_context(|| format!("{}: cannot be written", history_place.display()));

@@ -6,6 +6,7 @@ use std::fmt::Write;
 use cromosim_learned::{LearnedSimulator, NETWORK_RATE_HZ, Pair};
 
 use super::config::Config;
+use super::engine::Choice;
 
 /// Seconds with a target.
 pub fn seconds<'a>(pairs: impl Iterator<Item = &'a Pair>) -> f64 {
@@ -67,8 +68,9 @@ pub fn scores(simulator: &LearnedSimulator, pairs: &[Pair]) -> anyhow::Result<St
 pub fn text(config: &Config, simulator: &LearnedSimulator, training: &[Pair], validation: &[Pair], scores: &str) -> String {
     let shape = config.shape();
     let mut text = format!(
-        "# Model card\n\nMade by cromosim {}, `cromosim train`, seed {}.\n\nInput `{}`, {} convolutions of {} channels and {} taps, {} LSTM layers of {} ({:?}), {} parameters a network; one for acceleration, one for angular velocity, at {NETWORK_RATE_HZ} Hz.\n\n## Data\n\n| subject | what | seconds | licence |\n|---|---|---|---|\n",
+        "# Model card\n\nMade by cromosim {}, `cromosim train`{}, seed {}.\n\nInput `{}`, {} convolutions of {} channels and {} taps, {} LSTM layers of {} ({:?}), {} parameters a network; one for acceleration, one for angular velocity, at {NETWORK_RATE_HZ} Hz.\n\n## Data\n\n| subject | what | seconds | licence |\n|---|---|---|---|\n",
         env!("CARGO_PKG_VERSION"),
+        if config.training.engine == Choice::Kernels { String::new() } else { format!(" by {:?}", config.training.engine) },
         config.training.seed,
         config.input.name(),
         shape.convolutions,
@@ -84,9 +86,10 @@ pub fn text(config: &Config, simulator: &LearnedSimulator, training: &[Pair], va
             format!("real devices: {}", source.recordings.join(", "))
         } else {
             format!(
-                "drawn people and devices on {}, {:?}, at {}, {} draws each",
+                "drawn people and devices on {}, {:?}{}, at {}, {} draws each",
                 source.motions.join(", "),
                 source.source,
+                source.rate_hz.map_or(String::new(), |rate_hz| format!(" of {rate_hz} Hz")),
                 source.sites.join(", "),
                 source.repeats
             )

@@ -8,6 +8,8 @@ use cromosim_learned::train::{Loss, Schedule, TrainOptions};
 use cromosim_learned::{DeviceRanges, Direction, Input, NetworkShape, SourceErrors, Turns, Wearing};
 use serde::Deserialize;
 
+use super::engine::Choice;
+
 const SCHEMA: &str = "cromosim/training/1";
 
 /// A training's file.
@@ -114,6 +116,9 @@ pub struct Running {
     patience: u64,
     /// Of weights, batches, devices and people.
     pub seed: u64,
+    /// What computes the gradients.
+    #[serde(default)]
+    pub engine: Choice,
 }
 
 fn one() -> u64 {

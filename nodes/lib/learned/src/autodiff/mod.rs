@@ -33,11 +33,19 @@ impl BurnEngine {
         Self { device: Device::flex(), fused: false }
     }
 
-    /// On an NVIDIA GPU; index: which, from 0 on. Panics within Burn where there is none.
+    /// On an NVIDIA GPU; index: which, from 0 on.
+    ///
+    /// # Errors
+    /// [`LearnedError::Burn`] where Burn finds none (it panics, and prints why).
     #[cfg(feature = "cuda")]
-    #[must_use]
-    pub fn cuda(index: usize) -> Self {
-        Self { device: Device::cuda(index), fused: false }
+    pub fn cuda(index: usize) -> Result<Self, LearnedError> {
+        let device = std::panic::catch_unwind(|| {
+            let device = Device::cuda(index);
+            Tensor::<1>::zeros([1], &device).into_data();
+            device
+        });
+        let missing = |_| LearnedError::Burn { reason: format!("no NVIDIA GPU {index}; `engine: burn` runs on the CPU") };
+        Ok(Self { device: device.map_err(missing)?, fused: false })
     }
 
     fn input(&self, network: &Network, batch: &Batch, device: &Device) -> Tensor<3> {
