@@ -72,7 +72,7 @@ fn what_cannot_be_compared_is_named() {
     let here = folder.path();
     prepare(here, "nobodys");
     let command = ["evaluate", "fidelity", "--protocol", "protocol.yaml", "--data", ".", "--out", "out"];
-    refuses(here, &command, &["nobodys", "motion_capture, motion_capture_60, streaming, video"]);
+    refuses(here, &command, &["nobodys", "motion_capture, motion_capture_60, streaming, streaming_video, video"]);
     refuses(here, &[&command[..], &["--models", "models"]].concat(), &["models/nobodys/acceleration.safetensors"]);
     for (from, to, expected) in [
         ("walk.bvh", "gone.bvh", "gone.bvh"),
@@ -92,7 +92,7 @@ fn models_that_come_with_the_suite_simulate() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     prepare(here, "none");
-    for model in ["motion_capture", "motion_capture_60", "video", "streaming"] {
+    for model in ["motion_capture", "motion_capture_60", "video", "streaming", "streaming_video"] {
         let said = succeed(here, &["simulate", "walk.bvh", "--learned", model, "--out", &format!("{model}.mcap")]);
         assert!(said.contains("messages"), "{said}");
     }
@@ -119,7 +119,7 @@ fn models_that_come_with_the_suite_are_worth_what_their_evaluation_says() {
     // A real device whose other trials were learned from.
     assert!(of(4, "learned")[0] < 0.7 * of(4, "spline")[0]);
     // Nothing says more than networks that know what was measured.
-    for study in 0..6 {
+    for study in 0..8 {
         assert!(of(study, "perfect")[0] <= of(study, "learned")[0]);
     }
 }

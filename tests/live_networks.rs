@@ -118,7 +118,7 @@ fn the_node_says_what_simulate_computes_of_the_same_states() {
             // Stencils read the same frames live; the spline is fitted to the last 43 of them.
             let (most_force, most_rate) = if *name == "sternum" { (0.02, 1e-4) } else { (1e-5, 1e-5) };
             assert!(force < most_force && rate < most_rate, "{name}: {force:e} m/s2, {rate:e} rad/s");
-            assert!(learned_force > 1.0 && learned_rate > 0.1, "{name}: the networks say something");
+            assert!(learned_force > 1.0 && learned_rate > 0.05, "{name}: the networks say something");
         }
     });
 }

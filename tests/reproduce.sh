@@ -22,8 +22,15 @@ for part in "$@"; do
     case $part in
     # The weights in nodes/lib/learned/models.
     models)
-        for model in motion_capture streaming video; do
+        for model in motion_capture motion_capture_60 video streaming streaming_video; do
             "$cromosim" train "config/training/$model.yaml" --data "$data" --out "$out/models/$model"
+            for network in acceleration angular_velocity; do
+                if cmp -s "$out/models/$model/$network.safetensors" "nodes/lib/learned/models/$model/$network.safetensors"; then
+                    echo "$model, $network: the same bytes as the suite's"
+                else
+                    echo "$model, $network: OTHER bytes than the suite's"
+                fi
+            done
         done
         ;;
     fidelity) "$cromosim" evaluate fidelity --data "$data" --out "$out/fidelity" --force ;;

@@ -84,7 +84,7 @@ pub struct Arguments {
     csv: Option<PathBuf>,
     #[command(flatten)]
     motion: MotionArguments,
-    /// Networks (motion_capture, motion_capture_60, video, streaming, or a folder that `cromosim train` wrote) that correct acceleration and angular velocity before the device's effects; with --rigid the scheme is then spline unless --scheme names one, as in training
+    /// Networks (motion_capture, motion_capture_60, video, streaming, streaming_video, or a folder that `cromosim train` wrote) that correct acceleration and angular velocity before the device's effects; with --rigid the scheme is then spline unless --scheme names one, as in training
     #[arg(long, value_name = "MODEL", conflicts_with = "reference")]
     pub learned: Option<PathBuf>,
     /// A distribution mapping (a file that `cromosim map` wrote), applied last to the placements that it names

@@ -20,7 +20,7 @@ node_config! {
         /// Seed of the noise and of lost samples.
         pub seed: i64 = 0,
         /// Folder of streaming networks, as `cromosim train` writes it, that correct acceleration and angular velocity before the device's
-        /// effects; placements then run at 100 Hz. Empty: none.
+        /// effects; placements then run at 100 Hz, at most 90 ms and two states behind. Empty: none.
         pub learned: String = String::new(),
         /// Distribution mapping (YAML), as `cromosim map` writes it, applied last to the placements that it names. Empty: none.
         pub mapping: String = String::new(),

@@ -102,6 +102,8 @@ pub struct VirtualImuNode {
     learned: Option<LearnedSimulator>,
     /// The networks' states.
     live: Option<LivePlacements>,
+    /// At most, s; 0 without, and before the rate of the states is known.
+    networks_delay: f64,
     mapping: MappingFile,
 }
 
@@ -146,6 +148,7 @@ impl VirtualImuNode {
             counts: Counts::default(),
             learned,
             live: None,
+            networks_delay: 0.0,
             mapping,
         };
         node.channels = node.fresh_channels()?;
@@ -169,7 +172,10 @@ impl VirtualImuNode {
     }
 
     fn fresh_networks(&self) -> Result<Option<LivePlacements>, LearnedError> {
-        self.learned.as_ref().map(|networks| LivePlacements::new(networks, &self.shaped, &self.placements)).transpose()
+        self.learned
+            .as_ref()
+            .map(|networks| LivePlacements::new(networks, &self.shaped, &self.placements, self.config.gap_seconds))
+            .transpose()
     }
 
     /// The placements, in the order of [`Reading::placement`].
@@ -177,9 +183,10 @@ impl VirtualImuNode {
         &self.placements
     }
 
-    /// Delay of each placement's scheme, s; none before the rate of the states is known.
+    /// Delay of each placement's scheme and networks, s; none before the rate of the states is known.
     pub fn delays_seconds(&self) -> Vec<Option<f64>> {
-        self.channels.iter().map(|channel| channel.stream.as_ref().map(StreamingImu::delay_seconds)).collect()
+        let delay = |stream: &StreamingImu| stream.delay_seconds().max(self.networks_delay);
+        self.channels.iter().map(|channel| channel.stream.as_ref().map(delay)).collect()
     }
 
     /// The messages that follow from one state.
@@ -237,11 +244,13 @@ impl VirtualImuNode {
     }
 
     fn open_streams(&mut self, state_rate_hz: f64) -> Result<(), ImuError> {
+        self.networks_delay = if self.live.is_some() { LivePlacements::delay_seconds(state_rate_hz) } else { 0.0 };
         for (channel, placement) in self.channels.iter_mut().zip(&self.placements) {
             let options =
                 StreamOptions { longest_gap: self.config.gap_seconds, ..StreamOptions::resampled(state_rate_hz, placement.rate_hz()) };
             let stream = StreamingImu::new(placement.scheme(), options)?;
-            log::info!("{}: {} at {} Hz, delay {:.4} s", placement.name(), placement.scheme(), placement.rate_hz(), stream.delay_seconds());
+            let delay = stream.delay_seconds().max(self.networks_delay);
+            log::info!("{}: {} at {} Hz, delay {delay:.4} s", placement.name(), placement.scheme(), placement.rate_hz());
             channel.stream = Some(stream);
         }
         Ok(())
@@ -249,12 +258,13 @@ impl VirtualImuNode {
 
     fn push(&mut self, (stamp, body, pose_std): (Stamp, &BodyPose, PoseStd), readings: &mut Vec<Reading>) -> Result<(), Refusal> {
         let mut released = Vec::with_capacity(self.channels.len());
-        for (channel, frame) in self.channels.iter_mut().zip(self.sites.frames(body)) {
+        let frames = self.sites.frames(body);
+        for (channel, frame) in self.channels.iter_mut().zip(&frames) {
             let stream = channel.stream.as_mut();
             released.push(stream.map_or_else(|| Ok(Vec::new()), |stream| stream.push_kinematics(frame.at(stamp).with_pose_std(pose_std)))?);
         }
         if let Some(live) = &mut self.live {
-            live.push(stamp, body);
+            live.push(stamp, body, &frames);
             live.correct(&mut released)?;
         }
         for (placement, (channel, motions)) in self.channels.iter_mut().zip(released).enumerate() {

@@ -11,6 +11,9 @@ const PATCH_SIZE: f64 = 0.03;
 /// Of unsmoothed acceleration, m/s2, which is mostly noise.
 const UNSMOOTHED: f64 = 15.0;
 
+/// So many samples later are the plain differences that [`Input::Streaming`] sees: no later than the spline's own delay, up to states of 160 Hz.
+pub(crate) const AHEAD: usize = 8;
+
 /// What a network predicts, world axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -54,8 +57,8 @@ pub enum Input {
     /// The same and acceleration and angular velocity by plain differences, 39 channels: for motion whose scatter makes the analytic simulation
     /// smooth much, video above all.
     Differences,
-    /// Eight points less their mean, and the analytic acceleration and angular velocity, 30 channels: nothing that needs a window. The
-    /// network says what is to be added.
+    /// Eight points less their mean, the analytic acceleration and angular velocity, and those by plain differences four samples later, 36
+    /// channels: nothing that needs a window, or frames that the spline does not wait for, too. The network says what is to be added.
     Streaming,
 }
 
@@ -81,7 +84,7 @@ impl Input {
             Self::Points => 27,
             Self::Residual => 33,
             Self::Differences => 39,
-            Self::Streaming => 30,
+            Self::Streaming => 36,
         }
     }
 
@@ -99,26 +102,24 @@ impl Input {
             _ => (0..count).map(|k| mean(&motion.points[at(k)])).sum::<Vector3<f64>>() / count.max(1) as f64,
         };
         for k in 0..count {
-            self.sample(&motion.points[at(k)], &motion.kinematics[at(k)], &origin, turn, features);
-            if self == Self::Differences {
-                // How much to smooth changes within a motion, and the analytic simulation smooths all of it alike.
-                let [acceleration, angular_velocity] = motion.unsmoothed[at(k)];
-                push_turned(turn, acceleration, UNSMOOTHED, features);
-                push_turned(turn, angular_velocity, Quantity::AngularVelocity.scale(), features);
-            }
+            let ahead = if self == Self::Streaming { AHEAD } else { 0 };
+            let unsmoothed = &motion.unsmoothed[(at(k) + ahead).min(last)];
+            self.sample(&motion.points[at(k)], &motion.kinematics[at(k)], unsmoothed, &origin, turn, features);
         }
     }
 
-    /// Appends one sample; `origin` is the mean of the window's points (of no meaning to [`Self::Streaming`]).
-    pub fn sample(
+    /// Appends one sample; `origin` is the mean of the window's points (of no meaning to [`Self::Streaming`]), `unsmoothed` as in
+    /// [`SiteMotion::unsmoothed`] (of meaning to [`Self::Differences`] and, [`AHEAD`], to [`Self::Streaming`]).
+    pub(crate) fn sample(
         self,
         points: &[Vector3<f64>; PATCH_POINTS],
         kinematic: &cromosim_imu::KinematicSample,
+        unsmoothed: &[Vector3<f64>; 2],
         origin: &Vector3<f64>,
         turn: &UnitQuaternion<f64>,
         features: &mut Vec<f32>,
     ) {
-        let mut push = |value: Vector3<f64>, scale: f64| push_turned(turn, value, scale, features);
+        let mut push = |value: Vector3<f64>, scale: f64| features.extend((turn * value / scale).iter().map(|x| *x as f32));
         let centre = mean(points);
         if self != Self::Streaming {
             push(centre - origin, TRAVEL);
@@ -130,11 +131,13 @@ impl Input {
             push(kinematic.acceleration, Quantity::Acceleration.scale());
             push(kinematic.angular_velocity, Quantity::AngularVelocity.scale());
         }
+        if matches!(self, Self::Differences | Self::Streaming) {
+            // How much to smooth changes within a motion, and the analytic simulation smooths all of it alike.
+            let [acceleration, angular_velocity] = *unsmoothed;
+            push(acceleration, UNSMOOTHED);
+            push(angular_velocity, Quantity::AngularVelocity.scale());
+        }
     }
-}
-
-fn push_turned(turn: &UnitQuaternion<f64>, value: Vector3<f64>, scale: f64, features: &mut Vec<f32>) {
-    features.extend((turn * value / scale).iter().map(|x| *x as f32));
 }
 
 fn mean(points: &[Vector3<f64>; PATCH_POINTS]) -> Vector3<f64> {
@@ -190,7 +193,7 @@ mod tests {
         let motion = motion(Vector3::zeros(), UnitQuaternion::identity());
         let mut features = Vec::new();
         Input::Streaming.fill(&motion, 50, 30, &UnitQuaternion::identity(), &mut features);
-        let rows: Vec<&[f32]> = features.chunks_exact(30).collect();
+        let rows: Vec<&[f32]> = features.chunks_exact(36).collect();
         assert_eq!(rows[29], rows[9]);
         assert_ne!(rows[8], rows[9]);
     }

@@ -1,19 +1,25 @@
 //! The streaming networks of the placements on one body, sample by sample.
 
-use cromosim_body::{BodyPose, ShapedBody, VertexSubset};
-use cromosim_imu::{KinematicSample, MountedSite, Placement, Scheme};
-use cromosim_spatial::Stamp;
-use nalgebra::{UnitQuaternion, Vector3};
+use std::collections::VecDeque;
 
-use crate::site_motion::Around;
+use cromosim_body::{BodyPose, ShapedBody, VertexSubset};
+use cromosim_imu::{KinematicSample, MountedSite, Placement, Scheme, SiteFrame};
+use cromosim_spatial::Stamp;
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+
+use crate::features::AHEAD;
+use crate::site_motion::{Around, difference};
 use crate::{Input, LearnedError, LearnedSimulator, NETWORK_RATE_HZ, PATCH_POINTS, Patch, Quantity, StreamingBatch};
 
 /// Frames of the patches that are kept at least: more than any scheme's delay.
 const KEPT: usize = 128;
+/// Between samples.
+const PERIOD: f64 = 1.0 / NETWORK_RATE_HZ;
 
 /// The patches of several placements over the last frames, and their networks' states. Poses go in as they come, and the skeleton is computed
-/// once for all; the samples of the schemes, which come later, are corrected in order. Placements of one scheme, whose samples come together,
-/// are one batch to the networks. The samples have to come at [`NETWORK_RATE_HZ`].
+/// once for all; the samples of the schemes, which come later, are corrected in order, once the frames are there that the networks see ahead
+/// of a sample ([`Self::delay_seconds`]). Placements of one scheme, whose samples come together, are one batch to the networks. The samples
+/// have to come at [`NETWORK_RATE_HZ`].
 pub struct LivePlacements {
     /// The points of every patch, one after the other.
     subset: VertexSubset,
@@ -21,8 +27,14 @@ pub struct LivePlacements {
     stamps: Vec<Stamp>,
     /// (frames, placements).
     points: Vec<[Vector3<f64>; PATCH_POINTS]>,
+    /// Of the sensors, (frames, placements).
+    frames: Vec<Isometry3<f64>>,
     positions: Vec<Vector3<f64>>,
     groups: Vec<Group>,
+    /// Samples of each placement that wait for frames.
+    waiting: Vec<VecDeque<KinematicSample>>,
+    /// Frames further apart, s, belong to different series.
+    longest_gap: f64,
 }
 
 /// Placements of one scheme.
@@ -30,20 +42,19 @@ struct Group {
     /// Their numbers.
     members: Vec<usize>,
     networks: [StreamingBatch; 2],
-    /// Stamp of the last sample of each.
-    last: Vec<Option<Stamp>>,
+    recent: Vec<Recent>,
     features: Vec<f32>,
     /// Which of them have a sample now.
     advance: Vec<bool>,
 }
 
 impl LivePlacements {
-    /// Placements before their first frame.
+    /// Placements before their first frame; frames more than `longest_gap` seconds apart belong to different series, as for the schemes.
     ///
     /// # Errors
     /// [`LearnedError::NotCausal`] for networks that need a window, [`LearnedError::WrongRate`] for a placement of another rate,
     /// [`LearnedError::NoPatch`].
-    pub fn new(simulator: &LearnedSimulator, body: &ShapedBody, placements: &[Placement]) -> Result<Self, LearnedError> {
+    pub fn new(simulator: &LearnedSimulator, body: &ShapedBody, placements: &[Placement], longest_gap: f64) -> Result<Self, LearnedError> {
         if simulator.input() != Input::Streaming {
             return Err(LearnedError::NotCausal);
         }
@@ -64,31 +75,52 @@ impl LivePlacements {
             placements: placements.len(),
             stamps: Vec::with_capacity(2 * KEPT),
             points: Vec::with_capacity(2 * KEPT * placements.len()),
+            frames: Vec::with_capacity(2 * KEPT * placements.len()),
             positions: Vec::with_capacity(vertices.len()),
             groups: schemes.into_iter().map(|(_, members)| Group::new(simulator, members)).collect::<Result<_, _>>()?,
+            waiting: vec![VecDeque::new(); placements.len()],
+            longest_gap,
         })
     }
 
-    /// Takes the body's pose of a time.
-    pub fn push(&mut self, stamp: Stamp, pose: &BodyPose) {
+    /// At most so long after its stamp a sample is corrected, s, where its scheme is no slower.
+    pub fn delay_seconds(state_rate_hz: f64) -> f64 {
+        (AHEAD + 1) as f64 * PERIOD + 2.0 / state_rate_hz
+    }
+
+    /// Takes the body's pose of a time, and the frame of each placement then.
+    ///
+    /// # Panics
+    /// For another number of frames than placements.
+    pub fn push(&mut self, stamp: Stamp, pose: &BodyPose, frames: &[SiteFrame]) {
+        assert_eq!(frames.len(), self.placements, "frames of {} placements", self.placements);
+        if self.stamps.last().is_some_and(|last| stamp - *last > self.longest_gap) {
+            self.forget_frames();
+        }
         if self.stamps.len() == 2 * KEPT {
             self.stamps.drain(..KEPT);
             self.points.drain(..KEPT * self.placements);
+            self.frames.drain(..KEPT * self.placements);
         }
         self.stamps.push(stamp);
         self.subset.positions_into(pose, &mut self.positions);
         self.points.extend_from_slice(self.positions.as_chunks::<PATCH_POINTS>().0);
+        self.frames.extend(frames.iter().map(|frame| frame.world_from_sensor));
     }
 
-    /// Adds what the networks say to samples of the placements' schemes, (placements, samples in order); before the first frame nothing.
+    /// Takes samples of the placements' schemes, (placements, samples in order), and puts in their place those that can be corrected now, these
+    /// or earlier ones, with what the networks say added.
     ///
     /// # Errors
     /// As [`StreamingBatch::step`].
     pub fn correct(&mut self, released: &mut [Vec<KinematicSample>]) -> Result<(), LearnedError> {
-        if self.stamps.is_empty() {
-            return Ok(());
+        for (waiting, released) in self.waiting.iter_mut().zip(released.iter_mut()) {
+            waiting.extend(released.drain(..));
+            while let Some(sample) = waiting.pop_front_if(|sample| sees_ahead(&self.stamps, sample.stamp)) {
+                released.push(sample);
+            }
         }
-        let history = History { stamps: &self.stamps, points: &self.points, placements: self.placements };
+        let history = History { stamps: &self.stamps, points: &self.points, frames: &self.frames, placements: self.placements };
         for group in &mut self.groups {
             let count = |member: &usize| released.get(*member).map_or(0, Vec::len);
             let most = group.members.iter().map(count).max().unwrap_or(0);
@@ -99,22 +131,46 @@ impl LivePlacements {
         Ok(())
     }
 
-    /// Forgets everything: a series ends here, and another begins.
-    pub fn reset(&mut self) {
+    /// A pause: what waits for the frames after it stays without them.
+    fn forget_frames(&mut self) {
         self.stamps.clear();
         self.points.clear();
+        self.frames.clear();
+        self.waiting.iter_mut().for_each(VecDeque::clear);
+    }
+
+    /// Forgets everything: a series ends here, and another begins.
+    pub fn reset(&mut self) {
+        self.forget_frames();
         for group in &mut self.groups {
-            group.last.fill(None);
+            group.recent.fill_with(Recent::default);
             group.networks.iter_mut().for_each(StreamingBatch::reset);
         }
     }
+}
+
+/// Whether the frames are there that make up the pose one sample after the differences, which the networks see ahead of a sample.
+fn sees_ahead(stamps: &[Stamp], sample: Stamp) -> bool {
+    let needed = sample.plus_seconds((AHEAD + 1) as f64 * PERIOD);
+    let after = stamps.partition_point(|stamp| *stamp < needed);
+    stamps.get(after).is_some_and(|stamp| *stamp == needed || after + 1 < stamps.len())
 }
 
 /// What is known of the patches.
 struct History<'a> {
     stamps: &'a [Stamp],
     points: &'a [[Vector3<f64>; PATCH_POINTS]],
+    frames: &'a [Isometry3<f64>],
     placements: usize,
+}
+
+/// Of one placement.
+#[derive(Clone, Default)]
+struct Recent {
+    /// Stamp of the last sample.
+    last: Option<Stamp>,
+    /// The sensor at the three samples around the differences that the networks see with it.
+    poses: [Isometry3<f64>; 3],
 }
 
 impl Group {
@@ -123,7 +179,7 @@ impl Group {
         let count = members.len();
         Ok(Self {
             networks: [StreamingBatch::new(acceleration, count)?, StreamingBatch::new(angular_velocity, count)?],
-            last: vec![None; count],
+            recent: vec![Recent::default(); count],
             features: Vec::with_capacity(count * Input::Streaming.channels()),
             advance: vec![false; count],
             members,
@@ -161,17 +217,29 @@ impl Group {
                 self.features.resize(self.features.len() + Input::Streaming.channels(), 0.0);
                 continue;
             };
-            // After a pause another series begins.
-            if self.last[row].replace(sample.stamp).is_some_and(|last| sample.stamp - last > 1.5 / NETWORK_RATE_HZ) {
-                self.networks.iter_mut().for_each(|network| network.reset_sequence(row));
-            }
             // Most samples of a batch have the same stamp.
             let place = match around.take() {
                 Some((stamp, place)) if stamp == sample.stamp => place,
                 _ => Around::new(history.stamps, sample.stamp.clamp(first, last)),
             };
             let points = place.blend(|frame| &history.points[frame * history.placements + member]);
-            Input::Streaming.sample(&points, sample, &Vector3::zeros(), &UnitQuaternion::identity(), &mut self.features);
+            let recent = &mut self.recent[row];
+            let pose = |ahead: usize| {
+                let stamp = sample.stamp.plus_seconds(ahead as f64 * PERIOD);
+                Around::new(history.stamps, stamp).blend_pose(|frame| &history.frames[frame * history.placements + member])
+            };
+            match recent.last.replace(sample.stamp) {
+                Some(last) if sample.stamp - last <= 1.5 * PERIOD => recent.poses = [recent.poses[1], recent.poses[2], pose(AHEAD + 1)],
+                last => {
+                    recent.poses = [AHEAD - 1, AHEAD, AHEAD + 1].map(pose);
+                    // After a pause another series begins.
+                    if last.is_some() {
+                        self.networks.iter_mut().for_each(|network| network.reset_sequence(row));
+                    }
+                }
+            }
+            let (unsmoothed, origin) = (difference(&recent.poses), Vector3::zeros());
+            Input::Streaming.sample(&points, sample, &unsmoothed, &origin, &UnitQuaternion::identity(), &mut self.features);
             around = Some((sample.stamp, place));
         }
     }
@@ -188,9 +256,10 @@ mod tests {
     use crate::{Direction, Network, NetworkShape, SiteMotion};
 
     const STATES_HZ: f64 = 120.0;
+    const GAP: f64 = 0.5;
 
     fn simulator(direction: Direction) -> Result<LearnedSimulator, LearnedError> {
-        let shape = NetworkShape { inputs: 30, channels: 8, kernel: 5, convolutions: 3, hidden: 8, layers: 2, direction, outputs: 3 };
+        let shape = NetworkShape { inputs: 36, channels: 8, kernel: 5, convolutions: 3, hidden: 8, layers: 2, direction, outputs: 3 };
         LearnedSimulator::new(Input::Streaming, [Network::new(shape.clone(), 1)?, Network::new(shape, 2)?])
     }
 
@@ -212,12 +281,12 @@ mod tests {
         let sites = MountedSites::new(&body, placements).unwrap();
         let options = StreamOptions::resampled(STATES_HZ, 100.0);
         let mut streams: Vec<_> = placements.iter().map(|placement| StreamingImu::new(placement.scheme(), options).unwrap()).collect();
-        let mut live = LivePlacements::new(&simulator(Direction::Forward).unwrap(), &body, placements).unwrap();
+        let mut live = LivePlacements::new(&simulator(Direction::Forward).unwrap(), &body, placements, GAP).unwrap();
         let mut all = vec![Vec::new(); placements.len()];
         for (number, stamp) in stamps.iter().enumerate() {
             let pose = pose(stamp);
-            live.push(*stamp, &pose);
             let frames = sites.frames(&pose);
+            live.push(*stamp, &pose, &frames);
             let mut released: Vec<_> =
                 streams.iter_mut().zip(&frames).map(|(stream, frame)| stream.push_kinematics(frame.at(*stamp)).unwrap()).collect();
             for (placement, samples) in placements.iter().zip(&mut released) {
@@ -277,7 +346,7 @@ mod tests {
         assert!(simulator(Direction::Both).unwrap_err().to_string().contains("direction: forward"));
         let body = ShapedBody::new(BodyModel::embedded(), &[]).unwrap();
         let fast = Placement::at_site("left_wrist", "left_watch", 200.0).unwrap();
-        let error = LivePlacements::new(&simulator(Direction::Forward).unwrap(), &body, &[fast]).err().unwrap().to_string();
+        let error = LivePlacements::new(&simulator(Direction::Forward).unwrap(), &body, &[fast], GAP).err().unwrap().to_string();
         assert!(error.contains("left_wrist") && error.contains("100"), "{error}");
     }
 }

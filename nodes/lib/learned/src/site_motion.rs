@@ -3,7 +3,7 @@
 use cromosim_body::{BodyPose, ShapedBody};
 use cromosim_imu::{KinematicSample, MountedSite, Placement, Scheme, SensorTrajectory, simulate_kinematics};
 use cromosim_spatial::{MAX_STENCIL, Stamp, derivative_weights, so3, uniform_stamps};
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Vector3};
 
 use crate::{LearnedError, PATCH_POINTS, Patch};
 
@@ -56,8 +56,9 @@ impl SiteMotion {
         let grid = uniform_stamps(trajectory.start(), trajectory.end(), NETWORK_RATE_HZ)?;
         let stamps: Vec<Stamp> = trajectory.frames().iter().map(|frame| frame.stamp).collect();
         let points = grid.iter().map(|stamp| Around::new(&stamps, *stamp).blend(|frame| &frames[frame])).collect();
-        let plain = simulate_kinematics(trajectory, Scheme::SecondDifference, &grid)?;
-        let unsmoothed = differences(&plain);
+        let poses: Vec<_> = trajectory.frames().iter().map(|frame| frame.world_from_sensor).collect();
+        let at_samples: Vec<_> = grid.iter().map(|stamp| Around::new(&stamps, *stamp).blend_pose(|frame| &poses[frame])).collect();
+        let unsmoothed = differences(&at_samples);
         Ok(Self { points, kinematics: simulate_kinematics(trajectory, scheme, &grid)?, unsmoothed })
     }
 
@@ -72,22 +73,22 @@ impl SiteMotion {
     }
 }
 
-/// Second difference of the position, and the turn between the neighbours; at the ends those of the sample beside. The rate of the samples, not
-/// that of the source, so that scatter of the same size looks alike.
-fn differences(samples: &[KinematicSample]) -> Vec<[Vector3<f64>; 2]> {
+/// At each sample; at the ends that of the sample beside.
+fn differences(samples: &[Isometry3<f64>]) -> Vec<[Vector3<f64>; 2]> {
     let last = samples.len().saturating_sub(1);
     let at = |k: usize| {
-        let Some([before, own, after]) =
-            k.checked_sub(1).and_then(|first| samples.get(first..first + 3)).and_then(|three| three.as_array())
-        else {
-            return [Vector3::zeros(); 2];
-        };
-        let [before, own, after] = [before, own, after].map(|sample| sample.world_from_sensor);
-        let second = before.translation.vector - 2.0 * own.translation.vector + after.translation.vector;
-        let turn = so3::log(&(after.rotation * before.rotation.inverse()));
-        [second * NETWORK_RATE_HZ.powi(2), turn * (0.5 * NETWORK_RATE_HZ)]
+        let three = k.checked_sub(1).and_then(|first| samples.get(first..first + 3)).and_then(|three| three.as_array());
+        three.map_or([Vector3::zeros(); 2], difference)
     };
     (0..samples.len()).map(|k| at(k.clamp(1, last.saturating_sub(1).max(1)))).collect()
+}
+
+/// Second difference of the position, m/s2, and the turn between the neighbours, rad/s, at the middle of three samples. The rate of the samples,
+/// not that of the source, so that scatter of the same size looks alike.
+pub(crate) fn difference([before, own, after]: &[Isometry3<f64>; 3]) -> [Vector3<f64>; 2] {
+    let second = before.translation.vector - 2.0 * own.translation.vector + after.translation.vector;
+    let turn = so3::log(&(after.rotation * before.rotation.inverse()));
+    [second * NETWORK_RATE_HZ.powi(2), turn * (0.5 * NETWORK_RATE_HZ)]
 }
 
 /// How the frames around a stamp make up what was there: a cubic through four, or one frame of that very stamp.
@@ -96,6 +97,8 @@ pub(crate) struct Around {
     first: usize,
     width: usize,
     weights: [f64; MAX_STENCIL],
+    /// The last frame before the stamp.
+    before: usize,
 }
 
 impl Around {
@@ -103,7 +106,7 @@ impl Around {
     pub(crate) fn new(stamps: &[Stamp], stamp: Stamp) -> Self {
         let after = stamps.partition_point(|other| *other < stamp).min(stamps.len() - 1);
         if stamps[after] == stamp {
-            return Self { first: after, width: 1, weights: [1.0; MAX_STENCIL] };
+            return Self { first: after, width: 1, weights: [1.0; MAX_STENCIL], before: after };
         }
         let width = stamps.len().min(4);
         let first = after.saturating_sub(2).min(stamps.len() - width);
@@ -111,7 +114,7 @@ impl Around {
         for (seconds, other) in seconds.iter_mut().zip(&stamps[first..first + width]) {
             *seconds = *other - stamp;
         }
-        Self { first, width, weights: derivative_weights(&seconds[..width], 0.0)[0] }
+        Self { first, width, weights: derivative_weights(&seconds[..width], 0.0)[0], before: after.saturating_sub(1) }
     }
 
     /// The points there, from those of each frame.
@@ -121,6 +124,20 @@ impl Around {
         }
         std::array::from_fn(|point| (0..self.width).map(|k| frame(self.first + k)[point] * self.weights[k]).sum())
     }
+
+    /// The pose there, from that of each frame: position and rotation vector since the frame before.
+    pub(crate) fn blend_pose<'a>(&self, frame: impl Fn(usize) -> &'a Isometry3<f64>) -> Isometry3<f64> {
+        let before = *frame(self.before);
+        if self.width == 1 {
+            return before;
+        }
+        let sum = |of: &dyn Fn(&Isometry3<f64>) -> Vector3<f64>| -> Vector3<f64> {
+            (0..self.width).map(|k| of(frame(self.first + k)) * self.weights[k]).sum()
+        };
+        let turn = sum(&|frame| so3::log(&(frame.rotation * before.rotation.inverse())));
+        let step = sum(&|frame| frame.translation.vector - before.translation.vector);
+        Isometry3::from_parts((before.translation.vector + step).into(), so3::exp(&turn) * before.rotation)
+    }
 }
 
 #[cfg(test)]
@@ -128,7 +145,6 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use cromosim_body::BodyModel;
     use cromosim_imu::{PlacementSet, SensorFrame};
-    use nalgebra::Isometry3;
 
     use super::*;
 
@@ -147,7 +163,7 @@ mod tests {
             // Stamps are whole nanoseconds, which second differences multiply by 1e4.
             assert!((acceleration - fall).norm() < 1e-3 && (angular_velocity - turn).norm() < 1e-5);
         }
-        assert_eq!(differences(&motion.kinematics[..2]), [[Vector3::zeros(); 2]; 2]);
+        assert_eq!(differences(&[Isometry3::identity(); 2]), [[Vector3::zeros(); 2]; 2]);
     }
 
     #[test]

@@ -70,7 +70,7 @@ mod tests {
 
     #[test]
     fn files_that_come_with_the_suite_are_sound() {
-        assert_eq!(Protocol::read(None).unwrap().studies.len(), 6);
+        assert_eq!(Protocol::read(None).unwrap().studies.len(), 8);
         let totalcapture = Path::new(env!("CARGO_MANIFEST_DIR")).join("config/evaluation/totalcapture.yaml");
         assert_eq!(Protocol::read(Some(&totalcapture)).unwrap().studies[0].test[0].sites, ["L_LowArm", "R_LowArm"]);
     }
