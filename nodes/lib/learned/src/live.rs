@@ -11,7 +11,7 @@ use crate::features::AHEAD;
 use crate::site_motion::{Around, difference};
 use crate::{Input, LearnedError, LearnedSimulator, NETWORK_RATE_HZ, PATCH_POINTS, Patch, Quantity, StreamingBatch};
 
-/// Frames of the patches that are kept at least: more than any scheme's delay.
+/// Frames that are kept at least: more than any scheme's delay.
 const KEPT: usize = 128;
 /// Between samples.
 const PERIOD: f64 = 1.0 / NETWORK_RATE_HZ;
@@ -23,29 +23,15 @@ const PERIOD: f64 = 1.0 / NETWORK_RATE_HZ;
 pub struct LivePlacements {
     /// The points of every patch, one after the other.
     subset: VertexSubset,
-    placements: usize,
-    stamps: Vec<Stamp>,
-    /// (frames, placements).
-    points: Vec<[Vector3<f64>; PATCH_POINTS]>,
-    /// Of the sensors, (frames, placements).
-    frames: Vec<Isometry3<f64>>,
     positions: Vec<Vector3<f64>>,
+    frames: Frames,
+    /// Before a pause, until its last samples have come.
+    ended: Option<Frames>,
     groups: Vec<Group>,
     /// Samples of each placement that wait for frames.
     waiting: Vec<VecDeque<KinematicSample>>,
     /// Frames further apart, s, belong to different series.
     longest_gap: f64,
-}
-
-/// Placements of one scheme.
-struct Group {
-    /// Their numbers.
-    members: Vec<usize>,
-    networks: [StreamingBatch; 2],
-    recent: Vec<Recent>,
-    features: Vec<f32>,
-    /// Which of them have a sample now.
-    advance: Vec<bool>,
 }
 
 impl LivePlacements {
@@ -72,11 +58,9 @@ impl LivePlacements {
         }
         Ok(Self {
             subset: body.subset(&vertices)?,
-            placements: placements.len(),
-            stamps: Vec::with_capacity(2 * KEPT),
-            points: Vec::with_capacity(2 * KEPT * placements.len()),
-            frames: Vec::with_capacity(2 * KEPT * placements.len()),
             positions: Vec::with_capacity(vertices.len()),
+            frames: Frames::new(placements.len()),
+            ended: None,
             groups: schemes.into_iter().map(|(_, members)| Group::new(simulator, members)).collect::<Result<_, _>>()?,
             waiting: vec![VecDeque::new(); placements.len()],
             longest_gap,
@@ -93,19 +77,13 @@ impl LivePlacements {
     /// # Panics
     /// For another number of frames than placements.
     pub fn push(&mut self, stamp: Stamp, pose: &BodyPose, frames: &[SiteFrame]) {
-        assert_eq!(frames.len(), self.placements, "frames of {} placements", self.placements);
-        if self.stamps.last().is_some_and(|last| stamp - *last > self.longest_gap) {
-            self.forget_frames();
+        let placements = self.frames.placements;
+        assert_eq!(frames.len(), placements, "frames of {placements} placements");
+        if self.frames.stamps.last().is_some_and(|last| stamp - *last > self.longest_gap) {
+            self.ended = Some(std::mem::replace(&mut self.frames, Frames::new(placements)));
         }
-        if self.stamps.len() == 2 * KEPT {
-            self.stamps.drain(..KEPT);
-            self.points.drain(..KEPT * self.placements);
-            self.frames.drain(..KEPT * self.placements);
-        }
-        self.stamps.push(stamp);
         self.subset.positions_into(pose, &mut self.positions);
-        self.points.extend_from_slice(self.positions.as_chunks::<PATCH_POINTS>().0);
-        self.frames.extend(frames.iter().map(|frame| frame.world_from_sensor));
+        self.frames.push(stamp, self.positions.as_chunks::<PATCH_POINTS>().0, frames);
     }
 
     /// Takes samples of the placements' schemes, (placements, samples in order), and puts in their place those that can be corrected now, these
@@ -114,34 +92,23 @@ impl LivePlacements {
     /// # Errors
     /// As [`StreamingBatch::step`].
     pub fn correct(&mut self, released: &mut [Vec<KinematicSample>]) -> Result<(), LearnedError> {
-        for (waiting, released) in self.waiting.iter_mut().zip(released.iter_mut()) {
+        let Self { frames, ended, groups, waiting, .. } = self;
+        for (waiting, released) in waiting.iter_mut().zip(released.iter_mut()) {
             waiting.extend(released.drain(..));
-            while let Some(sample) = waiting.pop_front_if(|sample| sees_ahead(&self.stamps, sample.stamp)) {
-                released.push(sample);
-            }
         }
-        let history = History { stamps: &self.stamps, points: &self.points, frames: &self.frames, placements: self.placements };
-        for group in &mut self.groups {
-            let count = |member: &usize| released.get(*member).map_or(0, Vec::len);
-            let most = group.members.iter().map(count).max().unwrap_or(0);
-            for index in 0..most {
-                group.step(&history, released, index)?;
-            }
+        // What waited for frames when the pause began gets none.
+        if let Some(ended) = ended.take() {
+            let belongs = |sample: &KinematicSample| ended.stamps.last().is_some_and(|last| sample.stamp <= *last);
+            correct_those((groups, waiting), &ended, released, belongs)?;
         }
-        Ok(())
-    }
-
-    /// A pause: what waits for the frames after it stays without them.
-    fn forget_frames(&mut self) {
-        self.stamps.clear();
-        self.points.clear();
-        self.frames.clear();
-        self.waiting.iter_mut().for_each(VecDeque::clear);
+        correct_those((groups, waiting), frames, released, |sample| frames.reach(sample.stamp))
     }
 
     /// Forgets everything: a series ends here, and another begins.
     pub fn reset(&mut self) {
-        self.forget_frames();
+        self.frames = Frames::new(self.frames.placements);
+        self.ended = None;
+        self.waiting.iter_mut().for_each(VecDeque::clear);
         for group in &mut self.groups {
             group.recent.fill_with(Recent::default);
             group.networks.iter_mut().for_each(StreamingBatch::reset);
@@ -149,19 +116,85 @@ impl LivePlacements {
     }
 }
 
-/// Whether the frames are there that make up the pose one sample after the differences, which the networks see ahead of a sample.
-fn sees_ahead(stamps: &[Stamp], sample: Stamp) -> bool {
-    let needed = sample.plus_seconds((AHEAD + 1) as f64 * PERIOD);
-    let after = stamps.partition_point(|stamp| *stamp < needed);
-    stamps.get(after).is_some_and(|stamp| *stamp == needed || after + 1 < stamps.len())
+/// Corrects the first of those that wait, as far as they may, and appends them to what is released.
+fn correct_those(
+    (groups, waiting): (&mut [Group], &mut [VecDeque<KinematicSample>]),
+    frames: &Frames,
+    released: &mut [Vec<KinematicSample>],
+    may: impl Fn(&KinematicSample) -> bool,
+) -> Result<(), LearnedError> {
+    let begin: Vec<usize> = released.iter().map(Vec::len).collect();
+    for (waiting, released) in waiting.iter_mut().zip(released.iter_mut()) {
+        while let Some(sample) = waiting.pop_front_if(|sample| may(sample)) {
+            released.push(sample);
+        }
+    }
+    for group in groups {
+        let count = |member: &usize| released.get(*member).map_or(0, |own| own.len() - begin[*member]);
+        let most = group.members.iter().map(count).max().unwrap_or(0);
+        for index in 0..most {
+            group.step(frames, released, &begin, index)?;
+        }
+    }
+    Ok(())
 }
 
-/// What is known of the patches.
-struct History<'a> {
-    stamps: &'a [Stamp],
-    points: &'a [[Vector3<f64>; PATCH_POINTS]],
-    frames: &'a [Isometry3<f64>],
+/// The last frames of a series.
+struct Frames {
     placements: usize,
+    stamps: Vec<Stamp>,
+    /// Of the patches, (frames, placements).
+    points: Vec<[Vector3<f64>; PATCH_POINTS]>,
+    /// Of the sensors, (frames, placements).
+    poses: Vec<Isometry3<f64>>,
+}
+
+impl Frames {
+    fn new(placements: usize) -> Self {
+        Self { placements, stamps: Vec::new(), points: Vec::new(), poses: Vec::new() }
+    }
+
+    fn push(&mut self, stamp: Stamp, points: &[[Vector3<f64>; PATCH_POINTS]], frames: &[SiteFrame]) {
+        if self.stamps.len() == 2 * KEPT {
+            self.stamps.drain(..KEPT);
+            self.points.drain(..KEPT * self.placements);
+            self.poses.drain(..KEPT * self.placements);
+        }
+        self.stamps.push(stamp);
+        self.points.extend_from_slice(points);
+        self.poses.extend(frames.iter().map(|frame| frame.world_from_sensor));
+    }
+
+    /// Whether the frames are there that make up the pose one sample after the differences, which the networks see ahead of a sample.
+    fn reach(&self, sample: Stamp) -> bool {
+        let needed = sample.plus_seconds((AHEAD + 1) as f64 * PERIOD);
+        let after = self.stamps.partition_point(|stamp| *stamp < needed);
+        self.stamps.get(after).is_some_and(|stamp| *stamp == needed || after + 1 < self.stamps.len())
+    }
+
+    /// Around a stamp, or around the end that is nearer to it.
+    fn around(&self, stamp: Stamp) -> Around {
+        Around::new(&self.stamps, stamp.clamp(self.stamps[0], self.stamps[self.stamps.len() - 1]))
+    }
+
+    fn points(&self, around: &Around, placement: usize) -> [Vector3<f64>; PATCH_POINTS] {
+        around.blend(|frame| &self.points[frame * self.placements + placement])
+    }
+
+    fn pose(&self, stamp: Stamp, placement: usize) -> Isometry3<f64> {
+        self.around(stamp).blend_pose(|frame| &self.poses[frame * self.placements + placement])
+    }
+}
+
+/// Placements of one scheme.
+struct Group {
+    /// Their numbers.
+    members: Vec<usize>,
+    networks: [StreamingBatch; 2],
+    recent: Vec<Recent>,
+    features: Vec<f32>,
+    /// Which of them have a sample now.
+    advance: Vec<bool>,
 }
 
 /// Of one placement.
@@ -171,6 +204,22 @@ struct Recent {
     last: Option<Stamp>,
     /// The sensor at the three samples around the differences that the networks see with it.
     poses: [Isometry3<f64>; 3],
+}
+
+impl Recent {
+    /// Whether the sample goes on with the series, or begins one; and the differences that the networks see with it.
+    fn advance(&mut self, sample: Stamp, end: Stamp, pose: impl Fn(Stamp) -> Isometry3<f64>) -> (bool, [Vector3<f64>; 2]) {
+        let goes_on = self.last.is_some_and(|last| sample - last <= 1.5 * PERIOD);
+        self.last = Some(sample);
+        let next = sample.plus_seconds((AHEAD + 1) as f64 * PERIOD);
+        // A series that ends keeps its last differences.
+        if goes_on && next <= end {
+            self.poses = [self.poses[1], self.poses[2], pose(next)];
+        } else if !goes_on {
+            self.poses = [2.0, 1.0, 0.0].map(|back| pose(next.min(end).plus_seconds(-back * PERIOD)));
+        }
+        (goes_on, difference(&self.poses))
+    }
 }
 
 impl Group {
@@ -186,15 +235,15 @@ impl Group {
         })
     }
 
-    /// Corrects the sample `index` of each member that has one.
-    fn step(&mut self, history: &History, released: &mut [Vec<KinematicSample>], index: usize) -> Result<(), LearnedError> {
-        self.fill_features(history, released, index);
+    /// Corrects the sample `index` of each member that has one, counted from where each begins.
+    fn step(&mut self, frames: &Frames, released: &mut [Vec<KinematicSample>], begin: &[usize], index: usize) -> Result<(), LearnedError> {
+        self.fill_features(frames, released, begin, index);
         let mut added = [&[][..]; 2];
         for (added, network) in added.iter_mut().zip(&mut self.networks) {
             *added = network.step_some(&self.features, &self.advance)?;
         }
         for (row, member) in self.members.iter().enumerate() {
-            let Some(sample) = released.get_mut(*member).and_then(|samples| samples.get_mut(index)) else { continue };
+            let Some(sample) = released.get_mut(*member).and_then(|samples| samples.get_mut(begin[*member] + index)) else { continue };
             let [acceleration, rate] = [0, 1].map(|which| {
                 let output = &added[which][3 * row..][..3];
                 Vector3::new(output[0], output[1], output[2]).map(f64::from) * Quantity::BOTH[which].scale()
@@ -206,12 +255,11 @@ impl Group {
         Ok(())
     }
 
-    fn fill_features(&mut self, history: &History, released: &[Vec<KinematicSample>], index: usize) {
-        let (first, last) = (history.stamps[0], history.stamps[history.stamps.len() - 1]);
+    fn fill_features(&mut self, frames: &Frames, released: &[Vec<KinematicSample>], begin: &[usize], index: usize) {
         let mut around: Option<(Stamp, Around)> = None;
         self.features.clear();
         for (row, member) in self.members.iter().enumerate() {
-            let sample = released.get(*member).and_then(|samples| samples.get(index));
+            let sample = released.get(*member).and_then(|samples| samples.get(begin[*member] + index));
             self.advance[row] = sample.is_some();
             let Some(sample) = sample else {
                 self.features.resize(self.features.len() + Input::Streaming.channels(), 0.0);
@@ -220,25 +268,14 @@ impl Group {
             // Most samples of a batch have the same stamp.
             let place = match around.take() {
                 Some((stamp, place)) if stamp == sample.stamp => place,
-                _ => Around::new(history.stamps, sample.stamp.clamp(first, last)),
+                _ => frames.around(sample.stamp),
             };
-            let points = place.blend(|frame| &history.points[frame * history.placements + member]);
-            let recent = &mut self.recent[row];
-            let pose = |ahead: usize| {
-                let stamp = sample.stamp.plus_seconds(ahead as f64 * PERIOD);
-                Around::new(history.stamps, stamp).blend_pose(|frame| &history.frames[frame * history.placements + member])
-            };
-            match recent.last.replace(sample.stamp) {
-                Some(last) if sample.stamp - last <= 1.5 * PERIOD => recent.poses = [recent.poses[1], recent.poses[2], pose(AHEAD + 1)],
-                last => {
-                    recent.poses = [AHEAD - 1, AHEAD, AHEAD + 1].map(pose);
-                    // After a pause another series begins.
-                    if last.is_some() {
-                        self.networks.iter_mut().for_each(|network| network.reset_sequence(row));
-                    }
-                }
+            let end = frames.stamps[frames.stamps.len() - 1];
+            let (goes_on, unsmoothed) = self.recent[row].advance(sample.stamp, end, |stamp| frames.pose(stamp, *member));
+            if !goes_on {
+                self.networks.iter_mut().for_each(|network| network.reset_sequence(row));
             }
-            let (unsmoothed, origin) = (difference(&recent.poses), Vector3::zeros());
+            let (points, origin) = (frames.points(&place, *member), Vector3::zeros());
             Input::Streaming.sample(&points, sample, &unsmoothed, &origin, &UnitQuaternion::identity(), &mut self.features);
             around = Some((sample.stamp, place));
         }
@@ -313,6 +350,27 @@ mod tests {
             assert_eq!(one.stamp, all.stamp);
             assert!((one.acceleration - all.acceleration).norm() < 1e-3, "{} {}", one.acceleration, all.acceleration);
             assert!((one.angular_velocity - all.angular_velocity).norm() < 1e-4);
+        }
+    }
+
+    #[test]
+    fn a_series_before_a_pause_is_corrected_to_its_end() {
+        let body = ShapedBody::new(BodyModel::embedded(), &[]).unwrap();
+        for scheme in [Scheme::SecondDifference, Scheme::Richardson, Scheme::Triangle] {
+            let placement = Placement::at_site("left_wrist", "left_watch", 100.0).unwrap().with_scheme(scheme);
+            let (before, after) = (stamps(1.0, 3.0), stamps(4.0, 4.2));
+            let poses: Vec<BodyPose> = before.iter().map(pose).collect();
+            let motion = SiteMotion::on_body(&body, &placement, &before, &poses).unwrap();
+            let whole = simulator(Direction::Forward).unwrap().simulate(&motion).unwrap();
+            let samples = &run(&[placement], &[before, after].concat(), |_, _| true)[0];
+            let found: Vec<_> = samples.iter().filter(|sample| sample.stamp <= Stamp::from_seconds(3.0)).collect();
+            assert_eq!(found.len(), whole.len(), "{scheme}");
+            for (one, all) in found.iter().zip(&whole).skip(60) {
+                assert_eq!(one.stamp, all.stamp);
+                assert!((one.acceleration - all.acceleration).norm() < 1e-3, "{scheme}: {} {}", one.acceleration, all.acceleration);
+                assert!((one.angular_velocity - all.angular_velocity).norm() < 1e-4, "{scheme}");
+            }
+            assert!(samples.len() > whole.len() + 8);
         }
     }
 
