@@ -128,7 +128,8 @@ fn choose(cells: &[Cell], without: &str) -> Option<Variant> {
     best.map(|(_, variant)| variant)
 }
 
-/// Each Mix2R over R2R of the same share, without turned copies and with them; of V2R, each variant over its simulator's plain one, and over the analytic simulator's alike.
+/// Each Mix2R over R2R of the same share, without turned copies and with them; those over R2R; of V2R, each variant over its simulator's plain
+/// one, and over the analytic simulator's alike.
 fn comparisons(cells: &[Cell], seed: u64) -> Vec<Comparison> {
     let find = |training: Training, variant: Option<Variant>, share: f64| {
         cells.iter().find(|cell| !cell.chosen && cell.training == training && cell.variant == variant && cell.share == share)
