@@ -86,7 +86,7 @@ fn tried(results: &Results) -> Vec<(Variant, Option<&Cell>, Option<&Cell>)> {
 fn ways(results: &Results) -> Table {
     let real = results.cell(Training::Real, None, false, 1.0);
     let columns = [Column::text("learned from"), Column::text("simulator"), Column::text("with")];
-    let scores = ["virtual alone (V2R)", "real and virtual (Mix2R)", "Mix2R over R2R"].map(Column::numbers);
+    let scores = ["alone (R2R, V2R)", "real and virtual (Mix2R)", "Mix2R over R2R"].map(Column::numbers);
     let alone = |name: &str, cell| [name, "", "", &score(cell), "", ""].map(str::to_owned).to_vec();
     let turned = results.cell(Training::Turned, None, false, 1.0);
     let first = [alone("real (R2R)", real), alone("real, turned copies", turned)];
