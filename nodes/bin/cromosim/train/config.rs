@@ -272,7 +272,7 @@ mod tests {
             assert!(config.data.iter().any(|source| !config.validation.contains(&source.subject)));
             count += 1;
         }
-        assert_eq!(count, 5);
+        assert_eq!(count, 6);
     }
 
     #[test]
