@@ -239,7 +239,7 @@ fn effects_of_a_reference_are_none_of_a_live_device() {
 fn constant_networks(folder: &std::path::Path, acceleration: [f32; 3], angular_velocity: [f32; 3]) {
     use cromosim_learned::{Direction, Input, LearnedSimulator, Network, NetworkShape};
     let shape = NetworkShape {
-        inputs: 30,
+        inputs: Input::Streaming.channels(),
         channels: 4,
         kernel: 3,
         convolutions: 3,
