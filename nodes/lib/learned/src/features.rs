@@ -11,7 +11,7 @@ const PATCH_SIZE: f64 = 0.03;
 /// Of unsmoothed acceleration, m/s2, which is mostly noise.
 const UNSMOOTHED: f64 = 15.0;
 
-/// So many samples later are the plain differences that [`Input::Streaming`] sees: no later than the spline's own delay, up to states of 160 Hz.
+/// So many samples later are the plain differences that [`Input::Streaming`] sees: for states of 60 Hz within the spline's own delay.
 pub(crate) const AHEAD: usize = 8;
 
 /// What a network predicts, world axes.
@@ -57,8 +57,8 @@ pub enum Input {
     /// The same and acceleration and angular velocity by plain differences, 39 channels: for motion whose scatter makes the analytic simulation
     /// smooth much, video above all.
     Differences,
-    /// Eight points less their mean, the analytic acceleration and angular velocity, and those by plain differences four samples later, 36
-    /// channels: nothing that needs a window, or frames that the spline does not wait for, too. The network says what is to be added.
+    /// Eight points less their mean, the analytic acceleration and angular velocity, and those by plain differences eight samples later, 36
+    /// channels: nothing that needs a window. The network says what is to be added.
     Streaming,
 }
 
