@@ -27,13 +27,25 @@ fn prepare(folder: &Path, model: &str) {
     let motion = embedded_walk().slice(1.0, Some(6.0)).unwrap();
     let body = ShapedBody::new(BodyModel::embedded(), &motion.betas).unwrap();
     fs::write(folder.join("walk.bvh"), write_bvh(&motion, &body)).unwrap();
-    fs::write(folder.join("protocol.yaml"), PROTOCOL.replace("MODEL", model)).unwrap();
+    fs::write(
+        folder.join("protocol.yaml"),
+        PROTOCOL.replace("MODEL", model),
+    )
+    .unwrap();
 }
 
 fn rmse(results: &serde_json::Value, position: &str, simulator: &str) -> [f64; 2] {
     let positions = results["studies"][0]["positions"].as_array().unwrap();
-    let own = positions.iter().find(|own| own["position"] == position).unwrap();
-    let own = own["simulators"].as_array().unwrap().iter().find(|own| own["simulator"] == simulator).unwrap();
+    let own = positions
+        .iter()
+        .find(|own| own["position"] == position)
+        .unwrap();
+    let own = own["simulators"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|own| own["simulator"] == simulator)
+        .unwrap();
     [0, 1].map(|which| own["rmse"][which].as_f64().unwrap())
 }
 
@@ -42,24 +54,63 @@ fn simulators_are_compared_and_the_same_again_is_the_same() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     prepare(here, "motion_capture");
-    let command = |out| ["evaluate", "fidelity", "--protocol", "protocol.yaml", "--data", ".", "--out", out];
+    let command = |out| {
+        [
+            "evaluate",
+            "fidelity",
+            "--protocol",
+            "protocol.yaml",
+            "--data",
+            ".",
+            "--out",
+            out,
+        ]
+    };
     let said = succeed(here, &command("one"));
-    assert!(said.contains("| left watch (2 recordings") && said.contains("learned, mapped"), "{said}");
-    let results: serde_json::Value = serde_json::from_slice(&fs::read(here.join("one/results.json")).unwrap()).unwrap();
+    assert!(
+        said.contains("| left watch (2 recordings") && said.contains("learned, mapped"),
+        "{said}"
+    );
+    let results: serde_json::Value =
+        serde_json::from_slice(&fs::read(here.join("one/results.json")).unwrap()).unwrap();
     for position in ["left_watch", "right_instep", "all"] {
-        let [analytic, spline] = ["analytic", "spline"].map(|simulator| rmse(&results, position, simulator));
+        let [analytic, spline] =
+            ["analytic", "spline"].map(|simulator| rmse(&results, position, simulator));
         // Frames of motion capture scatter, and a scheme that does not smooth shows it.
-        assert!(spline[0] < 0.8 * analytic[0], "{position}: {spline:?} {analytic:?}");
+        assert!(
+            spline[0] < 0.8 * analytic[0],
+            "{position}: {spline:?} {analytic:?}"
+        );
     }
     // The forearm's skin turns nearly as its joint does, but lies away from it.
-    let [analytic, joint] = ["analytic", "joint"].map(|simulator| rmse(&results, "left_watch", simulator));
-    assert!((joint[1] / analytic[1] - 1.0).abs() < 0.5 && joint[0] != analytic[0], "{joint:?} {analytic:?}");
-    for picture in ["walk__60_Hz_specific_force.png", "walk__60_Hz_angular_velocity.png"] {
-        assert!(fs::read(here.join("one").join(picture)).unwrap().starts_with(b"\x89PNG"));
+    let [analytic, joint] =
+        ["analytic", "joint"].map(|simulator| rmse(&results, "left_watch", simulator));
+    assert!(
+        (joint[1] / analytic[1] - 1.0).abs() < 0.5 && joint[0] != analytic[0],
+        "{joint:?} {analytic:?}"
+    );
+    for picture in [
+        "walk__60_Hz_specific_force.png",
+        "walk__60_Hz_angular_velocity.png",
+    ] {
+        assert!(
+            fs::read(here.join("one").join(picture))
+                .unwrap()
+                .starts_with(b"\x89PNG")
+        );
     }
     succeed(here, &command("two"));
-    for name in ["results.json", "tables.md", "report.html", "walk__60_Hz_specific_force.png"] {
-        assert!(fs::read(here.join("one").join(name)).unwrap() == fs::read(here.join("two").join(name)).unwrap(), "{name} differs");
+    for name in [
+        "results.json",
+        "tables.md",
+        "report.html",
+        "walk__60_Hz_specific_force.png",
+    ] {
+        assert!(
+            fs::read(here.join("one").join(name)).unwrap()
+                == fs::read(here.join("two").join(name)).unwrap(),
+            "{name} differs"
+        );
     }
     refuses(here, &command("one"), &["one/results.json", "--force"]);
     let quick = succeed(here, &[&command("quick")[..], &["--quick"]].concat());
@@ -71,9 +122,29 @@ fn what_cannot_be_compared_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     prepare(here, "nobodys");
-    let command = ["evaluate", "fidelity", "--protocol", "protocol.yaml", "--data", ".", "--out", "out"];
-    refuses(here, &command, &["nobodys", "motion_capture, motion_capture_60, streaming, streaming_video, video"]);
-    refuses(here, &[&command[..], &["--models", "models"]].concat(), &["models/nobodys/acceleration.safetensors"]);
+    let command = [
+        "evaluate",
+        "fidelity",
+        "--protocol",
+        "protocol.yaml",
+        "--data",
+        ".",
+        "--out",
+        "out",
+    ];
+    refuses(
+        here,
+        &command,
+        &[
+            "nobodys",
+            "motion_capture, motion_capture_60, streaming, streaming_video, video",
+        ],
+    );
+    refuses(
+        here,
+        &[&command[..], &["--models", "models"]].concat(),
+        &["models/nobodys/acceleration.safetensors"],
+    );
     for (from, to, expected) in [
         ("walk.bvh", "gone.bvh", "gone.bvh"),
         ("left_watch", "left_wing", "left_wing"),
@@ -81,7 +152,11 @@ fn what_cannot_be_compared_is_named() {
         ("fidelity/1", "fidelity/9", "cromosim/fidelity/1"),
         ("seed", "sead", "sead"),
     ] {
-        fs::write(here.join("protocol.yaml"), PROTOCOL.replace("MODEL", "none").replace(from, to)).unwrap();
+        fs::write(
+            here.join("protocol.yaml"),
+            PROTOCOL.replace("MODEL", "none").replace(from, to),
+        )
+        .unwrap();
         refuses(here, &command, &[expected]);
     }
     assert!(!here.join("out").exists());
@@ -92,29 +167,76 @@ fn models_that_come_with_the_suite_simulate() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     prepare(here, "none");
-    for model in ["motion_capture", "motion_capture_60", "video", "streaming", "streaming_video"] {
-        let said = succeed(here, &["simulate", "walk.bvh", "--learned", model, "--out", &format!("{model}.mcap")]);
+    for model in [
+        "motion_capture",
+        "motion_capture_60",
+        "video",
+        "streaming",
+        "streaming_video",
+    ] {
+        let said = succeed(
+            here,
+            &[
+                "simulate",
+                "walk.bvh",
+                "--learned",
+                model,
+                "--out",
+                &format!("{model}.mcap"),
+            ],
+        );
         assert!(said.contains("messages"), "{said}");
     }
-    refuses(here, &["simulate", "walk.bvh", "--learned", "moton_capture", "--out", "x.mcap"], &["moton_capture", "streaming"]);
+    refuses(
+        here,
+        &[
+            "simulate",
+            "walk.bvh",
+            "--learned",
+            "moton_capture",
+            "--out",
+            "x.mcap",
+        ],
+        &["moton_capture", "streaming"],
+    );
 }
 
 #[test]
 fn models_that_come_with_the_suite_are_worth_what_their_evaluation_says() {
-    let Some(data) = common::shared_data() else { return };
+    let Some(data) = common::shared_data() else {
+        return;
+    };
     let data = data.display().to_string();
     let folder = tempfile::tempdir().unwrap();
-    succeed(folder.path(), &["evaluate", "fidelity", "--quick", "--data", &data, "--out", "out"]);
-    let results: serde_json::Value = serde_json::from_slice(&fs::read(folder.path().join("out/results.json")).unwrap()).unwrap();
+    succeed(
+        folder.path(),
+        &[
+            "evaluate", "fidelity", "--quick", "--data", &data, "--out", "out",
+        ],
+    );
+    let results: serde_json::Value =
+        serde_json::from_slice(&fs::read(folder.path().join("out/results.json")).unwrap()).unwrap();
     let of = |study: usize, simulator: &str| {
-        let position = results["studies"][study]["positions"].as_array().unwrap().last().unwrap();
-        let own = position["simulators"].as_array().unwrap().iter().find(|own| own["simulator"] == simulator).unwrap();
+        let position = results["studies"][study]["positions"]
+            .as_array()
+            .unwrap()
+            .last()
+            .unwrap();
+        let own = position["simulators"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .find(|own| own["simulator"] == simulator)
+            .unwrap();
         [0, 1].map(|which| own["rmse"][which].as_f64().unwrap())
     };
     // Motion capture of 60 Hz and video: people and positions that the networks have not seen.
     for (study, least) in [(0, 0.2), (2, 0.05)] {
         let (spline, learned) = (of(study, "spline"), of(study, "learned"));
-        assert!(learned[1] < (1.0 - least) * spline[1], "study {study}: {learned:?}, spline {spline:?}");
+        assert!(
+            learned[1] < (1.0 - least) * spline[1],
+            "study {study}: {learned:?}, spline {spline:?}"
+        );
     }
     // A real device whose other trials were learned from.
     assert!(of(4, "learned")[0] < 0.7 * of(4, "spline")[0]);

@@ -27,17 +27,27 @@ ros_message! {
 macro_rules! nanoseconds {
     ($name:ident) => {
         impl $name {
-            /// From nanoseconds. What 32 bits of seconds cannot hold (after January 2038) saturates.
+            /// From nanoseconds. What 32 bits of seconds cannot hold (after January 2038)
+            /// saturates.
             pub const fn from_nanos(nanos: i64) -> Self {
                 const BILLION: i64 = 1_000_000_000;
                 let sec = nanos.div_euclid(BILLION);
                 if sec > i32::MAX as i64 {
-                    return Self { sec: i32::MAX, nanosec: 999_999_999 };
+                    return Self {
+                        sec: i32::MAX,
+                        nanosec: 999_999_999,
+                    };
                 }
                 if sec < i32::MIN as i64 {
-                    return Self { sec: i32::MIN, nanosec: 0 };
+                    return Self {
+                        sec: i32::MIN,
+                        nanosec: 0,
+                    };
                 }
-                Self { sec: sec as i32, nanosec: nanos.rem_euclid(BILLION) as u32 }
+                Self {
+                    sec: sec as i32,
+                    nanosec: nanos.rem_euclid(BILLION) as u32,
+                }
             }
 
             /// Nanoseconds. Exact for every value, `nanosec` above 1e9 included.

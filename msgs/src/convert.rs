@@ -22,10 +22,14 @@ pub enum NotABody {
     Position(Point),
 }
 
-/// Pelvis joint in the world (m) and the 24 rotations: world_from_pelvis first, the others parent_from_joint.
+/// Pelvis joint in the world (m) and the 24 rotations: world_from_pelvis first, the others
+/// parent_from_joint.
 type RootAndRotations = (nalgebra::Vector3<f64>, [UnitQuaternion<f64>; 24]);
 
-fn root_and_rotations(root: Pose, rotations: &[Quaternion; 24]) -> Result<RootAndRotations, NotABody> {
+fn root_and_rotations(
+    root: Pose,
+    rotations: &[Quaternion; 24],
+) -> Result<RootAndRotations, NotABody> {
     let position: nalgebra::Vector3<f64> = root.position.into();
     if !position.iter().all(|metres| metres.is_finite()) {
         return Err(NotABody::Position(root.position));
@@ -34,7 +38,9 @@ fn root_and_rotations(root: Pose, rotations: &[Quaternion; 24]) -> Result<RootAn
     for (joint, raw) in rotations.iter().enumerate() {
         // Element 0 only repeats the root's orientation.
         let raw = if joint == 0 { root.orientation } else { *raw };
-        checked[joint] = raw.try_into().map_err(|source| NotABody::Rotation { joint, source })?;
+        checked[joint] = raw
+            .try_into()
+            .map_err(|source| NotABody::Rotation { joint, source })?;
     }
     Ok((position, checked))
 }
@@ -42,11 +48,12 @@ fn root_and_rotations(root: Pose, rotations: &[Quaternion; 24]) -> Result<RootAn
 macro_rules! body_message {
     ($($name:ident),*) => { $(
         impl $name {
-            /// Pelvis joint in the world (m) and the 24 rotations: world_from_pelvis first, the others parent_from_joint. Rotations are
-            /// normalised.
+            /// Pelvis joint in the world (m) and the 24 rotations: world_from_pelvis first, the
+            /// others parent_from_joint. Rotations are normalised.
             ///
             /// # Errors
-            /// [`NotABody`] for what is no rotation, NaN included, and for a position that is not finite.
+            /// [`NotABody`] for what is no rotation, NaN included, and for a position that is not
+            /// finite.
             pub fn root_and_rotations(&self) -> Result<(nalgebra::Vector3<f64>, [UnitQuaternion<f64>; 24]), NotABody> {
                 root_and_rotations(self.world_from_pelvis, &self.local_rotations)
             }
@@ -68,7 +75,11 @@ pub struct NotARotation(pub Quaternion);
 
 impl From<nalgebra::Vector3<f64>> for Vector3 {
     fn from(v: nalgebra::Vector3<f64>) -> Self {
-        Self { x: v.x, y: v.y, z: v.z }
+        Self {
+            x: v.x,
+            y: v.y,
+            z: v.z,
+        }
     }
 }
 
@@ -80,7 +91,11 @@ impl From<Vector3> for nalgebra::Vector3<f64> {
 
 impl From<nalgebra::Vector3<f64>> for Point {
     fn from(v: nalgebra::Vector3<f64>) -> Self {
-        Self { x: v.x, y: v.y, z: v.z }
+        Self {
+            x: v.x,
+            y: v.y,
+            z: v.z,
+        }
     }
 }
 
@@ -92,7 +107,12 @@ impl From<Point> for nalgebra::Vector3<f64> {
 
 impl From<UnitQuaternion<f64>> for Quaternion {
     fn from(q: UnitQuaternion<f64>) -> Self {
-        Self { x: q.i, y: q.j, z: q.k, w: q.w }
+        Self {
+            x: q.i,
+            y: q.j,
+            z: q.k,
+            w: q.w,
+        }
     }
 }
 
@@ -103,13 +123,20 @@ impl TryFrom<Quaternion> for UnitQuaternion<f64> {
     fn try_from(q: Quaternion) -> Result<Self, NotARotation> {
         let raw = nalgebra::Quaternion::new(q.w, q.x, q.y, q.z);
         let norm = raw.norm();
-        if norm.is_finite() && (norm - 1.0).abs() <= 0.01 { Ok(Self::new_normalize(raw)) } else { Err(NotARotation(q)) }
+        if norm.is_finite() && (norm - 1.0).abs() <= 0.01 {
+            Ok(Self::new_normalize(raw))
+        } else {
+            Err(NotARotation(q))
+        }
     }
 }
 
 impl From<Isometry3<f64>> for Pose {
     fn from(world_from_body: Isometry3<f64>) -> Self {
-        Self { position: world_from_body.translation.vector.into(), orientation: world_from_body.rotation.into() }
+        Self {
+            position: world_from_body.translation.vector.into(),
+            orientation: world_from_body.rotation.into(),
+        }
     }
 }
 
@@ -119,13 +146,19 @@ impl TryFrom<Pose> for Isometry3<f64> {
     /// As for the quaternion.
     fn try_from(message: Pose) -> Result<Self, NotARotation> {
         let position: nalgebra::Vector3<f64> = message.position.into();
-        Ok(Self::from_parts(Translation3::from(position), message.orientation.try_into()?))
+        Ok(Self::from_parts(
+            Translation3::from(position),
+            message.orientation.try_into()?,
+        ))
     }
 }
 
 impl From<Isometry3<f64>> for Transform {
     fn from(parent_from_child: Isometry3<f64>) -> Self {
-        Self { translation: parent_from_child.translation.vector.into(), rotation: parent_from_child.rotation.into() }
+        Self {
+            translation: parent_from_child.translation.vector.into(),
+            rotation: parent_from_child.rotation.into(),
+        }
     }
 }
 
@@ -135,15 +168,36 @@ impl TryFrom<Transform> for Isometry3<f64> {
     /// As for the quaternion.
     fn try_from(message: Transform) -> Result<Self, NotARotation> {
         let translation: nalgebra::Vector3<f64> = message.translation.into();
-        Ok(Self::from_parts(Translation3::from(translation), message.rotation.try_into()?))
+        Ok(Self::from_parts(
+            Translation3::from(translation),
+            message.rotation.try_into()?,
+        ))
     }
 }
 
 impl From<SmplPose> for SmplState {
     /// Takes the fields over as they are.
     fn from(source: SmplPose) -> Self {
-        let SmplPose { header, body_id, gender, betas, shape_space, world_from_pelvis, local_rotations, confidence } = source;
-        Self { header, body_id, gender, betas, shape_space, world_from_pelvis, local_rotations, confidence }
+        let SmplPose {
+            header,
+            body_id,
+            gender,
+            betas,
+            shape_space,
+            world_from_pelvis,
+            local_rotations,
+            confidence,
+        } = source;
+        Self {
+            header,
+            body_id,
+            gender,
+            betas,
+            shape_space,
+            world_from_pelvis,
+            local_rotations,
+            confidence,
+        }
     }
 }
 
@@ -154,7 +208,10 @@ mod tests {
 
     #[test]
     fn an_isometry_survives_the_way_there_and_back() {
-        let there = Isometry3::new(nalgebra::Vector3::new(1.0, -2.0, 3.0), nalgebra::Vector3::new(0.3, 0.2, -0.9));
+        let there = Isometry3::new(
+            nalgebra::Vector3::new(1.0, -2.0, 3.0),
+            nalgebra::Vector3::new(0.3, 0.2, -0.9),
+        );
         let pose: Isometry3<f64> = Pose::from(there).try_into().unwrap();
         let edge: Isometry3<f64> = Transform::from(there).try_into().unwrap();
         assert!((pose.to_homogeneous() - there.to_homogeneous()).norm() < 1e-15);
@@ -163,24 +220,51 @@ mod tests {
 
     #[test]
     fn a_body_survives_the_way_there_and_back_and_nonsense_is_refused() {
-        let rotations =
-            std::array::from_fn(|joint| UnitQuaternion::from_scaled_axis(nalgebra::Vector3::new(0.1 * joint as f64, 0.2, -0.3)));
+        let rotations = std::array::from_fn(|joint| {
+            UnitQuaternion::from_scaled_axis(nalgebra::Vector3::new(0.1 * joint as f64, 0.2, -0.3))
+        });
         let mut state = SmplState::default();
         state.set_root_and_rotations(nalgebra::Vector3::new(1.0, 2.0, 3.0), &rotations);
         let (root, back) = state.root_and_rotations().unwrap();
         assert_eq!(root, nalgebra::Vector3::new(1.0, 2.0, 3.0));
-        assert!(back.iter().zip(&rotations).all(|(one, other)| one.angle_to(other) < 1e-7));
+        assert!(
+            back.iter()
+                .zip(&rotations)
+                .all(|(one, other)| one.angle_to(other) < 1e-7)
+        );
         state.local_rotations[5].w = f64::NAN;
-        assert!(state.root_and_rotations().unwrap_err().to_string().starts_with("joint 5"));
+        assert!(
+            state
+                .root_and_rotations()
+                .unwrap_err()
+                .to_string()
+                .starts_with("joint 5")
+        );
         state.world_from_pelvis.position.z = f64::INFINITY;
-        assert!(matches!(state.root_and_rotations(), Err(NotABody::Position(_))));
+        assert!(matches!(
+            state.root_and_rotations(),
+            Err(NotABody::Position(_))
+        ));
     }
 
     #[test]
     fn what_is_no_rotation_is_refused() {
         for w in [0.0, 0.98, 1.02, f64::NAN, f64::INFINITY] {
-            assert!(UnitQuaternion::try_from(Quaternion { w, ..Quaternion::default() }).is_err(), "{w}");
+            assert!(
+                UnitQuaternion::try_from(Quaternion {
+                    w,
+                    ..Quaternion::default()
+                })
+                .is_err(),
+                "{w}"
+            );
         }
-        assert!(UnitQuaternion::try_from(Quaternion { w: 1.001, ..Quaternion::default() }).is_ok());
+        assert!(
+            UnitQuaternion::try_from(Quaternion {
+                w: 1.001,
+                ..Quaternion::default()
+            })
+            .is_ok()
+        );
     }
 }

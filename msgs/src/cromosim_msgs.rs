@@ -20,7 +20,8 @@ ros_message! {
         pub shape_space: String,
         /// Pose of the pelvis joint, m.
         pub world_from_pelvis: Pose,
-        /// Element 0 repeats `world_from_pelvis.orientation`, the others are parent_from_joint, in SMPL's order of joints.
+        /// Element 0 repeats `world_from_pelvis.orientation`, the others are parent_from_joint, in
+        /// SMPL's order of joints.
         pub local_rotations: [Quaternion; 24],
         /// 0 to 1; 1 or NaN where the source cannot say.
         pub confidence: f64,
@@ -44,7 +45,8 @@ ros_message! {
         pub shape_space: String,
         /// Pose of the pelvis joint, m.
         pub world_from_pelvis: Pose,
-        /// Element 0 repeats `world_from_pelvis.orientation`, the others are parent_from_joint, in SMPL's order of joints.
+        /// Element 0 repeats `world_from_pelvis.orientation`, the others are parent_from_joint, in
+        /// SMPL's order of joints.
         pub local_rotations: [Quaternion; 24],
         /// 0 to 1; 1 or NaN where the source cannot say.
         pub confidence: f64,

@@ -38,7 +38,8 @@ pub trait RosService {
 /// Describes one message type.
 #[derive(Debug)]
 pub struct MessageType {
-    /// `package/msg/Name`; `package/srv/Name_Request` and `package/srv/Name_Response` for the halves of a service.
+    /// `package/msg/Name`; `package/srv/Name_Request` and `package/srv/Name_Response` for the
+    /// halves of a service.
     pub name: &'static str,
     /// The interface file, with comments.
     pub file_text: &'static str,
@@ -83,7 +84,10 @@ impl FieldType {
     /// The same arity of another element.
     #[must_use]
     pub const fn of(self, element: Element) -> Self {
-        Self { element, arity: self.arity }
+        Self {
+            element,
+            arity: self.arity,
+        }
     }
 }
 
@@ -169,11 +173,17 @@ primitives! {
 }
 
 impl<E: RosElement> RosField for Vec<E> {
-    const FIELD_TYPE: FieldType = FieldType { element: E::ELEMENT, arity: Arity::Sequence };
+    const FIELD_TYPE: FieldType = FieldType {
+        element: E::ELEMENT,
+        arity: Arity::Sequence,
+    };
 }
 
 impl<E: RosElement, const N: usize> RosField for [E; N] {
-    const FIELD_TYPE: FieldType = FieldType { element: E::ELEMENT, arity: Arity::Array(N) };
+    const FIELD_TYPE: FieldType = FieldType {
+        element: E::ELEMENT,
+        arity: Arity::Array(N),
+    };
 }
 
 impl MessageType {
@@ -181,7 +191,10 @@ impl MessageType {
     pub fn definition(&self) -> &'static str {
         let (request, response) = match self.file_text.strip_prefix("---\n") {
             Some(response) => ("", response),
-            None => self.file_text.split_once("\n---\n").unwrap_or((self.file_text, "")),
+            None => self
+                .file_text
+                .split_once("\n---\n")
+                .unwrap_or((self.file_text, "")),
         };
         match self.part {
             Part::Message => self.file_text,
@@ -207,22 +220,35 @@ impl MessageType {
         }
     }
 
-    /// The schema as MCAP's encoding `ros2msg` wants it: the definition, then each dependency after a line of 80 `=` and a line
-    /// `MSG: package/Name`, in the order of their names.
+    /// The schema as MCAP's encoding `ros2msg` wants it: the definition, then each dependency after
+    /// a line of 80 `=` and a line `MSG: package/Name`, in the order of their names.
     pub fn schema_text(&self) -> String {
         let mut text = self.definition().to_owned();
         for dependency in self.dependencies() {
             let short = dependency.name.replacen("/msg/", "/", 1);
-            let _ = write!(text, "{}\nMSG: {short}\n{}", "=".repeat(80), dependency.definition());
+            let _ = write!(
+                text,
+                "{}\nMSG: {short}\n{}",
+                "=".repeat(80),
+                dependency.definition()
+            );
         }
         text
     }
 
-    /// `RIHS01_` and the SHA-256, in hexadecimal, of the type description as JSON (REP-2016), dependencies ordered by name.
+    /// `RIHS01_` and the SHA-256, in hexadecimal, of the type description as JSON (REP-2016),
+    /// dependencies ordered by name.
     pub fn type_hash(&self) -> String {
-        let referenced: Vec<String> = self.dependencies().iter().map(|inner| inner.description()).collect();
-        let json =
-            format!(r#"{{"type_description": {}, "referenced_type_descriptions": [{}]}}"#, self.description(), referenced.join(", "));
+        let referenced: Vec<String> = self
+            .dependencies()
+            .iter()
+            .map(|inner| inner.description())
+            .collect();
+        let json = format!(
+            r#"{{"type_description": {}, "referenced_type_descriptions": [{}]}}"#,
+            self.description(),
+            referenced.join(", ")
+        );
         let digest = Sha256::digest(json.as_bytes());
         digest.iter().fold("RIHS01_".to_owned(), |mut hash, byte| {
             let _ = write!(hash, "{byte:02x}");
@@ -230,16 +256,22 @@ impl MessageType {
         })
     }
 
-    /// This type alone as REP-2016's JSON. Names hold only ASCII letters, digits, `_` and `/`: nothing needs escaping.
+    /// This type alone as REP-2016's JSON. Names hold only ASCII letters, digits, `_` and `/`:
+    /// nothing needs escaping.
     fn description(&self) -> String {
         let fields: Vec<String> = self.fields.iter().map(Field::description).collect();
-        format!(r#"{{"type_name": "{}", "fields": [{}]}}"#, self.name, fields.join(", "))
+        format!(
+            r#"{{"type_name": "{}", "fields": [{}]}}"#,
+            self.name,
+            fields.join(", ")
+        )
     }
 }
 
 impl Field {
     fn description(&self) -> String {
-        // Arrays, bounded and unbounded sequences count on from the element's number in steps of 48.
+        // Arrays, bounded and unbounded sequences count on from the element's number in steps of
+        // 48.
         let (step, capacity) = match self.field_type.arity {
             Arity::One => (0, 0),
             Arity::Array(length) => (48, length),

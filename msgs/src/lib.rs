@@ -1,7 +1,8 @@
 //! ROS 2 messages as plain Rust structs, with their schema text and type hashes; no middleware.
 //!
-//! One module for each ROS package. A struct's fields stand in wire order, so that any serde CDR encoder writes what ROS 2 reads.
-//! The interface files (`msg/` for our own, `std/` for those of ROS) are the schema text; tests compare them with the structs.
+//! One module for each ROS package. A struct's fields stand in wire order, so that any serde CDR
+//! encoder writes what ROS 2 reads. The interface files (`msg/` for our own, `std/` for those of
+//! ROS) are the schema text; tests compare them with the structs.
 //!
 //! ```
 //! use cromosim_msgs::{RosMessage, sensor_msgs::Imu};
@@ -26,9 +27,13 @@ pub mod tf2_msgs;
 
 pub use convert::{NotABody, NotARotation};
 pub use cromosim_msgs::{SmplPose, SmplState};
-pub use definition::{Arity, Element, Field, FieldType, MessageType, Part, RosElement, RosField, RosMessage, RosService};
+pub use definition::{
+    Arity, Element, Field, FieldType, MessageType, Part, RosElement, RosField, RosMessage,
+    RosService,
+};
 
-/// Every message type of this crate, the halves of services included, by name: for recorders that meet a type at run time.
+/// Every message type of this crate, the halves of services included, by name: for recorders that
+/// meet a type at run time.
 pub fn known_types() -> &'static [&'static MessageType] {
     KNOWN
 }

@@ -1,8 +1,10 @@
 //! The macros from which a message's struct and its description come together.
 
-/// Defines a message: the struct (fields in wire order), its [`RosMessage`](crate::RosMessage) implementation, and what a field of it is.
+/// Defines a message: the struct (fields in wire order), its [`RosMessage`](crate::RosMessage)
+/// implementation, and what a field of it is.
 ///
-/// `field: u8 as Byte` writes the field as the `byte` of the interface language, which type hashes tell from `uint8`.
+/// `field: u8 as Byte` writes the field as the `byte` of the interface language, which type hashes
+/// tell from `uint8`.
 macro_rules! ros_message {
     (
         $type_name:literal, $path:literal, $part:ident;

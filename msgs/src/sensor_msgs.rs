@@ -7,7 +7,8 @@ ros_message! {
     "sensor_msgs/msg/Imu", "../std/sensor_msgs/msg/Imu.msg", Message;
     /// One sample of an inertial measurement unit, in sensor axes (REP-145).
     ///
-    /// Covariances: row major 3x3. All zeros: unknown; element 0 = -1: the quantity is not reported.
+    /// Covariances: row major 3x3. All zeros: unknown; element 0 = -1: the quantity is not
+    /// reported.
     #[derive(Default)]
     pub struct Imu {
         /// Time, and the sensor's frame.

@@ -27,6 +27,9 @@ ros_message! {
 impl Header {
     /// The header of a stamp in nanoseconds and a frame.
     pub fn new(stamp_nanos: i64, frame_id: impl Into<std::string::String>) -> Self {
-        Self { stamp: Time::from_nanos(stamp_nanos), frame_id: frame_id.into() }
+        Self {
+            stamp: Time::from_nanos(stamp_nanos),
+            frame_id: frame_id.into(),
+        }
     }
 }

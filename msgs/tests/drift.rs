@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 
 use cromosim_msgs::{Arity, Element, MessageType, known_type, known_types};
 
-/// (type, name) of each field, and (name, value) of each constant, read from the text by rules of its own.
+/// (type, name) of each field, and (name, value) of each constant, read from the text by rules of
+/// its own.
 type Parsed = (Vec<(String, String)>, Vec<(String, i64)>);
 
 fn parse(definition: &str, package: &str) -> Parsed {
@@ -23,7 +24,9 @@ fn parse(definition: &str, package: &str) -> Parsed {
             continue;
         }
         let name = rest.split_whitespace().next().unwrap();
-        let (element, brackets) = type_name.find('[').map_or((type_name, ""), |at| type_name.split_at(at));
+        let (element, brackets) = type_name
+            .find('[')
+            .map_or((type_name, ""), |at| type_name.split_at(at));
         let element = match element {
             own if own.starts_with(char::is_uppercase) => format!("{package}/{own}"),
             other => other.to_owned(),
@@ -51,12 +54,27 @@ fn compare(message: &MessageType) {
     let (mut fields, constants) = parse(message.definition(), package);
     if fields.is_empty() {
         // CDR knows no empty structure: ROS 2 puts this member into every one.
-        fields.push(("uint8".to_owned(), "structure_needs_at_least_one_member".to_owned()));
+        fields.push((
+            "uint8".to_owned(),
+            "structure_needs_at_least_one_member".to_owned(),
+        ));
     }
-    let rust: Vec<(String, String)> =
-        message.fields.iter().map(|field| (spelled(field.field_type.element, field.field_type.arity), field.name.to_owned())).collect();
+    let rust: Vec<(String, String)> = message
+        .fields
+        .iter()
+        .map(|field| {
+            (
+                spelled(field.field_type.element, field.field_type.arity),
+                field.name.to_owned(),
+            )
+        })
+        .collect();
     assert_eq!(rust, fields, "{}", message.name);
-    let rust: Vec<(String, i64)> = message.constants.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
+    let rust: Vec<(String, i64)> = message
+        .constants
+        .iter()
+        .map(|(name, value)| ((*name).to_owned(), *value))
+        .collect();
     assert_eq!(rust, constants, "{}", message.name);
 }
 
@@ -92,15 +110,27 @@ fn every_interface_file_has_its_struct() {
             Ok(inside) => inside.iter().next().unwrap().to_str().unwrap(),
             Err(_) => "cromosim_msgs",
         };
-        let halves: &[&str] = if kind == "srv" { &["_Request", "_Response"] } else { &[""] };
+        let halves: &[&str] = if kind == "srv" {
+            &["_Request", "_Response"]
+        } else {
+            &[""]
+        };
         for half in halves {
             let name = format!("{package}/{kind}/{stem}{half}");
-            let message = known_type(&name).unwrap_or_else(|| panic!("{}: no struct", path.display()));
-            assert_eq!(message.file_text, fs::read_to_string(path).unwrap(), "{name}: the struct names another file");
+            let message =
+                known_type(&name).unwrap_or_else(|| panic!("{}: no struct", path.display()));
+            assert_eq!(
+                message.file_text,
+                fs::read_to_string(path).unwrap(),
+                "{name}: the struct names another file"
+            );
             from_files.insert(name);
         }
     }
-    let from_rust: BTreeSet<String> = known_types().iter().map(|known| known.name.to_owned()).collect();
+    let from_rust: BTreeSet<String> = known_types()
+        .iter()
+        .map(|known| known.name.to_owned())
+        .collect();
     assert_eq!(from_rust, from_files);
 }
 
@@ -109,15 +139,28 @@ fn the_build_file_for_colcon_lists_every_own_message() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let build = fs::read_to_string(root.join("CMakeLists.txt")).unwrap();
     let package = fs::read_to_string(root.join("package.xml")).unwrap();
-    for own in known_types().iter().filter(|known| known.name.starts_with("cromosim_msgs/")) {
+    for own in known_types()
+        .iter()
+        .filter(|known| known.name.starts_with("cromosim_msgs/"))
+    {
         let file = own.name.trim_start_matches("cromosim_msgs/");
         assert!(build.contains(&format!("\"{file}.msg\"")), "{file}");
-        for dependency in own.fields.iter().filter_map(|field| match field.field_type.element {
-            Element::Message(inner) => inner.name.split('/').next(),
-            _ => None,
-        }) {
-            assert!(package.contains(&format!("<depend>{dependency}</depend>")), "{dependency}");
-            assert!(build.contains(&format!("find_package({dependency} REQUIRED)")), "{dependency}");
+        for dependency in own
+            .fields
+            .iter()
+            .filter_map(|field| match field.field_type.element {
+                Element::Message(inner) => inner.name.split('/').next(),
+                _ => None,
+            })
+        {
+            assert!(
+                package.contains(&format!("<depend>{dependency}</depend>")),
+                "{dependency}"
+            );
+            assert!(
+                build.contains(&format!("find_package({dependency} REQUIRED)")),
+                "{dependency}"
+            );
         }
     }
 }

@@ -13,13 +13,21 @@ pub const CROMOSIM: &str = env!("CARGO_BIN_EXE_cromosim");
 
 /// Runs `cromosim` in a folder and waits.
 pub fn cromosim_in(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(CROMOSIM).args(arguments).current_dir(folder).output().expect("cromosim starts")
+    Command::new(CROMOSIM)
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .expect("cromosim starts")
 }
 
 /// Runs `cromosim`, which must succeed; gives its standard output.
 pub fn succeed(folder: &Path, arguments: &[&str]) -> String {
     let output = cromosim_in(folder, arguments);
-    assert!(output.status.success(), "cromosim {arguments:?} failed: {}", text(&output));
+    assert!(
+        output.status.success(),
+        "cromosim {arguments:?} failed: {}",
+        text(&output)
+    );
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
@@ -27,25 +35,53 @@ pub fn succeed(folder: &Path, arguments: &[&str]) -> String {
 pub fn refuses(folder: &Path, arguments: &[&str], words: &[&str]) {
     let output = cromosim_in(folder, arguments);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", text(&output));
+    assert_eq!(
+        output.status.code(),
+        Some(2),
+        "{arguments:?}: {}",
+        text(&output)
+    );
     assert_eq!(said.trim_end().lines().count(), 1, "{said}");
-    assert!(words.iter().all(|word| said.contains(word)), "{arguments:?}: {said}");
+    assert!(
+        words.iter().all(|word| said.contains(word)),
+        "{arguments:?}: {said}"
+    );
 }
 
 /// Random networks that say much, in a new folder.
 pub fn write_networks(input: Input, folder: &Path) {
-    let direction = if input == Input::Streaming { Direction::Forward } else { Direction::Both };
+    let direction = if input == Input::Streaming {
+        Direction::Forward
+    } else {
+        Direction::Both
+    };
     let inputs = input.channels();
-    let shape = NetworkShape { inputs, channels: 12, kernel: 5, convolutions: 3, hidden: 16, layers: 2, direction, outputs: 3 };
+    let shape = NetworkShape {
+        inputs,
+        channels: 12,
+        kernel: 5,
+        convolutions: 3,
+        hidden: 16,
+        layers: 2,
+        direction,
+        outputs: 3,
+    };
     let network = |seed| Network::new(shape.clone(), seed).expect("a sound shape");
     std::fs::create_dir(folder).expect("a new folder");
-    let simulator = LearnedSimulator::new(input, [network(1), network(2)]).expect("networks that fit");
-    simulator.write(folder, &BTreeMap::new()).expect("files that can be written");
+    let simulator =
+        LearnedSimulator::new(input, [network(1), network(2)]).expect("networks that fit");
+    simulator
+        .write(folder, &BTreeMap::new())
+        .expect("files that can be written");
 }
 
 /// Both outputs.
 pub fn text(output: &Output) -> String {
-    format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr))
+    format!(
+        "{}{}",
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr)
+    )
 }
 
 /// The repository.
@@ -57,16 +93,23 @@ pub fn root() -> PathBuf {
 pub fn skipped(why: &str) {
     // Past the test harness, which swallows what passing tests print.
     let _ = writeln!(std::io::stderr(), "skipped: {why}");
-    assert!(std::env::var_os("CROMOSIM_REQUIRE_ALL").is_none_or(|value| value != "1"), "skipped, but CROMOSIM_REQUIRE_ALL=1: {why}");
+    assert!(
+        std::env::var_os("CROMOSIM_REQUIRE_ALL").is_none_or(|value| value != "1"),
+        "skipped, but CROMOSIM_REQUIRE_ALL=1: {why}"
+    );
 }
 
 /// The shared third-party data, where they are.
 pub fn shared_data() -> Option<PathBuf> {
-    let path = std::env::var_os("CROMOSIM_DATA").map_or_else(|| root().join("../shared/data"), PathBuf::from);
+    let path = std::env::var_os("CROMOSIM_DATA")
+        .map_or_else(|| root().join("../shared/data"), PathBuf::from);
     if path.is_dir() {
         return Some(path);
     }
-    skipped(&format!("no shared data at {} (CROMOSIM_DATA names another place)", path.display()));
+    skipped(&format!(
+        "no shared data at {} (CROMOSIM_DATA names another place)",
+        path.display()
+    ));
     None
 }
 
@@ -74,12 +117,15 @@ pub fn shared_data() -> Option<PathBuf> {
 pub fn python() -> Option<PathBuf> {
     let python = std::env::var_os("CROMOSIM_PYTHON").map(PathBuf::from);
     if python.is_none() {
-        skipped("CROMOSIM_PYTHON names no Python with tests/interop/requirements.txt (.ci/run makes one)");
+        skipped(
+            "CROMOSIM_PYTHON names no Python with tests/interop/requirements.txt (.ci/run makes one)",
+        );
     }
     python
 }
 
-/// A real motion in a minimal BVH: a hip, a chain of two limbs; enough for readers, too little for a body.
+/// A real motion in a minimal BVH: a hip, a chain of two limbs; enough for readers, too little for
+/// a body.
 pub const TINY_BVH: &str = "HIERARCHY
 ROOT Hips
 {
@@ -110,15 +156,28 @@ pub fn taller(from: &Path, to: &Path, factor: f64) {
         let shape = npz.header(&key).expect("sound").expect("there").shape;
         let any = vec![None; shape.len()];
         if matches!(key.as_str(), "f" | "kintree_table") {
-            let array = npz.integers(&key, &any, "integers").expect("integers").expect("there");
+            let array = npz
+                .integers(&key, &any, "integers")
+                .expect("integers")
+                .expect("there");
             let values: Vec<u32> = array.values.iter().map(|value| *value as u32).collect();
-            writer.integers(&key, &array.shape, &values).expect("writable");
+            writer
+                .integers(&key, &array.shape, &values)
+                .expect("writable");
             continue;
         }
-        let Ok(Some(array)) = npz.floats(&key, &any, "numbers") else { continue };
-        let scale = if matches!(key.as_str(), "v_template" | "shapedirs" | "posedirs") { factor } else { 1.0 };
+        let Ok(Some(array)) = npz.floats(&key, &any, "numbers") else {
+            continue;
+        };
+        let scale = if matches!(key.as_str(), "v_template" | "shapedirs" | "posedirs") {
+            factor
+        } else {
+            1.0
+        };
         let values: Vec<f64> = array.values.iter().map(|value| value * scale).collect();
-        writer.floats(&key, &array.shape, &values).expect("writable");
+        writer
+            .floats(&key, &array.shape, &values)
+            .expect("writable");
     }
     writer.finish().expect("writable");
 }

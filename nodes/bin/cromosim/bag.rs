@@ -11,7 +11,8 @@ use cromosim_bag::{BagReader, recover, write_imu_csv};
 /// Commands on bags.
 #[derive(Subcommand)]
 pub enum Command {
-    /// Mend a bag whose recorder was killed, or a file that was cut: everything up to the damage is kept
+    /// Mend a bag whose recorder was killed, or a file that was cut: everything up to the damage is
+    /// kept
     Recover {
         /// The unfinished .mcap file or rosbag2 directory; it is left as it is
         bag: PathBuf,
@@ -19,7 +20,8 @@ pub enum Command {
         #[arg(long)]
         out: Option<PathBuf>,
     },
-    /// Write the samples of an Imu topic as CSV: stamp, orientation, angular velocity (rad/s), specific force (m/s2)
+    /// Write the samples of an Imu topic as CSV: stamp, orientation, angular velocity (rad/s),
+    /// specific force (m/s2)
     Csv {
         /// A .mcap file or a rosbag2 directory
         bag: PathBuf,
@@ -37,22 +39,39 @@ pub fn run(command: &Command) -> anyhow::Result<()> {
         Command::Recover { bag, out } => {
             let out = out.clone().unwrap_or_else(|| recovered_name(bag));
             let recovery = recover(bag, &out)?;
-            println!("{}: {} messages kept, {} bytes lost", out.display(), recovery.messages_kept(), recovery.bytes_lost);
+            println!(
+                "{}: {} messages kept, {} bytes lost",
+                out.display(),
+                recovery.messages_kept(),
+                recovery.bytes_lost
+            );
             for damage in &recovery.damages {
-                println!("  {}, byte {}: {}", damage.path.display(), damage.at, damage.reason);
+                println!(
+                    "  {}, byte {}: {}",
+                    damage.path.display(),
+                    damage.at,
+                    damage.reason
+                );
             }
         }
         Command::Csv { bag, topic, out } => {
             let reader = BagReader::open(bag)?;
             match out {
                 Some(path) => {
-                    let file = File::create(path).with_context(|| format!("{}: cannot be written", path.display()))?;
+                    let file = File::create(path)
+                        .with_context(|| format!("{}: cannot be written", path.display()))?;
                     let mut file = BufWriter::new(file);
                     let rows = write_imu_csv(&reader, topic, &mut file, path)?;
-                    file.flush().with_context(|| format!("{}: cannot be written", path.display()))?;
+                    file.flush()
+                        .with_context(|| format!("{}: cannot be written", path.display()))?;
                     eprintln!("{}: {rows} rows", path.display());
                 }
-                None => drop(write_imu_csv(&reader, topic, stdout().lock(), Path::new("standard output"))?),
+                None => drop(write_imu_csv(
+                    &reader,
+                    topic,
+                    stdout().lock(),
+                    Path::new("standard output"),
+                )?),
             }
         }
     }
@@ -63,7 +82,9 @@ pub fn run(command: &Command) -> anyhow::Result<()> {
 fn recovered_name(bag: &Path) -> PathBuf {
     let stem = bag.file_stem().unwrap_or_default().to_string_lossy();
     match bag.extension() {
-        Some(ending) if !bag.is_dir() => bag.with_file_name(format!("{stem}_recovered.{}", ending.to_string_lossy())),
+        Some(ending) if !bag.is_dir() => {
+            bag.with_file_name(format!("{stem}_recovered.{}", ending.to_string_lossy()))
+        }
         _ => bag.with_file_name(format!("{stem}_recovered")),
     }
 }

@@ -29,10 +29,16 @@ pub enum Command {
 /// The mesh at rest, model frame: x left, y up, z forward.
 fn export_obj(out: &Path, model: &Arc<BodyModel>, betas: &[f64]) -> anyhow::Result<()> {
     let shaped = ShapedBody::new(model.clone(), betas)?;
-    let vertices: Vec<[f32; 3]> = shaped.rest_vertices().iter().map(|vertex| vertex.map(|metres| metres as f32).into()).collect();
+    let vertices: Vec<[f32; 3]> = shaped
+        .rest_vertices()
+        .iter()
+        .map(|vertex| vertex.map(|metres| metres as f32).into())
+        .collect();
     let cannot = || format!("{}: cannot be written", out.display());
     let mut file = BufWriter::new(File::create(out).with_context(cannot)?);
-    write_obj(&mut file, &vertices, model.faces()).and_then(|()| file.flush()).with_context(cannot)
+    write_obj(&mut file, &vertices, model.faces())
+        .and_then(|()| file.flush())
+        .with_context(cannot)
 }
 
 /// The model of a file, or the embedded one.
@@ -43,15 +49,25 @@ pub fn model(path: Option<&PathBuf>) -> anyhow::Result<Arc<BodyModel>> {
     })
 }
 
-/// The body that what a bag holds of SMPL is for: `given`, or the embedded one, unless the bag says that it was made on another.
-pub fn of_bag(reader: &BagReader, given: Option<&Arc<BodyModel>>) -> anyhow::Result<Arc<BodyModel>> {
+/// The body that what a bag holds of SMPL is for: `given`, or the embedded one, unless the bag says
+/// that it was made on another.
+pub fn of_bag(
+    reader: &BagReader,
+    given: Option<&Arc<BodyModel>>,
+) -> anyhow::Result<Arc<BodyModel>> {
     if let Some(model) = given {
         return Ok(model.clone());
     }
     let model = BodyModel::embedded();
-    match reader.metadata("cromosim").and_then(|values| values.get("body")) {
+    match reader
+        .metadata("cromosim")
+        .and_then(|values| values.get("body"))
+    {
         Some(body) if body != model.id() => {
-            bail!("{}: its poses are of the body {body}, not of the embedded one; give --body FILE", reader.path().display())
+            bail!(
+                "{}: its poses are of the body {body}, not of the embedded one; give --body FILE",
+                reader.path().display()
+            )
         }
         _ => Ok(model),
     }
@@ -63,9 +79,14 @@ pub fn run(command: &Command) -> anyhow::Result<()> {
     let model = model(body.as_ref())?;
     match out.extension().and_then(|ending| ending.to_str()) {
         Some("npz") if betas.is_empty() => model.write_npz(out)?,
-        Some("npz") => bail!("--betas shapes a mesh; an npz holds the whole model, which has every shape"),
+        Some("npz") => {
+            bail!("--betas shapes a mesh; an npz holds the whole model, which has every shape")
+        }
         Some("obj") => export_obj(out, &model, betas)?,
-        _ => bail!("{}: the ending says what to write: .npz (model) or .obj (mesh)", out.display()),
+        _ => bail!(
+            "{}: the ending says what to write: .npz (model) or .obj (mesh)",
+            out.display()
+        ),
     }
     println!("{}", out.display());
     Ok(())

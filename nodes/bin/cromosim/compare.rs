@@ -1,4 +1,5 @@
-//! `cromosim compare A B`: what differs between two diagnoses, or between the IMUs of two recordings.
+//! `cromosim compare A B`: what differs between two diagnoses, or between the IMUs of two
+//! recordings.
 
 mod diagnoses;
 mod recordings;
@@ -47,11 +48,18 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         (Side::Diagnosis(a), Side::Diagnosis(b)) => diagnoses::compare(a, b)?,
         (Side::Recording(a), Side::Recording(b)) => recordings::compare(a, b)?,
         _ => {
-            bail!("{} is {} and {} is {}; two of a kind can be compared", arguments.a.display(), a.kind(), arguments.b.display(), b.kind())
+            bail!(
+                "{} is {} and {} is {}; two of a kind can be compared",
+                arguments.a.display(),
+                a.kind(),
+                arguments.b.display(),
+                b.kind()
+            )
         }
     };
     if let Some(path) = &arguments.out {
-        let text = serde_json::to_string_pretty(&found).context("what was found is no JSON")? + "\n";
+        let text =
+            serde_json::to_string_pretty(&found).context("what was found is no JSON")? + "\n";
         fs::write(path, text).with_context(|| format!("{}: cannot be written", path.display()))?;
     }
     Ok(())
@@ -61,7 +69,11 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
 fn open(path: &Path) -> anyhow::Result<Side> {
     if path.is_dir() {
         let file = path.join("diagnosis.json");
-        return if file.is_file() { read_diagnosis(&file) } else { Ok(Side::Recording(BagReader::open(path)?)) };
+        return if file.is_file() {
+            read_diagnosis(&file)
+        } else {
+            Ok(Side::Recording(BagReader::open(path)?))
+        };
     }
     let mut head = Vec::new();
     File::open(path)
@@ -75,9 +87,16 @@ fn open(path: &Path) -> anyhow::Result<Side> {
 }
 
 fn read_diagnosis(path: &Path) -> anyhow::Result<Side> {
-    let text = fs::read_to_string(path).with_context(|| format!("{}: cannot be read", path.display()))?;
-    let diagnosis: Diagnosis = serde_json::from_str(&text).with_context(|| format!("{}: no diagnosis", path.display()))?;
-    ensure!(diagnosis.schema == SCHEMA, "{}: expected the schema '{SCHEMA}', found '{}'", path.display(), diagnosis.schema);
+    let text =
+        fs::read_to_string(path).with_context(|| format!("{}: cannot be read", path.display()))?;
+    let diagnosis: Diagnosis =
+        serde_json::from_str(&text).with_context(|| format!("{}: no diagnosis", path.display()))?;
+    ensure!(
+        diagnosis.schema == SCHEMA,
+        "{}: expected the schema '{SCHEMA}', found '{}'",
+        path.display(),
+        diagnosis.schema
+    );
     Ok(Side::Diagnosis(diagnosis))
 }
 

@@ -1,4 +1,5 @@
-//! `cromosim convert`: motions, trajectories of rigid bodies, IMU series and recordings into each other's files.
+//! `cromosim convert`: motions, trajectories of rigid bodies, IMU series and recordings into each
+//! other's files.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -28,10 +29,11 @@ use write::{Target, Written};
 /// Convert a motion, a trajectory of a rigid body, an IMU series or a recording into another format
 #[derive(Args)]
 pub struct Arguments {
-    /// A motion, a trajectory (TUM, EuRoC, CSV), an IMU series (EuRoC, CSV), a recording of a data set (BROAD, TotalCapture, PAMAP2,
-    /// RealWorld, phone and watch) or a bag; its content tells
+    /// A motion, a trajectory (TUM, EuRoC, CSV), an IMU series (EuRoC, CSV), a recording of a data
+    /// set (BROAD, TotalCapture, PAMAP2, RealWorld, phone and watch) or a bag; its content tells
     input: PathBuf,
-    /// What to write; the ending decides where --to does not: .npz, .bvh, .trc, .tum or .txt, .csv, .mcap
+    /// What to write; the ending decides where --to does not: .npz, .bvh, .trc, .tum or .txt, .csv,
+    /// .mcap
     out: PathBuf,
     /// The format to write
     #[arg(long, value_enum, value_name = "FORMAT")]
@@ -45,7 +47,8 @@ pub struct Arguments {
     /// Of a motion: the trajectory of a sensor at this named site of the skin
     #[arg(long, value_name = "NAME")]
     site: Option<String>,
-    /// Of a bag: the topic to take (SmplState, SmplPose, PoseStamped, TFMessage or Imu); needed where there are several
+    /// Of a bag: the topic to take (SmplState, SmplPose, PoseStamped, TFMessage or Imu); needed
+    /// where there are several
     #[arg(long, value_name = "TOPIC")]
     topic: Option<String>,
     /// Of a bag's TF: the frame whose motion to take
@@ -54,7 +57,8 @@ pub struct Arguments {
     /// Of a bag's TF: the frame that stands still; default: the root of the tree
     #[arg(long, value_name = "FRAME", requires = "frame")]
     fixed_frame: Option<String>,
-    /// Into a bag: name of the placement in /reference/NAME and /imu/NAME/data_raw; default: body, or as the data set says
+    /// Into a bag: name of the placement in /reference/NAME and /imu/NAME/data_raw; default: body,
+    /// or as the data set says
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
     /// Into a bag: the IMU series (EuRoC, CSV) that was measured along the trajectory
@@ -94,7 +98,11 @@ impl Content {
             Self::Motion(motion) => motion.frames.len(),
             Self::Poses(poses) => poses.trajectory.stamps.len(),
             Self::Imu(series) => series.stamps.len(),
-            Self::Recording(recording) => recording.imus.iter().map(|imu| imu.series.stamps.len()).sum(),
+            Self::Recording(recording) => recording
+                .imus
+                .iter()
+                .map(|imu| imu.series.stamps.len())
+                .sum(),
         }
     }
 }
@@ -103,27 +111,49 @@ impl Content {
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let target = Target::of(arguments.to, &arguments.out)?;
     if arguments.out.exists() && !arguments.force {
-        bail!("{}: exists already; --force replaces it", arguments.out.display());
+        bail!(
+            "{}: exists already; --force replaces it",
+            arguments.out.display()
+        );
     }
     if arguments.imu.is_some() && target != Target::Bag {
         bail!("--imu goes into a bag; OUT is {}", target.describe());
     }
     let model = body::model(arguments.body.as_ref())?;
-    let content = followed(source::read(arguments, &model, target)?, arguments, &model, target)?;
+    let content = followed(
+        source::read(arguments, &model, target)?,
+        arguments,
+        &model,
+        target,
+    )?;
     let (is_motion, count) = (matches!(content, Content::Motion(_)), content.count());
     match write::written(&content, target, &model, arguments)? {
         Written::Bytes(bytes) => write::file(&arguments.out, &bytes, arguments.force)?,
         Written::Bag => bag::write(&content, imu(arguments)?.as_ref(), &model, arguments)?,
     }
-    println!("{}: {} of {count} {}", arguments.out.display(), target.describe(), if is_motion { "frames" } else { "rows" });
+    println!(
+        "{}: {} of {count} {}",
+        arguments.out.display(),
+        target.describe(),
+        if is_motion { "frames" } else { "rows" }
+    );
     Ok(())
 }
 
 /// A motion's joint or site, where one is asked for.
-fn followed(content: Content, arguments: &Arguments, model: &Arc<BodyModel>, target: Target) -> anyhow::Result<Content> {
+fn followed(
+    content: Content,
+    arguments: &Arguments,
+    model: &Arc<BodyModel>,
+    target: Target,
+) -> anyhow::Result<Content> {
     let Content::Motion(motion) = content else {
         if let Some(name) = arguments.joint.as_ref().or(arguments.site.as_ref()) {
-            bail!("{}: {} has no joint or site {name}; leave --joint and --site out", arguments.input.display(), content.name());
+            bail!(
+                "{}: {} has no joint or site {name}; leave --joint and --site out",
+                arguments.input.display(),
+                content.name()
+            );
         }
         return Ok(content);
     };
@@ -137,16 +167,27 @@ fn followed(content: Content, arguments: &Arguments, model: &Arc<BodyModel>, tar
             target.describe()
         ),
     };
-    Ok(Content::Poses(EurocGroundTruth { trajectory, ..EurocGroundTruth::default() }))
+    Ok(Content::Poses(EurocGroundTruth {
+        trajectory,
+        ..EurocGroundTruth::default()
+    }))
 }
 
 /// The IMU series beside a trajectory.
 fn imu(arguments: &Arguments) -> anyhow::Result<Option<ImuSeries>> {
-    let Some(path) = &arguments.imu else { return Ok(None) };
+    let Some(path) = &arguments.imu else {
+        return Ok(None);
+    };
     match source::rigid(path, &source::bytes(path)?)? {
         Some(Content::Imu(series)) => Ok(Some(series)),
-        Some(_) => bail!("{}: a trajectory; --imu takes an IMU series", path.display()),
-        None => bail!("{}: not an IMU series: expected EuRoC's columns or a table with a header that names them", path.display()),
+        Some(_) => bail!(
+            "{}: a trajectory; --imu takes an IMU series",
+            path.display()
+        ),
+        None => bail!(
+            "{}: not an IMU series: expected EuRoC's columns or a table with a header that names them",
+            path.display()
+        ),
     }
 }
 

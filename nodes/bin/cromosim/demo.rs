@@ -1,4 +1,5 @@
-//! The main job: a motion through all five nodes, each in a process of its own, over DDS on this machine.
+//! The main job: a motion through all five nodes, each in a process of its own, over DDS on this
+//! machine.
 
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader};
@@ -62,10 +63,16 @@ struct NodeProcess {
 }
 
 impl NodeProcess {
-    fn start(name: &'static str, parameters: &[(&str, String)], logs: &Path) -> anyhow::Result<Self> {
+    fn start(
+        name: &'static str,
+        parameters: &[(&str, String)],
+        logs: &Path,
+    ) -> anyhow::Result<Self> {
         let log = logs.join(format!("{name}.log"));
-        let file = File::create(&log).with_context(|| format!("{}: cannot be written", log.display()))?;
-        let mut command = Command::new(std::env::current_exe().context("the path of this program is unknown")?);
+        let file =
+            File::create(&log).with_context(|| format!("{}: cannot be written", log.display()))?;
+        let mut command =
+            Command::new(std::env::current_exe().context("the path of this program is unknown")?);
         command.args(["node", name, "--ros-args"]);
         for (key, value) in parameters {
             command.arg("-p").arg(format!("{key}:={value}"));
@@ -89,7 +96,12 @@ impl NodeProcess {
                 }
             });
         }
-        Ok(Self { name, child, log, ready })
+        Ok(Self {
+            name,
+            child,
+            log,
+            ready,
+        })
     }
 
     /// Waits until the node has said that its topics are connected.
@@ -99,7 +111,11 @@ impl NodeProcess {
             match self.ready.recv_timeout(Duration::from_millis(50)) {
                 Ok(()) => return Ok(()),
                 Err(mpsc::RecvTimeoutError::Timeout) if Instant::now() < until => {}
-                Err(_) => bail!("{} is not ready after {PATIENCE:?}: {}", self.name, self.last_words()),
+                Err(_) => bail!(
+                    "{} is not ready after {PATIENCE:?}: {}",
+                    self.name,
+                    self.last_words()
+                ),
             }
             if self.child.try_wait()?.is_some() {
                 bail!("{} ended early: {}", self.name, self.last_words());
@@ -113,7 +129,12 @@ impl NodeProcess {
     /// The last line of the node's log.
     fn last_words(&self) -> String {
         let text = fs::read_to_string(&self.log).unwrap_or_default();
-        let last = text.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or("it said nothing").to_owned();
+        let last = text
+            .lines()
+            .rev()
+            .find(|line| !line.trim().is_empty())
+            .unwrap_or("it said nothing")
+            .to_owned();
         format!("{last} (log: {})", self.log.display())
     }
 
@@ -127,11 +148,19 @@ impl NodeProcess {
         let until = Instant::now() + PATIENCE;
         while Instant::now() < until {
             if let Some(status) = self.child.try_wait()? {
-                return if status.success() { Ok(()) } else { bail!("{} failed: {}", self.name, self.last_words()) };
+                return if status.success() {
+                    Ok(())
+                } else {
+                    bail!("{} failed: {}", self.name, self.last_words())
+                };
             }
             std::thread::sleep(Duration::from_millis(10));
         }
-        bail!("{} did not end within {PATIENCE:?} and was killed: {}", self.name, self.last_words())
+        bail!(
+            "{} did not end within {PATIENCE:?} and was killed: {}",
+            self.name,
+            self.last_words()
+        )
     }
 }
 
@@ -161,13 +190,21 @@ struct Places {
 impl Places {
     /// Clears what an earlier demo left, and nothing else.
     fn prepare(out: &Path) -> anyhow::Result<Self> {
-        let places = Self { bag: out.join("bag"), recording: out.join("demo.rrd"), logs: out.join("logs") };
-        clear(&places.bag, |name| name == "metadata.yaml" || name.ends_with(".mcap"))?;
+        let places = Self {
+            bag: out.join("bag"),
+            recording: out.join("demo.rrd"),
+            logs: out.join("logs"),
+        };
+        clear(&places.bag, |name| {
+            name == "metadata.yaml" || name.ends_with(".mcap")
+        })?;
         clear(&places.logs, |name| name.ends_with(".log"))?;
         if places.recording.exists() {
-            fs::remove_file(&places.recording).with_context(|| format!("{}: cannot be replaced", places.recording.display()))?;
+            fs::remove_file(&places.recording)
+                .with_context(|| format!("{}: cannot be replaced", places.recording.display()))?;
         }
-        fs::create_dir_all(&places.logs).with_context(|| format!("{}: cannot be made", places.logs.display()))?;
+        fs::create_dir_all(&places.logs)
+            .with_context(|| format!("{}: cannot be made", places.logs.display()))?;
         Ok(places)
     }
 }
@@ -181,7 +218,10 @@ fn clear(folder: &Path, ours: impl Fn(&str) -> bool) -> anyhow::Result<()> {
     for entry in fs::read_dir(folder).with_context(cannot)? {
         let name = entry.with_context(cannot)?.file_name();
         if !ours(&name.to_string_lossy()) {
-            bail!("{}: no demo made this, and it would be replaced; give another --out", folder.join(name).display());
+            bail!(
+                "{}: no demo made this, and it would be replaced; give another --out",
+                folder.join(name).display()
+            );
         }
     }
     fs::remove_dir_all(folder).with_context(cannot)
@@ -208,7 +248,10 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         node.finish()?;
     }
     outcome?;
-    summary::print(&places.bag, (!arguments.no_viewer).then_some(&*places.recording))
+    summary::print(
+        &places.bag,
+        (!arguments.no_viewer).then_some(&*places.recording),
+    )
 }
 
 fn play(replay: &mut NodeProcess, duration: f64, stop: &Interrupt) -> anyhow::Result<()> {
@@ -228,7 +271,8 @@ fn play(replay: &mut NodeProcess, duration: f64, stop: &Interrupt) -> anyhow::Re
 }
 
 impl Arguments {
-    /// Seconds that the demo will play. Finds what is wrong with the input before any process starts.
+    /// Seconds that the demo will play. Finds what is wrong with the input before any process
+    /// starts.
     fn check(&self) -> anyhow::Result<f64> {
         if let Some(seconds) = self.duration
             && !(seconds.is_finite() && seconds > 0.0)
@@ -253,31 +297,60 @@ impl Arguments {
 
     fn listeners(&self, places: &Places) -> anyhow::Result<Vec<NodeProcess>> {
         let viewers = i64::from(!self.no_viewer);
-        let path = |path: &Path| -> anyhow::Result<String> { Ok(quoted(&std::path::absolute(path)?.display().to_string())) };
-        let body = self.body.as_deref().map(path).transpose()?.map(|file| ("body", file));
-        let recorder = [("bag_path", path(&places.bag)?), ("seed", self.seed.to_string()), ("run", quoted(&self.describe()))];
+        let path = |path: &Path| -> anyhow::Result<String> {
+            Ok(quoted(&std::path::absolute(path)?.display().to_string()))
+        };
+        let body = self
+            .body
+            .as_deref()
+            .map(path)
+            .transpose()?
+            .map(|file| ("body", file));
+        let recorder = [
+            ("bag_path", path(&places.bag)?),
+            ("seed", self.seed.to_string()),
+            ("run", quoted(&self.describe())),
+        ];
         // Whoever needs a body is told of the same one.
-        let parameters = |own: &[(&'static str, String)]| own.iter().cloned().chain(body.clone()).collect::<Vec<_>>();
+        let parameters = |own: &[(&'static str, String)]| {
+            own.iter().cloned().chain(body.clone()).collect::<Vec<_>>()
+        };
         let mut nodes = vec![NodeProcess::start("recorder", &recorder, &places.logs)?];
         if !self.no_viewer {
-            nodes.push(NodeProcess::start("viewer", &parameters(&[("recording", path(&places.recording)?)]), &places.logs)?);
+            nodes.push(NodeProcess::start(
+                "viewer",
+                &parameters(&[("recording", path(&places.recording)?)]),
+                &places.logs,
+            )?);
         }
         let listeners = 1 + viewers + i64::from(self.listeners);
-        let mut imu = parameters(&[("seed", self.seed.to_string()), ("ready_subscriptions", listeners.to_string())]);
+        let mut imu = parameters(&[
+            ("seed", self.seed.to_string()),
+            ("ready_subscriptions", listeners.to_string()),
+        ]);
         if let Some(file) = &self.placements {
             imu.push(("placements", path(file)?));
         }
         nodes.push(NodeProcess::start("virtual_imu", &imu, &places.logs)?);
-        nodes.push(NodeProcess::start("smpl_state", &parameters(&[("ready_subscriptions", (2 + viewers).to_string())]), &places.logs)?);
+        nodes.push(NodeProcess::start(
+            "smpl_state",
+            &parameters(&[("ready_subscriptions", (2 + viewers).to_string())]),
+            &places.logs,
+        )?);
         Ok(nodes)
     }
 
     /// For the bag's metadata: what the nodes were told. The placements are attached to the bag.
     fn describe(&self) -> String {
         let name = |path: &Option<PathBuf>, default: &str| {
-            path.as_deref().and_then(Path::file_name).map_or_else(|| default.to_owned(), |name| name.to_string_lossy().into_owned())
+            path.as_deref().and_then(Path::file_name).map_or_else(
+                || default.to_owned(),
+                |name| name.to_string_lossy().into_owned(),
+            )
         };
-        let duration = self.duration.map_or_else(|| "whole".to_owned(), |seconds| format!("{seconds} s"));
+        let duration = self
+            .duration
+            .map_or_else(|| "whole".to_owned(), |seconds| format!("{seconds} s"));
         format!(
             "demo; motion: {}; body: {}; duration: {duration}; placements: {}; seed: {}; all else as the nodes' defaults",
             name(&self.motion, "embedded walk"),

@@ -1,4 +1,5 @@
-//! `cromosim diagnose`: where the gap between simulated and real lies, which effects cause it, how far it shrinks.
+//! `cromosim diagnose`: where the gap between simulated and real lies, which effects cause it, how
+//! far it shrinks.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -9,7 +10,9 @@ use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use cromosim_bag::BagReader;
 use cromosim_body::BodyModel;
-use cromosim_gap::{Cause, DiagnoseOptions, Diagnosis, Evidence, PlacementAnswer, PlacementDiagnosis, SCHEMA};
+use cromosim_gap::{
+    Cause, DiagnoseOptions, Diagnosis, Evidence, PlacementAnswer, PlacementDiagnosis, SCHEMA,
+};
 use cromosim_imu::{EffectKind, EffectsFile};
 use rayon::prelude::*;
 use serde::Deserialize;
@@ -19,9 +22,15 @@ use crate::progress::{self, Interrupt};
 use crate::recorded::{self, Recorded};
 
 /// The files in DIR.
-const FILES: [&str; 4] = ["diagnosis.json", "effects.yaml", "report.html", "diagnosis.rrd"];
+const FILES: [&str; 4] = [
+    "diagnosis.json",
+    "effects.yaml",
+    "report.html",
+    "diagnosis.rrd",
+];
 
-/// Say which effects separate a recording's real IMUs from their simulation, and how far the gap falls with them
+/// Say which effects separate a recording's real IMUs from their simulation, and how far the gap
+/// falls with them
 #[derive(Args)]
 #[command(after_long_help = "\
 The recording (MCAP, ROS 2) holds /reference/NAME (geometry_msgs/msg/PoseStamped) or SMPL states with an attachment placements.yaml, and
@@ -35,7 +44,8 @@ A config FILE, every line of it optional:
 pub struct Arguments {
     /// The recording (.mcap, rosbag2 directory)
     recording: PathBuf,
-    /// The folder for the four files; is made where it is missing, and files of an earlier diagnosis in it are replaced
+    /// The folder for the four files; is made where it is missing, and files of an earlier
+    /// diagnosis in it are replaced
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Settings (YAML), see below with --help
@@ -54,22 +64,35 @@ pub struct Arguments {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let config = arguments.config.as_deref().map(Config::read).transpose()?.unwrap_or_default();
+    let config = arguments
+        .config
+        .as_deref()
+        .map(Config::read)
+        .transpose()?
+        .unwrap_or_default();
     let (names, place) = match (&arguments.config, arguments.without.is_empty()) {
         (Some(file), true) => (&config.without, format!("{}: without", file.display())),
         _ => (&arguments.without, "--without".to_owned()),
     };
-    let without = names.iter().map(|name| effect(name, &place)).collect::<anyhow::Result<_>>()?;
-    let options = DiagnoseOptions { without, seed: arguments.seed.or(config.seed).unwrap_or(0) };
+    let without = names
+        .iter()
+        .map(|name| effect(name, &place))
+        .collect::<anyhow::Result<_>>()?;
+    let options = DiagnoseOptions {
+        without,
+        seed: arguments.seed.or(config.seed).unwrap_or(0),
+    };
     check_folder(&arguments.out)?;
     let reader = BagReader::open(&arguments.recording)?;
     let body = arguments.body.as_deref().map(BodyModel::read).transpose()?;
     let (recorded, mut notes, mut failures) = select(&reader, body.as_ref(), &config.placements)?;
 
-    // Until the files are written a signal may end the process as it likes: there is nothing to clear away.
+    // Until the files are written a signal may end the process as it likes: there is nothing to
+    // clear away.
     let bar = progress::bar(recorded.len() as u64, "diagnosing, placements");
     let diagnose = |placement: &Recorded| {
-        let answer = cromosim_gap::diagnose(&placement.record(), &options).map_err(|error| error.to_string());
+        let answer = cromosim_gap::diagnose(&placement.record(), &options)
+            .map_err(|error| error.to_string());
         bar.inc(1);
         answer
     };
@@ -79,7 +102,12 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     for (placement, result) in recorded.iter().zip(results) {
         match result {
             Ok(answer) => {
-                notes.extend(placement.notes.iter().map(|note| format!("placement {}: {note}", placement.name)));
+                notes.extend(
+                    placement
+                        .notes
+                        .iter()
+                        .map(|note| format!("placement {}: {note}", placement.name)),
+                );
                 answers.insert(placement.name.clone(), answer);
             }
             Err(error) => failures.push(error),
@@ -89,7 +117,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         bail!("{}: {}", arguments.recording.display(), failures.join("; "));
     }
     notes.iter().for_each(|note| eprintln!("warning: {note}"));
-    failures.iter().for_each(|failure| eprintln!("error: {failure}; the other placements are diagnosed"));
+    failures
+        .iter()
+        .for_each(|failure| eprintln!("error: {failure}; the other placements are diagnosed"));
     let (diagnosis, effects, evidence) = split(answers);
     write(arguments, &diagnosis, &effects, &evidence)?;
     print(&diagnosis);
@@ -97,18 +127,29 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if cfg!(feature = "view") {
         println!("\n{folder}: {}", FILES.join(", "));
     } else {
-        println!("\n{folder}: {}; {} is left out, as this cromosim was built without its feature `view`", FILES[..3].join(", "), FILES[3]);
+        println!(
+            "\n{folder}: {}; {} is left out, as this cromosim was built without its feature `view`",
+            FILES[..3].join(", "),
+            FILES[3]
+        );
     }
     Ok(())
 }
 
 /// The placements to diagnose, what a user should know of the others, and which cannot be read.
-fn select(reader: &BagReader, body: Option<&Arc<BodyModel>>, only: &[String]) -> anyhow::Result<(Vec<Recorded>, Vec<String>, Vec<String>)> {
+fn select(
+    reader: &BagReader,
+    body: Option<&Arc<BodyModel>>,
+    only: &[String],
+) -> anyhow::Result<(Vec<Recorded>, Vec<String>, Vec<String>)> {
     let file = reader.path().display();
     let mut found = recorded::read(reader, body)?;
     let names: Vec<&str> = found.iter().map(|(name, _)| name.as_str()).collect();
     if let Some(name) = only.iter().find(|name| !names.contains(&name.as_str())) {
-        bail!("{file}: placement `{name}` of the config: the recording has no such placement; it has {}", names.join(", "));
+        bail!(
+            "{file}: placement `{name}` of the config: the recording has no such placement; it has {}",
+            names.join(", ")
+        );
     }
     found.retain(|(name, _)| only.is_empty() || only.contains(name));
     let (mut recorded, mut notes, mut failures) = (Vec::new(), Vec::new(), Vec::new());
@@ -124,14 +165,23 @@ fn select(reader: &BagReader, body: Option<&Arc<BodyModel>>, only: &[String]) ->
     if recorded.is_empty() && failures.is_empty() {
         bail!(
             "{file}: no placement has both a reference and messages on /imu/NAME/data_raw (sensor_msgs/msg/Imu): {}",
-            if notes.is_empty() { "there is none".to_owned() } else { notes.join("; ") }
+            if notes.is_empty() {
+                "there is none".to_owned()
+            } else {
+                notes.join("; ")
+            }
         );
     }
     Ok((recorded, notes, failures))
 }
 
-fn split(answers: BTreeMap<String, PlacementAnswer>) -> (Diagnosis, EffectsFile, BTreeMap<String, Evidence>) {
-    let mut diagnosis = Diagnosis { schema: SCHEMA.to_owned(), placements: BTreeMap::new() };
+fn split(
+    answers: BTreeMap<String, PlacementAnswer>,
+) -> (Diagnosis, EffectsFile, BTreeMap<String, Evidence>) {
+    let mut diagnosis = Diagnosis {
+        schema: SCHEMA.to_owned(),
+        placements: BTreeMap::new(),
+    };
     let (mut effects, mut evidence) = (EffectsFile::default(), BTreeMap::new());
     for (name, answer) in answers {
         diagnosis.placements.insert(name.clone(), answer.diagnosis);
@@ -152,7 +202,8 @@ struct Config {
 
 impl Config {
     fn read(file: &Path) -> anyhow::Result<Self> {
-        let text = fs::read_to_string(file).with_context(|| format!("{}: cannot be read", file.display()))?;
+        let text = fs::read_to_string(file)
+            .with_context(|| format!("{}: cannot be read", file.display()))?;
         Self::parse(&text).with_context(|| file.display().to_string())
     }
 
@@ -167,22 +218,41 @@ fn effect(name: &str, place: &str) -> anyhow::Result<EffectKind> {
     EffectKind::from_name(name).ok_or_else(|| {
         let mut known: Vec<&str> = EffectKind::ALL.into_iter().map(EffectKind::name).collect();
         known.sort_by_key(|known| strsim::levenshtein(known, name));
-        anyhow!("{place} {name}: no such effect; the nearest are {}", known[..3].join(", "))
+        anyhow!(
+            "{place} {name}: no such effect; the nearest are {}",
+            known[..3].join(", ")
+        )
     })
 }
 
 /// Says before the work what would stop its files after it.
 fn check_folder(folder: &Path) -> anyhow::Result<()> {
-    if let Some(file) = folder.ancestors().find(|place| place.exists()).filter(|place| !place.is_dir()) {
-        bail!("{}: --out: {} is no folder", folder.display(), file.display());
+    if let Some(file) = folder
+        .ancestors()
+        .find(|place| place.exists())
+        .filter(|place| !place.is_dir())
+    {
+        bail!(
+            "{}: --out: {} is no folder",
+            folder.display(),
+            file.display()
+        );
     }
-    match FILES.iter().map(|name| folder.join(name)).find(|path| path.is_dir()) {
-        Some(path) => bail!("{}: is a folder and cannot be replaced by a file", path.display()),
+    match FILES
+        .iter()
+        .map(|name| folder.join(name))
+        .find(|path| path.is_dir())
+    {
+        Some(path) => bail!(
+            "{}: is a folder and cannot be replaced by a file",
+            path.display()
+        ),
         None => Ok(()),
     }
 }
 
-/// Files under temporary names; those that have not got their own when this is dropped are removed, and so is a folder made for them.
+/// Files under temporary names; those that have not got their own when this is dropped are removed,
+/// and so is a folder made for them.
 struct Staged {
     folder: PathBuf,
     made: bool,
@@ -192,25 +262,37 @@ struct Staged {
 impl Staged {
     fn new(folder: &Path) -> anyhow::Result<Self> {
         let made = !folder.exists();
-        fs::create_dir_all(folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
-        Ok(Self { folder: folder.to_owned(), made, names: Vec::new() })
+        fs::create_dir_all(folder)
+            .with_context(|| format!("{}: cannot be made", folder.display()))?;
+        Ok(Self {
+            folder: folder.to_owned(),
+            made,
+            names: Vec::new(),
+        })
     }
 
     /// Where a file is written first.
     fn temporary(&self, name: &str) -> PathBuf {
-        self.folder.join(format!(".{name}.{}.tmp", std::process::id()))
+        self.folder
+            .join(format!(".{name}.{}.tmp", std::process::id()))
     }
 
-    fn add(&mut self, name: &'static str, write: impl FnOnce(&Path) -> anyhow::Result<()>) -> anyhow::Result<()> {
+    fn add(
+        &mut self,
+        name: &'static str,
+        write: impl FnOnce(&Path) -> anyhow::Result<()>,
+    ) -> anyhow::Result<()> {
         self.names.push(name);
-        write(&self.temporary(name)).with_context(|| format!("{}: cannot be written", self.folder.join(name).display()))
+        write(&self.temporary(name))
+            .with_context(|| format!("{}: cannot be written", self.folder.join(name).display()))
     }
 
     /// Gives all files their names.
     fn finish(mut self) -> anyhow::Result<()> {
         for name in self.names.clone() {
             let path = self.folder.join(name);
-            fs::rename(self.temporary(name), &path).with_context(|| format!("{}: cannot be written", path.display()))?;
+            fs::rename(self.temporary(name), &path)
+                .with_context(|| format!("{}: cannot be written", path.display()))?;
             self.names.retain(|other| *other != name);
             self.made = false;
         }
@@ -221,21 +303,36 @@ impl Staged {
 impl Drop for Staged {
     fn drop(&mut self) {
         // What cannot be removed is nothing that an error on top would mend.
-        self.names.iter().for_each(|name| drop(fs::remove_file(self.temporary(name))));
+        self.names
+            .iter()
+            .for_each(|name| drop(fs::remove_file(self.temporary(name))));
         if self.made {
             drop(fs::remove_dir(&self.folder));
         }
     }
 }
 
-fn write(arguments: &Arguments, diagnosis: &Diagnosis, effects: &EffectsFile, evidence: &BTreeMap<String, Evidence>) -> anyhow::Result<()> {
+fn write(
+    arguments: &Arguments,
+    diagnosis: &Diagnosis,
+    effects: &EffectsFile,
+    evidence: &BTreeMap<String, Evidence>,
+) -> anyhow::Result<()> {
     let interrupt = Interrupt::watch()?;
     let folder = &arguments.out;
-    let recording = arguments.recording.file_name().unwrap_or_default().to_string_lossy();
+    let recording = arguments
+        .recording
+        .file_name()
+        .unwrap_or_default()
+        .to_string_lossy();
     let texts = [
         serde_json::to_string_pretty(diagnosis)? + "\n",
         effects.to_yaml(),
-        cromosim_gap::report::html(diagnosis, evidence, &format!("Gap diagnosis of {recording}")),
+        cromosim_gap::report::html(
+            diagnosis,
+            evidence,
+            &format!("Gap diagnosis of {recording}"),
+        ),
     ];
     let mut staged = Staged::new(folder)?;
     for (name, text) in FILES.into_iter().zip(texts) {
@@ -243,7 +340,9 @@ fn write(arguments: &Arguments, diagnosis: &Diagnosis, effects: &EffectsFile, ev
         interrupt.check()?;
     }
     #[cfg(feature = "view")]
-    staged.add(FILES[3], |path| crate::diagnose_view::write_rrd(path, diagnosis, evidence))?;
+    staged.add(FILES[3], |path| {
+        crate::diagnose_view::write_rrd(path, diagnosis, evidence)
+    })?;
     interrupt.check()?;
     staged.finish()?;
     if cfg!(not(feature = "view")) {
@@ -256,11 +355,17 @@ fn write(arguments: &Arguments, diagnosis: &Diagnosis, effects: &EffectsFile, ev
 /// What was found, for people.
 fn print(diagnosis: &Diagnosis) {
     for (name, placement) in &diagnosis.placements {
-        let PlacementDiagnosis { verdict, causes, .. } = placement;
+        let PlacementDiagnosis {
+            verdict, causes, ..
+        } = placement;
         println!("{name}: {verdict}");
         for cause in causes {
-            let (effect, probability, share) = (&cause.effect, cause.probability, 100.0 * cause.gap_share);
-            println!("  {effect:<20} probability {probability:.2}, {share:5.1} % of the gap; {}", parameters(cause));
+            let (effect, probability, share) =
+                (&cause.effect, cause.probability, 100.0 * cause.gap_share);
+            println!(
+                "  {effect:<20} probability {probability:.2}, {share:5.1} % of the gap; {}",
+                parameters(cause)
+            );
         }
     }
 }
@@ -269,22 +374,49 @@ fn print(diagnosis: &Diagnosis) {
 fn parameters(cause: &Cause) -> String {
     let specs = EffectKind::from_name(&cause.effect).map_or(&[][..], |kind| kind.spec().parameters);
     let one = |(name, value): (&String, &Value)| {
-        let unit = specs.iter().find(|spec| spec.name == *name).map_or("", |spec| spec.unit);
-        let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
-        let error = cause.standard_errors.get(name).map(|error| format!(" +- {}", short(error, 2))).unwrap_or_default();
+        let unit = specs
+            .iter()
+            .find(|spec| spec.name == *name)
+            .map_or("", |spec| spec.unit);
+        let unit = if unit.is_empty() {
+            String::new()
+        } else {
+            format!(" {unit}")
+        };
+        let error = cause
+            .standard_errors
+            .get(name)
+            .map(|error| format!(" +- {}", short(error, 2)))
+            .unwrap_or_default();
         format!("{name} {}{unit}{error}", short(value, 4))
     };
-    cause.parameters.iter().map(one).collect::<Vec<_>>().join(", ")
+    cause
+        .parameters
+        .iter()
+        .map(one)
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 /// Numbers with so many significant digits.
 fn short(value: &Value, digits: i32) -> String {
     match value {
-        Value::Array(values) => format!("[{}]", values.iter().map(|value| short(value, digits)).collect::<Vec<_>>().join(", ")),
+        Value::Array(values) => format!(
+            "[{}]",
+            values
+                .iter()
+                .map(|value| short(value, digits))
+                .collect::<Vec<_>>()
+                .join(", ")
+        ),
         Value::String(word) => word.clone(),
         Value::Number(number) => {
             let number = number.as_f64().unwrap_or(f64::NAN);
-            let magnitude = if number == 0.0 { 0 } else { number.abs().log10().floor() as i32 };
+            let magnitude = if number == 0.0 {
+                0
+            } else {
+                number.abs().log10().floor() as i32
+            };
             if number == 0.0 || (-4..9).contains(&magnitude) {
                 format!("{number:.*}", (digits - 1 - magnitude).clamp(0, 9) as usize)
             } else {
@@ -301,8 +433,17 @@ mod tests {
 
     #[test]
     fn config_takes_both_forms_of_lists() {
-        let list = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
-        let expected = || Config { placements: list(&["wrist", "left"]), without: list(&["low_pass"]), seed: Some(7) };
+        let list = |names: &[&str]| {
+            names
+                .iter()
+                .map(|name| (*name).to_owned())
+                .collect::<Vec<_>>()
+        };
+        let expected = || Config {
+            placements: list(&["wrist", "left"]),
+            without: list(&["low_pass"]),
+            seed: Some(7),
+        };
         for text in [
             "placements: [wrist, 'left']\nwithout:\n  - low_pass  # why\nseed: 7\n",
             "# c\nseed: 7\nplacements:\n- wrist\n- \"left\"\nwithout: [low_pass]",
@@ -324,8 +465,14 @@ mod tests {
             ("what", 1, "what"),
         ] {
             let error = Config::parse(text).expect_err(text);
-            let (found, problem) = (error.location().map_or(0, |location| location.line()), error.to_string());
-            assert!(found == line && problem.contains(part), "{text}: line {found}: {problem}");
+            let (found, problem) = (
+                error.location().map_or(0, |location| location.line()),
+                error.to_string(),
+            );
+            assert!(
+                found == line && problem.contains(part),
+                "{text}: line {found}: {problem}"
+            );
         }
     }
 }

@@ -11,15 +11,26 @@ use cromosim_view::{GapCoursePoint, GapPlacement, GapSpectrum, write_gap};
 ///
 /// # Errors
 /// Where the file cannot be written.
-pub fn write_rrd(path: &Path, diagnosis: &Diagnosis, evidence: &BTreeMap<String, Evidence>) -> anyhow::Result<()> {
+pub fn write_rrd(
+    path: &Path,
+    diagnosis: &Diagnosis,
+    evidence: &BTreeMap<String, Evidence>,
+) -> anyhow::Result<()> {
     let nothing = Evidence::default();
     let mut sorted: Vec<(&String, &PlacementDiagnosis)> = diagnosis.placements.iter().collect();
     // The viewer opens at the first one: what has a gap comes before what has none.
     sorted.sort_by_key(|(name, placement)| (placement.causes.is_empty(), *name));
     let evidence_of = |name: &String| evidence.get(name).unwrap_or(&nothing);
-    let placements: Vec<GapPlacement> =
-        sorted.into_iter().map(|(name, placement)| gap_placement(name, placement, evidence_of(name))).collect();
-    Ok(write_gap(path, "diagnosis of the gap", &summary(diagnosis), &placements)?)
+    let placements: Vec<GapPlacement> = sorted
+        .into_iter()
+        .map(|(name, placement)| gap_placement(name, placement, evidence_of(name)))
+        .collect();
+    Ok(write_gap(
+        path,
+        "diagnosis of the gap",
+        &summary(diagnosis),
+        &placements,
+    )?)
 }
 
 fn gap_placement(name: &str, placement: &PlacementDiagnosis, evidence: &Evidence) -> GapPlacement {
@@ -39,7 +50,9 @@ fn gap_placement(name: &str, placement: &PlacementDiagnosis, evidence: &Evidence
         spectra: if evidence.spectra.frequencies.is_empty() {
             Vec::new()
         } else {
-            [0, 3].map(|first| spectrum(placement, evidence, first)).into()
+            [0, 3]
+                .map(|first| spectrum(placement, evidence, first))
+                .into()
         },
     }
 }
@@ -47,12 +60,26 @@ fn gap_placement(name: &str, placement: &PlacementDiagnosis, evidence: &Evidence
 /// The spectra of the axis of a channel that has the largest share of the gap.
 fn spectrum(placement: &PlacementDiagnosis, evidence: &Evidence, first: usize) -> GapSpectrum {
     let share = |axis: usize| placement.place.axes.get(AXES[axis]).copied().unwrap_or(0.0);
-    let axis = (first + 1..first + 3).fold(first, |best, axis| if share(axis) > share(best) { axis } else { best });
+    let axis = (first + 1..first + 3).fold(first, |best, axis| {
+        if share(axis) > share(best) {
+            axis
+        } else {
+            best
+        }
+    });
     let unit = if first == 0 { "m/s²" } else { "rad/s" };
-    let of = |name: &str, values: &[[f64; 6]]| (name.to_owned(), values.iter().map(|value| value[axis]).collect());
+    let of = |name: &str, values: &[[f64; 6]]| {
+        (
+            name.to_owned(),
+            values.iter().map(|value| value[axis]).collect(),
+        )
+    };
     let spectra = &evidence.spectra;
     GapSpectrum {
-        title: format!("spectra of {}: measured, residuals, predicted noise, ({unit})²/Hz", AXES[axis]),
+        title: format!(
+            "spectra of {}: measured, residuals, predicted noise, ({unit})²/Hz",
+            AXES[axis]
+        ),
         frequencies: spectra.frequencies.clone(),
         lines: vec![
             of("measured", &spectra.measured),
@@ -68,8 +95,16 @@ fn summary(diagnosis: &Diagnosis) -> String {
     text += "| placement | verdict | accel RMSE, m/s² | gyro RMSE, rad/s |\n|---|---|---|---|\n";
     for (name, placement) in &diagnosis.placements {
         let (before, after) = (&placement.gap.before, &placement.gap.after);
-        let (accel, gyro) = (change(before.accel_rmse, after.accel_rmse), change(before.gyro_rmse, after.gyro_rmse));
-        let _ = writeln!(text, "| **{}** | {} | {accel} | {gyro} |", cell(name), cell(&placement.verdict));
+        let (accel, gyro) = (
+            change(before.accel_rmse, after.accel_rmse),
+            change(before.gyro_rmse, after.gyro_rmse),
+        );
+        let _ = writeln!(
+            text,
+            "| **{}** | {} | {accel} | {gyro} |",
+            cell(name),
+            cell(&placement.verdict)
+        );
     }
     text + "\nEach placement has a tab. Curves: measured grey, simulated before orange, with all named causes blue.\n"
 }
@@ -89,9 +124,18 @@ fn words(name: &str, placement: &PlacementDiagnosis) -> String {
         text += "| cause | share | probability | parameters |\n|---|---|---|---|\n";
         for cause in &placement.causes {
             let (share, probability) = (100.0 * cause.gap_share, 100.0 * cause.probability);
-            let _ = writeln!(text, "| **{}** | {share:.0} % | {probability:.0} % | {} |", cell(&cause.effect), cell(&parameters(cause)));
+            let _ = writeln!(
+                text,
+                "| **{}** | {share:.0} % | {probability:.0} % | {} |",
+                cell(&cause.effect),
+                cell(&parameters(cause))
+            );
         }
-        let _ = writeln!(text, "| unexplained | {:.0} % | | |", 100.0 * placement.unexplained.share);
+        let _ = writeln!(
+            text,
+            "| unexplained | {:.0} % | | |",
+            100.0 * placement.unexplained.share
+        );
     }
     if !placement.unidentifiable.is_empty() {
         text += "\n**What this motion cannot tell**\n\n";
@@ -104,13 +148,23 @@ fn words(name: &str, placement: &PlacementDiagnosis) -> String {
 
 fn parameters(cause: &Cause) -> String {
     let one = |(name, value): (&String, &serde_json::Value)| format!("{name} {}", rounded(value));
-    cause.parameters.iter().map(one).collect::<Vec<_>>().join("; ")
+    cause
+        .parameters
+        .iter()
+        .map(one)
+        .collect::<Vec<_>>()
+        .join("; ")
 }
 
 fn rounded(value: &serde_json::Value) -> String {
     match value {
-        serde_json::Value::Array(items) => format!("[{}]", items.iter().map(rounded).collect::<Vec<_>>().join(", ")),
-        serde_json::Value::Number(number) => number.as_f64().map_or_else(|| number.to_string(), short),
+        serde_json::Value::Array(items) => format!(
+            "[{}]",
+            items.iter().map(rounded).collect::<Vec<_>>().join(", ")
+        ),
+        serde_json::Value::Number(number) => {
+            number.as_f64().map_or_else(|| number.to_string(), short)
+        }
         serde_json::Value::String(word) => word.clone(),
         other => other.to_string(),
     }
@@ -122,8 +176,19 @@ fn short(value: f64) -> String {
         return format!("{value}");
     }
     let places = (3 - value.abs().log10().floor() as i32).clamp(0, 9);
-    let text = format!("{value:.*}", if value.abs() > 1e7 { 3 } else { places as usize });
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+    let text = format!(
+        "{value:.*}",
+        if value.abs() > 1e7 {
+            3
+        } else {
+            places as usize
+        }
+    );
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
 }
 
 fn change(before: f64, after: f64) -> String {
@@ -131,7 +196,11 @@ fn change(before: f64, after: f64) -> String {
 }
 
 fn rmse(value: f64) -> String {
-    if value.is_finite() { format!("{value:.*}", if value.abs() < 0.1 { 4 } else { 2 }) } else { "–".to_owned() }
+    if value.is_finite() {
+        format!("{value:.*}", if value.abs() < 0.1 { 4 } else { 2 })
+    } else {
+        "–".to_owned()
+    }
 }
 
 /// Text that cannot end a table's cell.

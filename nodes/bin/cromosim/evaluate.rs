@@ -14,7 +14,8 @@ mod output;
 pub enum Command {
     /// How far simulators are from measured IMUs, on people and positions that no network has seen
     Fidelity(fidelity::Arguments),
-    /// Recognition of activities: does a classifier learn from virtual IMUs what it needs on real ones?
+    /// Recognition of activities: does a classifier learn from virtual IMUs what it needs on real
+    /// ones?
     Har(Box<har::Arguments>),
 }
 
@@ -29,5 +30,8 @@ pub fn run(command: &Command) -> anyhow::Result<()> {
 /// The folder with the third-party data: what is given, else CROMOSIM_DATA, else ../shared/data.
 fn data_folder(given: Option<&Path>) -> PathBuf {
     let stated = || std::env::var_os("CROMOSIM_DATA").map(PathBuf::from);
-    given.map(Path::to_owned).or_else(stated).unwrap_or_else(|| PathBuf::from("../shared/data"))
+    given
+        .map(Path::to_owned)
+        .or_else(stated)
+        .unwrap_or_else(|| PathBuf::from("../shared/data"))
 }

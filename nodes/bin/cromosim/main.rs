@@ -29,7 +29,12 @@ mod trajectory;
 
 /// Virtual IMUs from body motion: ROS 2 nodes in Rust, offline simulation, bags and pictures.
 #[derive(Parser)]
-#[command(name = "cromosim", version, propagate_version = true, max_term_width = 120)]
+#[command(
+    name = "cromosim",
+    version,
+    propagate_version = true,
+    max_term_width = 120
+)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -37,11 +42,14 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Play a motion through the five nodes over DDS on this machine; leaves a bag and a Rerun recording
+    /// Play a motion through the five nodes over DDS on this machine; leaves a bag and a Rerun
+    /// recording
     Demo(demo::Arguments),
-    /// Simulate IMUs from motion files, or again from a recording's reference; offline, on all cores
+    /// Simulate IMUs from motion files, or again from a recording's reference; offline, on all
+    /// cores
     Simulate(Box<simulate::Arguments>),
-    /// Say which effects separate a recording's real IMUs from their simulation, and how far the gap falls with them
+    /// Say which effects separate a recording's real IMUs from their simulation, and how far the
+    /// gap falls with them
     Diagnose(diagnose::Arguments),
     /// Say what differs between two diagnoses, or between the IMUs of two recordings
     Compare(compare::Arguments),
@@ -53,7 +61,8 @@ enum Command {
     Train(train::Arguments),
     /// Fit a distribution mapping from simulated to real IMUs
     Map(map::Arguments),
-    /// Measure what simulated IMUs are worth: against measured ones, and on the recognition of activities
+    /// Measure what simulated IMUs are worth: against measured ones, and on the recognition of
+    /// activities
     Evaluate {
         #[command(subcommand)]
         command: evaluate::Command,
@@ -70,7 +79,8 @@ enum Command {
         #[command(subcommand)]
         command: body::Command,
     },
-    /// Run one node in this process: replay, smpl_state, virtual_imu, recorder, viewer or gap_monitor
+    /// Run one node in this process: replay, smpl_state, virtual_imu, recorder, viewer or
+    /// gap_monitor
     Node(node::Arguments),
     /// Print a shell's completion script
     Completion {
@@ -86,7 +96,8 @@ fn completion(shell: Shell, out: Option<PathBuf>) -> anyhow::Result<()> {
     let mut script = Vec::new();
     clap_complete::generate(shell, &mut Cli::command(), "cromosim", &mut script);
     match out {
-        Some(path) => std::fs::write(&path, script).map_err(|error| anyhow::anyhow!("{}: cannot be written: {error}", path.display())),
+        Some(path) => std::fs::write(&path, script)
+            .map_err(|error| anyhow::anyhow!("{}: cannot be written: {error}", path.display())),
         None => std::io::Write::write_all(&mut std::io::stdout(), &script).map_err(Into::into),
     }
 }

@@ -11,7 +11,8 @@ use cromosim_learned::{MappingFile, PlacementMapping};
 use cromosim_msgs::RosMessage;
 use cromosim_msgs::sensor_msgs::Imu;
 
-/// Fit a distribution mapping (by ranks, per channel and placement) from a simulated to a measured recording
+/// Fit a distribution mapping (by ranks, per channel and placement) from a simulated to a measured
+/// recording
 #[derive(Args)]
 pub struct Arguments {
     /// The recording with the simulated IMUs
@@ -34,10 +35,18 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if arguments.out.exists() && !arguments.force {
         bail!("{out}: exists already; give another name, or --force to replace it");
     }
-    let (simulated, measured) = (readings(&arguments.simulated)?, readings(&arguments.measured)?);
-    let names: BTreeSet<&String> = simulated.keys().filter(|name| measured.contains_key(*name)).collect();
+    let (simulated, measured) = (
+        readings(&arguments.simulated)?,
+        readings(&arguments.measured)?,
+    );
+    let names: BTreeSet<&String> = simulated
+        .keys()
+        .filter(|name| measured.contains_key(*name))
+        .collect();
     if names.is_empty() {
-        let list = |readings: &BTreeMap<String, Vec<Reading>>| readings.keys().cloned().collect::<Vec<_>>().join(", ");
+        let list = |readings: &BTreeMap<String, Vec<Reading>>| {
+            readings.keys().cloned().collect::<Vec<_>>().join(", ")
+        };
         bail!(
             "no placement is in both recordings: {} has {}; {} has {}",
             arguments.simulated.display(),
@@ -48,25 +57,57 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let mut file = MappingFile::default();
     for name in names {
-        file.placements.insert(name.clone(), PlacementMapping::fit(&simulated[name], &measured[name], name)?);
+        file.placements.insert(
+            name.clone(),
+            PlacementMapping::fit(&simulated[name], &measured[name], name)?,
+        );
     }
     file.write(&arguments.out)?;
-    println!("{out}: {}", file.placements.keys().cloned().collect::<Vec<_>>().join(", "));
+    println!(
+        "{out}: {}",
+        file.placements
+            .keys()
+            .cloned()
+            .collect::<Vec<_>>()
+            .join(", ")
+    );
     Ok(())
 }
 
 /// Readings of every /imu/NAME/data_raw.
 fn readings(path: &Path) -> anyhow::Result<BTreeMap<String, Vec<Reading>>> {
     let bag = BagReader::open(path)?;
-    let topics = bag.summary().topics.iter().filter(|counted| counted.topic.type_name == Imu::TYPE_NAME);
-    let names: Vec<String> =
-        topics.filter_map(|counted| Some(counted.topic.name.strip_prefix("/imu/")?.strip_suffix("/data_raw")?.to_owned())).collect();
+    let topics = bag
+        .summary()
+        .topics
+        .iter()
+        .filter(|counted| counted.topic.type_name == Imu::TYPE_NAME);
+    let names: Vec<String> = topics
+        .filter_map(|counted| {
+            Some(
+                counted
+                    .topic
+                    .name
+                    .strip_prefix("/imu/")?
+                    .strip_suffix("/data_raw")?
+                    .to_owned(),
+            )
+        })
+        .collect();
     if names.is_empty() {
-        bail!("{}: no topic /imu/NAME/data_raw of sensor_msgs/msg/Imu", path.display());
+        bail!(
+            "{}: no topic /imu/NAME/data_raw of sensor_msgs/msg/Imu",
+            path.display()
+        );
     }
     let read = |name: String| -> anyhow::Result<(String, Vec<Reading>)> {
-        let messages = bag.read::<Imu>(&format!("/imu/{name}/data_raw"))?.into_iter();
-        let readings = messages.map(|(_, imu)| Reading { force: imu.linear_acceleration.into(), rate: imu.angular_velocity.into() });
+        let messages = bag
+            .read::<Imu>(&format!("/imu/{name}/data_raw"))?
+            .into_iter();
+        let readings = messages.map(|(_, imu)| Reading {
+            force: imu.linear_acceleration.into(),
+            rate: imu.angular_velocity.into(),
+        });
         Ok((name, readings.collect()))
     };
     names.into_iter().map(read).collect()

@@ -12,11 +12,17 @@ pub struct MotionArguments {
     /// Up axis of the motion files: auto, x, y or z
     #[arg(long, default_value = "auto")]
     up_axis: String,
-    /// Metres of one unit of the motion files; default: found out from the skeleton's size, or as the file says
+    /// Metres of one unit of the motion files; default: found out from the skeleton's size, or as
+    /// the file says
     #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
     unit: Option<f64>,
     /// Begin so many seconds after the motion's beginning
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
     start: f64,
     /// Take so many seconds of the motion; default: to its end
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
@@ -24,7 +30,8 @@ pub struct MotionArguments {
     /// An AMC file's skeleton (ASF) rather than the one beside it
     #[arg(long, value_name = "FILE")]
     skeleton: Option<PathBuf>,
-    /// Frames per second of a motion file that does not say it (AMC: 120 where absent; video estimates: 30), Hz
+    /// Frames per second of a motion file that does not say it (AMC: 120 where absent; video
+    /// estimates: 30), Hz
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     motion_rate: Option<f64>,
     /// Which marker is where: plug_in_gait, or a YAML file
@@ -33,10 +40,12 @@ pub struct MotionArguments {
     /// Whose markers are taken, where the labels name several people
     #[arg(long, value_name = "NAME")]
     subject: Option<String>,
-    /// Take markers to be stuck exactly where the marker set says, instead of about a centimetre around it
+    /// Take markers to be stuck exactly where the marker set says, instead of about a centimetre
+    /// around it
     #[arg(long)]
     placements_as_given: bool,
-    /// Which person of a file of several; default: who is in it for the longest time. `simulate` also takes all, or names with commas between: topics and frames then begin with person_NAME
+    /// Which person of a file of several; default: who is in it for the longest time. `simulate`
+    /// also takes all, or names with commas between: topics and frames then begin with person_NAME
     #[arg(long, value_name = "NAME")]
     person: Option<String>,
     /// Where the body's shape comes from: detect, file, fit (to bone lengths) or mean
@@ -53,13 +62,17 @@ impl MotionArguments {
         if !(self.start >= 0.0 && self.start.is_finite()) {
             bail!("--start {}: expected 0 or more seconds", self.start);
         }
-        if let Some(seconds) = self.duration.filter(|seconds| !(*seconds > 0.0 && seconds.is_finite())) {
+        if let Some(seconds) = self
+            .duration
+            .filter(|seconds| !(*seconds > 0.0 && seconds.is_finite()))
+        {
             bail!("--duration {seconds}: expected a positive number of seconds");
         }
         Ok((self.start, self.duration))
     }
 
-    /// The first option that was given; `--start` and `--duration`, which other things than motions may have too, on demand.
+    /// The first option that was given; `--start` and `--duration`, which other things than motions
+    /// may have too, on demand.
     pub fn given(&self, with_part: bool) -> Option<&'static str> {
         let given = [
             (self.up_axis != "auto", "--up-axis"),
@@ -75,7 +88,9 @@ impl MotionArguments {
             (self.shape != "detect", "--shape"),
             (self.source_body.is_some(), "--source-body"),
         ];
-        given.into_iter().find_map(|(given, option)| given.then_some(option))
+        given
+            .into_iter()
+            .find_map(|(given, option)| given.then_some(option))
     }
 
     /// The options, checked.
@@ -87,7 +102,10 @@ impl MotionArguments {
             "z" => UpAxis::Z,
             other => bail!("--up-axis {other}: expected auto, x, y or z"),
         };
-        if let Some(rate) = self.motion_rate.filter(|rate| !(*rate > 0.0 && rate.is_finite())) {
+        if let Some(rate) = self
+            .motion_rate
+            .filter(|rate| !(*rate > 0.0 && rate.is_finite()))
+        {
             bail!("--motion-rate {rate}: expected a positive number of frames a second");
         }
         Ok(MotionOptions {

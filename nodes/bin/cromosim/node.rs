@@ -1,4 +1,5 @@
-//! `cromosim node NAME`: any node of the suite in this process, with the arguments that its own binary takes.
+//! `cromosim node NAME`: any node of the suite in this process, with the arguments that its own
+//! binary takes.
 
 use clap::Args;
 
@@ -26,13 +27,17 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         #[cfg(feature = "view")]
         "viewer" => cromosim_viewer::run(rest),
         #[cfg(not(feature = "view"))]
-        "viewer" => anyhow::bail!("this cromosim was built without the feature `view`; build it with default features to get the viewer"),
+        "viewer" => anyhow::bail!(
+            "this cromosim was built without the feature `view`; build it with default features to get the viewer"
+        ),
         "--help" | "-h" => {
             println!(
                 "Usage: cromosim node <replay|smpl_state|virtual_imu|recorder|viewer|gap_monitor> [--help] [--check-config] [--ros-args ...]"
             );
             Ok(())
         }
-        other => anyhow::bail!("there is no node '{other}'; there are replay, smpl_state, virtual_imu, recorder, viewer and gap_monitor"),
+        other => anyhow::bail!(
+            "there is no node '{other}'; there are replay, smpl_state, virtual_imu, recorder, viewer and gap_monitor"
+        ),
     }
 }

@@ -7,8 +7,9 @@ use anyhow::{Context, bail};
 use cromosim_bag::{BagOptions, BagReader, BagSummary, BagWriter, Compression};
 use cromosim_body::BodyModel;
 use cromosim_imu::{
-    Covariances, DeclaredNoise, Device, Dropouts, EffectKind, EffectSet, EffectsFile, ImuSample, NoiseSource, Placement, PlacementEffects,
-    Reading, Scheme, SensorFrame, SensorModel, SensorTrajectory, simulate_kinematics,
+    Covariances, DeclaredNoise, Device, Dropouts, EffectKind, EffectSet, EffectsFile, ImuSample,
+    NoiseSource, Placement, PlacementEffects, Reading, Scheme, SensorFrame, SensorModel,
+    SensorTrajectory, simulate_kinematics,
 };
 use cromosim_learned::{LearnedSimulator, MappingFile, SiteMotion};
 use cromosim_msgs::geometry_msgs::PoseStamped;
@@ -39,18 +40,44 @@ pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
     if let (Ok(from), Ok(to)) = (recording.canonicalize(), arguments.out.canonicalize())
         && from == to
     {
-        bail!("{}: --out is the recording itself, which would be lost; give another name", arguments.out.display());
+        bail!(
+            "{}: --out is the recording itself, which would be lost; give another name",
+            arguments.out.display()
+        );
     }
-    let scheme: Option<Scheme> = arguments.scheme.as_deref().map(str::parse).transpose().context("--scheme")?;
+    let scheme: Option<Scheme> = arguments
+        .scheme
+        .as_deref()
+        .map(str::parse)
+        .transpose()
+        .context("--scheme")?;
     let reader = BagReader::open(recording)?;
     let body = arguments.body.as_deref().map(BodyModel::read).transpose()?;
-    let recorded =
-        recorded::read(&reader, body.as_ref())?.into_iter().map(|(_, placement)| placement).collect::<anyhow::Result<Vec<_>>>()?;
-    let effects = arguments.effects.as_deref().map(|file| read_effects(file, &recorded)).transpose()?.unwrap_or_default();
+    let recorded = recorded::read(&reader, body.as_ref())?
+        .into_iter()
+        .map(|(_, placement)| placement)
+        .collect::<anyhow::Result<Vec<_>>>()?;
+    let effects = arguments
+        .effects
+        .as_deref()
+        .map(|file| read_effects(file, &recorded))
+        .transpose()?
+        .unwrap_or_default();
     let (recorded, without_stamps) = with_stamps(recorded, arguments.rate);
-    let how = How { scheme, effects, ..How::default() };
+    let how = How {
+        scheme,
+        effects,
+        ..How::default()
+    };
     let simulated = simulate_all(&recorded, &how, arguments)?;
-    let summary = write(&arguments.out, metadata(recording, &how, arguments), &recorded, &simulated, false, arguments)?;
+    let summary = write(
+        &arguments.out,
+        metadata(recording, &how, arguments),
+        &recorded,
+        &simulated,
+        false,
+        arguments,
+    )?;
     println!(
         "{}: {} messages of {} placements, from the reference in {}",
         arguments.out.display(),
@@ -74,12 +101,18 @@ pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
 
 /// Runs `simulate --rigid TRAJECTORY`: the trajectory is the reference of one placement.
 pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()> {
-    let scheme: Option<Scheme> = arguments.scheme.as_deref().map(str::parse).transpose().context("--scheme")?;
+    let scheme: Option<Scheme> = arguments
+        .scheme
+        .as_deref()
+        .map(str::parse)
+        .transpose()
+        .context("--scheme")?;
     let name = &arguments.placement;
     if let Err((_, problem)) = Placement::at_site(name, "left_watch", 1.0) {
         bail!("--placement {name}: {problem}");
     }
-    let Some(Content::Poses(poses)) = source::rigid(trajectory, &source::bytes(trajectory)?)? else {
+    let Some(Content::Poses(poses)) = source::rigid(trajectory, &source::bytes(trajectory)?)?
+    else {
         bail!(
             "{}: not a trajectory of a rigid body: expected TUM, EuRoC ground truth or a table of poses with a header",
             trajectory.display()
@@ -89,28 +122,76 @@ pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()>
     let frame = |((stamp, position), rotation): ((&Stamp, &Vector3<f64>), &UnitQuaternion<f64>)| {
         SensorFrame::new(*stamp, Isometry3::from_parts((*position).into(), *rotation))
     };
-    let frames = poses.stamps.iter().zip(&poses.positions).zip(&poses.rotations).map(frame).collect();
-    let recorded = vec![Recorded { name: name.clone(), frames, measured: Vec::new(), notes: Vec::new() }];
-    let mut effects = arguments.effects.as_deref().map(|file| read_effects(file, &recorded)).transpose()?.unwrap_or_default();
+    let frames = poses
+        .stamps
+        .iter()
+        .zip(&poses.positions)
+        .zip(&poses.rotations)
+        .map(frame)
+        .collect();
+    let recorded = vec![Recorded {
+        name: name.clone(),
+        frames,
+        measured: Vec::new(),
+        notes: Vec::new(),
+    }];
+    let mut effects = arguments
+        .effects
+        .as_deref()
+        .map(|file| read_effects(file, &recorded))
+        .transpose()?
+        .unwrap_or_default();
     if let Some(device) = &arguments.device {
         let device = Device::resolve(Some(device), Path::new("."))?;
-        let declared_noise = DeclaredNoise { accel_density: device.accel_density(), gyro_density: device.gyro_density() };
-        let of_device = PlacementEffects { epoch: recorded[0].span().0, declared_noise, effects: device.effects().clone() };
+        let declared_noise = DeclaredNoise {
+            accel_density: device.accel_density(),
+            gyro_density: device.gyro_density(),
+        };
+        let of_device = PlacementEffects {
+            epoch: recorded[0].span().0,
+            declared_noise,
+            effects: device.effects().clone(),
+        };
         effects.placements.insert(name.clone(), of_device);
     }
-    let learned = arguments.learned.as_deref().map(LearnedSimulator::find).transpose()?;
+    let learned = arguments
+        .learned
+        .as_deref()
+        .map(LearnedSimulator::find)
+        .transpose()?;
     // What the networks learned on top of.
     let scheme = scheme.or(learned.as_ref().map(|_| Scheme::Spline));
     let mapping = read_mapping(arguments.mapping.as_deref(), &[name.as_str()])?;
-    let how = How { scheme, effects, learned, mapping };
+    let how = How {
+        scheme,
+        effects,
+        learned,
+        mapping,
+    };
     let simulated = simulate_all(&recorded, &how, arguments)?;
-    let summary = write(&arguments.out, metadata(trajectory, &how, arguments), &recorded, &simulated, true, arguments)?;
-    println!("{}: {} messages of {name}, along {}", arguments.out.display(), summary.message_count(), trajectory.display());
+    let summary = write(
+        &arguments.out,
+        metadata(trajectory, &how, arguments),
+        &recorded,
+        &simulated,
+        true,
+        arguments,
+    )?;
+    println!(
+        "{}: {} messages of {name}, along {}",
+        arguments.out.display(),
+        summary.message_count(),
+        trajectory.display()
+    );
     Ok(())
 }
 
 /// Each placement on whatever core is free.
-fn simulate_all(recorded: &[Recorded], how: &How, arguments: &Arguments) -> anyhow::Result<Vec<Vec<Imu>>> {
+fn simulate_all(
+    recorded: &[Recorded],
+    how: &How,
+    arguments: &Arguments,
+) -> anyhow::Result<Vec<Vec<Imu>>> {
     let interrupt = Interrupt::watch()?;
     let bar = progress::bar(recorded.len() as u64, "simulating, placements");
     let one = |placement: &Recorded| {
@@ -133,20 +214,41 @@ fn write(
     with_references: bool,
     arguments: &Arguments,
 ) -> anyhow::Result<BagSummary> {
-    let options = BagOptions { compression: Compression::Zstd, replace: arguments.force, ..BagOptions::default() };
+    let options = BagOptions {
+        compression: Compression::Zstd,
+        replace: arguments.force,
+        ..BagOptions::default()
+    };
     let mut bag = BagWriter::create(out, options)?;
     bag.write_metadata("cromosim", metadata)?;
     // Of one time, references first.
     let mut order: Vec<(i64, bool, usize, usize)> = Vec::new();
     for (number, placement) in recorded.iter().enumerate() {
         if with_references {
-            order.extend(placement.frames.iter().enumerate().map(|(index, frame)| (frame.stamp.nanos, false, number, index)));
+            order.extend(
+                placement
+                    .frames
+                    .iter()
+                    .enumerate()
+                    .map(|(index, frame)| (frame.stamp.nanos, false, number, index)),
+            );
         }
-        order.extend(simulated[number].iter().enumerate().map(|(index, message)| (message.header.stamp.nanos(), true, number, index)));
+        order.extend(
+            simulated[number]
+                .iter()
+                .enumerate()
+                .map(|(index, message)| (message.header.stamp.nanos(), true, number, index)),
+        );
     }
     order.sort_by_key(|(nanos, is_sample, ..)| (*nanos, *is_sample));
-    let topics: Vec<String> = recorded.iter().map(|placement| format!("/imu/{}/data_raw", placement.name)).collect();
-    let references: Vec<String> = recorded.iter().map(|placement| format!("/reference/{}", placement.name)).collect();
+    let topics: Vec<String> = recorded
+        .iter()
+        .map(|placement| format!("/imu/{}/data_raw", placement.name))
+        .collect();
+    let references: Vec<String> = recorded
+        .iter()
+        .map(|placement| format!("/reference/{}", placement.name))
+        .collect();
     let interrupt = Interrupt::watch()?;
     for (nanos, is_sample, number, index) in order {
         interrupt.check()?;
@@ -155,7 +257,14 @@ fn write(
             bag.write(&topics[number], stamp, &simulated[number][index])?;
         } else {
             let pose = recorded[number].frames[index].world_from_sensor.into();
-            bag.write(&references[number], stamp, &PoseStamped { header: Header::new(nanos, "world"), pose })?;
+            bag.write(
+                &references[number],
+                stamp,
+                &PoseStamped {
+                    header: Header::new(nanos, "world"),
+                    pose,
+                },
+            )?;
         }
     }
     Ok(bag.finish()?)
@@ -165,9 +274,28 @@ fn metadata(recording: &Path, how: &How, arguments: &Arguments) -> BTreeMap<Stri
     let entry = |key: &str, value: String| (key.to_owned(), value);
     let mut entries = BTreeMap::from([
         entry("version", env!("CARGO_PKG_VERSION").to_owned()),
-        entry("command", if arguments.rigid.is_some() { "simulate --rigid" } else { "simulate --reference" }.to_owned()),
-        entry("reference", recording.file_name().unwrap_or_default().to_string_lossy().into_owned()),
-        entry("scheme", how.scheme.map_or_else(|| "estimate".to_owned(), |scheme| scheme.to_string())),
+        entry(
+            "command",
+            if arguments.rigid.is_some() {
+                "simulate --rigid"
+            } else {
+                "simulate --reference"
+            }
+            .to_owned(),
+        ),
+        entry(
+            "reference",
+            recording
+                .file_name()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned(),
+        ),
+        entry(
+            "scheme",
+            how.scheme
+                .map_or_else(|| "estimate".to_owned(), |scheme| scheme.to_string()),
+        ),
         entry("seed", arguments.seed.to_string()),
         entry("noise", (!arguments.no_noise).to_string()),
     ]);
@@ -178,26 +306,59 @@ fn metadata(recording: &Path, how: &How, arguments: &Arguments) -> BTreeMap<Stri
         entries.insert("learned".to_owned(), networks.input().name().to_owned());
     }
     if arguments.mapping.is_some() {
-        entries.insert("mapping".to_owned(), how.mapping.placements.keys().cloned().collect::<Vec<_>>().join(", "));
+        entries.insert(
+            "mapping".to_owned(),
+            how.mapping
+                .placements
+                .keys()
+                .cloned()
+                .collect::<Vec<_>>()
+                .join(", "),
+        );
     }
     entries
 }
 
-/// The placements whose samples have stamps, from messages or by a rate, and the names of the others; all where none has any.
+/// The placements whose samples have stamps, from messages or by a rate, and the names of the
+/// others; all where none has any.
 fn with_stamps(recorded: Vec<Recorded>, rate_hz: Option<f64>) -> (Vec<Recorded>, Vec<String>) {
-    if rate_hz.is_some() || recorded.iter().all(|placement| placement.measured.is_empty()) {
+    if rate_hz.is_some()
+        || recorded
+            .iter()
+            .all(|placement| placement.measured.is_empty())
+    {
         return (recorded, Vec::new());
     }
-    let (with, without): (Vec<_>, Vec<_>) = recorded.into_iter().partition(|placement| !placement.measured.is_empty());
-    (with, without.into_iter().map(|placement| placement.name).collect())
+    let (with, without): (Vec<_>, Vec<_>) = recorded
+        .into_iter()
+        .partition(|placement| !placement.measured.is_empty());
+    (
+        with,
+        without
+            .into_iter()
+            .map(|placement| placement.name)
+            .collect(),
+    )
 }
 
-/// The effects file; what it names must be there, while placements that it does not name stay nominal.
+/// The effects file; what it names must be there, while placements that it does not name stay
+/// nominal.
 fn read_effects(file: &Path, recorded: &[Recorded]) -> anyhow::Result<EffectsFile> {
     let effects = EffectsFile::read(file)?;
-    let names: Vec<&str> = recorded.iter().map(|placement| placement.name.as_str()).collect();
-    if let Some(name) = effects.placements.keys().find(|name| !names.contains(&name.as_str())) {
-        bail!("{}: placement `{name}`: the recording has no such placement; it has {}", file.display(), names.join(", "));
+    let names: Vec<&str> = recorded
+        .iter()
+        .map(|placement| placement.name.as_str())
+        .collect();
+    if let Some(name) = effects
+        .placements
+        .keys()
+        .find(|name| !names.contains(&name.as_str()))
+    {
+        bail!(
+            "{}: placement `{name}`: the recording has no such placement; it has {}",
+            file.display(),
+            names.join(", ")
+        );
     }
     Ok(effects)
 }
@@ -207,12 +368,25 @@ fn resimulate(placement: &Recorded, how: &How, arguments: &Arguments) -> anyhow:
     let (name, (start, end), seed) = (&placement.name, placement.span(), arguments.seed);
     let stamps = match (placement.measured.as_slice(), arguments.rate) {
         ([], Some(rate_hz)) => uniform_stamps(start, end, rate_hz)?,
-        ([], None) => bail!("{name}: the recording has no /imu/{name}/data_raw to take the stamps from; give --rate HZ"),
-        (measured, _) => measured.iter().map(|message| Stamp::from_nanos(message.header.stamp.nanos())).collect(),
+        ([], None) => bail!(
+            "{name}: the recording has no /imu/{name}/data_raw to take the stamps from; give --rate HZ"
+        ),
+        (measured, _) => measured
+            .iter()
+            .map(|message| Stamp::from_nanos(message.header.stamp.nanos()))
+            .collect(),
     };
     let rate_hz = rate(&stamps);
-    let nominal = PlacementEffects { epoch: stamps[0], declared_noise: declared(placement, rate_hz), effects: EffectSet::new() };
-    let PlacementEffects { epoch, declared_noise, effects } = how.effects.placements.get(name).unwrap_or(&nominal);
+    let nominal = PlacementEffects {
+        epoch: stamps[0],
+        declared_noise: declared(placement, rate_hz),
+        effects: EffectSet::new(),
+    };
+    let PlacementEffects {
+        epoch,
+        declared_noise,
+        effects,
+    } = how.effects.placements.get(name).unwrap_or(&nominal);
     let model = SensorModel::new(effects, *epoch);
     let track = track(placement, how, rate_hz, effects).with_context(|| name.clone())?;
     let mut readings = model.read(&model.sensor(model.tissue(model.segment(&track))), &stamps);
@@ -220,7 +394,10 @@ fn resimulate(placement: &Recorded, how: &How, arguments: &Arguments) -> anyhow:
     let mut dropouts = None;
     if !arguments.no_noise {
         let beyond = model.noise_density();
-        let densities = (declared_noise.accel_density.hypot(beyond.0), declared_noise.gyro_density.hypot(beyond.1));
+        let densities = (
+            declared_noise.accel_density.hypot(beyond.0),
+            declared_noise.gyro_density.hypot(beyond.1),
+        );
         let mut noise = NoiseSource::white(densities, 0.0, rate_hz, seed, name)?;
         for reading in &mut readings {
             let drawn = noise.draw();
@@ -234,34 +411,62 @@ fn resimulate(placement: &Recorded, how: &How, arguments: &Arguments) -> anyhow:
     }
     model.digital(&mut readings);
     if let Some(mapping) = how.mapping.placements.get(name) {
-        readings.iter_mut().for_each(|reading| *reading = mapping.apply(reading));
+        readings
+            .iter_mut()
+            .for_each(|reading| *reading = mapping.apply(reading));
     }
     let device = Device::white(declared_noise.accel_density, declared_noise.gyro_density);
     let covariances = Covariances::of(&device, rate_hz).without_orientation();
-    let frame_id = placement.measured.first().map_or_else(|| format!("{name}_imu"), |message| message.header.frame_id.clone());
+    let frame_id = placement.measured.first().map_or_else(
+        || format!("{name}_imu"),
+        |message| message.header.frame_id.clone(),
+    );
     let message = |(stamp, reading): (&Stamp, &Reading)| {
         let world_from_sensor = UnitQuaternion::identity();
-        let sample = ImuSample { stamp: *stamp, world_from_sensor, specific_force: reading.force, angular_velocity: reading.rate };
+        let sample = ImuSample {
+            stamp: *stamp,
+            world_from_sensor,
+            specific_force: reading.force,
+            angular_velocity: reading.rate,
+        };
         let lost = dropouts.as_mut().is_some_and(Dropouts::next_is_lost);
         (!lost).then(|| imu_message(&sample, &frame_id, &covariances, false))
     };
     Ok(stamps.iter().zip(&readings).filter_map(message).collect())
 }
 
-/// The reference's motion as the diagnosis estimates it, or by a scheme, at least at 200 Hz and twice the IMU's rate.
-fn track(placement: &Recorded, how: &How, imu_rate_hz: f64, effects: &EffectSet) -> anyhow::Result<KinematicTrack> {
-    let undone_hz = effects.get(EffectKind::ReferenceSmoothing).and_then(|smoothing| smoothing.values().first().copied());
+/// The reference's motion as the diagnosis estimates it, or by a scheme, at least at 200 Hz and
+/// twice the IMU's rate.
+fn track(
+    placement: &Recorded,
+    how: &How,
+    imu_rate_hz: f64,
+    effects: &EffectSet,
+) -> anyhow::Result<KinematicTrack> {
+    let undone_hz = effects
+        .get(EffectKind::ReferenceSmoothing)
+        .and_then(|smoothing| smoothing.values().first().copied());
     let rate_hz = (2.0 * imu_rate_hz).max(200.0);
     let Some(scheme) = how.scheme else {
         let poses = placement.poses();
         let estimate = PoseEstimate::fit(&poses.stamps, &poses.positions, &poses.rotations)
-            .context("the reference's motion cannot be estimated (--scheme spline does with two poses)")?;
-        return Ok(undone_hz.map(|cutoff_hz| estimate.undoing(cutoff_hz)).unwrap_or(estimate).track_for(imu_rate_hz));
+            .context(
+                "the reference's motion cannot be estimated (--scheme spline does with two poses)",
+            )?;
+        return Ok(undone_hz
+            .map(|cutoff_hz| estimate.undoing(cutoff_hz))
+            .unwrap_or(estimate)
+            .track_for(imu_rate_hz));
     };
     if undone_hz.is_some() {
         bail!("--scheme {scheme} cannot undo reference_smoothing; leave --scheme out");
     }
-    differentiated(&placement.trajectory()?, scheme, rate_hz, how.learned.as_ref())
+    differentiated(
+        &placement.trajectory()?,
+        scheme,
+        rate_hz,
+        how.learned.as_ref(),
+    )
 }
 
 /// The motion by a scheme and what networks add to it, on a grid from the first frame to the last.
@@ -274,33 +479,57 @@ fn differentiated(
     let (start, seconds) = (trajectory.start(), trajectory.end() - trajectory.start());
     // A whole number of intervals, so that the grid ends where the reference does.
     let rate_hz = (seconds * least_rate_hz).ceil().max(1.0) / seconds;
-    let mut motion = simulate_kinematics(trajectory, scheme, &uniform_stamps(start, trajectory.end(), rate_hz)?)?;
+    let mut motion = simulate_kinematics(
+        trajectory,
+        scheme,
+        &uniform_stamps(start, trajectory.end(), rate_hz)?,
+    )?;
     if let Some(networks) = networks {
         motion = networks.correct(&SiteMotion::rigid(trajectory, scheme)?, &motion)?;
     }
-    let mut track = KinematicTrack { start, rate_hz, ..KinematicTrack::default() };
+    let mut track = KinematicTrack {
+        start,
+        rate_hz,
+        ..KinematicTrack::default()
+    };
     for (k, sample) in motion.iter().enumerate() {
         let world_from_segment = sample.world_from_sensor.rotation;
-        let in_segment = |vector: &Vector3<f64>| world_from_segment.inverse_transform_vector(vector);
+        let in_segment =
+            |vector: &Vector3<f64>| world_from_segment.inverse_transform_vector(vector);
         let difference = || {
-            let (before, after) = (&motion[k.saturating_sub(1)], &motion[(k + 1).min(motion.len() - 1)]);
-            (after.angular_velocity - before.angular_velocity) / (after.stamp - before.stamp).max(1e-9)
+            let (before, after) = (
+                &motion[k.saturating_sub(1)],
+                &motion[(k + 1).min(motion.len() - 1)],
+            );
+            (after.angular_velocity - before.angular_velocity)
+                / (after.stamp - before.stamp).max(1e-9)
         };
         track.world_from_segment.push(world_from_segment);
         track.acceleration.push(in_segment(&sample.acceleration));
-        track.angular_velocity.push(in_segment(&sample.angular_velocity));
-        track.angular_acceleration.push(in_segment(&sample.angular_acceleration.unwrap_or_else(difference)));
+        track
+            .angular_velocity
+            .push(in_segment(&sample.angular_velocity));
+        track.angular_acceleration.push(in_segment(
+            &sample.angular_acceleration.unwrap_or_else(difference),
+        ));
     }
     Ok(track)
 }
 
-/// The white noise that the messages declare, none where it is unknown: density = sigma / sqrt(rate).
+/// The white noise that the messages declare, none where it is unknown: density = sigma /
+/// sqrt(rate).
 fn declared(placement: &Recorded, rate_hz: f64) -> DeclaredNoise {
-    let [accel_density, gyro_density] = placement.declared().map(|sigma| sigma.unwrap_or(0.0) / rate_hz.sqrt());
-    DeclaredNoise { accel_density, gyro_density }
+    let [accel_density, gyro_density] = placement
+        .declared()
+        .map(|sigma| sigma.unwrap_or(0.0) / rate_hz.sqrt());
+    DeclaredNoise {
+        accel_density,
+        gyro_density,
+    }
 }
 
-/// Mean rate of stamps in Hz, losses counted by how many medians of the intervals they span: the rate that a diagnosis of them goes by.
+/// Mean rate of stamps in Hz, losses counted by how many medians of the intervals they span: the
+/// rate that a diagnosis of them goes by.
 fn rate(stamps: &[Stamp]) -> f64 {
     let mut stamps = stamps.to_vec();
     stamps.sort();
@@ -308,15 +537,23 @@ fn rate(stamps: &[Stamp]) -> f64 {
     let intervals: Vec<f64> = stamps.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let mut sorted = intervals.clone();
     sorted.sort_unstable_by(f64::total_cmp);
-    let Some(median) = sorted.get(sorted.len() / 2) else { return 1.0 };
-    let steps: f64 = intervals.iter().map(|interval| (interval / median).round().max(1.0)).sum();
+    let Some(median) = sorted.get(sorted.len() / 2) else {
+        return 1.0;
+    };
+    let steps: f64 = intervals
+        .iter()
+        .map(|interval| (interval / median).round().max(1.0))
+        .sum();
     steps / (stamps[stamps.len() - 1] - stamps[0])
 }
 
 /// What a user should know of samples that the reference does not cover.
 fn outside(placement: &Recorded) -> Option<String> {
     let (start, end) = placement.span();
-    let covered = |message: &&Imu| (start..=end).contains(&Stamp::from_nanos(message.header.stamp.nanos()));
+    let covered =
+        |message: &&Imu| (start..=end).contains(&Stamp::from_nanos(message.header.stamp.nanos()));
     let missing = placement.measured.len() - placement.measured.iter().filter(covered).count();
-    (missing > 0).then(|| format!("{missing} messages lie outside the reference; they hold what its ends read"))
+    (missing > 0).then(|| {
+        format!("{missing} messages lie outside the reference; they hold what its ends read")
+    })
 }

@@ -11,8 +11,8 @@ use clap::Args;
 use cromosim_bag::{BagOptions, BagWriter, Compression};
 use cromosim_body::{BodyModel, ShapedBody};
 use cromosim_imu::{
-    Covariances, Device, MAX_RATE_HZ, MountedSite, MountedSites, PlacementSet, PoseStd, Reading, Scheme, SensorTrajectory,
-    StreamingEffects, simulate_kinematics_on,
+    Covariances, Device, MAX_RATE_HZ, MountedSite, MountedSites, PlacementSet, PoseStd, Reading,
+    Scheme, SensorTrajectory, StreamingEffects, simulate_kinematics_on,
 };
 use cromosim_learned::{LearnedSimulator, MappingFile, Patch, SiteMotion};
 use cromosim_motion::{MotionOptions, SmplMotion, embedded_walk, read_motion_for, read_people};
@@ -43,31 +43,41 @@ pub struct Arguments {
     /// Re-simulate the IMUs of this recording from its reference motion instead
     #[arg(long, value_name = "RECORDING", conflicts_with_all = ["motions", "placements", "csv", "up_axis", "unit", "start", "duration", "skeleton", "motion_rate", "marker_set", "subject", "placements_as_given"])]
     pub reference: Option<PathBuf>,
-    /// Simulate an IMU on a rigid body (robot, prop) that moves along this trajectory (TUM, EuRoC or CSV) instead
+    /// Simulate an IMU on a rigid body (robot, prop) that moves along this trajectory (TUM, EuRoC
+    /// or CSV) instead
     #[arg(long, value_name = "FILE", requires = "rate", conflicts_with_all = ["motions", "placements", "body", "csv", "up_axis", "unit", "start", "duration", "skeleton", "motion_rate", "marker_set", "subject", "placements_as_given"])]
     pub rigid: Option<PathBuf>,
     /// With --rigid: the placement's name, in /imu/NAME/data_raw
     #[arg(long, value_name = "NAME", default_value = "body", requires = "rigid")]
     pub placement: String,
     /// With --rigid: a device's name or file, for its noise and effects; default: an ideal sensor
-    #[arg(long, value_name = "DEVICE", requires = "rigid", conflicts_with = "effects")]
+    #[arg(
+        long,
+        value_name = "DEVICE",
+        requires = "rigid",
+        conflicts_with = "effects"
+    )]
     pub device: Option<String>,
-    /// With --reference or --rigid: the effects of each placement (YAML, as a diagnosis writes them) rather than the nominal simulation
+    /// With --reference or --rigid: the effects of each placement (YAML, as a diagnosis writes
+    /// them) rather than the nominal simulation
     #[arg(long, value_name = "FILE", requires = "recorded")]
     pub effects: Option<PathBuf>,
-    /// The bag to write (.mcap, or a rosbag2 directory); with several motions a directory for one .mcap each
+    /// The bag to write (.mcap, or a rosbag2 directory); with several motions a directory for one
+    /// .mcap each
     #[arg(long, value_name = "OUT")]
     pub out: PathBuf,
     /// Sensor placements (YAML) rather than left_wrist, right_ankle, pelvis, sternum and head
     #[arg(long, value_name = "FILE")]
     placements: Option<PathBuf>,
-    /// Derivative scheme for every placement: spline, richardson, triangle, normal_tracking or second_difference. With --reference the default is the estimate that a diagnosis uses
+    /// Derivative scheme for every placement: spline, richardson, triangle, normal_tracking or
+    /// second_difference. With --reference the default is the estimate that a diagnosis uses
     #[arg(long, value_name = "NAME")]
     pub scheme: Option<String>,
     /// Messages per second rather than the placements' own rate, Hz
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub rate: Option<f64>,
-    /// Body model as npz or pickle rather than the embedded one; with --reference that of the recording's SMPL states
+    /// Body model as npz or pickle rather than the embedded one; with --reference that of the
+    /// recording's SMPL states
     #[arg(long, value_name = "FILE")]
     pub body: Option<PathBuf>,
     /// Seed of the sensor noise
@@ -76,18 +86,28 @@ pub struct Arguments {
     /// Leave out the random part of the sensor errors
     #[arg(long)]
     pub no_noise: bool,
-    /// How long errors of the poses hold, for the covariances that follow from a motion's confidence, s; 0: new with each pose
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, allow_negative_numbers = true)]
+    /// How long errors of the poses hold, for the covariances that follow from a motion's
+    /// confidence, s; 0: new with each pose
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
     pose_error_correlation: f64,
     /// Write the samples of each placement as CSV into this directory too
     #[arg(long, value_name = "DIR")]
     csv: Option<PathBuf>,
     #[command(flatten)]
     motion: MotionArguments,
-    /// Networks (motion_capture, motion_capture_60, video, streaming, streaming_video, or a folder that `cromosim train` wrote) that correct acceleration and angular velocity before the device's effects; with --rigid the scheme is then spline unless --scheme names one, as in training
+    /// Networks (motion_capture, motion_capture_60, video, streaming, streaming_video, or a folder
+    /// that `cromosim train` wrote) that correct acceleration and angular velocity before the
+    /// device's effects; with --rigid the scheme is then spline unless --scheme names one, as in
+    /// training
     #[arg(long, value_name = "MODEL", conflicts_with = "reference")]
     pub learned: Option<PathBuf>,
-    /// A distribution mapping (a file that `cromosim map` wrote), applied last to the placements that it names
+    /// A distribution mapping (a file that `cromosim map` wrote), applied last to the placements
+    /// that it names
     #[arg(long, value_name = "FILE", conflicts_with = "reference")]
     pub mapping: Option<PathBuf>,
     /// Replace OUT where it exists
@@ -113,11 +133,19 @@ struct Setup {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    if let Some(rate) = arguments.rate.filter(|rate| !(*rate > 0.0 && *rate <= MAX_RATE_HZ)) {
-        bail!("--rate {rate}: expected a positive number of messages a second, at most {MAX_RATE_HZ}");
+    if let Some(rate) = arguments
+        .rate
+        .filter(|rate| !(*rate > 0.0 && *rate <= MAX_RATE_HZ))
+    {
+        bail!(
+            "--rate {rate}: expected a positive number of messages a second, at most {MAX_RATE_HZ}"
+        );
     }
     if !(arguments.pose_error_correlation >= 0.0 && arguments.pose_error_correlation.is_finite()) {
-        bail!("--pose-error-correlation {}: expected 0 s or more", arguments.pose_error_correlation);
+        bail!(
+            "--pose-error-correlation {}: expected 0 s or more",
+            arguments.pose_error_correlation
+        );
     }
     if let Some(trajectory) = &arguments.rigid {
         return reference::run_rigid(trajectory, arguments);
@@ -135,7 +163,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         println!("{}", line?);
         return Ok(());
     }
-    fs::create_dir_all(&arguments.out).with_context(|| format!("{}: cannot be made", arguments.out.display()))?;
+    fs::create_dir_all(&arguments.out)
+        .with_context(|| format!("{}: cannot be made", arguments.out.display()))?;
     let outs = output_names(&arguments.motions, &arguments.out)?;
     let bar = progress::bar(outs.len() as u64, "simulating, files");
     let results: Vec<anyhow::Result<String>> = arguments
@@ -143,7 +172,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .par_iter()
         .zip(&outs)
         .map(|(path, out)| {
-            let result = setup.read(Some(path)).and_then(|people| simulate_one(&setup, &people, out, &ProgressBar::hidden()));
+            let result = setup
+                .read(Some(path))
+                .and_then(|people| simulate_one(&setup, &people, out, &ProgressBar::hidden()));
             bar.inc(1);
             result
         })
@@ -160,7 +191,10 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         }
     }
     if failed > 0 {
-        bail!("{failed} of {} files failed (above); the others are written", results.len());
+        bail!(
+            "{failed} of {} files failed (above); the others are written",
+            results.len()
+        );
     }
     Ok(())
 }
@@ -170,9 +204,16 @@ fn output_names(motions: &[PathBuf], out: &Path) -> anyhow::Result<Vec<PathBuf>>
     let mut taken: BTreeMap<PathBuf, &PathBuf> = BTreeMap::new();
     let mut outs = Vec::new();
     for motion in motions {
-        let place = out.join(motion.file_stem().unwrap_or_default()).with_extension("mcap");
+        let place = out
+            .join(motion.file_stem().unwrap_or_default())
+            .with_extension("mcap");
         if let Some(other) = taken.insert(place.clone(), motion) {
-            bail!("{} and {} would both become {}; simulate them into two directories", other.display(), motion.display(), place.display());
+            bail!(
+                "{} and {} would both become {}; simulate them into two directories",
+                other.display(),
+                motion.display(),
+                place.display()
+            );
         }
         outs.push(place);
     }
@@ -183,15 +224,23 @@ impl Setup {
     fn new(arguments: &Arguments) -> anyhow::Result<Self> {
         let file = arguments.placements.as_deref();
         let placements = file.map_or_else(|| Ok(PlacementSet::demo()), PlacementSet::read)?;
-        let scheme = arguments.scheme.as_deref().map(Scheme::from_str).transpose().context("--scheme")?;
+        let scheme = arguments
+            .scheme
+            .as_deref()
+            .map(Scheme::from_str)
+            .transpose()
+            .context("--scheme")?;
         let placements = placements.map(|placement| {
             let rate_hz = arguments.rate.unwrap_or(placement.rate_hz());
             let scheme = scheme.unwrap_or(placement.scheme());
             placement.with_rate_hz(rate_hz).with_scheme(scheme)
         });
         let folder = file.and_then(Path::parent).unwrap_or(Path::new("."));
-        let devices =
-            placements.placements().iter().map(|placement| Device::resolve(placement.device(), folder)).collect::<Result<_, _>>()?;
+        let devices = placements
+            .placements()
+            .iter()
+            .map(|placement| Device::resolve(placement.device(), folder))
+            .collect::<Result<_, _>>()?;
         Ok(Self {
             model: body::model(arguments.body.as_ref())?,
             devices,
@@ -201,7 +250,11 @@ impl Setup {
             pose_error_correlation_s: arguments.pose_error_correlation,
             force: arguments.force,
             csv: arguments.csv.clone(),
-            learned: arguments.learned.as_deref().map(LearnedSimulator::find).transpose()?,
+            learned: arguments
+                .learned
+                .as_deref()
+                .map(LearnedSimulator::find)
+                .transpose()?,
             mapping: read_mapping(arguments.mapping.as_deref(), &names(&placements))?,
             placements,
             interrupt: Interrupt::watch()?,
@@ -211,10 +264,21 @@ impl Setup {
     fn read(&self, path: Option<&PathBuf>) -> anyhow::Result<Vec<Played>> {
         let several = self.motion.asks_for_several();
         Ok(match path {
-            Some(path) if several => read_people(path, &self.model, &self.motion)?.into_iter().map(Played::of_several).collect(),
-            Some(path) => vec![Played::alone(read_motion_for(path, &self.model, &self.motion)?)],
-            None if several => bail!("--person: the embedded walk has one person; name a motion file"),
-            None => vec![Played::alone(embedded_walk().slice(self.motion.start_s, self.motion.duration_s)?)],
+            Some(path) if several => read_people(path, &self.model, &self.motion)?
+                .into_iter()
+                .map(Played::of_several)
+                .collect(),
+            Some(path) => vec![Played::alone(read_motion_for(
+                path,
+                &self.model,
+                &self.motion,
+            )?)],
+            None if several => {
+                bail!("--person: the embedded walk has one person; name a motion file")
+            }
+            None => vec![Played::alone(
+                embedded_walk().slice(self.motion.start_s, self.motion.duration_s)?,
+            )],
         })
     }
 
@@ -224,18 +288,33 @@ impl Setup {
         let shaped = ShapedBody::new(self.model.clone(), &motion.betas)?;
         let sites = MountedSites::new(&shaped, self.placements.placements())?;
         if motion.frames.len() < 2 {
-            bail!("{}: {} frame is no motion; at least 2 are needed", motion.name, motion.frames.len());
+            bail!(
+                "{}: {} frame is no motion; at least 2 are needed",
+                motion.name,
+                motion.frames.len()
+            );
         }
         let confidences = motion.confidence.as_deref().unwrap_or_default();
-        let stds: Vec<PoseStd> =
-            confidences.iter().map(|&confidence| PoseStd::of_confidence(confidence, self.pose_error_correlation_s)).collect();
-        let trajectories: Vec<SensorTrajectory> =
-            sites.trajectories(stamps, &motion.frames)?.into_iter().map(|trajectory| trajectory.with_pose_stds(&stds)).collect();
+        let stds: Vec<PoseStd> = confidences
+            .iter()
+            .map(|&confidence| PoseStd::of_confidence(confidence, self.pose_error_correlation_s))
+            .collect();
+        let trajectories: Vec<SensorTrajectory> = sites
+            .trajectories(stamps, &motion.frames)?
+            .into_iter()
+            .map(|trajectory| trajectory.with_pose_stds(&stds))
+            .collect();
         let times = PoseTimes::new(stamps)?;
         bar.inc(1);
         let one = |(index, trajectory): (usize, &SensorTrajectory)| {
             self.interrupt.check()?;
-            let simulated = self.simulate_placement(person, (&shaped, &sites.sites()[index]), index, trajectory, &times);
+            let simulated = self.simulate_placement(
+                person,
+                (&shaped, &sites.sites()[index]),
+                index,
+                trajectory,
+                &times,
+            );
             bar.inc(1);
             simulated
         };
@@ -255,32 +334,63 @@ impl Setup {
         let output = uniform_stamps(trajectory.start(), trajectory.end(), rate_hz)?;
         // Several people's devices err each on its own, as those of nodes with a prefix do.
         let effects = StreamingEffects::new(device, rate_hz, self.seed, &person.frame(name))?;
-        let mut effects = if self.noise { effects } else { effects.without_noise() };
+        let mut effects = if self.noise {
+            effects
+        } else {
+            effects.without_noise()
+        };
         let covariances = Covariances::of(device, rate_hz);
         let frame_id = person.frame(&format!("{name}_imu"));
-        let (mut raw, mut full) = (Vec::with_capacity(output.len()), Vec::with_capacity(output.len()));
-        let mut kinematics = simulate_kinematics_on(times, trajectory, placement.scheme(), &output)?;
+        let (mut raw, mut full) = (
+            Vec::with_capacity(output.len()),
+            Vec::with_capacity(output.len()),
+        );
+        let mut kinematics =
+            simulate_kinematics_on(times, trajectory, placement.scheme(), &output)?;
         if let Some(networks) = &self.learned {
             let patch = Patch::new(shaped, mounted.site())?;
-            let points: Vec<_> = person.motion.frames.iter().map(|pose| patch.points(pose)).collect();
-            kinematics = networks.correct(&SiteMotion::new(trajectory, placement.scheme(), &points)?, &kinematics)?;
+            let points: Vec<_> = person
+                .motion
+                .frames
+                .iter()
+                .map(|pose| patch.points(pose))
+                .collect();
+            kinematics = networks.correct(
+                &SiteMotion::new(trajectory, placement.scheme(), &points)?,
+                &kinematics,
+            )?;
         }
         let mapping = self.mapping.placements.get(name);
         for kinematic in kinematics {
-            let Some(mut sample) = effects.step(&kinematic) else { continue };
+            let Some(mut sample) = effects.step(&kinematic) else {
+                continue;
+            };
             if let Some(mapping) = mapping {
-                let mapped = mapping.apply(&Reading { force: sample.specific_force, rate: sample.angular_velocity });
+                let mapped = mapping.apply(&Reading {
+                    force: sample.specific_force,
+                    rate: sample.angular_velocity,
+                });
                 (sample.specific_force, sample.angular_velocity) = (mapped.force, mapped.rate);
             }
             let covariances = covariances.with_motion(&kinematic.variance, &sample);
-            raw.push(imu_message(&sample, &frame_id, &covariances.without_orientation(), false));
+            raw.push(imu_message(
+                &sample,
+                &frame_id,
+                &covariances.without_orientation(),
+                false,
+            ));
             full.push(imu_message(&sample, &frame_id, &covariances, true));
         }
-        let reference = trajectory
-            .frames()
-            .iter()
-            .map(|frame| PoseStamped { header: Header::new(frame.stamp.nanos, "world"), pose: frame.world_from_sensor.into() });
-        Ok(Simulated { name: name.to_owned(), reference: reference.collect(), raw, full })
+        let reference = trajectory.frames().iter().map(|frame| PoseStamped {
+            header: Header::new(frame.stamp.nanos, "world"),
+            pose: frame.world_from_sensor.into(),
+        });
+        Ok(Simulated {
+            name: name.to_owned(),
+            reference: reference.collect(),
+            raw,
+            full,
+        })
     }
 
     /// What a bag says about how it was made.
@@ -291,39 +401,90 @@ impl Setup {
             entry("command", "simulate".to_owned()),
             entry(
                 "motion",
-                Path::new(&motion.name).file_name().map_or_else(|| motion.name.clone(), |name| name.to_string_lossy().into_owned()),
+                Path::new(&motion.name).file_name().map_or_else(
+                    || motion.name.clone(),
+                    |name| name.to_string_lossy().into_owned(),
+                ),
             ),
             entry("body", self.model.id().to_owned()),
             entry("seed", self.seed.to_string()),
             entry("noise", self.noise.to_string()),
             entry("placements", self.placements.to_yaml()),
-            entry("learned", self.learned.as_ref().map_or("none", |networks| networks.input().name()).to_owned()),
-            entry("mapping", self.mapping.placements.keys().cloned().collect::<Vec<_>>().join(", ")),
+            entry(
+                "learned",
+                self.learned
+                    .as_ref()
+                    .map_or("none", |networks| networks.input().name())
+                    .to_owned(),
+            ),
+            entry(
+                "mapping",
+                self.mapping
+                    .placements
+                    .keys()
+                    .cloned()
+                    .collect::<Vec<_>>()
+                    .join(", "),
+            ),
         ])
     }
 }
 
 fn names(placements: &PlacementSet) -> Vec<&str> {
-    placements.placements().iter().map(cromosim_imu::Placement::name).collect()
+    placements
+        .placements()
+        .iter()
+        .map(cromosim_imu::Placement::name)
+        .collect()
 }
 
 /// A mapping of these placements at least in part.
 pub fn read_mapping(path: Option<&Path>, placements: &[&str]) -> anyhow::Result<MappingFile> {
-    let Some(path) = path else { return Ok(MappingFile::default()) };
+    let Some(path) = path else {
+        return Ok(MappingFile::default());
+    };
     let mapping = MappingFile::read(path)?;
-    if !placements.iter().any(|name| mapping.placements.contains_key(*name)) {
+    if !placements
+        .iter()
+        .any(|name| mapping.placements.contains_key(*name))
+    {
         let known: Vec<&str> = mapping.placements.keys().map(String::as_str).collect();
-        bail!("{}: maps {}; none of the placements {}", path.display(), known.join(", "), placements.join(", "));
+        bail!(
+            "{}: maps {}; none of the placements {}",
+            path.display(),
+            known.join(", "),
+            placements.join(", ")
+        );
     }
     Ok(mapping)
 }
 
-fn simulate_one(setup: &Setup, people: &[Played], out: &Path, bar: &ProgressBar) -> anyhow::Result<String> {
-    let simulated = people.iter().map(|person| setup.simulate(person, bar)).collect::<anyhow::Result<Vec<_>>>()?;
+fn simulate_one(
+    setup: &Setup,
+    people: &[Played],
+    out: &Path,
+    bar: &ProgressBar,
+) -> anyhow::Result<String> {
+    let simulated = people
+        .iter()
+        .map(|person| setup.simulate(person, bar))
+        .collect::<anyhow::Result<Vec<_>>>()?;
     let motion = &people[0].motion;
-    let mut bag = BagWriter::create(out, BagOptions { compression: Compression::Zstd, replace: setup.force, ..BagOptions::default() })?;
+    let mut bag = BagWriter::create(
+        out,
+        BagOptions {
+            compression: Compression::Zstd,
+            replace: setup.force,
+            ..BagOptions::default()
+        },
+    )?;
     bag.write_metadata("cromosim", setup.metadata(motion))?;
-    bag.attach("placements.yaml", "application/yaml", BEGINS, setup.placements.to_yaml().as_bytes())?;
+    bag.attach(
+        "placements.yaml",
+        "application/yaml",
+        BEGINS,
+        setup.placements.to_yaml().as_bytes(),
+    )?;
     write_in_order_of_time(&mut bag, people, &simulated, &setup.interrupt)?;
     let summary = bag.finish()?;
     if let Some(folder) = &setup.csv {
@@ -331,8 +492,21 @@ fn simulate_one(setup: &Setup, people: &[Played], out: &Path, bar: &ProgressBar)
             write_csv(out, folder, person, simulated)?;
         }
     }
-    let last = people.iter().filter_map(|person| person.stamps.last()).max().map_or(0.0, |last| *last - BEGINS);
+    let last = people
+        .iter()
+        .filter_map(|person| person.stamps.last())
+        .max()
+        .map_or(0.0, |last| *last - BEGINS);
     let placements = setup.placements.placements().len();
-    let who = if people.len() > 1 { format!("{} people, ", people.len()) } else { String::new() };
-    Ok(format!("{}: {} messages, {who}{placements} placements, {last:.2} s of {}", out.display(), summary.message_count(), motion.name))
+    let who = if people.len() > 1 {
+        format!("{} people, ", people.len())
+    } else {
+        String::new()
+    };
+    Ok(format!(
+        "{}: {} messages, {who}{placements} placements, {last:.2} s of {}",
+        out.display(),
+        summary.message_count(),
+        motion.name
+    ))
 }

@@ -11,17 +11,27 @@ use cromosim_spatial::Stamp;
 struct Latency {
     /// From the stamp of a sample to its publication: the scheme's delay included.
     age: Vec<f64>,
-    /// From the publication of the state that completed the sample to the publication of the sample.
+    /// From the publication of the state that completed the sample to the publication of the
+    /// sample.
     beyond_state: Vec<f64>,
 }
 
 impl Latency {
-    /// Adds the samples of one placement: stamp and publication of each. The state that released a sample is the first whose stamp is the
-    /// scheme's delay later; the delay is the median distance to the newest state at the publication.
+    /// Adds the samples of one placement: stamp and publication of each. The state that released a
+    /// sample is the first whose stamp is the scheme's delay later; the delay is the median
+    /// distance to the newest state at the publication.
     fn add(&mut self, states: &[(Stamp, Stamp)], samples: &[(Stamp, Stamp)]) {
-        let newest = |published: Stamp| states.partition_point(|&(_, time)| time <= published).checked_sub(1);
-        let mut delays: Vec<f64> =
-            samples.iter().filter_map(|&(stamp, published)| newest(published).map(|state| states[state].0 - stamp)).collect();
+        let newest = |published: Stamp| {
+            states
+                .partition_point(|&(_, time)| time <= published)
+                .checked_sub(1)
+        };
+        let mut delays: Vec<f64> = samples
+            .iter()
+            .filter_map(|&(stamp, published)| {
+                newest(published).map(|state| states[state].0 - stamp)
+            })
+            .collect();
         delays.sort_unstable_by(f64::total_cmp);
         let delay = quantile(&delays, 0.5);
         for &(stamp, published) in samples {
@@ -29,7 +39,10 @@ impl Latency {
             // Half a millisecond of slack: states and samples need not stand on one grid.
             let releasing = states.partition_point(|&(time, _)| time - stamp < delay - 0.5e-3);
             // The first samples wait until the rate of the states is known.
-            if let Some(&(_, sent)) = states.get(releasing).filter(|&&(_, sent)| published >= sent) {
+            if let Some(&(_, sent)) = states
+                .get(releasing)
+                .filter(|&&(_, sent)| published >= sent)
+            {
                 self.beyond_state.push(published - sent);
             }
         }
@@ -39,12 +52,19 @@ impl Latency {
 /// The value that a fraction of a sorted list stays below (nearest rank).
 fn quantile(sorted: &[f64], fraction: f64) -> f64 {
     let rank = (fraction * sorted.len() as f64).ceil() as usize;
-    sorted.get(rank.clamp(1, sorted.len().max(1)) - 1).copied().unwrap_or(f64::NAN)
+    sorted
+        .get(rank.clamp(1, sorted.len().max(1)) - 1)
+        .copied()
+        .unwrap_or(f64::NAN)
 }
 
 fn latency(reader: &BagReader) -> anyhow::Result<Option<Latency>> {
     let of_type = |wanted: &str| -> Vec<String> {
-        let topics = reader.summary().topics.iter().filter(|counted| counted.topic.type_name == wanted);
+        let topics = reader
+            .summary()
+            .topics
+            .iter()
+            .filter(|counted| counted.topic.type_name == wanted);
         topics.map(|counted| counted.topic.name.clone()).collect()
     };
     let (states, imus) = (of_type(SmplState::TYPE_NAME), of_type(Imu::TYPE_NAME));
@@ -53,19 +73,31 @@ fn latency(reader: &BagReader) -> anyhow::Result<Option<Latency>> {
     }
     // Stamp of each state, and when it was published.
     let mut published: Vec<(Stamp, Stamp)> = Vec::new();
-    for message in reader.messages(&Selection { topics: Some(states), ..Selection::default() })? {
+    for message in reader.messages(&Selection {
+        topics: Some(states),
+        ..Selection::default()
+    })? {
         let message = message?;
         let state: SmplState = message.decode()?;
-        published.push((Stamp::from_nanos(state.header.stamp.nanos()), message.publish_time));
+        published.push((
+            Stamp::from_nanos(state.header.stamp.nanos()),
+            message.publish_time,
+        ));
     }
     published.sort_unstable();
-    let mut latency = Latency { age: Vec::new(), beyond_state: Vec::new() };
+    let mut latency = Latency {
+        age: Vec::new(),
+        beyond_state: Vec::new(),
+    };
     for topic in imus {
         let mut samples: Vec<(Stamp, Stamp)> = Vec::new();
         for message in reader.messages(&Selection::topic(&topic))? {
             let message = message?;
             let imu: Imu = message.decode()?;
-            samples.push((Stamp::from_nanos(imu.header.stamp.nanos()), message.publish_time));
+            samples.push((
+                Stamp::from_nanos(imu.header.stamp.nanos()),
+                message.publish_time,
+            ));
         }
         latency.add(&published, &samples);
     }
@@ -80,13 +112,29 @@ pub fn print(bag: &Path, recording: Option<&Path>) -> anyhow::Result<()> {
     let summary = reader.summary();
     let mut topics: Vec<_> = summary.topics.iter().collect();
     topics.sort_by(|one, other| one.topic.name.cmp(&other.topic.name));
-    let width = topics.iter().map(|counted| counted.topic.name.len()).max().unwrap_or(5).max(5);
-    println!("{:width$}  {:>8}  {:>9}  type", "topic", "messages", "rate, Hz");
+    let width = topics
+        .iter()
+        .map(|counted| counted.topic.name.len())
+        .max()
+        .unwrap_or(5)
+        .max(5);
+    println!(
+        "{:width$}  {:>8}  {:>9}  type",
+        "topic", "messages", "rate, Hz"
+    );
     for counted in topics {
-        let rate = active_rate(&reader, &counted.topic.name)?.map_or_else(|| "-".to_owned(), |rate| format!("{rate:.2}"));
-        println!("{:width$}  {:8}  {rate:>9}  {}", counted.topic.name, counted.message_count, counted.topic.type_name);
+        let rate = active_rate(&reader, &counted.topic.name)?
+            .map_or_else(|| "-".to_owned(), |rate| format!("{rate:.2}"));
+        println!(
+            "{:width$}  {:8}  {rate:>9}  {}",
+            counted.topic.name, counted.message_count, counted.topic.type_name
+        );
     }
-    println!("{} messages in {:.2} s", summary.message_count(), summary.duration());
+    println!(
+        "{} messages in {:.2} s",
+        summary.message_count(),
+        summary.duration()
+    );
     if let Some(latency) = latency(&reader)? {
         let ms = |sorted: &[f64], fraction| 1e3 * quantile(sorted, fraction);
         println!(
@@ -99,7 +147,11 @@ pub fn print(bag: &Path, recording: Option<&Path>) -> anyhow::Result<()> {
     }
     println!("bag        {}", bag.display());
     if let Some(recording) = recording {
-        println!("recording  {}   (open it: rerun {})", recording.display(), recording.display());
+        println!(
+            "recording  {}   (open it: rerun {})",
+            recording.display(),
+            recording.display()
+        );
     }
     Ok(())
 }
@@ -124,7 +176,14 @@ mod tests {
     #[test]
     fn quantiles_are_nearest_ranks() {
         let sorted: Vec<f64> = (1..=100).map(f64::from).collect();
-        assert_eq!((quantile(&sorted, 0.5), quantile(&sorted, 0.99), quantile(&sorted, 1.0)), (50.0, 99.0, 100.0));
+        assert_eq!(
+            (
+                quantile(&sorted, 0.5),
+                quantile(&sorted, 0.99),
+                quantile(&sorted, 1.0)
+            ),
+            (50.0, 99.0, 100.0)
+        );
         assert!(quantile(&[], 0.5).is_nan());
     }
 }

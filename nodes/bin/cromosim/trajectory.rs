@@ -1,4 +1,5 @@
-//! `cromosim trajectory`: in-place poses of a video become a motion in the world, by keypoints, depth maps and cameras.
+//! `cromosim trajectory`: in-place poses of a video become a motion in the world, by keypoints,
+//! depth maps and cameras.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -7,7 +8,8 @@ use anyhow::bail;
 use clap::Args;
 use cromosim_body::BodyModel;
 use cromosim_motion::camera::{
-    CameraAxes, CameraClip, CameraFolder, DepthEncoding, FolderLayout, ScaleSource, Trajectory, TrajectoryOptions, global_trajectory,
+    CameraAxes, CameraClip, CameraFolder, DepthEncoding, FolderLayout, ScaleSource, Trajectory,
+    TrajectoryOptions, global_trajectory,
 };
 use cromosim_motion::{MotionOptions, PoseView, SmplMotion, open_poses, read_motion_for};
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
@@ -21,10 +23,11 @@ use crate::motion_arguments::MotionArguments;
 #[derive(Args)]
 #[command(group = clap::ArgGroup::new("size").args(["body_height", "scale"]).multiple(false))]
 pub struct Arguments {
-    /// The in-place poses: what VIBE, PHALP, WHAM, GVHMR or TRAM wrote; or any motion whose root orientation is that against a level camera
-    /// which looks along the world's y axis
+    /// The in-place poses: what VIBE, PHALP, WHAM, GVHMR or TRAM wrote; or any motion whose root
+    /// orientation is that against a level camera which looks along the world's y axis
     poses: PathBuf,
-    /// The motion to write; the ending decides where --to does not: .npz, .bvh, .trc, or .mcap, which keeps the frames' confidence
+    /// The motion to write; the ending decides where --to does not: .npz, .bvh, .trc, or .mcap,
+    /// which keeps the frames' confidence
     out: PathBuf,
     /// The format to write: amass, bvh, trc or bag
     #[arg(long, value_enum, value_name = "FORMAT")]
@@ -41,7 +44,8 @@ pub struct Arguments {
     /// What the depth maps hold; Robust CVD's hold disparity
     #[arg(long, value_parser = ["depth", "disparity"])]
     depth_encoding: String,
-    /// Which way the cameras' axes point: y down and z forward (opencv), or y up and z backward (opengl)
+    /// Which way the cameras' axes point: y down and z forward (opencv), or y up and z backward
+    /// (opengl)
     #[arg(long, value_parser = ["opencv", "opengl"])]
     camera_axes: String,
     /// Width and height of the video, in which the keypoints are, px
@@ -77,7 +81,9 @@ pub struct Arguments {
 
 /// `1920x1080`.
 fn size(text: &str) -> Result<[usize; 2], String> {
-    let parts = text.split_once('x').and_then(|(width, height)| Some([width.parse().ok()?, height.parse().ok()?]));
+    let parts = text
+        .split_once('x')
+        .and_then(|(width, height)| Some([width.parse().ok()?, height.parse().ok()?]));
     parts
         .filter(|[width, height]| (1..=1 << 16).contains(width) && (1..=1 << 16).contains(height))
         .ok_or("expected WIDTHxHEIGHT in pixels".to_owned())
@@ -87,14 +93,26 @@ fn size(text: &str) -> Result<[usize; 2], String> {
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let target = Target::of(arguments.to, &arguments.out)?;
     if !target.takes_motions() {
-        bail!("{}: {} holds no motion of a body; give .npz, .bvh, .trc or .mcap", arguments.out.display(), target.describe());
+        bail!(
+            "{}: {} holds no motion of a body; give .npz, .bvh, .trc or .mcap",
+            arguments.out.display(),
+            target.describe()
+        );
     }
     if arguments.out.exists() && !arguments.force {
-        bail!("{}: exists already; --force replaces it", arguments.out.display());
+        bail!(
+            "{}: exists already; --force replaces it",
+            arguments.out.display()
+        );
     }
     let options = options(arguments)?;
     let model = body::model(arguments.body.as_ref())?;
-    let (mut clip, first_frame) = clip(&arguments.poses, pixels(arguments.image), &model, &arguments.motion.options()?)?;
+    let (mut clip, first_frame) = clip(
+        &arguments.poses,
+        pixels(arguments.image),
+        &model,
+        &arguments.motion.options()?,
+    )?;
     let folder = CameraFolder {
         keypoints: arguments.keypoints.clone(),
         depth: arguments.depth.clone(),
@@ -105,34 +123,62 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     (clip.keypoints, clip.cameras) = (files.keypoints, files.cameras);
     let placed = global_trajectory(&clip, &mut files.depth, &model, &options)?;
     if target == Target::Bag {
-        bag::motion_bag(&placed.motion, &model, "trajectory", &arguments.out, arguments.force)?;
+        bag::motion_bag(
+            &placed.motion,
+            &model,
+            "trajectory",
+            &arguments.out,
+            arguments.force,
+        )?;
     } else {
         let bytes = write::motion_bytes(&placed.motion, target, &model, &arguments.motion)?;
         write::file(&arguments.out, &bytes, arguments.force)?;
     }
-    println!("{}: {} of {} frames", arguments.out.display(), target.describe(), placed.motion.frames.len());
+    println!(
+        "{}: {} of {} frames",
+        arguments.out.display(),
+        target.describe(),
+        placed.motion.frames.len()
+    );
     println!("  {}", placed.report);
     Ok(())
 }
 
 fn options(arguments: &Arguments) -> anyhow::Result<TrajectoryOptions> {
-    let trajectory = if arguments.trajectory == "none" { Trajectory::None } else { Trajectory::Depth };
+    let trajectory = if arguments.trajectory == "none" {
+        Trajectory::None
+    } else {
+        Trajectory::Depth
+    };
     let scale = match (arguments.body_height, arguments.scale, trajectory) {
         (Some(metres), ..) => ScaleSource::BodyHeight(metres),
         (None, Some(factor), _) => ScaleSource::Given(factor),
         // In place there is nothing to scale.
         (None, None, Trajectory::None) => ScaleSource::Given(1.0),
         (None, None, Trajectory::Depth) => {
-            bail!("no scale of depth maps and cameras; give --body-height, or --scale (1 where they are metric)")
+            bail!(
+                "no scale of depth maps and cameras; give --body-height, or --scale (1 where they are metric)"
+            )
         }
     };
-    Ok(TrajectoryOptions { trajectory, ..TrajectoryOptions::new(scale) })
+    Ok(TrajectoryOptions {
+        trajectory,
+        ..TrajectoryOptions::new(scale)
+    })
 }
 
 fn layout(arguments: &Arguments, first_frame: usize) -> FolderLayout {
     FolderLayout {
-        encoding: if arguments.depth_encoding == "disparity" { DepthEncoding::Disparity } else { DepthEncoding::Depth },
-        axes: if arguments.camera_axes == "opengl" { CameraAxes::OpenGl } else { CameraAxes::OpenCv },
+        encoding: if arguments.depth_encoding == "disparity" {
+            DepthEncoding::Disparity
+        } else {
+            DepthEncoding::Depth
+        },
+        axes: if arguments.camera_axes == "opengl" {
+            CameraAxes::OpenGl
+        } else {
+            CameraAxes::OpenCv
+        },
         keypoint_image_px: pixels(arguments.image),
         intrinsics_image_px: pixels(arguments.camera_image.unwrap_or(arguments.image)),
         first_number: arguments.first_number + first_frame,
@@ -145,22 +191,39 @@ fn pixels([width, height]: [usize; 2]) -> Vector2<f64> {
 }
 
 /// The poses, and the video's frame of the first of them.
-fn clip(path: &Path, image: Vector2<f64>, model: &Arc<BodyModel>, options: &MotionOptions) -> anyhow::Result<(CameraClip, usize)> {
-    let Some(file) = open_poses(path, PoseView::Camera)?.filter(|file| file.format.is_video()) else {
+fn clip(
+    path: &Path,
+    image: Vector2<f64>,
+    model: &Arc<BodyModel>,
+    options: &MotionOptions,
+) -> anyhow::Result<(CameraClip, usize)> {
+    let Some(file) = open_poses(path, PoseView::Camera)?.filter(|file| file.format.is_video())
+    else {
         return Ok((in_place(&read_motion_for(path, model, options)?, image), 0));
     };
     let people = file.into_camera_poses(model, options)?;
     if people.is_empty() {
-        bail!("{}: no poses in a camera's axes; VIBE, PHALP, WHAM, GVHMR and TRAM have such", path.display());
+        bail!(
+            "{}: no poses in a camera's axes; VIBE, PHALP, WHAM, GVHMR and TRAM have such",
+            path.display()
+        );
     }
     let names: Vec<String> = people.iter().map(|poses| poses.person.clone()).collect();
     let chosen = match &options.person {
         Some(person) => people.into_iter().find(|poses| poses.person == *person),
         // Of equal length the first, as everywhere.
-        None => people.into_iter().rev().max_by_key(|poses| poses.poses.len()),
+        None => people
+            .into_iter()
+            .rev()
+            .max_by_key(|poses| poses.poses.len()),
     };
     let Some(poses) = chosen else {
-        bail!("{}: nobody is called {}; there are: {}", path.display(), options.person.as_deref().unwrap_or_default(), names.join(", "))
+        bail!(
+            "{}: nobody is called {}; there are: {}",
+            path.display(),
+            options.person.as_deref().unwrap_or_default(),
+            names.join(", ")
+        )
     };
     let clip = CameraClip {
         name: poses.name,
@@ -176,10 +239,11 @@ fn clip(path: &Path, image: Vector2<f64>, model: &Arc<BodyModel>, options: &Moti
     Ok((clip, usize::try_from(poses.first_frame).unwrap_or(0)))
 }
 
-/// The motion as an estimator would give it: before a level camera that looks along the world's y axis, so that the camera's x is the
-/// world's, its y down and its z the world's y.
+/// The motion as an estimator would give it: before a level camera that looks along the world's y
+/// axis, so that the camera's x is the world's, its y down and its z the world's y.
 fn in_place(motion: &SmplMotion, keypoint_image_px: Vector2<f64>) -> CameraClip {
-    let camera_from_world = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2);
+    let camera_from_world =
+        UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2);
     let count = motion.frames.len();
     let mut poses = motion.frames.clone();
     for pose in &mut poses {
@@ -190,7 +254,10 @@ fn in_place(motion: &SmplMotion, keypoint_image_px: Vector2<f64>) -> CameraClip 
         rate_hz: motion.rate_hz,
         gender: motion.gender,
         poses,
-        pose_confidence: motion.confidence.clone().unwrap_or_else(|| vec![1.0; count]),
+        pose_confidence: motion
+            .confidence
+            .clone()
+            .unwrap_or_else(|| vec![1.0; count]),
         betas: vec![motion.betas.clone(); count],
         keypoints: Vec::new(),
         keypoint_image_px,
@@ -204,21 +271,45 @@ mod tests {
 
     #[test]
     fn a_videos_own_estimates_are_taken_in_the_cameras_axes() -> anyhow::Result<()> {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("nodes/lib/motion/tests/data/poses");
+        let folder =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("nodes/lib/motion/tests/data/poses");
         let (model, image) = (BodyModel::embedded(), Vector2::new(1920.0, 1080.0));
-        let read = |name: &str, options: &MotionOptions| clip(&folder.join(name), image, &model, options);
+        let read =
+            |name: &str, options: &MotionOptions| clip(&folder.join(name), image, &model, options);
         for name in ["vibe.joblib", "wham.pkl", "phalp.pkl", "gvhmr.pt"] {
             let (clip, _) = read(name, &MotionOptions::default())?;
-            assert!(clip.poses.len() >= 4 && clip.poses.iter().all(|pose| pose.root_position.norm() == 0.0), "{name}");
+            assert!(
+                clip.poses.len() >= 4
+                    && clip
+                        .poses
+                        .iter()
+                        .all(|pose| pose.root_position.norm() == 0.0),
+                "{name}"
+            );
         }
         // A person who stands before a level camera has the head towards the image's top: up is -y.
         let (vibe, _) = read("vibe.joblib", &MotionOptions::default())?;
         assert!((vibe.poses[0].local_rotations[0] * Vector3::y()).y < -0.5);
-        let nobody = MotionOptions { person: Some("17".to_owned()), ..MotionOptions::default() };
-        let error = read("wham.pkl", &nobody).err().map(|error| error.to_string()).unwrap_or_default();
-        assert!(error.contains("nobody is called 17") && error.contains("0, 3"), "{error}");
-        let error = read("slahmr.npz", &MotionOptions::default()).err().map(|error| error.to_string()).unwrap_or_default();
-        assert!(error.contains("slahmr.npz: no poses in a camera's axes"), "{error}");
+        let nobody = MotionOptions {
+            person: Some("17".to_owned()),
+            ..MotionOptions::default()
+        };
+        let error = read("wham.pkl", &nobody)
+            .err()
+            .map(|error| error.to_string())
+            .unwrap_or_default();
+        assert!(
+            error.contains("nobody is called 17") && error.contains("0, 3"),
+            "{error}"
+        );
+        let error = read("slahmr.npz", &MotionOptions::default())
+            .err()
+            .map(|error| error.to_string())
+            .unwrap_or_default();
+        assert!(
+            error.contains("slahmr.npz: no poses in a camera's axes"),
+            "{error}"
+        );
         Ok(())
     }
 }

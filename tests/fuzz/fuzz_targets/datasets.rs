@@ -1,4 +1,5 @@
-//! Recordings of data sets (TotalCapture, PAMAP2, RealWorld, BROAD, phone and watch, DIP-IMU) and labelled skeleton clips. No panic, and what comes out is in order.
+//! Recordings of data sets (TotalCapture, PAMAP2, RealWorld, BROAD, phone and watch, DIP-IMU) and
+//! labelled skeleton clips. No panic, and what comes out is in order.
 #![no_main]
 
 use std::io::Cursor;

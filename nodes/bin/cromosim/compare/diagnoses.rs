@@ -13,31 +13,68 @@ const CHANGED: f64 = 3.0;
 pub(super) fn compare(a: &Diagnosis, b: &Diagnosis) -> anyhow::Result<Value> {
     let mut placements = serde_json::Map::new();
     for (name, one) in &a.placements {
-        let Some(other) = b.placements.get(name) else { continue };
+        let Some(other) = b.placements.get(name) else {
+            continue;
+        };
         println!("\n{name}");
         print_gap(one, other);
-        placements.insert(name.clone(), json!({"gap": gap(one, other), "causes": causes(one, other)}));
+        placements.insert(
+            name.clone(),
+            json!({"gap": gap(one, other), "causes": causes(one, other)}),
+        );
     }
     if placements.is_empty() {
-        let names = |diagnosis: &Diagnosis| diagnosis.placements.keys().cloned().collect::<Vec<_>>().join(", ");
-        bail!("the diagnoses have no placement in common: A has {}; B has {}", names(a), names(b));
+        let names = |diagnosis: &Diagnosis| {
+            diagnosis
+                .placements
+                .keys()
+                .cloned()
+                .collect::<Vec<_>>()
+                .join(", ")
+        };
+        bail!(
+            "the diagnoses have no placement in common: A has {}; B has {}",
+            names(a),
+            names(b)
+        );
     }
     let lacking = |one: &Diagnosis, other: &Diagnosis| -> Vec<String> {
-        one.placements.keys().filter(|name| !other.placements.contains_key(*name)).cloned().collect()
+        one.placements
+            .keys()
+            .filter(|name| !other.placements.contains_key(*name))
+            .cloned()
+            .collect()
     };
     let (only_a, only_b) = (lacking(a, b), lacking(b, a));
     print_only("A", &only_a.iter().map(String::as_str).collect::<Vec<_>>());
     print_only("B", &only_b.iter().map(String::as_str).collect::<Vec<_>>());
-    Ok(json!({"kind": "diagnoses", "placements": placements, "only_in_a": only_a, "only_in_b": only_b}))
+    Ok(
+        json!({"kind": "diagnoses", "placements": placements, "only_in_a": only_a, "only_in_b": only_b}),
+    )
 }
 
 fn print_gap(a: &PlacementDiagnosis, b: &PlacementDiagnosis) {
-    println!("  {:18}{:>22}{:>22}", "RMSE of the gap", "accel, m/s2", "gyro, rad/s");
+    println!(
+        "  {:18}{:>22}{:>22}",
+        "RMSE of the gap", "accel, m/s2", "gyro, rad/s"
+    );
     for (side, placement) in [("A", a), ("B", b)] {
         let gap = &placement.gap;
-        let change = |pick: fn(&Metrics) -> f64| format!("{} -> {}", significant(pick(&gap.before), 3), significant(pick(&gap.after), 3));
-        let (accel, gyro) = (change(|metrics| metrics.accel_rmse), change(|metrics| metrics.gyro_rmse));
-        println!("  {:18}{accel:>22}{gyro:>22}", format!("{side} before -> after"));
+        let change = |pick: fn(&Metrics) -> f64| {
+            format!(
+                "{} -> {}",
+                significant(pick(&gap.before), 3),
+                significant(pick(&gap.after), 3)
+            )
+        };
+        let (accel, gyro) = (
+            change(|metrics| metrics.accel_rmse),
+            change(|metrics| metrics.gyro_rmse),
+        );
+        println!(
+            "  {:18}{accel:>22}{gyro:>22}",
+            format!("{side} before -> after")
+        );
     }
 }
 
@@ -47,7 +84,13 @@ fn gap(a: &PlacementDiagnosis, b: &PlacementDiagnosis) -> Value {
 }
 
 fn causes(a: &PlacementDiagnosis, b: &PlacementDiagnosis) -> Vec<Value> {
-    let find = |placement: &PlacementDiagnosis, effect: &str| placement.causes.iter().find(|cause| cause.effect == effect).cloned();
+    let find = |placement: &PlacementDiagnosis, effect: &str| {
+        placement
+            .causes
+            .iter()
+            .find(|cause| cause.effect == effect)
+            .cloned()
+    };
     let mut found = Vec::new();
     for cause in &a.causes {
         let Some(now) = find(b, &cause.effect) else {
@@ -61,14 +104,24 @@ fn causes(a: &PlacementDiagnosis, b: &PlacementDiagnosis) -> Vec<Value> {
             None if cause.parameters != now.parameters => "changed",
             _ => "same",
         };
-        let by = moved.map_or_else(String::new, |errors| format!(", by {errors:.1} standard errors"));
+        let by = moved.map_or_else(String::new, |errors| {
+            format!(", by {errors:.1} standard errors")
+        });
         match change {
-            "changed" => println!("  changed  {}\n        -> {}{by}", described(cause), described(&now)),
+            "changed" => println!(
+                "  changed  {}\n        -> {}{by}",
+                described(cause),
+                described(&now)
+            ),
             _ => println!("  same     {}{by}", described(&now)),
         }
         found.push(json!({"effect": cause.effect, "change": change, "standard_errors_moved": moved, "a": cause, "b": now}));
     }
-    for cause in b.causes.iter().filter(|cause| find(a, &cause.effect).is_none()) {
+    for cause in b
+        .causes
+        .iter()
+        .filter(|cause| find(a, &cause.effect).is_none())
+    {
         println!("  new      {}", described(cause));
         found.push(json!({"effect": cause.effect, "change": "new", "b": cause}));
     }
@@ -80,22 +133,40 @@ fn causes(a: &PlacementDiagnosis, b: &PlacementDiagnosis) -> Vec<Value> {
 
 /// `lever_arm (71 %): offset [0.05, 0, -0.06]`.
 fn described(cause: &Cause) -> String {
-    let parameters: Vec<String> =
-        cause.parameters.iter().map(|(name, value)| format!("{name} {}", short(value, cause.standard_errors.get(name)))).collect();
-    format!("{} ({:.0} %): {}", cause.effect, 100.0 * cause.gap_share, parameters.join(", "))
+    let parameters: Vec<String> = cause
+        .parameters
+        .iter()
+        .map(|(name, value)| format!("{name} {}", short(value, cause.standard_errors.get(name))))
+        .collect();
+    format!(
+        "{} ({:.0} %): {}",
+        cause.effect,
+        100.0 * cause.gap_share,
+        parameters.join(", ")
+    )
 }
 
 fn short(value: &Value, error: Option<&Value>) -> String {
     match value {
         Value::Array(items) => {
-            let items: Vec<String> = items.iter().enumerate().map(|(k, item)| short(item, error.and_then(|error| error.get(k)))).collect();
+            let items: Vec<String> = items
+                .iter()
+                .enumerate()
+                .map(|(k, item)| short(item, error.and_then(|error| error.get(k))))
+                .collect();
             format!("[{}]", items.join(", "))
         }
         Value::Number(number) => {
             let value = number.as_f64().unwrap_or(f64::NAN);
-            match error.and_then(Value::as_f64).filter(|error| *error > 0.0 && error.is_finite()) {
+            match error
+                .and_then(Value::as_f64)
+                .filter(|error| *error > 0.0 && error.is_finite())
+            {
                 // To the second digit of the error.
-                Some(error) => format!("{value:.*}", (1 - error.log10().floor() as i32).clamp(0, 9) as usize),
+                Some(error) => format!(
+                    "{value:.*}",
+                    (1 - error.log10().floor() as i32).clamp(0, 9) as usize
+                ),
                 None if value.abs() > 1e7 => format!("{value:.3}"),
                 None => significant(value, 4),
             }
@@ -105,7 +176,8 @@ fn short(value: &Value, error: Option<&Value>) -> String {
     }
 }
 
-/// The largest move of any parameter, in standard errors of the difference; none where the parameters have none.
+/// The largest move of any parameter, in standard errors of the difference; none where the
+/// parameters have none.
 fn moved(a: &Cause, b: &Cause) -> Option<f64> {
     let parts = a.parameters.iter().filter_map(|(name, value)| {
         let errors = (a.standard_errors.get(name)?, b.standard_errors.get(name)?);
@@ -116,8 +188,13 @@ fn moved(a: &Cause, b: &Cause) -> Option<f64> {
 
 fn largest(a: &Value, b: &Value, errors: (&Value, &Value)) -> Option<f64> {
     if let (Value::Array(one), Value::Array(other)) = (a, b) {
-        let parts =
-            one.iter().zip(other).enumerate().filter_map(|(k, (one, other))| largest(one, other, (errors.0.get(k)?, errors.1.get(k)?)));
+        let parts = one
+            .iter()
+            .zip(other)
+            .enumerate()
+            .filter_map(|(k, (one, other))| {
+                largest(one, other, (errors.0.get(k)?, errors.1.get(k)?))
+            });
         return parts.reduce(f64::max);
     }
     let error = errors.0.as_f64()?.hypot(errors.1.as_f64()?);
@@ -152,26 +229,65 @@ mod tests {
             unidentifiable: Vec::new(),
             unexplained: Default::default(),
         };
-        Diagnosis { schema: cromosim_gap::SCHEMA.to_owned(), placements: BTreeMap::from([("wrist".to_owned(), placement)]) }
+        Diagnosis {
+            schema: cromosim_gap::SCHEMA.to_owned(),
+            placements: BTreeMap::from([("wrist".to_owned(), placement)]),
+        }
     }
 
     #[test]
     fn causes_go_come_and_change() {
-        let a = diagnosis(vec![cause("lever_arm", 0.05), cause("mount_slip", 0.0), cause("soft_tissue", 0.0)]);
-        let b = diagnosis(vec![cause("lever_arm", 0.08), cause("soft_tissue", 0.001), cause("low_pass", 0.0)]);
+        let a = diagnosis(vec![
+            cause("lever_arm", 0.05),
+            cause("mount_slip", 0.0),
+            cause("soft_tissue", 0.0),
+        ]);
+        let b = diagnosis(vec![
+            cause("lever_arm", 0.08),
+            cause("soft_tissue", 0.001),
+            cause("low_pass", 0.0),
+        ]);
         let found = compare(&a, &b).unwrap();
         let causes = found["placements"]["wrist"]["causes"].as_array().unwrap();
-        let changes: Vec<(&str, &str)> =
-            causes.iter().map(|cause| (cause["effect"].as_str().unwrap(), cause["change"].as_str().unwrap())).collect();
-        assert_eq!(changes, [("lever_arm", "changed"), ("mount_slip", "gone"), ("soft_tissue", "same"), ("low_pass", "new")]);
-        assert!((causes[0]["standard_errors_moved"].as_f64().unwrap() - 0.03 / (0.003 * 2.0_f64.sqrt())).abs() < 1e-9);
+        let changes: Vec<(&str, &str)> = causes
+            .iter()
+            .map(|cause| {
+                (
+                    cause["effect"].as_str().unwrap(),
+                    cause["change"].as_str().unwrap(),
+                )
+            })
+            .collect();
+        assert_eq!(
+            changes,
+            [
+                ("lever_arm", "changed"),
+                ("mount_slip", "gone"),
+                ("soft_tissue", "same"),
+                ("low_pass", "new")
+            ]
+        );
+        assert!(
+            (causes[0]["standard_errors_moved"].as_f64().unwrap()
+                - 0.03 / (0.003 * 2.0_f64.sqrt()))
+            .abs()
+                < 1e-9
+        );
         let mut other = b.clone();
         other.placements = BTreeMap::from([("head".to_owned(), b.placements["wrist"].clone())]);
-        assert!(compare(&a, &other).unwrap_err().to_string().contains("A has wrist; B has head"));
+        assert!(
+            compare(&a, &other)
+                .unwrap_err()
+                .to_string()
+                .contains("A has wrist; B has head")
+        );
     }
 
     #[test]
     fn parameters_have_the_digits_of_their_errors() {
-        assert_eq!(described(&cause("lever_arm", 0.05)), "lever_arm (70 %): offset [0.0500, 0.0000, -0.0600]");
+        assert_eq!(
+            described(&cause("lever_arm", 0.05)),
+            "lever_arm (70 %): offset [0.0500, 0.0000, -0.0600]"
+        );
     }
 }

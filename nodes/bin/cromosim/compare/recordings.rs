@@ -1,4 +1,5 @@
-//! The IMUs of two recordings: rate, noise, rest, spectra, distributions; lag and difference where they overlap in time.
+//! The IMUs of two recordings: rate, noise, rest, spectra, distributions; lag and difference where
+//! they overlap in time.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +15,8 @@ use super::{print_only, significant};
 
 /// Length of a stretch that is looked at for rest, s.
 const REST_S: f64 = 1.0;
-/// At rest, both channels scatter by less than three times their noise, or than this, m/s2 and rad/s.
+/// At rest, both channels scatter by less than three times their noise, or than this, m/s2 and
+/// rad/s.
 const REST_SCATTER: [f64; 2] = [0.05, 0.01];
 /// Window of a spectrum, s.
 const SPECTRUM_S: f64 = 4.0;
@@ -36,28 +38,48 @@ pub(super) fn compare(a: &BagReader, b: &BagReader) -> anyhow::Result<Value> {
     let (topics_a, topics_b) = (topics(a), topics(b));
     let mut placements = serde_json::Map::new();
     for (name, topic) in &topics_a {
-        let Some(other) = topics_b.get(name) else { continue };
+        let Some(other) = topics_b.get(name) else {
+            continue;
+        };
         println!("\n{name}");
         let (one, other) = (Series::read(a, topic)?, Series::read(b, other)?);
         if one.readings.len() < 2 || other.readings.len() < 2 {
-            println!("  too few messages: A has {}, B has {}", one.readings.len(), other.readings.len());
+            println!(
+                "  too few messages: A has {}, B has {}",
+                one.readings.len(),
+                other.readings.len()
+            );
             continue;
         }
         placements.insert(name.clone(), compare_series(&one, &other));
     }
-    let lacking = |one: &BTreeMap<String, String>, other: &BTreeMap<String, String>| -> Vec<String> {
-        one.keys().filter(|name| !other.contains_key(*name)).cloned().collect()
-    };
+    let lacking =
+        |one: &BTreeMap<String, String>, other: &BTreeMap<String, String>| -> Vec<String> {
+            one.keys()
+                .filter(|name| !other.contains_key(*name))
+                .cloned()
+                .collect()
+        };
     let (only_a, only_b) = (lacking(&topics_a, &topics_b), lacking(&topics_b, &topics_a));
     if topics_a.keys().all(|name| !topics_b.contains_key(name)) {
         let names = |topics: &BTreeMap<String, String>| {
-            if topics.is_empty() { "none".to_owned() } else { topics.keys().cloned().collect::<Vec<_>>().join(", ") }
+            if topics.is_empty() {
+                "none".to_owned()
+            } else {
+                topics.keys().cloned().collect::<Vec<_>>().join(", ")
+            }
         };
-        bail!("the recordings have no IMU (/imu/NAME/data_raw) in common: A has {}; B has {}", names(&topics_a), names(&topics_b));
+        bail!(
+            "the recordings have no IMU (/imu/NAME/data_raw) in common: A has {}; B has {}",
+            names(&topics_a),
+            names(&topics_b)
+        );
     }
     print_only("A", &only_a.iter().map(String::as_str).collect::<Vec<_>>());
     print_only("B", &only_b.iter().map(String::as_str).collect::<Vec<_>>());
-    Ok(json!({"kind": "recordings", "placements": placements, "only_in_a": only_a, "only_in_b": only_b}))
+    Ok(
+        json!({"kind": "recordings", "placements": placements, "only_in_a": only_a, "only_in_b": only_b}),
+    )
 }
 
 /// Topics of IMUs by placement: `.../NAME/data_raw`, below `/imu` before others of the same name.
@@ -65,8 +87,15 @@ fn topics(reader: &BagReader) -> BTreeMap<String, String> {
     let mut found: BTreeMap<String, String> = BTreeMap::new();
     for counted in &reader.summary().topics {
         let topic = &counted.topic.name;
-        let Some(name) = topic.strip_suffix("/data_raw").and_then(|path| path.rsplit('/').next()) else { continue };
-        if counted.topic.type_name == Imu::TYPE_NAME && (topic.starts_with("/imu/") || !found.contains_key(name)) {
+        let Some(name) = topic
+            .strip_suffix("/data_raw")
+            .and_then(|path| path.rsplit('/').next())
+        else {
+            continue;
+        };
+        if counted.topic.type_name == Imu::TYPE_NAME
+            && (topic.starts_with("/imu/") || !found.contains_key(name))
+        {
             found.insert(name.to_owned(), topic.clone());
         }
     }
@@ -77,19 +106,34 @@ impl Series {
     fn read(reader: &BagReader, topic: &str) -> anyhow::Result<Self> {
         let reading = |(_, imu): (Stamp, Imu)| {
             let (force, rate) = (imu.linear_acceleration, imu.angular_velocity);
-            ImuReading { stamp: Stamp::from_nanos(imu.header.stamp.nanos()), values: [force.x, force.y, force.z, rate.x, rate.y, rate.z] }
+            ImuReading {
+                stamp: Stamp::from_nanos(imu.header.stamp.nanos()),
+                values: [force.x, force.y, force.z, rate.x, rate.y, rate.z],
+            }
         };
-        let mut readings: Vec<ImuReading> = reader.read::<Imu>(topic)?.into_iter().map(reading).collect();
+        let mut readings: Vec<ImuReading> = reader
+            .read::<Imu>(topic)?
+            .into_iter()
+            .map(reading)
+            .collect();
         readings.retain(|reading| reading.values.iter().all(|value| value.is_finite()));
         readings.sort_by_key(|reading| reading.stamp);
         readings.dedup_by_key(|reading| reading.stamp);
         let (pace, floors) = (pace(&readings), noise_floors(&readings));
         let rest = rest(&readings, pace.rate_hz, floors);
-        Ok(Self { readings, pace, floors, rest })
+        Ok(Self {
+            readings,
+            pace,
+            floors,
+            rest,
+        })
     }
 
     fn axis(&self, axis: usize) -> Vec<f64> {
-        self.readings.iter().map(|reading| reading.values[axis]).collect()
+        self.readings
+            .iter()
+            .map(|reading| reading.values[axis])
+            .collect()
     }
 }
 
@@ -98,9 +142,21 @@ fn rest(readings: &[ImuReading], rate_hz: f64, floors: [f64; 2]) -> Option<([f64
     let length = ((REST_S * rate_hz) as usize).max(5);
     let (mut sum, mut count) = ([0.0; 6], 0usize);
     for stretch in readings.chunks_exact(length) {
-        let mean: [f64; 6] = std::array::from_fn(|axis| stretch.iter().map(|reading| reading.values[axis]).sum::<f64>() / length as f64);
-        let scatter =
-            |axis: usize| (stretch.iter().map(|reading| (reading.values[axis] - mean[axis]).powi(2)).sum::<f64>() / length as f64).sqrt();
+        let mean: [f64; 6] = std::array::from_fn(|axis| {
+            stretch
+                .iter()
+                .map(|reading| reading.values[axis])
+                .sum::<f64>()
+                / length as f64
+        });
+        let scatter = |axis: usize| {
+            (stretch
+                .iter()
+                .map(|reading| (reading.values[axis] - mean[axis]).powi(2))
+                .sum::<f64>()
+                / length as f64)
+                .sqrt()
+        };
         if (0..6).all(|axis| scatter(axis) < (3.0 * floors[axis / 3]).max(REST_SCATTER[axis / 3])) {
             (0..6).for_each(|axis| sum[axis] += mean[axis] * length as f64);
             count += length;
@@ -111,27 +167,56 @@ fn rest(readings: &[ImuReading], rate_hz: f64, floors: [f64; 2]) -> Option<([f64
 
 fn compare_series(a: &Series, b: &Series) -> Value {
     println!("  {:26}{:>14}{:>14}{:>16}", "", "A", "B", "difference");
-    let row = |what: &str, one: String, other: String, difference: String| println!("  {what:26}{one:>14}{other:>14}{difference:>16}");
-    row("messages", a.readings.len().to_string(), b.readings.len().to_string(), String::new());
+    let row = |what: &str, one: String, other: String, difference: String| {
+        println!("  {what:26}{one:>14}{other:>14}{difference:>16}")
+    };
+    row(
+        "messages",
+        a.readings.len().to_string(),
+        b.readings.len().to_string(),
+        String::new(),
+    );
     let (rate_a, rate_b) = (a.pace.rate_hz, b.pace.rate_hz);
-    row("rate, Hz", format!("{rate_a:.2}"), format!("{rate_b:.2}"), format!("{:+.2}", rate_b - rate_a));
-    row("dropped", a.pace.dropped.to_string(), b.pace.dropped.to_string(), String::new());
+    row(
+        "rate, Hz",
+        format!("{rate_a:.2}"),
+        format!("{rate_b:.2}"),
+        format!("{:+.2}", rate_b - rate_a),
+    );
+    row(
+        "dropped",
+        a.pace.dropped.to_string(),
+        b.pace.dropped.to_string(),
+        String::new(),
+    );
     for (channel, (name, unit)) in CHANNELS.into_iter().enumerate() {
         let (one, other) = (a.floors[channel], b.floors[channel]);
-        row(&format!("{name} noise, {unit}"), significant(one, 3), significant(other, 3), format!("x {}", significant(other / one, 3)));
+        row(
+            &format!("{name} noise, {unit}"),
+            significant(one, 3),
+            significant(other, 3),
+            format!("x {}", significant(other / one, 3)),
+        );
     }
     print_rest(a, b);
     let mut channels = serde_json::Map::new();
-    println!("  {:26}{:>14}{:>30}", "", "spectra, dB", "distributions (Wasserstein-1)");
+    println!(
+        "  {:26}{:>14}{:>30}",
+        "", "spectra, dB", "distributions (Wasserstein-1)"
+    );
     for (channel, (name, unit)) in CHANNELS.into_iter().enumerate() {
-        let (spectra_db, wasserstein) = (spectral_distance(a, b, channel), wasserstein(a, b, channel));
+        let (spectra_db, wasserstein) =
+            (spectral_distance(a, b, channel), wasserstein(a, b, channel));
         println!(
             "  {:26}{:>14}{:>30}",
             format!("{name}, apart by"),
             significant(spectra_db, 3),
             format!("{} {unit}", significant(wasserstein, 3))
         );
-        channels.insert(name.to_owned(), json!({"log_spectral_distance_db": spectra_db, "wasserstein": wasserstein}));
+        channels.insert(
+            name.to_owned(),
+            json!({"log_spectral_distance_db": spectra_db, "wasserstein": wasserstein}),
+        );
     }
     json!({"a": described(a), "b": described(b), "channels": channels, "overlap": overlap(a, b)})
 }
@@ -145,22 +230,46 @@ fn described(series: &Series) -> Value {
 }
 
 fn print_rest(a: &Series, b: &Series) {
-    let seconds = |series: &Series| series.rest.map_or_else(|| "none".to_owned(), |(_, seconds)| format!("{seconds:.0} s"));
+    let seconds = |series: &Series| {
+        series.rest.map_or_else(
+            || "none".to_owned(),
+            |(_, seconds)| format!("{seconds:.0} s"),
+        )
+    };
     println!("  {:26}{:>14}{:>14}", "at rest for", seconds(a), seconds(b));
-    let (Some((one, _)), Some((other, _))) = (a.rest, b.rest) else { return };
-    let norm = |mean: [f64; 6]| mean[..3].iter().map(|value| value * value).sum::<f64>().sqrt();
-    let line = |what: &str, one: f64, other: f64| println!("  {what:26}{one:>14.5}{other:>14.5}{:>+16.5}", other - one);
+    let (Some((one, _)), Some((other, _))) = (a.rest, b.rest) else {
+        return;
+    };
+    let norm = |mean: [f64; 6]| {
+        mean[..3]
+            .iter()
+            .map(|value| value * value)
+            .sum::<f64>()
+            .sqrt()
+    };
+    let line = |what: &str, one: f64, other: f64| {
+        println!("  {what:26}{one:>14.5}{other:>14.5}{:>+16.5}", other - one)
+    };
     line("  accel, norm, m/s2", norm(one), norm(other));
     for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-        line(&format!("  gyro {name}, rad/s"), one[axis + 3], other[axis + 3]);
+        line(
+            &format!("  gyro {name}, rad/s"),
+            one[axis + 3],
+            other[axis + 3],
+        );
     }
 }
 
-/// Root mean square over frequency, up to the lower Nyquist frequency, and over axes, of the difference of Welch spectra, dB.
+/// Root mean square over frequency, up to the lower Nyquist frequency, and over axes, of the
+/// difference of Welch spectra, dB.
 fn spectral_distance(a: &Series, b: &Series, channel: usize) -> f64 {
     let highest = 0.45 * a.pace.rate_hz.min(b.pace.rate_hz);
     let spectrum = |series: &Series, axis: usize| -> Spectrum {
-        welch(&series.axis(axis), series.pace.rate_hz, (SPECTRUM_S * series.pace.rate_hz) as usize)
+        welch(
+            &series.axis(axis),
+            series.pace.rate_hz,
+            (SPECTRUM_S * series.pace.rate_hz) as usize,
+        )
     };
     let mut sum = 0.0;
     for axis in 3 * channel..3 * channel + 3 {
@@ -183,30 +292,55 @@ fn wasserstein(a: &Series, b: &Series, channel: usize) -> f64 {
         let at = |k: usize| {
             let place = (k as f64 + 0.5) / POINTS as f64 * values.len() as f64 - 0.5;
             let (index, share) = (place.floor().max(0.0) as usize, place.max(0.0).fract());
-            values[index.min(values.len() - 1)] * (1.0 - share) + values[(index + 1).min(values.len() - 1)] * share
+            values[index.min(values.len() - 1)] * (1.0 - share)
+                + values[(index + 1).min(values.len() - 1)] * share
         };
         (0..POINTS).map(at).collect()
     };
     let distance = |axis: usize| {
         let (one, other) = (quantiles(a, axis), quantiles(b, axis));
-        one.iter().zip(&other).map(|(one, other)| (one - other).abs()).sum::<f64>() / POINTS as f64
+        one.iter()
+            .zip(&other)
+            .map(|(one, other)| (one - other).abs())
+            .sum::<f64>()
+            / POINTS as f64
     };
     (3 * channel..3 * channel + 3).map(distance).sum::<f64>() / 3.0
 }
 
-/// Lag of A behind B by the correlation of |w|, and what is left of the difference once it is taken out; null without common stamps.
+/// Lag of A behind B by the correlation of |w|, and what is left of the difference once it is taken
+/// out; null without common stamps.
 fn overlap(a: &Series, b: &Series) -> Value {
-    let options = MonitorOptions { largest_lag_s: 1.0, ..MonitorOptions::default() };
+    let options = MonitorOptions {
+        largest_lag_s: 1.0,
+        ..MonitorOptions::default()
+    };
     let Some(plain) = assess(&a.readings, &b.readings, &options) else {
         println!("  they have no stamps in common: no lag, no difference sample by sample");
         return Value::Null;
     };
     let lag = plain.lag_s.unwrap_or(0.0);
-    let moved: Vec<ImuReading> =
-        b.readings.iter().map(|reading| ImuReading { stamp: reading.stamp.plus_seconds(lag), ..*reading }).collect();
+    let moved: Vec<ImuReading> = b
+        .readings
+        .iter()
+        .map(|reading| ImuReading {
+            stamp: reading.stamp.plus_seconds(lag),
+            ..*reading
+        })
+        .collect();
     let left = assess(&a.readings, &moved, &options).unwrap_or_else(|| plain.clone());
-    let rmse = |accel: f64, gyro: f64| format!("{} m/s2, {} rad/s", significant(accel, 3), significant(gyro, 3));
-    println!("  common stamps: {} of A; RMSE of the difference {}", plain.compared, rmse(plain.accel_rmse, plain.gyro_rmse));
+    let rmse = |accel: f64, gyro: f64| {
+        format!(
+            "{} m/s2, {} rad/s",
+            significant(accel, 3),
+            significant(gyro, 3)
+        )
+    };
+    println!(
+        "  common stamps: {} of A; RMSE of the difference {}",
+        plain.compared,
+        rmse(plain.accel_rmse, plain.gyro_rmse)
+    );
     match plain.lag_s {
         Some(lag) => println!(
             "  A is {:.1} ms {} B by the correlation of |w|; RMSE after that {}",
@@ -233,23 +367,47 @@ mod tests {
             // Still for three seconds.
             let u = (start + t - late - 3.0).max(0.0);
             let moving = |frequency: f64| gain * (frequency * u).sin();
-            let values = [moving(3.0), moving(5.0), 9.8 + moving(4.0), 0.3 * moving(2.0), 0.2 * moving(3.3), 0.3 * moving(5.1)];
-            ImuReading { stamp: Stamp::from_seconds(100.0 + start + t), values }
+            let values = [
+                moving(3.0),
+                moving(5.0),
+                9.8 + moving(4.0),
+                0.3 * moving(2.0),
+                0.2 * moving(3.3),
+                0.3 * moving(5.1),
+            ];
+            ImuReading {
+                stamp: Stamp::from_seconds(100.0 + start + t),
+                values,
+            }
         };
         let readings: Vec<ImuReading> = (0..(20.0 * rate_hz) as usize).map(reading).collect();
         let (pace, floors) = (pace(&readings), noise_floors(&readings));
         let rest = rest(&readings, pace.rate_hz, floors);
-        Series { readings, pace, floors, rest }
+        Series {
+            readings,
+            pace,
+            floors,
+            rest,
+        }
     }
 
     #[test]
     fn the_same_motion_late_is_a_lag_and_no_difference() {
         let (a, b) = (series(100.0, 0.05, 2.0, 0.0), series(125.0, 0.0, 2.0, 0.0));
         let found = compare_series(&a, &b);
-        assert!((found["overlap"]["lag_s"].as_f64().unwrap() - 0.05).abs() < 1e-3, "{found}");
+        assert!(
+            (found["overlap"]["lag_s"].as_f64().unwrap() - 0.05).abs() < 1e-3,
+            "{found}"
+        );
         assert!(found["overlap"]["accel_rmse"].as_f64().unwrap() > 0.2);
-        assert!(found["overlap"]["accel_rmse_after_lag"].as_f64().unwrap() < 0.02, "{found}");
-        assert!((2.0..=4.0).contains(&found["a"]["rest"]["seconds"].as_f64().unwrap()), "{found}");
+        assert!(
+            found["overlap"]["accel_rmse_after_lag"].as_f64().unwrap() < 0.02,
+            "{found}"
+        );
+        assert!(
+            (2.0..=4.0).contains(&found["a"]["rest"]["seconds"].as_f64().unwrap()),
+            "{found}"
+        );
         assert!((found["b"]["rate_hz"].as_f64().unwrap() - 125.0).abs() < 0.01);
     }
 
@@ -257,7 +415,10 @@ mod tests {
     fn twice_the_motion_is_6_db_and_a_wider_distribution() {
         let found = compare_series(&series(100.0, 0.0, 2.0, 3.0), &series(100.0, 0.0, 4.0, 3.0));
         let gyro = &found["channels"]["gyro"];
-        assert!((gyro["log_spectral_distance_db"].as_f64().unwrap() - 6.02).abs() < 0.1, "{found}");
+        assert!(
+            (gyro["log_spectral_distance_db"].as_f64().unwrap() - 6.02).abs() < 0.1,
+            "{found}"
+        );
         assert!(gyro["wasserstein"].as_f64().unwrap() > 0.2);
         let same = series(100.0, 0.0, 2.0, 3.0);
         assert_eq!(wasserstein(&same, &same, 0), 0.0);
@@ -265,7 +426,10 @@ mod tests {
 
     #[test]
     fn recordings_of_other_times_are_still_compared() {
-        let found = compare_series(&series(100.0, 0.0, 2.0, 0.0), &series(100.0, 0.0, 2.0, 1000.0));
+        let found = compare_series(
+            &series(100.0, 0.0, 2.0, 0.0),
+            &series(100.0, 0.0, 2.0, 1000.0),
+        );
         assert!(found["overlap"].is_null());
     }
 }

@@ -13,26 +13,53 @@ use nalgebra::Isometry3;
 use crate::simulate::BEGINS;
 
 /// The segment's frame of a joint.
-pub fn joint(motion: &SmplMotion, model: &Arc<BodyModel>, name: &str) -> anyhow::Result<PoseTrajectory> {
+pub fn joint(
+    motion: &SmplMotion,
+    model: &Arc<BodyModel>,
+    name: &str,
+) -> anyhow::Result<PoseTrajectory> {
     let Some(joint) = Joint::from_name(name) else {
         let known: Vec<&str> = Joint::ALL.iter().map(|joint| joint.name()).collect();
-        bail!("--joint {name}: SMPL has no such joint; it has {}", known.join(", "));
+        bail!(
+            "--joint {name}: SMPL has no such joint; it has {}",
+            known.join(", ")
+        );
     };
     let shaped = ShapedBody::new(model.clone(), &motion.betas)?;
-    Ok(trajectory(motion, motion.frames.iter().map(|pose| shaped.world_from_segments(pose)[joint.index()])))
+    Ok(trajectory(
+        motion,
+        motion
+            .frames
+            .iter()
+            .map(|pose| shaped.world_from_segments(pose)[joint.index()]),
+    ))
 }
 
 /// The frame of a sensor on the skin: z outward, x along the bone.
-pub fn site(motion: &SmplMotion, model: &Arc<BodyModel>, name: &str) -> anyhow::Result<PoseTrajectory> {
+pub fn site(
+    motion: &SmplMotion,
+    model: &Arc<BodyModel>,
+    name: &str,
+) -> anyhow::Result<PoseTrajectory> {
     let shaped = ShapedBody::new(model.clone(), &motion.betas)?;
-    let placement =
-        Placement::at_site("site", name, motion.rate_hz).map_err(|(field, problem)| anyhow!("--site {name}: {field}: {problem}"))?;
-    let mounted = MountedSite::new(&shaped, &placement).map_err(|error| anyhow!("--site {name}: {error}"))?;
-    Ok(trajectory(motion, motion.frames.iter().map(|pose| mounted.frame(pose).world_from_sensor)))
+    let placement = Placement::at_site("site", name, motion.rate_hz)
+        .map_err(|(field, problem)| anyhow!("--site {name}: {field}: {problem}"))?;
+    let mounted =
+        MountedSite::new(&shaped, &placement).map_err(|error| anyhow!("--site {name}: {error}"))?;
+    Ok(trajectory(
+        motion,
+        motion
+            .frames
+            .iter()
+            .map(|pose| mounted.frame(pose).world_from_sensor),
+    ))
 }
 
 fn trajectory(motion: &SmplMotion, frames: impl Iterator<Item = Isometry3<f64>>) -> PoseTrajectory {
-    let mut trajectory = PoseTrajectory { frame: "world".to_owned(), ..PoseTrajectory::default() };
+    let mut trajectory = PoseTrajectory {
+        frame: "world".to_owned(),
+        ..PoseTrajectory::default()
+    };
     for (index, frame) in frames.enumerate() {
         trajectory.stamps.push(stamp(motion, index));
         trajectory.positions.push(frame.translation.vector);

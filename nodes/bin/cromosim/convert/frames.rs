@@ -24,23 +24,42 @@ pub struct Tree {
 }
 
 impl Tree {
-    /// All transforms of the bag's TFMessage topics; those of topics that end in `tf_static` hold for ever.
+    /// All transforms of the bag's TFMessage topics; those of topics that end in `tf_static` hold
+    /// for ever.
     pub fn read(reader: &BagReader) -> anyhow::Result<Self> {
         let mut branches: BTreeMap<String, Branch> = BTreeMap::new();
-        let topics = reader.summary().topics.iter().filter(|counted| counted.topic.type_name == TFMessage::TYPE_NAME);
-        for topic in topics.map(|counted| counted.topic.name.clone()).collect::<Vec<_>>() {
+        let topics = reader
+            .summary()
+            .topics
+            .iter()
+            .filter(|counted| counted.topic.type_name == TFMessage::TYPE_NAME);
+        for topic in topics
+            .map(|counted| counted.topic.name.clone())
+            .collect::<Vec<_>>()
+        {
             let is_static = topic.ends_with("tf_static");
             for (_, message) in reader.read::<TFMessage>(&topic)? {
                 for transform in message.transforms {
                     let stamp = Stamp::from_nanos(transform.header.stamp.nanos());
                     let (parent, child) = (transform.header.frame_id, transform.child_frame_id);
                     let pose = transform.transform.try_into().map_err(|error| {
-                        anyhow!("{}, {topic}, frame {child} at {:.6} s: {error}", reader.path().display(), stamp.as_seconds())
+                        anyhow!(
+                            "{}, {topic}, frame {child} at {:.6} s: {error}",
+                            reader.path().display(),
+                            stamp.as_seconds()
+                        )
                     })?;
-                    let branch =
-                        branches.entry(child.clone()).or_insert_with(|| Branch { parent: parent.clone(), poses: Vec::new(), is_static });
+                    let branch = branches.entry(child.clone()).or_insert_with(|| Branch {
+                        parent: parent.clone(),
+                        poses: Vec::new(),
+                        is_static,
+                    });
                     if branch.parent != parent {
-                        bail!("{}, {topic}: frame {child} hangs on {} and on {parent}", reader.path().display(), branch.parent);
+                        bail!(
+                            "{}, {topic}: frame {child} hangs on {} and on {parent}",
+                            reader.path().display(),
+                            branch.parent
+                        );
                     }
                     branch.poses.push((stamp, pose));
                 }
@@ -51,7 +70,11 @@ impl Tree {
             branch.poses.dedup_by_key(|(stamp, _)| *stamp);
         }
         if branches.is_empty() {
-            bail!("{}: no topic of {} with transforms", reader.path().display(), TFMessage::TYPE_NAME);
+            bail!(
+                "{}: no topic of {} with transforms",
+                reader.path().display(),
+                TFMessage::TYPE_NAME
+            );
         }
         Ok(Self { branches })
     }
@@ -69,7 +92,9 @@ impl Tree {
             let Some(branch) = self.branches.get(at) else {
                 match fixed {
                     None if !chain.is_empty() => break,
-                    Some(fixed) if !chain.is_empty() => bail!("frame {frame} does not hang on {fixed}; the root above it is {at}"),
+                    Some(fixed) if !chain.is_empty() => {
+                        bail!("frame {frame} does not hang on {fixed}; the root above it is {at}")
+                    }
                     _ => bail!("no frame {frame}; there are {}", self.known()),
                 }
             };
@@ -82,16 +107,24 @@ impl Tree {
         Ok((chain, at.to_owned()))
     }
 
-    /// Where `frame` is in `fixed` (default: the root), at the stamps of the nearest of its frames that moves; frames above it are
-    /// interpolated, linearly and the shortest way round. Stamps at which one of them is not known are left out.
+    /// Where `frame` is in `fixed` (default: the root), at the stamps of the nearest of its frames
+    /// that moves; frames above it are interpolated, linearly and the shortest way round. Stamps at
+    /// which one of them is not known are left out.
     pub fn trajectory(&self, frame: &str, fixed: Option<&str>) -> anyhow::Result<PoseTrajectory> {
         let (chain, fixed) = self.chain(frame, fixed)?;
         let Some(moving) = chain.iter().find(|branch| !branch.is_static) else {
             bail!("frame {frame} stands still in {fixed}: it has no stamps of its own");
         };
-        let mut trajectory = PoseTrajectory { frame: fixed, ..PoseTrajectory::default() };
+        let mut trajectory = PoseTrajectory {
+            frame: fixed,
+            ..PoseTrajectory::default()
+        };
         for (stamp, _) in &moving.poses {
-            let pose = chain.iter().try_fold(Isometry3::identity(), |below, branch| Some(branch.at(*stamp)? * below));
+            let pose = chain
+                .iter()
+                .try_fold(Isometry3::identity(), |below, branch| {
+                    Some(branch.at(*stamp)? * below)
+                });
             if let Some(pose) = pose {
                 trajectory.stamps.push(*stamp);
                 trajectory.positions.push(pose.translation.vector);
@@ -117,8 +150,14 @@ impl Branch {
         }
         let (before, from) = self.poses.get(after.checked_sub(1)?)?;
         let fraction = (stamp - *before) / (*next - *before);
-        let position = from.translation.vector.lerp(&pose.translation.vector, fraction);
+        let position = from
+            .translation
+            .vector
+            .lerp(&pose.translation.vector, fraction);
         let turn = (from.rotation.inverse() * pose.rotation).scaled_axis() * fraction;
-        Some(Isometry3::from_parts(position.into(), from.rotation * nalgebra::UnitQuaternion::from_scaled_axis(turn)))
+        Some(Isometry3::from_parts(
+            position.into(),
+            from.rotation * nalgebra::UnitQuaternion::from_scaled_axis(turn),
+        ))
     }
 }

@@ -21,15 +21,31 @@ const HEAD_BYTES: u64 = 1 << 16;
 const MCAP: &[u8] = b"\x89MCAP";
 
 /// Reads whatever the input is.
-pub fn read(arguments: &Arguments, model: &Arc<BodyModel>, target: Target) -> anyhow::Result<Content> {
+pub fn read(
+    arguments: &Arguments,
+    model: &Arc<BodyModel>,
+    target: Target,
+) -> anyhow::Result<Content> {
     let path = &arguments.input;
-    let head = if path.is_dir() { MCAP.to_vec() } else { head(path)? };
+    let head = if path.is_dir() {
+        MCAP.to_vec()
+    } else {
+        head(path)?
+    };
     if head.starts_with(MCAP) {
         refuse_dataset_options(arguments)?;
-        return recording::read(path, arguments, model, target).and_then(|content| without_motion_options(content, arguments));
+        return recording::read(path, arguments, model, target)
+            .and_then(|content| without_motion_options(content, arguments));
     }
-    if let Some(option) = [(&arguments.topic, "--topic"), (&arguments.frame, "--frame")].iter().find(|(value, _)| value.is_some()) {
-        bail!("{}: {} chooses from a bag, which this file is not", path.display(), option.1);
+    if let Some(option) = [(&arguments.topic, "--topic"), (&arguments.frame, "--frame")]
+        .iter()
+        .find(|(value, _)| value.is_some())
+    {
+        bail!(
+            "{}: {} chooses from a bag, which this file is not",
+            path.display(),
+            option.1
+        );
     }
     if head.is_empty() {
         bail!("{}: the file is empty", path.display());
@@ -45,13 +61,21 @@ pub fn read(arguments: &Arguments, model: &Arc<BodyModel>, target: Target) -> an
     {
         return without_motion_options(content, arguments);
     }
-    Ok(Content::Motion(Box::new(read_motion_for(path, model, &arguments.motion.options()?)?)))
+    Ok(Content::Motion(Box::new(read_motion_for(
+        path,
+        model,
+        &arguments.motion.options()?,
+    )?)))
 }
 
 fn without_motion_options(content: Content, arguments: &Arguments) -> anyhow::Result<Content> {
     match arguments.motion.given(true) {
         Some(option) if !matches!(content, Content::Motion(_)) => {
-            bail!("{}: {option} is for motions, and this is {}; leave it out", arguments.input.display(), content.name())
+            bail!(
+                "{}: {option} is for motions, and this is {}; leave it out",
+                arguments.input.display(),
+                content.name()
+            )
         }
         _ => Ok(content),
     }
@@ -60,7 +84,10 @@ fn without_motion_options(content: Content, arguments: &Arguments) -> anyhow::Re
 fn refuse_dataset_options(arguments: &Arguments) -> anyhow::Result<()> {
     match arguments.dataset.given() {
         Some(option) => {
-            bail!("{}: {option} is for recordings of data sets, which this file is not; leave it out", arguments.input.display())
+            bail!(
+                "{}: {option} is for recordings of data sets, which this file is not; leave it out",
+                arguments.input.display()
+            )
         }
         None => Ok(()),
     }

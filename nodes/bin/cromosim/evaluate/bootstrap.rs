@@ -6,15 +6,23 @@ use rand_chacha::ChaCha12Rng;
 /// Draws.
 const DRAWS: usize = 10_000;
 
-/// 95 % intervals of numbers that `of` makes of `count` items (at least one), by drawing the items anew with replacement (Efron 1979,
-/// percentiles); `of` is given the items' places. The same seed gives the same.
-pub fn intervals<const N: usize>(count: usize, seed: u64, of: impl Fn(&[usize]) -> [f64; N]) -> [[f64; 2]; N] {
+/// 95 % intervals of numbers that `of` makes of `count` items (at least one), by drawing the items
+/// anew with replacement (Efron 1979, percentiles); `of` is given the items' places. The same seed
+/// gives the same.
+pub fn intervals<const N: usize>(
+    count: usize,
+    seed: u64,
+    of: impl Fn(&[usize]) -> [f64; N],
+) -> [[f64; 2]; N] {
     let mut random = ChaCha12Rng::seed_from_u64(seed);
     let mut drawn = [(); N].map(|()| Vec::with_capacity(DRAWS));
     let mut places = vec![0; count];
     for _ in 0..DRAWS {
         places.fill_with(|| random.random_range(0..count));
-        drawn.iter_mut().zip(of(&places)).for_each(|(all, value)| all.push(value));
+        drawn
+            .iter_mut()
+            .zip(of(&places))
+            .for_each(|(all, value)| all.push(value));
     }
     drawn.map(|mut values| {
         values.sort_by(f64::total_cmp);
@@ -29,9 +37,17 @@ mod tests {
     #[test]
     fn the_interval_is_that_of_the_mean() {
         // Of n equal halves at 0 and 1 the mean's standard error is 0.5 / sqrt n.
-        let mean = |places: &[usize]| [places.iter().map(|place| (place % 2) as f64).sum::<f64>() / places.len() as f64, 0.7];
+        let mean = |places: &[usize]| {
+            [
+                places.iter().map(|place| (place % 2) as f64).sum::<f64>() / places.len() as f64,
+                0.7,
+            ]
+        };
         let [[low, high], constant] = intervals(100, 1, mean);
-        assert!((low - 0.402).abs() < 0.02 && (high - 0.598).abs() < 0.02 && constant == [0.7, 0.7], "{low} {high}");
+        assert!(
+            (low - 0.402).abs() < 0.02 && (high - 0.598).abs() < 0.02 && constant == [0.7, 0.7],
+            "{low} {high}"
+        );
         assert_eq!(intervals(100, 1, mean), intervals(100, 1, mean));
     }
 }

@@ -10,7 +10,12 @@ use cromosim_charts::{Chart, Page};
 const WIDTH: u32 = 1600;
 
 /// Texts by name, report.html, and the pictures as PNG.
-pub fn write(folder: &Path, texts: &[(&str, String)], page: &Page, charts: &[(String, Chart)]) -> anyhow::Result<()> {
+pub fn write(
+    folder: &Path,
+    texts: &[(&str, String)],
+    page: &Page,
+    charts: &[(String, Chart)],
+) -> anyhow::Result<()> {
     fs::create_dir_all(folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
     // Whole or not at all, each of them.
     let put = |name: &str, bytes: &[u8]| {
@@ -22,5 +27,7 @@ pub fn write(folder: &Path, texts: &[(&str, String)], page: &Page, charts: &[(St
     for (name, chart) in charts {
         put(name, &chart.png(WIDTH).with_context(|| name.clone())?)?;
     }
-    texts.iter().try_for_each(|(name, text)| put(name, text.as_bytes()))
+    texts
+        .iter()
+        .try_for_each(|(name, text)| put(name, text.as_bytes()))
 }

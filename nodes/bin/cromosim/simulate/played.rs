@@ -36,18 +36,37 @@ pub(super) struct Simulated {
 impl Played {
     /// A file's only person, or the chosen one.
     pub fn alone(motion: SmplMotion) -> Self {
-        Self { stamps: stamps(&motion, 0.0), motion, label: String::new(), body_id: "0".to_owned() }
+        Self {
+            stamps: stamps(&motion, 0.0),
+            motion,
+            label: String::new(),
+            body_id: "0".to_owned(),
+        }
     }
 
     /// One of several people.
     pub fn of_several(person: Person) -> Self {
-        let Person { name, label, begins_s, motion } = person;
-        Self { stamps: stamps(&motion, begins_s), motion, label, body_id: name }
+        let Person {
+            name,
+            label,
+            begins_s,
+            motion,
+        } = person;
+        Self {
+            stamps: stamps(&motion, begins_s),
+            motion,
+            label,
+            body_id: name,
+        }
     }
 
     /// The name of a frame, or of anything that is this person's own.
     pub fn frame(&self, name: &str) -> String {
-        if self.label.is_empty() { name.to_owned() } else { format!("{}/{name}", self.label) }
+        if self.label.is_empty() {
+            name.to_owned()
+        } else {
+            format!("{}/{name}", self.label)
+        }
     }
 
     /// The name of a topic.
@@ -64,7 +83,10 @@ impl Played {
             gender: motion.gender.name().to_owned(),
             betas: motion.betas.clone(),
             shape_space: motion.shape_space.name().to_owned(),
-            confidence: motion.confidence.as_ref().map_or(1.0, |values| values[frame]),
+            confidence: motion
+                .confidence
+                .as_ref()
+                .map_or(1.0, |values| values[frame]),
             ..SmplState::default()
         };
         state.set_root_and_rotations(body.root_position, &body.local_rotations);
@@ -73,7 +95,9 @@ impl Played {
 }
 
 fn stamps(motion: &SmplMotion, begins_s: f64) -> Vec<Stamp> {
-    (0..motion.frames.len()).map(|frame| BEGINS.plus_seconds(begins_s + frame as f64 / motion.rate_hz)).collect()
+    (0..motion.frames.len())
+        .map(|frame| BEGINS.plus_seconds(begins_s + frame as f64 / motion.rate_hz))
+        .collect()
 }
 
 /// Messages of one time: of each person the state first, then each placement's.
@@ -88,17 +112,41 @@ pub(super) fn write_in_order_of_time(
         Reference(&'a str, &'a PoseStamped),
         Sample(&'a [String; 2], [&'a Imu; 2]),
     }
-    let topics: Vec<Vec<(String, [String; 2])>> =
-        people.iter().zip(simulated).map(|(person, simulated)| topics(person, simulated)).collect();
-    let states: Vec<String> = people.iter().map(|person| person.topic("smpl/state")).collect();
+    let topics: Vec<Vec<(String, [String; 2])>> = people
+        .iter()
+        .zip(simulated)
+        .map(|(person, simulated)| topics(person, simulated))
+        .collect();
+    let states: Vec<String> = people
+        .iter()
+        .map(|person| person.topic("smpl/state"))
+        .collect();
     let mut schedule: Vec<(i64, usize, What)> = Vec::new();
     for (number, (person, simulated)) in people.iter().zip(simulated).enumerate() {
-        schedule.extend(person.stamps.iter().enumerate().map(|(frame, stamp)| (stamp.nanos, number, What::State(person, frame))));
+        schedule.extend(
+            person
+                .stamps
+                .iter()
+                .enumerate()
+                .map(|(frame, stamp)| (stamp.nanos, number, What::State(person, frame))),
+        );
         for (placement, (reference, samples)) in simulated.iter().zip(&topics[number]) {
             let references = placement.reference.iter();
-            schedule.extend(references.map(|message| (message.header.stamp.nanos(), number, What::Reference(reference, message))));
+            schedule.extend(references.map(|message| {
+                (
+                    message.header.stamp.nanos(),
+                    number,
+                    What::Reference(reference, message),
+                )
+            }));
             let both = placement.raw.iter().zip(&placement.full);
-            schedule.extend(both.map(|(raw, full)| (raw.header.stamp.nanos(), number, What::Sample(samples, [raw, full]))));
+            schedule.extend(both.map(|(raw, full)| {
+                (
+                    raw.header.stamp.nanos(),
+                    number,
+                    What::Sample(samples, [raw, full]),
+                )
+            }));
         }
     }
     schedule.sort_by_key(|(nanos, ..)| *nanos);
@@ -106,7 +154,9 @@ pub(super) fn write_in_order_of_time(
         let stamp = Stamp::from_nanos(nanos);
         interrupt.check()?;
         match what {
-            What::State(person, frame) => bag.write(&states[number], stamp, &person.state(frame))?,
+            What::State(person, frame) => {
+                bag.write(&states[number], stamp, &person.state(frame))?
+            }
             What::Reference(topic, message) => bag.write(topic, stamp, message)?,
             What::Sample([raw_topic, full_topic], [raw, full]) => {
                 bag.write(raw_topic, stamp, raw)?;
@@ -127,15 +177,26 @@ fn topics(person: &Played, simulated: &[Simulated]) -> Vec<(String, [String; 2])
     simulated.iter().map(of).collect()
 }
 
-/// DIR/NAME_PLACEMENT.csv with the samples of `data`; of several people NAME_person_ID_PLACEMENT.csv.
-pub(super) fn write_csv(bag: &Path, folder: &Path, person: &Played, simulated: &[Simulated]) -> anyhow::Result<()> {
+/// DIR/NAME_PLACEMENT.csv with the samples of `data`; of several people
+/// NAME_person_ID_PLACEMENT.csv.
+pub(super) fn write_csv(
+    bag: &Path,
+    folder: &Path,
+    person: &Played,
+    simulated: &[Simulated],
+) -> anyhow::Result<()> {
     fs::create_dir_all(folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
     let reader = BagReader::open(bag)?;
     let stem = bag.file_stem().unwrap_or_default().to_string_lossy();
-    let label = if person.label.is_empty() { String::new() } else { format!("_{}", person.label) };
+    let label = if person.label.is_empty() {
+        String::new()
+    } else {
+        format!("_{}", person.label)
+    };
     for placement in simulated {
         let path = folder.join(format!("{stem}{label}_{}.csv", placement.name));
-        let file = fs::File::create(&path).with_context(|| format!("{}: cannot be written", path.display()))?;
+        let file = fs::File::create(&path)
+            .with_context(|| format!("{}: cannot be written", path.display()))?;
         let topic = person.topic(&format!("imu/{}/data", placement.name));
         write_imu_csv(&reader, &topic, std::io::BufWriter::new(file), &path)?;
     }

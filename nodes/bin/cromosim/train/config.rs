@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use cromosim_imu::SensorFrame;
 use cromosim_learned::train::{Loss, Schedule, TrainOptions};
-use cromosim_learned::{DeviceRanges, Direction, Input, NetworkShape, SourceErrors, Turns, Wearing};
+use cromosim_learned::{
+    DeviceRanges, Direction, Input, NetworkShape, SourceErrors, Turns, Wearing,
+};
 use serde::Deserialize;
 
 use super::engine::Choice;
@@ -56,7 +58,8 @@ pub struct Source {
     pub subject: String,
     /// Under which licence, for the model card.
     pub licence: String,
-    /// With motions: the body's sites. With recordings: only IMUs of these names; all where none is named.
+    /// With motions: the body's sites. With recordings: only IMUs of these names; all where none is
+    /// named.
     #[serde(default)]
     pub sites: Vec<String>,
     /// With motions: draws of device and person for each motion and site.
@@ -65,7 +68,8 @@ pub struct Source {
     /// With motions: errors of the source.
     #[serde(default)]
     pub source: SourceChoice,
-    /// With motions: frames per second that the source gives, Hz, rather than its own; a motion of fewer keeps its own.
+    /// With motions: frames per second that the source gives, Hz, rather than its own; a motion of
+    /// fewer keeps its own.
     #[serde(default)]
     pub rate_hz: Option<f64>,
     /// With motions: what devices differ by.
@@ -136,31 +140,73 @@ fn whole() -> [f64; 2] {
 impl Config {
     /// Reads a file.
     pub fn read(path: &Path) -> anyhow::Result<Self> {
-        let text = std::fs::read_to_string(path).with_context(|| format!("{}: cannot be read", path.display()))?;
-        let config: Self = serde_norway::from_str(&text).with_context(|| path.display().to_string())?;
+        let text = std::fs::read_to_string(path)
+            .with_context(|| format!("{}: cannot be read", path.display()))?;
+        let config: Self =
+            serde_norway::from_str(&text).with_context(|| path.display().to_string())?;
         if config.schema != SCHEMA {
-            bail!("{}: schema: expected `{SCHEMA}`, found `{}`", path.display(), config.schema);
+            bail!(
+                "{}: schema: expected `{SCHEMA}`, found `{}`",
+                path.display(),
+                config.schema
+            );
         }
         for source in &config.data {
             source.check().with_context(|| path.display().to_string())?;
         }
-        if let Some(unknown) = config.validation.iter().find(|subject| !config.data.iter().any(|source| source.subject == **subject)) {
-            bail!("{}: validation: no data of subject {unknown}", path.display());
+        if let Some(unknown) = config
+            .validation
+            .iter()
+            .find(|subject| !config.data.iter().any(|source| source.subject == **subject))
+        {
+            bail!(
+                "{}: validation: no data of subject {unknown}",
+                path.display()
+            );
         }
-        config.options().check(&config.shape()).with_context(|| path.display().to_string())?;
+        config
+            .options()
+            .check(&config.shape())
+            .with_context(|| path.display().to_string())?;
         Ok(config)
     }
 
     /// The networks' shape.
     pub fn shape(&self) -> NetworkShape {
-        let Sizes { channels, kernel, convolutions, hidden, layers } = self.network;
-        let direction = if self.input == Input::Streaming { Direction::Forward } else { Direction::Both };
-        NetworkShape { inputs: self.input.channels(), channels, kernel, convolutions, hidden, layers, direction, outputs: 3 }
+        let Sizes {
+            channels,
+            kernel,
+            convolutions,
+            hidden,
+            layers,
+        } = self.network;
+        let direction = if self.input == Input::Streaming {
+            Direction::Forward
+        } else {
+            Direction::Both
+        };
+        NetworkShape {
+            inputs: self.input.channels(),
+            channels,
+            kernel,
+            convolutions,
+            hidden,
+            layers,
+            direction,
+            outputs: 3,
+        }
     }
 
     /// The training's options.
     pub fn options(&self) -> TrainOptions {
-        let Running { steps, learning_rate, validate_every, patience, seed, .. } = self.training;
+        let Running {
+            steps,
+            learning_rate,
+            validate_every,
+            patience,
+            seed,
+            ..
+        } = self.training;
         TrainOptions {
             losses: vec![Loss::Huber { delta: 1.0 }],
             learning_rate,
@@ -179,13 +225,25 @@ impl Source {
     /// How drawn people wear drawn devices.
     pub fn wearing(&self) -> Wearing {
         let errors = self.source.errors();
-        let errors = SourceErrors { rate_hz: self.rate_hz.unwrap_or(errors.rate_hz), ..errors };
-        Wearing { devices: self.devices.clone(), speed: self.speed, ..Wearing::of(errors) }
+        let errors = SourceErrors {
+            rate_hz: self.rate_hz.unwrap_or(errors.rate_hz),
+            ..errors
+        };
+        Wearing {
+            devices: self.devices.clone(),
+            speed: self.speed,
+            ..Wearing::of(errors)
+        }
     }
 
     /// Whether everything that is needed is there and in its range.
     pub fn check(&self) -> anyhow::Result<()> {
-        let Self { subject, speed, part, .. } = self;
+        let Self {
+            subject,
+            speed,
+            part,
+            ..
+        } = self;
         if self.motions.is_empty() == self.recordings.is_empty() {
             bail!("data of subject {subject}: expected either motions or recordings");
         }
@@ -195,7 +253,10 @@ impl Source {
         if !(speed[0] > 0.1 && speed[0] <= speed[1] && speed[1] < 10.0) {
             bail!("data of subject {subject}: speed {speed:?}: expected a range within 0.1 to 10");
         }
-        if let Some(rate_hz) = self.rate_hz.filter(|rate_hz| !(5.0..=1000.0).contains(rate_hz)) {
+        if let Some(rate_hz) = self
+            .rate_hz
+            .filter(|rate_hz| !(5.0..=1000.0).contains(rate_hz))
+        {
             bail!("data of subject {subject}: rate_hz {rate_hz}: expected 5 to 1000");
         }
         if !(part[0] >= 0.0 && part[0] < part[1] && part[1] <= 1.0) {
@@ -206,9 +267,16 @@ impl Source {
 
     /// The frames of a recording's reference within its part of the time.
     pub fn part_of(&self, frames: Vec<SensorFrame>) -> Vec<SensorFrame> {
-        let (Some(first), Some(last)) = (frames.first(), frames.last()) else { return frames };
-        let [from, to] = self.part.map(|part| first.stamp.plus_seconds(part * (last.stamp - first.stamp)));
-        frames.into_iter().filter(|frame| frame.stamp >= from && frame.stamp <= to).collect()
+        let (Some(first), Some(last)) = (frames.first(), frames.last()) else {
+            return frames;
+        };
+        let [from, to] = self
+            .part
+            .map(|part| first.stamp.plus_seconds(part * (last.stamp - first.stamp)));
+        frames
+            .into_iter()
+            .filter(|frame| frame.stamp >= from && frame.stamp <= to)
+            .collect()
     }
 
     /// The motion files, in order; relative to a folder.
@@ -231,12 +299,26 @@ fn files(patterns: &[String], folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
             found.push(path);
             continue;
         }
-        let (parent, name) = (path.parent().unwrap_or(folder), path.file_name().unwrap_or_default().to_string_lossy().into_owned());
-        let parent = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
-        let entries = std::fs::read_dir(parent).with_context(|| format!("{}: cannot be read", parent.display()))?;
+        let (parent, name) = (
+            path.parent().unwrap_or(folder),
+            path.file_name()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned(),
+        );
+        let parent = if parent.as_os_str().is_empty() {
+            Path::new(".")
+        } else {
+            parent
+        };
+        let entries = std::fs::read_dir(parent)
+            .with_context(|| format!("{}: cannot be read", parent.display()))?;
         let mut matching: Vec<PathBuf> = entries
             .filter_map(|entry| Some(entry.ok()?.path()))
-            .filter(|path| path.file_name().is_some_and(|own| matches(&name, &own.to_string_lossy())))
+            .filter(|path| {
+                path.file_name()
+                    .is_some_and(|own| matches(&name, &own.to_string_lossy()))
+            })
             .collect();
         if matching.is_empty() {
             bail!("{}: no file matches {name}", parent.display());
@@ -252,8 +334,12 @@ fn matches(pattern: &str, name: &str) -> bool {
     match pattern.split_once('*') {
         None => pattern == name,
         Some((head, rest)) => {
-            let Some(tail) = name.strip_prefix(head) else { return false };
-            (0..=tail.len()).filter(|at| tail.is_char_boundary(*at)).any(|at| matches(rest, &tail[at..]))
+            let Some(tail) = name.strip_prefix(head) else {
+                return false;
+            };
+            (0..=tail.len())
+                .filter(|at| tail.is_char_boundary(*at))
+                .any(|at| matches(rest, &tail[at..]))
         }
     }
 }
@@ -269,7 +355,12 @@ mod tests {
         let mut count = 0;
         for entry in std::fs::read_dir(folder).unwrap() {
             let config = Config::read(&entry.unwrap().path()).unwrap();
-            assert!(config.data.iter().any(|source| !config.validation.contains(&source.subject)));
+            assert!(
+                config
+                    .data
+                    .iter()
+                    .any(|source| !config.validation.contains(&source.subject))
+            );
             count += 1;
         }
         assert_eq!(count, 6);

@@ -42,7 +42,11 @@ pub struct Motion {
 impl Motion {
     /// As the drawing of devices takes it.
     pub fn known(&self) -> KnownMotion<'_> {
-        KnownMotion { poses: &self.poses, rate_hz: self.rate_hz, suspect: &self.suspect }
+        KnownMotion {
+            poses: &self.poses,
+            rate_hz: self.rate_hz,
+            suspect: &self.suspect,
+        }
     }
 }
 
@@ -56,7 +60,8 @@ pub struct Skeleton {
     pub atypical: String,
 }
 
-/// Skeleton clips as npz begin with what is left of a blend out of the T-pose: hands come down with 300 m/s2.
+/// Skeleton clips as npz begin with what is left of a blend out of the T-pose: hands come down with
+/// 300 m/s2.
 const BLEND_FRAMES: usize = 6;
 
 /// Reads a skeleton clip (npz) without the blend that it begins with.
@@ -70,7 +75,12 @@ pub fn read_motion(path: &Path, model: &Arc<BodyModel>) -> anyhow::Result<Motion
         return Ok(played(clip, path, model)?.motion);
     }
     let motion = read_motion_for(path, model, &options())?;
-    Ok(Motion { name: name_of(path), rate_hz: motion.rate_hz, poses: motion.frames, suspect: Vec::new() })
+    Ok(Motion {
+        name: name_of(path),
+        rate_hz: motion.rate_hz,
+        poses: motion.frames,
+        suspect: Vec::new(),
+    })
 }
 
 fn parse_skeleton(path: &Path) -> anyhow::Result<LabelledClip> {
@@ -80,25 +90,52 @@ fn parse_skeleton(path: &Path) -> anyhow::Result<LabelledClip> {
 }
 
 fn played(clip: LabelledClip, path: &Path, model: &Arc<BodyModel>) -> anyhow::Result<Skeleton> {
-    let LabelledClip { clip, mut suspect, mut labels, atypical, .. } = clip;
+    let LabelledClip {
+        clip,
+        mut suspect,
+        mut labels,
+        atypical,
+        ..
+    } = clip;
     let motion = retarget(&clip, model, &options())?;
     let begin = BLEND_FRAMES.min(motion.frames.len());
     suspect.drain(..begin.min(suspect.len()));
     labels.drain(..begin.min(labels.len()));
-    let motion = Motion { name: name_of(path), rate_hz: motion.rate_hz, poses: motion.frames[begin..].to_vec(), suspect };
-    Ok(Skeleton { motion, labels, atypical })
+    let motion = Motion {
+        name: name_of(path),
+        rate_hz: motion.rate_hz,
+        poses: motion.frames[begin..].to_vec(),
+        suspect,
+    };
+    Ok(Skeleton {
+        motion,
+        labels,
+        atypical,
+    })
 }
 
 fn options() -> MotionOptions {
-    MotionOptions { keep_lead_in: true, ..MotionOptions::default() }
+    MotionOptions {
+        keep_lead_in: true,
+        ..MotionOptions::default()
+    }
 }
 
 fn name_of(path: &Path) -> String {
-    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+    path.file_stem()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned()
 }
 
-/// All pairs of a training, in the order of its file; motions are played on the body that is given, or the embedded one.
-pub fn pairs(config: &Config, folder: &Path, given: Option<&Arc<BodyModel>>, interrupt: &Interrupt) -> anyhow::Result<Vec<Pair>> {
+/// All pairs of a training, in the order of its file; motions are played on the body that is given,
+/// or the embedded one.
+pub fn pairs(
+    config: &Config,
+    folder: &Path,
+    given: Option<&Arc<BodyModel>>,
+    interrupt: &Interrupt,
+) -> anyhow::Result<Vec<Pair>> {
     let model = given.cloned().unwrap_or_else(BodyModel::embedded);
     let mut all = Vec::new();
     for (index, source) in config.data.iter().enumerate() {
@@ -107,7 +144,11 @@ pub fn pairs(config: &Config, folder: &Path, given: Option<&Arc<BodyModel>>, int
                 all.push(piece.pair(&source.subject)?);
             }
         } else {
-            let seed = config.training.seed.wrapping_mul(1_000_003).wrapping_add(index as u64);
+            let seed = config
+                .training
+                .seed
+                .wrapping_mul(1_000_003)
+                .wrapping_add(index as u64);
             let pair = |worn: Worn, names| Ok(worn.pair(names, worn.motion(Scheme::Spline)?)?);
             all.extend(draw(source, folder, &model, seed, interrupt, pair)?);
         }
@@ -125,9 +166,16 @@ pub fn draw<T: Send>(
     make: impl Fn(Worn, PairNames) -> anyhow::Result<T> + Sync,
 ) -> anyhow::Result<Vec<T>> {
     let files = source.motion_files(folder)?;
-    let placements = source.sites.iter().map(|site| placement(site)).collect::<anyhow::Result<Vec<_>>>()?;
+    let placements = source
+        .sites
+        .iter()
+        .map(|site| placement(site))
+        .collect::<anyhow::Result<Vec<_>>>()?;
     let wearing = source.wearing();
-    let bar = progress::bar(files.len() as u64, &format!("subject {}, motions", source.subject));
+    let bar = progress::bar(
+        files.len() as u64,
+        &format!("subject {}, motions", source.subject),
+    );
     let one = |(number, path): (usize, &std::path::PathBuf)| -> anyhow::Result<Vec<T>> {
         interrupt.check()?;
         let motion = read_motion(path, model)?;
@@ -141,7 +189,8 @@ pub fn draw<T: Send>(
                 };
                 let draw = mix(&[seed, number as u64, place as u64, repeat]);
                 let worn = wearing.draw(model, &motion.known(), placement, draw);
-                let worn = worn.with_context(|| format!("{}, site {}", path.display(), placement.name()))?;
+                let worn =
+                    worn.with_context(|| format!("{}, site {}", path.display(), placement.name()))?;
                 made.push(make(worn, names).with_context(|| path.display().to_string())?);
             }
         }
@@ -155,17 +204,20 @@ pub fn draw<T: Send>(
 
 /// A placement named as its site.
 fn placement(site: &str) -> anyhow::Result<Placement> {
-    Placement::at_site(site, site, RATE_HZ).map_err(|(field, problem)| anyhow!("site {site}: {field}: {problem}"))
+    Placement::at_site(site, site, RATE_HZ)
+        .map_err(|(field, problem)| anyhow!("site {site}: {field}: {problem}"))
 }
 
 /// One seed of several numbers (SplitMix64, Steele et al. 2014).
 pub fn mix(numbers: &[u64]) -> u64 {
-    numbers.iter().fold(0x9E37_79B9_7F4A_7C15, |state: u64, number| {
-        let mut z = (state ^ number).wrapping_add(0x9E37_79B9_7F4A_7C15);
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    })
+    numbers
+        .iter()
+        .fold(0x9E37_79B9_7F4A_7C15, |state: u64, number| {
+            let mut z = (state ^ number).wrapping_add(0x9E37_79B9_7F4A_7C15);
+            z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+            z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+            z ^ (z >> 31)
+        })
 }
 
 /// A real device beside its reference, where the reference has no gap.
@@ -185,14 +237,22 @@ impl Piece {
     /// The pair, its motion by the spline.
     pub fn pair(&self, subject: &str) -> anyhow::Result<Pair> {
         let motion = SiteMotion::rigid(&self.trajectory, Scheme::Spline)?;
-        let names = PairNames { name: self.name.clone(), subject: subject.to_owned(), position: self.position.clone() };
+        let names = PairNames {
+            name: self.name.clone(),
+            subject: subject.to_owned(),
+            position: self.position.clone(),
+        };
         let pair = Pair::new(names, motion.clone(), &motion, &self.stamps, &self.readings);
         pair.with_context(|| format!("{}, {}", self.name, self.position))
     }
 }
 
 /// The real devices of a source.
-pub fn recorded(source: &Source, folder: &Path, given: Option<&Arc<BodyModel>>) -> anyhow::Result<Vec<Piece>> {
+pub fn recorded(
+    source: &Source,
+    folder: &Path,
+    given: Option<&Arc<BodyModel>>,
+) -> anyhow::Result<Vec<Piece>> {
     let mut all = Vec::new();
     for path in source.recording_files(folder)? {
         let name = name_of(&path);
@@ -201,52 +261,107 @@ pub fn recorded(source: &Source, folder: &Path, given: Option<&Arc<BodyModel>>) 
             if !source.sites.is_empty() && !source.sites.iter().any(|site| site == position) {
                 return Ok(());
             }
-            all.extend(pieces(&name, position, source.part_of(frames), stamps, readings)?);
+            all.extend(pieces(
+                &name,
+                position,
+                source.part_of(frames),
+                stamps,
+                readings,
+            )?);
             Ok(())
         };
         if let Some((_, recording)) = open_dataset(&path, &DatasetFiles::default())? {
             for placed in of_dataset(&recording) {
-                let (Some(poses), Some(series)) = (placed.poses, placed.series) else { continue };
-                let frames =
-                    poses.stamps.iter().zip(&poses.positions).zip(&poses.rotations).map(|((stamp, position), rotation)| {
-                        SensorFrame::new(*stamp, Isometry3::from_parts((*position).into(), *rotation))
+                let (Some(poses), Some(series)) = (placed.poses, placed.series) else {
+                    continue;
+                };
+                let frames = poses
+                    .stamps
+                    .iter()
+                    .zip(&poses.positions)
+                    .zip(&poses.rotations)
+                    .map(|((stamp, position), rotation)| {
+                        SensorFrame::new(
+                            *stamp,
+                            Isometry3::from_parts((*position).into(), *rotation),
+                        )
                     });
                 let both = series.specific_force.iter().zip(&series.angular_velocity);
-                let readings = both.map(|(force, rate)| Reading { force: *force, rate: *rate }).collect();
-                add(placed.name, frames.collect(), series.stamps.clone(), readings)?;
+                let readings = both
+                    .map(|(force, rate)| Reading {
+                        force: *force,
+                        rate: *rate,
+                    })
+                    .collect();
+                add(
+                    placed.name,
+                    frames.collect(),
+                    series.stamps.clone(),
+                    readings,
+                )?;
             }
         } else {
             for (position, recorded) in recorded::read(&BagReader::open(&path)?, given)? {
-                let recorded = recorded.with_context(|| format!("{}: {position}", path.display()))?;
+                let recorded =
+                    recorded.with_context(|| format!("{}: {position}", path.display()))?;
                 let record = recorded.record();
                 let (stamps, readings) = (record.imu.stamps.clone(), record.imu.readings.clone());
                 add(&position, recorded.frames, stamps, readings)?;
             }
         }
         if all.len() == before {
-            let named = if source.sites.is_empty() { String::new() } else { format!(" called {}", source.sites.join(" or ")) };
-            bail!("{}: no reference of {SHORTEST} s without a gap beside an IMU{named}", path.display());
+            let named = if source.sites.is_empty() {
+                String::new()
+            } else {
+                format!(" called {}", source.sites.join(" or "))
+            };
+            bail!(
+                "{}: no reference of {SHORTEST} s without a gap beside an IMU{named}",
+                path.display()
+            );
         }
     }
     Ok(all)
 }
 
 /// One for each piece of the reference without a gap.
-fn pieces(name: &str, position: &str, frames: Vec<SensorFrame>, stamps: Vec<Stamp>, readings: Vec<Reading>) -> anyhow::Result<Vec<Piece>> {
+fn pieces(
+    name: &str,
+    position: &str,
+    frames: Vec<SensorFrame>,
+    stamps: Vec<Stamp>,
+    readings: Vec<Reading>,
+) -> anyhow::Result<Vec<Piece>> {
     let mut pieces: Vec<Vec<SensorFrame>> = vec![Vec::new()];
     for frame in frames {
         let piece = pieces.len() - 1;
-        if pieces[piece].last().is_some_and(|last| frame.stamp - last.stamp > LONGEST_GAP) {
+        if pieces[piece]
+            .last()
+            .is_some_and(|last| frame.stamp - last.stamp > LONGEST_GAP)
+        {
             pieces.push(vec![frame]);
         } else {
             pieces[piece].push(frame);
         }
     }
     let (stamps, readings) = (Arc::new(stamps), Arc::new(readings));
-    let long = |piece: &Vec<SensorFrame>| piece.len() > 10 && piece[piece.len() - 1].stamp - piece[0].stamp >= SHORTEST;
+    let long = |piece: &Vec<SensorFrame>| {
+        piece.len() > 10 && piece[piece.len() - 1].stamp - piece[0].stamp >= SHORTEST
+    };
     let piece = |(number, frames): (usize, Vec<SensorFrame>)| -> anyhow::Result<Piece> {
         let (name, position) = (format!("{name} {number}"), position.to_owned());
-        Ok(Piece { name, position, trajectory: SensorTrajectory::new(frames)?, stamps: stamps.clone(), readings: readings.clone() })
+        Ok(Piece {
+            name,
+            position,
+            trajectory: SensorTrajectory::new(frames)?,
+            stamps: stamps.clone(),
+            readings: readings.clone(),
+        })
     };
-    pieces.into_iter().filter(long).enumerate().map(piece).collect()
+    pieces
+        .into_iter()
+        .filter(long)
+        .enumerate()
+        .map(piece)
+        .collect()
 }

@@ -34,7 +34,9 @@ fn burn() -> anyhow::Result<Box<dyn Engine>> {
 
 #[cfg(not(feature = "burn"))]
 fn burn() -> anyhow::Result<Box<dyn Engine>> {
-    anyhow::bail!("training: engine burn: this program was built without Burn; build it by `cargo build --features burn`")
+    anyhow::bail!(
+        "training: engine burn: this program was built without Burn; build it by `cargo build --features burn`"
+    )
 }
 
 #[cfg(feature = "cuda")]
@@ -44,5 +46,7 @@ fn cuda() -> anyhow::Result<Box<dyn Engine>> {
 
 #[cfg(not(feature = "cuda"))]
 fn cuda() -> anyhow::Result<Box<dyn Engine>> {
-    anyhow::bail!("training: engine cuda: this program was built without CUDA; build it by `cargo build --features cuda`")
+    anyhow::bail!(
+        "training: engine cuda: this program was built without CUDA; build it by `cargo build --features cuda`"
+    )
 }

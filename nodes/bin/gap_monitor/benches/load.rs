@@ -1,5 +1,5 @@
-//! What the monitor costs: a round over 17 placements at 100 Hz with a window of 10 s. There is one a second, so that a millisecond is
-//! 0.1 % of a core.
+//! What the monitor costs: a round over 17 placements at 100 Hz with a window of 10 s. There is one
+//! a second, so that a millisecond is 0.1 % of a core.
 //!
 //! `cargo bench -p cromosim_gap_monitor`
 
@@ -13,7 +13,10 @@ const PLACEMENTS: usize = 17;
 const RATE_HZ: usize = 100;
 
 fn imu(seconds: f64, error: f64) -> Imu {
-    let mut imu = Imu { header: Header::new(Stamp::from_seconds(1000.0 + seconds).nanos, "imu"), ..Imu::default() };
+    let mut imu = Imu {
+        header: Header::new(Stamp::from_seconds(1000.0 + seconds).nanos, "imu"),
+        ..Imu::default()
+    };
     imu.linear_acceleration.x = 2.0 * (3.0 * seconds).sin() + error;
     imu.linear_acceleration.y = 1.5 * (5.0 * seconds).cos();
     imu.linear_acceleration.z = 9.8 + (4.0 * seconds).sin();
@@ -31,26 +34,39 @@ fn take_second(node: &mut GapMonitorNode, second: usize) {
         for placement in 0..PLACEMENTS {
             // A gap everywhere, as a window without one is cheaper.
             node.take(placement, Source::Measured, &imu(seconds, 0.5), now);
-            node.take(placement, Source::Simulated, &imu(seconds - 0.004, 0.0), now);
+            node.take(
+                placement,
+                Source::Simulated,
+                &imu(seconds - 0.004, 0.0),
+                now,
+            );
         }
     }
 }
 
 fn load(criterion: &mut Criterion) {
-    let placements = (0..PLACEMENTS).map(|number| format!("imu_{number}")).collect();
-    let mut node = GapMonitorNode::new(Config { placements, ..Config::default() });
+    let placements = (0..PLACEMENTS)
+        .map(|number| format!("imu_{number}"))
+        .collect();
+    let mut node = GapMonitorNode::new(Config {
+        placements,
+        ..Config::default()
+    });
     let mut second = 0;
     while second < 10 {
         take_second(&mut node, second);
         second += 1;
     }
-    criterion.bench_function("a second of 17 placements at 100 Hz, window 10 s", |bencher| {
-        bencher.iter(|| {
-            take_second(&mut node, second);
-            second += 1;
-            node.diagnostics(Stamp::from_seconds(1000.0 + second as f64), "/gap_monitor")
-        });
-    });
+    criterion.bench_function(
+        "a second of 17 placements at 100 Hz, window 10 s",
+        |bencher| {
+            bencher.iter(|| {
+                take_second(&mut node, second);
+                second += 1;
+                node.diagnostics(Stamp::from_seconds(1000.0 + second as f64), "/gap_monitor")
+            });
+        },
+    );
 }
 
 criterion_group!(benches, load);

@@ -22,9 +22,11 @@ node_config! {
         pub accel_floor: f64 = 0.02,
         /// White noise below which a difference of the gyroscopes is no gap, rad/s per axis.
         pub gyro_floor: f64 = 0.002,
-        /// A gap from here on is an error rather than a warning, m/s2 (root mean square of the vector).
+        /// A gap from here on is an error rather than a warning, m/s2 (root mean square of the
+        /// vector).
         pub accel_error: f64 = 5.0,
-        /// A gap from here on is an error rather than a warning, rad/s (root mean square of the vector).
+        /// A gap from here on is an error rather than a warning, rad/s (root mean square of the
+        /// vector).
         pub gyro_error: f64 = 1.0,
     }
 }
@@ -43,10 +45,19 @@ impl Config {
             "parameter 'placements': expected the names of one or more IMUs, found none; give them as placements:=[left_wrist, head]"
         );
         for (index, name) in self.placements.iter().enumerate() {
-            ensure!(!name.is_empty(), "parameter 'placements': expected names, found an empty one");
-            ensure!(!self.placements[..index].contains(name), "parameter 'placements': '{name}' is there twice");
+            ensure!(
+                !name.is_empty(),
+                "parameter 'placements': expected names, found an empty one"
+            );
+            ensure!(
+                !self.placements[..index].contains(name),
+                "parameter 'placements': '{name}' is there twice"
+            );
         }
-        for (parameter, topic) in [("measured_topic", &self.measured_topic), ("simulated_topic", &self.simulated_topic)] {
+        for (parameter, topic) in [
+            ("measured_topic", &self.measured_topic),
+            ("simulated_topic", &self.simulated_topic),
+        ] {
             ensure!(
                 topic.contains(NAME) || self.placements.len() == 1,
                 "parameter '{parameter}': expected {NAME} in it, as there are {} placements, found '{topic}'",
@@ -69,14 +80,24 @@ impl Config {
             ("gyro_error", self.gyro_error),
         ];
         for (parameter, value) in positive {
-            ensure!(value.is_finite() && value > 0.0, "parameter '{parameter}': expected more than 0, found {value}");
+            ensure!(
+                value.is_finite() && value > 0.0,
+                "parameter '{parameter}': expected more than 0, found {value}"
+            );
         }
-        ensure!(self.window_s <= 600.0, "parameter 'window_s': expected at most 600, found {}", self.window_s);
+        ensure!(
+            self.window_s <= 600.0,
+            "parameter 'window_s': expected at most 600, found {}",
+            self.window_s
+        );
         Ok(())
     }
 
     /// The topics of a placement: measured, simulated.
     pub fn topics(&self, placement: &str) -> [String; 2] {
-        [self.measured_topic.replace(NAME, placement), self.simulated_topic.replace(NAME, placement)]
+        [
+            self.measured_topic.replace(NAME, placement),
+            self.simulated_topic.replace(NAME, placement),
+        ]
     }
 }

@@ -5,7 +5,8 @@ use cromosim_ros::node_config;
 node_config! {
     /// ROS parameters of `recorder`.
     pub struct Config {
-        /// The rosbag2 directory to make; it must not exist yet. Empty: `rosbag2_` and the time of the start.
+        /// The rosbag2 directory to make; it must not exist yet. Empty: `rosbag2_` and the time of
+        /// the start.
         pub bag_path: String = String::new(),
         /// Topics to record; empty: all, as they appear.
         pub topics: Vec<String> = Vec::new(),
@@ -21,7 +22,8 @@ node_config! {
         pub depth: i64 = 1000,
         /// Compress chunks: none or zstd.
         pub compression: String = "none".to_owned(),
-        /// Topic of std_msgs/msg/String whose last message becomes the attachment `placements.yaml`.
+        /// Topic of std_msgs/msg/String whose last message becomes the attachment
+        /// `placements.yaml`.
         pub placements_topic: String = "virtual_imu/placements".to_owned(),
         /// What else the bag's metadata is to say of the run: the settings of the other nodes, say.
         pub run: String = String::new(),

@@ -19,18 +19,28 @@ const ABOUT: &str = "recorder: any topic of any type into a rosbag2 bag (MCAP)";
 /// Runs the node with these arguments until it is interrupted.
 ///
 /// # Errors
-/// What is wrong with the arguments; what DDS refuses; a disk that is full (what was written is kept).
+/// What is wrong with the arguments; what DDS refuses; a disk that is full (what was written is
+/// kept).
 pub fn run(arguments: &[String]) -> anyhow::Result<()> {
-    let Some(prepared) = prepare("recorder", ABOUT, arguments, check)? else { return Ok(()) };
+    let Some(prepared) = prepare("recorder", ABOUT, arguments, check)? else {
+        return Ok(());
+    };
     let config = prepared.config.clone();
-    let path =
-        if config.bag_path.is_empty() { PathBuf::from(node::default_name(Clock::system_now())) } else { PathBuf::from(&config.bag_path) };
+    let path = if config.bag_path.is_empty() {
+        PathBuf::from(node::default_name(Clock::system_now()))
+    } else {
+        PathBuf::from(&config.bag_path)
+    };
     let mut logic = RecorderNode::new(config.clone(), &path)?;
     let (node, _) = prepared.start()?;
     logic.resolve_names(|name| node.resolve(name))?;
     log::info!("records into {}", path.display());
-    let mut recording =
-        Recording { bell: Bell::new(), subscriptions: BTreeMap::new(), node: &node, depth: u32::try_from(config.depth).unwrap_or(1000) };
+    let mut recording = Recording {
+        bell: Bell::new(),
+        subscriptions: BTreeMap::new(),
+        node: &node,
+        depth: u32::try_from(config.depth).unwrap_or(1000),
+    };
     node.ring_at_graph_change(&recording.bell);
     node.shutdown().ring_at_request(&recording.bell);
     println!("ready");
@@ -51,12 +61,26 @@ pub fn run(arguments: &[String]) -> anyhow::Result<()> {
 
 fn check(config: &Config) -> anyhow::Result<()> {
     let flush = config.flush_seconds;
-    anyhow::ensure!(flush > 0.0 && flush <= 3600.0, "parameter 'flush_seconds': expected more than 0 and at most 3600, found {flush}");
-    anyhow::ensure!(config.depth >= 1, "parameter 'depth': expected 1 or more, found {}", config.depth);
+    anyhow::ensure!(
+        flush > 0.0 && flush <= 3600.0,
+        "parameter 'flush_seconds': expected more than 0 and at most 3600, found {flush}"
+    );
+    anyhow::ensure!(
+        config.depth >= 1,
+        "parameter 'depth': expected 1 or more, found {}",
+        config.depth
+    );
     let compression = config.compression.as_str();
-    anyhow::ensure!(matches!(compression, "none" | "zstd"), "parameter 'compression': expected none or zstd, found '{compression}'");
+    anyhow::ensure!(
+        matches!(compression, "none" | "zstd"),
+        "parameter 'compression': expected none or zstd, found '{compression}'"
+    );
     let path = Path::new(&config.bag_path);
-    anyhow::ensure!(config.bag_path.is_empty() || !path.exists(), "{}: there is something already; give another bag_path", path.display());
+    anyhow::ensure!(
+        config.bag_path.is_empty() || !path.exists(),
+        "{}: there is something already; give another bag_path",
+        path.display()
+    );
     Ok(())
 }
 
@@ -81,7 +105,8 @@ impl Recording<'_> {
             if ending {
                 return Ok(());
             }
-            self.bell.wait(flushes.left().or(Some(Duration::from_secs(1))));
+            self.bell
+                .wait(flushes.left().or(Some(Duration::from_secs(1))));
         }
     }
 
@@ -90,11 +115,16 @@ impl Recording<'_> {
         let publishers = self.node.publishers();
         for publisher in &publishers {
             let topic = &publisher.topic;
-            if self.subscriptions.contains_key(topic) || !logic.wants(topic) || publisher.node.as_ref() == Some(self.node.name()) {
+            if self.subscriptions.contains_key(topic)
+                || !logic.wants(topic)
+                || publisher.node.as_ref() == Some(self.node.name())
+            {
                 continue;
             }
-            let all: Vec<&Endpoint> =
-                publishers.iter().filter(|other| other.topic == *topic && other.type_name == publisher.type_name).collect();
+            let all: Vec<&Endpoint> = publishers
+                .iter()
+                .filter(|other| other.topic == *topic && other.type_name == publisher.type_name)
+                .collect();
             // What the weakest publisher offers is what all of them can give.
             let mut qos = publisher.qos.matching_subscription(self.depth);
             for other in &all {
@@ -103,7 +133,9 @@ impl Recording<'_> {
                 }
             }
             logic.add_topic(topic, &publisher.type_name, &all)?;
-            let subscription = self.node.raw_subscription(topic, &publisher.type_name, qos)?;
+            let subscription = self
+                .node
+                .raw_subscription(topic, &publisher.type_name, qos)?;
             subscription.ring(self.bell.clone());
             self.subscriptions.insert(topic.clone(), subscription);
         }

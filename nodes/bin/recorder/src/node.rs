@@ -3,9 +3,13 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use cromosim_bag::{BagError, BagOptions, BagSummary, BagWriter, Compression, QosProfile, Topic, TopicId};
+use cromosim_bag::{
+    BagError, BagOptions, BagSummary, BagWriter, Compression, QosProfile, Topic, TopicId,
+};
 use cromosim_msgs::std_msgs;
-use cromosim_ros::{Durability, Endpoint, History, Qos, RawMessage, Received, Reliability, RosResult};
+use cromosim_ros::{
+    Durability, Endpoint, History, Qos, RawMessage, Received, Reliability, RosResult,
+};
 use cromosim_spatial::Stamp;
 
 use crate::config::Config;
@@ -28,20 +32,42 @@ impl RecorderNode {
     /// # Errors
     /// Where something is there already, or cannot be made.
     pub fn new(config: Config, path: &Path) -> Result<Self, BagError> {
-        let compression = if config.compression == "zstd" { Compression::Zstd } else { Compression::None };
-        let mut bag = BagWriter::create(path, BagOptions { compression, live: true, replace: false })?;
+        let compression = if config.compression == "zstd" {
+            Compression::Zstd
+        } else {
+            Compression::None
+        };
+        let mut bag = BagWriter::create(
+            path,
+            BagOptions {
+                compression,
+                live: true,
+                replace: false,
+            },
+        )?;
         // Written first, so that a bag that is cut has it too.
         bag.write_metadata("cromosim", run_metadata(&config))?;
         bag.flush()?;
-        Ok(Self { config, bag, topics: BTreeMap::new(), placements: None })
+        Ok(Self {
+            config,
+            bag,
+            topics: BTreeMap::new(),
+            placements: None,
+        })
     }
 
-    /// Makes the names of the configuration absolute, as `resolve` knows the node's namespace and remaps.
+    /// Makes the names of the configuration absolute, as `resolve` knows the node's namespace and
+    /// remaps.
     ///
     /// # Errors
     /// What `resolve` refuses.
     pub fn resolve_names(&mut self, resolve: impl Fn(&str) -> RosResult<String>) -> RosResult<()> {
-        let Config { topics, exclude, placements_topic, .. } = &mut self.config;
+        let Config {
+            topics,
+            exclude,
+            placements_topic,
+            ..
+        } = &mut self.config;
         for name in topics.iter_mut().chain(exclude).chain([placements_topic]) {
             *name = resolve(name)?;
         }
@@ -51,16 +77,27 @@ impl RecorderNode {
     /// Whether a topic is to be recorded.
     pub fn wants(&self, topic: &str) -> bool {
         let infrastructure = matches!(topic, "/rosout" | "/parameter_events");
-        let listed = self.config.topics.is_empty() || self.config.topics.iter().any(|wanted| wanted == topic);
-        listed && !self.config.exclude.iter().any(|left_out| left_out == topic) && (self.config.include_infrastructure || !infrastructure)
+        let listed = self.config.topics.is_empty()
+            || self.config.topics.iter().any(|wanted| wanted == topic);
+        listed
+            && !self.config.exclude.iter().any(|left_out| left_out == topic)
+            && (self.config.include_infrastructure || !infrastructure)
     }
 
     /// Adds a topic, as its publishers offer it.
     ///
     /// # Errors
     /// [`BagError`]: the bag cannot be written.
-    pub fn add_topic(&mut self, name: &str, type_name: &str, publishers: &[&Endpoint]) -> Result<(), BagError> {
-        let offered: Vec<QosProfile> = publishers.iter().map(|publisher| profile(&publisher.qos)).collect();
+    pub fn add_topic(
+        &mut self,
+        name: &str,
+        type_name: &str,
+        publishers: &[&Endpoint],
+    ) -> Result<(), BagError> {
+        let offered: Vec<QosProfile> = publishers
+            .iter()
+            .map(|publisher| profile(&publisher.qos))
+            .collect();
         let topic: Topic = schema::describe(name, type_name).with_qos(&offered);
         let id = self.bag.add_topic(&topic)?;
         self.topics.insert(name.to_owned(), id);
@@ -72,9 +109,16 @@ impl RecorderNode {
     /// # Errors
     /// [`BagError`]: the bag cannot be written.
     pub fn record(&mut self, topic: &str, received: &Received<RawMessage>) -> Result<(), BagError> {
-        let Some(&id) = self.topics.get(topic) else { return Ok(()) };
+        let Some(&id) = self.topics.get(topic) else {
+            return Ok(());
+        };
         let published = received.source_stamp.unwrap_or(received.received_stamp);
-        self.bag.write_payload(id, received.message.cdr(), received.received_stamp, published)?;
+        self.bag.write_payload(
+            id,
+            received.message.cdr(),
+            received.received_stamp,
+            published,
+        )?;
         if topic == self.config.placements_topic {
             self.attach_placements(received)?;
         }
@@ -82,9 +126,16 @@ impl RecorderNode {
     }
 
     fn attach_placements(&mut self, received: &Received<RawMessage>) -> Result<(), BagError> {
-        let Ok(std_msgs::String { data: placements }) = received.message.decode() else { return Ok(()) };
+        let Ok(std_msgs::String { data: placements }) = received.message.decode() else {
+            return Ok(());
+        };
         if self.placements.as_ref() != Some(&placements) {
-            self.bag.attach(PLACEMENTS_ATTACHMENT, "application/yaml", received.received_stamp, placements.as_bytes())?;
+            self.bag.attach(
+                PLACEMENTS_ATTACHMENT,
+                "application/yaml",
+                received.received_stamp,
+                placements.as_bytes(),
+            )?;
             self.placements = Some(placements);
         }
         Ok(())
@@ -95,7 +146,11 @@ impl RecorderNode {
     /// # Errors
     /// [`BagError`]: the bag cannot be written.
     pub fn flush(&mut self) -> Result<(), BagError> {
-        if self.config.sync { self.bag.sync() } else { self.bag.flush() }
+        if self.config.sync {
+            self.bag.sync()
+        } else {
+            self.bag.flush()
+        }
     }
 
     /// Completes the bag.
@@ -124,8 +179,16 @@ fn profile(qos: &Qos) -> QosProfile {
         History::KeepAll => 0,
     };
     let profile = QosProfile::reliable(depth);
-    let profile = if qos.reliability == Reliability::BestEffort { profile.best_effort() } else { profile };
-    if qos.durability == Durability::TransientLocal { profile.transient_local() } else { profile }
+    let profile = if qos.reliability == Reliability::BestEffort {
+        profile.best_effort()
+    } else {
+        profile
+    };
+    if qos.durability == Durability::TransientLocal {
+        profile.transient_local()
+    } else {
+        profile
+    }
 }
 
 /// `rosbag2_2026_11_21-17_52_07` (UTC), where no name was given.
@@ -140,8 +203,17 @@ mod tests {
 
     #[test]
     fn default_names_are_dates() {
-        assert_eq!(default_name(Stamp::from_nanos(0)), "rosbag2_1970_01_01-00_00_00");
-        assert_eq!(default_name(Stamp::from_nanos(951_782_400 * 1_000_000_000)), "rosbag2_2000_02_29-00_00_00");
-        assert_eq!(default_name(Stamp::from_nanos(1_795_283_527 * 1_000_000_000)), "rosbag2_2026_11_21-17_52_07");
+        assert_eq!(
+            default_name(Stamp::from_nanos(0)),
+            "rosbag2_1970_01_01-00_00_00"
+        );
+        assert_eq!(
+            default_name(Stamp::from_nanos(951_782_400 * 1_000_000_000)),
+            "rosbag2_2000_02_29-00_00_00"
+        );
+        assert_eq!(
+            default_name(Stamp::from_nanos(1_795_283_527 * 1_000_000_000)),
+            "rosbag2_2026_11_21-17_52_07"
+        );
     }
 }

@@ -1,4 +1,6 @@
-//! The node `replay`: plays a motion file as `smpl/pose` (several people as `person_NAME/smpl/pose`), or a bag with all its topics, with `/clock` and rosbag2's playback services.
+//! The node `replay`: plays a motion file as `smpl/pose` (several people as
+//! `person_NAME/smpl/pose`), or a bag with all its topics, with `/clock` and rosbag2's playback
+//! services.
 
 mod config;
 mod motion;
@@ -22,8 +24,7 @@ pub use source::{Item, Source};
 use outlet::Outlet;
 use services::Remote;
 
-const ABOUT: &str =
-    "replay: plays a motion file as smpl/pose, each of several people as person_NAME/smpl/pose, or a bag with everything in it";
+const ABOUT: &str = "replay: plays a motion file as smpl/pose, each of several people as person_NAME/smpl/pose, or a bag with everything in it";
 /// From ready to the first message, ns.
 const LEAD: i64 = 20_000_000;
 /// Silence between two rounds of a loop, ns: longer than any gap that a node bridges.
@@ -34,32 +35,61 @@ const PAUSE_BETWEEN_ROUNDS: i64 = 1_000_000_000;
 /// # Errors
 /// What is wrong with the arguments or the file; what DDS refuses.
 pub fn run(arguments: &[String]) -> anyhow::Result<()> {
-    let Some(prepared) = prepare("replay", ABOUT, arguments, check)? else { return Ok(()) };
+    let Some(prepared) = prepare("replay", ABOUT, arguments, check)? else {
+        return Ok(());
+    };
     let source = Source::open(&prepared.config)?;
     let (node, config) = prepared.start()?;
     for line in source.describe().lines() {
         log::info!("{line}");
     }
     let outlet = Outlet::new(&node, &source)?;
-    let clock = if config.clock_rate_hz > 0.0 { Some(node.clock_publisher()?) } else { None };
-    let connected = |count| outlet.wait_for_subscriptions(count, Duration::from_secs_f64(config.ready_timeout_seconds));
+    let clock = if config.clock_rate_hz > 0.0 {
+        Some(node.clock_publisher()?)
+    } else {
+        None
+    };
+    let connected = |count| {
+        outlet.wait_for_subscriptions(count, Duration::from_secs_f64(config.ready_timeout_seconds))
+    };
     if !connected(usize::try_from(config.ready_subscriptions).unwrap_or(0)) {
-        log::warn!("begins without the {} subscriptions it waited for", config.ready_subscriptions);
+        log::warn!(
+            "begins without the {} subscriptions it waited for",
+            config.ready_subscriptions
+        );
     }
     println!("ready");
     let bell = Bell::new();
     node.shutdown().ring_at_request(&bell);
     // A moment of lead, so that the first message is not late already.
-    let player = Player::new(system_nanos() + LEAD, source.begins(), config.rate, config.start_paused);
+    let player = Player::new(
+        system_nanos() + LEAD,
+        source.begins(),
+        config.rate,
+        config.start_paused,
+    );
     let remote = Remote::new(player, source.begins()..=source.ends(), &bell);
     let _services = remote.serve(&node)?;
-    let ended = Playback { node: &node, config: &config, source, outlet: &outlet, clock, remote: &remote, bell: &bell }.play();
+    let ended = Playback {
+        node: &node,
+        config: &config,
+        source,
+        outlet: &outlet,
+        clock,
+        remote: &remote,
+        bell: &bell,
+    }
+    .play();
     outlet.wait_until_received(Duration::from_secs(2));
     ended
 }
 
 fn check(config: &Config) -> anyhow::Result<()> {
-    anyhow::ensure!(config.rate.is_finite() && config.rate > 0.0, "parameter 'rate': expected a positive factor, found {}", config.rate);
+    anyhow::ensure!(
+        config.rate.is_finite() && config.rate > 0.0,
+        "parameter 'rate': expected a positive factor, found {}",
+        config.rate
+    );
     let not_negative = [
         ("start_seconds", config.start_seconds),
         ("duration_seconds", config.duration_seconds),
@@ -68,10 +98,16 @@ fn check(config: &Config) -> anyhow::Result<()> {
         ("ready_timeout_seconds", config.ready_timeout_seconds),
     ];
     for (name, value) in not_negative {
-        anyhow::ensure!(value.is_finite() && value >= 0.0, "parameter '{name}': expected 0 or more, found {value}");
+        anyhow::ensure!(
+            value.is_finite() && value >= 0.0,
+            "parameter '{name}': expected 0 or more, found {value}"
+        );
     }
     let patience = config.ready_timeout_seconds;
-    anyhow::ensure!(patience <= 86_400.0, "parameter 'ready_timeout_seconds': expected at most a day (86400), found {patience}");
+    anyhow::ensure!(
+        patience <= 86_400.0,
+        "parameter 'ready_timeout_seconds': expected at most a day (86400), found {patience}"
+    );
     // Opened here too, so that --check-config finds what is wrong with the file.
     Source::open(config).map(drop)
 }
@@ -99,7 +135,12 @@ impl Playback<'_> {
                 self.remote.player().seek(system_nanos(), recorded);
             }
             if let (Some(clock), true) = (&self.clock, ticks.is_due()) {
-                clock.publish(Stamp::from_nanos(self.remote.player().recorded_at(system_nanos()).max(self.source.begins())))?;
+                clock.publish(Stamp::from_nanos(
+                    self.remote
+                        .player()
+                        .recorded_at(system_nanos())
+                        .max(self.source.begins()),
+                ))?;
             }
             let Some(due) = self.source.due() else {
                 if !self.config.r#loop {
@@ -119,7 +160,8 @@ impl Playback<'_> {
         Ok(())
     }
 
-    /// Publishes what is due. Live stamps are the times it was due at, not when the scheduler let it through: derivatives see jitter.
+    /// Publishes what is due. Live stamps are the times it was due at, not when the scheduler let
+    /// it through: derivatives see jitter.
     fn publish(&mut self, due: i64, wall: i64) -> anyhow::Result<()> {
         let stamp = Stamp::from_nanos(if self.clock.is_some() { due } else { wall });
         if let Some(item) = self.source.take(stamp)? {
@@ -131,13 +173,19 @@ impl Playback<'_> {
     fn begin_again(&mut self) -> anyhow::Result<()> {
         let begins = self.source.begins();
         self.source.seek(begins)?;
-        anyhow::ensure!(self.source.due().is_some(), "nothing to play again: the part that was chosen holds no messages");
-        self.remote.player().seek(system_nanos() + PAUSE_BETWEEN_ROUNDS, begins);
+        anyhow::ensure!(
+            self.source.due().is_some(),
+            "nothing to play again: the part that was chosen holds no messages"
+        );
+        self.remote
+            .player()
+            .seek(system_nanos() + PAUSE_BETWEEN_ROUNDS, begins);
         Ok(())
     }
 
     fn sleep(&self, wall: Option<i64>, ticks: &Periodic) {
-        let until_due = wall.map(|wall| Duration::from_nanos(u64::try_from(wall - system_nanos()).unwrap_or(0)));
+        let until_due = wall
+            .map(|wall| Duration::from_nanos(u64::try_from(wall - system_nanos()).unwrap_or(0)));
         let shortest = [until_due, ticks.left()].into_iter().flatten().min();
         self.bell.wait(shortest);
     }

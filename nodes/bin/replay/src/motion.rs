@@ -3,7 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use cromosim_body::BodyModel;
-use cromosim_motion::{MotionOptions, Person, ShapeChoice, SmplMotion, UpAxis, embedded_walk, read_motion_for, read_people};
+use cromosim_motion::{
+    MotionOptions, Person, ShapeChoice, SmplMotion, UpAxis, embedded_walk, read_motion_for,
+    read_people,
+};
 use cromosim_msgs::cromosim_msgs::SmplPose;
 use cromosim_msgs::std_msgs::Header;
 use cromosim_spatial::Stamp;
@@ -30,35 +33,72 @@ struct Track {
 }
 
 impl MotionSource {
-    /// The motions that the configuration names: one as `smpl/pose`, several as `person_NAME/smpl/pose`.
+    /// The motions that the configuration names: one as `smpl/pose`, several as
+    /// `person_NAME/smpl/pose`.
     ///
     /// # Errors
     /// What is wrong with the file or the settings.
     pub fn open(config: &Config) -> anyhow::Result<Self> {
         let options = options(config)?;
-        let one = |motion| Track { topic: "smpl/pose".to_owned(), body_id: config.body_id.clone(), begins_s: 0.0, motion, next: 0 };
-        let several = |Person { name, label, begins_s, motion }| {
+        let one = |motion| Track {
+            topic: "smpl/pose".to_owned(),
+            body_id: config.body_id.clone(),
+            begins_s: 0.0,
+            motion,
+            next: 0,
+        };
+        let several = |Person {
+                           name,
+                           label,
+                           begins_s,
+                           motion,
+                       }| {
             let topic = format!("{label}/smpl/pose");
-            Track { topic, body_id: name, begins_s, motion, next: 0 }
+            Track {
+                topic,
+                body_id: name,
+                begins_s,
+                motion,
+                next: 0,
+            }
         };
         let tracks = if config.motion.is_empty() {
-            anyhow::ensure!(!options.asks_for_several(), "parameter 'person': the embedded walk has one person; name a file by 'motion'");
-            vec![one(embedded_walk().slice(options.start_s, options.duration_s)?)]
+            anyhow::ensure!(
+                !options.asks_for_several(),
+                "parameter 'person': the embedded walk has one person; name a file by 'motion'"
+            );
+            vec![one(
+                embedded_walk().slice(options.start_s, options.duration_s)?
+            )]
         } else {
-            let body = if config.body.is_empty() { BodyModel::embedded() } else { BodyModel::read(Path::new(&config.body))? };
+            let body = if config.body.is_empty() {
+                BodyModel::embedded()
+            } else {
+                BodyModel::read(Path::new(&config.body))?
+            };
             let path = Path::new(&config.motion);
             if options.asks_for_several() {
-                read_people(path, &body, &options)?.into_iter().map(several).collect()
+                read_people(path, &body, &options)?
+                    .into_iter()
+                    .map(several)
+                    .collect()
             } else {
                 vec![one(read_motion_for(path, &body, &options)?)]
             }
         };
-        Ok(Self { tracks, frame_id: config.frame_id.clone() })
+        Ok(Self {
+            tracks,
+            frame_id: config.frame_id.clone(),
+        })
     }
 
     /// A line about each person.
     pub fn describe(&self) -> String {
-        self.tracks.iter().map(Track::describe).collect::<Vec<_>>().join("\n")
+        self.tracks
+            .iter()
+            .map(Track::describe)
+            .collect::<Vec<_>>()
+            .join("\n")
     }
 
     /// The topic of each person's poses.
@@ -68,17 +108,30 @@ impl MotionSource {
 
     /// Recorded time of the first frame of all, ns.
     pub fn begins(&self) -> i64 {
-        self.tracks.iter().map(|track| track.recorded(0)).min().unwrap_or(MOTION_BEGINS)
+        self.tracks
+            .iter()
+            .map(|track| track.recorded(0))
+            .min()
+            .unwrap_or(MOTION_BEGINS)
     }
 
     /// Recorded time of the last frame of all, ns.
     pub fn ends(&self) -> i64 {
-        self.tracks.iter().map(|track| track.recorded(track.motion.frames.len().saturating_sub(1))).max().unwrap_or(MOTION_BEGINS)
+        self.tracks
+            .iter()
+            .map(|track| track.recorded(track.motion.frames.len().saturating_sub(1)))
+            .max()
+            .unwrap_or(MOTION_BEGINS)
     }
 
-    /// The person whose frame comes next, and when; of several at one time the first. None at the end.
+    /// The person whose frame comes next, and when; of several at one time the first. None at the
+    /// end.
     fn next(&self) -> Option<(i64, usize)> {
-        self.tracks.iter().enumerate().filter_map(|(person, track)| Some((track.due()?, person))).min()
+        self.tracks
+            .iter()
+            .enumerate()
+            .filter_map(|(person, track)| Some((track.due()?, person)))
+            .min()
     }
 
     /// Recorded time of what comes next, ns.
@@ -123,7 +176,10 @@ impl Track {
             gender: motion.gender.name().to_owned(),
             betas: motion.betas.clone(),
             shape_space: motion.shape_space.name().to_owned(),
-            confidence: motion.confidence.as_ref().map_or(1.0, |values| values[frame]),
+            confidence: motion
+                .confidence
+                .as_ref()
+                .map_or(1.0, |values| values[frame]),
             ..SmplPose::default()
         };
         message.set_root_and_rotations(body.root_position, &body.local_rotations);
@@ -132,7 +188,10 @@ impl Track {
 
     fn describe(&self) -> String {
         let motion = &self.motion;
-        let report = motion.how_read().map(|report| format!("; {report}")).unwrap_or_default();
+        let report = motion
+            .how_read()
+            .map(|report| format!("; {report}"))
+            .unwrap_or_default();
         format!(
             "{} on {}: {} frames at {:.2} Hz, {:.2} s{report}",
             motion.name,
@@ -158,7 +217,9 @@ fn options(config: &Config) -> anyhow::Result<MotionOptions> {
         "file" => ShapeChoice::File,
         "fit" => ShapeChoice::Fit,
         "mean" => ShapeChoice::Mean,
-        other => anyhow::bail!("parameter 'shape': expected detect, file, fit or mean, found '{other}'"),
+        other => {
+            anyhow::bail!("parameter 'shape': expected detect, file, fit or mean, found '{other}'")
+        }
     };
     let said = |text: &String| Some(text.clone()).filter(|text| !text.is_empty());
     Ok(MotionOptions {

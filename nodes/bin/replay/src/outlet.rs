@@ -5,7 +5,9 @@ use std::time::Duration;
 
 use cromosim_bag::{QosProfile, Topic};
 use cromosim_msgs::cromosim_msgs::SmplPose;
-use cromosim_ros::{Durability, History, Node, Publisher, Qos, RawMessage, RawPublisher, Reliability, RosError};
+use cromosim_ros::{
+    Durability, History, Node, Publisher, Qos, RawMessage, RawPublisher, Reliability, RosError,
+};
 
 use crate::source::{Item, Source};
 
@@ -24,30 +26,54 @@ impl Outlet {
     pub fn new(node: &Node, source: &Source) -> Result<Self, RosError> {
         match source {
             Source::Motion(motion) => {
-                let poses = motion.topics().map(|topic| node.publisher(topic, Qos::reliable())).collect::<Result<_, _>>()?;
-                Ok(Self { poses, topics: BTreeMap::new() })
+                let poses = motion
+                    .topics()
+                    .map(|topic| node.publisher(topic, Qos::reliable()))
+                    .collect::<Result<_, _>>()?;
+                Ok(Self {
+                    poses,
+                    topics: BTreeMap::new(),
+                })
             }
-            Source::Bag { reader, selection, .. } => {
+            Source::Bag {
+                reader, selection, ..
+            } => {
                 let mut topics = BTreeMap::new();
                 for counted in &reader.summary().topics {
                     let topic = &counted.topic;
-                    if selection.topics.as_ref().is_some_and(|wanted| !wanted.contains(&topic.name)) {
+                    if selection
+                        .topics
+                        .as_ref()
+                        .is_some_and(|wanted| !wanted.contains(&topic.name))
+                    {
                         continue;
                     }
-                    topics.insert(topic.name.clone(), node.raw_publisher(&topic.name, &topic.type_name, offered(topic))?);
+                    topics.insert(
+                        topic.name.clone(),
+                        node.raw_publisher(&topic.name, &topic.type_name, offered(topic))?,
+                    );
                 }
-                Ok(Self { poses: Vec::new(), topics })
+                Ok(Self {
+                    poses: Vec::new(),
+                    topics,
+                })
             }
         }
     }
 
     fn publishers(&self) -> impl Iterator<Item = &RawPublisher> {
-        self.poses.iter().map(|publisher| &**publisher).chain(self.topics.values())
+        self.poses
+            .iter()
+            .map(|publisher| &**publisher)
+            .chain(self.topics.values())
     }
 
     /// Waits until every publisher has `count` subscriptions; false where `timeout` was over.
     pub fn wait_for_subscriptions(&self, count: usize, timeout: Duration) -> bool {
-        count == 0 || self.publishers().all(|publisher| publisher.wait_for_subscriptions(count, timeout))
+        count == 0
+            || self
+                .publishers()
+                .all(|publisher| publisher.wait_for_subscriptions(count, timeout))
     }
 
     /// Waits until what was published has been received, as far as subscriptions are reliable.
@@ -62,7 +88,9 @@ impl Outlet {
     /// Publishes one thing; what does not get out is worth a line, and no more.
     pub fn publish(&self, item: &Item) {
         let sent = match item {
-            Item::Pose(person, message) => self.poses.get(*person).map(|poses| poses.publish(message)),
+            Item::Pose(person, message) => {
+                self.poses.get(*person).map(|poses| poses.publish(message))
+            }
             Item::Raw(message) => self.topics.get(&message.topic.name).map(|publisher| {
                 let raw = RawMessage::from_cdr(message.payload.clone())?;
                 publisher.publish(raw)
@@ -80,8 +108,25 @@ fn offered(topic: &Topic) -> Qos {
 }
 
 fn from_profile(profile: &QosProfile) -> Qos {
-    let reliability = if profile.reliability == "best_effort" { Reliability::BestEffort } else { Reliability::Reliable };
-    let durability = if profile.durability == "transient_local" { Durability::TransientLocal } else { Durability::Volatile };
-    let history = if profile.history == "keep_all" { History::KeepAll } else { History::KeepLast(profile.depth.max(1)) };
-    Qos { reliability, durability, history, ..Qos::reliable() }
+    let reliability = if profile.reliability == "best_effort" {
+        Reliability::BestEffort
+    } else {
+        Reliability::Reliable
+    };
+    let durability = if profile.durability == "transient_local" {
+        Durability::TransientLocal
+    } else {
+        Durability::Volatile
+    };
+    let history = if profile.history == "keep_all" {
+        History::KeepAll
+    } else {
+        History::KeepLast(profile.depth.max(1))
+    };
+    Qos {
+        reliability,
+        durability,
+        history,
+        ..Qos::reliable()
+    }
 }

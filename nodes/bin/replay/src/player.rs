@@ -1,6 +1,7 @@
 //! The relation of wall time to recorded time, under rate, pause and seek. Pure: time is passed in.
 
-/// Recorded time runs as `recorded = anchor_recorded + rate (wall - anchor_wall)`, or stands still while paused. All in nanoseconds.
+/// Recorded time runs as `recorded = anchor_recorded + rate (wall - anchor_wall)`, or stands still
+/// while paused. All in nanoseconds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Player {
     rate: f64,
@@ -12,7 +13,12 @@ pub struct Player {
 impl Player {
     /// A player that stands at `recorded` at the wall time `wall`; the rate is positive.
     pub fn new(wall: i64, recorded: i64, rate: f64, paused: bool) -> Self {
-        Self { rate, paused, anchor_wall: wall, anchor_recorded: recorded }
+        Self {
+            rate,
+            paused,
+            anchor_wall: wall,
+            anchor_recorded: recorded,
+        }
     }
 
     /// Speed factor.
@@ -36,7 +42,9 @@ impl Player {
 
     /// When `recorded` is due; never while paused.
     pub fn wall_of(&self, recorded: i64) -> Option<i64> {
-        (!self.paused).then(|| self.anchor_wall + ((recorded - self.anchor_recorded) as f64 / self.rate).round() as i64)
+        (!self.paused).then(|| {
+            self.anchor_wall + ((recorded - self.anchor_recorded) as f64 / self.rate).round() as i64
+        })
     }
 
     fn anchor(&mut self, wall: i64) {

@@ -1,5 +1,6 @@
-//! Trajectories, IMU series and data sets' recordings as the recordings that other nodes and commands know: `/reference/NAME`,
-//! `/imu/NAME/data_raw` and, where the device gave orientations, `/imu/NAME/data`.
+//! Trajectories, IMU series and data sets' recordings as the recordings that other nodes and
+//! commands know: `/reference/NAME`, `/imu/NAME/data_raw` and, where the device gave orientations,
+//! `/imu/NAME/data`.
 
 use std::fmt::Write;
 use std::fs::File;
@@ -10,8 +11,8 @@ use anyhow::{Context, bail};
 use cromosim_bag::{BagOptions, BagWriter, Compression};
 use cromosim_motion::datasets::{DatasetFiles, DatasetRecording, open_dataset};
 use cromosim_motion::rigid::{
-    EurocGroundTruth, ImuSeries, PoseTrajectory, RigidFormat, parse_euroc_ground_truth, parse_euroc_imu, parse_imu_csv, parse_pose_csv,
-    parse_tum, sniff_rigid,
+    EurocGroundTruth, ImuSeries, PoseTrajectory, RigidFormat, parse_euroc_ground_truth,
+    parse_euroc_imu, parse_imu_csv, parse_pose_csv, parse_tum, sniff_rigid,
 };
 use cromosim_msgs::geometry_msgs::{Pose, PoseStamped};
 use cromosim_msgs::sensor_msgs::Imu;
@@ -38,7 +39,9 @@ pub struct Placed<'a> {
 
 /// When the first message is; none without any.
 pub fn begins(placements: &[Placed<'_>]) -> Option<Stamp> {
-    in_order_of_time(placements).first().map(|(first, ..)| *first)
+    in_order_of_time(placements)
+        .first()
+        .map(|(first, ..)| *first)
 }
 
 /// Seconds by which a data set's stamps are moved, where they begin at 0.
@@ -67,7 +70,10 @@ pub fn bytes(path: &Path) -> anyhow::Result<Vec<u8>> {
     let read = File::open(path).and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes));
     read.with_context(|| format!("{}: cannot be read", path.display()))?;
     if bytes.len() as u64 > MAX_BYTES {
-        bail!("{}: more than {MAX_BYTES} bytes; cut the file into parts", path.display());
+        bail!(
+            "{}: more than {MAX_BYTES} bytes; cut the file into parts",
+            path.display()
+        );
     }
     Ok(bytes)
 }
@@ -86,8 +92,15 @@ pub enum Rigid {
 /// # Errors
 /// What is wrong with the file, with its line.
 pub fn parse_rigid(bytes: &[u8], name: &str) -> anyhow::Result<Option<Rigid>> {
-    let poses = |trajectory| Rigid::Poses(EurocGroundTruth { trajectory, ..EurocGroundTruth::default() });
-    let Some(format) = sniff_rigid(bytes) else { return Ok(None) };
+    let poses = |trajectory| {
+        Rigid::Poses(EurocGroundTruth {
+            trajectory,
+            ..EurocGroundTruth::default()
+        })
+    };
+    let Some(format) = sniff_rigid(bytes) else {
+        return Ok(None);
+    };
     Ok(Some(match format {
         RigidFormat::Tum => poses(parse_tum(bytes, name)?),
         RigidFormat::PoseCsv => poses(parse_pose_csv(bytes, name)?),
@@ -97,8 +110,8 @@ pub fn parse_rigid(bytes: &[u8], name: &str) -> anyhow::Result<Option<Rigid>> {
     }))
 }
 
-/// The file as a bag at `out`; false where it is neither a data set's recording, nor a trajectory, nor an IMU series. A rigid body is called
-/// `body`.
+/// The file as a bag at `out`; false where it is neither a data set's recording, nor a trajectory,
+/// nor an IMU series. A rigid body is called `body`.
 ///
 /// # Errors
 /// What is wrong with the file.
@@ -108,26 +121,58 @@ pub fn to_bag(path: &Path, out: &Path) -> anyhow::Result<bool> {
         create(&of_dataset(&recording), true, &name, out)?;
         return Ok(true);
     }
-    let body = |poses, series| [Placed { name: "body", poses, series, orientations: &[] }];
+    let body = |poses, series| {
+        [Placed {
+            name: "body",
+            poses,
+            series,
+            orientations: &[],
+        }]
+    };
     match parse_rigid(&bytes(path)?, &name)? {
         None => return Ok(false),
-        Some(Rigid::Poses(poses)) => create(&body(Some(&poses.trajectory), None), false, &name, out)?,
+        Some(Rigid::Poses(poses)) => {
+            create(&body(Some(&poses.trajectory), None), false, &name, out)?
+        }
         Some(Rigid::Imu(series)) => create(&body(None, Some(&series)), false, &name, out)?,
     }
     Ok(true)
 }
 
-fn create(placements: &[Placed<'_>], of_dataset: bool, name: &str, out: &Path) -> anyhow::Result<()> {
-    let Some(first) = begins(placements) else { bail!("{name}: no pose and no reading") };
-    let mut bag = BagWriter::create(out, BagOptions { compression: Compression::Zstd, ..BagOptions::default() })?;
-    write(&mut bag, placements, if of_dataset { later(first) } else { 0.0 })?;
+fn create(
+    placements: &[Placed<'_>],
+    of_dataset: bool,
+    name: &str,
+    out: &Path,
+) -> anyhow::Result<()> {
+    let Some(first) = begins(placements) else {
+        bail!("{name}: no pose and no reading")
+    };
+    let mut bag = BagWriter::create(
+        out,
+        BagOptions {
+            compression: Compression::Zstd,
+            ..BagOptions::default()
+        },
+    )?;
+    write(
+        &mut bag,
+        placements,
+        if of_dataset { later(first) } else { 0.0 },
+    )?;
     bag.finish()?;
     Ok(())
 }
 
 /// Every IMU with the reference of its name.
 pub fn of_dataset(recording: &DatasetRecording) -> Vec<Placed<'_>> {
-    let reference = |name: &str| recording.references.iter().find(|(of, _)| of == name).map(|(_, poses)| poses);
+    let reference = |name: &str| {
+        recording
+            .references
+            .iter()
+            .find(|(of, _)| of == name)
+            .map(|(_, poses)| poses)
+    };
     let placed = recording.imus.iter().map(|imu| Placed {
         name: &imu.placement,
         poses: reference(&imu.placement),
@@ -137,11 +182,15 @@ pub fn of_dataset(recording: &DatasetRecording) -> Vec<Placed<'_>> {
     placed.collect()
 }
 
-/// What was done when, of a recording whose stamps are `later` by so many seconds: start_ns, end_ns, activity.
+/// What was done when, of a recording whose stamps are `later` by so many seconds: start_ns,
+/// end_ns, activity.
 pub fn activities_csv(recording: &DatasetRecording, later: f64) -> String {
     let mut table = "start_ns,end_ns,activity\n".to_owned();
     for span in &recording.activities {
-        let (start, end) = (span.start.plus_seconds(later).nanos, span.end.plus_seconds(later).nanos);
+        let (start, end) = (
+            span.start.plus_seconds(later).nanos,
+            span.end.plus_seconds(later).nanos,
+        );
         // Writing into a string cannot fail.
         let _ = writeln!(table, "{start},{end},{}", span.activity);
     }
@@ -158,9 +207,15 @@ enum What {
 fn in_order_of_time(placements: &[Placed<'_>]) -> Vec<(Stamp, usize, What)> {
     let mut all = Vec::new();
     for (number, placement) in placements.iter().enumerate() {
-        let poses = placement.poses.into_iter().flat_map(|poses| poses.stamps.iter().enumerate());
+        let poses = placement
+            .poses
+            .into_iter()
+            .flat_map(|poses| poses.stamps.iter().enumerate());
         all.extend(poses.map(|(index, stamp)| (*stamp, number, What::Pose(index))));
-        let readings = placement.series.into_iter().flat_map(|series| series.stamps.iter().enumerate());
+        let readings = placement
+            .series
+            .into_iter()
+            .flat_map(|series| series.stamps.iter().enumerate());
         all.extend(readings.map(|(index, stamp)| (*stamp, number, What::Reading(index))));
     }
     all.sort_by_key(|(stamp, ..)| *stamp);
@@ -179,7 +234,11 @@ struct Topics {
 impl Topics {
     fn of(placement: &Placed<'_>) -> Self {
         let name = placement.name;
-        let world = placement.poses.map(|poses| poses.frame.as_str()).filter(|frame| !frame.is_empty()).unwrap_or("world");
+        let world = placement
+            .poses
+            .map(|poses| poses.frame.as_str())
+            .filter(|frame| !frame.is_empty())
+            .unwrap_or("world");
         Self {
             reference: format!("/reference/{name}"),
             raw: format!("/imu/{name}/data_raw"),
@@ -189,11 +248,27 @@ impl Topics {
         }
     }
 
-    fn write(&self, bag: &mut BagWriter, placement: &Placed<'_>, what: What, stamp: Stamp) -> anyhow::Result<()> {
+    fn write(
+        &self,
+        bag: &mut BagWriter,
+        placement: &Placed<'_>,
+        what: What,
+        stamp: Stamp,
+    ) -> anyhow::Result<()> {
         match (what, placement.poses, placement.series) {
             (What::Pose(index), Some(poses), _) => {
-                let pose = Pose { position: poses.positions[index].into(), orientation: poses.rotations[index].into() };
-                bag.write(&self.reference, stamp, &PoseStamped { header: Header::new(stamp.nanos, self.world.as_str()), pose })?;
+                let pose = Pose {
+                    position: poses.positions[index].into(),
+                    orientation: poses.rotations[index].into(),
+                };
+                bag.write(
+                    &self.reference,
+                    stamp,
+                    &PoseStamped {
+                        header: Header::new(stamp.nanos, self.world.as_str()),
+                        pose,
+                    },
+                )?;
             }
             (What::Reading(index), _, Some(series)) => {
                 let message = imu_message(series, index, stamp, &self.frame);
@@ -203,7 +278,11 @@ impl Topics {
                     bag.write(
                         &self.full,
                         stamp,
-                        &Imu { orientation: (*orientation).into(), orientation_covariance: covariance, ..message },
+                        &Imu {
+                            orientation: (*orientation).into(),
+                            orientation_covariance: covariance,
+                            ..message
+                        },
                     )?;
                 }
             }

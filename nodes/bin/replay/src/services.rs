@@ -45,7 +45,15 @@ impl std::ops::DerefMut for PlayerGuard<'_> {
 impl Remote {
     /// Control of `player` within the recorded times `seekable`; `bell` wakes the playing loop.
     pub fn new(player: Player, seekable: RangeInclusive<i64>, bell: &Arc<Bell>) -> Self {
-        Self { shared: Arc::new(Mutex::new(Shared { player, seek: None, seekable, burst: 0 })), bell: bell.clone() }
+        Self {
+            shared: Arc::new(Mutex::new(Shared {
+                player,
+                seek: None,
+                seekable,
+                burst: 0,
+            })),
+            bell: bell.clone(),
+        }
     }
 
     fn lock(&self) -> MutexGuard<'_, Shared> {
@@ -83,10 +91,15 @@ impl Remote {
     pub fn serve(&self, node: &Node) -> Result<Vec<ServiceServer>, RosError> {
         let remote = || self.clone();
         let (pause, resume, toggle, is_paused) = (remote(), remote(), remote(), remote());
-        let (set_rate, get_rate, seek, play_next, burst) = (remote(), remote(), remote(), remote(), remote());
+        let (set_rate, get_rate, seek, play_next, burst) =
+            (remote(), remote(), remote(), remote(), remote());
         Ok(vec![
-            node.serve::<srv::Pause>("~/pause", move |_| pause.change(|shared, now| (shared.player.pause(now), Default::default()).1))?,
-            node.serve::<srv::Resume>("~/resume", move |_| resume.change(|shared, now| (shared.player.resume(now), Default::default()).1))?,
+            node.serve::<srv::Pause>("~/pause", move |_| {
+                pause.change(|shared, now| (shared.player.pause(now), Default::default()).1)
+            })?,
+            node.serve::<srv::Resume>("~/resume", move |_| {
+                resume.change(|shared, now| (shared.player.resume(now), Default::default()).1)
+            })?,
             node.serve::<srv::TogglePaused>("~/toggle_paused", move |_| {
                 toggle.change(|shared, now| {
                     if shared.player.paused() {
@@ -97,11 +110,15 @@ impl Remote {
                     Default::default()
                 })
             })?,
-            node.serve::<srv::IsPaused>("~/is_paused", move |_| srv::IsPausedResponse { paused: is_paused.player().paused() })?,
+            node.serve::<srv::IsPaused>("~/is_paused", move |_| srv::IsPausedResponse {
+                paused: is_paused.player().paused(),
+            })?,
             node.serve::<srv::SetRate>("~/set_rate", move |request| srv::SetRateResponse {
                 success: set_rate.change(|shared, now| shared.player.set_rate(now, request.rate)),
             })?,
-            node.serve::<srv::GetRate>("~/get_rate", move |_| srv::GetRateResponse { rate: get_rate.player().rate() })?,
+            node.serve::<srv::GetRate>("~/get_rate", move |_| srv::GetRateResponse {
+                rate: get_rate.player().rate(),
+            })?,
             node.serve::<srv::Seek>("~/seek", move |request| {
                 let recorded = request.time.nanos();
                 // The playing loop moves the source and the player together.
@@ -113,8 +130,12 @@ impl Remote {
                     srv::SeekResponse { success }
                 })
             })?,
-            node.serve::<srv::PlayNext>("~/play_next", move |_| srv::PlayNextResponse { success: play_next.ask_for(1) == 1 })?,
-            node.serve::<srv::Burst>("~/burst", move |request| srv::BurstResponse { actually_burst: burst.ask_for(request.num_messages) })?,
+            node.serve::<srv::PlayNext>("~/play_next", move |_| srv::PlayNextResponse {
+                success: play_next.ask_for(1) == 1,
+            })?,
+            node.serve::<srv::Burst>("~/burst", move |request| srv::BurstResponse {
+                actually_burst: burst.ask_for(request.num_messages),
+            })?,
         ])
     }
 

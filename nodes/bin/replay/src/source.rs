@@ -52,11 +52,16 @@ impl Source {
         if config.bag.is_empty() {
             return Ok(Self::Motion(Box::new(MotionSource::open(config)?)));
         }
-        anyhow::ensure!(config.motion.is_empty(), "parameters 'motion' and 'bag' are both given; play one of them");
+        anyhow::ensure!(
+            config.motion.is_empty(),
+            "parameters 'motion' and 'bag' are both given; play one of them"
+        );
         // The iterator borrows the reader, and both live as long as the process plays.
         let (path, folder) = as_bag(Path::new(&config.bag))?;
         let reader: &'static BagReader = Box::leak(Box::new(BagReader::open(&path)?));
-        let Some((first, last)) = reader.summary().time_range else { anyhow::bail!("{}: the bag holds no messages", config.bag) };
+        let Some((first, last)) = reader.summary().time_range else {
+            anyhow::bail!("{}: the bag holds no messages", config.bag)
+        };
         let from = first.plus_seconds(config.start_seconds);
         anyhow::ensure!(
             from <= last,
@@ -64,12 +69,23 @@ impl Source {
             config.start_seconds,
             last - first
         );
-        let until = (config.duration_seconds > 0.0).then(|| from.plus_seconds(config.duration_seconds));
+        let until =
+            (config.duration_seconds > 0.0).then(|| from.plus_seconds(config.duration_seconds));
         let topics = (!config.topics.is_empty()).then(|| config.topics.clone());
-        let selection = Selection { topics, from: Some(from), until };
+        let selection = Selection {
+            topics,
+            from: Some(from),
+            until,
+        };
         let mut messages = reader.messages(&selection)?;
         let next = messages.next().transpose()?;
-        Ok(Self::Bag { reader, messages, next, selection, _folder: folder })
+        Ok(Self::Bag {
+            reader,
+            messages,
+            next,
+            selection,
+            _folder: folder,
+        })
     }
 
     /// Recorded time of the beginning, ns.
@@ -84,7 +100,10 @@ impl Source {
     pub fn ends(&self) -> i64 {
         match self {
             Self::Motion(motion) => motion.ends(),
-            Self::Bag { reader, .. } => reader.summary().time_range.map_or(0, |(_, last)| last.nanos),
+            Self::Bag { reader, .. } => reader
+                .summary()
+                .time_range
+                .map_or(0, |(_, last)| last.nanos),
         }
     }
 
@@ -102,7 +121,9 @@ impl Source {
     /// Where the bag is damaged.
     pub fn take(&mut self, stamp: Stamp) -> anyhow::Result<Option<Item>> {
         match self {
-            Self::Motion(motion) => Ok(motion.take(stamp).map(|(person, pose)| Item::Pose(person, Box::new(pose)))),
+            Self::Motion(motion) => Ok(motion
+                .take(stamp)
+                .map(|(person, pose)| Item::Pose(person, Box::new(pose)))),
             Self::Bag { messages, next, .. } => {
                 let item = next.take().map(Item::Raw);
                 *next = messages.next().transpose()?;
@@ -118,9 +139,18 @@ impl Source {
     pub fn seek(&mut self, recorded: i64) -> anyhow::Result<()> {
         match self {
             Self::Motion(motion) => motion.seek(recorded),
-            Self::Bag { reader, messages, next, selection, .. } => {
+            Self::Bag {
+                reader,
+                messages,
+                next,
+                selection,
+                ..
+            } => {
                 let from = Stamp::from_nanos(recorded).max(selection.from.unwrap_or_default());
-                *messages = reader.messages(&Selection { from: Some(from), ..selection.clone() })?;
+                *messages = reader.messages(&Selection {
+                    from: Some(from),
+                    ..selection.clone()
+                })?;
                 *next = messages.next().transpose()?;
             }
         }
@@ -148,7 +178,11 @@ impl Source {
 /// A bag stays as it is; what else can be played as one is made into a bag in a folder of its own.
 fn as_bag(path: &Path) -> anyhow::Result<(PathBuf, Option<TempDir>)> {
     let mut magic = [0; MCAP.len()];
-    let other = path.is_file() && File::open(path).and_then(|mut file| file.read_exact(&mut magic)).is_ok() && magic != MCAP;
+    let other = path.is_file()
+        && File::open(path)
+            .and_then(|mut file| file.read_exact(&mut magic))
+            .is_ok()
+        && magic != MCAP;
     if other {
         let folder = tempfile::tempdir()?;
         let bag = folder.path().join("recording.mcap");
@@ -165,8 +199,11 @@ mod tests {
     use super::*;
 
     fn played(file: &str) -> Vec<(String, i64)> {
-        let config =
-            Config { bag: concat!(env!("CARGO_MANIFEST_DIR"), "/../../../tests/fuzz/samples/").to_owned() + file, ..Config::default() };
+        let config = Config {
+            bag: concat!(env!("CARGO_MANIFEST_DIR"), "/../../../tests/fuzz/samples/").to_owned()
+                + file,
+            ..Config::default()
+        };
         let mut source = Source::open(&config).unwrap();
         let mut topics = Vec::new();
         while let Some(Item::Raw(message)) = source.take(Stamp::default()).unwrap() {
@@ -179,12 +216,24 @@ mod tests {
     fn trajectories_readings_and_data_sets_play_as_recordings() {
         let poses = played("tum/three_poses.txt");
         assert_eq!(poses.len(), 3);
-        assert!(poses.iter().all(|(topic, _)| topic == "/reference/body") && poses.is_sorted_by_key(|(_, nanos)| *nanos), "{poses:?}");
+        assert!(
+            poses.iter().all(|(topic, _)| topic == "/reference/body")
+                && poses.is_sorted_by_key(|(_, nanos)| *nanos),
+            "{poses:?}"
+        );
         let readings = played("euroc/imu.csv");
-        assert!(!readings.is_empty() && readings.iter().all(|(topic, _)| topic == "/imu/body/data_raw"), "{readings:?}");
+        assert!(
+            !readings.is_empty()
+                && readings
+                    .iter()
+                    .all(|(topic, _)| topic == "/imu/body/data_raw"),
+            "{readings:?}"
+        );
         let placements = played("datasets/pamap2.dat");
         assert!(
-            placements.iter().any(|(topic, _)| topic == "/imu/hand/data_raw")
+            placements
+                .iter()
+                .any(|(topic, _)| topic == "/imu/hand/data_raw")
                 && placements.iter().all(|(_, nanos)| *nanos >= 1_000_000_000)
         );
     }
@@ -194,7 +243,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("notes.txt");
         std::fs::write(&path, "nothing that moves").unwrap();
-        let error = Source::open(&Config { bag: path.display().to_string(), ..Config::default() }).err().unwrap().to_string();
+        let error = Source::open(&Config {
+            bag: path.display().to_string(),
+            ..Config::default()
+        })
+        .err()
+        .unwrap()
+        .to_string();
         assert!(error.contains("notes.txt"), "{error}");
     }
 }

@@ -7,8 +7,8 @@ node_config! {
     pub struct Config {
         /// Body model file (SMPL, SMPL-H, SMPL-X; npz or pickle); empty: the embedded body.
         pub body: String = String::new(),
-        /// The body file that betas of another shape space are for: this node's body is then fitted to that person's bones; empty: such
-        /// betas are refused.
+        /// The body file that betas of another shape space are for: this node's body is then fitted
+        /// to that person's bones; empty: such betas are refused.
         pub source_body: String = String::new(),
         /// Name of the world frame (z up).
         pub world_frame: String = "world".to_owned(),
@@ -30,6 +30,10 @@ node_config! {
 impl Config {
     /// The name of a frame of this body.
     pub fn frame(&self, name: &str) -> String {
-        if self.prefix.is_empty() { name.to_owned() } else { format!("{}/{name}", self.prefix) }
+        if self.prefix.is_empty() {
+            name.to_owned()
+        } else {
+            format!("{}/{name}", self.prefix)
+        }
     }
 }

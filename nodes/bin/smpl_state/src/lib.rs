@@ -25,7 +25,12 @@ const ABOUT: &str = "smpl_state: averages the shape, puts poses into the world, 
 /// # Errors
 /// What is wrong with the arguments or the body file; what DDS refuses.
 pub fn run(arguments: &[String]) -> anyhow::Result<()> {
-    let Some(prepared) = prepare("smpl_state", ABOUT, arguments, |config: &Config| logic(config).map(drop))? else { return Ok(()) };
+    let Some(prepared) = prepare("smpl_state", ABOUT, arguments, |config: &Config| {
+        logic(config).map(drop)
+    })?
+    else {
+        return Ok(());
+    };
     let mut logic = logic(&prepared.config)?;
     let (node, config) = prepared.start()?;
     let poses = node.subscription::<SmplPose>("smpl/pose", Qos::reliable().depth(100))?;
@@ -58,15 +63,35 @@ pub fn run(arguments: &[String]) -> anyhow::Result<()> {
 }
 
 fn logic(config: &Config) -> anyhow::Result<SmplStateNode> {
-    let checks = [("smoothing_cutoff_hz", config.smoothing_cutoff_hz), ("diagnostics_rate_hz", config.diagnostics_rate_hz)];
+    let checks = [
+        ("smoothing_cutoff_hz", config.smoothing_cutoff_hz),
+        ("diagnostics_rate_hz", config.diagnostics_rate_hz),
+    ];
     for (name, value) in checks {
-        anyhow::ensure!(value.is_finite() && value >= 0.0, "parameter '{name}': expected 0 or more, found {value}");
+        anyhow::ensure!(
+            value.is_finite() && value >= 0.0,
+            "parameter '{name}': expected 0 or more, found {value}"
+        );
     }
-    for (name, values) in [("source_position", config.source_position), ("source_rotvec", config.source_rotvec)] {
-        anyhow::ensure!(values.iter().all(|value| value.is_finite()), "parameter '{name}': expected finite numbers, found {values:?}");
+    for (name, values) in [
+        ("source_position", config.source_position),
+        ("source_rotvec", config.source_rotvec),
+    ] {
+        anyhow::ensure!(
+            values.iter().all(|value| value.is_finite()),
+            "parameter '{name}': expected finite numbers, found {values:?}"
+        );
     }
-    let model = if config.body.is_empty() { BodyModel::embedded() } else { BodyModel::read(Path::new(&config.body))? };
-    let source_body = if config.source_body.is_empty() { None } else { Some(BodyModel::read(Path::new(&config.source_body))?) };
+    let model = if config.body.is_empty() {
+        BodyModel::embedded()
+    } else {
+        BodyModel::read(Path::new(&config.body))?
+    };
+    let source_body = if config.source_body.is_empty() {
+        None
+    } else {
+        Some(BodyModel::read(Path::new(&config.source_body))?)
+    };
     Ok(SmplStateNode::new(config.clone(), model, source_body)?)
 }
 

@@ -58,25 +58,40 @@ struct Counts {
     last_refusal: String,
 }
 
-/// base_link (x forward, y left, z up, REP-103) in the axes of the pelvis (x left, y up, z forward).
+/// base_link (x forward, y left, z up, REP-103) in the axes of the pelvis (x left, y up, z
+/// forward).
 pub fn pelvis_from_base_link() -> UnitQuaternion<f64> {
     let columns = [Vector3::z(), Vector3::x(), Vector3::y()];
-    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(nalgebra::Matrix3::from_columns(&columns)))
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(
+        nalgebra::Matrix3::from_columns(&columns),
+    ))
 }
 
 impl SmplStateNode {
-    /// A node for bodies of this model; `source_body` is the one that betas of another shape space are for.
+    /// A node for bodies of this model; `source_body` is the one that betas of another shape space
+    /// are for.
     ///
     /// # Errors
     /// None that a sound model gives.
-    pub fn new(config: Config, model: Arc<BodyModel>, source_body: Option<Arc<BodyModel>>) -> Result<Self, BodyError> {
+    pub fn new(
+        config: Config,
+        model: Arc<BodyModel>,
+        source_body: Option<Arc<BodyModel>>,
+    ) -> Result<Self, BodyError> {
         let world_from_source = Isometry3::from_parts(
             Translation3::from(Vector3::from(config.source_position)),
             UnitQuaternion::from_scaled_axis(Vector3::from(config.source_rotvec)),
         );
         let shape = PersonShape::new(model.clone(), source_body)?;
         let smoother = Smoother::new(config.smoothing_cutoff_hz);
-        Ok(Self { config, model, world_from_source, shape, smoother, counts: Counts::default() })
+        Ok(Self {
+            config,
+            model,
+            world_from_source,
+            shape,
+            smoother,
+            counts: Counts::default(),
+        })
     }
 
     /// The state and the frames that follow from one pose.
@@ -100,11 +115,19 @@ impl SmplStateNode {
             return Err(Refusal::Confidence(source.confidence));
         }
         self.shape.take(source)?;
-        let root_position = (self.world_from_source * nalgebra::Point3::from(root_position * self.shape.metres())).coords;
-        let mut body = BodyPose { root_position, local_rotations };
+        let root_position = (self.world_from_source
+            * nalgebra::Point3::from(root_position * self.shape.metres()))
+        .coords;
+        let mut body = BodyPose {
+            root_position,
+            local_rotations,
+        };
         body.local_rotations[0] = self.world_from_source.rotation * body.local_rotations[0];
         let body = self.smoother.smooth(nanos, body);
-        let header = Header { stamp: source.header.stamp, frame_id: self.config.world_frame.clone() };
+        let header = Header {
+            stamp: source.header.stamp,
+            frame_id: self.config.world_frame.clone(),
+        };
         let frames = self.frames(&header, &body);
         let mut state = SmplState {
             header,
@@ -138,27 +161,43 @@ impl SmplStateNode {
         let transforms = Joint::ALL.into_iter().map(|joint| {
             let (parent, translation) = match joint.parent() {
                 None => (self.config.world_frame.clone(), body.root_position),
-                Some(parent) => (self.config.frame(parent.name()), joints[joint.index()] - joints[parent.index()]),
+                Some(parent) => (
+                    self.config.frame(parent.name()),
+                    joints[joint.index()] - joints[parent.index()],
+                ),
             };
-            let parent_from_joint = Isometry3::from_parts(Translation3::from(translation), body.local_rotations[joint.index()]);
+            let parent_from_joint = Isometry3::from_parts(
+                Translation3::from(translation),
+                body.local_rotations[joint.index()],
+            );
             TransformStamped {
-                header: Header { stamp: header.stamp, frame_id: parent },
+                header: Header {
+                    stamp: header.stamp,
+                    frame_id: parent,
+                },
                 child_frame_id: self.config.frame(joint.name()),
                 transform: parent_from_joint.into(),
             }
         });
-        TFMessage { transforms: transforms.collect() }
+        TFMessage {
+            transforms: transforms.collect(),
+        }
     }
 
     /// For `/tf_static`: base_link beside the pelvis (REP-103), in axes of robots.
     pub fn static_frames(&self, stamp: Time) -> TFMessage {
         let beside = Isometry3::from_parts(Translation3::identity(), pelvis_from_base_link());
         let edge = TransformStamped {
-            header: Header { stamp, frame_id: self.config.frame(Joint::Pelvis.name()) },
+            header: Header {
+                stamp,
+                frame_id: self.config.frame(Joint::Pelvis.name()),
+            },
             child_frame_id: self.config.frame("base_link"),
             transform: beside.into(),
         };
-        TFMessage { transforms: vec![edge] }
+        TFMessage {
+            transforms: vec![edge],
+        }
     }
 
     /// For `/diagnostics`.
@@ -167,9 +206,15 @@ impl SmplStateNode {
         let (level, message) = match (counts.poses, counts.refused) {
             (0, 0) => (DiagnosticStatus::WARN, "no pose has come yet".to_owned()),
             (_, 0) => (DiagnosticStatus::OK, "poses arrive".to_owned()),
-            _ => (DiagnosticStatus::WARN, format!("poses were left out; the last one: {}", counts.last_refusal)),
+            _ => (
+                DiagnosticStatus::WARN,
+                format!("poses were left out; the last one: {}", counts.last_refusal),
+            ),
         };
-        let value = |key: &str, value: String| KeyValue { key: key.to_owned(), value };
+        let value = |key: &str, value: String| KeyValue {
+            key: key.to_owned(),
+            value,
+        };
         let status = DiagnosticStatus {
             level,
             name: format!("{node_name}: body"),
@@ -183,6 +228,12 @@ impl SmplStateNode {
                 value("betas", format!("{:.3?}", self.shape.betas())),
             ],
         };
-        DiagnosticArray { header: Header { stamp, frame_id: String::new() }, status: vec![status] }
+        DiagnosticArray {
+            header: Header {
+                stamp,
+                frame_id: String::new(),
+            },
+            status: vec![status],
+        }
     }
 }

@@ -1,4 +1,5 @@
-//! The shape of a body does not change while it moves: betas are averaged over time, and fitted where they are another body's.
+//! The shape of a body does not change while it moves: betas are averaged over time, and fitted
+//! where they are another body's.
 
 use std::sync::Arc;
 
@@ -6,7 +7,8 @@ use cromosim_body::{BodyError, BodyModel, JOINT_COUNT, Joint, ShapeSpace, Shaped
 use cromosim_msgs::cromosim_msgs::SmplPose;
 use nalgebra::Vector3;
 
-/// A step of a beta that is worth a new shape, standard deviations. 0.01 moves no surface point by more than about a millimetre.
+/// A step of a beta that is worth a new shape, standard deviations. 0.01 moves no surface point by
+/// more than about a millimetre.
 const WORTHWHILE: f64 = 0.01;
 
 /// The mean of all betas so far, and the betas in force.
@@ -18,19 +20,28 @@ pub struct ShapeAverage {
 }
 
 impl ShapeAverage {
-    /// Takes one estimate of finite numbers in; true where the betas in force have changed. An empty estimate says nothing.
+    /// Takes one estimate of finite numbers in; true where the betas in force have changed. An
+    /// empty estimate says nothing.
     pub fn add(&mut self, betas: &[f64]) -> bool {
         if betas.is_empty() {
             return false;
         }
         if betas.len() != self.mean.len() {
-            *self = Self { mean: vec![0.0; betas.len()], count: 0.0, in_force: vec![f64::NAN; betas.len()] };
+            *self = Self {
+                mean: vec![0.0; betas.len()],
+                count: 0.0,
+                in_force: vec![f64::NAN; betas.len()],
+            };
         }
         self.count += 1.0;
         for (mean, beta) in self.mean.iter_mut().zip(betas) {
             *mean += (beta - *mean) / self.count;
         }
-        let near = self.mean.iter().zip(&self.in_force).all(|(mean, held)| (mean - held).abs() < WORTHWHILE);
+        let near = self
+            .mean
+            .iter()
+            .zip(&self.in_force)
+            .all(|(mean, held)| (mean - held).abs() < WORTHWHILE);
         if !near {
             self.in_force.clone_from(&self.mean);
         }
@@ -57,19 +68,31 @@ pub struct PersonShape {
 
 impl PersonShape {
     /// The mean body.
-    pub fn new(model: Arc<BodyModel>, source_body: Option<Arc<BodyModel>>) -> Result<Self, BodyError> {
+    pub fn new(
+        model: Arc<BodyModel>,
+        source_body: Option<Arc<BodyModel>>,
+    ) -> Result<Self, BodyError> {
         let shaped = ShapedBody::new(model.clone(), &[])?;
-        Ok(Self { model, source_body, average: ShapeAverage::default(), of_source: false, shaped, metres: 1.0 })
+        Ok(Self {
+            model,
+            source_body,
+            average: ShapeAverage::default(),
+            of_source: false,
+            shaped,
+            metres: 1.0,
+        })
     }
 
-    /// Takes in what a pose says of the shape. Betas of the node's own body are averaged; others are averaged as those of the source body, and
-    /// the node's is fitted to that person's bones.
+    /// Takes in what a pose says of the shape. Betas of the node's own body are averaged; others
+    /// are averaged as those of the source body, and the node's is fitted to that person's bones.
     ///
     /// # Errors
     /// Betas that are neither body's, too many, or no numbers: nothing has changed then.
     pub fn take(&mut self, source: &SmplPose) -> Result<(), BodyError> {
         let betas = &source.betas;
-        let own = self.model.check_named_betas(&source.shape_space, &source.gender, betas);
+        let own = self
+            .model
+            .check_named_betas(&source.shape_space, &source.gender, betas);
         let space = ShapeSpace::from_name(&source.shape_space);
         let others = space.is_some_and(|space| own.is_err() || space != self.model.shape_space());
         let source_body = self.source_body.clone().filter(|_| others);
@@ -90,7 +113,10 @@ impl PersonShape {
             return Ok(());
         }
         (self.shaped, self.metres) = match source_body {
-            None => (ShapedBody::new(self.model.clone(), self.average.betas())?, 1.0),
+            None => (
+                ShapedBody::new(self.model.clone(), self.average.betas())?,
+                1.0,
+            ),
             Some(body) => self.fitted(body)?,
         };
         Ok(())
@@ -98,9 +124,15 @@ impl PersonShape {
 
     fn fitted(&self, source_body: Arc<BodyModel>) -> Result<(ShapedBody, f64), BodyError> {
         let person = ShapedBody::new(source_body, self.average.betas())?;
-        let fit = self.model.fit_bone_lengths(|joint| Some(person.joints_in_model()[joint.index()]), 1.0);
+        let fit = self
+            .model
+            .fit_bone_lengths(|joint| Some(person.joints_in_model()[joint.index()]), 1.0);
         let shaped = ShapedBody::new(self.model.clone(), &fit.betas)?;
-        log::debug!("betas of {}: fitted to their bones within {:.1} mm (RMS)", person.model().id(), 1e3 * fit.length_rms_m);
+        log::debug!(
+            "betas of {}: fitted to their bones within {:.1} mm (RMS)",
+            person.model().id(),
+            1e3 * fit.length_rms_m
+        );
         let metres = leg_length(shaped.joints_in_model()) / leg_length(person.joints_in_model());
         Ok((shaped, metres))
     }
@@ -115,7 +147,8 @@ impl PersonShape {
         self.shaped.betas()
     }
 
-    /// What the source's positions are multiplied with, so that feet stay where they stand: 1, but for a body that was fitted.
+    /// What the source's positions are multiplied with, so that feet stay where they stand: 1, but
+    /// for a body that was fitted.
     pub fn metres(&self) -> f64 {
         self.metres
     }
@@ -125,7 +158,8 @@ impl PersonShape {
 fn leg_length(joints: &[Vector3<f64>; JOINT_COUNT]) -> f64 {
     let length = |from: Joint, to: Joint| (joints[to.index()] - joints[from.index()]).norm();
     let left = length(Joint::LeftHip, Joint::LeftKnee) + length(Joint::LeftKnee, Joint::LeftAnkle);
-    let right = length(Joint::RightHip, Joint::RightKnee) + length(Joint::RightKnee, Joint::RightAnkle);
+    let right =
+        length(Joint::RightHip, Joint::RightKnee) + length(Joint::RightKnee, Joint::RightAnkle);
     0.5 * (left + right)
 }
 

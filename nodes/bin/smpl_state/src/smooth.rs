@@ -2,8 +2,8 @@
 
 use cromosim_body::BodyPose;
 
-/// First-order low-pass of position and rotations: y += (1 - exp(-2 pi f dt)) (x - y), rotations along the shortest arc.
-/// Delays slow motion by 1 / (2 pi f).
+/// First-order low-pass of position and rotations: y += (1 - exp(-2 pi f dt)) (x - y), rotations
+/// along the shortest arc. Delays slow motion by 1 / (2 pi f).
 pub struct Smoother {
     cutoff_hz: f64,
     last: Option<(i64, BodyPose)>,
@@ -12,7 +12,10 @@ pub struct Smoother {
 impl Smoother {
     /// `cutoff_hz` = 0 passes everything on as it is.
     pub fn new(cutoff_hz: f64) -> Self {
-        Self { cutoff_hz, last: None }
+        Self {
+            cutoff_hz,
+            last: None,
+        }
     }
 
     /// Forgets the past.

@@ -21,7 +21,8 @@ use cromosim_view::{Destination, Recording, RecordingOptions};
 pub use config::Config;
 pub use node::{Refusal, ViewerNode};
 
-const ABOUT: &str = "viewer: the moving body, sensor frames and IMU curves in Rerun, live or into a file";
+const ABOUT: &str =
+    "viewer: the moving body, sensor frames and IMU curves in Rerun, live or into a file";
 const FLUSH_RATE_HZ: f64 = 4.0;
 
 /// What the node listens to; everything rings one bell.
@@ -43,15 +44,29 @@ impl Listeners {
             node.subscription::<TFMessage>("/tf", Qos::tf())?,
             node.subscription::<TFMessage>("/tf_static", Qos::tf_static().depth(100))?,
         ];
-        frames.iter().for_each(|subscription| subscription.ring(bell.clone()));
+        frames
+            .iter()
+            .for_each(|subscription| subscription.ring(bell.clone()));
         node.ring_at_graph_change(&bell);
-        Ok(Self { node: node.clone(), bell, states, frames, imus: BTreeMap::new() })
+        Ok(Self {
+            node: node.clone(),
+            bell,
+            states,
+            frames,
+            imus: BTreeMap::new(),
+        })
     }
 
     /// Listens to every IMU that has come up: `.../NAME/data_raw`.
     fn look_for_imus(&mut self) -> Result<(), RosError> {
         for publisher in self.node.publishers() {
-            let Some(placement) = publisher.topic.strip_suffix("/data_raw").and_then(|path| path.rsplit('/').next()) else { continue };
+            let Some(placement) = publisher
+                .topic
+                .strip_suffix("/data_raw")
+                .and_then(|path| path.rsplit('/').next())
+            else {
+                continue;
+            };
             if publisher.type_name != Imu::TYPE_NAME || self.imus.contains_key(&publisher.topic) {
                 continue;
             }
@@ -59,7 +74,10 @@ impl Listeners {
             let subscription = self.node.subscription::<Imu>(&publisher.topic, qos)?;
             subscription.ring(self.bell.clone());
             log::info!("shows {}", publisher.topic);
-            self.imus.insert(publisher.topic.clone(), (placement.to_owned(), subscription));
+            self.imus.insert(
+                publisher.topic.clone(),
+                (placement.to_owned(), subscription),
+            );
         }
         Ok(())
     }
@@ -83,7 +101,8 @@ impl Listeners {
     }
 }
 
-/// The next message; what cannot be read is worth a line, and those after it are looked at in the next round.
+/// The next message; what cannot be read is worth a line, and those after it are looked at in the
+/// next round.
 fn next<M: RosMessage>(subscription: &Subscription<M>) -> Option<Received<M>> {
     subscription.try_recv().unwrap_or_else(|error| {
         log::warn!("{error}");
@@ -109,17 +128,33 @@ fn tolerate(shown: Result<(), Refusal>) -> Result<(), Refusal> {
 pub fn run(arguments: &[String]) -> anyhow::Result<()> {
     let check = |config: &Config| -> anyhow::Result<()> {
         let rate_hz = config.mesh_rate_hz;
-        anyhow::ensure!(rate_hz.is_finite() && rate_hz > 0.0, "parameter 'mesh_rate_hz': expected a positive rate, found {rate_hz}");
+        anyhow::ensure!(
+            rate_hz.is_finite() && rate_hz > 0.0,
+            "parameter 'mesh_rate_hz': expected a positive rate, found {rate_hz}"
+        );
         let window = config.curve_window_seconds;
-        anyhow::ensure!(window.is_finite() && window > 0.0, "parameter 'curve_window_seconds': expected more than 0, found {window}");
+        anyhow::ensure!(
+            window.is_finite() && window > 0.0,
+            "parameter 'curve_window_seconds': expected more than 0, found {window}"
+        );
         destination(config).map(drop)
     };
-    let Some(prepared) = prepare("viewer", ABOUT, arguments, check)? else { return Ok(()) };
+    let Some(prepared) = prepare("viewer", ABOUT, arguments, check)? else {
+        return Ok(());
+    };
     let config = prepared.config.clone();
-    let model = if config.body.is_empty() { BodyModel::embedded() } else { BodyModel::read(Path::new(&config.body))? };
+    let model = if config.body.is_empty() {
+        BodyModel::embedded()
+    } else {
+        BodyModel::read(Path::new(&config.body))?
+    };
     let destination = destination(&config)?;
     let curve_window_s = destination.is_live().then_some(config.curve_window_seconds);
-    let options = RecordingOptions { frame_rate_hz: config.mesh_rate_hz, curve_window_s, ..RecordingOptions::default() };
+    let options = RecordingOptions {
+        frame_rate_hz: config.mesh_rate_hz,
+        curve_window_s,
+        ..RecordingOptions::default()
+    };
     let recording = Recording::open(std::slice::from_ref(&destination), options)?;
     let mut logic = ViewerNode::new(config, model, recording)?;
     let (node, _) = prepared.start()?;
@@ -129,7 +164,11 @@ pub fn run(arguments: &[String]) -> anyhow::Result<()> {
     let finished = logic.finish();
     outcome?;
     let summary = finished?;
-    log::info!("{destination}: {} frames of the body, {} IMU samples", summary.body_frames, summary.imu_samples);
+    log::info!(
+        "{destination}: {} frames of the body, {} IMU samples",
+        summary.body_frames,
+        summary.imu_samples
+    );
     Ok(())
 }
 
@@ -144,15 +183,23 @@ fn listen(node: &Node, listeners: &mut Listeners, logic: &mut ViewerNode) -> any
         if node.shutdown().is_requested() {
             return Ok(());
         }
-        listeners.bell.wait(flushes.left().or(Some(Duration::from_secs(1))));
+        listeners
+            .bell
+            .wait(flushes.left().or(Some(Duration::from_secs(1))));
     }
 }
 
 fn destination(config: &Config) -> anyhow::Result<Destination> {
     if !config.recording.is_empty() {
-        return Ok(Destination::File { path: config.recording.clone().into() });
+        return Ok(Destination::File {
+            path: config.recording.clone().into(),
+        });
     }
-    let address: SocketAddr =
-        config.connect.parse().with_context(|| format!("parameter 'connect': '{}': expected ADDRESS:PORT", config.connect))?;
+    let address: SocketAddr = config.connect.parse().with_context(|| {
+        format!(
+            "parameter 'connect': '{}': expected ADDRESS:PORT",
+            config.connect
+        )
+    })?;
     Ok(Destination::Connect { address })
 }

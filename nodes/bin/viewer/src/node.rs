@@ -45,11 +45,27 @@ impl ViewerNode {
     ///
     /// # Errors
     /// Where the body's mesh cannot be shown.
-    pub fn new(config: Config, model: Arc<BodyModel>, mut recording: Recording) -> Result<Self, Refusal> {
+    pub fn new(
+        config: Config,
+        model: Arc<BodyModel>,
+        mut recording: Recording,
+    ) -> Result<Self, Refusal> {
         let shaped = ShapedBody::new(model.clone(), &[])?;
-        let rest: Vec<[f32; 3]> = shaped.rest_vertices().iter().map(|vertex| vertex.map(|x| x as f32).into()).collect();
+        let rest: Vec<[f32; 3]> = shaped
+            .rest_vertices()
+            .iter()
+            .map(|vertex| vertex.map(|x| x as f32).into())
+            .collect();
         recording.set_body(&rest, model.faces())?;
-        Ok(Self { config, model, shaped, betas: Vec::new(), recording, vertices: Vec::new(), mounted: BTreeMap::new() })
+        Ok(Self {
+            config,
+            model,
+            shaped,
+            betas: Vec::new(),
+            recording,
+            vertices: Vec::new(),
+            mounted: BTreeMap::new(),
+        })
     }
 
     /// Draws the body and the sensors on it.
@@ -62,9 +78,13 @@ impl ViewerNode {
             return Ok(());
         }
         let (root_position, local_rotations) = state.root_and_rotations()?;
-        let body = BodyPose { root_position, local_rotations };
+        let body = BodyPose {
+            root_position,
+            local_rotations,
+        };
         if state.betas != self.betas {
-            self.model.check_named_betas(&state.shape_space, &state.gender, &state.betas)?;
+            self.model
+                .check_named_betas(&state.shape_space, &state.gender, &state.betas)?;
             self.shaped = ShapedBody::new(self.model.clone(), &state.betas)?;
             self.betas.clone_from(&state.betas);
         }
@@ -72,12 +92,17 @@ impl ViewerNode {
         self.recording.log_body(stamp, &self.vertices)?;
         let segments = self.shaped.world_from_segments(&body);
         if self.config.skeleton {
-            let joints = segments.map(|segment| segment.translation.vector.map(|x| x as f32).into());
+            let joints =
+                segments.map(|segment| segment.translation.vector.map(|x| x as f32).into());
             let parents = Joint::ALL.map(|joint| joint.parent().map(Joint::index));
             self.recording.log_skeleton(stamp, &joints, &parents)?;
         }
         for (name, (joint, segment_from_sensor)) in &self.mounted {
-            self.recording.log_sensor(stamp, name, &(segments[joint.index()] * segment_from_sensor))?;
+            self.recording.log_sensor(
+                stamp,
+                name,
+                &(segments[joint.index()] * segment_from_sensor),
+            )?;
         }
         Ok(())
     }
@@ -85,16 +110,31 @@ impl ViewerNode {
     /// Learns where sensors sit: frames `NAME_imu` below a segment.
     pub fn learn_frames(&mut self, frames: &TFMessage) {
         for edge in &frames.transforms {
-            let (Some(child), Some(parent)) = (self.own(&edge.child_frame_id), self.own(&edge.header.frame_id)) else { continue };
-            let (Some(name), Some(joint)) = (child.strip_suffix("_imu"), Joint::from_name(parent)) else { continue };
-            let Ok(segment_from_sensor) = edge.transform.try_into() else { continue };
-            self.mounted.insert(name.to_owned(), (joint, segment_from_sensor));
+            let (Some(child), Some(parent)) = (
+                self.own(&edge.child_frame_id),
+                self.own(&edge.header.frame_id),
+            ) else {
+                continue;
+            };
+            let (Some(name), Some(joint)) = (child.strip_suffix("_imu"), Joint::from_name(parent))
+            else {
+                continue;
+            };
+            let Ok(segment_from_sensor) = edge.transform.try_into() else {
+                continue;
+            };
+            self.mounted
+                .insert(name.to_owned(), (joint, segment_from_sensor));
         }
     }
 
     /// The frame's name without this body's prefix.
     fn own<'a>(&self, frame: &'a str) -> Option<&'a str> {
-        if self.config.prefix.is_empty() { Some(frame) } else { frame.strip_prefix(&self.config.prefix)?.strip_prefix('/') }
+        if self.config.prefix.is_empty() {
+            Some(frame)
+        } else {
+            frame.strip_prefix(&self.config.prefix)?.strip_prefix('/')
+        }
     }
 
     /// Adds a sample to the curves of a placement.
@@ -103,7 +143,12 @@ impl ViewerNode {
     /// [`Refusal::View`].
     pub fn show_imu(&mut self, placement: &str, imu: &Imu) -> Result<(), Refusal> {
         let stamp = Stamp::from_nanos(imu.header.stamp.nanos());
-        self.recording.log_imu(stamp, placement, &imu.linear_acceleration.into(), &imu.angular_velocity.into())?;
+        self.recording.log_imu(
+            stamp,
+            placement,
+            &imu.linear_acceleration.into(),
+            &imu.angular_velocity.into(),
+        )?;
         Ok(())
     }
 

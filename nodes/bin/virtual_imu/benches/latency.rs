@@ -1,8 +1,11 @@
-//! Live latency from SmplState to Imu, beyond the scheme's own delay: `cargo bench -p cromosim_virtual_imu`.
+//! Live latency from SmplState to Imu, beyond the scheme's own delay: `cargo bench -p
+//! cromosim_virtual_imu`.
 //!
-//! A process of its own runs the node; this one publishes the states of the embedded walk at 100 Hz and receives `imu/NAME/data_raw` of every
-//! placement over DDS, in a private network namespace. A sample's latency is the time from just before the publication of the state that
-//! released it to its reception here, so two hops of DDS are in it. Goal: p99 under 2 ms at 5 and at 17 placements.
+//! A process of its own runs the node; this one publishes the states of the embedded walk at 100 Hz
+//! and receives `imu/NAME/data_raw` of every placement over DDS, in a private network namespace. A
+//! sample's latency is the time from just before the publication of the state that released it to
+//! its reception here, so two hops of DDS are in it. Goal: p99 under 2 ms at 5 and at 17
+//! placements.
 #![allow(missing_docs)]
 
 use std::process::{Child, Command, Stdio};
@@ -24,7 +27,8 @@ const WARM_UP: usize = 100;
 
 fn main() {
     if let Ok(placements) = std::env::var(NODE) {
-        let arguments = ["--ros-args", "-p", &format!("placements:='{placements}'")].map(str::to_owned);
+        let arguments =
+            ["--ros-args", "-p", &format!("placements:='{placements}'")].map(str::to_owned);
         cromosim_virtual_imu::run(&arguments).expect("the node runs");
         return;
     }
@@ -35,18 +39,34 @@ fn main() {
     if !cromosim_ros::testing::is_private()
         && let Some(mut command) = inside_private_network(&[])
     {
-        assert!(command.status().expect("this program starts again").success());
+        assert!(
+            command
+                .status()
+                .expect("this program starts again")
+                .success()
+        );
         return;
     }
     println!("latency from SmplState to Imu over DDS, {STATES} states at 100 Hz, scheme spline");
     let folder = std::env::temp_dir();
-    for (name, set) in [("5 placements", PlacementSet::demo()), ("17 placements", PlacementSet::full17())] {
+    for (name, set) in [
+        ("5 placements", PlacementSet::demo()),
+        ("17 placements", PlacementSet::full17()),
+    ] {
         let file = folder.join(format!("cromosim_latency_{}.yaml", std::process::id()));
         std::fs::write(&file, set.to_yaml()).expect("a temporary file can be written");
         let latencies = measure(&set, &file.display().to_string());
         std::fs::remove_file(&file).expect("the temporary file is there");
-        let at = |fraction: f64| 1e3 * latencies[((latencies.len() - 1) as f64 * fraction).round() as usize];
-        println!("{name}: {} samples, p50 {:.2} ms, p99 {:.2} ms, max {:.2} ms", latencies.len(), at(0.5), at(0.99), at(1.0));
+        let at = |fraction: f64| {
+            1e3 * latencies[((latencies.len() - 1) as f64 * fraction).round() as usize]
+        };
+        println!(
+            "{name}: {} samples, p50 {:.2} ms, p99 {:.2} ms, max {:.2} ms",
+            latencies.len(),
+            at(0.5),
+            at(0.99),
+            at(1.0)
+        );
     }
 }
 
@@ -62,20 +82,42 @@ impl Drop for NodeProcess {
 
 fn measure(set: &PlacementSet, file: &str) -> Vec<f64> {
     let program = std::env::current_exe().expect("this program has a path");
-    let child = Command::new(program).env(NODE, file).envs(environment()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+    let child = Command::new(program)
+        .env(NODE, file)
+        .envs(environment())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn();
     let _node_process = NodeProcess(child.expect("the node's process starts"));
     let args = RosArgs::parse(Vec::<String>::new()).expect("no arguments");
-    let node = Node::start(NodeOptions::new("bench", &args, &Parameters::new()).expect("valid").network(network())).expect("DDS starts");
-    let states = node.publisher::<SmplState>("smpl/state", Qos::reliable()).expect("a publisher");
+    let node = Node::start(
+        NodeOptions::new("bench", &args, &Parameters::new())
+            .expect("valid")
+            .network(network()),
+    )
+    .expect("DDS starts");
+    let states = node
+        .publisher::<SmplState>("smpl/state", Qos::reliable())
+        .expect("a publisher");
     let bell = Bell::new();
     let subscribe = |name: &str| {
-        let subscription = node.subscription::<Imu>(&format!("imu/{name}/data_raw"), Qos::recorder()).expect("a subscription");
+        let subscription = node
+            .subscription::<Imu>(&format!("imu/{name}/data_raw"), Qos::recorder())
+            .expect("a subscription");
         subscription.ring(Arc::clone(&bell));
         subscription
     };
-    let imus: Vec<Subscription<Imu>> = set.placements().iter().map(|placement| subscribe(placement.name())).collect();
+    let imus: Vec<Subscription<Imu>> = set
+        .placements()
+        .iter()
+        .map(|placement| subscribe(placement.name()))
+        .collect();
     let long = Duration::from_secs(20);
-    assert!(states.wait_for_subscriptions(1, long) && imus.iter().all(|imu| imu.wait_for_publishers(1, long)), "no connection");
+    assert!(
+        states.wait_for_subscriptions(1, long)
+            && imus.iter().all(|imu| imu.wait_for_publishers(1, long)),
+        "no connection"
+    );
 
     let walk = cromosim_motion::embedded_walk();
     let begin = Clock::system_now().nanos + 50_000_000;
@@ -104,7 +146,11 @@ fn measure(set: &PlacementSet, file: &str) -> Vec<f64> {
     std::thread::sleep(Duration::from_millis(200));
     collect(&imus, &mut arrivals);
     let latencies = latencies(begin, &sent, &arrivals);
-    assert!(latencies.len() > (STATES - WARM_UP - 20) * imus.len(), "samples are missing: {}", latencies.len());
+    assert!(
+        latencies.len() > (STATES - WARM_UP - 20) * imus.len(),
+        "samples are missing: {}",
+        latencies.len()
+    );
     latencies
 }
 
@@ -115,19 +161,31 @@ type Arrival = (i64, i64);
 fn collect(imus: &[Subscription<Imu>], arrivals: &mut Vec<Arrival>) {
     for subscription in imus {
         while let Some(received) = subscription.try_recv().expect("readable samples") {
-            arrivals.push((received.message.header.stamp.nanos(), received.received_stamp.nanos));
+            arrivals.push((
+                received.message.header.stamp.nanos(),
+                received.received_stamp.nanos,
+            ));
         }
     }
 }
 
-/// Seconds from just before the publication of the state that released each sample, sorted. That state is the first one whose stamp is the
-/// scheme's delay later than the sample's; the delay is the median age of samples on the grid of the states.
+/// Seconds from just before the publication of the state that released each sample, sorted. That
+/// state is the first one whose stamp is the scheme's delay later than the sample's; the delay is
+/// the median age of samples on the grid of the states.
 fn latencies(begin: i64, sent: &[i64], arrivals: &[Arrival]) -> Vec<f64> {
     let frames_of = |nanos: i64| nanos.div_euclid(INTERVAL_NANOS);
-    let mut ages: Vec<i64> = arrivals.iter().map(|(stamp, arrived)| frames_of(arrived - stamp)).collect();
+    let mut ages: Vec<i64> = arrivals
+        .iter()
+        .map(|(stamp, arrived)| frames_of(arrived - stamp))
+        .collect();
     ages.sort_unstable();
     let delay_frames = ages[ages.len() / 2];
-    let releasing = |stamp: i64| usize::try_from((stamp - begin + INTERVAL_NANOS / 2).div_euclid(INTERVAL_NANOS) + delay_frames).ok();
+    let releasing = |stamp: i64| {
+        usize::try_from(
+            (stamp - begin + INTERVAL_NANOS / 2).div_euclid(INTERVAL_NANOS) + delay_frames,
+        )
+        .ok()
+    };
     let latency = |&(stamp, arrived): &Arrival| {
         let state = releasing(stamp).filter(|&state| state > WARM_UP)?;
         Some((arrived - sent.get(state)?) as f64 * 1e-9)

@@ -19,17 +19,20 @@ node_config! {
         pub noise: bool = true,
         /// Seed of the noise and of lost samples.
         pub seed: i64 = 0,
-        /// Folder of streaming networks, as `cromosim train` writes it, that correct acceleration and angular velocity before the device's
-        /// effects; placements then run at 100 Hz, at most 90 ms and two states behind. Empty: none.
+        /// Folder of streaming networks, as `cromosim train` writes it, that correct acceleration
+        /// and angular velocity before the device's effects; placements then run at 100 Hz, at most
+        /// 90 ms and two states behind. Empty: none.
         pub learned: String = String::new(),
-        /// Distribution mapping (YAML), as `cromosim map` writes it, applied last to the placements that it names. Empty: none.
+        /// Distribution mapping (YAML), as `cromosim map` writes it, applied last to the placements
+        /// that it names. Empty: none.
         pub mapping: String = String::new(),
         /// Put before every frame but the world's, with a slash; as for smpl_state.
         pub prefix: String = String::new(),
         /// Publish the site's pose of every state as `reference/NAME` too.
         pub publish_reference: bool = false,
-        /// How long errors of the poses hold, s: their correlation is exp(-(dt / this)^2 / 2). 0: they are new with each pose, the worst case;
-        /// the covariances that follow from SmplState's confidence are then far too large for poses that were smoothed.
+        /// How long errors of the poses hold, s: their correlation is exp(-(dt / this)^2 / 2). 0:
+        /// they are new with each pose, the worst case; the covariances that follow from
+        /// SmplState's confidence are then far too large for poses that were smoothed.
         pub pose_error_correlation_s: f64 = 0.0,
         /// Silence of the states after which the schemes begin anew, s.
         pub gap_seconds: f64 = 0.25,
@@ -43,6 +46,10 @@ node_config! {
 impl Config {
     /// The name of a frame of this body.
     pub fn frame(&self, name: &str) -> String {
-        if self.prefix.is_empty() { name.to_owned() } else { format!("{}/{name}", self.prefix) }
+        if self.prefix.is_empty() {
+            name.to_owned()
+        } else {
+            format!("{}/{name}", self.prefix)
+        }
     }
 }

@@ -1,4 +1,5 @@
-//! The node `virtual_imu`: `smpl/state` in; `imu/NAME/data_raw` and `imu/NAME/data` of every placement out, with their frames.
+//! The node `virtual_imu`: `smpl/state` in; `imu/NAME/data_raw` and `imu/NAME/data` of every
+//! placement out, with their frames.
 
 mod config;
 mod node;
@@ -37,18 +38,51 @@ struct Publishers {
 }
 
 impl Publishers {
-    fn new(node: &Node, logic: &VirtualImuNode, config: &Config, placements: &PlacementSet) -> Result<Self, RosError> {
-        let topics =
-            |ending: &str| logic.placements().iter().map(move |placement| format!("imu/{}/{ending}", placement.name())).collect::<Vec<_>>();
-        let imu = |ending| topics(ending).iter().map(|topic| node.publisher::<Imu>(topic, Qos::reliable())).collect::<Result<Vec<_>, _>>();
-        let reference = |placement: &Placement| node.publisher::<PoseStamped>(&format!("reference/{}", placement.name()), Qos::reliable());
-        let referenced = if config.publish_reference { logic.placements() } else { &[] };
+    fn new(
+        node: &Node,
+        logic: &VirtualImuNode,
+        config: &Config,
+        placements: &PlacementSet,
+    ) -> Result<Self, RosError> {
+        let topics = |ending: &str| {
+            logic
+                .placements()
+                .iter()
+                .map(move |placement| format!("imu/{}/{ending}", placement.name()))
+                .collect::<Vec<_>>()
+        };
+        let imu = |ending| {
+            topics(ending)
+                .iter()
+                .map(|topic| node.publisher::<Imu>(topic, Qos::reliable()))
+                .collect::<Result<Vec<_>, _>>()
+        };
+        let reference = |placement: &Placement| {
+            node.publisher::<PoseStamped>(
+                &format!("reference/{}", placement.name()),
+                Qos::reliable(),
+            )
+        };
+        let referenced = if config.publish_reference {
+            logic.placements()
+        } else {
+            &[]
+        };
         let rigid = logic.static_frames(Time::from_nanos(node.now().nanos));
-        let static_frames =
-            if rigid.transforms.is_empty() { None } else { Some(node.publisher::<TFMessage>("/tf_static", Qos::tf_static())?) };
-        static_frames.as_ref().map(|publisher| publisher.publish(&rigid)).transpose()?;
-        let described = node.publisher::<std_msgs::String>("virtual_imu/placements", Qos::tf_static())?;
-        described.publish(&std_msgs::String { data: placements.to_yaml() })?;
+        let static_frames = if rigid.transforms.is_empty() {
+            None
+        } else {
+            Some(node.publisher::<TFMessage>("/tf_static", Qos::tf_static())?)
+        };
+        static_frames
+            .as_ref()
+            .map(|publisher| publisher.publish(&rigid))
+            .transpose()?;
+        let described =
+            node.publisher::<std_msgs::String>("virtual_imu/placements", Qos::tf_static())?;
+        described.publish(&std_msgs::String {
+            data: placements.to_yaml(),
+        })?;
         Ok(Self {
             raw: imu("data_raw")?,
             full: imu("data")?,
@@ -61,7 +95,8 @@ impl Publishers {
     }
 
     fn publish(&self, step: &Step) {
-        // What most stacks listen to goes first, and what nobody listens to stays here: each message costs the later ones some 30 us.
+        // What most stacks listen to goes first, and what nobody listens to stays here: each
+        // message costs the later ones some 30 us.
         for reading in &step.readings {
             publish_if_heard(&self.raw[reading.placement], &reading.raw);
         }
@@ -79,7 +114,9 @@ impl Publishers {
 
 fn publish_if_heard(publisher: &Publisher<Imu>, message: &Imu) {
     // A transient-local publisher keeps its messages for those who come late.
-    if publisher.subscription_count() > 0 || publisher.qos().durability == Durability::TransientLocal {
+    if publisher.subscription_count() > 0
+        || publisher.qos().durability == Durability::TransientLocal
+    {
         report(publisher.publish(message));
     }
 }
@@ -89,12 +126,21 @@ fn publish_if_heard(publisher: &Publisher<Imu>, message: &Imu) {
 /// # Errors
 /// What is wrong with the arguments, placements, devices or the body file; what DDS refuses.
 pub fn run(arguments: &[String]) -> anyhow::Result<()> {
-    let Some(prepared) = prepare("virtual_imu", ABOUT, arguments, |config: &Config| logic(config).map(drop))? else { return Ok(()) };
+    let Some(prepared) = prepare("virtual_imu", ABOUT, arguments, |config: &Config| {
+        logic(config).map(drop)
+    })?
+    else {
+        return Ok(());
+    };
     let (mut logic, placements) = logic(&prepared.config)?;
     let (node, config) = prepared.start()?;
     let states = node.subscription::<SmplState>("smpl/state", Qos::reliable().depth(100))?;
     let publishers = Publishers::new(&node, &logic, &config, &placements)?;
-    let watched: Vec<_> = publishers.raw.iter().map(|publisher| &**publisher).collect();
+    let watched: Vec<_> = publishers
+        .raw
+        .iter()
+        .map(|publisher| &**publisher)
+        .collect();
     cromosim_ros::announce_ready(&node, &watched, config.ready_subscriptions);
 
     let mut schedule = cromosim_ros::Periodic::new(config.diagnostics_rate_hz);
@@ -109,7 +155,11 @@ pub fn run(arguments: &[String]) -> anyhow::Result<()> {
             Err(error) => log::warn!("{error}"),
         }
         if schedule.is_due() {
-            report(publishers.diagnostics.publish(&logic.diagnostics(Time::from_nanos(node.now().nanos), &name)));
+            report(
+                publishers
+                    .diagnostics
+                    .publish(&logic.diagnostics(Time::from_nanos(node.now().nanos), &name)),
+            );
         }
     }
     Ok(())
@@ -120,15 +170,27 @@ pub fn run(arguments: &[String]) -> anyhow::Result<()> {
 /// # Errors
 /// What is wrong with the file or a parameter.
 pub fn placements(config: &Config) -> anyhow::Result<PlacementSet> {
-    let read = if config.placements.is_empty() { PlacementSet::demo() } else { PlacementSet::read(Path::new(&config.placements))? };
+    let read = if config.placements.is_empty() {
+        PlacementSet::demo()
+    } else {
+        PlacementSet::read(Path::new(&config.placements))?
+    };
     let rate_hz = config.rate_hz;
     anyhow::ensure!(
         (0.0..=MAX_RATE_HZ).contains(&rate_hz),
         "parameter 'rate_hz': expected a positive rate up to {MAX_RATE_HZ}, or 0 for that of each placement, found {rate_hz}"
     );
-    let scheme = if config.scheme.is_empty() { None } else { Some(Scheme::from_str(&config.scheme).context("parameter 'scheme'")?) };
+    let scheme = if config.scheme.is_empty() {
+        None
+    } else {
+        Some(Scheme::from_str(&config.scheme).context("parameter 'scheme'")?)
+    };
     Ok(read.map(|placement| {
-        let rate_hz = if rate_hz > 0.0 { rate_hz } else { placement.rate_hz() };
+        let rate_hz = if rate_hz > 0.0 {
+            rate_hz
+        } else {
+            placement.rate_hz()
+        };
         let scheme = scheme.unwrap_or(placement.scheme());
         placement.with_rate_hz(rate_hz).with_scheme(scheme)
     }))
@@ -141,13 +203,29 @@ fn logic(config: &Config) -> anyhow::Result<(VirtualImuNode, PlacementSet)> {
         ("pose_error_correlation_s", config.pose_error_correlation_s),
     ];
     for (name, value) in not_negative {
-        anyhow::ensure!(value.is_finite() && value >= 0.0, "parameter '{name}': expected 0 or more, found {value}");
+        anyhow::ensure!(
+            value.is_finite() && value >= 0.0,
+            "parameter '{name}': expected 0 or more, found {value}"
+        );
     }
-    anyhow::ensure!(config.gap_seconds > 0.0, "parameter 'gap_seconds': expected more than 0, found {}", config.gap_seconds);
+    anyhow::ensure!(
+        config.gap_seconds > 0.0,
+        "parameter 'gap_seconds': expected more than 0, found {}",
+        config.gap_seconds
+    );
     let placements = placements(config)?;
-    let model = if config.body.is_empty() { BodyModel::embedded() } else { BodyModel::read(Path::new(&config.body))? };
-    let folder = Path::new(&config.placements).parent().unwrap_or(Path::new("."));
-    Ok((VirtualImuNode::new(config.clone(), model, &placements, folder)?, placements))
+    let model = if config.body.is_empty() {
+        BodyModel::embedded()
+    } else {
+        BodyModel::read(Path::new(&config.body))?
+    };
+    let folder = Path::new(&config.placements)
+        .parent()
+        .unwrap_or(Path::new("."));
+    Ok((
+        VirtualImuNode::new(config.clone(), model, &placements, folder)?,
+        placements,
+    ))
 }
 
 /// A message that does not get out is worth a line, and no more: the next one may.

@@ -5,10 +5,12 @@ use std::sync::Arc;
 
 use cromosim_body::{BodyError, BodyModel, BodyPose, Joint, ShapedBody};
 use cromosim_imu::{
-    Covariances, Device, Follow, ImuError, ImuSample, MountedSites, Placement, PlacementSet, PoseStd, StreamOptions, StreamingEffects,
-    StreamingImu,
+    Covariances, Device, Follow, ImuError, ImuSample, MountedSites, Placement, PlacementSet,
+    PoseStd, StreamOptions, StreamingEffects, StreamingImu,
 };
-use cromosim_learned::{LearnedError, LearnedSimulator, LivePlacements, MappingFile, PlacementMapping};
+use cromosim_learned::{
+    LearnedError, LearnedSimulator, LivePlacements, MappingFile, PlacementMapping,
+};
 use cromosim_msgs::NotABody;
 use cromosim_msgs::builtin_interfaces::Time;
 use cromosim_msgs::cromosim_msgs::SmplState;
@@ -122,17 +124,45 @@ impl VirtualImuNode {
     ///
     /// # Errors
     /// Sites that the body does not have, devices that are not there.
-    pub fn new(config: Config, model: Arc<BodyModel>, placements: &PlacementSet, device_folder: &Path) -> Result<Self, Refusal> {
+    pub fn new(
+        config: Config,
+        model: Arc<BodyModel>,
+        placements: &PlacementSet,
+        device_folder: &Path,
+    ) -> Result<Self, Refusal> {
         let resolve = |placement: &Placement| Device::resolve(placement.device(), device_folder);
         let placements: Vec<Placement> = placements.placements().to_vec();
-        let devices = placements.iter().map(resolve).collect::<Result<Vec<_>, _>>()?;
+        let devices = placements
+            .iter()
+            .map(resolve)
+            .collect::<Result<Vec<_>, _>>()?;
         let shaped = ShapedBody::new(model.clone(), &[])?;
         let sites = MountedSites::new(&shaped, &placements)?;
-        let learned = if config.learned.is_empty() { None } else { Some(LearnedSimulator::find(Path::new(&config.learned))?) };
-        let mapping = if config.mapping.is_empty() { MappingFile::default() } else { MappingFile::read(Path::new(&config.mapping))? };
-        if !config.mapping.is_empty() && !placements.iter().any(|placement| mapping.placements.contains_key(placement.name())) {
-            let known = mapping.placements.keys().cloned().collect::<Vec<_>>().join(", ");
-            return Err(Refusal::Unmapped { file: config.mapping, known });
+        let learned = if config.learned.is_empty() {
+            None
+        } else {
+            Some(LearnedSimulator::find(Path::new(&config.learned))?)
+        };
+        let mapping = if config.mapping.is_empty() {
+            MappingFile::default()
+        } else {
+            MappingFile::read(Path::new(&config.mapping))?
+        };
+        if !config.mapping.is_empty()
+            && !placements
+                .iter()
+                .any(|placement| mapping.placements.contains_key(placement.name()))
+        {
+            let known = mapping
+                .placements
+                .keys()
+                .cloned()
+                .collect::<Vec<_>>()
+                .join(", ");
+            return Err(Refusal::Unmapped {
+                file: config.mapping,
+                known,
+            });
         }
         let mut node = Self {
             config,
@@ -162,19 +192,40 @@ impl VirtualImuNode {
             let seed = self.config.seed as u64;
             // Several bodies' devices err each on its own.
             let name = self.config.frame(placement.name());
-            let effects = if self.config.noise { Some(StreamingEffects::new(device, rate_hz, seed, &name)?) } else { None };
+            let effects = if self.config.noise {
+                Some(StreamingEffects::new(device, rate_hz, seed, &name)?)
+            } else {
+                None
+            };
             let covariances = Covariances::of(device, rate_hz);
             let frame_id = self.config.frame(&format!("{}_imu", placement.name()));
             let mapping = self.mapping.placements.get(placement.name()).cloned();
-            Ok(Channel { stream: None, effects, covariances, frame_id, mapping })
+            Ok(Channel {
+                stream: None,
+                effects,
+                covariances,
+                frame_id,
+                mapping,
+            })
         };
-        self.placements.iter().zip(&self.devices).map(channel).collect()
+        self.placements
+            .iter()
+            .zip(&self.devices)
+            .map(channel)
+            .collect()
     }
 
     fn fresh_networks(&self) -> Result<Option<LivePlacements>, LearnedError> {
         self.learned
             .as_ref()
-            .map(|networks| LivePlacements::new(networks, &self.shaped, &self.placements, self.config.gap_seconds))
+            .map(|networks| {
+                LivePlacements::new(
+                    networks,
+                    &self.shaped,
+                    &self.placements,
+                    self.config.gap_seconds,
+                )
+            })
             .transpose()
     }
 
@@ -183,10 +234,14 @@ impl VirtualImuNode {
         &self.placements
     }
 
-    /// Delay of each placement's scheme and networks, s; none before the rate of the states is known.
+    /// Delay of each placement's scheme and networks, s; none before the rate of the states is
+    /// known.
     pub fn delays_seconds(&self) -> Vec<Option<f64>> {
         let delay = |stream: &StreamingImu| stream.delay_seconds().max(self.networks_delay);
-        self.channels.iter().map(|channel| channel.stream.as_ref().map(delay)).collect()
+        self.channels
+            .iter()
+            .map(|channel| channel.stream.as_ref().map(delay))
+            .collect()
     }
 
     /// The messages that follow from one state.
@@ -199,7 +254,8 @@ impl VirtualImuNode {
             Ok(step) => {
                 self.counts.states += 1;
                 self.counts.readings += step.readings.len() as u64;
-                let without = |reading: &&Reading| reading.raw.linear_acceleration_covariance[0] < 0.0;
+                let without =
+                    |reading: &&Reading| reading.raw.linear_acceleration_covariance[0] < 0.0;
                 self.counts.without_estimate += step.readings.iter().filter(without).count() as u64;
             }
             Err(refusal) => {
@@ -212,12 +268,16 @@ impl VirtualImuNode {
 
     fn try_step(&mut self, state: &SmplState) -> Result<Step, Refusal> {
         let (root_position, local_rotations) = state.root_and_rotations()?;
-        let body = BodyPose { root_position, local_rotations };
+        let body = BodyPose {
+            root_position,
+            local_rotations,
+        };
         let stamp = Stamp::from_nanos(state.header.stamp.nanos());
         if self.last == Some(stamp) {
             return Err(Refusal::Repeated(stamp));
         }
-        self.model.check_named_betas(&state.shape_space, &state.gender, &state.betas)?;
+        self.model
+            .check_named_betas(&state.shape_space, &state.gender, &state.betas)?;
         self.watch_time(stamp);
         if state.betas != self.betas {
             self.shaped = ShapedBody::new(self.model.clone(), &state.betas)?;
@@ -225,7 +285,8 @@ impl VirtualImuNode {
             self.betas.clone_from(&state.betas);
             self.live = self.fresh_networks()?;
         }
-        let pose_std = PoseStd::of_confidence(state.confidence, self.config.pose_error_correlation_s);
+        let pose_std =
+            PoseStd::of_confidence(state.confidence, self.config.pose_error_correlation_s);
         let mut step = self.frames_of(state, &body);
         self.last = Some(stamp);
         if self.channels.iter().all(|channel| channel.stream.is_some()) {
@@ -234,7 +295,11 @@ impl VirtualImuNode {
         }
         self.early.push((stamp, body, pose_std));
         if self.config.state_rate_hz > 0.0 || self.early.len() >= RATE_STATES {
-            let rate_hz = if self.config.state_rate_hz > 0.0 { self.config.state_rate_hz } else { median_rate(&self.early) };
+            let rate_hz = if self.config.state_rate_hz > 0.0 {
+                self.config.state_rate_hz
+            } else {
+                median_rate(&self.early)
+            };
             self.open_streams(rate_hz)?;
             for (stamp, body, pose_std) in std::mem::take(&mut self.early) {
                 self.push((stamp, &body, pose_std), &mut step.readings)?;
@@ -244,24 +309,42 @@ impl VirtualImuNode {
     }
 
     fn open_streams(&mut self, state_rate_hz: f64) -> Result<(), ImuError> {
-        self.networks_delay = if self.live.is_some() { LivePlacements::delay_seconds(state_rate_hz) } else { 0.0 };
+        self.networks_delay = if self.live.is_some() {
+            LivePlacements::delay_seconds(state_rate_hz)
+        } else {
+            0.0
+        };
         for (channel, placement) in self.channels.iter_mut().zip(&self.placements) {
-            let options =
-                StreamOptions { longest_gap: self.config.gap_seconds, ..StreamOptions::resampled(state_rate_hz, placement.rate_hz()) };
+            let options = StreamOptions {
+                longest_gap: self.config.gap_seconds,
+                ..StreamOptions::resampled(state_rate_hz, placement.rate_hz())
+            };
             let stream = StreamingImu::new(placement.scheme(), options)?;
             let delay = stream.delay_seconds().max(self.networks_delay);
-            log::info!("{}: {} at {} Hz, delay {delay:.4} s", placement.name(), placement.scheme(), placement.rate_hz());
+            log::info!(
+                "{}: {} at {} Hz, delay {delay:.4} s",
+                placement.name(),
+                placement.scheme(),
+                placement.rate_hz()
+            );
             channel.stream = Some(stream);
         }
         Ok(())
     }
 
-    fn push(&mut self, (stamp, body, pose_std): (Stamp, &BodyPose, PoseStd), readings: &mut Vec<Reading>) -> Result<(), Refusal> {
+    fn push(
+        &mut self,
+        (stamp, body, pose_std): (Stamp, &BodyPose, PoseStd),
+        readings: &mut Vec<Reading>,
+    ) -> Result<(), Refusal> {
         let mut released = Vec::with_capacity(self.channels.len());
         let frames = self.sites.frames(body);
         for (channel, frame) in self.channels.iter_mut().zip(&frames) {
             let stream = channel.stream.as_mut();
-            released.push(stream.map_or_else(|| Ok(Vec::new()), |stream| stream.push_kinematics(frame.at(stamp).with_pose_std(pose_std)))?);
+            released.push(stream.map_or_else(
+                || Ok(Vec::new()),
+                |stream| stream.push_kinematics(frame.at(stamp).with_pose_std(pose_std)),
+            )?);
         }
         if let Some(live) = &mut self.live {
             live.push(stamp, body, &frames);
@@ -269,17 +352,32 @@ impl VirtualImuNode {
         }
         for (placement, (channel, motions)) in self.channels.iter_mut().zip(released).enumerate() {
             for motion in motions {
-                let sample = channel.effects.as_mut().map_or_else(|| Some(motion.imu()), |effects| effects.step(&motion));
+                let sample = channel
+                    .effects
+                    .as_mut()
+                    .map_or_else(|| Some(motion.imu()), |effects| effects.step(&motion));
                 // None: the device loses it.
                 let Some(mut sample) = sample else { continue };
                 if let Some(mapping) = &channel.mapping {
-                    let mapped = mapping.apply(&cromosim_imu::Reading { force: sample.specific_force, rate: sample.angular_velocity });
+                    let mapped = mapping.apply(&cromosim_imu::Reading {
+                        force: sample.specific_force,
+                        rate: sample.angular_velocity,
+                    });
                     (sample.specific_force, sample.angular_velocity) = (mapped.force, mapped.rate);
                 }
                 let covariances = channel.covariances.with_motion(&motion.variance, &sample);
-                let raw = imu_message(&sample, &channel.frame_id, &covariances.without_orientation(), false);
+                let raw = imu_message(
+                    &sample,
+                    &channel.frame_id,
+                    &covariances.without_orientation(),
+                    false,
+                );
                 let full = imu_message(&sample, &channel.frame_id, &covariances, true);
-                readings.push(Reading { placement, raw, full });
+                readings.push(Reading {
+                    placement,
+                    raw,
+                    full,
+                });
             }
         }
         Ok(())
@@ -305,13 +403,27 @@ impl VirtualImuNode {
             return step;
         }
         let segments = self.shaped.world_from_segments(body);
-        for ((placement, site), frame) in self.placements.iter().zip(self.sites.sites()).zip(self.sites.frames(body)) {
+        for ((placement, site), frame) in self
+            .placements
+            .iter()
+            .zip(self.sites.sites())
+            .zip(self.sites.frames(body))
+        {
             if follows_skin(placement) {
-                let segment_from_sensor = segments[site.joint().index()].inverse() * frame.world_from_sensor;
-                step.frames.transforms.push(self.edge(state.header.stamp, site.joint(), placement, segment_from_sensor));
+                let segment_from_sensor =
+                    segments[site.joint().index()].inverse() * frame.world_from_sensor;
+                step.frames.transforms.push(self.edge(
+                    state.header.stamp,
+                    site.joint(),
+                    placement,
+                    segment_from_sensor,
+                ));
             }
             if self.config.publish_reference {
-                step.references.push(PoseStamped { header: state.header.clone(), pose: frame.world_from_sensor.into() });
+                step.references.push(PoseStamped {
+                    header: state.header.clone(),
+                    pose: frame.world_from_sensor.into(),
+                });
             }
         }
         step
@@ -319,15 +431,32 @@ impl VirtualImuNode {
 
     /// For `/tf_static`: the frames of sensors that follow their segment.
     pub fn static_frames(&self, stamp: Time) -> TFMessage {
-        let rigid = self.placements.iter().zip(self.sites.sites()).filter(|(placement, _)| placement.follow() == Follow::Segment);
+        let rigid = self
+            .placements
+            .iter()
+            .zip(self.sites.sites())
+            .filter(|(placement, _)| placement.follow() == Follow::Segment);
         TFMessage {
-            transforms: rigid.map(|(placement, site)| self.edge(stamp, site.joint(), placement, site.segment_from_sensor())).collect(),
+            transforms: rigid
+                .map(|(placement, site)| {
+                    self.edge(stamp, site.joint(), placement, site.segment_from_sensor())
+                })
+                .collect(),
         }
     }
 
-    fn edge(&self, stamp: Time, joint: Joint, placement: &Placement, segment_from_sensor: Isometry3<f64>) -> TransformStamped {
+    fn edge(
+        &self,
+        stamp: Time,
+        joint: Joint,
+        placement: &Placement,
+        segment_from_sensor: Isometry3<f64>,
+    ) -> TransformStamped {
         TransformStamped {
-            header: Header { stamp, frame_id: self.config.frame(joint.name()) },
+            header: Header {
+                stamp,
+                frame_id: self.config.frame(joint.name()),
+            },
             child_frame_id: self.config.frame(&format!("{}_imu", placement.name())),
             transform: segment_from_sensor.into(),
         }
@@ -339,19 +468,37 @@ impl VirtualImuNode {
         let (level, message) = match (counts.states, counts.refused) {
             (0, 0) => (DiagnosticStatus::WARN, "no state has come yet".to_owned()),
             (_, 0) => (DiagnosticStatus::OK, "states arrive".to_owned()),
-            _ => (DiagnosticStatus::WARN, format!("states were left out; the last one: {}", counts.last_refusal)),
+            _ => (
+                DiagnosticStatus::WARN,
+                format!(
+                    "states were left out; the last one: {}",
+                    counts.last_refusal
+                ),
+            ),
         };
         let value = |key: String, value: String| KeyValue { key, value };
         let mut values = vec![
             value("states".to_owned(), counts.states.to_string()),
             value("states left out".to_owned(), counts.refused.to_string()),
             value("readings".to_owned(), counts.readings.to_string()),
-            value("readings without an estimate (confidence 0)".to_owned(), counts.without_estimate.to_string()),
-            value("restarts of the source's time".to_owned(), counts.restarts.to_string()),
+            value(
+                "readings without an estimate (confidence 0)".to_owned(),
+                counts.without_estimate.to_string(),
+            ),
+            value(
+                "restarts of the source's time".to_owned(),
+                counts.restarts.to_string(),
+            ),
         ];
         for (placement, delay) in self.placements.iter().zip(self.delays_seconds()) {
-            let delay = delay.map_or_else(|| "not yet known".to_owned(), |seconds| format!("{seconds:.4}"));
-            values.push(value(format!("{}: delay of {}, s", placement.name(), placement.scheme()), delay));
+            let delay = delay.map_or_else(
+                || "not yet known".to_owned(),
+                |seconds| format!("{seconds:.4}"),
+            );
+            values.push(value(
+                format!("{}: delay of {}, s", placement.name(), placement.scheme()),
+                delay,
+            ));
         }
         let status = DiagnosticStatus {
             level,
@@ -360,13 +507,28 @@ impl VirtualImuNode {
             hardware_id: self.model.id().to_owned(),
             values,
         };
-        DiagnosticArray { header: Header { stamp, frame_id: String::new() }, status: vec![status] }
+        DiagnosticArray {
+            header: Header {
+                stamp,
+                frame_id: String::new(),
+            },
+            status: vec![status],
+        }
     }
 }
 
 /// The message of a sample; the orientation is left at identity where it is not reported.
-pub fn imu_message(sample: &ImuSample, frame_id: &str, covariances: &Covariances, oriented: bool) -> Imu {
-    let orientation = if oriented { sample.world_from_sensor } else { UnitQuaternion::identity() };
+pub fn imu_message(
+    sample: &ImuSample,
+    frame_id: &str,
+    covariances: &Covariances,
+    oriented: bool,
+) -> Imu {
+    let orientation = if oriented {
+        sample.world_from_sensor
+    } else {
+        UnitQuaternion::identity()
+    };
     Imu {
         header: Header::new(sample.stamp.nanos, frame_id),
         orientation: orientation.into(),
@@ -380,7 +542,12 @@ pub fn imu_message(sample: &ImuSample, frame_id: &str, covariances: &Covariances
 
 /// Rate of states by the median of their intervals, Hz.
 fn median_rate(states: &[(Stamp, BodyPose, PoseStd)]) -> f64 {
-    let mut intervals: Vec<f64> = states.windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
+    let mut intervals: Vec<f64> = states
+        .windows(2)
+        .map(|pair| pair[1].0 - pair[0].0)
+        .collect();
     intervals.sort_unstable_by(f64::total_cmp);
-    intervals.get(intervals.len() / 2).map_or(f64::NAN, |interval| interval.recip())
+    intervals
+        .get(intervals.len() / 2)
+        .map_or(f64::NAN, |interval| interval.recip())
 }

@@ -15,11 +15,20 @@ use nalgebra::{UnitQuaternion, Vector3};
 const START: i64 = 1_700_000_000_000_000_000;
 
 fn node(config: Config) -> VirtualImuNode {
-    VirtualImuNode::new(config, BodyModel::embedded(), &PlacementSet::demo(), Path::new(".")).unwrap()
+    VirtualImuNode::new(
+        config,
+        BodyModel::embedded(),
+        &PlacementSet::demo(),
+        Path::new("."),
+    )
+    .unwrap()
 }
 
 fn quiet() -> Config {
-    Config { noise: false, ..Config::default() }
+    Config {
+        noise: false,
+        ..Config::default()
+    }
 }
 
 fn state(motion: &SmplMotion, frame: usize, nanos: i64) -> SmplState {
@@ -37,7 +46,11 @@ fn state(motion: &SmplMotion, frame: usize, nanos: i64) -> SmplState {
 
 /// The readings of the walk's frames, whose stamps begin at `start`.
 fn walk(node: &mut VirtualImuNode, motion: &SmplMotion, start: i64) -> Vec<Reading> {
-    let step = |frame| node.step(&state(motion, frame, start + frame as i64 * 10_000_000)).unwrap().readings;
+    let step = |frame| {
+        node.step(&state(motion, frame, start + frame as i64 * 10_000_000))
+            .unwrap()
+            .readings
+    };
     (0..motion.frames.len()).flat_map(step).collect()
 }
 
@@ -49,9 +62,15 @@ fn a_body_at_rest_reads_gravity_upwards_and_no_rate() {
     for reading in walk(&mut node(quiet()), &standing, START) {
         let world_from_sensor: UnitQuaternion<f64> = reading.full.orientation.try_into().unwrap();
         let force = world_from_sensor * Vector3::from(reading.full.linear_acceleration);
-        assert!((force - Vector3::new(0.0, 0.0, 9.80665)).norm() < 1e-4, "{force}");
+        assert!(
+            (force - Vector3::new(0.0, 0.0, 9.80665)).norm() < 1e-4,
+            "{force}"
+        );
         assert!(Vector3::from(reading.full.angular_velocity).norm() < 1e-5);
-        assert_eq!(reading.raw.linear_acceleration, reading.full.linear_acceleration);
+        assert_eq!(
+            reading.raw.linear_acceleration,
+            reading.full.linear_acceleration
+        );
         assert_eq!(reading.raw.orientation_covariance[0], -1.0);
         assert!(reading.raw.header.frame_id.ends_with("_imu"));
     }
@@ -69,13 +88,22 @@ fn every_sample_comes_out_once_with_the_stated_delay() {
             // The first states wait until their rate is known.
             if frame > 20 {
                 let delay = node.delays_seconds()[reading.placement].unwrap();
-                assert!(((now - stamp) as f64 * 1e-9 - delay).abs() < 2e-3, "stated {delay} s, found {} ns", now - stamp);
+                assert!(
+                    ((now - stamp) as f64 * 1e-9 - delay).abs() < 2e-3,
+                    "stated {delay} s, found {} ns",
+                    now - stamp
+                );
             }
             stamps[reading.placement].push(stamp);
         }
     }
     for stamps in stamps {
-        assert!(stamps.windows(2).all(|pair| pair[1] - pair[0] == 10_000_000), "a grid without holes or doubles");
+        assert!(
+            stamps
+                .windows(2)
+                .all(|pair| pair[1] - pair[0] == 10_000_000),
+            "a grid without holes or doubles"
+        );
         assert_eq!(stamps[0], START);
         assert!(stamps.len() >= motion.frames.len() - 10);
     }
@@ -88,15 +116,34 @@ fn a_source_that_starts_over_starts_the_schemes_over() {
     let first = walk(&mut node, &motion, START);
     let again = walk(&mut node, &motion, START - 60_000_000_000);
     assert_eq!(first.len(), again.len());
-    assert!(again.iter().all(|reading| reading.full.header.stamp.nanos() < START));
-    let largest = again.iter().map(|reading| Vector3::from(reading.full.linear_acceleration).norm()).fold(0.0, f64::max);
-    assert!(largest < 60.0, "the jump of the source shows as {largest} m/s2");
+    assert!(
+        again
+            .iter()
+            .all(|reading| reading.full.header.stamp.nanos() < START)
+    );
+    let largest = again
+        .iter()
+        .map(|reading| Vector3::from(reading.full.linear_acceleration).norm())
+        .fold(0.0, f64::max);
+    assert!(
+        largest < 60.0,
+        "the jump of the source shows as {largest} m/s2"
+    );
 }
 
 #[test]
 fn the_seed_makes_the_noise() {
     let motion = embedded_walk();
-    let run = |seed| walk(&mut node(Config { seed, ..Config::default() }), &motion, START);
+    let run = |seed| {
+        walk(
+            &mut node(Config {
+                seed,
+                ..Config::default()
+            }),
+            &motion,
+            START,
+        )
+    };
     assert!(run(1) == run(1));
     assert!(run(1) != run(2));
 }
@@ -125,13 +172,18 @@ fn nonsense_is_refused_and_the_node_goes_on() {
     assert!(report.status[0].message.contains("left out"), "{report:?}");
 }
 
-/// The readings of the walk's first second with this confidence, without those that rest on its ends.
+/// The readings of the walk's first second with this confidence, without those that rest on its
+/// ends.
 fn with_confidence(config: Config, confidence: f64) -> Vec<Reading> {
     let motion = embedded_walk().slice(0.0, Some(1.0)).unwrap();
     let placements = cromosim_virtual_imu::placements(&config).unwrap();
-    let mut node = VirtualImuNode::new(config, BodyModel::embedded(), &placements, Path::new(".")).unwrap();
+    let mut node =
+        VirtualImuNode::new(config, BodyModel::embedded(), &placements, Path::new(".")).unwrap();
     let step = |frame: usize| {
-        let state = SmplState { confidence, ..state(&motion, frame, START + frame as i64 * 10_000_000) };
+        let state = SmplState {
+            confidence,
+            ..state(&motion, frame, START + frame as i64 * 10_000_000)
+        };
         node.step(&state).unwrap().readings
     };
     (0..motion.frames.len()).flat_map(step).collect()
@@ -139,24 +191,45 @@ fn with_confidence(config: Config, confidence: f64) -> Vec<Reading> {
 
 #[test]
 fn confidence_grows_the_covariances() {
-    let scheme = || Config { scheme: "second_difference".to_owned(), ..Config::default() };
+    let scheme = || Config {
+        scheme: "second_difference".to_owned(),
+        ..Config::default()
+    };
     let certain = with_confidence(scheme(), 1.0);
-    assert!(certain == with_confidence(scheme(), f64::NAN), "where the source cannot say, nothing is added");
+    assert!(
+        certain == with_confidence(scheme(), f64::NAN),
+        "where the source cannot say, nothing is added"
+    );
     // 1 mm: (6 / h4) (1 mm)2 and (1 / 2 h2) (2 mrad)2, more where gravity tilts.
     let doubtful = with_confidence(scheme(), 1.0 / (1.0 + 1e-4));
     assert_eq!(certain.len(), doubtful.len());
     for (certain, doubtful) in certain.iter().zip(&doubtful).skip(100) {
-        assert_eq!(certain.raw.linear_acceleration, doubtful.raw.linear_acceleration, "the reading stays as it is");
+        assert_eq!(
+            certain.raw.linear_acceleration, doubtful.raw.linear_acceleration,
+            "the reading stays as it is"
+        );
         let grown = |pick: fn(&Reading) -> [f64; 9]| (pick(doubtful)[0] - pick(certain)[0]).sqrt();
-        let (force, rate) = (grown(|r| r.raw.linear_acceleration_covariance), grown(|r| r.raw.angular_velocity_covariance));
+        let (force, rate) = (
+            grown(|r| r.raw.linear_acceleration_covariance),
+            grown(|r| r.raw.angular_velocity_covariance),
+        );
         assert!((24.0..25.0).contains(&force), "{force} m/s2");
         assert!((0.14..0.15).contains(&rate), "{rate} rad/s");
         assert!((grown(|r| r.full.orientation_covariance) - 0.002).abs() < 1e-6);
         assert_eq!(doubtful.raw.orientation_covariance[0], -1.0);
     }
-    let holding = with_confidence(Config { pose_error_correlation_s: 0.5, ..scheme() }, 0.5);
+    let holding = with_confidence(
+        Config {
+            pose_error_correlation_s: 0.5,
+            ..scheme()
+        },
+        0.5,
+    );
     let force = holding[200].raw.linear_acceleration_covariance[0].sqrt();
-    assert!((0.5..5.0).contains(&force), "0.1 m that hold for half a second are sqrt(3) 0.1 / 0.25 m/s2, and 0.2 rad of gravity: {force}");
+    assert!(
+        (0.5..5.0).contains(&force),
+        "0.1 m that hold for half a second are sqrt(3) 0.1 / 0.25 m/s2, and 0.2 rad of gravity: {force}"
+    );
 }
 
 #[test]
@@ -165,74 +238,170 @@ fn at_confidence_0_there_is_no_estimate() {
     let mut node = node(quiet());
     let mut lost = Vec::new();
     for frame in 0..300 {
-        let confidence = if (100..130).contains(&frame) { 0.0 } else { 1.0 };
-        let state = SmplState { confidence, ..state(&motion, frame, START + frame as i64 * 10_000_000) };
+        let confidence = if (100..130).contains(&frame) {
+            0.0
+        } else {
+            1.0
+        };
+        let state = SmplState {
+            confidence,
+            ..state(&motion, frame, START + frame as i64 * 10_000_000)
+        };
         for reading in node.step(&state).unwrap().readings {
-            let covariances =
-                [reading.raw.linear_acceleration_covariance, reading.raw.angular_velocity_covariance, reading.full.orientation_covariance];
+            let covariances = [
+                reading.raw.linear_acceleration_covariance,
+                reading.raw.angular_velocity_covariance,
+                reading.full.orientation_covariance,
+            ];
             let at = (reading.raw.header.stamp.nanos() - START) / 10_000_000;
             if (105..125).contains(&at) {
-                assert!(covariances.iter().all(|covariance| covariance[0] == -1.0), "frame {at}");
+                assert!(
+                    covariances.iter().all(|covariance| covariance[0] == -1.0),
+                    "frame {at}"
+                );
             }
             if !(85..=145).contains(&at) {
-                assert!(covariances.iter().all(|covariance| covariance[0] >= 0.0), "frame {at}");
+                assert!(
+                    covariances.iter().all(|covariance| covariance[0] >= 0.0),
+                    "frame {at}"
+                );
             }
             lost.extend((reading.raw.linear_acceleration_covariance[0] < 0.0).then_some(at));
         }
     }
     let report = node.diagnostics(Header::new(START, "").stamp, "/virtual_imu");
-    let told = report.status[0].values.iter().find(|value| value.key.contains("without an estimate")).unwrap();
+    let told = report.status[0]
+        .values
+        .iter()
+        .find(|value| value.key.contains("without an estimate"))
+        .unwrap();
     assert_eq!(told.value, lost.len().to_string());
 }
 
 #[test]
 fn betas_of_another_body_are_refused() {
     let motion = embedded_walk();
-    let foreign = SmplState { betas: vec![0.5], shape_space: "smpl".to_owned(), ..state(&motion, 0, START) };
-    assert!(node(quiet()).step(&foreign).unwrap_err().to_string().contains("belong to SMPL"));
+    let foreign = SmplState {
+        betas: vec![0.5],
+        shape_space: "smpl".to_owned(),
+        ..state(&motion, 0, START)
+    };
+    assert!(
+        node(quiet())
+            .step(&foreign)
+            .unwrap_err()
+            .to_string()
+            .contains("belong to SMPL")
+    );
 }
 
 #[test]
 fn two_people_have_errors_of_their_own() {
     let motion = embedded_walk();
-    let run = |prefix: &str| walk(&mut node(Config { prefix: prefix.to_owned(), ..Config::default() }), &motion, START);
+    let run = |prefix: &str| {
+        walk(
+            &mut node(Config {
+                prefix: prefix.to_owned(),
+                ..Config::default()
+            }),
+            &motion,
+            START,
+        )
+    };
     let (one, other) = (run("person_1"), run("person_2"));
-    assert_eq!(one[0].raw.header.frame_id, format!("person_1/{}_imu", node(quiet()).placements()[one[0].placement].name()));
-    assert!(one.iter().zip(&other).all(|(one, other)| one.raw.linear_acceleration != other.raw.linear_acceleration));
+    assert_eq!(
+        one[0].raw.header.frame_id,
+        format!(
+            "person_1/{}_imu",
+            node(quiet()).placements()[one[0].placement].name()
+        )
+    );
+    assert!(
+        one.iter()
+            .zip(&other)
+            .all(|(one, other)| one.raw.linear_acceleration != other.raw.linear_acceleration)
+    );
 }
 
 /// A node with one placement, whose device has these effects.
 fn with_device(name: &str, effects: &str) -> Result<VirtualImuNode, String> {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
-    let text = format!("schema: cromosim/device/1\ndeclared_noise: {{accel_density: 0.0, gyro_density: 0.0}}\neffects:\n{effects}");
+    let text = format!(
+        "schema: cromosim/device/1\ndeclared_noise: {{accel_density: 0.0, gyro_density: 0.0}}\neffects:\n{effects}"
+    );
     std::fs::write(folder.join(name), text).unwrap();
-    let placements = format!("schema: cromosim/placements/1\nplacements:\n  wrist: {{site: left_watch, rate_hz: 100, device: {name}}}\n");
+    let placements = format!(
+        "schema: cromosim/placements/1\nplacements:\n  wrist: {{site: left_watch, rate_hz: 100, device: {name}}}\n"
+    );
     let placements = PlacementSet::parse(&placements, "placements.yaml").unwrap();
-    VirtualImuNode::new(Config::default(), BodyModel::embedded(), &placements, folder).map_err(|refusal| refusal.to_string())
+    VirtualImuNode::new(
+        Config::default(),
+        BodyModel::embedded(),
+        &placements,
+        folder,
+    )
+    .map_err(|refusal| refusal.to_string())
 }
 
 #[test]
 fn a_devices_effects_act_live() {
     let motion = embedded_walk();
-    let ideal = walk(&mut with_device("ideal.yaml", "- {effect: accel_bias, bias: [0.0, 0.0, 0.0]}").unwrap(), &motion, START);
+    let ideal = walk(
+        &mut with_device(
+            "ideal.yaml",
+            "- {effect: accel_bias, bias: [0.0, 0.0, 0.0]}",
+        )
+        .unwrap(),
+        &motion,
+        START,
+    );
     let effects = "- {effect: time_offset, seconds: 0.25}\n- {effect: clock_drift, ppm: 1000}\n- {effect: gyro_units, factor: 1000}\n\
                    - {effect: mount_rotation, rotvec: [0.0, 0.0, 1.5707963267948966]}\n";
-    let changed = walk(&mut with_device("changed.yaml", effects).unwrap(), &motion, START);
+    let changed = walk(
+        &mut with_device("changed.yaml", effects).unwrap(),
+        &motion,
+        START,
+    );
     assert_eq!(ideal.len(), changed.len());
     for (ideal, changed) in ideal.iter().zip(&changed) {
         let since = ideal.raw.header.stamp.nanos() - START;
-        assert_eq!(changed.raw.header.stamp.nanos() - START, since + since / 1000 + 250_000_000);
-        let (ideal, changed) = (Vector3::from(ideal.raw.angular_velocity), Vector3::from(changed.raw.angular_velocity));
-        assert!((changed - Vector3::new(ideal.y, -ideal.x, ideal.z) * 1000.0).norm() < 1e-6, "{ideal} {changed}");
+        assert_eq!(
+            changed.raw.header.stamp.nanos() - START,
+            since + since / 1000 + 250_000_000
+        );
+        let (ideal, changed) = (
+            Vector3::from(ideal.raw.angular_velocity),
+            Vector3::from(changed.raw.angular_velocity),
+        );
+        assert!(
+            (changed - Vector3::new(ideal.y, -ideal.x, ideal.z) * 1000.0).norm() < 1e-6,
+            "{ideal} {changed}"
+        );
     }
-    let lossy = walk(&mut with_device("lossy.yaml", "- {effect: dropped_samples, fraction: 0.3, mean_burst: 5}").unwrap(), &motion, START);
+    let lossy = walk(
+        &mut with_device(
+            "lossy.yaml",
+            "- {effect: dropped_samples, fraction: 0.3, mean_burst: 5}",
+        )
+        .unwrap(),
+        &motion,
+        START,
+    );
     assert!(lossy.len() < ideal.len() * 9 / 10 && !lossy.is_empty());
 }
 
 #[test]
 fn effects_of_a_reference_are_none_of_a_live_device() {
-    let refusal = with_device("tilted.yaml", "- {effect: reference_tilt, rotvec: [0.01, 0.0, 0.0]}").err().unwrap();
-    assert!(refusal.contains("tilted.yaml: `reference_tilt` is an effect of a recording's reference"), "{refusal}");
+    let refusal = with_device(
+        "tilted.yaml",
+        "- {effect: reference_tilt, rotvec: [0.01, 0.0, 0.0]}",
+    )
+    .err()
+    .unwrap();
+    assert!(
+        refusal.contains("tilted.yaml: `reference_tilt` is an effect of a recording's reference"),
+        "{refusal}"
+    );
 }
 
 /// Networks whose last layer is zero but for its bias: what they add is known.
@@ -251,7 +420,10 @@ fn constant_networks(folder: &std::path::Path, acceleration: [f32; 3], angular_v
     let constant = |values: [f32; 3]| {
         let mut network = Network::new(shape.clone(), 1).unwrap();
         let tensors = network.shape().tensors();
-        for tensor in tensors.iter().filter(|tensor| tensor.name.starts_with("linear.")) {
+        for tensor in tensors
+            .iter()
+            .filter(|tensor| tensor.name.starts_with("linear."))
+        {
             let place = &mut network.parameters_mut()[tensor.range.clone()];
             place.fill(0.0);
             if tensor.name == "linear.bias" {
@@ -261,7 +433,10 @@ fn constant_networks(folder: &std::path::Path, acceleration: [f32; 3], angular_v
         network
     };
     let networks = [constant(acceleration), constant(angular_velocity)];
-    LearnedSimulator::new(Input::Streaming, networks).unwrap().write(folder, &BTreeMap::new()).unwrap();
+    LearnedSimulator::new(Input::Streaming, networks)
+        .unwrap()
+        .write(folder, &BTreeMap::new())
+        .unwrap();
 }
 
 #[test]
@@ -270,18 +445,38 @@ fn networks_correct_what_the_scheme_says_before_the_device() {
     constant_networks(folder.path(), [0.1, 0.0, 0.0], [0.0, 0.5, 0.0]);
     let motion = embedded_walk();
     let read = |learned: String| {
-        let mut node = node(Config { noise: false, learned, ..Config::default() });
+        let mut node = node(Config {
+            noise: false,
+            learned,
+            ..Config::default()
+        });
         let states = (0..200).map(|frame| state(&motion, frame, START + frame as i64 * 10_000_000));
-        states.flat_map(|state| node.step(&state).unwrap().readings).collect::<Vec<_>>()
+        states
+            .flat_map(|state| node.step(&state).unwrap().readings)
+            .collect::<Vec<_>>()
     };
-    let (plain, learned) = (read(String::new()), read(folder.path().display().to_string()));
+    let (plain, learned) = (
+        read(String::new()),
+        read(folder.path().display().to_string()),
+    );
     assert_eq!(plain.len(), learned.len());
     for (before, after) in plain.iter().zip(&learned) {
-        let difference = |a: cromosim_msgs::geometry_msgs::Vector3, b: cromosim_msgs::geometry_msgs::Vector3| {
+        let difference = |a: cromosim_msgs::geometry_msgs::Vector3,
+                          b: cromosim_msgs::geometry_msgs::Vector3| {
             (Vector3::from(a) - Vector3::from(b)).norm()
         };
         // 0.1 of 5 m/s2 and 0.5 of 2 rad/s, whatever way the sensor is turned.
-        assert!((difference(after.raw.linear_acceleration, before.raw.linear_acceleration) - 0.5).abs() < 1e-5);
-        assert!((difference(after.raw.angular_velocity, before.raw.angular_velocity) - 1.0).abs() < 1e-5);
+        assert!(
+            (difference(
+                after.raw.linear_acceleration,
+                before.raw.linear_acceleration
+            ) - 0.5)
+                .abs()
+                < 1e-5
+        );
+        assert!(
+            (difference(after.raw.angular_velocity, before.raw.angular_velocity) - 1.0).abs()
+                < 1e-5
+        );
     }
 }

@@ -1,4 +1,5 @@
-//! A part of bytes that are shared: arrays refer to the file that they came in, so that reading copies nothing.
+//! A part of bytes that are shared: arrays refer to the file that they came in, so that reading
+//! copies nothing.
 
 use std::ops::{Deref, Range};
 use std::sync::Arc;
@@ -13,15 +14,23 @@ pub struct Blob {
 impl Blob {
     /// Part of this, `None` where it reaches past the end.
     pub fn part(&self, start: usize, length: usize) -> Option<Self> {
-        let end = start.checked_add(length).filter(|&end| end <= self.range.len())?;
-        Some(Self { bytes: Arc::clone(&self.bytes), range: self.range.start + start..self.range.start + end })
+        let end = start
+            .checked_add(length)
+            .filter(|&end| end <= self.range.len())?;
+        Some(Self {
+            bytes: Arc::clone(&self.bytes),
+            range: self.range.start + start..self.range.start + end,
+        })
     }
 }
 
 impl From<Vec<u8>> for Blob {
     fn from(bytes: Vec<u8>) -> Self {
         let range = 0..bytes.len();
-        Self { bytes: Arc::new(bytes), range }
+        Self {
+            bytes: Arc::new(bytes),
+            range,
+        }
     }
 }
 

@@ -41,10 +41,15 @@ pub struct DType {
 impl DType {
     /// Little-endian elements of `size` bytes.
     pub const fn new(kind: Kind, size: usize) -> Self {
-        Self { kind, size, big_endian: false }
+        Self {
+            kind,
+            size,
+            big_endian: false,
+        }
     }
 
-    /// From numpy's description, such as `<f4`, `|S5`, `>i8`, `O`; without a byte order it is little-endian.
+    /// From numpy's description, such as `<f4`, `|S5`, `>i8`, `O`; without a byte order it is
+    /// little-endian.
     pub fn parse(description: &str) -> Option<Self> {
         let (order, rest) = match description.as_bytes().first()? {
             b'<' | b'=' | b'|' => (false, description.get(1..)?),
@@ -55,7 +60,13 @@ impl DType {
             return Some(Self::new(Kind::Bool, 1));
         }
         let (letter, digits) = (rest.as_bytes().first()?, rest.get(1..)?);
-        let number = |digits: &str| if digits.is_empty() { Some(0) } else { digits.parse::<usize>().ok().filter(|&n| n < 1 << 31) };
+        let number = |digits: &str| {
+            if digits.is_empty() {
+                Some(0)
+            } else {
+                digits.parse::<usize>().ok().filter(|&n| n < 1 << 31)
+            }
+        };
         let (kind, size) = match letter {
             b'b' => (Kind::Bool, number(digits)?),
             b'i' => (Kind::Int, number(digits)?),
@@ -76,7 +87,11 @@ impl DType {
             Kind::Complex => matches!(size, 8 | 16),
             _ => true,
         };
-        fits.then_some(Self { kind, size, big_endian: order })
+        fits.then_some(Self {
+            kind,
+            size,
+            big_endian: order,
+        })
     }
 }
 
@@ -122,7 +137,9 @@ mod tests {
 
     #[test]
     fn descriptions_come_back() {
-        for text in ["<f4", ">f8", "<i8", "|b1", "<U5", "|S3", "|u1", "<c16", "|O", "<f2", "|V10"] {
+        for text in [
+            "<f4", ">f8", "<i8", "|b1", "<U5", "|S3", "|u1", "<c16", "|O", "<f2", "|V10",
+        ] {
             assert_eq!(DType::parse(text).unwrap().to_string(), text);
         }
         assert_eq!(DType::parse("f4"), DType::parse("<f4"));
@@ -133,7 +150,13 @@ mod tests {
 
     #[test]
     fn halves() {
-        let cases = [(0x3c00, 1.0), (0xc000, -2.0), (0x7bff, 65504.0), (0x0001, 2_f64.powi(-24)), (0x3555, 0.333_251_953_125)];
+        let cases = [
+            (0x3c00, 1.0),
+            (0xc000, -2.0),
+            (0x7bff, 65504.0),
+            (0x0001, 2_f64.powi(-24)),
+            (0x3555, 0.333_251_953_125),
+        ];
         assert!(cases.iter().all(|&(bits, value)| half(bits) == value));
         assert!(half(0x7c00).is_infinite() && half(0x7e00).is_nan());
     }

@@ -8,7 +8,8 @@ use crate::array::{Array, ArrayData};
 use crate::limits::ELEMENTS_LIMIT;
 use crate::value::{Sparse, Value};
 
-/// A value with its file and its key path, such as `smpl_params_global.body_pose`. Cloning is cheap.
+/// A value with its file and its key path, such as `smpl_params_global.body_pose`. Cloning is
+/// cheap.
 #[derive(Clone, Debug)]
 pub struct Entry {
     pub(crate) path: Arc<Path>,
@@ -19,10 +20,15 @@ pub struct Entry {
 impl Entry {
     /// A value of `path` under `key`; the root's key is empty.
     pub fn new(path: &Path, key: impl Into<String>, value: Value) -> Self {
-        Self { path: Arc::from(path), key: key.into(), value }
+        Self {
+            path: Arc::from(path),
+            key: key.into(),
+            value,
+        }
     }
 
-    /// The value; a dictionary that `numpy.save` wrapped into an array without dimensions is taken out of it.
+    /// The value; a dictionary that `numpy.save` wrapped into an array without dimensions is taken
+    /// out of it.
     pub fn value(&self) -> &Value {
         self.value.unwrapped()
     }
@@ -37,12 +43,14 @@ impl Entry {
         &self.path
     }
 
-    /// What a dictionary has under `name`; `None` where it has nothing or `None`, or where this is no dictionary.
+    /// What a dictionary has under `name`; `None` where it has nothing or `None`, or where this is
+    /// no dictionary.
     pub fn get(&self, name: &str) -> Option<Self> {
         match self.value() {
-            Value::Dict(dict) => {
-                dict.get(name).filter(|value| !matches!(value.unwrapped(), Value::None)).map(|value| self.child(name, value))
-            }
+            Value::Dict(dict) => dict
+                .get(name)
+                .filter(|value| !matches!(value.unwrapped(), Value::None))
+                .map(|value| self.child(name, value)),
             _ => None,
         }
     }
@@ -50,9 +58,14 @@ impl Entry {
     /// What a dictionary has under `name`.
     ///
     /// # Errors
-    /// [`ArraysError::Type`] where this is no dictionary, [`ArraysError::MissingKey`] with the keys that there are.
+    /// [`ArraysError::Type`] where this is no dictionary, [`ArraysError::MissingKey`] with the keys
+    /// that there are.
     pub fn at(&self, name: &str) -> Result<Self, ArraysError> {
-        let missing = |known| ArraysError::MissingKey { path: self.path.to_path_buf(), key: self.joined(name), known };
+        let missing = |known| ArraysError::MissingKey {
+            path: self.path.to_path_buf(),
+            key: self.joined(name),
+            known,
+        };
         match self.value() {
             Value::Dict(_) => self.get(name).ok_or_else(|| missing(self.known_keys())),
             _ => Err(self.wrong_type("a dictionary")),
@@ -64,8 +77,14 @@ impl Entry {
     /// # Errors
     /// [`ArraysError::Type`].
     pub fn pairs(&self) -> Result<Vec<(Value, Self)>, ArraysError> {
-        let Value::Dict(dict) = self.value() else { return Err(self.wrong_type("a dictionary")) };
-        Ok(dict.pairs().iter().map(|(key, value)| (key.clone(), self.child(&key_text(key), value))).collect())
+        let Value::Dict(dict) = self.value() else {
+            return Err(self.wrong_type("a dictionary"));
+        };
+        Ok(dict
+            .pairs()
+            .iter()
+            .map(|(key, value)| (key.clone(), self.child(&key_text(key), value)))
+            .collect())
     }
 
     /// The items of a list, a tuple or an array of objects.
@@ -75,11 +94,16 @@ impl Entry {
     pub fn items(&self) -> Result<Vec<Self>, ArraysError> {
         let items = match self.value() {
             Value::List(items) | Value::Tuple(items) => items.as_slice(),
-            Value::Array(array) if array.object_elements().len() == array.element_count() => array.object_elements(),
+            Value::Array(array) if array.object_elements().len() == array.element_count() => {
+                array.object_elements()
+            }
             _ => return Err(self.wrong_type("a list")),
         };
-        let item =
-            |(index, value): (usize, &Value)| Self { path: self.path.clone(), key: format!("{}[{index}]", self.key), value: value.clone() };
+        let item = |(index, value): (usize, &Value)| Self {
+            path: self.path.clone(),
+            key: format!("{}[{index}]", self.key),
+            value: value.clone(),
+        };
         Ok(items.iter().enumerate().map(item).collect())
     }
 
@@ -95,26 +119,41 @@ impl Entry {
         }
     }
 
-    /// Numbers in C order as float64, from an array or tensor of any number type, byte order and strides, a sparse matrix, a chumpy
-    /// array, a number, or lists of such. `expected` holds the dimensions that are given and is named by `expectation` in the error.
+    /// Numbers in C order as float64, from an array or tensor of any number type, byte order and
+    /// strides, a sparse matrix, a chumpy array, a number, or lists of such. `expected` holds the
+    /// dimensions that are given and is named by `expectation` in the error.
     ///
     /// # Errors
-    /// [`ArraysError::Type`], [`ArraysError::ElementType`], [`ArraysError::Shape`], [`ArraysError::TooLarge`],
-    /// [`ArraysError::NotFinite`].
-    pub fn floats(&self, expected: &[Option<usize>], expectation: &str) -> Result<Array<f64>, ArraysError> {
+    /// [`ArraysError::Type`], [`ArraysError::ElementType`], [`ArraysError::Shape`],
+    /// [`ArraysError::TooLarge`], [`ArraysError::NotFinite`].
+    pub fn floats(
+        &self,
+        expected: &[Option<usize>],
+        expectation: &str,
+    ) -> Result<Array<f64>, ArraysError> {
         let array = self.floats_with_nan(expected, expectation)?;
         if let Some(element) = array.values.iter().position(|value| !value.is_finite()) {
             let value = array.values[element];
-            return Err(ArraysError::NotFinite { path: self.path.to_path_buf(), key: self.key.clone(), element, value });
+            return Err(ArraysError::NotFinite {
+                path: self.path.to_path_buf(),
+                key: self.key.clone(),
+                element,
+                value,
+            });
         }
         Ok(array)
     }
 
-    /// Like [`Self::floats`], NaN and infinities included: for files in which NaN marks what is missing.
+    /// Like [`Self::floats`], NaN and infinities included: for files in which NaN marks what is
+    /// missing.
     ///
     /// # Errors
     /// As [`Self::floats`], without [`ArraysError::NotFinite`].
-    pub fn floats_with_nan(&self, expected: &[Option<usize>], expectation: &str) -> Result<Array<f64>, ArraysError> {
+    pub fn floats_with_nan(
+        &self,
+        expected: &[Option<usize>],
+        expectation: &str,
+    ) -> Result<Array<f64>, ArraysError> {
         // What tells its shape is not decoded before the shape is known to suit.
         match self.value() {
             Value::Array(array) => self.check_shape(array.shape(), expected, expectation)?,
@@ -126,24 +165,46 @@ impl Entry {
         Ok(array)
     }
 
-    /// Whole numbers in C order; floats are not rounded but refused. Unsigned ones above i64's range become its largest value.
+    /// Whole numbers in C order; floats are not rounded but refused. Unsigned ones above i64's
+    /// range become its largest value.
     ///
     /// # Errors
     /// As [`Self::floats`].
-    pub fn integers(&self, expected: &[Option<usize>], expectation: &str) -> Result<Array<i64>, ArraysError> {
+    pub fn integers(
+        &self,
+        expected: &[Option<usize>],
+        expectation: &str,
+    ) -> Result<Array<i64>, ArraysError> {
         let array = match self.value() {
             Value::Array(array) => {
                 self.check_shape(array.shape(), expected, expectation)?;
                 self.check_size(array.element_count())?;
-                let values = array.as_integers().ok_or_else(|| self.wrong_elements(array, "integers"))?;
-                Array { shape: array.shape().to_vec(), values }
+                let values = array
+                    .as_integers()
+                    .ok_or_else(|| self.wrong_elements(array, "integers"))?;
+                Array {
+                    shape: array.shape().to_vec(),
+                    values,
+                }
             }
-            Value::Int(value) => Array { shape: Vec::new(), values: vec![*value] },
-            Value::Bool(value) => Array { shape: Vec::new(), values: vec![i64::from(*value)] },
+            Value::Int(value) => Array {
+                shape: Vec::new(),
+                values: vec![*value],
+            },
+            Value::Bool(value) => Array {
+                shape: Vec::new(),
+                values: vec![i64::from(*value)],
+            },
             Value::List(_) | Value::Tuple(_) => {
                 let items = self.items()?;
-                let values = items.iter().map(Self::integer).collect::<Result<Vec<_>, _>>()?;
-                Array { shape: vec![values.len()], values }
+                let values = items
+                    .iter()
+                    .map(Self::integer)
+                    .collect::<Result<Vec<_>, _>>()?;
+                Array {
+                    shape: vec![values.len()],
+                    values,
+                }
             }
             _ => return Err(self.wrong_type("an array of integers")),
         };
@@ -154,11 +215,16 @@ impl Entry {
     /// A single number: of a Python number or an array of one element.
     ///
     /// # Errors
-    /// [`ArraysError::Type`], [`ArraysError::ElementType`], [`ArraysError::Shape`], [`ArraysError::NotFinite`].
+    /// [`ArraysError::Type`], [`ArraysError::ElementType`], [`ArraysError::Shape`],
+    /// [`ArraysError::NotFinite`].
     pub fn float(&self) -> Result<f64, ArraysError> {
         self.check_single()?;
         let array = self.floats(&vec![None; self.shape()?.len()], "a number")?;
-        array.values.first().copied().ok_or_else(|| self.wrong_type("a number"))
+        array
+            .values
+            .first()
+            .copied()
+            .ok_or_else(|| self.wrong_type("a number"))
     }
 
     /// A single whole number: of a Python number or an array of one element.
@@ -171,8 +237,13 @@ impl Entry {
             Value::Int(value) => Ok(*value),
             Value::Bool(value) => Ok(i64::from(*value)),
             Value::Array(array) => {
-                let values = array.as_integers().ok_or_else(|| self.wrong_elements(array, "integers"))?;
-                values.first().copied().ok_or_else(|| self.wrong_type("a whole number"))
+                let values = array
+                    .as_integers()
+                    .ok_or_else(|| self.wrong_elements(array, "integers"))?;
+                values
+                    .first()
+                    .copied()
+                    .ok_or_else(|| self.wrong_type("a whole number"))
             }
             _ => Err(self.wrong_type("a whole number")),
         }
@@ -187,7 +258,15 @@ impl Entry {
         match self.value() {
             Value::Array(array) if array.element_count() == 1 => {
                 let first = array.as_texts().and_then(|texts| texts.into_iter().next());
-                first.or_else(|| array.object_elements().first()?.text().map(|text| text.to_string())).ok_or_else(wrong)
+                first
+                    .or_else(|| {
+                        array
+                            .object_elements()
+                            .first()?
+                            .text()
+                            .map(|text| text.to_string())
+                    })
+                    .ok_or_else(wrong)
             }
             value => value.text().map(|text| text.to_string()).ok_or_else(wrong),
         }
@@ -207,20 +286,39 @@ impl Entry {
     }
 
     fn child(&self, name: &str, value: &Value) -> Self {
-        Self { path: self.path.clone(), key: self.joined(name), value: value.clone() }
+        Self {
+            path: self.path.clone(),
+            key: self.joined(name),
+            value: value.clone(),
+        }
     }
 
     fn joined(&self, name: &str) -> String {
-        if self.key.is_empty() { name.to_owned() } else { format!("{}.{name}", self.key) }
+        if self.key.is_empty() {
+            name.to_owned()
+        } else {
+            format!("{}.{name}", self.key)
+        }
     }
 
     fn known_keys(&self) -> String {
-        let Value::Dict(dict) = self.value() else { return String::new() };
-        let mut names: Vec<_> = dict.pairs().iter().take(20).map(|(key, _)| key_text(key)).collect();
+        let Value::Dict(dict) = self.value() else {
+            return String::new();
+        };
+        let mut names: Vec<_> = dict
+            .pairs()
+            .iter()
+            .take(20)
+            .map(|(key, _)| key_text(key))
+            .collect();
         if dict.pairs().len() > names.len() {
             names.push(format!("and {} more", dict.pairs().len() - names.len()));
         }
-        if names.is_empty() { "none".to_owned() } else { names.join(", ") }
+        if names.is_empty() {
+            "none".to_owned()
+        } else {
+            names.join(", ")
+        }
     }
 
     /// Whatever is made of numbers, as an array.
@@ -228,14 +326,26 @@ impl Entry {
         match self.value() {
             Value::Array(array) if array.object_elements().is_empty() => {
                 self.check_size(array.element_count())?;
-                let values = array.as_floats().ok_or_else(|| self.wrong_elements(array, "numbers"))?;
-                Ok(Array { shape: array.shape().to_vec(), values })
+                let values = array
+                    .as_floats()
+                    .ok_or_else(|| self.wrong_elements(array, "numbers"))?;
+                Ok(Array {
+                    shape: array.shape().to_vec(),
+                    values,
+                })
             }
             Value::Sparse(sparse) => self.dense(sparse),
             value => {
-                let mut stack = Stack { entry: self, values: Vec::new(), visits: 0 };
+                let mut stack = Stack {
+                    entry: self,
+                    values: Vec::new(),
+                    visits: 0,
+                };
                 let shape = stack.add(value, 0)?;
-                Ok(Array { shape, values: stack.values })
+                Ok(Array {
+                    shape,
+                    values: stack.values,
+                })
             }
         }
     }
@@ -247,14 +357,18 @@ impl Entry {
         for &(row, column, value) in &sparse.entries {
             values[row as usize * columns + column as usize] += value; // scipy sums what is stored twice
         }
-        Ok(Array { shape: vec![rows, columns], values })
+        Ok(Array {
+            shape: vec![rows, columns],
+            values,
+        })
     }
 
     fn check_single(&self) -> Result<(), ArraysError> {
         match self.value() {
-            Value::Array(array) if array.element_count() != 1 => {
-                Err(self.wrong_shape(array.shape().iter().map(|&size| size as u64).collect(), "one element".to_owned()))
-            }
+            Value::Array(array) if array.element_count() != 1 => Err(self.wrong_shape(
+                array.shape().iter().map(|&size| size as u64).collect(),
+                "one element".to_owned(),
+            )),
             Value::Array(_) | Value::Int(_) | Value::Float(_) | Value::Bool(_) => Ok(()),
             _ => Err(self.wrong_type("a number")),
         }
@@ -262,29 +376,67 @@ impl Entry {
 
     fn check_size(&self, elements: usize) -> Result<(), ArraysError> {
         if elements > ELEMENTS_LIMIT {
-            let (bytes, limit) = ((elements as u64).saturating_mul(8), 8 * ELEMENTS_LIMIT as u64);
-            return Err(ArraysError::TooLarge { path: self.path.to_path_buf(), key: self.key.clone(), bytes, limit });
+            let (bytes, limit) = (
+                (elements as u64).saturating_mul(8),
+                8 * ELEMENTS_LIMIT as u64,
+            );
+            return Err(ArraysError::TooLarge {
+                path: self.path.to_path_buf(),
+                key: self.key.clone(),
+                bytes,
+                limit,
+            });
         }
         Ok(())
     }
 
-    fn check_shape(&self, shape: &[usize], expected: &[Option<usize>], expectation: &str) -> Result<(), ArraysError> {
-        let suits =
-            shape.len() == expected.len() && shape.iter().zip(expected).all(|(&found, expected)| expected.is_none_or(|e| found == e));
-        if suits { Ok(()) } else { Err(self.wrong_shape(shape.iter().map(|&size| size as u64).collect(), expectation.to_owned())) }
+    fn check_shape(
+        &self,
+        shape: &[usize],
+        expected: &[Option<usize>],
+        expectation: &str,
+    ) -> Result<(), ArraysError> {
+        let suits = shape.len() == expected.len()
+            && shape
+                .iter()
+                .zip(expected)
+                .all(|(&found, expected)| expected.is_none_or(|e| found == e));
+        if suits {
+            Ok(())
+        } else {
+            Err(self.wrong_shape(
+                shape.iter().map(|&size| size as u64).collect(),
+                expectation.to_owned(),
+            ))
+        }
     }
 
     fn wrong_shape(&self, found: Vec<u64>, expected: String) -> ArraysError {
-        ArraysError::Shape { path: self.path.to_path_buf(), key: self.key.clone(), found, expected }
+        ArraysError::Shape {
+            path: self.path.to_path_buf(),
+            key: self.key.clone(),
+            found,
+            expected,
+        }
     }
 
     fn wrong_elements(&self, array: &ArrayData, expected: &'static str) -> ArraysError {
-        ArraysError::ElementType { path: self.path.to_path_buf(), key: self.key.clone(), found: array.dtype().to_string(), expected }
+        ArraysError::ElementType {
+            path: self.path.to_path_buf(),
+            key: self.key.clone(),
+            found: array.dtype().to_string(),
+            expected,
+        }
     }
 
     fn wrong_type(&self, expected: &str) -> ArraysError {
         let found = format!("{} ({:?})", self.value().type_name(), self.value());
-        ArraysError::Type { path: self.path.to_path_buf(), key: self.key.clone(), found, expected: expected.to_owned() }
+        ArraysError::Type {
+            path: self.path.to_path_buf(),
+            key: self.key.clone(),
+            found,
+            expected: expected.to_owned(),
+        }
     }
 }
 
@@ -306,35 +458,55 @@ impl Stack<'_> {
     fn add(&mut self, value: &Value, depth: usize) -> Result<Vec<usize>, ArraysError> {
         self.visits += 1;
         if depth > STACK_DEPTH_LIMIT || self.visits > STACK_VISITS_LIMIT {
-            return Err(self.entry.wrong_type("an array of numbers, or lists of few levels"));
+            return Err(self
+                .entry
+                .wrong_type("an array of numbers, or lists of few levels"));
         }
         let number = match value.unwrapped() {
             Value::Float(number) => *number,
             Value::Int(number) => *number as f64,
             Value::Bool(number) => f64::from(u8::from(*number)),
-            Value::List(items) | Value::Tuple(items) => return self.add_items(items, &[items.len()], depth),
+            Value::List(items) | Value::Tuple(items) => {
+                return self.add_items(items, &[items.len()], depth);
+            }
             Value::Array(array) if array.object_elements().is_empty() => {
-                self.entry.check_size(self.values.len().saturating_add(array.element_count()))?;
-                self.values.extend(array.as_floats().ok_or_else(|| self.entry.wrong_elements(array, "numbers"))?);
+                self.entry
+                    .check_size(self.values.len().saturating_add(array.element_count()))?;
+                self.values.extend(
+                    array
+                        .as_floats()
+                        .ok_or_else(|| self.entry.wrong_elements(array, "numbers"))?,
+                );
                 return Ok(array.shape().to_vec());
             }
-            Value::Array(array) => return self.add_items(array.object_elements(), array.shape(), depth),
+            Value::Array(array) => {
+                return self.add_items(array.object_elements(), array.shape(), depth);
+            }
             _ => return Err(self.entry.wrong_type("an array of numbers")),
         };
         self.values.push(number);
         Ok(Vec::new())
     }
 
-    fn add_items(&mut self, items: &[Value], outer: &[usize], depth: usize) -> Result<Vec<usize>, ArraysError> {
+    fn add_items(
+        &mut self,
+        items: &[Value],
+        outer: &[usize],
+        depth: usize,
+    ) -> Result<Vec<usize>, ArraysError> {
         let mut inner: Option<Vec<usize>> = None;
         for item in items {
             let shape = self.add(item, depth + 1)?;
             let first = inner.get_or_insert_with(|| shape.clone());
-            // Most items are numbers, without a shape: comparing empty vectors, whose pointers dangle, would take most of the time.
+            // Most items are numbers, without a shape: comparing empty vectors, whose pointers
+            // dangle, would take most of the time.
             let both_empty = first.is_empty() && shape.is_empty();
             if !both_empty && *first != shape {
                 let found = shape.iter().map(|&size| size as u64).collect();
-                return Err(self.entry.wrong_shape(found, format!("{first:?} for every item of a list, as its first has")));
+                return Err(self.entry.wrong_shape(
+                    found,
+                    format!("{first:?} for every item of a list, as its first has"),
+                ));
             }
         }
         Ok([outer, &inner.unwrap_or_default()].concat())

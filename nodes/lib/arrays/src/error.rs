@@ -3,7 +3,8 @@
 use std::io;
 use std::path::PathBuf;
 
-/// An error of this crate; the message names the file, the place and what to do. `key` is empty where the file as a whole is meant.
+/// An error of this crate; the message names the file, the place and what to do. `key` is empty
+/// where the file as a whole is meant.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ArraysError {
@@ -158,7 +159,11 @@ pub enum ArraysError {
 }
 
 fn at(key: &str) -> String {
-    if key.is_empty() { String::new() } else { format!("key {key}: ") }
+    if key.is_empty() {
+        String::new()
+    } else {
+        format!("key {key}: ")
+    }
 }
 
 pub(crate) fn invalid(message: impl Into<String>) -> io::Error {

@@ -1,10 +1,12 @@
-//! Containers of arrays, as tools around body models and motion write them: `.npy`, `.npz`, pickles of protocols 0 to 5, joblib files
-//! (plain, zlib, gzip), torch files (zip and legacy), MATLAB's `.mat` up to version 7.
+//! Containers of arrays, as tools around body models and motion write them: `.npy`, `.npz`, pickles
+//! of protocols 0 to 5, joblib files (plain, zlib, gzip), torch files (zip and legacy), MATLAB's
+//! `.mat` up to version 7.
 //!
-//! What a file is, its first bytes tell. Nothing is executed: a pickle refers to Python functions by name, and this reader rebuilds what a
-//! fixed list names (arrays and scalars of numpy, sparse csc and csr matrices of scipy, chumpy arrays, torch tensors, builtin and ordered
-//! dictionaries) and refuses all else by name. What a file declares is checked against the bytes that it has before memory is taken, and
-//! [`Limits`] bound what compression, sharing and nesting can multiply.
+//! What a file is, its first bytes tell. Nothing is executed: a pickle refers to Python functions
+//! by name, and this reader rebuilds what a fixed list names (arrays and scalars of numpy, sparse
+//! csc and csr matrices of scipy, chumpy arrays, torch tensors, builtin and ordered dictionaries)
+//! and refuses all else by name. What a file declares is checked against the bytes that it has
+//! before memory is taken, and [`Limits`] bound what compression, sharing and nesting can multiply.
 //!
 //! ```
 //! use std::io::Cursor;
@@ -22,13 +24,15 @@
 //! # }
 //! ```
 //!
-//! Why an own pickle reader: `serde-pickle` 1.2 drops the types of numpy arrays and reads no joblib; `repugnant-pickle` 0.0.1 fails on
-//! joblib; `pyferrite` 0.0.2 reads most of this, but not protocol 0 nor torch tensors within `.npy`, and is too young to lean on.
-//! zip and zlib are left to `zip` and `flate2`.
+//! Why an own pickle reader: `serde-pickle` 1.2 drops the types of numpy arrays and reads no
+//! joblib; `repugnant-pickle` 0.0.1 fails on joblib; `pyferrite` 0.0.2 reads most of this, but not
+//! protocol 0 nor torch tensors within `.npy`, and is too young to lean on. zip and zlib are left
+//! to `zip` and `flate2`.
 //!
-//! MATLAB's level 5 files are a page of rules over zlib, against five crates behind `matfile` 0.5. HDF5 (MATLAB 7.3) is refused by name:
-//! `hdf5-pure` 0.47 has 127 000 lines, breaks its API monthly and has open reports of panics on damaged files; `hdf5-reader` 0.12 has 30 000
-//! and maps files into memory by unsafe code; `hdf5-metno` links the C library.
+//! MATLAB's level 5 files are a page of rules over zlib, against five crates behind `matfile` 0.5.
+//! HDF5 (MATLAB 7.3) is refused by name: `hdf5-pure` 0.47 has 127 000 lines, breaks its API monthly
+//! and has open reports of panics on damaged files; `hdf5-reader` 0.12 has 30 000 and maps files
+//! into memory by unsafe code; `hdf5-metno` links the C library.
 
 mod array;
 mod blob;

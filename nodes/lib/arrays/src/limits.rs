@@ -1,7 +1,8 @@
 //! What a hostile file may cost.
 
-/// Bounds on what is built from one container. Whatever a header declares is checked against the bytes that are there before memory is
-/// taken; these bounds are for what honest bytes can still multiply into (compression, shared objects, deep nesting).
+/// Bounds on what is built from one container. Whatever a header declares is checked against the
+/// bytes that are there before memory is taken; these bounds are for what honest bytes can still
+/// multiply into (compression, shared objects, deep nesting).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Bytes that decompressed data, and objects rebuilt from it, may take in all.
@@ -15,14 +16,19 @@ pub struct Limits {
 impl Default for Limits {
     /// 4 GiB, 50 million opcodes, 100 levels: hours of video estimates with all their vertices.
     fn default() -> Self {
-        Self { decoded_bytes: 4 << 30, opcodes: 50_000_000, depth: 100 }
+        Self {
+            decoded_bytes: 4 << 30,
+            opcodes: 50_000_000,
+            depth: 100,
+        }
     }
 }
 
 /// Elements of the largest array that accessors hand out as numbers: 2 GiB of float64.
 pub const ELEMENTS_LIMIT: usize = 1 << 28;
 
-/// A tensor with a stride of 0 shows the same bytes many times. It may show this many bytes, and [`EXPANSION`] times what the file has.
+/// A tensor with a stride of 0 shows the same bytes many times. It may show this many bytes, and
+/// [`EXPANSION`] times what the file has.
 pub(crate) const EXPANDED_BYTES: u64 = 16 << 20;
 pub(crate) const EXPANSION: u64 = 256;
 
@@ -43,7 +49,8 @@ impl Budget {
         Self {
             decoded_bytes: limits.decoded_bytes,
             opcodes: limits.opcodes,
-            expanded_bytes: EXPANDED_BYTES.saturating_add(EXPANSION.saturating_mul(container_bytes)),
+            expanded_bytes: EXPANDED_BYTES
+                .saturating_add(EXPANSION.saturating_mul(container_bytes)),
             depth: limits.depth,
             limits,
             skipped: &[],
@@ -52,7 +59,10 @@ impl Budget {
 
     /// Takes `bytes` off; the message where too little is left.
     pub fn take(&mut self, bytes: u64) -> Result<(), String> {
-        self.decoded_bytes = self.decoded_bytes.checked_sub(bytes).ok_or_else(|| self.too_much())?;
+        self.decoded_bytes = self
+            .decoded_bytes
+            .checked_sub(bytes)
+            .ok_or_else(|| self.too_much())?;
         Ok(())
     }
 
@@ -65,7 +75,9 @@ impl Budget {
 
     pub fn take_expanded(&mut self, bytes: u64) -> Result<(), String> {
         let left = self.expanded_bytes.checked_sub(bytes);
-        self.expanded_bytes = left.ok_or_else(|| format!("a tensor repeats few bytes into {bytes}; save a contiguous copy of it"))?;
+        self.expanded_bytes = left.ok_or_else(|| {
+            format!("a tensor repeats few bytes into {bytes}; save a contiguous copy of it")
+        })?;
         Ok(())
     }
 }

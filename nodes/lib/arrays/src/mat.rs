@@ -1,8 +1,11 @@
-//! MATLAB's level 5 files (`.mat` by `save -v6` and `-v7`, GNU Octave, `scipy.io.savemat`): arrays of numbers and text by name.
+//! MATLAB's level 5 files (`.mat` by `save -v6` and `-v7`, GNU Octave, `scipy.io.savemat`): arrays
+//! of numbers and text by name.
 //!
-//! Source: MathWorks, MAT-File Format, level 5. 128 bytes of header, then elements: a tag (type, bytes) and content, padded to 8 bytes;
-//! contents of up to 4 bytes lie in the tag. An array is an element of elements: flags, dimensions, name, numbers by columns; it may stand
-//! in a zlib stream. What is no array of real numbers or text (cells, structs, objects, sparse, complex) is passed over.
+//! Source: MathWorks, MAT-File Format, level 5. 128 bytes of header, then elements: a tag (type,
+//! bytes) and content, padded to 8 bytes; contents of up to 4 bytes lie in the tag. An array is an
+//! element of elements: flags, dimensions, name, numbers by columns; it may stand in a zlib stream.
+//! What is no array of real numbers or text (cells, structs, objects, sparse, complex) is passed
+//! over.
 
 use std::sync::Arc;
 
@@ -34,16 +37,30 @@ pub(crate) fn read(bytes: &Blob, budget: &mut Budget) -> Result<Value, String> {
         Some(b"MI") => true,
         _ => return Err("the MATLAB header is cut short or damaged".to_owned()),
     };
-    let mut file = Elements { bytes: bytes.clone(), position: HEADER_BYTES, big_endian };
+    let mut file = Elements {
+        bytes: bytes.clone(),
+        position: HEADER_BYTES,
+        big_endian,
+    };
     let mut arrays = Vec::new();
     while let Some(element) = file.next()? {
         let array = match element.kind {
             COMPRESSED => {
-                let limits = Limits { decoded_bytes: budget.decoded_bytes, ..budget.limits };
+                let limits = Limits {
+                    decoded_bytes: budget.decoded_bytes,
+                    ..budget.limits
+                };
                 let content = inflated(&element.content, limits)?;
                 budget.take(content.len() as u64)?;
-                let mut within = Elements { bytes: content.into(), position: 0, big_endian };
-                within.next()?.filter(|element| element.kind == MATRIX).map(|element| array(element, big_endian, budget))
+                let mut within = Elements {
+                    bytes: content.into(),
+                    position: 0,
+                    big_endian,
+                };
+                within
+                    .next()?
+                    .filter(|element| element.kind == MATRIX)
+                    .map(|element| array(element, big_endian, budget))
             }
             MATRIX => Some(array(element, big_endian, budget)),
             _ => None,
@@ -72,18 +89,27 @@ impl Elements {
             return Ok(None);
         }
         let at = self.position;
-        let cut = || format!("byte {at}: an element is cut short; the file is incomplete or damaged");
+        let cut =
+            || format!("byte {at}: an element is cut short; the file is incomplete or damaged");
         let tag = self.number(at).ok_or_else(cut)?;
         // Two bytes of length before the type: the content stands in the tag.
         let (kind, length, start) = match tag >> 16 {
             0 => (tag, self.number(at + 4).ok_or_else(cut)? as usize, at + 8),
             length @ 1..=4 => (tag & 0xffff, length as usize, at + 4),
-            length => return Err(format!("byte {at}: an element of {length} bytes within its tag; the file is damaged")),
+            length => {
+                return Err(format!(
+                    "byte {at}: an element of {length} bytes within its tag; the file is damaged"
+                ));
+            }
         };
         let content = self.bytes.part(start, length).ok_or_else(cut)?;
         let end = start + length;
         // zlib streams are not padded; the last padding of a file may be missing.
-        self.position = if kind == COMPRESSED { end } else { end.next_multiple_of(8) };
+        self.position = if kind == COMPRESSED {
+            end
+        } else {
+            end.next_multiple_of(8)
+        };
         Ok(Some(Element { kind, content }))
     }
 
@@ -94,13 +120,29 @@ impl Elements {
 
 fn number(bytes: &[u8], big_endian: bool) -> Option<u32> {
     let bytes = *bytes.first_chunk()?;
-    Some(if big_endian { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) })
+    Some(if big_endian {
+        u32::from_be_bytes(bytes)
+    } else {
+        u32::from_le_bytes(bytes)
+    })
 }
 
 /// Name and value of an array, `None` for what is passed over.
-fn array(matrix: Element, big_endian: bool, budget: &mut Budget) -> Result<Option<(Value, Value)>, String> {
-    let mut parts = Elements { bytes: matrix.content, position: 0, big_endian };
-    let mut part = |what: &str| parts.next()?.ok_or_else(|| format!("an array has no {what}; the file is damaged"));
+fn array(
+    matrix: Element,
+    big_endian: bool,
+    budget: &mut Budget,
+) -> Result<Option<(Value, Value)>, String> {
+    let mut parts = Elements {
+        bytes: matrix.content,
+        position: 0,
+        big_endian,
+    };
+    let mut part = |what: &str| {
+        parts
+            .next()?
+            .ok_or_else(|| format!("an array has no {what}; the file is damaged"))
+    };
     let flags = part("flags")?;
     let word = number(&flags.content, big_endian).ok_or("an array's flags are cut short")?;
     let (class, flags) = (word as u8, (word >> 8) as u8);
@@ -109,8 +151,13 @@ fn array(matrix: Element, big_endian: bool, budget: &mut Budget) -> Result<Optio
     }
     let (dimensions, name, content) = (part("dimensions")?, part("name")?, part("content")?);
     let (sizes, rest) = dimensions.content.as_chunks::<4>();
-    let shape = sizes.iter().map(|size| number(size, big_endian).map(|size| size as usize)).collect::<Option<Vec<_>>>();
-    let Some(shape) = shape.filter(|shape| rest.is_empty() && (2..=DIMENSIONS_LIMIT).contains(&shape.len())) else {
+    let shape = sizes
+        .iter()
+        .map(|size| number(size, big_endian).map(|size| size as usize))
+        .collect::<Option<Vec<_>>>();
+    let Some(shape) =
+        shape.filter(|shape| rest.is_empty() && (2..=DIMENSIONS_LIMIT).contains(&shape.len()))
+    else {
         return Err("an array's dimensions are no list of sizes".to_owned());
     };
     if name.content.len() > NAME_LIMIT {
@@ -123,14 +170,19 @@ fn array(matrix: Element, big_endian: bool, budget: &mut Budget) -> Result<Optio
     let name = String::from_utf8_lossy(&name.content).into_owned();
     let in_name = |problem: String| format!("array {name}: {problem}");
     let value = if class == CHARACTERS {
-        budget.take(4 * content.content.len() as u64).map_err(in_name)?;
+        budget
+            .take(4 * content.content.len() as u64)
+            .map_err(in_name)?;
         match text(&content, big_endian) {
             Some(text) => Value::Text(text.into()),
             None => return Ok(None),
         }
     } else {
-        let dtype = dtype(content.kind, big_endian).ok_or_else(|| in_name(format!("elements of type {}", content.kind)))?;
-        Value::Array(Arc::new(ArrayData::contiguous(dtype, shape, true, content.content).map_err(in_name)?))
+        let dtype = dtype(content.kind, big_endian)
+            .ok_or_else(|| in_name(format!("elements of type {}", content.kind)))?;
+        Value::Array(Arc::new(
+            ArrayData::contiguous(dtype, shape, true, content.content).map_err(in_name)?,
+        ))
     };
     Ok(Some((Value::Text(name.into()), value)))
 }
@@ -150,16 +202,30 @@ fn dtype(kind: u32, big_endian: bool) -> Option<DType> {
         13 => (Kind::Uint, 8),
         _ => return None,
     };
-    Some(DType { kind, size, big_endian })
+    Some(DType {
+        kind,
+        size,
+        big_endian,
+    })
 }
 
 /// Of several rows the letters come by columns, as MATLAB's `x(:)'`.
 fn text(content: &Element, big_endian: bool) -> Option<String> {
     let units = || {
-        content.content.as_chunks::<2>().0.iter().map(|two| if big_endian { u16::from_be_bytes(*two) } else { u16::from_le_bytes(*two) })
+        content.content.as_chunks::<2>().0.iter().map(|two| {
+            if big_endian {
+                u16::from_be_bytes(*two)
+            } else {
+                u16::from_le_bytes(*two)
+            }
+        })
     };
     match content.kind {
-        4 | 17 => Some(char::decode_utf16(units()).map(|letter| letter.unwrap_or(char::REPLACEMENT_CHARACTER)).collect()),
+        4 | 17 => Some(
+            char::decode_utf16(units())
+                .map(|letter| letter.unwrap_or(char::REPLACEMENT_CHARACTER))
+                .collect(),
+        ),
         1 | 2 | 16 => Some(String::from_utf8_lossy(&content.content).into_owned()),
         _ => None,
     }

@@ -16,7 +16,8 @@ pub enum Value {
     Bool(bool),
     /// `int` within 64 bits.
     Int(i64),
-    /// Any other `int`: its decimal digits, or its bytes as `0x…` (two's complement, most significant first).
+    /// Any other `int`: its decimal digits, or its bytes as `0x…` (two's complement, most
+    /// significant first).
     BigInt(Arc<str>),
     /// `float`.
     Float(f64),
@@ -88,7 +89,10 @@ impl Dict {
 
     /// The value under a key of text (`str`, or `bytes` of the same letters).
     pub fn get(&self, key: &str) -> Option<&Value> {
-        self.by_text.get(key).and_then(|&index| self.pairs.get(index)).map(|(_, value)| value)
+        self.by_text
+            .get(key)
+            .and_then(|&index| self.pairs.get(index))
+            .map(|(_, value)| value)
     }
 
     /// Keys and values in the order of the file.
@@ -107,7 +111,8 @@ impl Value {
         }
     }
 
-    /// The object in a 0-dimensional array of objects, as `numpy.save` wraps a dictionary; else the value itself.
+    /// The object in a 0-dimensional array of objects, as `numpy.save` wraps a dictionary; else the
+    /// value itself.
     pub fn unwrapped(&self) -> &Self {
         let mut value = self;
         // Arrays of objects nest at most as deep as `Limits::depth`.
@@ -155,7 +160,9 @@ impl fmt::Debug for Value {
             Self::List(items) => write!(formatter, "list of {}", items.len()),
             Self::Tuple(items) => write!(formatter, "tuple of {}", items.len()),
             Self::Dict(dict) => write!(formatter, "{dict:?}"),
-            Self::Array(array) => write!(formatter, "array {:?} of {}", array.shape(), array.dtype()),
+            Self::Array(array) => {
+                write!(formatter, "array {:?} of {}", array.shape(), array.dtype())
+            }
             Self::Sparse(sparse) => write!(formatter, "sparse {:?}", sparse.shape),
             Self::Name(name) => write!(formatter, "name {name}"),
         }

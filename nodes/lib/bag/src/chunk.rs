@@ -39,25 +39,44 @@ impl ChunkHeader {
     }
 }
 
-/// Unpacks a chunk's body. Of a whole chunk, size and checksum must be right; of a cut one, what is there is given.
+/// Unpacks a chunk's body. Of a whole chunk, size and checksum must be right; of a cut one, what is
+/// there is given.
 pub(crate) fn unpack(body: &[u8]) -> Unpacked {
     let mut fields = Fields(body);
     let Some(header) = ChunkHeader::take(&mut fields) else {
-        return Unpacked { records: Vec::new(), fault: Some("a chunk without a whole header".to_owned()) };
+        return Unpacked {
+            records: Vec::new(),
+            fault: Some("a chunk without a whole header".to_owned()),
+        };
     };
-    let there = fields.0.len().min(usize::try_from(header.compressed_size).unwrap_or(usize::MAX));
-    let (records, fault) = decompress(&header.compression, &fields.0[..there], header.uncompressed_size.min(LARGEST_RECORD));
+    let there = fields
+        .0
+        .len()
+        .min(usize::try_from(header.compressed_size).unwrap_or(usize::MAX));
+    let (records, fault) = decompress(
+        &header.compression,
+        &fields.0[..there],
+        header.uncompressed_size.min(LARGEST_RECORD),
+    );
     let fault = fault.or_else(|| check(&header, &records));
     Unpacked { records, fault }
 }
 
 fn check(header: &ChunkHeader, records: &[u8]) -> Option<String> {
     if records.len() as u64 != header.uncompressed_size {
-        return Some(format!("expected a chunk of {} bytes, found {}", header.uncompressed_size, records.len()));
+        return Some(format!(
+            "expected a chunk of {} bytes, found {}",
+            header.uncompressed_size,
+            records.len()
+        ));
     }
     let found = crc32fast::hash(records);
-    (header.uncompressed_crc != 0 && header.uncompressed_crc != found)
-        .then(|| format!("expected the checksum {:08x} for a chunk, found {found:08x}", header.uncompressed_crc))
+    (header.uncompressed_crc != 0 && header.uncompressed_crc != found).then(|| {
+        format!(
+            "expected the checksum {:08x} for a chunk, found {found:08x}",
+            header.uncompressed_crc
+        )
+    })
 }
 
 /// At most `most` bytes, as many as could be unpacked, and what went wrong.
@@ -65,11 +84,14 @@ fn decompress(compression: &str, packed: &[u8], most: u64) -> (Vec<u8>, Option<S
     let mut records = Vec::new();
     let read = match compression {
         "" => packed.take(most).read_to_end(&mut records),
-        "zstd" => zstd::stream::read::Decoder::with_buffer(packed).and_then(|decoder| drain(decoder, most, &mut records)),
+        "zstd" => zstd::stream::read::Decoder::with_buffer(packed)
+            .and_then(|decoder| drain(decoder, most, &mut records)),
         "lz4" => lz4::Decoder::new(packed).and_then(|decoder| drain(decoder, most, &mut records)),
         other => return (records, Some(format!("unknown compression {other:?}"))),
     };
-    let fault = read.err().map(|error| format!("cannot unpack a chunk: {error}"));
+    let fault = read
+        .err()
+        .map(|error| format!("cannot unpack a chunk: {error}"));
     (records, fault)
 }
 
@@ -97,6 +119,9 @@ pub(crate) fn inner_records(bytes: &[u8]) -> impl Iterator<Item = InnerRecord<'_
     std::iter::from_fn(move || {
         let opcode = fields.bytes(1)?[0];
         let length = usize::try_from(fields.u64()?).ok()?;
-        Some(InnerRecord { opcode, body: fields.bytes(length)? })
+        Some(InnerRecord {
+            opcode,
+            body: fields.bytes(length)?,
+        })
     })
 }

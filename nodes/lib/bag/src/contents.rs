@@ -40,7 +40,12 @@ impl MessageHead {
     const BYTES: u64 = 22;
 
     pub(crate) fn take(fields: &mut Fields<'_>) -> Option<Self> {
-        Some(Self { channel: fields.u16()?, sequence: fields.u32()?, log_time: fields.u64()?, publish_time: fields.u64()? })
+        Some(Self {
+            channel: fields.u16()?,
+            sequence: fields.u32()?,
+            log_time: fields.u64()?,
+            publish_time: fields.u64()?,
+        })
     }
 }
 
@@ -65,7 +70,8 @@ impl Channels {
         let mut fields = Fields(body);
         match opcode {
             op::SCHEMA => {
-                let (id, schema) = read_schema(&mut fields).ok_or("a schema that is not well-formed")?;
+                let (id, schema) =
+                    read_schema(&mut fields).ok_or("a schema that is not well-formed")?;
                 self.schemas.insert(id, schema);
             }
             op::CHANNEL => {
@@ -88,15 +94,30 @@ impl Channels {
     fn read_channel(&self, fields: &mut Fields<'_>) -> Result<(u16, Topic), String> {
         let malformed = || "a channel that is not well-formed".to_owned();
         let (id, schema_id) = fields.u16().zip(fields.u16()).ok_or_else(malformed)?;
-        let (name, message_encoding) = fields.string().zip(fields.string()).ok_or_else(malformed)?;
+        let (name, message_encoding) =
+            fields.string().zip(fields.string()).ok_or_else(malformed)?;
         let metadata = read_map(fields).ok_or_else(malformed)?;
         let schema = match (schema_id, self.schemas.get(&schema_id)) {
             (0, _) => Schema::default(),
             (_, Some(schema)) => schema.clone(),
             (_, None) => return Err(format!("topic {name} has the unknown schema {schema_id}")),
         };
-        let Schema { type_name, encoding: schema_encoding, text: schema } = schema;
-        Ok((id, Topic { name, type_name, schema_encoding, schema, message_encoding, metadata }))
+        let Schema {
+            type_name,
+            encoding: schema_encoding,
+            text: schema,
+        } = schema;
+        Ok((
+            id,
+            Topic {
+                name,
+                type_name,
+                schema_encoding,
+                schema,
+                message_encoding,
+                metadata,
+            },
+        ))
     }
 }
 
@@ -104,7 +125,14 @@ fn read_schema(fields: &mut Fields<'_>) -> Option<(u16, Schema)> {
     let id = fields.u16()?;
     let (type_name, encoding) = (fields.string()?, fields.string()?);
     let length = fields.u32()? as usize;
-    Some((id, Schema { type_name, encoding, text: fields.bytes(length)?.to_vec() }))
+    Some((
+        id,
+        Schema {
+            type_name,
+            encoding,
+            text: fields.bytes(length)?.to_vec(),
+        },
+    ))
 }
 
 fn read_map(fields: &mut Fields<'_>) -> Option<BTreeMap<String, String>> {
@@ -155,14 +183,23 @@ fn read_statistics(body: &[u8]) -> Option<Statistics> {
     while !inner.0.is_empty() {
         counts.insert(inner.u16()?, inner.u64()?);
     }
-    Some(Statistics { message_count, start, end, counts })
+    Some(Statistics {
+        message_count,
+        start,
+        end,
+        counts,
+    })
 }
 
 impl Contents {
     /// Walks over a file.
     pub(crate) fn read(path: &Path) -> Result<Self, BagError> {
         let file = File::open(path).map_err(io_error(path, "open"))?;
-        let mut walker = Walker::new(file).map_err(io_error(path, "read"))?.ok_or_else(|| BagError::NotMcap { path: path.to_owned() })?;
+        let mut walker = Walker::new(file)
+            .map_err(io_error(path, "read"))?
+            .ok_or_else(|| BagError::NotMcap {
+                path: path.to_owned(),
+            })?;
         let mut contents = Self {
             path: path.to_owned(),
             channels: Channels::default(),
@@ -177,7 +214,9 @@ impl Contents {
             match walker.step().map_err(io_error(path, "read"))? {
                 Step::Whole(record) => contents.take(record, &mut walker, &mut statistics)?,
                 Step::Finished => break,
-                Step::Cut(RecordAt { start: at, .. }) | Step::Ragged(at) => return Err(unfinished(path, at, walker.size())),
+                Step::Cut(RecordAt { start: at, .. }) | Step::Ragged(at) => {
+                    return Err(unfinished(path, at, walker.size()));
+                }
                 Step::Ended => return Err(unfinished(path, walker.size(), walker.size())),
             }
         }
@@ -186,12 +225,25 @@ impl Contents {
     }
 
     fn corrupt(&self, record: RecordAt, reason: impl Into<String>) -> BagError {
-        BagError::Corrupt { path: self.path.clone(), at: record.start, reason: reason.into() }
+        BagError::Corrupt {
+            path: self.path.clone(),
+            at: record.start,
+            reason: reason.into(),
+        }
     }
 
-    fn take(&mut self, record: RecordAt, walker: &mut Walker<File>, statistics: &mut Option<Statistics>) -> Result<(), BagError> {
+    fn take(
+        &mut self,
+        record: RecordAt,
+        walker: &mut Walker<File>,
+        statistics: &mut Option<Statistics>,
+    ) -> Result<(), BagError> {
         let path = self.path.clone();
-        let mut body = |most| walker.read_body(record, most).map_err(io_error(&path, "read"));
+        let mut body = |most| {
+            walker
+                .read_body(record, most)
+                .map_err(io_error(&path, "read"))
+        };
         match record.opcode {
             op::SCHEMA | op::CHANNEL => {
                 let taken = self.channels.take(record.opcode, &body(u64::MAX)?);
@@ -199,21 +251,35 @@ impl Contents {
             }
             op::MESSAGE => {
                 let head = MessageHead::take(&mut Fields(&body(MessageHead::BYTES)?));
-                let head = head.ok_or_else(|| self.corrupt(record, "a message without a whole header"))?;
-                self.loose.push(LooseMessage { record, log_time: head.log_time });
+                let head =
+                    head.ok_or_else(|| self.corrupt(record, "a message without a whole header"))?;
+                self.loose.push(LooseMessage {
+                    record,
+                    log_time: head.log_time,
+                });
             }
             op::CHUNK => {
                 let header = ChunkHeader::take(&mut Fields(&body(HEADER_AT_MOST)?));
-                let header = header.ok_or_else(|| self.corrupt(record, "a chunk without a whole header"))?;
-                self.chunks.push(ChunkAt { record, start_time: header.start_time, end_time: header.end_time });
+                let header =
+                    header.ok_or_else(|| self.corrupt(record, "a chunk without a whole header"))?;
+                self.chunks.push(ChunkAt {
+                    record,
+                    start_time: header.start_time,
+                    end_time: header.end_time,
+                });
             }
             op::ATTACHMENT => {
                 let attachment = parse_attachment(&body(u64::MAX)?);
-                self.attachments.push(attachment.ok_or_else(|| self.corrupt(record, "an attachment that fails its checksum"))?);
+                self.attachments.push(attachment.ok_or_else(|| {
+                    self.corrupt(record, "an attachment that fails its checksum")
+                })?);
             }
             op::METADATA => {
                 let metadata = read_metadata(&body(u64::MAX)?);
-                self.metadata.push(metadata.ok_or_else(|| self.corrupt(record, "metadata that is not well-formed"))?);
+                self.metadata.push(
+                    metadata
+                        .ok_or_else(|| self.corrupt(record, "metadata that is not well-formed"))?,
+                );
             }
             op::STATISTICS => *statistics = read_statistics(&body(u64::MAX)?),
             _ => {}
@@ -221,13 +287,26 @@ impl Contents {
         Ok(())
     }
 
-    /// Counts messages: by the file's statistics where it has them for every channel, else by looking at each message.
-    fn summarise(&mut self, statistics: Option<Statistics>, walker: &mut Walker<File>) -> Result<(), BagError> {
+    /// Counts messages: by the file's statistics where it has them for every channel, else by
+    /// looking at each message.
+    fn summarise(
+        &mut self,
+        statistics: Option<Statistics>,
+        walker: &mut Walker<File>,
+    ) -> Result<(), BagError> {
         let statistics = statistics.filter(|known| {
-            known.counts.values().fold(0, |sum: u64, &count| sum.saturating_add(count)) == known.message_count
-                && known.counts.keys().all(|channel| self.channels.topics.contains_key(channel))
+            known
+                .counts
+                .values()
+                .fold(0, |sum: u64, &count| sum.saturating_add(count))
+                == known.message_count
+                && known
+                    .counts
+                    .keys()
+                    .all(|channel| self.channels.topics.contains_key(channel))
         });
-        let mut counts: BTreeMap<u16, u64> = self.channels.topics.keys().map(|&id| (id, 0)).collect();
+        let mut counts: BTreeMap<u16, u64> =
+            self.channels.topics.keys().map(|&id| (id, 0)).collect();
         if let Some(known) = statistics {
             if known.counts.values().any(|&count| count > 0) {
                 self.summary.cover(stamp(known.start));
@@ -236,7 +315,9 @@ impl Contents {
             counts.extend(known.counts);
         } else {
             for message in self.loose.clone() {
-                let body = walker.read_body(message.record, MessageHead::BYTES).map_err(io_error(&self.path, "read"))?;
+                let body = walker
+                    .read_body(message.record, MessageHead::BYTES)
+                    .map_err(io_error(&self.path, "read"))?;
                 self.count(&body, &mut counts);
             }
             for chunk in self.chunks.clone() {
@@ -268,8 +349,14 @@ impl Contents {
     }
 
     /// The records of a chunk; an error names the chunk.
-    pub(crate) fn unpack(&self, chunk: ChunkAt, walker: &mut Walker<File>) -> Result<Vec<u8>, BagError> {
-        let body = walker.read_body(chunk.record, u64::MAX).map_err(io_error(&self.path, "read"))?;
+    pub(crate) fn unpack(
+        &self,
+        chunk: ChunkAt,
+        walker: &mut Walker<File>,
+    ) -> Result<Vec<u8>, BagError> {
+        let body = walker
+            .read_body(chunk.record, u64::MAX)
+            .map_err(io_error(&self.path, "read"))?;
         let unpacked = unpack(&body);
         match unpacked.fault {
             None => Ok(unpacked.records),
@@ -279,5 +366,9 @@ impl Contents {
 }
 
 fn unfinished(path: &Path, at: u64, size: u64) -> BagError {
-    BagError::Unfinished { path: path.to_owned(), at, size }
+    BagError::Unfinished {
+        path: path.to_owned(),
+        at,
+        size,
+    }
 }

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use cromosim_spatial::Stamp;
 use thiserror::Error;
 
-/// Everything that this crate returns as an error. Each message names the file and the place, and a remedy where there is one.
+/// Everything that this crate returns as an error. Each message names the file and the place, and a
+/// remedy where there is one.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum BagError {
@@ -141,19 +142,34 @@ pub enum BagError {
 }
 
 fn list(names: &[String]) -> String {
-    if names.is_empty() { "no topics".to_owned() } else { names.join(", ") }
+    if names.is_empty() {
+        "no topics".to_owned()
+    } else {
+        names.join(", ")
+    }
 }
 
 /// Makes an [`io::Error`] into a [`BagError::Io`].
 pub(crate) fn io_error(path: &Path, action: &'static str) -> impl FnOnce(io::Error) -> BagError {
     let path = path.to_owned();
-    move |source| BagError::Io { path, action, source }
+    move |source| BagError::Io {
+        path,
+        action,
+        source,
+    }
 }
 
 /// What the MCAP writer says, with the operating system's reason in front where there is one.
 pub(crate) fn write_error(path: &Path, error: mcap::McapError) -> BagError {
     match error {
-        mcap::McapError::Io(source) => BagError::Io { path: path.to_owned(), action: "write", source },
-        other => BagError::Refused { path: path.to_owned(), reason: other.to_string() },
+        mcap::McapError::Io(source) => BagError::Io {
+            path: path.to_owned(),
+            action: "write",
+            source,
+        },
+        other => BagError::Refused {
+            path: path.to_owned(),
+            reason: other.to_string(),
+        },
     }
 }

@@ -5,8 +5,9 @@
 //! - [`recover`] mends what a killed recorder left behind.
 //! - [`write_imu_csv`] exports an IMU's samples.
 //!
-//! Message payloads are plain CDR after a four-byte header (OMG DDSI-RTPS 2.5, 10); schemas are `ros2msg` text. The same calls give the same
-//! bytes: times come from the caller, and compression uses one thread.
+//! Message payloads are plain CDR after a four-byte header (OMG DDSI-RTPS 2.5, 10); schemas are
+//! `ros2msg` text. The same calls give the same bytes: times come from the caller, and compression
+//! uses one thread.
 
 pub mod cdr;
 mod chunk;

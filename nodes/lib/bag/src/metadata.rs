@@ -114,17 +114,28 @@ impl Information {
 
     /// As it stands in `metadata.yaml`.
     pub(crate) fn yaml(&self) -> String {
-        serde_norway::to_string(&File { rosbag2_bagfile_information: self }).unwrap_or_default()
+        serde_norway::to_string(&File {
+            rosbag2_bagfile_information: self,
+        })
+        .unwrap_or_default()
     }
 }
 
 fn start(summary: &BagSummary) -> SinceEpoch {
     // An empty bag starts at the largest time, as rosbag2 writes it.
-    SinceEpoch { nanoseconds_since_epoch: summary.time_range.map_or(i64::MAX, |(start, _)| start.nanos) }
+    SinceEpoch {
+        nanoseconds_since_epoch: summary
+            .time_range
+            .map_or(i64::MAX, |(start, _)| start.nanos),
+    }
 }
 
 fn duration(summary: &BagSummary) -> Nanoseconds {
-    Nanoseconds { nanoseconds: summary.time_range.map_or(0, |(start, end)| end.nanos - start.nanos) }
+    Nanoseconds {
+        nanoseconds: summary
+            .time_range
+            .map_or(0, |(start, end)| end.nanos - start.nanos),
+    }
 }
 
 #[derive(Deserialize)]
@@ -146,25 +157,46 @@ pub(crate) fn files_of(directory: &Path) -> Result<Vec<PathBuf>, BagError> {
     let path = directory.join("metadata.yaml");
     let text = match fs::read_to_string(&path) {
         Ok(text) => text,
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Err(BagError::NoMetadata { path: directory.to_owned() }),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            return Err(BagError::NoMetadata {
+                path: directory.to_owned(),
+            });
+        }
         Err(error) => return Err(io_error(&path, "read")(error)),
     };
     let information = match serde_norway::from_str::<ReadFile>(&text) {
         Ok(file) => file.rosbag2_bagfile_information,
-        Err(error) => return Err(BagError::Metadata { path, reason: error.to_string() }),
+        Err(error) => {
+            return Err(BagError::Metadata {
+                path,
+                reason: error.to_string(),
+            });
+        }
     };
     if information.storage_identifier != "mcap" {
-        return Err(BagError::Unsupported { path, what: format!("storage {:?}", information.storage_identifier) });
+        return Err(BagError::Unsupported {
+            path,
+            what: format!("storage {:?}", information.storage_identifier),
+        });
     }
     if information.compression_mode.eq_ignore_ascii_case("file") {
-        return Err(BagError::Unsupported { path, what: "compression of whole files".to_owned() });
+        return Err(BagError::Unsupported {
+            path,
+            what: "compression of whole files".to_owned(),
+        });
     }
     let mut files = Vec::with_capacity(information.relative_file_paths.len());
     for relative in information.relative_file_paths {
-        // Older bags name the directory too; what leads out of the directory is no file of this bag.
+        // Older bags name the directory too; what leads out of the directory is no file of this
+        // bag.
         match Path::new(&relative).file_name() {
             Some(name) => files.push(directory.join(name)),
-            None => return Err(BagError::Metadata { path, reason: format!("relative_file_paths: {relative:?} names no file") }),
+            None => {
+                return Err(BagError::Metadata {
+                    path,
+                    reason: format!("relative_file_paths: {relative:?} names no file"),
+                });
+            }
         }
     }
     Ok(files)

@@ -36,11 +36,15 @@ pub struct QosTime {
 
 impl QosTime {
     /// What ROS 2 writes for "no limit": the largest 64-bit number of nanoseconds.
-    pub const INFINITE: Self = Self { sec: 9_223_372_036, nsec: 854_775_807 };
+    pub const INFINITE: Self = Self {
+        sec: 9_223_372_036,
+        nsec: 854_775_807,
+    };
 }
 
 impl QosProfile {
-    /// Reliable, volatile, the last `depth` messages: what publishers of ROS 2 offer where nobody says otherwise.
+    /// Reliable, volatile, the last `depth` messages: what publishers of ROS 2 offer where nobody
+    /// says otherwise.
     pub fn reliable(depth: u32) -> Self {
         Self {
             history: "keep_last".to_owned(),
@@ -58,17 +62,23 @@ impl QosProfile {
     /// The profile with best effort in place of reliability.
     #[must_use]
     pub fn best_effort(self) -> Self {
-        Self { reliability: "best_effort".to_owned(), ..self }
+        Self {
+            reliability: "best_effort".to_owned(),
+            ..self
+        }
     }
 
     /// The profile with late subscribers served.
     #[must_use]
     pub fn transient_local(self) -> Self {
-        Self { durability: "transient_local".to_owned(), ..self }
+        Self {
+            durability: "transient_local".to_owned(),
+            ..self
+        }
     }
 
-    /// What a topic of this name is usually offered with: `/tf_static` transient local, `/clock` best effort, depth 1; the others reliable,
-    /// depth 10 (100 for `/tf`).
+    /// What a topic of this name is usually offered with: `/tf_static` transient local, `/clock`
+    /// best effort, depth 1; the others reliable, depth 10 (100 for `/tf`).
     pub fn usual(topic: &str) -> Self {
         match topic {
             "/tf_static" => Self::reliable(1).transient_local(),

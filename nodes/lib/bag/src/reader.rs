@@ -40,7 +40,10 @@ pub struct Selection {
 impl Selection {
     /// All messages of one topic.
     pub fn topic(name: &str) -> Self {
-        Self { topics: Some(vec![name.to_owned()]), ..Self::default() }
+        Self {
+            topics: Some(vec![name.to_owned()]),
+            ..Self::default()
+        }
     }
 
     fn has_time(&self, log_time: u64) -> bool {
@@ -49,7 +52,9 @@ impl Selection {
     }
 
     fn has_topic(&self, name: &str) -> bool {
-        self.topics.as_ref().is_none_or(|topics| topics.iter().any(|topic| topic == name))
+        self.topics
+            .as_ref()
+            .is_none_or(|topics| topics.iter().any(|topic| topic == name))
     }
 }
 
@@ -77,26 +82,47 @@ impl Message {
         if self.topic.type_name != M::TYPE_NAME {
             return Err(wrong_type::<M>(&self.topic));
         }
-        cdr::decode(&self.payload).map_err(|reason| BagError::Decode { topic: self.topic.name.clone(), log_time: self.log_time, reason })
+        cdr::decode(&self.payload).map_err(|reason| BagError::Decode {
+            topic: self.topic.name.clone(),
+            log_time: self.log_time,
+            reason,
+        })
     }
 }
 
 fn wrong_type<M: RosMessage>(topic: &Topic) -> BagError {
-    BagError::WrongType { topic: topic.name.clone(), expected: M::TYPE_NAME.to_owned(), found: topic.type_name.clone() }
+    BagError::WrongType {
+        topic: topic.name.clone(),
+        expected: M::TYPE_NAME.to_owned(),
+        found: topic.type_name.clone(),
+    }
 }
 
 impl BagReader {
-    /// Opens a bag and lists what it holds. Files without an index are read as well; unfinished and cut ones are not.
+    /// Opens a bag and lists what it holds. Files without an index are read as well; unfinished and
+    /// cut ones are not.
     ///
     /// # Errors
-    /// [`BagError::Unfinished`] and [`BagError::Corrupt`] with the byte where reading ended, [`BagError::NotMcap`],
-    /// [`BagError::NoMetadata`], [`BagError::Metadata`], [`BagError::Unsupported`], [`BagError::Io`].
+    /// [`BagError::Unfinished`] and [`BagError::Corrupt`] with the byte where reading ended,
+    /// [`BagError::NotMcap`], [`BagError::NoMetadata`], [`BagError::Metadata`],
+    /// [`BagError::Unsupported`], [`BagError::Io`].
     pub fn open(path: &Path) -> Result<Self, BagError> {
-        let paths = if path.is_dir() { files_of(path)? } else { vec![path.to_owned()] };
-        let files = paths.iter().map(|file| Contents::read(file)).collect::<Result<Vec<_>, _>>()?;
+        let paths = if path.is_dir() {
+            files_of(path)?
+        } else {
+            vec![path.to_owned()]
+        };
+        let files = paths
+            .iter()
+            .map(|file| Contents::read(file))
+            .collect::<Result<Vec<_>, _>>()?;
         let mut summary = BagSummary::default();
         files.iter().for_each(|file| summary.add(&file.summary));
-        Ok(Self { path: path.to_owned(), files, summary })
+        Ok(Self {
+            path: path.to_owned(),
+            files,
+            summary,
+        })
     }
 
     /// The path that was opened.
@@ -114,12 +140,23 @@ impl BagReader {
     /// # Errors
     /// [`BagError::UnknownTopic`], with the names that there are.
     pub fn topic(&self, name: &str) -> Result<&Arc<Topic>, BagError> {
-        let found = self.summary.topics.iter().find(|counted| counted.topic.name == name);
-        found.map(|counted| &counted.topic).ok_or_else(|| BagError::UnknownTopic {
-            path: self.path.clone(),
-            topic: name.to_owned(),
-            known: self.summary.topics.iter().map(|counted| counted.topic.name.clone()).collect(),
-        })
+        let found = self
+            .summary
+            .topics
+            .iter()
+            .find(|counted| counted.topic.name == name);
+        found
+            .map(|counted| &counted.topic)
+            .ok_or_else(|| BagError::UnknownTopic {
+                path: self.path.clone(),
+                topic: name.to_owned(),
+                known: self
+                    .summary
+                    .topics
+                    .iter()
+                    .map(|counted| counted.topic.name.clone())
+                    .collect(),
+            })
     }
 
     /// The attachments of all files, in their order.
@@ -129,35 +166,54 @@ impl BagReader {
 
     /// The content of the last attachment of this name.
     pub fn attachment(&self, name: &str) -> Option<&[u8]> {
-        self.attachments().filter(|attachment| attachment.name == name).last().map(|attachment| attachment.content.as_slice())
+        self.attachments()
+            .filter(|attachment| attachment.name == name)
+            .last()
+            .map(|attachment| attachment.content.as_slice())
     }
 
     /// The metadata records of all files, in their order: name and values.
     pub fn metadata_records(&self) -> impl Iterator<Item = (&str, &BTreeMap<String, String>)> {
-        self.files.iter().flat_map(|file| &file.metadata).map(|(name, values)| (name.as_str(), values))
+        self.files
+            .iter()
+            .flat_map(|file| &file.metadata)
+            .map(|(name, values)| (name.as_str(), values))
     }
 
     /// The last metadata record of this name.
     pub fn metadata(&self, name: &str) -> Option<&BTreeMap<String, String>> {
-        self.metadata_records().filter(|(found, _)| *found == name).last().map(|(_, values)| values)
+        self.metadata_records()
+            .filter(|(found, _)| *found == name)
+            .last()
+            .map(|(_, values)| values)
     }
 
-    /// The selected messages in order of log time; those of one time in the order of the file. Memory: the chunks that overlap in time.
+    /// The selected messages in order of log time; those of one time in the order of the file.
+    /// Memory: the chunks that overlap in time.
     ///
     /// # Errors
-    /// [`BagError::UnknownTopic`]; [`BagError::Io`]. The iterator gives [`BagError::Corrupt`] and [`BagError::Io`], and then ends.
+    /// [`BagError::UnknownTopic`]; [`BagError::Io`]. The iterator gives [`BagError::Corrupt`] and
+    /// [`BagError::Io`], and then ends.
     pub fn messages(&self, selection: &Selection) -> Result<Messages<'_>, BagError> {
         for name in selection.topics.iter().flatten() {
             self.topic(name)?;
         }
-        let files = self.files.iter().map(|contents| FileMessages::new(contents, selection)).collect::<Result<_, _>>()?;
-        Ok(Messages { files, failed: false })
+        let files = self
+            .files
+            .iter()
+            .map(|contents| FileMessages::new(contents, selection))
+            .collect::<Result<_, _>>()?;
+        Ok(Messages {
+            files,
+            failed: false,
+        })
     }
 
     /// All messages of a topic with their log times.
     ///
     /// # Errors
-    /// [`BagError::UnknownTopic`], [`BagError::WrongType`], [`BagError::Decode`], [`BagError::Corrupt`], [`BagError::Io`].
+    /// [`BagError::UnknownTopic`], [`BagError::WrongType`], [`BagError::Decode`],
+    /// [`BagError::Corrupt`], [`BagError::Io`].
     pub fn read<M: RosMessage>(&self, topic: &str) -> Result<Vec<(Stamp, M)>, BagError> {
         let found = self.topic(topic)?;
         if found.type_name != M::TYPE_NAME {
@@ -189,7 +245,9 @@ impl Iterator for Messages<'_> {
                     self.failed = true;
                     return Some(Err(error));
                 }
-                Ok(Some(time)) if earliest.is_none_or(|(known, _)| time < known) => earliest = Some((time, index)),
+                Ok(Some(time)) if earliest.is_none_or(|(known, _)| time < known) => {
+                    earliest = Some((time, index))
+                }
                 Ok(_) => {}
             }
         }
@@ -256,21 +314,42 @@ impl<'a> FileMessages<'a> {
     fn new(contents: &'a Contents, selection: &Selection) -> Result<Self, BagError> {
         let path = &contents.path;
         let file = File::open(path).map_err(io_error(path, "open"))?;
-        let walker = Walker::new(file).map_err(io_error(path, "read"))?.ok_or_else(|| BagError::NotMcap { path: path.clone() })?;
+        let walker = Walker::new(file)
+            .map_err(io_error(path, "read"))?
+            .ok_or_else(|| BagError::NotMcap { path: path.clone() })?;
         let outside = |start: u64, end: u64| {
-            selection.until.is_some_and(|until| stamp(start) >= until) || selection.from.is_some_and(|from| stamp(end) < from)
+            selection.until.is_some_and(|until| stamp(start) >= until)
+                || selection.from.is_some_and(|from| stamp(end) < from)
         };
-        let chunks = contents.chunks.iter().filter(|chunk| !outside(chunk.start_time, chunk.end_time)).map(|&chunk| Stretch::Chunk(chunk));
-        let loose = contents.loose.iter().filter(|message| selection.has_time(message.log_time)).map(|&message| Stretch::Loose(message));
+        let chunks = contents
+            .chunks
+            .iter()
+            .filter(|chunk| !outside(chunk.start_time, chunk.end_time))
+            .map(|&chunk| Stretch::Chunk(chunk));
+        let loose = contents
+            .loose
+            .iter()
+            .filter(|message| selection.has_time(message.log_time))
+            .map(|&message| Stretch::Loose(message));
         let mut stretches: Vec<Stretch> = chunks.chain(loose).collect();
         stretches.sort_by_key(|stretch| (stretch.start_time(), stretch.record().start));
-        Ok(Self { contents, selection: selection.clone(), walker, stretches: stretches.into(), ahead: BinaryHeap::new() })
+        Ok(Self {
+            contents,
+            selection: selection.clone(),
+            walker,
+            stretches: stretches.into(),
+            ahead: BinaryHeap::new(),
+        })
     }
 
     /// Log time of the next message, once everything that could come before it is loaded.
     fn peek_time(&mut self) -> Result<Option<u64>, BagError> {
         while let Some(stretch) = self.stretches.front() {
-            if self.ahead.peek().is_some_and(|Reverse(next)| next.order.0 < stretch.start_time()) {
+            if self
+                .ahead
+                .peek()
+                .is_some_and(|Reverse(next)| next.order.0 < stretch.start_time())
+            {
                 break;
             }
             if let Some(stretch) = self.stretches.pop_front() {
@@ -288,23 +367,34 @@ impl<'a> FileMessages<'a> {
         let record = stretch.record();
         match *stretch {
             Stretch::Loose(_) => {
-                let body = self.walker.read_body(record, u64::MAX).map_err(io_error(&self.contents.path, "read"))?;
+                let body = self
+                    .walker
+                    .read_body(record, u64::MAX)
+                    .map_err(io_error(&self.contents.path, "read"))?;
                 self.take(&body, record, 0)
             }
             Stretch::Chunk(chunk) => {
                 let records = self.contents.unpack(chunk, &mut self.walker)?;
                 let messages = inner_records(&records).filter(|inner| inner.opcode == op::MESSAGE);
-                messages.enumerate().try_for_each(|(index, inner)| self.take(inner.body, record, index))
+                messages
+                    .enumerate()
+                    .try_for_each(|(index, inner)| self.take(inner.body, record, index))
             }
         }
     }
 
     fn take(&mut self, body: &[u8], record: RecordAt, index: usize) -> Result<(), BagError> {
-        let corrupt = |reason: String| BagError::Corrupt { path: self.contents.path.clone(), at: record.start, reason };
+        let corrupt = |reason: String| BagError::Corrupt {
+            path: self.contents.path.clone(),
+            at: record.start,
+            reason,
+        };
         let mut fields = Fields(body);
-        let head = MessageHead::take(&mut fields).ok_or_else(|| corrupt("a message without a whole header".to_owned()))?;
+        let head = MessageHead::take(&mut fields)
+            .ok_or_else(|| corrupt("a message without a whole header".to_owned()))?;
         let topic = self.contents.channels.topics.get(&head.channel);
-        let topic = topic.ok_or_else(|| corrupt(format!("a message of the unknown channel {}", head.channel)))?;
+        let topic = topic
+            .ok_or_else(|| corrupt(format!("a message of the unknown channel {}", head.channel)))?;
         if self.selection.has_time(head.log_time) && self.selection.has_topic(&topic.name) {
             let message = Message {
                 topic: Arc::clone(topic),
@@ -313,7 +403,10 @@ impl<'a> FileMessages<'a> {
                 publish_time: stamp(head.publish_time),
                 payload: fields.0.to_vec(),
             };
-            self.ahead.push(Reverse(Ahead { order: (head.log_time, record.start, index), message }));
+            self.ahead.push(Reverse(Ahead {
+                order: (head.log_time, record.start, index),
+                message,
+            }));
         }
         Ok(())
     }

@@ -18,7 +18,8 @@ use crate::writer::{is_single_file, name_of, parent_of, temporary};
 pub struct Recovery {
     /// Topics, counts and time range of the mended bag.
     pub summary: BagSummary,
-    /// Bytes of damaged records from which no message could be taken; counted unpacked inside a chunk that was cut.
+    /// Bytes of damaged records from which no message could be taken; counted unpacked inside a
+    /// chunk that was cut.
     pub bytes_lost: u64,
     /// The damage, in order; empty where the bag was whole, or lacked its end alone.
     pub damages: Vec<Damage>,
@@ -48,21 +49,30 @@ impl Recovery {
     }
 }
 
-/// Writes a whole bag with all that is readable in the bag `path` to `output`, which may be `path` itself.
+/// Writes a whole bag with all that is readable in the bag `path` to `output`, which may be `path`
+/// itself.
 ///
-/// For a directory, every `.mcap` file in it is mended and `metadata.yaml` made anew. Whole chunks whose checksum fails are left out; of a
-/// cut chunk, the messages that are whole are kept. `output` appears only when it is complete.
+/// For a directory, every `.mcap` file in it is mended and `metadata.yaml` made anew. Whole chunks
+/// whose checksum fails are left out; of a cut chunk, the messages that are whole are kept.
+/// `output` appears only when it is complete.
 ///
 /// # Errors
-/// [`BagError::NotMcap`] where not even the start of a bag is there, [`BagError::NoMetadata`] for a directory without `.mcap` files,
-/// [`BagError::Exists`] where `output` is another bag, [`BagError::Io`].
+/// [`BagError::NotMcap`] where not even the start of a bag is there, [`BagError::NoMetadata`] for a
+/// directory without `.mcap` files, [`BagError::Exists`] where `output` is another bag,
+/// [`BagError::Io`].
 pub fn recover(path: &Path, output: &Path) -> Result<Recovery, BagError> {
     let found = fs::canonicalize(path).map_err(io_error(path, "open"))?;
     let in_place = fs::canonicalize(output).is_ok_and(|there| there == found);
     if !in_place && fs::symlink_metadata(output).is_ok() {
-        return Err(BagError::Exists { path: output.to_owned() });
+        return Err(BagError::Exists {
+            path: output.to_owned(),
+        });
     }
-    if found.is_dir() { recover_directory(path, output, in_place) } else { recover_file(path, output) }
+    if found.is_dir() {
+        recover_directory(path, output, in_place)
+    } else {
+        recover_file(path, output)
+    }
 }
 
 /// The MCAP files in a directory: `NAME_2` before `NAME_10`.
@@ -76,7 +86,13 @@ fn bag_files(directory: &Path) -> Result<Vec<PathBuf>, BagError> {
         }
     }
     files.sort_by_key(|file| (name_of(file).len(), name_of(file)));
-    if files.is_empty() { Err(BagError::NoMetadata { path: directory.to_owned() }) } else { Ok(files) }
+    if files.is_empty() {
+        Err(BagError::NoMetadata {
+            path: directory.to_owned(),
+        })
+    } else {
+        Ok(files)
+    }
 }
 
 fn recover_directory(path: &Path, output: &Path, in_place: bool) -> Result<Recovery, BagError> {
@@ -90,18 +106,34 @@ fn recover_directory(path: &Path, output: &Path, in_place: bool) -> Result<Recov
         summaries.push((name_of(file), one.summary.clone()));
         all.add(one);
     }
-    let counted: Vec<(String, &BagSummary)> = summaries.iter().map(|(name, summary)| (name.clone(), summary)).collect();
+    let counted: Vec<(String, &BagSummary)> = summaries
+        .iter()
+        .map(|(name, summary)| (name.clone(), summary))
+        .collect();
     let target = output.join("metadata.yaml");
-    let mut metadata = temporary(&target).tempfile_in(output).map_err(io_error(&target, "create"))?;
-    metadata.write_all(Information::of(&counted).yaml().as_bytes()).map_err(io_error(&target, "write"))?;
-    metadata.persist(&target).map_err(|error| io_error(&target, "write")(error.error))?;
+    let mut metadata = temporary(&target)
+        .tempfile_in(output)
+        .map_err(io_error(&target, "create"))?;
+    metadata
+        .write_all(Information::of(&counted).yaml().as_bytes())
+        .map_err(io_error(&target, "write"))?;
+    metadata
+        .persist(&target)
+        .map_err(|error| io_error(&target, "write")(error.error))?;
     Ok(all)
 }
 
 fn recover_file(path: &Path, output: &Path) -> Result<Recovery, BagError> {
     let input = File::open(path).map_err(io_error(path, "open"))?;
-    let mut walker = Walker::new(input).map_err(io_error(path, "read"))?.ok_or_else(|| BagError::NotMcap { path: path.to_owned() })?;
-    let (file, temporary) = temporary(output).tempfile_in(parent_of(output)).map_err(io_error(output, "create"))?.into_parts();
+    let mut walker = Walker::new(input)
+        .map_err(io_error(path, "read"))?
+        .ok_or_else(|| BagError::NotMcap {
+            path: path.to_owned(),
+        })?;
+    let (file, temporary) = temporary(output)
+        .tempfile_in(parent_of(output))
+        .map_err(io_error(output, "create"))?
+        .into_parts();
     let (compression, channels) = preview(path)?;
     let mut rescue = Rescue {
         path: path.to_owned(),
@@ -115,37 +147,60 @@ fn recover_file(path: &Path, output: &Path) -> Result<Recovery, BagError> {
         match step {
             Step::Whole(record) => rescue.whole(record, &mut walker)?,
             Step::Cut(record) => rescue.cut(record, &mut walker)?,
-            Step::Ragged(at) => rescue.lose(at, walker.size() - at, "the file ends in the middle of a record"),
+            Step::Ragged(at) => rescue.lose(
+                at,
+                walker.size() - at,
+                "the file ends in the middle of a record",
+            ),
             Step::Finished | Step::Ended => {}
         }
         if !matches!(step, Step::Whole(_)) {
             break;
         }
     }
-    let Rescue { writer, mut recovery, .. } = rescue;
+    let Rescue {
+        writer,
+        mut recovery,
+        ..
+    } = rescue;
     let (_, summary) = writer.finish(&name_of(output))?;
-    temporary.persist(output).map_err(|error| io_error(output, "write")(error.error))?;
+    temporary
+        .persist(output)
+        .map_err(|error| io_error(output, "write")(error.error))?;
     recovery.summary = summary;
     Ok(recovery)
 }
 
-/// What a first look at a file tells: how it is packed, and the channels that its index repeats, in case the chunk that defines them is
-/// damaged.
+/// What a first look at a file tells: how it is packed, and the channels that its index repeats, in
+/// case the chunk that defines them is damaged.
 fn preview(path: &Path) -> Result<(Compression, Channels), BagError> {
     let input = File::open(path).map_err(io_error(path, "open"))?;
     let (mut compression, mut channels) = (None, Channels::default());
-    let Some(mut walker) = Walker::new(input).map_err(io_error(path, "read"))? else { return Ok((Compression::None, channels)) };
+    let Some(mut walker) = Walker::new(input).map_err(io_error(path, "read"))? else {
+        return Ok((Compression::None, channels));
+    };
     loop {
         let step = walker.step().map_err(io_error(path, "read"))?;
-        let (Step::Whole(record) | Step::Cut(record)) = step else { break };
+        let (Step::Whole(record) | Step::Cut(record)) = step else {
+            break;
+        };
         match record.opcode {
             op::CHUNK if compression.is_none() => {
-                let head = walker.read_body(record, HEADER_AT_MOST).map_err(io_error(path, "read"))?;
-                let packed = ChunkHeader::take(&mut Fields(&head)).is_some_and(|header| !header.compression.is_empty());
-                compression = Some(if packed { Compression::Zstd } else { Compression::None });
+                let head = walker
+                    .read_body(record, HEADER_AT_MOST)
+                    .map_err(io_error(path, "read"))?;
+                let packed = ChunkHeader::take(&mut Fields(&head))
+                    .is_some_and(|header| !header.compression.is_empty());
+                compression = Some(if packed {
+                    Compression::Zstd
+                } else {
+                    Compression::None
+                });
             }
             op::SCHEMA | op::CHANNEL => {
-                let body = walker.read_body(record, u64::MAX).map_err(io_error(path, "read"))?;
+                let body = walker
+                    .read_body(record, u64::MAX)
+                    .map_err(io_error(path, "read"))?;
                 // What is wrong with it is said when the data are taken over.
                 let _ = channels.take(record.opcode, &body);
             }
@@ -172,7 +227,11 @@ impl Rescue {
     fn lose(&mut self, at: u64, bytes: u64, reason: &str) {
         if !self.data_ended {
             self.recovery.bytes_lost += bytes;
-            self.recovery.damages.push(Damage { path: self.path.clone(), at, reason: reason.to_owned() });
+            self.recovery.damages.push(Damage {
+                path: self.path.clone(),
+                at,
+                reason: reason.to_owned(),
+            });
         }
     }
 
@@ -181,11 +240,16 @@ impl Rescue {
     }
 
     fn whole(&mut self, record: RecordAt, walker: &mut Walker<File>) -> Result<(), BagError> {
-        if !matches!(record.opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE | op::CHUNK | op::ATTACHMENT | op::METADATA) {
+        if !matches!(
+            record.opcode,
+            op::SCHEMA | op::CHANNEL | op::MESSAGE | op::CHUNK | op::ATTACHMENT | op::METADATA
+        ) {
             self.data_ended |= record.opcode == op::DATA_END;
             return Ok(());
         }
-        let body = walker.read_body(record, u64::MAX).map_err(io_error(&self.path, "read"))?;
+        let body = walker
+            .read_body(record, u64::MAX)
+            .map_err(io_error(&self.path, "read"))?;
         match record.opcode {
             op::CHUNK => {
                 let unpacked = unpack(&body);
@@ -200,7 +264,8 @@ impl Rescue {
             },
             op::METADATA => match read_metadata(&body) {
                 // Ours is written at the end, with the counts of what was kept.
-                Some((name, values)) if name == "rosbag2" && values.contains_key("serialized_metadata") => {}
+                Some((name, values))
+                    if name == "rosbag2" && values.contains_key("serialized_metadata") => {}
                 Some((name, values)) => self.writer.write_metadata(&name, values)?,
                 None => self.lose_record(record, "metadata that is not well-formed"),
             },
@@ -217,15 +282,27 @@ impl Rescue {
     fn cut(&mut self, record: RecordAt, walker: &mut Walker<File>) -> Result<(), BagError> {
         let there = walker.size() - record.start;
         if record.opcode != op::CHUNK {
-            self.lose(record.start, there, "the file ends in the middle of a record");
+            self.lose(
+                record.start,
+                there,
+                "the file ends in the middle of a record",
+            );
             return Ok(());
         }
-        let body = walker.read_body(record, u64::MAX).map_err(io_error(&self.path, "read"))?;
+        let body = walker
+            .read_body(record, u64::MAX)
+            .map_err(io_error(&self.path, "read"))?;
         let unpacked = unpack(&body);
-        let used: usize = inner_records(&unpacked.records).map(|inner| HEADER_BYTES as usize + inner.body.len()).sum();
+        let used: usize = inner_records(&unpacked.records)
+            .map(|inner| HEADER_BYTES as usize + inner.body.len())
+            .sum();
         self.inner(record, &unpacked.records)?;
         // Not even a header: nothing was unpacked, and the bytes in the file are what is lost.
-        let lost = if unpacked.records.is_empty() { there } else { (unpacked.records.len() - used) as u64 };
+        let lost = if unpacked.records.is_empty() {
+            there
+        } else {
+            (unpacked.records.len() - used) as u64
+        };
         self.lose(record.start, lost, "the file ends in the middle of a chunk");
         Ok(())
     }
@@ -254,12 +331,23 @@ impl Rescue {
             }
             return Ok(None);
         }
-        let Some(head) = MessageHead::take(&mut fields) else { return Ok(Some("a message without a whole header".to_owned())) };
+        let Some(head) = MessageHead::take(&mut fields) else {
+            return Ok(Some("a message without a whole header".to_owned()));
+        };
         let Some(topic) = self.channels.topics.get(&head.channel) else {
-            return Ok(Some(format!("a message of the unknown channel {}", head.channel)));
+            return Ok(Some(format!(
+                "a message of the unknown channel {}",
+                head.channel
+            )));
         };
         let id = self.writer.add_channel(topic)?;
-        self.writer.write_numbered(id, head.sequence, fields.0, stamp(head.log_time), stamp(head.publish_time))?;
+        self.writer.write_numbered(
+            id,
+            head.sequence,
+            fields.0,
+            stamp(head.log_time),
+            stamp(head.publish_time),
+        )?;
         Ok(None)
     }
 }

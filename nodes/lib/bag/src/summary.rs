@@ -27,7 +27,10 @@ pub struct CountedTopic {
 impl BagSummary {
     /// Messages on all topics.
     pub fn message_count(&self) -> u64 {
-        self.topics.iter().map(|counted| counted.message_count).sum()
+        self.topics
+            .iter()
+            .map(|counted| counted.message_count)
+            .sum()
     }
 
     /// Last log time minus first, s; 0 for an empty bag.
@@ -37,22 +40,33 @@ impl BagSummary {
 
     /// Mean rate of a topic over the bag's time range, Hz; none for fewer than two messages.
     pub fn rate(&self, topic: &str) -> Option<f64> {
-        let count = self.topics.iter().find(|counted| counted.topic.name == topic)?.message_count;
+        let count = self
+            .topics
+            .iter()
+            .find(|counted| counted.topic.name == topic)?
+            .message_count;
         (count > 1 && self.duration() > 0.0).then(|| (count - 1) as f64 / self.duration())
     }
 
     /// Counts `count` messages of a topic; topics of one name and type are one.
     pub(crate) fn count(&mut self, topic: &Arc<Topic>, count: u64) {
-        let same = |counted: &&mut CountedTopic| counted.topic.name == topic.name && counted.topic.type_name == topic.type_name;
+        let same = |counted: &&mut CountedTopic| {
+            counted.topic.name == topic.name && counted.topic.type_name == topic.type_name
+        };
         match self.topics.iter_mut().find(same) {
             Some(counted) => counted.message_count += count,
-            None => self.topics.push(CountedTopic { topic: Arc::clone(topic), message_count: count }),
+            None => self.topics.push(CountedTopic {
+                topic: Arc::clone(topic),
+                message_count: count,
+            }),
         }
     }
 
     /// Widens the time range.
     pub(crate) fn cover(&mut self, time: Stamp) {
-        self.time_range = Some(self.time_range.map_or((time, time), |(start, end)| (start.min(time), end.max(time))));
+        self.time_range = Some(self.time_range.map_or((time, time), |(start, end)| {
+            (start.min(time), end.max(time))
+        }));
     }
 
     /// Adds what another file holds.

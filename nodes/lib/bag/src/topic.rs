@@ -32,8 +32,9 @@ impl Topic {
         Self::known(name, M::TYPE)
     }
 
-    /// The topic `name` with messages of a type known by name only. Where cromosim_msgs has the type, the schema and the type hash come from
-    /// there; else the schema stays empty, which readers with an own copy of the type accept.
+    /// The topic `name` with messages of a type known by name only. Where cromosim_msgs has the
+    /// type, the schema and the type hash come from there; else the schema stays empty, which
+    /// readers with an own copy of the type accept.
     pub fn named(name: &str, type_name: &str) -> Self {
         match known_type(type_name) {
             Some(message) => Self::known(name, message),
@@ -46,7 +47,11 @@ impl Topic {
         let topic = Self {
             name: name.to_owned(),
             type_name: type_name.to_owned(),
-            schema_encoding: if schema_text.is_empty() { String::new() } else { "ros2msg".to_owned() },
+            schema_encoding: if schema_text.is_empty() {
+                String::new()
+            } else {
+                "ros2msg".to_owned()
+            },
             schema: schema_text.as_bytes().to_vec(),
             message_encoding: "cdr".to_owned(),
             metadata: BTreeMap::from([(HASH_KEY.to_owned(), String::new())]),
@@ -55,7 +60,8 @@ impl Topic {
     }
 
     fn known(name: &str, message: &MessageType) -> Self {
-        Self::with_schema(name, message.name, &message.schema_text()).with_type_hash(&message.type_hash())
+        Self::with_schema(name, message.name, &message.schema_text())
+            .with_type_hash(&message.type_hash())
     }
 
     /// The topic with these offered profiles, one for each publisher.
@@ -74,9 +80,13 @@ impl Topic {
         self
     }
 
-    /// The offered profiles; empty where the file does not say, or says it in the numbers of ROS 2 before Jazzy.
+    /// The offered profiles; empty where the file does not say, or says it in the numbers of ROS 2
+    /// before Jazzy.
     pub fn qos(&self) -> Vec<QosProfile> {
-        self.metadata.get(QOS_KEY).and_then(|text| serde_norway::from_str(text).ok()).unwrap_or_default()
+        self.metadata
+            .get(QOS_KEY)
+            .and_then(|text| serde_norway::from_str(text).ok())
+            .unwrap_or_default()
     }
 
     /// The type hash (`RIHS01_…`); empty where the file does not say.

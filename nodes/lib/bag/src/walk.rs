@@ -85,7 +85,13 @@ impl<R: Read + Seek> Walker<R> {
         if magic != mcap::MAGIC {
             return Ok(None);
         }
-        Ok(Some(Self { input, position: magic.len() as u64, cursor: magic.len() as u64, size, footer_seen: false }))
+        Ok(Some(Self {
+            input,
+            position: magic.len() as u64,
+            cursor: magic.len() as u64,
+            size,
+            footer_seen: false,
+        }))
     }
 
     /// Bytes in the file.
@@ -100,7 +106,11 @@ impl<R: Read + Seek> Walker<R> {
         if self.footer_seen && left >= mcap::MAGIC.len() as u64 {
             let mut magic = [0; mcap::MAGIC.len()];
             self.read_at(start, &mut magic)?;
-            return Ok(if magic == mcap::MAGIC { Step::Finished } else { Step::Ragged(start) });
+            return Ok(if magic == mcap::MAGIC {
+                Step::Finished
+            } else {
+                Step::Ragged(start)
+            });
         }
         if left == 0 {
             return Ok(Step::Ended);
@@ -112,7 +122,11 @@ impl<R: Read + Seek> Walker<R> {
         self.read_at(start, &mut header)?;
         let mut length = [0; 8];
         length.copy_from_slice(&header[1..]);
-        let record = RecordAt { opcode: header[0], start, length: u64::from_le_bytes(length) };
+        let record = RecordAt {
+            opcode: header[0],
+            start,
+            length: u64::from_le_bytes(length),
+        };
         if record.end() > self.size {
             return Ok(Step::Cut(record));
         }
@@ -200,7 +214,13 @@ pub(crate) fn parse_attachment(body: &[u8]) -> Option<Attachment> {
     if sum != 0 && sum != crc32fast::hash(&body[..summed]) {
         return None;
     }
-    Some(Attachment { name, media_type, log_time: stamp(log_time), create_time: stamp(create_time), content })
+    Some(Attachment {
+        name,
+        media_type,
+        log_time: stamp(log_time),
+        create_time: stamp(create_time),
+        content,
+    })
 }
 
 /// A time of the file; what 63 bits do not hold (after the year 2262) saturates.

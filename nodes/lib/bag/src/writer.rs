@@ -20,14 +20,17 @@ use crate::topic::Topic;
 pub struct BagOptions {
     /// How messages are packed.
     pub compression: Compression,
-    /// Live: the bag grows in place, and each [`BagWriter::flush`] keeps what came before it even from kill -9. Otherwise it is written under
-    /// a temporary name beside its own and takes its name in [`BagWriter::finish`]; dropped unfinished, it leaves nothing behind.
+    /// Live: the bag grows in place, and each [`BagWriter::flush`] keeps what came before it even
+    /// from kill -9. Otherwise it is written under a temporary name beside its own and takes its
+    /// name in [`BagWriter::finish`]; dropped unfinished, it leaves nothing behind.
     pub live: bool,
-    /// Takes the place of the file `NAME.mcap`, or of a directory that holds a bag and nothing else.
+    /// Takes the place of the file `NAME.mcap`, or of a directory that holds a bag and nothing
+    /// else.
     pub replace: bool,
 }
 
-/// Writes one bag: the single file `NAME.mcap` where the path ends so, else the directory `NAME` with `NAME_0.mcap` and `metadata.yaml`.
+/// Writes one bag: the single file `NAME.mcap` where the path ends so, else the directory `NAME`
+/// with `NAME_0.mcap` and `metadata.yaml`.
 pub struct BagWriter {
     stream: StreamWriter<BufWriter<File>>,
     place: Place,
@@ -49,38 +52,63 @@ impl BagWriter {
     /// Starts a bag at `path`.
     ///
     /// # Errors
-    /// [`BagError::Exists`] where something is there that `options` does not allow to replace; [`BagError::Io`].
+    /// [`BagError::Exists`] where something is there that `options` does not allow to replace;
+    /// [`BagError::Io`].
     pub fn create(path: &Path, options: BagOptions) -> Result<Self, BagError> {
         let single = is_single_file(path);
         check_target(path, single, options.replace)?;
-        let file_name = if single { name_of(path) } else { format!("{}_0.mcap", name_of(path)) };
+        let file_name = if single {
+            name_of(path)
+        } else {
+            format!("{}_0.mcap", name_of(path))
+        };
         let parent = parent_of(path);
         let create = || io_error(path, "create");
         let (file, place) = match (single, options.live) {
             (true, true) => (File::create(path).map_err(create())?, Place::LiveFile),
             (true, false) => {
-                let (file, temporary) = temporary(path).tempfile_in(parent).map_err(create())?.into_parts();
+                let (file, temporary) = temporary(path)
+                    .tempfile_in(parent)
+                    .map_err(create())?
+                    .into_parts();
                 (file, Place::TemporaryFile(temporary))
             }
             (false, true) => {
                 remove_bag(path)?;
                 fs::create_dir(path).map_err(create())?;
-                (File::create(path.join(&file_name)).map_err(create())?, Place::LiveDirectory)
+                (
+                    File::create(path.join(&file_name)).map_err(create())?,
+                    Place::LiveDirectory,
+                )
             }
             (false, false) => {
-                let directory = temporary(path).permissions(everybody(0o777)).tempdir_in(parent).map_err(create())?;
-                (File::create(directory.path().join(&file_name)).map_err(create())?, Place::TemporaryDirectory(directory))
+                let directory = temporary(path)
+                    .permissions(everybody(0o777))
+                    .tempdir_in(parent)
+                    .map_err(create())?;
+                (
+                    File::create(directory.path().join(&file_name)).map_err(create())?,
+                    Place::TemporaryDirectory(directory),
+                )
             }
         };
         let buffered = BufWriter::with_capacity(64 * 1024, file.try_clone().map_err(create())?);
         let stream = StreamWriter::new(buffered, path, options.compression)?;
-        Ok(Self { stream, place, target: path.to_owned(), file_name, file, options })
+        Ok(Self {
+            stream,
+            place,
+            target: path.to_owned(),
+            file_name,
+            file,
+            options,
+        })
     }
 
     /// See [`StreamWriter::add_topic`].
     ///
     /// # Errors
-    /// As there; [`BagError::RecordingStopped`] in place of [`BagError::Io`] for live bags. So for all functions below.
+    /// As there; [`BagError::RecordingStopped`] in place of [`BagError::Io`] for live bags. So for
+    /// all functions below.
     pub fn add_topic(&mut self, topic: &Topic) -> Result<TopicId, BagError> {
         let result = self.stream.add_topic(topic);
         self.placed(result)
@@ -90,7 +118,12 @@ impl BagWriter {
     ///
     /// # Errors
     /// As there.
-    pub fn write<M: RosMessage>(&mut self, topic: &str, stamp: Stamp, message: &M) -> Result<(), BagError> {
+    pub fn write<M: RosMessage>(
+        &mut self,
+        topic: &str,
+        stamp: Stamp,
+        message: &M,
+    ) -> Result<(), BagError> {
         let result = self.stream.write(topic, stamp, message);
         self.placed(result)
     }
@@ -99,8 +132,16 @@ impl BagWriter {
     ///
     /// # Errors
     /// As there.
-    pub fn write_payload(&mut self, topic: TopicId, payload: &[u8], log_time: Stamp, publish_time: Stamp) -> Result<(), BagError> {
-        let result = self.stream.write_payload(topic, payload, log_time, publish_time);
+    pub fn write_payload(
+        &mut self,
+        topic: TopicId,
+        payload: &[u8],
+        log_time: Stamp,
+        publish_time: Stamp,
+    ) -> Result<(), BagError> {
+        let result = self
+            .stream
+            .write_payload(topic, payload, log_time, publish_time);
         self.placed(result)
     }
 
@@ -108,7 +149,13 @@ impl BagWriter {
     ///
     /// # Errors
     /// As there.
-    pub fn attach(&mut self, name: &str, media_type: &str, time: Stamp, content: &[u8]) -> Result<(), BagError> {
+    pub fn attach(
+        &mut self,
+        name: &str,
+        media_type: &str,
+        time: Stamp,
+        content: &[u8],
+    ) -> Result<(), BagError> {
         let result = self.stream.attach(name, media_type, time, content);
         self.placed(result)
     }
@@ -117,13 +164,17 @@ impl BagWriter {
     ///
     /// # Errors
     /// As there.
-    pub fn write_metadata(&mut self, name: &str, values: BTreeMap<String, String>) -> Result<(), BagError> {
+    pub fn write_metadata(
+        &mut self,
+        name: &str,
+        values: BTreeMap<String, String>,
+    ) -> Result<(), BagError> {
         let result = self.stream.write_metadata(name, values);
         self.placed(result)
     }
 
-    /// Hands everything written so far to the operating system: from here on it survives the end of this process. A live recorder calls it
-    /// at least every 250 ms.
+    /// Hands everything written so far to the operating system: from here on it survives the end of
+    /// this process. A live recorder calls it at least every 250 ms.
     ///
     /// # Errors
     /// As above.
@@ -132,13 +183,17 @@ impl BagWriter {
         self.placed(result)
     }
 
-    /// [`Self::flush`], and waits until the disk has it: from here on it survives a loss of power. Takes milliseconds.
+    /// [`Self::flush`], and waits until the disk has it: from here on it survives a loss of power.
+    /// Takes milliseconds.
     ///
     /// # Errors
     /// As above.
     pub fn sync(&mut self) -> Result<(), BagError> {
         self.flush()?;
-        let result = self.file.sync_data().map_err(io_error(&self.target, "write"));
+        let result = self
+            .file
+            .sync_data()
+            .map_err(io_error(&self.target, "write"));
         self.placed(result)
     }
 
@@ -157,18 +212,33 @@ impl BagWriter {
     /// # Errors
     /// As above.
     pub fn finish(self) -> Result<BagSummary, BagError> {
-        let Self { stream, place, target, file_name, file: _, options } = self;
-        let (_, summary) = stream.finish(&file_name).map_err(|error| placed(error, options.live, &target))?;
+        let Self {
+            stream,
+            place,
+            target,
+            file_name,
+            file: _,
+            options,
+        } = self;
+        let (_, summary) = stream
+            .finish(&file_name)
+            .map_err(|error| placed(error, options.live, &target))?;
         let metadata = Information::of(&[(file_name, &summary)]).yaml();
         let finish = || io_error(&target, "write");
         match place {
             Place::LiveFile => {}
-            Place::LiveDirectory => fs::write(target.join("metadata.yaml"), metadata).map_err(finish())?,
+            Place::LiveDirectory => {
+                fs::write(target.join("metadata.yaml"), metadata).map_err(finish())?
+            }
             Place::TemporaryFile(temporary) if options.replace => {
-                temporary.persist(&target).map_err(|error| finish()(error.error))?;
+                temporary
+                    .persist(&target)
+                    .map_err(|error| finish()(error.error))?;
             }
             Place::TemporaryFile(temporary) => match temporary.persist_noclobber(&target) {
-                Err(error) if error.error.kind() == std::io::ErrorKind::AlreadyExists => return Err(BagError::Exists { path: target }),
+                Err(error) if error.error.kind() == std::io::ErrorKind::AlreadyExists => {
+                    return Err(BagError::Exists { path: target });
+                }
                 result => result.map_err(|error| finish()(error.error))?,
             },
             Place::TemporaryDirectory(directory) => {
@@ -190,29 +260,41 @@ impl BagWriter {
 /// Says of a live recording's I/O error what is left and how to mend it.
 fn placed(error: BagError, live: bool, target: &Path) -> BagError {
     match error {
-        BagError::Io { source, .. } if live => BagError::RecordingStopped { path: target.to_owned(), source },
+        BagError::Io { source, .. } if live => BagError::RecordingStopped {
+            path: target.to_owned(),
+            source,
+        },
         other => other,
     }
 }
 
 /// Whether a path names a single MCAP file rather than a bag directory.
 pub(crate) fn is_single_file(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap"))
+    path.extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("mcap"))
 }
 
 /// The last part of a path.
 pub(crate) fn name_of(path: &Path) -> String {
-    path.file_name().map_or_else(|| "bag".to_owned(), |name| name.to_string_lossy().into_owned())
+    path.file_name().map_or_else(
+        || "bag".to_owned(),
+        |name| name.to_string_lossy().into_owned(),
+    )
 }
 
 /// The directory that holds a path.
 pub(crate) fn parent_of(path: &Path) -> &Path {
-    path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
+    path.parent()
+        .filter(|parent| !parent.as_os_str().is_empty())
+        .unwrap_or(Path::new("."))
 }
 
 /// Names `.NAME.….partial` beside `path`, with the permissions that an ordinary new file has.
 pub(crate) fn temporary(path: &Path) -> Temporary {
-    Temporary { prefix: format!(".{}.", name_of(path)), permissions: everybody(0o666) }
+    Temporary {
+        prefix: format!(".{}.", name_of(path)),
+        permissions: everybody(0o666),
+    }
 }
 
 /// A pattern for temporary names.
@@ -223,7 +305,10 @@ pub(crate) struct Temporary {
 
 impl Temporary {
     fn permissions(self, permissions: Option<fs::Permissions>) -> Self {
-        Self { permissions, ..self }
+        Self {
+            permissions,
+            ..self
+        }
     }
 
     fn builder(&self) -> tempfile::Builder<'_, 'static> {
@@ -258,16 +343,33 @@ fn everybody(mode: u32) -> Option<fs::Permissions> {
 }
 
 fn check_target(path: &Path, single: bool, replace: bool) -> Result<(), BagError> {
-    let Ok(found) = fs::symlink_metadata(path) else { return Ok(()) };
-    let replaceable = if single { !found.is_dir() } else { found.is_dir() && is_bag_directory(path)? };
-    if replace && replaceable { Ok(()) } else { Err(BagError::Exists { path: path.to_owned() }) }
+    let Ok(found) = fs::symlink_metadata(path) else {
+        return Ok(());
+    };
+    let replaceable = if single {
+        !found.is_dir()
+    } else {
+        found.is_dir() && is_bag_directory(path)?
+    };
+    if replace && replaceable {
+        Ok(())
+    } else {
+        Err(BagError::Exists {
+            path: path.to_owned(),
+        })
+    }
 }
 
 /// Whether a directory holds nothing but what a bag consists of: only such a one may be removed.
 fn is_bag_directory(path: &Path) -> Result<bool, BagError> {
     for entry in fs::read_dir(path).map_err(io_error(path, "read"))? {
         let entry = entry.map_err(io_error(path, "read"))?.path();
-        if entry.is_dir() || !(is_single_file(&entry) || entry.file_name().is_some_and(|name| name == "metadata.yaml")) {
+        if entry.is_dir()
+            || !(is_single_file(&entry)
+                || entry
+                    .file_name()
+                    .is_some_and(|name| name == "metadata.yaml"))
+        {
             return Ok(false);
         }
     }
@@ -280,7 +382,9 @@ fn remove_bag(path: &Path) -> Result<(), BagError> {
         return Ok(());
     }
     if !is_bag_directory(path)? {
-        return Err(BagError::Exists { path: path.to_owned() });
+        return Err(BagError::Exists {
+            path: path.to_owned(),
+        });
     }
     fs::remove_dir_all(path).map_err(io_error(path, "replace"))
 }

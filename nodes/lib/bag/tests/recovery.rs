@@ -8,26 +8,47 @@ use std::io::{self, Cursor, Seek, SeekFrom, Write};
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
-use cromosim_bag::{BagError, BagOptions, BagReader, BagWriter, Compression, Selection, StreamWriter, recover};
+use cromosim_bag::{
+    BagError, BagOptions, BagReader, BagWriter, Compression, Selection, StreamWriter, recover,
+};
 
 use common::{Numbers, bag, check_samples, fill, imu, stamp};
 
-const PLAIN: BagOptions = BagOptions { compression: Compression::None, live: false, replace: true };
-const ZSTD: BagOptions = BagOptions { compression: Compression::Zstd, ..PLAIN };
-const LIVE: BagOptions = BagOptions { live: true, ..PLAIN };
+const PLAIN: BagOptions = BagOptions {
+    compression: Compression::None,
+    live: false,
+    replace: true,
+};
+const ZSTD: BagOptions = BagOptions {
+    compression: Compression::Zstd,
+    ..PLAIN
+};
+const LIVE: BagOptions = BagOptions {
+    live: true,
+    ..PLAIN
+};
 
-/// Bytes of one sample in an unpacked chunk: record header 9, message header 22, CDR header 4, header 8 + 4 + 15 + 5 (padding), 37 numbers.
+/// Bytes of one sample in an unpacked chunk: record header 9, message header 22, CDR header 4,
+/// header 8 + 4 + 15 + 5 (padding), 37 numbers.
 const SAMPLE_BYTES: u64 = 9 + 22 + 4 + 32 + 37 * 8;
 
 #[test]
 fn a_bag_cut_anywhere_gives_back_what_lay_before_the_cut() {
     let folder = tempfile::tempdir().unwrap();
-    let (whole, cut, mended) = (folder.path().join("whole.mcap"), folder.path().join("cut.mcap"), folder.path().join("mended.mcap"));
+    let (whole, cut, mended) = (
+        folder.path().join("whole.mcap"),
+        folder.path().join("cut.mcap"),
+        folder.path().join("mended.mcap"),
+    );
     for options in [PLAIN, ZSTD] {
         let mut writer = BagWriter::create(&whole, options).unwrap();
         fill(&mut writer, 60);
         writer.flush().unwrap();
-        (60..100).for_each(|index| writer.write("/imu/left_wrist/data_raw", stamp(index), &imu(index)).unwrap());
+        (60..100).for_each(|index| {
+            writer
+                .write("/imu/left_wrist/data_raw", stamp(index), &imu(index))
+                .unwrap()
+        });
         writer.finish().unwrap();
         let bytes = fs::read(&whole).unwrap();
         let mut kept_before = 0;
@@ -35,15 +56,24 @@ fn a_bag_cut_anywhere_gives_back_what_lay_before_the_cut() {
             fs::write(&cut, &bytes[..length]).unwrap();
             match BagReader::open(&cut) {
                 Err(error @ BagError::Unfinished { .. }) => {
-                    assert!(error.to_string().contains("cromosim bag recover"), "{error}");
+                    assert!(
+                        error.to_string().contains("cromosim bag recover"),
+                        "{error}"
+                    );
                 }
                 other => panic!("{length} bytes: {other:?}"),
             }
             let _ = fs::remove_file(&mended);
             let recovery = recover(&cut, &mended).unwrap();
             let kept = check_samples(&mended);
-            assert!(kept >= kept_before, "{length} bytes: {kept} samples kept, with fewer bytes {kept_before}");
-            assert_eq!(BagReader::open(&mended).unwrap().summary(), &recovery.summary);
+            assert!(
+                kept >= kept_before,
+                "{length} bytes: {kept} samples kept, with fewer bytes {kept_before}"
+            );
+            assert_eq!(
+                BagReader::open(&mended).unwrap().summary(),
+                &recovery.summary
+            );
             kept_before = kept;
         }
         assert_eq!(kept_before, 100);
@@ -53,9 +83,16 @@ fn a_bag_cut_anywhere_gives_back_what_lay_before_the_cut() {
 #[test]
 fn of_a_cut_chunk_every_whole_message_is_kept() {
     let folder = tempfile::tempdir().unwrap();
-    let (whole, cut) = (folder.path().join("whole.mcap"), folder.path().join("cut.mcap"));
+    let (whole, cut) = (
+        folder.path().join("whole.mcap"),
+        folder.path().join("cut.mcap"),
+    );
     let mut writer = BagWriter::create(&whole, PLAIN).unwrap();
-    (0..100).for_each(|index| writer.write("/imu/left_wrist/data_raw", stamp(index), &imu(index)).unwrap());
+    (0..100).for_each(|index| {
+        writer
+            .write("/imu/left_wrist/data_raw", stamp(index), &imu(index))
+            .unwrap()
+    });
     writer.finish().unwrap();
     let bytes = fs::read(&whole).unwrap();
     let kept_at = |length: u64| {
@@ -64,7 +101,10 @@ fn of_a_cut_chunk_every_whole_message_is_kept() {
         (check_samples(&cut), recovery)
     };
     let (kept, recovery) = kept_at(20_000);
-    assert!(recovery.bytes_lost > 0 && recovery.bytes_lost < SAMPLE_BYTES, "{recovery:?}");
+    assert!(
+        recovery.bytes_lost > 0 && recovery.bytes_lost < SAMPLE_BYTES,
+        "{recovery:?}"
+    );
     assert_eq!(recovery.damages.len(), 1);
     // Where the lost bytes begin, the last sample ends: one byte less, and one sample less.
     let end = 20_000 - recovery.bytes_lost;
@@ -81,16 +121,37 @@ fn a_killed_recorder_loses_what_came_after_the_last_flush_alone() {
         let mut writer = BagWriter::create(&path, LIVE).unwrap();
         fill(&mut writer, 1000);
         writer.flush().unwrap();
-        (1000..1020).for_each(|index| writer.write("/imu/left_wrist/data_raw", stamp(index), &imu(index)).unwrap());
+        (1000..1020).for_each(|index| {
+            writer
+                .write("/imu/left_wrist/data_raw", stamp(index), &imu(index))
+                .unwrap()
+        });
         // Killed: no destructor runs.
         std::mem::forget(writer);
         let error = BagReader::open(&path).unwrap_err();
-        assert!(error.to_string().contains("cromosim bag recover"), "{error}");
+        assert!(
+            error.to_string().contains("cromosim bag recover"),
+            "{error}"
+        );
         let recovery = recover(&path, &path).unwrap();
-        assert_eq!((check_samples(&path), recovery.messages_kept(), recovery.bytes_lost), (1000, 1100, 0), "{name}");
+        assert_eq!(
+            (
+                check_samples(&path),
+                recovery.messages_kept(),
+                recovery.bytes_lost
+            ),
+            (1000, 1100, 0),
+            "{name}"
+        );
         let reader = BagReader::open(&path).unwrap();
-        assert_eq!(reader.attachment("placements.yaml"), Some(b"placements: []\n".as_slice()));
-        assert!(reader.metadata("rosbag2").unwrap()["serialized_metadata"].contains("message_count: 1100"));
+        assert_eq!(
+            reader.attachment("placements.yaml"),
+            Some(b"placements: []\n".as_slice())
+        );
+        assert!(
+            reader.metadata("rosbag2").unwrap()["serialized_metadata"]
+                .contains("message_count: 1100")
+        );
     }
 }
 
@@ -101,22 +162,37 @@ fn a_directory_is_mended_into_another_one() {
     bag(&old, 200, PLAIN);
     fs::copy(old.join("old_0.mcap"), old.join("old_1.mcap")).unwrap();
     fs::remove_file(old.join("metadata.yaml")).unwrap();
-    assert!(matches!(BagReader::open(&old), Err(BagError::NoMetadata { .. })));
+    assert!(matches!(
+        BagReader::open(&old),
+        Err(BagError::NoMetadata { .. })
+    ));
     assert_eq!(recover(&old, &new).unwrap().messages_kept(), 440);
     let reader = BagReader::open(&new).unwrap();
-    let times: Vec<_> = reader.messages(&Selection::default()).unwrap().map(|message| message.unwrap().log_time).collect();
+    let times: Vec<_> = reader
+        .messages(&Selection::default())
+        .unwrap()
+        .map(|message| message.unwrap().log_time)
+        .collect();
     assert!(times.is_sorted() && times.len() == 440);
     assert!(matches!(recover(&old, &new), Err(BagError::Exists { .. })));
-    assert!(matches!(recover(folder.path(), &folder.path().join("none")), Err(BagError::NoMetadata { .. })));
+    assert!(matches!(
+        recover(folder.path(), &folder.path().join("none")),
+        Err(BagError::NoMetadata { .. })
+    ));
 }
 
 #[test]
 fn a_chunk_that_fails_its_checksum_is_left_out_and_named() {
     let folder = tempfile::tempdir().unwrap();
-    let (path, mended) = (folder.path().join("bad.mcap"), folder.path().join("mended.mcap"));
+    let (path, mended) = (
+        folder.path().join("bad.mcap"),
+        folder.path().join("mended.mcap"),
+    );
     let mut writer = BagWriter::create(&path, PLAIN).unwrap();
     for index in 0..100 {
-        writer.write("/imu/left_wrist/data_raw", stamp(index), &imu(index)).unwrap();
+        writer
+            .write("/imu/left_wrist/data_raw", stamp(index), &imu(index))
+            .unwrap();
         if index % 25 == 24 {
             writer.flush().unwrap();
         }
@@ -126,14 +202,22 @@ fn a_chunk_that_fails_its_checksum_is_left_out_and_named() {
     bytes[5000] ^= 0x10;
     fs::write(&path, &bytes).unwrap();
     let reader = BagReader::open(&path).unwrap();
-    let error = reader.messages(&Selection::default()).unwrap().find_map(Result::err).unwrap();
-    assert!(matches!(error, BagError::Corrupt { .. }) && error.to_string().contains("checksum"), "{error}");
+    let error = reader
+        .messages(&Selection::default())
+        .unwrap()
+        .find_map(Result::err)
+        .unwrap();
+    assert!(
+        matches!(error, BagError::Corrupt { .. }) && error.to_string().contains("checksum"),
+        "{error}"
+    );
     let recovery = recover(&path, &mended).unwrap();
     assert_eq!((recovery.messages_kept(), recovery.damages.len()), (75, 1));
     assert!(recovery.bytes_lost > 25 * SAMPLE_BYTES);
 }
 
-/// Takes a number of bytes and then is full, as a disk is. What it took stays readable after the writer is gone.
+/// Takes a number of bytes and then is full, as a disk is. What it took stays readable after the
+/// writer is gone.
 struct SmallDisk {
     stored: Arc<Mutex<Cursor<Vec<u8>>>>,
     capacity: usize,
@@ -163,27 +247,48 @@ impl Seek for SmallDisk {
 #[test]
 fn a_full_disk_is_an_error_and_what_was_written_is_kept() {
     let folder = tempfile::tempdir().unwrap();
-    let (path, mended) = (folder.path().join("full.mcap"), folder.path().join("mended.mcap"));
+    let (path, mended) = (
+        folder.path().join("full.mcap"),
+        folder.path().join("mended.mcap"),
+    );
     for capacity in (600..40_000).step_by(1777) {
         let stored = Arc::new(Mutex::new(Cursor::new(Vec::new())));
-        let disk = SmallDisk { stored: Arc::clone(&stored), capacity };
-        let mut writer = StreamWriter::new(disk, Path::new("full.mcap"), Compression::None).unwrap();
+        let disk = SmallDisk {
+            stored: Arc::clone(&stored),
+            capacity,
+        };
+        let mut writer =
+            StreamWriter::new(disk, Path::new("full.mcap"), Compression::None).unwrap();
         let mut flushed = 0;
         let error = (0..200).find_map(|index| {
-            let written = writer.write("/imu/left_wrist/data_raw", stamp(index), &imu(index)).and_then(|()| match index % 10 {
-                9 => writer.flush().map(|()| flushed = index + 1),
-                _ => Ok(()),
-            });
+            let written = writer
+                .write("/imu/left_wrist/data_raw", stamp(index), &imu(index))
+                .and_then(|()| match index % 10 {
+                    9 => writer.flush().map(|()| flushed = index + 1),
+                    _ => Ok(()),
+                });
             written.err()
         });
-        assert!(matches!(&error, Some(BagError::Io { source, .. }) if source.kind() == io::ErrorKind::StorageFull), "{error:?}");
-        assert!(writer.write("/imu/left_wrist/data_raw", stamp(0), &imu(0)).and_then(|()| writer.flush()).is_err(), "no second try");
+        assert!(
+            matches!(&error, Some(BagError::Io { source, .. }) if source.kind() == io::ErrorKind::StorageFull),
+            "{error:?}"
+        );
+        assert!(
+            writer
+                .write("/imu/left_wrist/data_raw", stamp(0), &imu(0))
+                .and_then(|()| writer.flush())
+                .is_err(),
+            "no second try"
+        );
         drop(writer);
         fs::write(&path, stored.lock().unwrap().get_ref()).unwrap();
         let _ = fs::remove_file(&mended);
         recover(&path, &mended).unwrap();
         let kept = check_samples(&mended);
-        assert!(kept >= flushed && kept < flushed + 10, "capacity {capacity}: {flushed} flushed, {kept} kept");
+        assert!(
+            kept >= flushed && kept < flushed + 10,
+            "capacity {capacity}: {flushed} flushed, {kept} kept"
+        );
     }
 }
 
@@ -200,15 +305,27 @@ fn a_live_recording_on_a_full_device_says_so() {
     let path = folder.path().join("full.mcap");
     std::os::unix::fs::symlink(full, &path).unwrap();
     let mut writer = BagWriter::create(&path, LIVE).unwrap();
-    let error = writer.write("/imu/left_wrist/data_raw", stamp(0), &imu(0)).and_then(|()| writer.flush()).unwrap_err();
-    assert!(matches!(error, BagError::RecordingStopped { .. }), "{error:?}");
-    assert!(error.to_string().contains("full.mcap") && error.to_string().contains("No space left"), "{error}");
+    let error = writer
+        .write("/imu/left_wrist/data_raw", stamp(0), &imu(0))
+        .and_then(|()| writer.flush())
+        .unwrap_err();
+    assert!(
+        matches!(error, BagError::RecordingStopped { .. }),
+        "{error:?}"
+    );
+    assert!(
+        error.to_string().contains("full.mcap") && error.to_string().contains("No space left"),
+        "{error}"
+    );
 }
 
 #[test]
 fn no_damage_makes_reading_or_mending_panic() {
     let folder = tempfile::tempdir().unwrap();
-    let (path, mended) = (folder.path().join("bag.mcap"), folder.path().join("mended.mcap"));
+    let (path, mended) = (
+        folder.path().join("bag.mcap"),
+        folder.path().join("mended.mcap"),
+    );
     let mut numbers = Numbers(20_240_607);
     for options in [PLAIN, ZSTD] {
         bag(&path, 40, options);
@@ -228,11 +345,18 @@ fn no_damage_makes_reading_or_mending_panic() {
             }
             fs::write(&path, &bytes).unwrap();
             if let Ok(reader) = BagReader::open(&path) {
-                let _ = reader.messages(&Selection::default()).unwrap().map(|message| message.map(|_| ())).collect::<Result<Vec<()>, _>>();
+                let _ = reader
+                    .messages(&Selection::default())
+                    .unwrap()
+                    .map(|message| message.map(|_| ()))
+                    .collect::<Result<Vec<()>, _>>();
             }
             let _ = fs::remove_file(&mended);
             match recover(&path, &mended) {
-                Ok(recovery) => assert_eq!(BagReader::open(&mended).unwrap().summary(), &recovery.summary),
+                Ok(recovery) => assert_eq!(
+                    BagReader::open(&mended).unwrap().summary(),
+                    &recovery.summary
+                ),
                 Err(error) => assert!(matches!(error, BagError::NotMcap { .. }), "{error}"),
             }
         }

@@ -18,27 +18,36 @@ static POSEDIRS: &str = include_str!("../assets/posedirs.json");
 pub(crate) static SITES: &str = include_str!("../assets/sites.json");
 
 impl BodyModel {
-    /// The body of this project: an adult of 1.70 m and 70 kg in SMPL's structure with 6954 vertices and 10 betas, each one standard
-    /// deviation: stature, mass, leg to trunk ratio, shoulder breadth, hip breadth, arm length, belly, muscle, sex dimorphism,
-    /// extremity size. They are not SMPL's betas: fit them to bone lengths instead of taking them from a motion file.
+    /// The body of this project: an adult of 1.70 m and 70 kg in SMPL's structure with 6954
+    /// vertices and 10 betas, each one standard deviation: stature, mass, leg to trunk ratio,
+    /// shoulder breadth, hip breadth, arm length, belly, muscle, sex dimorphism, extremity size.
+    /// They are not SMPL's betas: fit them to bone lengths instead of taking them from a motion
+    /// file.
     ///
     /// The first call unpacks it and makes its pose corrections; later calls share it.
     pub fn embedded() -> Arc<Self> {
         static BODY: OnceLock<Arc<BodyModel>> = OnceLock::new();
         // A broken asset is a fault of the build and not of any input: a test loads it.
-        BODY.get_or_init(|| Arc::new(load().expect("the embedded body is sound"))).clone()
+        BODY.get_or_init(|| Arc::new(load().expect("the embedded body is sound")))
+            .clone()
     }
 }
 
 fn load() -> Result<BodyModel, BodyError> {
     let path = Path::new("cromosim_neutral");
-    let mut arrays = Container::new(Cursor::new(ARRAYS), path, Limits::default()).map_err(BodyError::Arrays)?;
+    let mut arrays =
+        Container::new(Cursor::new(ARRAYS), path, Limits::default()).map_err(BodyError::Arrays)?;
     let mut raw = read_without_posedirs(&mut arrays)?.reduced()?;
     raw.space = ShapeSpace::Cromosim;
     raw.gender = Some(Gender::Neutral);
-    // The exact joints that the constants were made with; J_regressor gives them back within 0.02 mm.
-    let joints = arrays.at("J").and_then(|entry| entry.floats(&[Some(JOINT_COUNT), Some(3)], "(24, 3)")).map_err(BodyError::Arrays)?;
-    let constants: Constants = serde_json::from_str(POSEDIRS).expect("the embedded constants are sound");
+    // The exact joints that the constants were made with; J_regressor gives them back within 0.02
+    // mm.
+    let joints = arrays
+        .at("J")
+        .and_then(|entry| entry.floats(&[Some(JOINT_COUNT), Some(3)], "(24, 3)"))
+        .map_err(BodyError::Arrays)?;
+    let constants: Constants =
+        serde_json::from_str(POSEDIRS).expect("the embedded constants are sound");
     raw.pose_blocks = generated_pose_blocks(&constants, &raw, &joints.values);
     let mut body = BodyModel::from_raw(raw)?;
     body.sites = embedded_sites(&body)?;

@@ -77,13 +77,17 @@ pub enum BodyError {
         betas_of: String,
     },
     /// Shape coefficients that do not say whose they are.
-    #[error("betas of shape space '{given}'; say whose they are: smpl (SMPL and SMPL-H), smplx or cromosim (the embedded body)")]
+    #[error(
+        "betas of shape space '{given}'; say whose they are: smpl (SMPL and SMPL-H), smplx or cromosim (the embedded body)"
+    )]
     UnknownShapeSpace {
         /// What was given, maybe nothing.
         given: String,
     },
     /// More shape coefficients than the body has.
-    #[error("{given} betas given, but body {body} has {available}; fewer are allowed, the rest is 0")]
+    #[error(
+        "{given} betas given, but body {body} has {available}; fewer are allowed, the rest is 0"
+    )]
     TooManyBetas {
         /// The body's id.
         body: String,
@@ -131,13 +135,17 @@ pub enum BodyError {
         triangle_count: usize,
     },
     /// Barycentrics that name no point of the triangle.
-    #[error("barycentrics {barycentrics:?} are no point of a triangle; expected three numbers in [0, 1] that sum to 1")]
+    #[error(
+        "barycentrics {barycentrics:?} are no point of a triangle; expected three numbers in [0, 1] that sum to 1"
+    )]
     Barycentrics {
         /// What was given.
         barycentrics: [f64; 3],
     },
     /// A point from which no nearest surface follows.
-    #[error("point {point:?} is not finite; expected metres in the model frame (x left, y up, z forward)")]
+    #[error(
+        "point {point:?} is not finite; expected metres in the model frame (x left, y up, z forward)"
+    )]
     PointNotFinite {
         /// What was given.
         point: [f64; 3],

@@ -68,8 +68,12 @@ impl Joint {
         Self::RightHand,
     ];
 
-    const PARENTS: [u8; JOINT_COUNT] = [0, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19, 20, 21];
-    const MIRRORED: [u8; JOINT_COUNT] = [0, 2, 1, 3, 5, 4, 6, 8, 7, 9, 11, 10, 12, 14, 13, 15, 17, 16, 19, 18, 21, 20, 23, 22];
+    const PARENTS: [u8; JOINT_COUNT] = [
+        0, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19, 20, 21,
+    ];
+    const MIRRORED: [u8; JOINT_COUNT] = [
+        0, 2, 1, 3, 5, 4, 6, 8, 7, 9, 11, 10, 12, 14, 13, 15, 17, 16, 19, 18, 21, 20, 23, 22,
+    ];
     const NAMES: [&'static str; JOINT_COUNT] = [
         "pelvis",
         "left_hip",
@@ -114,7 +118,10 @@ impl Joint {
 
     /// The joint that SMPL calls `name`; `None` for any other name.
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::NAMES.iter().position(|&known| known == name).and_then(Self::from_index)
+        Self::NAMES
+            .iter()
+            .position(|&known| known == name)
+            .and_then(Self::from_index)
     }
 
     /// The next joint towards the pelvis; `None` for the pelvis.
@@ -132,7 +139,9 @@ impl Joint {
 
     /// The joints whose parent this is.
     pub fn children(self) -> impl Iterator<Item = Self> {
-        Self::ALL.into_iter().filter(move |joint| joint.parent() == Some(self))
+        Self::ALL
+            .into_iter()
+            .filter(move |joint| joint.parent() == Some(self))
     }
 }
 
@@ -146,7 +155,9 @@ impl FromStr for Joint {
     type Err = BodyError;
 
     fn from_str(name: &str) -> Result<Self, BodyError> {
-        Self::from_name(name).ok_or_else(|| BodyError::UnknownJoint { name: name.to_owned() })
+        Self::from_name(name).ok_or_else(|| BodyError::UnknownJoint {
+            name: name.to_owned(),
+        })
     }
 }
 
@@ -160,13 +171,35 @@ mod tests {
         for (index, joint) in Joint::ALL.into_iter().enumerate() {
             assert_eq!(joint.index(), index);
             assert_eq!(Joint::from_name(joint.name()), Some(joint));
-            assert!(joint.parent().is_none_or(|parent| parent < joint), "{joint}: a parent stands before its child");
+            assert!(
+                joint.parent().is_none_or(|parent| parent < joint),
+                "{joint}: a parent stands before its child"
+            );
             assert_eq!(joint.mirrored().mirrored(), joint);
-            assert_eq!(joint.mirrored().parent(), joint.parent().map(Joint::mirrored));
-            assert_eq!(joint.mirrored().name(), joint.name().replace("left", "?").replace("right", "left").replace('?', "right"));
+            assert_eq!(
+                joint.mirrored().parent(),
+                joint.parent().map(Joint::mirrored)
+            );
+            assert_eq!(
+                joint.mirrored().name(),
+                joint
+                    .name()
+                    .replace("left", "?")
+                    .replace("right", "left")
+                    .replace('?', "right")
+            );
         }
         assert_eq!(Joint::LeftWrist.parent(), Some(Joint::LeftElbow));
-        assert_eq!(Joint::Spine3.children().collect::<Vec<_>>(), [Joint::Neck, Joint::LeftCollar, Joint::RightCollar]);
-        assert!("wrist".parse::<Joint>().unwrap_err().to_string().contains("wrist"));
+        assert_eq!(
+            Joint::Spine3.children().collect::<Vec<_>>(),
+            [Joint::Neck, Joint::LeftCollar, Joint::RightCollar]
+        );
+        assert!(
+            "wrist"
+                .parse::<Joint>()
+                .unwrap_err()
+                .to_string()
+                .contains("wrist")
+        );
     }
 }

@@ -1,13 +1,16 @@
 //! The human body: SMPL model files, shape, skeleton, skin and the sites that sensors sit on.
 //!
-//! A body is a triangle mesh over 24 joints (SMPL, Loper et al. 2015). Shape coefficients `betas` move the rest mesh, the joints follow it,
-//! and a [`BodyPose`] turns it: `world_from_segments` is the skeleton, `skin` the whole mesh (f32, fast), `subset` a few vertices (f64).
+//! A body is a triangle mesh over 24 joints (SMPL, Loper et al. 2015). Shape coefficients `betas`
+//! move the rest mesh, the joints follow it, and a [`BodyPose`] turns it: `world_from_segments` is
+//! the skeleton, `skin` the whole mesh (f32, fast), `subset` a few vertices (f64).
 //!
-//! Files of SMPL, SMPL-H and SMPL-X are read by their content, npz or pickle; SMPL-H and SMPL-X keep their mesh and become bodies of 24
-//! joints, exactly so while their fingers, jaw and eyes rest ([`BodyModel::read`]).
+//! Files of SMPL, SMPL-H and SMPL-X are read by their content, npz or pickle; SMPL-H and SMPL-X
+//! keep their mesh and become bodies of 24 joints, exactly so while their fingers, jaw and eyes
+//! rest ([`BodyModel::read`]).
 //!
-//! Frames: the model frame has x to the subject's left, y up and z forward, in T-pose; the world is z up. A segment's frame stands at its
-//! joint and is parallel to the model frame at rest. Lengths are metres, angles radians, and transforms read right to left.
+//! Frames: the model frame has x to the subject's left, y up and z forward, in T-pose; the world is
+//! z up. A segment's frame stands at its joint and is parallel to the model frame at rest. Lengths
+//! are metres, angles radians, and transforms read right to left.
 //!
 //! ```
 //! use cromosim_body::{BodyModel, BodyPose, Joint, ShapedBody};

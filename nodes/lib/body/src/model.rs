@@ -50,7 +50,8 @@ impl fmt::Display for Gender {
     }
 }
 
-/// What one joint's rotation adds to one vertex: `coefficients[9 * axis + 3 * row + column]` times (R - I)[row, column].
+/// What one joint's rotation adds to one vertex: `coefficients[9 * axis + 3 * row + column]` times
+/// (R - I)[row, column].
 ///
 /// f32: corrections are centimetres, so that rounding stays under a nanometre.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,7 +62,8 @@ pub(crate) struct PoseBlock {
     pub coefficients: [f32; 27],
 }
 
-/// A body before it has a shape: SMPL (Loper et al. 2015) with V vertices, 24 joints and B shape coefficients.
+/// A body before it has a shape: SMPL (Loper et al. 2015) with V vertices, 24 joints and B shape
+/// coefficients.
 #[derive(Debug)]
 pub struct BodyModel {
     pub(crate) id: String,
@@ -101,7 +103,11 @@ impl<T> Rows<T> {
     }
 
     pub fn row(&self, index: usize) -> &[T] {
-        let start = if index == 0 { 0 } else { self.ends[index - 1] as usize };
+        let start = if index == 0 {
+            0
+        } else {
+            self.ends[index - 1] as usize
+        };
         &self.items[start..self.ends[index] as usize]
     }
 
@@ -132,20 +138,37 @@ pub(crate) struct RawModel {
 }
 
 impl BodyModel {
-    /// Checks what shapes alone do not tell, and brings the arrays into the order in which they are used.
+    /// Checks what shapes alone do not tell, and brings the arrays into the order in which they are
+    /// used.
     pub(crate) fn from_raw(raw: RawModel) -> Result<Self, BodyError> {
         let vertex_count = raw.template.len() / 3;
         check_sums(&raw.path, "weights", &raw.weights, JOINT_COUNT)?;
         check_sums(&raw.path, "J_regressor", &raw.regressor, vertex_count)?;
         let faces = checked_faces(&raw.path, &raw.faces, vertex_count)?;
-        let template: Vec<_> = raw.template.as_chunks().0.iter().map(|&point: &[f64; 3]| Vector3::from(point)).collect();
+        let template: Vec<_> = raw
+            .template
+            .as_chunks()
+            .0
+            .iter()
+            .map(|&point: &[f64; 3]| Vector3::from(point))
+            .collect();
         let nonzero = |&(_, weight): &(usize, f64)| weight != 0.0;
         let weights = raw.weights.chunks_exact(JOINT_COUNT);
-        let skin_weights =
-            Rows::new(weights.map(|row| row.iter().copied().enumerate().filter(nonzero).map(|(joint, weight)| (joint as u8, weight))));
+        let skin_weights = Rows::new(weights.map(|row| {
+            row.iter()
+                .copied()
+                .enumerate()
+                .filter(nonzero)
+                .map(|(joint, weight)| (joint as u8, weight))
+        }));
         let regressor = raw.regressor.chunks_exact(vertex_count);
-        let regressor =
-            Rows::new(regressor.map(|row| row.iter().copied().enumerate().filter(nonzero).map(|(vertex, weight)| (vertex as u32, weight))));
+        let regressor = Rows::new(regressor.map(|row| {
+            row.iter()
+                .copied()
+                .enumerate()
+                .filter(nonzero)
+                .map(|(vertex, weight)| (vertex as u32, weight))
+        }));
         let skin_tables = SkinTables::new(&raw.pose_blocks, &skin_weights, vertex_count);
         Ok(Self {
             id: raw.id,
@@ -178,7 +201,8 @@ impl BodyModel {
         self.space
     }
 
-    /// The triangles, counter-clockwise seen from outside; every index is below [`Self::vertex_count`].
+    /// The triangles, counter-clockwise seen from outside; every index is below
+    /// [`Self::vertex_count`].
     pub fn faces(&self) -> &[[u32; 3]] {
         &self.faces
     }
@@ -198,33 +222,75 @@ impl BodyModel {
         &self.template
     }
 
-    /// Rest joints are linear in betas: J(beta) = J(0) + sum_b beta_b D_b. These are J(0) and the D_b, (24, 3) each, m: what a fit of
-    /// betas to bone lengths needs.
-    pub fn joint_shape_directions(&self) -> ([Vector3<f64>; JOINT_COUNT], Vec<[Vector3<f64>; JOINT_COUNT]>) {
+    /// Rest joints are linear in betas: J(beta) = J(0) + sum_b beta_b D_b. These are J(0) and the
+    /// D_b, (24, 3) each, m: what a fit of betas to bone lengths needs.
+    pub fn joint_shape_directions(
+        &self,
+    ) -> (
+        [Vector3<f64>; JOINT_COUNT],
+        Vec<[Vector3<f64>; JOINT_COUNT]>,
+    ) {
         let at = |value: &dyn Fn(usize) -> Vector3<f64>| -> [Vector3<f64>; JOINT_COUNT] {
-            std::array::from_fn(|joint| self.regressor.row(joint).iter().map(|&(vertex, weight)| value(vertex as usize) * weight).sum())
+            std::array::from_fn(|joint| {
+                self.regressor
+                    .row(joint)
+                    .iter()
+                    .map(|&(vertex, weight)| value(vertex as usize) * weight)
+                    .sum()
+            })
         };
-        let direction =
-            |vertex: usize, beta: usize| Vector3::from_fn(|axis, _| self.shape_directions[(3 * vertex + axis) * self.beta_count + beta]);
+        let direction = |vertex: usize, beta: usize| {
+            Vector3::from_fn(|axis, _| {
+                self.shape_directions[(3 * vertex + axis) * self.beta_count + beta]
+            })
+        };
         let mean = at(&|vertex| self.template[vertex]);
-        (mean, (0..self.beta_count).map(|beta| at(&|vertex| direction(vertex, beta))).collect())
+        (
+            mean,
+            (0..self.beta_count)
+                .map(|beta| at(&|vertex| direction(vertex, beta)))
+                .collect(),
+        )
     }
 }
 
-/// Rows of `width` must sum to one within 1e-3: float32 files are within 1e-6, and a body whose weights do not would tear apart.
+/// Rows of `width` must sum to one within 1e-3: float32 files are within 1e-6, and a body whose
+/// weights do not would tear apart.
 fn check_sums(path: &Path, key: &str, values: &[f64], width: usize) -> Result<(), BodyError> {
     for (row, values) in values.chunks_exact(width).enumerate() {
         let sum: f64 = values.iter().sum();
         if (sum - 1.0).abs() > 1e-3 {
-            return Err(BodyError::WeightSum { path: path.to_owned(), key: key.to_owned(), row, sum });
+            return Err(BodyError::WeightSum {
+                path: path.to_owned(),
+                key: key.to_owned(),
+                row,
+                sum,
+            });
         }
     }
     Ok(())
 }
 
-fn checked_faces(path: &Path, faces: &[i64], vertex_count: usize) -> Result<Vec<[u32; 3]>, BodyError> {
-    if let Some(corner) = faces.iter().position(|&vertex| vertex < 0 || vertex >= vertex_count as i64) {
-        return Err(BodyError::TriangleVertex { path: path.to_owned(), triangle: corner / 3, vertex: faces[corner], vertex_count });
+fn checked_faces(
+    path: &Path,
+    faces: &[i64],
+    vertex_count: usize,
+) -> Result<Vec<[u32; 3]>, BodyError> {
+    if let Some(corner) = faces
+        .iter()
+        .position(|&vertex| vertex < 0 || vertex >= vertex_count as i64)
+    {
+        return Err(BodyError::TriangleVertex {
+            path: path.to_owned(),
+            triangle: corner / 3,
+            vertex: faces[corner],
+            vertex_count,
+        });
     }
-    Ok(faces.as_chunks().0.iter().map(|corners: &[i64; 3]| corners.map(|vertex| vertex as u32)).collect())
+    Ok(faces
+        .as_chunks()
+        .0
+        .iter()
+        .map(|corners: &[i64; 3]| corners.map(|vertex| vertex as u32))
+        .collect())
 }

@@ -1,10 +1,11 @@
 //! The embedded body's pose corrections in closed form; the twin of `scripts/posedirs.py`.
 //!
-//! posedirs P (V, 3, 23, 9) is the sum of three terms; R_j is a joint's rotation, W_j the skin weight of a joint and its descendants, n the
-//! vertex normal, S = diag(-1, 1, 1) the mirror:
+//! posedirs P (V, 3, 23, 9) is the sum of three terms; R_j is a joint's rotation, W_j the skin
+//! weight of a joint and its descendants, n the vertex normal, S = diag(-1, 1, 1) the mirror:
 //! 1. what linear blend skinning loses to second order: -c_j W_j (1 - W_j) sym(R_j - I) (v - J_j);
 //! 2. bulges along the normal: amplitude * mask(v) * (R_j - I)[row, column] * n;
-//! 3. shoulder and hip: sum_k phi_k(v) C_k (R_j - I) with phi_k = exp(-|v - c_k|^2 / 2 sigma^2), the right side mirrored.
+//! 3. shoulder and hip: sum_k phi_k(v) C_k (R_j - I) with phi_k = exp(-|v - c_k|^2 / 2 sigma^2),
+//!    the right side mirrored.
 
 use nalgebra::{SMatrix, Vector3};
 use serde::Deserialize;
@@ -66,22 +67,43 @@ struct Gaussians {
 }
 
 /// The blocks of every vertex of `raw`, whose joints (24, 3) stand at `joints`.
-pub(crate) fn generated_pose_blocks(constants: &Constants, raw: &RawModel, joints: &[f64]) -> Rows<PoseBlock> {
-    let vertices: Vec<Vector3<f64>> = raw.template.as_chunks::<3>().0.iter().map(|&v| Vector3::from(v)).collect();
+pub(crate) fn generated_pose_blocks(
+    constants: &Constants,
+    raw: &RawModel,
+    joints: &[f64],
+) -> Rows<PoseBlock> {
+    let vertices: Vec<Vector3<f64>> = raw
+        .template
+        .as_chunks::<3>()
+        .0
+        .iter()
+        .map(|&v| Vector3::from(v))
+        .collect();
     let normals = vertex_normals(&vertices, &raw.faces);
-    let joints: Vec<Vector3<f64>> = joints.as_chunks::<3>().0.iter().map(|&v| Vector3::from(v)).collect();
+    let joints: Vec<Vector3<f64>> = joints
+        .as_chunks::<3>()
+        .0
+        .iter()
+        .map(|&v| Vector3::from(v))
+        .collect();
     let weights = raw.weights.as_chunks::<JOINT_COUNT>().0;
-    let of_vertex = |((vertex, normal), weights): ((&Vector3<f64>, &Vector3<f64>), &[f64; JOINT_COUNT])| {
-        let mut directions = Directions::zeros();
-        add_blending_loss(&mut directions, &constants.lbs, vertex, weights, &joints);
-        for bulge in &constants.bulges {
-            add_bulge(&mut directions, bulge, vertex, normal, weights);
-        }
-        for gaussians in &constants.rbf {
-            add_gaussians(&mut directions, gaussians, vertex);
-        }
-        vertex_pose_blocks(directions.map(|entry| if entry.abs() < SMALLEST { 0.0 } else { entry }).as_slice(), JOINT_COUNT)
-    };
+    let of_vertex =
+        |((vertex, normal), weights): ((&Vector3<f64>, &Vector3<f64>), &[f64; JOINT_COUNT])| {
+            let mut directions = Directions::zeros();
+            add_blending_loss(&mut directions, &constants.lbs, vertex, weights, &joints);
+            for bulge in &constants.bulges {
+                add_bulge(&mut directions, bulge, vertex, normal, weights);
+            }
+            for gaussians in &constants.rbf {
+                add_gaussians(&mut directions, gaussians, vertex);
+            }
+            vertex_pose_blocks(
+                directions
+                    .map(|entry| if entry.abs() < SMALLEST { 0.0 } else { entry })
+                    .as_slice(),
+                JOINT_COUNT,
+            )
+        };
     Rows::new(vertices.iter().zip(&normals).zip(weights).map(of_vertex))
 }
 
@@ -95,7 +117,10 @@ fn vertex_normals(vertices: &[Vector3<f64>], faces: &[i64]) -> Vec<Vector3<f64>>
             normals[vertex as usize] += area_vector;
         }
     }
-    normals.into_iter().map(|normal| normal / normal.norm().max(1e-12)).collect()
+    normals
+        .into_iter()
+        .map(|normal| normal / normal.norm().max(1e-12))
+        .collect()
 }
 
 /// The row of element (row, column) of R_j - I.
@@ -135,23 +160,44 @@ fn mirrored(joint: usize) -> usize {
 
 /// The sign that mirroring gives to an element of a rotation matrix.
 fn mirror_sign(row: usize, column: usize) -> f64 {
-    if (row == 0) != (column == 0) { -1.0 } else { 1.0 }
+    if (row == 0) != (column == 0) {
+        -1.0
+    } else {
+        1.0
+    }
 }
 
-fn add_bulge(directions: &mut Directions, bulge: &Bulge, vertex: &Vector3<f64>, normal: &Vector3<f64>, weights: &[f64; JOINT_COUNT]) {
+fn add_bulge(
+    directions: &mut Directions,
+    bulge: &Bulge,
+    vertex: &Vector3<f64>,
+    normal: &Vector3<f64>,
+    weights: &[f64; JOINT_COUNT],
+) {
     let mut add = |joint: usize, along: f64, weight: f64, sign: f64| {
         let fade = (-0.5 * ((along - bulge.c) / bulge.s).powi(2)).exp();
-        let amount = sign * bulge.amp * bulge.sgn * weight * fade * (bulge.nz * normal.z).clamp(0.0, 1.0);
+        let amount =
+            sign * bulge.amp * bulge.sgn * weight * fade * (bulge.nz * normal.z).clamp(0.0, 1.0);
         for axis in 0..3 {
             directions[(feature(joint, bulge.row, bulge.col), axis)] += amount * normal[axis];
         }
     };
     let along = vertex[bulge.axis];
-    add(bulge.joint, along, bulge.wj.iter().map(|&joint| weights[joint]).sum(), 1.0);
+    add(
+        bulge.joint,
+        along,
+        bulge.wj.iter().map(|&joint| weights[joint]).sum(),
+        1.0,
+    );
     if mirrored(bulge.joint) != bulge.joint {
         let along = if bulge.axis == 0 { -along } else { along };
         let weight = bulge.wj.iter().map(|&joint| weights[mirrored(joint)]).sum();
-        add(mirrored(bulge.joint), along, weight, mirror_sign(bulge.row, bulge.col));
+        add(
+            mirrored(bulge.joint),
+            along,
+            weight,
+            mirror_sign(bulge.row, bulge.col),
+        );
     }
 }
 
@@ -159,7 +205,11 @@ fn add_gaussians(directions: &mut Directions, gaussians: &Gaussians, vertex: &Ve
     let doubled_variance = 2.0 * gaussians.sigma * gaussians.sigma;
     let reach_squared = (REACH_IN_SIGMA * gaussians.sigma).powi(2);
     for (joint, mirrors) in [(gaussians.joint, false), (mirrored(gaussians.joint), true)] {
-        let seen = if mirrors { Vector3::new(-vertex.x, vertex.y, vertex.z) } else { *vertex };
+        let seen = if mirrors {
+            Vector3::new(-vertex.x, vertex.y, vertex.z)
+        } else {
+            *vertex
+        };
         for (center, coefficients) in gaussians.centers.iter().zip(&gaussians.coef) {
             let distance_squared = (seen - Vector3::from(*center)).norm_squared();
             if distance_squared > reach_squared {
@@ -168,7 +218,11 @@ fn add_gaussians(directions: &mut Directions, gaussians: &Gaussians, vertex: &Ve
             let phi = (-distance_squared / doubled_variance).exp();
             for (element, values) in coefficients.iter().enumerate() {
                 for (axis, value) in values.iter().enumerate() {
-                    let sign = if mirrors { mirror_sign(element / 3, element % 3) * if axis == 0 { -1.0 } else { 1.0 } } else { 1.0 };
+                    let sign = if mirrors {
+                        mirror_sign(element / 3, element % 3) * if axis == 0 { -1.0 } else { 1.0 }
+                    } else {
+                        1.0
+                    };
                     directions[(9 * (joint - 1) + element, axis)] += sign * phi * value;
                 }
             }
@@ -185,7 +239,8 @@ mod tests {
 
     use crate::BodyModel;
 
-    /// The largest difference between the embedded body's posedirs and those of `ids` in `expected` (K, 3, 207).
+    /// The largest difference between the embedded body's posedirs and those of `ids` in `expected`
+    /// (K, 3, 207).
     fn largest_difference(ids: impl Iterator<Item = usize>, expected: &[f64]) -> f64 {
         let body = BodyModel::embedded();
         let mut largest: f64 = 0.0;
@@ -193,10 +248,15 @@ mod tests {
             let mut dense = [0.0; 621];
             for block in body.pose_blocks.row(vertex) {
                 for (i, &coefficient) in block.coefficients.iter().enumerate() {
-                    dense[(i / 9) * 207 + 9 * (block.joint as usize - 1) + i % 9] = f64::from(coefficient);
+                    dense[(i / 9) * 207 + 9 * (block.joint as usize - 1) + i % 9] =
+                        f64::from(coefficient);
                 }
             }
-            largest = dense.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(largest, f64::max);
+            largest = dense
+                .iter()
+                .zip(expected)
+                .map(|(a, b)| (a - b).abs())
+                .fold(largest, f64::max);
         }
         largest
     }
@@ -208,8 +268,16 @@ mod tests {
     fn generated_posedirs_are_those_of_the_script() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/posedirs_sample.npz");
         let mut npz = NpzReader::open(&path).unwrap();
-        let ids = npz.integers("vertex_ids", &[None], "").unwrap().unwrap().values;
-        let expected = npz.floats("posedirs", &[None, Some(3), Some(207)], "").unwrap().unwrap().values;
+        let ids = npz
+            .integers("vertex_ids", &[None], "")
+            .unwrap()
+            .unwrap()
+            .values;
+        let expected = npz
+            .floats("posedirs", &[None, Some(3), Some(207)], "")
+            .unwrap()
+            .unwrap()
+            .values;
         assert!(ids.len() > 150 && expected.iter().filter(|entry| **entry != 0.0).count() > 5000);
         let difference = largest_difference(ids.iter().map(|&id| id as usize), &expected);
         assert!(difference < TOLERANCE, "{difference} m");
@@ -218,14 +286,23 @@ mod tests {
     #[test]
     fn generated_posedirs_are_those_of_the_whole_body() {
         let data = std::env::var_os("CROMOSIM_DATA").map(PathBuf::from);
-        let data = data.unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../../shared/data"));
+        let data = data.unwrap_or_else(|| {
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../../shared/data")
+        });
         let path = data.join("../body/body.npz");
         if !path.exists() {
-            assert!(std::env::var_os("CROMOSIM_REQUIRE_ALL").is_none_or(|all| all != "1"), "body.npz is missing");
+            assert!(
+                std::env::var_os("CROMOSIM_REQUIRE_ALL").is_none_or(|all| all != "1"),
+                "body.npz is missing"
+            );
             println!("skipped: no body.npz beside the data folder");
             return;
         }
-        let expected = NpzReader::open(&path).unwrap().floats("posedirs", &[None, Some(3), Some(207)], "").unwrap().unwrap();
+        let expected = NpzReader::open(&path)
+            .unwrap()
+            .floats("posedirs", &[None, Some(3), Some(207)], "")
+            .unwrap()
+            .unwrap();
         let difference = largest_difference(0..expected.shape[0], &expected.values);
         println!("posedirs: {difference:.2e} m");
         assert!(difference < TOLERANCE, "{difference} m");

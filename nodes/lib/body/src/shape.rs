@@ -19,29 +19,55 @@ pub struct ShapedBody {
 }
 
 impl ShapedBody {
-    /// Shapes `model`: vertices v = v_template + shapedirs betas (V, 3) and joints J = J_regressor v (24, 3), m (SMPL, Loper et al.
-    /// 2015, eq. 8 and 10). Fewer betas than the model has are filled up with 0.
+    /// Shapes `model`: vertices v = v_template + shapedirs betas (V, 3) and joints J = J_regressor
+    /// v (24, 3), m (SMPL, Loper et al. 2015, eq. 8 and 10). Fewer betas than the model has are
+    /// filled up with 0.
     ///
     /// # Errors
     /// [`BodyError::TooManyBetas`], [`BodyError::BetaNotFinite`].
     pub fn new(model: Arc<BodyModel>, betas: &[f64]) -> Result<Self, BodyError> {
         let available = model.beta_count();
         if betas.len() > available {
-            return Err(BodyError::TooManyBetas { body: model.id().to_owned(), given: betas.len(), available });
+            return Err(BodyError::TooManyBetas {
+                body: model.id().to_owned(),
+                given: betas.len(),
+                available,
+            });
         }
         if let Some(index) = betas.iter().position(|beta| !beta.is_finite()) {
-            return Err(BodyError::BetaNotFinite { index, value: betas[index] });
+            return Err(BodyError::BetaNotFinite {
+                index,
+                value: betas[index],
+            });
         }
         let directions = model.shape_directions.chunks_exact(3 * available);
         let shaped = |(mean, directions): (&Vector3<f64>, &[f64])| {
-            mean + Vector3::from_fn(|axis, _| betas.iter().zip(&directions[axis * available..]).map(|(beta, s)| beta * s).sum())
+            mean + Vector3::from_fn(|axis, _| {
+                betas
+                    .iter()
+                    .zip(&directions[axis * available..])
+                    .map(|(beta, s)| beta * s)
+                    .sum()
+            })
         };
-        let rest_vertices: Vec<Vector3<f64>> = model.template.iter().zip(directions).map(shaped).collect();
+        let rest_vertices: Vec<Vector3<f64>> =
+            model.template.iter().zip(directions).map(shaped).collect();
         let joints_in_model = std::array::from_fn(|joint| {
-            model.regressor.row(joint).iter().map(|&(vertex, weight)| rest_vertices[vertex as usize] * weight).sum()
+            model
+                .regressor
+                .row(joint)
+                .iter()
+                .map(|&(vertex, weight)| rest_vertices[vertex as usize] * weight)
+                .sum()
         });
         let rest_tiles = model.skin_tables.tiled(&rest_vertices);
-        Ok(Self { betas: betas.to_vec(), rest_vertices, joints_in_model, rest_tiles, model })
+        Ok(Self {
+            betas: betas.to_vec(),
+            rest_vertices,
+            joints_in_model,
+            rest_tiles,
+            model,
+        })
     }
 
     /// What was shaped.
@@ -64,7 +90,8 @@ impl ShapedBody {
         &self.rest_vertices
     }
 
-    /// The pelvis joint in the world for SMPL's `trans`: J_0(beta) + trans, since SMPL turns about J_0 and moves afterwards.
+    /// The pelvis joint in the world for SMPL's `trans`: J_0(beta) + trans, since SMPL turns about
+    /// J_0 and moves afterwards.
     pub fn root_position(&self, trans: Vector3<f64>) -> Vector3<f64> {
         self.joints_in_model[0] + trans
     }
@@ -74,22 +101,28 @@ impl ShapedBody {
         root_position - self.joints_in_model[0]
     }
 
-    /// world_from_segment of every joint (SMPL eq. 4): G_0 = [R_0 | root], G_j = G_parent [R_j | J_j - J_parent].
+    /// world_from_segment of every joint (SMPL eq. 4): G_0 = [R_0 | root], G_j = G_parent [R_j |
+    /// J_j - J_parent].
     pub fn world_from_segments(&self, pose: &BodyPose) -> [Isometry3<f64>; JOINT_COUNT] {
         forward_kinematics(&self.joints_in_model, pose)
     }
 }
 
 /// As [`ShapedBody::world_from_segments`], from the rest joints alone.
-pub(crate) fn forward_kinematics(joints_in_model: &[Vector3<f64>; JOINT_COUNT], pose: &BodyPose) -> [Isometry3<f64>; JOINT_COUNT] {
+pub(crate) fn forward_kinematics(
+    joints_in_model: &[Vector3<f64>; JOINT_COUNT],
+    pose: &BodyPose,
+) -> [Isometry3<f64>; JOINT_COUNT] {
     let mut world_from_segments = [Isometry3::identity(); JOINT_COUNT];
     for joint in Joint::ALL {
         let rotation: UnitQuaternion<f64> = pose.local_rotations[joint.index()];
         world_from_segments[joint.index()] = match joint.parent() {
             None => Isometry3::from_parts(Translation3::from(pose.root_position), rotation),
             Some(parent) => {
-                let joint_in_parent = joints_in_model[joint.index()] - joints_in_model[parent.index()];
-                world_from_segments[parent.index()] * Isometry3::from_parts(Translation3::from(joint_in_parent), rotation)
+                let joint_in_parent =
+                    joints_in_model[joint.index()] - joints_in_model[parent.index()];
+                world_from_segments[parent.index()]
+                    * Isometry3::from_parts(Translation3::from(joint_in_parent), rotation)
             }
         };
     }

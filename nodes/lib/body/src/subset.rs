@@ -30,7 +30,11 @@ impl ShapedBody {
         let model = self.model();
         let of_vertex = |&index: &u32| {
             let vertex = index as usize;
-            let unknown = || BodyError::UnknownVertex { body: model.id().to_owned(), vertex: index, vertex_count: model.vertex_count() };
+            let unknown = || BodyError::UnknownVertex {
+                body: model.id().to_owned(),
+                vertex: index,
+                vertex_count: model.vertex_count(),
+            };
             Ok(SubsetVertex {
                 index,
                 rest: *self.rest_vertices().get(vertex).ok_or_else(unknown)?,
@@ -38,7 +42,10 @@ impl ShapedBody {
                 skin_weights: model.skin_weights.row(vertex).to_vec(),
             })
         };
-        Ok(VertexSubset { joints_in_model: *self.joints_in_model(), vertices: vertices.iter().map(of_vertex).collect::<Result<_, _>>()? })
+        Ok(VertexSubset {
+            joints_in_model: *self.joints_in_model(),
+            vertices: vertices.iter().map(of_vertex).collect::<Result<_, _>>()?,
+        })
     }
 }
 
@@ -62,7 +69,11 @@ impl VertexSubset {
     }
 
     /// As [`Self::positions_into`], and returns the skeleton that was evaluated on the way.
-    pub fn positions_and_segments_into(&self, pose: &BodyPose, positions: &mut Vec<Vector3<f64>>) -> [Isometry3<f64>; JOINT_COUNT] {
+    pub fn positions_and_segments_into(
+        &self,
+        pose: &BodyPose,
+        positions: &mut Vec<Vector3<f64>>,
+    ) -> [Isometry3<f64>; JOINT_COUNT] {
         let world_from_segments = forward_kinematics(&self.joints_in_model, pose);
         let root_position = pose.root_position;
         let features = pose.local_rotations.map(|rotation| {
@@ -75,8 +86,11 @@ impl VertexSubset {
             let moved = |&(joint, weight): &(u8, f64)| {
                 let in_segment = corrected - self.joints_in_model[joint as usize];
                 let world_from_segment = &world_from_segments[joint as usize];
-                // About the root: weights sum to 1 within 1e-7 only, which must not grow with the distance walked.
-                (world_from_segment.rotation * in_segment + (world_from_segment.translation.vector - root_position)) * weight
+                // About the root: weights sum to 1 within 1e-7 only, which must not grow with the
+                // distance walked.
+                (world_from_segment.rotation * in_segment
+                    + (world_from_segment.translation.vector - root_position))
+                    * weight
             };
             root_position + vertex.skin_weights.iter().map(moved).sum::<Vector3<f64>>()
         }));
@@ -89,7 +103,10 @@ fn correction(blocks: &[PoseBlock], features: &[[f64; 9]; JOINT_COUNT]) -> Vecto
     let mut correction = Vector3::zeros();
     for block in blocks {
         for (axis, row) in block.coefficients.as_chunks::<9>().0.iter().enumerate() {
-            let products = row.iter().zip(&features[block.joint as usize]).map(|(c, feature)| f64::from(*c) * feature);
+            let products = row
+                .iter()
+                .zip(&features[block.joint as usize])
+                .map(|(c, feature)| f64::from(*c) * feature);
             correction[axis] += products.sum::<f64>();
         }
     }

@@ -5,9 +5,10 @@ use nalgebra::{UnitQuaternion, Vector3};
 use crate::site::{NamedSite, nearest, point_at};
 use crate::{BodyError, BodyModel, JOINT_COUNT, Joint};
 
-/// The embedded body's sites on another body. With the embedded body's triangles they are the same; else each is placed by landmarks that
-/// do not depend on how a skeleton divides the spine (hips, shoulders, limbs' joints, the head's extent) and put onto the nearest skin:
-/// centimetres off, not more exact than a person's hand.
+/// The embedded body's sites on another body. With the embedded body's triangles they are the same;
+/// else each is placed by landmarks that do not depend on how a skeleton divides the spine (hips,
+/// shoulders, limbs' joints, the head's extent) and put onto the nearest skin: centimetres off, not
+/// more exact than a person's hand.
 pub(crate) fn transferred_sites(body: &BodyModel) -> Result<Vec<NamedSite>, BodyError> {
     let embedded = BodyModel::embedded();
     if body.faces == embedded.faces {
@@ -17,11 +18,20 @@ pub(crate) fn transferred_sites(body: &BodyModel) -> Result<Vec<NamedSite>, Body
     let owners = body.triangle_owners();
     let transferred = |named: &NamedSite| {
         let joint = named.site.joint;
-        let point = point_at(&embedded.faces[named.site.triangle as usize], &named.site.barycentrics, &embedded.template);
+        let point = point_at(
+            &embedded.faces[named.site.triangle as usize],
+            &named.site.barycentrics,
+            &embedded.template,
+        );
         let wanted = carried(&from, &to, joint, point);
-        let site = nearest(body, &body.template, wanted, |triangle| touches(Region::of(joint), Region::of(owners[triangle])))
-            .or_else(|| nearest(body, &body.template, wanted, |_| true));
-        site.map(|site| NamedSite { name: named.name.clone(), site })
+        let site = nearest(body, &body.template, wanted, |triangle| {
+            touches(Region::of(joint), Region::of(owners[triangle]))
+        })
+        .or_else(|| nearest(body, &body.template, wanted, |_| true));
+        site.map(|site| NamedSite {
+            name: named.name.clone(),
+            site,
+        })
     };
     Ok(embedded.sites.iter().filter_map(transferred).collect())
 }
@@ -40,14 +50,24 @@ enum Region {
 impl Region {
     fn of(joint: Joint) -> Self {
         match joint {
-            Joint::Pelvis | Joint::Spine1 | Joint::Spine2 | Joint::Spine3 | Joint::Neck | Joint::LeftCollar | Joint::RightCollar => {
-                Self::Trunk
-            }
+            Joint::Pelvis
+            | Joint::Spine1
+            | Joint::Spine2
+            | Joint::Spine3
+            | Joint::Neck
+            | Joint::LeftCollar
+            | Joint::RightCollar => Self::Trunk,
             Joint::Head => Self::Head,
-            Joint::LeftShoulder | Joint::LeftElbow | Joint::LeftWrist | Joint::LeftHand => Self::LeftArm,
-            Joint::RightShoulder | Joint::RightElbow | Joint::RightWrist | Joint::RightHand => Self::RightArm,
+            Joint::LeftShoulder | Joint::LeftElbow | Joint::LeftWrist | Joint::LeftHand => {
+                Self::LeftArm
+            }
+            Joint::RightShoulder | Joint::RightElbow | Joint::RightWrist | Joint::RightHand => {
+                Self::RightArm
+            }
             Joint::LeftHip | Joint::LeftKnee | Joint::LeftAnkle | Joint::LeftFoot => Self::LeftLeg,
-            Joint::RightHip | Joint::RightKnee | Joint::RightAnkle | Joint::RightFoot => Self::RightLeg,
+            Joint::RightHip | Joint::RightKnee | Joint::RightAnkle | Joint::RightFoot => {
+                Self::RightLeg
+            }
         }
     }
 }
@@ -70,15 +90,30 @@ impl Landmarks {
     fn of(body: &BodyModel) -> Self {
         let (joints, _) = body.joint_shape_directions();
         let middle = |a: Joint, b: Joint| (joints[a.index()] + joints[b.index()]) / 2.0;
-        let (hips, shoulders) = (middle(Joint::LeftHip, Joint::RightHip), middle(Joint::LeftShoulder, Joint::RightShoulder));
-        let crown = body.template.iter().map(|vertex| vertex.y).fold(f64::NEG_INFINITY, f64::max);
+        let (hips, shoulders) = (
+            middle(Joint::LeftHip, Joint::RightHip),
+            middle(Joint::LeftShoulder, Joint::RightShoulder),
+        );
+        let crown = body
+            .template
+            .iter()
+            .map(|vertex| vertex.y)
+            .fold(f64::NEG_INFINITY, f64::max);
         // Above the chin, and in T-pose above everything else.
         let lowest = (shoulders.y + crown) / 2.0;
-        let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+        let (mut low, mut high) = (
+            Vector3::repeat(f64::INFINITY),
+            Vector3::repeat(f64::NEG_INFINITY),
+        );
         for vertex in body.template.iter().filter(|vertex| vertex.y >= lowest) {
             (low, high) = (low.inf(vertex), high.sup(vertex));
         }
-        Self { joints, hips, shoulders, head: ((low + high) / 2.0, (high - low) / 2.0) }
+        Self {
+            joints,
+            hips,
+            shoulders,
+            head: ((low + high) / 2.0, (high - low) / 2.0),
+        }
     }
 
     fn joint(&self, joint: Joint) -> Vector3<f64> {
@@ -86,7 +121,10 @@ impl Landmarks {
     }
 
     fn length(&self, joints: &[Joint]) -> f64 {
-        joints.windows(2).map(|pair| (self.joint(pair[1]) - self.joint(pair[0])).norm()).sum()
+        joints
+            .windows(2)
+            .map(|pair| (self.joint(pair[1]) - self.joint(pair[0])).norm())
+            .sum()
     }
 }
 
@@ -94,19 +132,27 @@ impl Landmarks {
 fn carried(from: &Landmarks, to: &Landmarks, joint: Joint, point: Vector3<f64>) -> Vector3<f64> {
     let limb = |bones: [Joint; 3]| {
         let whole = ratio(to.length(&bones), from.length(&bones));
-        // Hands and feet turn with nothing at rest, and skeletons end them at different places: the limb's size is theirs.
+        // Hands and feet turn with nothing at rest, and skeletons end them at different places: the
+        // limb's size is theirs.
         let Some(bone) = bones.windows(2).find(|bone| bone[0] == joint) else {
             return to.joint(bones[2]) + (point - from.joint(bones[2])) * whole;
         };
-        let (from_bone, to_bone) = (from.joint(bone[1]) - from.joint(bone[0]), to.joint(bone[1]) - to.joint(bone[0]));
+        let (from_bone, to_bone) = (
+            from.joint(bone[1]) - from.joint(bone[0]),
+            to.joint(bone[1]) - to.joint(bone[0]),
+        );
         let turn = UnitQuaternion::rotation_between(&from_bone, &to_bone).unwrap_or_default();
-        to.joint(bone[0]) + turn * ((point - from.joint(bone[0])) * ratio(to_bone.norm(), from_bone.norm()))
+        to.joint(bone[0])
+            + turn * ((point - from.joint(bone[0])) * ratio(to_bone.norm(), from_bone.norm()))
     };
     match Region::of(joint) {
         Region::Trunk => {
             let (from_spine, to_spine) = (from.shoulders - from.hips, to.shoulders - to.hips);
             let height = ratio(point.y - from.hips.y, from_spine.y);
-            to.hips + to_spine * height + (point - from.hips - from_spine * height) * ratio(to_spine.norm(), from_spine.norm())
+            to.hips
+                + to_spine * height
+                + (point - from.hips - from_spine * height)
+                    * ratio(to_spine.norm(), from_spine.norm())
         }
         Region::Head => {
             let scale = to.head.1.zip_map(&from.head.1, ratio);

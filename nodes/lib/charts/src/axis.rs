@@ -24,36 +24,55 @@ impl Axis {
     pub fn linear(values: impl Iterator<Item = f64>) -> Self {
         let (low, high) = extent(values).unwrap_or((0.0, 1.0));
         // A flat series is no picture of its rounding errors.
-        let margin = (0.06 * (high - low)).max(1e-3 * low.abs().max(high.abs())).max(1e-9);
-        Self { low: low - margin, high: high + margin, logarithmic: false }
+        let margin = (0.06 * (high - low))
+            .max(1e-3 * low.abs().max(high.abs()))
+            .max(1e-9);
+        Self {
+            low: low - margin,
+            high: high + margin,
+            logarithmic: false,
+        }
     }
 
     /// Between exactly these values.
     pub fn exact(low: f64, high: f64) -> Self {
         let high = if high > low { high } else { low + 1.0 };
-        Self { low, high, logarithmic: false }
+        Self {
+            low,
+            high,
+            logarithmic: false,
+        }
     }
 
-    /// From the least to the greatest of the values and of nothing: for bars, whose lengths are compared.
+    /// From the least to the greatest of the values and of nothing: for bars, whose lengths are
+    /// compared.
     pub fn from_zero(values: impl Iterator<Item = f64>) -> Self {
         let (low, high) = extent(values.chain([0.0])).unwrap_or((0.0, 1.0));
         let margin = 0.06 * (high - low);
         match (low < 0.0, high > 0.0) {
             (false, false) => Self::exact(0.0, 1.0),
-            (below, above) => {
-                Self { low: if below { low - margin } else { 0.0 }, high: if above { high + margin } else { 0.0 }, logarithmic: false }
-            }
+            (below, above) => Self {
+                low: if below { low - margin } else { 0.0 },
+                high: if above { high + margin } else { 0.0 },
+                logarithmic: false,
+            },
         }
     }
 
-    /// Logarithmic, over at most `decades` below the greatest value; values that are not positive are left out.
+    /// Logarithmic, over at most `decades` below the greatest value; values that are not positive
+    /// are left out.
     pub fn logarithmic(values: impl Iterator<Item = f64>, decades: f64) -> Self {
         let (low, high) = extent(values.filter(|value| *value > 0.0)).unwrap_or((0.1, 10.0));
         let low = low.max(high * 10_f64.powf(-decades));
-        Self { low: low * 0.8, high: high * 1.25, logarithmic: true }
+        Self {
+            low: low * 0.8,
+            high: high * 1.25,
+            logarithmic: true,
+        }
     }
 
-    /// Where a value stands: 0 at the lower end, 1 at the upper; held within; none for what cannot be drawn.
+    /// Where a value stands: 0 at the lower end, 1 at the upper; held within; none for what cannot
+    /// be drawn.
     pub fn place(&self, value: f64) -> Option<f64> {
         let place = if self.logarithmic {
             if value.is_nan() {
@@ -83,7 +102,11 @@ impl Axis {
         }
         // One number alone says no scale.
         let ticks = self.steps(count);
-        if ticks.len() < 2 { self.steps(2 * count) } else { ticks }
+        if ticks.len() < 2 {
+            self.steps(2 * count)
+        } else {
+            ticks
+        }
     }
 
     fn steps(&self, count: usize) -> Vec<Tick> {
@@ -91,10 +114,19 @@ impl Axis {
         let power = 10_f64.powf(rough.log10().floor());
         let off = |step: f64| (step / rough).ln().abs();
         let steps = [1.0, 2.0, 5.0, 10.0].map(|factor| factor * power);
-        let step = steps.into_iter().min_by(|one, other| off(*one).total_cmp(&off(*other))).unwrap_or(rough);
+        let step = steps
+            .into_iter()
+            .min_by(|one, other| off(*one).total_cmp(&off(*other)))
+            .unwrap_or(rough);
         let places = (-(step.log10() + 1e-9).floor()).max(0.0) as usize;
-        let (first, last) = ((self.low / step).ceil() as i64, (self.high / step).floor() as i64);
-        let tick = |k: i64| Tick { value: k as f64 * step, label: decimals(k as f64 * step, places) };
+        let (first, last) = (
+            (self.low / step).ceil() as i64,
+            (self.high / step).floor() as i64,
+        );
+        let tick = |k: i64| Tick {
+            value: k as f64 * step,
+            label: decimals(k as f64 * step, places),
+        };
         (first..=last).map(tick).collect()
     }
 
@@ -117,7 +149,14 @@ impl Axis {
                     3 => whole < 1,
                     _ => false,
                 };
-                ticks.push(Tick { value, label: if is_labelled { power_label(value, factor, decade) } else { String::new() } });
+                ticks.push(Tick {
+                    value,
+                    label: if is_labelled {
+                        power_label(value, factor, decade)
+                    } else {
+                        String::new()
+                    },
+                });
             }
         }
         ticks
@@ -131,15 +170,27 @@ fn power_label(value: f64, factor: i32, decade: i32) -> String {
     }
     let superscript = |character: char| match character {
         '-' => '⁻',
-        digit => ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'][digit.to_digit(10).unwrap_or(0) as usize],
+        digit => ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹']
+            [digit.to_digit(10).unwrap_or(0) as usize],
     };
-    format!("10{}", decade.to_string().chars().map(superscript).collect::<String>())
+    format!(
+        "10{}",
+        decade
+            .to_string()
+            .chars()
+            .map(superscript)
+            .collect::<String>()
+    )
 }
 
 fn extent(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
-    values.filter(|value| value.is_finite()).fold(None, |extent: Option<(f64, f64)>, value| {
-        Some(extent.map_or((value, value), |(low, high)| (low.min(value), high.max(value))))
-    })
+    values
+        .filter(|value| value.is_finite())
+        .fold(None, |extent: Option<(f64, f64)>, value| {
+            Some(extent.map_or((value, value), |(low, high)| {
+                (low.min(value), high.max(value))
+            }))
+        })
 }
 
 #[cfg(test)]
@@ -147,24 +198,50 @@ mod tests {
     use super::*;
 
     fn labels(axis: Axis, count: usize) -> Vec<String> {
-        axis.ticks(count).into_iter().map(|tick| tick.label).filter(|label| !label.is_empty()).collect()
+        axis.ticks(count)
+            .into_iter()
+            .map(|tick| tick.label)
+            .filter(|label| !label.is_empty())
+            .collect()
     }
 
     #[test]
     fn ticks_stand_at_round_numbers() {
-        assert_eq!(labels(Axis::exact(-1.3, 2.9), 4), ["−1", "0", "1", "2"].map(str::to_owned).to_vec());
-        assert_eq!(labels(Axis::exact(31.2, 39.1), 4), ["32", "34", "36", "38"].map(str::to_owned).to_vec());
-        assert_eq!(labels(Axis::exact(0.0, 0.031), 4), ["0.00", "0.01", "0.02", "0.03"].map(str::to_owned).to_vec());
-        assert_eq!(labels(Axis::logarithmic([0.02, 300.0].into_iter(), 9.0), 6), ["0.1", "1", "10", "100"].map(str::to_owned).to_vec());
-        assert_eq!(labels(Axis::logarithmic([1e-7, 1e-1].into_iter(), 9.0), 4), ["10⁻⁶", "10⁻⁴", "0.01"].map(str::to_owned).to_vec());
+        assert_eq!(
+            labels(Axis::exact(-1.3, 2.9), 4),
+            ["−1", "0", "1", "2"].map(str::to_owned).to_vec()
+        );
+        assert_eq!(
+            labels(Axis::exact(31.2, 39.1), 4),
+            ["32", "34", "36", "38"].map(str::to_owned).to_vec()
+        );
+        assert_eq!(
+            labels(Axis::exact(0.0, 0.031), 4),
+            ["0.00", "0.01", "0.02", "0.03"].map(str::to_owned).to_vec()
+        );
+        assert_eq!(
+            labels(Axis::logarithmic([0.02, 300.0].into_iter(), 9.0), 6),
+            ["0.1", "1", "10", "100"].map(str::to_owned).to_vec()
+        );
+        assert_eq!(
+            labels(Axis::logarithmic([1e-7, 1e-1].into_iter(), 9.0), 4),
+            ["10⁻⁶", "10⁻⁴", "0.01"].map(str::to_owned).to_vec()
+        );
     }
 
     #[test]
     fn nothing_and_nonsense_still_make_an_axis() {
-        for axis in [Axis::linear([].into_iter()), Axis::linear([f64::NAN, 3.0].into_iter()), Axis::logarithmic([0.0].into_iter(), 4.0)] {
+        for axis in [
+            Axis::linear([].into_iter()),
+            Axis::linear([f64::NAN, 3.0].into_iter()),
+            Axis::logarithmic([0.0].into_iter(), 4.0),
+        ] {
             assert!(!axis.ticks(4).is_empty());
             assert_eq!(axis.place(f64::NAN), None);
         }
-        assert_eq!(Axis::logarithmic([1.0, 100.0].into_iter(), 4.0).place(0.0), Some(-0.02));
+        assert_eq!(
+            Axis::logarithmic([1.0, 100.0].into_iter(), 4.0).place(0.0),
+            Some(-0.02)
+        );
     }
 }

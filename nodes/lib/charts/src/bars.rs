@@ -22,7 +22,8 @@ const LINES: usize = 4;
 /// A bar.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bar {
-    /// What it belongs to: bars of one series have one colour; the legend lists series in the order of their first bars.
+    /// What it belongs to: bars of one series have one colour; the legend lists series in the order
+    /// of their first bars.
     pub series: String,
     /// Its length; not finite for none.
     pub value: f64,
@@ -39,8 +40,8 @@ pub struct Group {
     pub bars: Vec<Bar>,
 }
 
-/// Grouped bars from zero upwards or downwards, with their numbers where these fit. Each series keeps its place in every group, empty where a
-/// group has no bar of it.
+/// Grouped bars from zero upwards or downwards, with their numbers where these fit. Each series
+/// keeps its place in every group, empty where a group has no bar of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BarChart {
     /// Above all.
@@ -86,20 +87,44 @@ impl BarChart {
     pub fn svg(&self) -> String {
         let layout = self.layout();
         let frame = &layout.frame;
-        let names: Vec<&str> = self.groups.iter().map(|group| group.label.as_str()).collect();
-        let described = format!("{}: {} of {} for {}", self.title, self.y_label, layout.series.join(", "), names.join(", "));
-        let mut svg = frame.open(frame.bottom() + layout.below, &described, &self.y_label, Sample::Box);
+        let names: Vec<&str> = self
+            .groups
+            .iter()
+            .map(|group| group.label.as_str())
+            .collect();
+        let described = format!(
+            "{}: {} of {} for {}",
+            self.title,
+            self.y_label,
+            layout.series.join(", "),
+            names.join(", ")
+        );
+        let mut svg = frame.open(
+            frame.bottom() + layout.below,
+            &described,
+            &self.y_label,
+            Sample::Box,
+        );
         let mut over = String::new();
         for (index, group) in self.groups.iter().enumerate() {
             layout.write_bars(&mut svg, &mut over, index, group);
         }
         if let Some(zero) = frame.y_at(0.0) {
-            let _ = write!(svg, "<path class=\"axis\" d=\"M{} {zero:.1}H{:.1}\"/>", frame.left, frame.right());
+            let _ = write!(
+                svg,
+                "<path class=\"axis\" d=\"M{} {zero:.1}H{:.1}\"/>",
+                frame.left,
+                frame.right()
+            );
         }
         frame.write_level(&mut svg, self.level.as_ref());
         svg.push_str(&over);
         layout.write_labels(&mut svg);
-        if !self.groups.iter().any(|group| group.bars.iter().any(|bar| bar.value.is_finite())) {
+        if !self
+            .groups
+            .iter()
+            .any(|group| group.bars.iter().any(|bar| bar.value.is_finite()))
+        {
             frame.write_nothing(&mut svg);
         }
         svg.push_str("</svg>");
@@ -120,21 +145,51 @@ impl BarChart {
         let series = self.series();
         let (chart, slot) = size(self.groups.len(), series.len());
         let bar = (slot / (series.len() as f64 + 0.8)).min(BAR);
-        let in_lines = |group: &Group| (group.label.clone(), wrapped(&group.label, slot - 6.0, LABEL));
+        let in_lines = |group: &Group| {
+            (
+                group.label.clone(),
+                wrapped(&group.label, slot - 6.0, LABEL),
+            )
+        };
         let labels: Vec<(String, Vec<String>)> = self.groups.iter().map(in_lines).collect();
         let lines = || labels.iter().map(|(_, lines)| lines);
-        let widest = lines().flatten().map(|line| width(line, LABEL)).fold(0.0, f64::max);
+        let widest = lines()
+            .flatten()
+            .map(|line| width(line, LABEL))
+            .fold(0.0, f64::max);
         let leaning = widest > slot || lines().any(|lines| lines.len() > LINES);
-        let longest = self.groups.iter().map(|group| width(&group.label, LABEL)).fold(0.0, f64::max);
+        let longest = self
+            .groups
+            .iter()
+            .map(|group| width(&group.label, LABEL))
+            .fold(0.0, f64::max);
         // At 40 degrees.
         let (below, least_left) = match leaning {
             true => (24.0 + 0.65 * longest, 0.77 * longest - slot / 2.0 + 8.0),
-            false => (12.0 + 14.0 * lines().map(Vec::len).max().unwrap_or(0) as f64, 0.0),
+            false => (
+                12.0 + 14.0 * lines().map(Vec::len).max().unwrap_or(0) as f64,
+                0.0,
+            ),
         };
         let bars = || self.groups.iter().flat_map(|group| &group.bars);
-        let ends = bars().flat_map(|bar| [Some(bar.value), bar.interval.map(|ends| ends.0), bar.interval.map(|ends| ends.1)]).flatten();
-        let greatest = bars().map(|bar| bar.value.abs()).filter(|value| value.is_finite()).fold(0.0, f64::max);
-        let decimals = if greatest > 0.0 { (2.0 - greatest.log10().floor()).clamp(0.0, 7.0) as usize } else { 0 };
+        let ends = bars()
+            .flat_map(|bar| {
+                [
+                    Some(bar.value),
+                    bar.interval.map(|ends| ends.0),
+                    bar.interval.map(|ends| ends.1),
+                ]
+            })
+            .flatten();
+        let greatest = bars()
+            .map(|bar| bar.value.abs())
+            .filter(|value| value.is_finite())
+            .fold(0.0, f64::max);
+        let decimals = if greatest > 0.0 {
+            (2.0 - greatest.log10().floor()).clamp(0.0, 7.0) as usize
+        } else {
+            0
+        };
         let parts = Parts {
             title: &self.title,
             width: chart,
@@ -146,8 +201,18 @@ impl BarChart {
         };
         let frame = Frame::new(&parts);
         // What the labels took at the left is missing between the bars.
-        let shrunk = ((frame.right() - frame.left) / (slot * self.groups.len().max(1) as f64)).min(1.0);
-        Layout { frame, series, slot: slot * shrunk, bar: bar * shrunk, labels, leaning, below, decimals }
+        let shrunk =
+            ((frame.right() - frame.left) / (slot * self.groups.len().max(1) as f64)).min(1.0);
+        Layout {
+            frame,
+            series,
+            slot: slot * shrunk,
+            bar: bar * shrunk,
+            labels,
+            leaning,
+            below,
+            decimals,
+        }
     }
 }
 
@@ -169,9 +234,16 @@ impl Layout {
     fn write_bars(&self, svg: &mut String, over: &mut String, index: usize, group: &Group) {
         let first = self.middle(index) - self.bar * self.series.len() as f64 / 2.0;
         for (number, series) in self.series.iter().enumerate() {
-            let Some(bar) = group.bars.iter().rfind(|bar| bar.series == *series) else { continue };
-            let (Some(zero), Some(end)) = (self.frame.y_at(0.0), self.frame.y_at(bar.value)) else { continue };
-            let (x, wide) = (first + self.bar * number as f64, self.bar - 2.0_f64.min(0.2 * self.bar));
+            let Some(bar) = group.bars.iter().rfind(|bar| bar.series == *series) else {
+                continue;
+            };
+            let (Some(zero), Some(end)) = (self.frame.y_at(0.0), self.frame.y_at(bar.value)) else {
+                continue;
+            };
+            let (x, wide) = (
+                first + self.bar * number as f64,
+                self.bar - 2.0_f64.min(0.2 * self.bar),
+            );
             let (top, tall) = (zero.min(end), (zero - end).abs().max(0.5));
             let colour = colour(number);
             let _ = write!(
@@ -182,16 +254,30 @@ impl Layout {
                 decimals(bar.value, self.decimals)
             );
             let middle = x + wide / 2.0;
-            let whisker = bar.interval.and_then(|interval| whisker(&self.frame, middle, interval, (0.18 * wide).min(5.0)));
+            let whisker = bar.interval.and_then(|interval| {
+                whisker(&self.frame, middle, interval, (0.18 * wide).min(5.0))
+            });
             if let Some((path, ..)) = &whisker {
-                let _ = write!(over, "<path class=\"halo\" d=\"{path}\"/><path class=\"whisker\" d=\"{path}\"/>");
+                let _ = write!(
+                    over,
+                    "<path class=\"halo\" d=\"{path}\"/><path class=\"whisker\" d=\"{path}\"/>"
+                );
             }
             let text = decimals(bar.value, self.decimals);
             if width(&text, VALUE) <= self.bar + 1.0 {
                 // Beyond the end, which is below for what is less than zero.
-                let (upper, lower) = whisker.map_or((top, top + tall), |(_, upper, lower)| (upper.min(top), lower.max(top + tall)));
-                let y = if bar.value < 0.0 { lower + 11.0 } else { upper - 4.0 };
-                let _ = write!(over, "<text class=\"value\" x=\"{middle:.1}\" y=\"{y:.1}\" text-anchor=\"middle\">{text}</text>");
+                let (upper, lower) = whisker.map_or((top, top + tall), |(_, upper, lower)| {
+                    (upper.min(top), lower.max(top + tall))
+                });
+                let y = if bar.value < 0.0 {
+                    lower + 11.0
+                } else {
+                    upper - 4.0
+                };
+                let _ = write!(
+                    over,
+                    "<text class=\"value\" x=\"{middle:.1}\" y=\"{y:.1}\" text-anchor=\"middle\">{text}</text>"
+                );
             }
         }
     }
@@ -203,13 +289,19 @@ impl Layout {
             let x = self.middle(index);
             if self.leaning {
                 let (y, label) = (bottom + 14.0, escape(label));
-                let _ =
-                    write!(svg, "<text class=\"key\" transform=\"translate({x:.1} {y:.1})rotate(-40)\" text-anchor=\"end\">{label}</text>");
+                let _ = write!(
+                    svg,
+                    "<text class=\"key\" transform=\"translate({x:.1} {y:.1})rotate(-40)\" text-anchor=\"end\">{label}</text>"
+                );
                 continue;
             }
             for (line, text) in lines.iter().enumerate() {
                 let y = bottom + 16.0 + 14.0 * line as f64;
-                let _ = write!(svg, "<text class=\"key\" x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"middle\">{}</text>", escape(text));
+                let _ = write!(
+                    svg,
+                    "<text class=\"key\" x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"middle\">{}</text>",
+                    escape(text)
+                );
             }
         }
         svg.push_str("</g>");

@@ -27,7 +27,11 @@ pub struct Level {
 
 /// The classes of a series' colour.
 pub(crate) fn colour(series: usize) -> String {
-    format!("c{}{}", series % COLOURS, if series < COLOURS { "" } else { " pale" })
+    format!(
+        "c{}{}",
+        series % COLOURS,
+        if series < COLOURS { "" } else { " pale" }
+    )
 }
 
 /// How a series is shown in the legend.
@@ -72,12 +76,24 @@ pub(crate) struct Parts<'a> {
 impl Frame {
     pub fn new(parts: &Parts) -> Self {
         let ticks = parts.y.ticks((parts.plot_height / 28.0) as usize);
-        let widest = ticks.iter().map(|tick| width(&tick.label, LABEL)).fold(0.0, f64::max);
+        let widest = ticks
+            .iter()
+            .map(|tick| width(&tick.label, LABEL))
+            .fold(0.0, f64::max);
         let left = (18.0 + widest + GAP).max(parts.least_left).ceil();
         let title = wrapped(parts.title, parts.width - left - RIGHT, TITLE * 1.1);
         let legend = rows(parts, parts.width - left - RIGHT);
         let top = 8.0 + 16.0 * title.len() as f64 + 17.0 * legend.len() as f64 + 6.0;
-        Self { width: parts.width, left, top, plot_height: parts.plot_height, title, legend, y: parts.y, widest }
+        Self {
+            width: parts.width,
+            left,
+            top,
+            plot_height: parts.plot_height,
+            title,
+            legend,
+            y: parts.y,
+            widest,
+        }
     }
 
     pub fn right(&self) -> f64 {
@@ -90,7 +106,9 @@ impl Frame {
 
     /// Where a value stands; none for what is not finite.
     pub fn y_at(&self, value: f64) -> Option<f64> {
-        self.y.place(value).map(|place| self.top + (1.0 - place.clamp(0.0, 1.0)) * self.plot_height)
+        self.y
+            .place(value)
+            .map(|place| self.top + (1.0 - place.clamp(0.0, 1.0)) * self.plot_height)
     }
 
     /// The opening tag, title, legend, grid and vertical axis.
@@ -103,7 +121,12 @@ impl Frame {
         );
         for (index, line) in self.title.iter().enumerate() {
             let y = 15 + 16 * index;
-            let _ = write!(svg, "<text class=\"title\" x=\"{}\" y=\"{y}\">{}</text>", self.left, escape(line));
+            let _ = write!(
+                svg,
+                "<text class=\"title\" x=\"{}\" y=\"{y}\">{}</text>",
+                self.left,
+                escape(line)
+            );
         }
         self.write_legend(&mut svg, sample);
         self.write_vertical(&mut svg, y_label);
@@ -121,17 +144,31 @@ impl Frame {
                     }
                     (Some(series), Sample::Box) => {
                         let (colour, y) = (colour(series), y - 5.0);
-                        let _ =
-                            write!(svg, "<rect class=\"fill {colour}\" x=\"{x:.1}\" y=\"{y:.1}\" width=\"14\" height=\"10\" rx=\"1\"/>");
+                        let _ = write!(
+                            svg,
+                            "<rect class=\"fill {colour}\" x=\"{x:.1}\" y=\"{y:.1}\" width=\"14\" height=\"10\" rx=\"1\"/>"
+                        );
                     }
                     (Some(series), Sample::Line) => {
                         let colour = colour(series);
-                        let _ = write!(svg, "<g class=\"{colour}\"><path class=\"stroke\" d=\"M{x:.1} {y:.1}h16\"/>");
-                        let _ = write!(svg, "<path class=\"mark\" d=\"{}\"/></g>", mark(series, x + 8.0, y));
+                        let _ = write!(
+                            svg,
+                            "<g class=\"{colour}\"><path class=\"stroke\" d=\"M{x:.1} {y:.1}h16\"/>"
+                        );
+                        let _ = write!(
+                            svg,
+                            "<path class=\"mark\" d=\"{}\"/></g>",
+                            mark(series, x + 8.0, y)
+                        );
                     }
                 }
                 let label = escape(&entry.label);
-                let _ = write!(svg, "<text class=\"key\" x=\"{:.1}\" y=\"{:.1}\">{label}</text>", x + SAMPLE, y + 4.0);
+                let _ = write!(
+                    svg,
+                    "<text class=\"key\" x=\"{:.1}\" y=\"{:.1}\">{label}</text>",
+                    x + SAMPLE,
+                    y + 4.0
+                );
             }
         }
     }
@@ -140,17 +177,32 @@ impl Frame {
         let (left, top, right, bottom) = (self.left, self.top, self.right(), self.bottom());
         let (mut grid, mut marks, mut labels) = (String::new(), String::new(), String::new());
         for tick in self.y.ticks((self.plot_height / 28.0) as usize) {
-            let Some(y) = self.y_at(tick.value) else { continue };
+            let Some(y) = self.y_at(tick.value) else {
+                continue;
+            };
             let length = if tick.label.is_empty() { 2 } else { 4 };
             let _ = write!(marks, "M{left} {y:.1}h-{length}");
             if !tick.label.is_empty() {
                 let _ = write!(grid, "M{left} {y:.1}H{right:.1}");
-                let _ = write!(labels, "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>", left - GAP, y + 4.0, tick.label);
+                let _ = write!(
+                    labels,
+                    "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
+                    left - GAP,
+                    y + 4.0,
+                    tick.label
+                );
             }
         }
-        let _ = write!(svg, "<path class=\"grid\" d=\"{grid}\"/><path class=\"axis\" d=\"{marks}M{left} {top}V{bottom:.1}\"/>");
+        let _ = write!(
+            svg,
+            "<path class=\"grid\" d=\"{grid}\"/><path class=\"axis\" d=\"{marks}M{left} {top}V{bottom:.1}\"/>"
+        );
         let _ = write!(svg, "<g class=\"ticks\">{labels}</g>");
-        let (beside, centre, label) = (left - GAP - self.widest - 6.0, top + self.plot_height / 2.0, escape(y_label));
+        let (beside, centre, label) = (
+            left - GAP - self.widest - 6.0,
+            top + self.plot_height / 2.0,
+            escape(y_label),
+        );
         let _ = write!(
             svg,
             "<text class=\"label\" transform=\"translate({beside:.1} {centre:.1})rotate(-90)\" text-anchor=\"middle\">{label}</text>"
@@ -159,14 +211,30 @@ impl Frame {
 
     /// The dashed line, where there is one within the axis.
     pub fn write_level(&self, svg: &mut String, level: Option<&Level>) {
-        let Some(y) = level.filter(|level| self.y.contains(level.value)).and_then(|level| self.y_at(level.value)) else { return };
-        let _ = write!(svg, "<path class=\"threshold\" d=\"M{} {y:.1}H{:.1}\"/>", self.left, self.right());
+        let Some(y) = level
+            .filter(|level| self.y.contains(level.value))
+            .and_then(|level| self.y_at(level.value))
+        else {
+            return;
+        };
+        let _ = write!(
+            svg,
+            "<path class=\"threshold\" d=\"M{} {y:.1}H{:.1}\"/>",
+            self.left,
+            self.right()
+        );
     }
 
     /// Says that there is nothing to see.
     pub fn write_nothing(&self, svg: &mut String) {
-        let (x, y) = ((self.left + self.right()) / 2.0, self.top + self.plot_height / 2.0);
-        let _ = write!(svg, "<text class=\"none\" x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"middle\">no values</text>");
+        let (x, y) = (
+            (self.left + self.right()) / 2.0,
+            self.top + self.plot_height / 2.0,
+        );
+        let _ = write!(
+            svg,
+            "<text class=\"none\" x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"middle\">no values</text>"
+        );
     }
 }
 
@@ -174,9 +242,19 @@ impl Frame {
 fn rows(parts: &Parts, room: f64) -> Vec<Vec<(f64, Entry)>> {
     let left = parts.width - RIGHT - room;
     // One series alone is named by the title.
-    let named = if parts.series.len() > 1 || parts.level.is_some() { parts.series } else { &[] };
-    let series = named.iter().enumerate().map(|(index, label)| Entry { series: Some(index), label: label.clone() });
-    let level = parts.level.map(|level| Entry { series: None, label: level.label.clone() });
+    let named = if parts.series.len() > 1 || parts.level.is_some() {
+        parts.series
+    } else {
+        &[]
+    };
+    let series = named.iter().enumerate().map(|(index, label)| Entry {
+        series: Some(index),
+        label: label.clone(),
+    });
+    let level = parts.level.map(|level| Entry {
+        series: None,
+        label: level.label.clone(),
+    });
     let mut rows: Vec<Vec<(f64, Entry)>> = Vec::new();
     let mut x = left;
     for entry in series.chain(level) {
@@ -203,10 +281,22 @@ pub(crate) fn mark(series: usize, x: f64, y: f64) -> String {
     }
 }
 
-/// An interval as an upright line with caps, and its upper and lower end; none where one is not finite.
-pub(crate) fn whisker(frame: &Frame, x: f64, interval: (f64, f64), cap: f64) -> Option<(String, f64, f64)> {
+/// An interval as an upright line with caps, and its upper and lower end; none where one is not
+/// finite.
+pub(crate) fn whisker(
+    frame: &Frame,
+    x: f64,
+    interval: (f64, f64),
+    cap: f64,
+) -> Option<(String, f64, f64)> {
     let (one, other) = (frame.y_at(interval.0)?, frame.y_at(interval.1)?);
     let (top, bottom) = (one.min(other), one.max(other));
     let (from, wide) = (x - cap, 2.0 * cap);
-    Some((format!("M{x:.1} {top:.1}V{bottom:.1}M{from:.1} {top:.1}h{wide:.1}M{from:.1} {bottom:.1}h{wide:.1}"), top, bottom))
+    Some((
+        format!(
+            "M{x:.1} {top:.1}V{bottom:.1}M{from:.1} {top:.1}h{wide:.1}M{from:.1} {bottom:.1}h{wide:.1}"
+        ),
+        top,
+        bottom,
+    ))
 }

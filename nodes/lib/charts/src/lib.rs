@@ -1,5 +1,5 @@
-//! Charts and pages: SVG that follows the reader's light or dark theme, the same pictures as PNG, tables as HTML and Markdown, and reports
-//! in one HTML file with nothing to load.
+//! Charts and pages: SVG that follows the reader's light or dark theme, the same pictures as PNG,
+//! tables as HTML and Markdown, and reports in one HTML file with nothing to load.
 //!
 //! ```
 //! use cromosim_charts::{Bar, BarChart, Block, Chart, Column, Group, Page, Section, Table};
@@ -25,9 +25,10 @@
 //! assert!(html.contains("<svg") && html.contains("<b>learned</b>"));
 //! ```
 //!
-//! The same input gives the same bytes: nothing of the system (fonts, time, locale) comes in. Whatever text a chart is given is escaped;
-//! numbers that are not finite are left out of the picture. Colours can be told apart with the common kinds of colour blindness (a test
-//! simulates them), and lines differ by their marks too.
+//! The same input gives the same bytes: nothing of the system (fonts, time, locale) comes in.
+//! Whatever text a chart is given is escaped; numbers that are not finite are left out of the
+//! picture. Colours can be told apart with the common kinds of colour blindness (a test simulates
+//! them), and lines differ by their marks too.
 
 mod axis;
 mod bars;

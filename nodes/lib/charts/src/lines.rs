@@ -10,7 +10,8 @@ const WIDTH: f64 = 560.0;
 const PLOT: f64 = 240.0;
 /// Where the points of all lines stand at so few places, the axis is marked there.
 const FEW: usize = 8;
-/// Intervals of several lines at one place stand side by side: so far apart, and no farther than this from their place.
+/// Intervals of several lines at one place stand side by side: so far apart, and no farther than
+/// this from their place.
 const APART: f64 = 3.0;
 const ASIDE: f64 = 6.0;
 /// A line of more points has no marks.
@@ -36,8 +37,8 @@ pub struct Line {
     pub points: Vec<Point>,
 }
 
-/// Lines over one axis, as a learning curve. Where there are intervals, the lines are moved aside by a few units, so that the intervals of one place do
-/// not cover each other.
+/// Lines over one axis, as a learning curve. Where there are intervals, the lines are moved aside
+/// by a few units, so that the intervals of one place do not cover each other.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LineChart {
     /// Above all.
@@ -72,24 +73,57 @@ impl LineChart {
     /// The picture as an `svg` element.
     pub fn svg(&self) -> String {
         let points = || self.drawn().flat_map(|(_, line)| line);
-        let ends =
-            points().flat_map(|point| [Some(point.y), point.interval.map(|ends| ends.0), point.interval.map(|ends| ends.1)]).flatten();
+        let ends = points()
+            .flat_map(|point| {
+                [
+                    Some(point.y),
+                    point.interval.map(|ends| ends.0),
+                    point.interval.map(|ends| ends.1),
+                ]
+            })
+            .flatten();
         let series: Vec<String> = self.lines.iter().map(|line| line.label.clone()).collect();
         let y = Axis::linear(ends.chain(self.level.as_ref().map(|level| level.value)));
-        let parts =
-            Parts { title: &self.title, width: WIDTH, plot_height: PLOT, y, series: &series, level: self.level.as_ref(), least_left: 0.0 };
+        let parts = Parts {
+            title: &self.title,
+            width: WIDTH,
+            plot_height: PLOT,
+            y,
+            series: &series,
+            level: self.level.as_ref(),
+            least_left: 0.0,
+        };
         let frame = Frame::new(&parts);
         let xs: Vec<f64> = points().map(|point| point.x).collect();
-        let x = if self.logarithmic_x { Axis::logarithmic(xs.iter().copied(), 9.0) } else { Axis::linear(xs.iter().copied()) };
-        let described = format!("{}: {} over {}; {}", self.title, self.y_label, self.x_label, series.join(", "));
-        let mut svg = frame.open(frame.bottom() + 38.0, &described, &self.y_label, Sample::Line);
+        let x = if self.logarithmic_x {
+            Axis::logarithmic(xs.iter().copied(), 9.0)
+        } else {
+            Axis::linear(xs.iter().copied())
+        };
+        let described = format!(
+            "{}: {} over {}; {}",
+            self.title,
+            self.y_label,
+            self.x_label,
+            series.join(", ")
+        );
+        let mut svg = frame.open(
+            frame.bottom() + 38.0,
+            &described,
+            &self.y_label,
+            Sample::Line,
+        );
         let scale = Scale { frame: &frame, x };
         scale.write_axis(&mut svg, &xs, &self.x_label);
         frame.write_level(&mut svg, self.level.as_ref());
         let spread = points().any(|point| point.interval.is_some());
         for (number, line) in self.drawn() {
             let half = (self.lines.len() as f64 - 1.0) / 2.0;
-            let aside = if spread && half > 0.0 { (APART * half).min(ASIDE) * (number as f64 / half - 1.0) } else { 0.0 };
+            let aside = if spread && half > 0.0 {
+                (APART * half).min(ASIDE) * (number as f64 / half - 1.0)
+            } else {
+                0.0
+            };
             scale.write_line(&mut svg, number, &line, aside);
         }
         if xs.is_empty() {
@@ -99,10 +133,17 @@ impl LineChart {
         svg
     }
 
-    /// Each line with those of its points that have a place; an interruption as a point that is not finite.
+    /// Each line with those of its points that have a place; an interruption as a point that is not
+    /// finite.
     fn drawn(&self) -> impl Iterator<Item = (usize, Vec<Point>)> + '_ {
-        let has_place = |point: &Point| point.x.is_finite() && (point.x > 0.0 || !self.logarithmic_x);
-        self.lines.iter().enumerate().map(move |(number, line)| (number, line.points.iter().copied().filter(has_place).collect()))
+        let has_place =
+            |point: &Point| point.x.is_finite() && (point.x > 0.0 || !self.logarithmic_x);
+        self.lines.iter().enumerate().map(move |(number, line)| {
+            (
+                number,
+                line.points.iter().copied().filter(has_place).collect(),
+            )
+        })
     }
 }
 
@@ -114,7 +155,9 @@ struct Scale<'a> {
 impl Scale<'_> {
     fn x_at(&self, value: f64) -> Option<f64> {
         let (left, right) = (self.frame.left + 12.0, self.frame.right() - 12.0);
-        self.x.place(value).map(|place| left + place.clamp(0.0, 1.0) * (right - left))
+        self.x
+            .place(value)
+            .map(|place| left + place.clamp(0.0, 1.0) * (right - left))
     }
 
     /// The points' own places where these are few and far enough apart, else round numbers.
@@ -122,37 +165,77 @@ impl Scale<'_> {
         let mut places = xs.to_vec();
         places.sort_unstable_by(f64::total_cmp);
         places.dedup();
-        let own: Vec<Tick> = places.iter().map(|&value| Tick { value, label: trimmed(value, 4) }).collect();
+        let own: Vec<Tick> = places
+            .iter()
+            .map(|&value| Tick {
+                value,
+                label: trimmed(value, 4),
+            })
+            .collect();
         let fits = |pair: &[Tick]| {
-            let apart = self.x_at(pair[1].value).zip(self.x_at(pair[0].value)).map_or(0.0, |(one, other)| one - other);
+            let apart = self
+                .x_at(pair[1].value)
+                .zip(self.x_at(pair[0].value))
+                .map_or(0.0, |(one, other)| one - other);
             apart > (width(&pair[0].label, LABEL) + width(&pair[1].label, LABEL)) / 2.0 + 6.0
         };
         let is_few = !own.is_empty() && own.len() <= FEW && own.windows(2).all(fits);
-        if is_few { own } else { self.x.ticks(((self.frame.right() - self.frame.left) / 70.0) as usize) }
+        if is_few {
+            own
+        } else {
+            self.x
+                .ticks(((self.frame.right() - self.frame.left) / 70.0) as usize)
+        }
     }
 
     fn write_axis(&self, svg: &mut String, xs: &[f64], label: &str) {
-        let (left, right, top, bottom) = (self.frame.left, self.frame.right(), self.frame.top, self.frame.bottom());
+        let (left, right, top, bottom) = (
+            self.frame.left,
+            self.frame.right(),
+            self.frame.top,
+            self.frame.bottom(),
+        );
         let (mut marks, mut grid, mut labels) = (String::new(), String::new(), String::new());
         for tick in self.ticks(xs) {
-            let Some(x) = self.x_at(tick.value) else { continue };
-            let _ = write!(marks, "M{x:.1} {bottom:.1}v{}", if tick.label.is_empty() { 2 } else { 4 });
+            let Some(x) = self.x_at(tick.value) else {
+                continue;
+            };
+            let _ = write!(
+                marks,
+                "M{x:.1} {bottom:.1}v{}",
+                if tick.label.is_empty() { 2 } else { 4 }
+            );
             if !tick.label.is_empty() {
                 let _ = write!(grid, "M{x:.1} {top}V{bottom:.1}");
-                let _ = write!(labels, "<text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>", bottom + 16.0, tick.label);
+                let _ = write!(
+                    labels,
+                    "<text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>",
+                    bottom + 16.0,
+                    tick.label
+                );
             }
         }
-        let _ = write!(svg, "<path class=\"grid\" d=\"{grid}\"/><path class=\"axis\" d=\"{marks}M{left} {bottom:.1}H{right:.1}\"/>");
+        let _ = write!(
+            svg,
+            "<path class=\"grid\" d=\"{grid}\"/><path class=\"axis\" d=\"{marks}M{left} {bottom:.1}H{right:.1}\"/>"
+        );
         let (middle, low) = ((left + right) / 2.0, bottom + 33.0);
         let _ = write!(svg, "<g class=\"ticks\">{labels}</g>");
-        let _ = write!(svg, "<text class=\"label\" x=\"{middle:.1}\" y=\"{low:.1}\" text-anchor=\"middle\">{}</text>", escape(label));
+        let _ = write!(
+            svg,
+            "<text class=\"label\" x=\"{middle:.1}\" y=\"{low:.1}\" text-anchor=\"middle\">{}</text>",
+            escape(label)
+        );
     }
 
     fn write_line(&self, svg: &mut String, number: usize, points: &[Point], aside: f64) {
         let (mut path, mut spreads, mut marks) = (String::new(), String::new(), String::new());
         let mut is_open = false;
         for point in points {
-            let (Some(x), Some(y)) = (self.x_at(point.x).map(|x| x + aside), self.frame.y_at(point.y)) else {
+            let (Some(x), Some(y)) = (
+                self.x_at(point.x).map(|x| x + aside),
+                self.frame.y_at(point.y),
+            ) else {
                 is_open = false;
                 continue;
             };
@@ -161,7 +244,12 @@ impl Scale<'_> {
             if points.len() <= MARKS {
                 marks.push_str(&mark(number, x, y));
             }
-            spreads.extend(point.interval.and_then(|interval| whisker(self.frame, x, interval, 3.5)).map(|(path, ..)| path));
+            spreads.extend(
+                point
+                    .interval
+                    .and_then(|interval| whisker(self.frame, x, interval, 3.5))
+                    .map(|(path, ..)| path),
+            );
         }
         let _ = write!(svg, "<g class=\"{}\">", colour(number));
         if !spreads.is_empty() {

@@ -10,7 +10,8 @@ pub(crate) const STYLE: &str = include_str!("style.css");
 /// The style of charts, beside it.
 pub(crate) const CHARTS: &str = include_str!("charts.css");
 
-/// A whole document: the title (as plain text) stands in the head and above the body, which is markup. `further` is CSS beside the house's own.
+/// A whole document: the title (as plain text) stands in the head and above the body, which is
+/// markup. `further` is CSS beside the house's own.
 pub fn document(title: &str, further: &str, body: &str) -> String {
     let title = escape(title);
     format!(
@@ -113,8 +114,15 @@ impl Page {
             let _ = writeln!(body, "<p class=\"soft\">{}</p>", inline(&self.lead));
         }
         for (number, section) in self.sections.iter().enumerate() {
-            let _ = writeln!(body, "<section id=\"section-{number}\"><h2>{}</h2>", inline(&section.title));
-            section.blocks.iter().for_each(|block| write_block(&mut body, block));
+            let _ = writeln!(
+                body,
+                "<section id=\"section-{number}\"><h2>{}</h2>",
+                inline(&section.title)
+            );
+            section
+                .blocks
+                .iter()
+                .for_each(|block| write_block(&mut body, block));
             body.push_str("</section>\n");
         }
         document(&self.title, CHARTS, &body)
@@ -141,7 +149,12 @@ fn write_block(body: &mut String, block: &Block) {
             body.push_str("<div class=\"charts\">\n");
             for chart in charts {
                 // Wider, the letters would outgrow those of the page.
-                let _ = writeln!(body, "<figure style=\"max-width:{}px\">{}</figure>", chart.width(), chart.svg());
+                let _ = writeln!(
+                    body,
+                    "<figure style=\"max-width:{}px\">{}</figure>",
+                    chart.width(),
+                    chart.svg()
+                );
             }
             body.push_str("</div>\n");
         }

@@ -1,4 +1,5 @@
-//! One panel of curves as inline SVG. Colours come from the page's style sheet, so that the same picture serves light and dark.
+//! One panel of curves as inline SVG. Colours come from the page's style sheet, so that the same
+//! picture serves light and dark.
 
 use std::fmt::Write;
 
@@ -53,11 +54,15 @@ impl Panel {
     }
 
     fn x_at(&self, value: f64) -> Option<f64> {
-        self.x.place(value).map(|place| LEFT + place.clamp(0.0, 1.0) * self.inner().0)
+        self.x
+            .place(value)
+            .map(|place| LEFT + place.clamp(0.0, 1.0) * self.inner().0)
     }
 
     fn y_at(&self, value: f64) -> Option<f64> {
-        self.y.place(value).map(|place| TOP + (1.0 - place) * self.inner().1)
+        self.y
+            .place(value)
+            .map(|place| TOP + (1.0 - place) * self.inner().1)
     }
 
     /// The panel as an `svg` element.
@@ -70,15 +75,32 @@ impl Panel {
             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{}\">",
             escape(&described)
         );
-        let _ = write!(svg, "<text class=\"title\" x=\"{LEFT}\" y=\"14\">{}</text>", escape(&self.title));
+        let _ = write!(
+            svg,
+            "<text class=\"title\" x=\"{LEFT}\" y=\"14\">{}</text>",
+            escape(&self.title)
+        );
         for (class, from, to) in &self.shades {
-            let (Some(from), Some(to)) = (self.x_at(*from), self.x_at(*to)) else { continue };
+            let (Some(from), Some(to)) = (self.x_at(*from), self.x_at(*to)) else {
+                continue;
+            };
             let wide = (to - from).max(0.6);
-            let _ = write!(svg, "<rect class=\"{class}\" x=\"{from:.1}\" y=\"{TOP}\" width=\"{wide:.1}\" height=\"{inner_height:.1}\"/>");
+            let _ = write!(
+                svg,
+                "<rect class=\"{class}\" x=\"{from:.1}\" y=\"{TOP}\" width=\"{wide:.1}\" height=\"{inner_height:.1}\"/>"
+            );
         }
         self.write_axes(&mut svg);
-        if let Some(y) = self.level.filter(|level| self.y.contains(*level)).and_then(|level| self.y_at(level)) {
-            let _ = write!(svg, "<path class=\"level\" d=\"M{LEFT} {y:.1}H{:.1}\"/>", LEFT + inner_width);
+        if let Some(y) = self
+            .level
+            .filter(|level| self.y.contains(*level))
+            .and_then(|level| self.y_at(level))
+        {
+            let _ = write!(
+                svg,
+                "<path class=\"level\" d=\"M{LEFT} {y:.1}H{:.1}\"/>",
+                LEFT + inner_width
+            );
         }
         for series in &self.series {
             let path = self.path(&series.points);
@@ -95,32 +117,55 @@ impl Panel {
         let (right, bottom) = (LEFT + inner_width, TOP + inner_height);
         let (mut grid, mut marks, mut labels) = (String::new(), String::new(), String::new());
         for tick in self.x.ticks((inner_width / 70.0) as usize) {
-            let Some(x) = self.x_at(tick.value) else { continue };
+            let Some(x) = self.x_at(tick.value) else {
+                continue;
+            };
             let length = if tick.label.is_empty() { 2.0 } else { 4.0 };
             let _ = write!(marks, "M{x:.1} {bottom:.1}v{length}");
             if !tick.label.is_empty() {
                 let _ = write!(grid, "M{x:.1} {TOP}V{bottom:.1}");
-                let _ = write!(labels, "<text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>", bottom + 15.0, tick.label);
+                let _ = write!(
+                    labels,
+                    "<text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>",
+                    bottom + 15.0,
+                    tick.label
+                );
             }
         }
         for tick in self.y.ticks((inner_height / 24.0) as usize) {
-            let Some(y) = self.y_at(tick.value) else { continue };
+            let Some(y) = self.y_at(tick.value) else {
+                continue;
+            };
             let length = if tick.label.is_empty() { 2.0 } else { 4.0 };
             let _ = write!(marks, "M{LEFT} {y:.1}h-{length}");
             if !tick.label.is_empty() {
                 let _ = write!(grid, "M{LEFT} {y:.1}H{right:.1}");
-                let _ = write!(labels, "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>", LEFT - 7.0, y + 3.5, tick.label);
+                let _ = write!(
+                    labels,
+                    "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
+                    LEFT - 7.0,
+                    y + 3.5,
+                    tick.label
+                );
             }
         }
-        let _ = write!(svg, "<path class=\"grid\" d=\"{grid}\"/><path class=\"axis\" d=\"{marks}M{LEFT} {TOP}V{bottom:.1}H{right:.1}\"/>");
+        let _ = write!(
+            svg,
+            "<path class=\"grid\" d=\"{grid}\"/><path class=\"axis\" d=\"{marks}M{LEFT} {TOP}V{bottom:.1}H{right:.1}\"/>"
+        );
         let _ = write!(svg, "<g class=\"ticks\">{labels}</g>");
         let (middle, low) = (LEFT + inner_width / 2.0, self.height - 5.0);
-        let _ =
-            write!(svg, "<text class=\"label\" x=\"{middle:.1}\" y=\"{low:.1}\" text-anchor=\"middle\">{}</text>", escape(&self.x_label));
+        let _ = write!(
+            svg,
+            "<text class=\"label\" x=\"{middle:.1}\" y=\"{low:.1}\" text-anchor=\"middle\">{}</text>",
+            escape(&self.x_label)
+        );
         let centre = TOP + inner_height / 2.0;
         let label = escape(&self.y_label);
-        let _ =
-            write!(svg, "<text class=\"label\" transform=\"translate(12 {centre:.1})rotate(-90)\" text-anchor=\"middle\">{label}</text>");
+        let _ = write!(
+            svg,
+            "<text class=\"label\" transform=\"translate(12 {centre:.1})rotate(-90)\" text-anchor=\"middle\">{label}</text>"
+        );
     }
 
     /// The line's path, with no more points than the eye needs.
@@ -129,12 +174,22 @@ impl Panel {
         let mut run: Vec<(f64, f64)> = Vec::new();
         let mut flush = |run: &mut Vec<(f64, f64)>| {
             for (index, (x, y)) in simplified(&thinned(run)).into_iter().enumerate() {
-                let _ = write!(path, "{}{} {}", if index == 0 { "M" } else { "L" }, short(x), short(y));
+                let _ = write!(
+                    path,
+                    "{}{} {}",
+                    if index == 0 { "M" } else { "L" },
+                    short(x),
+                    short(y)
+                );
             }
             run.clear();
         };
         for &(x, y) in points {
-            match (self.x_at(x).filter(|_| self.x.contains(x) || self.x.is_logarithmic()), self.y_at(y)) {
+            match (
+                self.x_at(x)
+                    .filter(|_| self.x.contains(x) || self.x.is_logarithmic()),
+                self.y_at(y),
+            ) {
                 (Some(x), Some(y)) => run.push((x, y)),
                 _ => flush(&mut run),
             }
@@ -147,22 +202,38 @@ impl Panel {
 /// One decimal, without a zero.
 fn short(value: f64) -> String {
     let text = format!("{value:.1}");
-    text.strip_suffix(".0").map_or_else(|| text.clone(), str::to_owned)
+    text.strip_suffix(".0")
+        .map_or_else(|| text.clone(), str::to_owned)
 }
 
 /// At most the first, least, greatest and last point of each 1.5 units of width.
 fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     const COLUMN: f64 = 1.5;
     let mut kept = Vec::with_capacity(points.len());
-    for column in points.chunk_by(|one, other| (one.0 / COLUMN).floor() == (other.0 / COLUMN).floor()) {
+    for column in
+        points.chunk_by(|one, other| (one.0 / COLUMN).floor() == (other.0 / COLUMN).floor())
+    {
         if column.len() <= 4 {
             kept.extend_from_slice(column);
             continue;
         }
         let index_of = |better: fn(f64, f64) -> bool| {
-            (0..column.len()).reduce(|best, index| if better(column[index].1, column[best].1) { index } else { best }).unwrap_or(0)
+            (0..column.len())
+                .reduce(|best, index| {
+                    if better(column[index].1, column[best].1) {
+                        index
+                    } else {
+                        best
+                    }
+                })
+                .unwrap_or(0)
         };
-        let mut indices = [0, index_of(|one, other| one < other), index_of(|one, other| one > other), column.len() - 1];
+        let mut indices = [
+            0,
+            index_of(|one, other| one < other),
+            index_of(|one, other| one > other),
+            column.len() - 1,
+        ];
         indices.sort_unstable();
         let mut last = usize::MAX;
         for index in indices {
@@ -188,15 +259,25 @@ fn simplified(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
         let length = (x1 - x0).hypot(y1 - y0);
         let distance = |index: usize| {
             let (x, y) = points[index];
-            if length > 0.0 { ((x1 - x0) * (y0 - y) - (x0 - x) * (y1 - y0)).abs() / length } else { (x - x0).hypot(y - y0) }
+            if length > 0.0 {
+                ((x1 - x0) * (y0 - y) - (x0 - x) * (y1 - y0)).abs() / length
+            } else {
+                (x - x0).hypot(y - y0)
+            }
         };
-        let farthest = (from + 1..to).max_by(|&one, &other| distance(one).total_cmp(&distance(other)));
+        let farthest =
+            (from + 1..to).max_by(|&one, &other| distance(one).total_cmp(&distance(other)));
         if let Some(index) = farthest.filter(|&index| distance(index) > TOLERANCE) {
             keep[index] = true;
             stack.extend([(from, index), (index, to)]);
         }
     }
-    points.iter().zip(keep).filter(|(_, keep)| *keep).map(|(point, _)| *point).collect()
+    points
+        .iter()
+        .zip(keep)
+        .filter(|(_, keep)| *keep)
+        .map(|(point, _)| *point)
+        .collect()
 }
 
 #[cfg(test)]
@@ -205,15 +286,29 @@ mod tests {
 
     #[test]
     fn few_points_say_the_same() {
-        let line: Vec<(f64, f64)> = (0..1000).map(|k| (0.4 * f64::from(k), 50.0 + 0.1 * f64::from(k))).collect();
+        let line: Vec<(f64, f64)> = (0..1000)
+            .map(|k| (0.4 * f64::from(k), 50.0 + 0.1 * f64::from(k)))
+            .collect();
         assert_eq!(simplified(&line).len(), 2);
-        let wave: Vec<(f64, f64)> = (0..5000).map(|k| (0.08 * f64::from(k), 50.0 + 40.0 * (0.01 * f64::from(k)).sin())).collect();
+        let wave: Vec<(f64, f64)> = (0..5000)
+            .map(|k| {
+                (
+                    0.08 * f64::from(k),
+                    50.0 + 40.0 * (0.01 * f64::from(k)).sin(),
+                )
+            })
+            .collect();
         let drawn = simplified(&thinned(&wave));
         assert!(drawn.len() < 250, "{}", drawn.len());
         for (x, y) in &drawn {
             assert!((y - 50.0 - 40.0 * (x / 8.0).sin()).abs() < 1e-9);
         }
-        let spike: Vec<(f64, f64)> = (0..1000).map(|k| (0.1 * f64::from(k), if k == 517 { 90.0 } else { 10.0 })).collect();
-        assert!(thinned(&spike).iter().any(|(_, y)| *y == 90.0), "a spike is not thinned out");
+        let spike: Vec<(f64, f64)> = (0..1000)
+            .map(|k| (0.1 * f64::from(k), if k == 517 { 90.0 } else { 10.0 }))
+            .collect();
+        assert!(
+            thinned(&spike).iter().any(|(_, y)| *y == 90.0),
+            "a spike is not thinned out"
+        );
     }
 }

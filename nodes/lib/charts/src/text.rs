@@ -11,7 +11,9 @@ pub fn escape(text: &str) -> String {
             '"' => escaped.push_str("&quot;"),
             '\'' => escaped.push_str("&#39;"),
             // Not allowed in XML, in any form.
-            control if control.is_control() && !matches!(control, '\n' | '\t') => escaped.push('\u{FFFD}'),
+            control if control.is_control() && !matches!(control, '\n' | '\t') => {
+                escaped.push('\u{FFFD}')
+            }
             other => escaped.push(other),
         }
     }
@@ -39,7 +41,11 @@ pub fn trimmed(value: f64, digits: usize) -> String {
     match text.split_once('.') {
         Some((whole, fraction)) if !text.contains('e') => {
             let fraction = fraction.trim_end_matches('0');
-            if fraction.is_empty() { whole.to_owned() } else { format!("{whole}.{fraction}") }
+            if fraction.is_empty() {
+                whole.to_owned()
+            } else {
+                format!("{whole}.{fraction}")
+            }
         }
         _ => text,
     }
@@ -52,7 +58,9 @@ pub fn decimals(value: f64, decimals: usize) -> String {
     }
     let text = format!("{value:.decimals$}");
     // -0.00 is 0.00.
-    let is_zero = text.chars().all(|character| matches!(character, '-' | '0' | '.'));
+    let is_zero = text
+        .chars()
+        .all(|character| matches!(character, '-' | '0' | '.'));
     minus(text.strip_prefix('-').filter(|_| is_zero).unwrap_or(&text))
 }
 
@@ -71,7 +79,8 @@ pub fn percent(share: f64) -> String {
     }
 }
 
-/// Running text as markup: escaped, with `**bold**` and `` `code` `` as in Markdown; marks without a partner stay as they are.
+/// Running text as markup: escaped, with `**bold**` and `` `code` `` as in Markdown; marks without
+/// a partner stay as they are.
 pub fn inline(text: &str) -> String {
     let escaped = escape(text);
     paired(&paired(&escaped, "**", "b"), "`", "code")
@@ -93,7 +102,8 @@ fn paired(text: &str, mark: &str, tag: &str) -> String {
     marked
 }
 
-/// About how wide a line of text is drawn, in units of `size`; for DejaVu Sans Condensed, and a little much for most system fonts.
+/// About how wide a line of text is drawn, in units of `size`; for DejaVu Sans Condensed, and a
+/// little much for most system fonts.
 pub(crate) fn width(text: &str, size: f64) -> f64 {
     let em = |character: char| match character {
         'i' | 'j' | 'l' | 'I' | '.' | ',' | ':' | ';' | '|' | '!' | '\'' | ' ' => 0.31,
@@ -105,16 +115,22 @@ pub(crate) fn width(text: &str, size: f64) -> f64 {
     size * text.chars().map(em).sum::<f64>()
 }
 
-/// Text broken after spaces, underscores and slashes into lines of about this width; a longer word stays whole.
+/// Text broken after spaces, underscores and slashes into lines of about this width; a longer word
+/// stays whole.
 pub(crate) fn wrapped(text: &str, most: f64, size: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_inclusive([' ', '_', '/']) {
         match lines.last_mut() {
-            Some(line) if width(line, size) + width(word.trim_end(), size) <= most => line.push_str(word),
+            Some(line) if width(line, size) + width(word.trim_end(), size) <= most => {
+                line.push_str(word)
+            }
             _ => lines.push(word.to_owned()),
         }
     }
-    lines.into_iter().map(|line| line.trim_end().to_owned()).collect()
+    lines
+        .into_iter()
+        .map(|line| line.trim_end().to_owned())
+        .collect()
 }
 
 #[cfg(test)]
@@ -123,30 +139,53 @@ mod tests {
 
     #[test]
     fn markup_cannot_come_in() {
-        assert_eq!(escape("<a href='x'>&\"\u{1}"), "&lt;a href=&#39;x&#39;&gt;&amp;&quot;\u{FFFD}");
+        assert_eq!(
+            escape("<a href='x'>&\"\u{1}"),
+            "&lt;a href=&#39;x&#39;&gt;&amp;&quot;\u{FFFD}"
+        );
     }
 
     #[test]
     fn numbers_keep_what_they_say() {
-        assert_eq!((percent(0.004).as_str(), percent(0.62).as_str(), percent(1.0).as_str()), ("&lt; 1 %", "62 %", "100 %"));
+        assert_eq!(
+            (
+                percent(0.004).as_str(),
+                percent(0.62).as_str(),
+                percent(1.0).as_str()
+            ),
+            ("&lt; 1 %", "62 %", "100 %")
+        );
         assert_eq!(decimals(-0.0001, 2), "0.00");
         assert_eq!(
-            (significant(0.012_34, 2).as_str(), significant(-1.7e-7, 2).as_str(), significant(f64::NAN, 2).as_str()),
+            (
+                significant(0.012_34, 2).as_str(),
+                significant(-1.7e-7, 2).as_str(),
+                significant(f64::NAN, 2).as_str()
+            ),
             ("0.012", "−1.7e-7", "–")
         );
-        assert_eq!((trimmed(1200.0, 4).as_str(), trimmed(0.250, 3).as_str()), ("1200", "0.25"));
+        assert_eq!(
+            (trimmed(1200.0, 4).as_str(), trimmed(0.250, 3).as_str()),
+            ("1200", "0.25")
+        );
     }
 
     #[test]
     fn running_text_knows_bold_and_code() {
-        assert_eq!(inline("a **b** `c<d>` e"), "a <b>b</b> <code>c&lt;d&gt;</code> e");
+        assert_eq!(
+            inline("a **b** `c<d>` e"),
+            "a <b>b</b> <code>c&lt;d&gt;</code> e"
+        );
         assert_eq!(inline("2 ** 3 and `x"), "2 ** 3 and `x");
         assert_eq!(inline("**a** ** b"), "<b>a</b> ** b");
     }
 
     #[test]
     fn lines_break_where_words_end() {
-        assert_eq!(wrapped("left_wrist held out", 60.0, 11.0), ["left_wrist", "held out"]);
+        assert_eq!(
+            wrapped("left_wrist held out", 60.0, 11.0),
+            ["left_wrist", "held out"]
+        );
         assert_eq!(wrapped("left_wrist", 30.0, 11.0), ["left_", "wrist"]);
         assert_eq!(wrapped("", 30.0, 11.0), Vec::<String>::new());
     }

@@ -98,11 +98,13 @@ pub struct Cause {
     pub effect: String,
     /// That this cause is there.
     pub probability: f64,
-    /// By name, in SI: number, list, rows of a matrix, or word. Of `unknown`: channel, axes, band_hz, intervals_s, depends_on.
+    /// By name, in SI: number, list, rows of a matrix, or word. Of `unknown`: channel, axes,
+    /// band_hz, intervals_s, depends_on.
     pub parameters: BTreeMap<String, Value>,
     /// In the form of the parameters; absent where a parameter is not an estimate.
     pub standard_errors: BTreeMap<String, Value>,
-    /// Share of the whitened squared residual that it explains; with `unexplained.share` they add up to 1.
+    /// Share of the whitened squared residual that it explains; with `unexplained.share` they add
+    /// up to 1.
     pub gap_share: f64,
     /// With this cause and those above it.
     pub after: Metrics,

@@ -7,7 +7,9 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum GapError {
     /// Nothing to compare with.
-    #[error("placement {placement}: the IMU has {messages} usable messages, at least {needed} are needed")]
+    #[error(
+        "placement {placement}: the IMU has {messages} usable messages, at least {needed} are needed"
+    )]
     TooFewMessages {
         /// Name.
         placement: String,
@@ -37,7 +39,9 @@ pub enum GapError {
         placement: String,
     },
     /// A channel that never changes.
-    #[error("placement {placement}: {axes} never change; the sensor is stuck or not connected, nothing can be diagnosed")]
+    #[error(
+        "placement {placement}: {axes} never change; the sensor is stuck or not connected, nothing can be diagnosed"
+    )]
     Stuck {
         /// Name.
         placement: String,

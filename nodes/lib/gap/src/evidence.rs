@@ -8,14 +8,17 @@ use crate::metrics::Comparison;
 use crate::problem::axis_of;
 
 /// Names of the six axes, in the order of every array here.
-pub const AXES: [&str; 6] = ["accel_x", "accel_y", "accel_z", "gyro_x", "gyro_y", "gyro_z"];
+pub const AXES: [&str; 6] = [
+    "accel_x", "accel_y", "accel_z", "gyro_x", "gyro_y", "gyro_z",
+];
 
 /// Curves of one placement. All series have one entry for each IMU message.
 #[derive(Clone, Debug, Default)]
 pub struct Evidence {
     /// Stamp of each message.
     pub stamps: Vec<Stamp>,
-    /// Whether the reading was compared: false next to holes in the reference, outside it, at repeated or clipped values.
+    /// Whether the reading was compared: false next to holes in the reference, outside it, at
+    /// repeated or clipped values.
     pub used: Vec<bool>,
     /// Accelerometer [m/s2], gyroscope [rad/s], as recorded.
     pub measured: Vec<[f64; 6]>,
@@ -63,27 +66,48 @@ pub struct CoursePoint {
 const COURSE_S: f64 = 1.0;
 
 /// Curves of an analysed placement.
-pub(crate) fn collect(findings: &Findings, comparison: &Comparison, before: &[Reading], after: &[Reading]) -> Evidence {
+pub(crate) fn collect(
+    findings: &Findings,
+    comparison: &Comparison,
+    before: &[Reading],
+    after: &[Reading],
+) -> Evidence {
     let problem = comparison.problem;
     let six = |reading: &Reading| std::array::from_fn(|axis| axis_of(reading, axis));
     let all = |readings: &[Reading]| readings.iter().map(six).collect::<Vec<[f64; 6]>>();
     let measured = comparison.measured;
     let context = &findings.context;
     let spectrum = |of: &dyn Fn(usize, usize) -> f64| -> Vec<cromosim_spatial::Spectrum> {
-        let window = ((4.0 * problem.rate_hz) as usize).min(problem.length / 2).max(8);
-        problem.raster(of).iter().map(|series| cromosim_spatial::welch(series, problem.rate_hz, window)).collect()
+        let window = ((4.0 * problem.rate_hz) as usize)
+            .min(problem.length / 2)
+            .max(8);
+        problem
+            .raster(of)
+            .iter()
+            .map(|series| cromosim_spatial::welch(series, problem.rate_hz, window))
+            .collect()
     };
     let of_measured = spectrum(&|k, axis| axis_of(&measured[k], axis));
     let of_before = spectrum(&|k, axis| axis_of(&measured[k], axis) - axis_of(&before[k], axis));
     let of_after = spectrum(&|k, axis| axis_of(&measured[k], axis) - axis_of(&after[k], axis));
-    let bins = of_measured.first().map_or(0, |spectrum| spectrum.density.len());
-    let rows = |spectra: &[cromosim_spatial::Spectrum]| (0..bins).map(|k| std::array::from_fn(|axis| spectra[axis].density[k])).collect();
-    let units =
-        [EffectKind::AccelUnits, EffectKind::GyroUnits].map(|kind| values_of(&findings.named, kind).map_or(1.0, |values| values[0]));
+    let bins = of_measured
+        .first()
+        .map_or(0, |spectrum| spectrum.density.len());
+    let rows = |spectra: &[cromosim_spatial::Spectrum]| {
+        (0..bins)
+            .map(|k| std::array::from_fn(|axis| spectra[axis].density[k]))
+            .collect()
+    };
+    let units = [EffectKind::AccelUnits, EffectKind::GyroUnits]
+        .map(|kind| values_of(&findings.named, kind).map_or(1.0, |values| values[0]));
     let frequencies: Vec<f64> = (0..bins).map(|k| of_measured[0].frequency(k)).collect();
     let predicted = frequencies
         .iter()
-        .map(|&hz| std::array::from_fn(|axis| context.noise.density(axis / 3, hz, problem.rate_hz) * units[axis / 3].powi(2)))
+        .map(|&hz| {
+            std::array::from_fn(|axis| {
+                context.noise.density(axis / 3, hz, problem.rate_hz) * units[axis / 3].powi(2)
+            })
+        })
         .collect();
     let spectra = Spectra {
         frequencies,
@@ -93,15 +117,23 @@ pub(crate) fn collect(findings: &Findings, comparison: &Comparison, before: &[Re
         predicted,
     };
     let white = |readings: &[Reading]| {
-        context.whitener.apply(&problem.raster(|k, axis| (axis_of(&measured[k], axis) - axis_of(&readings[k], axis)) / units[axis / 3]))
+        context.whitener.apply(&problem.raster(|k, axis| {
+            (axis_of(&measured[k], axis) - axis_of(&readings[k], axis)) / units[axis / 3]
+        }))
     };
     let (white_before, white_after) = (white(before), white(after));
     let step = ((COURSE_S * problem.rate_hz) as usize).max(1);
     let mean_square = |white: &[f64], channel: usize, from: usize, to: usize| {
         let (mut sum, mut weight) = (0.0, 0.0);
         for axis in 3 * channel..3 * channel + 3 {
-            sum += white[axis * problem.length + from..axis * problem.length + to].iter().map(|e| e * e).sum::<f64>();
-            weight += context.whitener.weight[axis][from..to].iter().map(|w| w * w).sum::<f64>();
+            sum += white[axis * problem.length + from..axis * problem.length + to]
+                .iter()
+                .map(|e| e * e)
+                .sum::<f64>();
+            weight += context.whitener.weight[axis][from..to]
+                .iter()
+                .map(|w| w * w)
+                .sum::<f64>();
         }
         if weight > 0.0 { sum / weight } else { f64::NAN }
     };
@@ -118,7 +150,11 @@ pub(crate) fn collect(findings: &Findings, comparison: &Comparison, before: &[Re
         .collect();
     Evidence {
         stamps: problem.stamps.clone(),
-        used: problem.usable.iter().map(|usable| usable.iter().all(|axis| *axis)).collect(),
+        used: problem
+            .usable
+            .iter()
+            .map(|usable| usable.iter().all(|axis| *axis))
+            .collect(),
         measured: all(measured),
         before: all(before),
         after: all(after),

@@ -9,10 +9,12 @@ const REACH: usize = 24;
 /// How far from its edge a long hole is filled; beyond, nothing is known but the mean, zero.
 const EDGE: usize = 48;
 
-/// Fills holes of a circular series by the values to be expected given their neighbours: `C_mn C_nn^-1 x_n`, with C the predicted covariance.
+/// Fills holes of a circular series by the values to be expected given their neighbours: `C_mn
+/// C_nn^-1 x_n`, with C the predicted covariance.
 ///
-/// A linear map of the series, so that a fit sees its own columns through the same holes. Anything simpler (a straight line) carries one noisy
-/// neighbour over the hole, which after whitening is a jump.
+/// A linear map of the series, so that a fit sees its own columns through the same holes. Anything
+/// simpler (a straight line) carries one noisy neighbour over the hole, which after whitening is a
+/// jump.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Filler {
     runs: Vec<Run>,
@@ -31,7 +33,10 @@ impl Filler {
     /// For a series of which `there` says what is there; `covariance` by distance, circular.
     pub fn new(there: &[bool], covariance: &[f64]) -> Self {
         let length = there.len();
-        let mut filler = Self { runs: Vec::new(), variance: vec![0.0; length] };
+        let mut filler = Self {
+            runs: Vec::new(),
+            variance: vec![0.0; length],
+        };
         let mut next = 0;
         while next < length {
             if there[next] {
@@ -42,11 +47,23 @@ impl Filler {
             filler.variance[next..end].fill(covariance[0]);
             let hole = next..end;
             if hole.len() <= 2 * EDGE {
-                filler.add(hole.clone(), neighbours(there, &hole, true, true), covariance);
+                filler.add(
+                    hole.clone(),
+                    neighbours(there, &hole, true, true),
+                    covariance,
+                );
             } else {
                 let (left, right) = (hole.start..hole.start + EDGE, hole.end - EDGE..hole.end);
-                filler.add(left.clone(), neighbours(there, &left, true, false), covariance);
-                filler.add(right.clone(), neighbours(there, &right, false, true), covariance);
+                filler.add(
+                    left.clone(),
+                    neighbours(there, &left, true, false),
+                    covariance,
+                );
+                filler.add(
+                    right.clone(),
+                    neighbours(there, &right, false, true),
+                    covariance,
+                );
             }
             next = end;
         }
@@ -61,12 +78,19 @@ impl Filler {
             between(neighbours[i], neighbours[j]) + if i == j { nugget } else { 0.0 }
         });
         let Some(factor) = own.cholesky() else { return };
-        let across = DMatrix::from_fn(neighbours.len(), missing.len(), |i, m| between(neighbours[i], missing.start + m));
+        let across = DMatrix::from_fn(neighbours.len(), missing.len(), |i, m| {
+            between(neighbours[i], missing.start + m)
+        });
         let weights = factor.solve(&across);
         for (m, entry) in missing.clone().enumerate() {
-            self.variance[entry] = (covariance[0] - weights.column(m).dot(&across.column(m))).max(0.0);
+            self.variance[entry] =
+                (covariance[0] - weights.column(m).dot(&across.column(m))).max(0.0);
         }
-        self.runs.push(Run { missing, neighbours, weights: weights.transpose() });
+        self.runs.push(Run {
+            missing,
+            neighbours,
+            weights: weights.transpose(),
+        });
     }
 
     /// Overwrites what is missing.
@@ -80,7 +104,13 @@ impl Filler {
         let filled: Vec<DVector<f64>> = self
             .runs
             .iter()
-            .map(|run| &run.weights * DVector::from_iterator(run.neighbours.len(), run.neighbours.iter().map(|&k| series[k])))
+            .map(|run| {
+                &run.weights
+                    * DVector::from_iterator(
+                        run.neighbours.len(),
+                        run.neighbours.iter().map(|&k| series[k]),
+                    )
+            })
             .collect();
         for (run, values) in self.runs.iter().zip(filled) {
             for (entry, value) in run.missing.clone().zip(values.iter()) {
@@ -97,10 +127,20 @@ fn neighbours(there: &[bool], hole: &Range<usize>, left: bool, right: bool) -> V
     // Not further than a few reaches: beyond, the series is another one.
     let far = (4 * REACH).min(length - hole.len());
     if left {
-        found.extend((1..=far).map(|step| (hole.start + length - step) % length).filter(|&k| there[k]).take(REACH));
+        found.extend(
+            (1..=far)
+                .map(|step| (hole.start + length - step) % length)
+                .filter(|&k| there[k])
+                .take(REACH),
+        );
     }
     if right {
-        found.extend((0..far).map(|step| (hole.end + step) % length).filter(|&k| there[k]).take(REACH));
+        found.extend(
+            (0..far)
+                .map(|step| (hole.end + step) % length)
+                .filter(|&k| there[k])
+                .take(REACH),
+        );
     }
     found.sort_unstable();
     found.dedup();
@@ -116,20 +156,36 @@ mod tests {
         let length = 1000;
         // Correlated over fifty entries.
         let covariance: Vec<f64> = (0..length)
-            .map(|k: usize| (-0.5 * (k.min(length - k) as f64 / 20.0).powi(2)).exp() + if k == 0 { 1e-3 } else { 0.0 })
+            .map(|k: usize| {
+                (-0.5 * (k.min(length - k) as f64 / 20.0).powi(2)).exp()
+                    + if k == 0 { 1e-3 } else { 0.0 }
+            })
             .collect();
         let mut there = vec![true; length];
         there[300..304].fill(false);
         there[600..800].fill(false);
         let filler = Filler::new(&there, &covariance);
-        let truth: Vec<f64> = (0..length).map(|k| (k as f64 * std::f64::consts::TAU / 200.0).sin()).collect();
+        let truth: Vec<f64> = (0..length)
+            .map(|k| (k as f64 * std::f64::consts::TAU / 200.0).sin())
+            .collect();
         let mut series = truth.clone();
-        there.iter().enumerate().filter(|(_, there)| !**there).for_each(|(k, _)| series[k] = 1e9);
+        there
+            .iter()
+            .enumerate()
+            .filter(|(_, there)| !**there)
+            .for_each(|(k, _)| series[k] = 1e9);
         filler.fill(&mut series);
         for k in 300..304 {
-            assert!((series[k] - truth[k]).abs() < 0.02, "{} {}", series[k], truth[k]);
+            assert!(
+                (series[k] - truth[k]).abs() < 0.02,
+                "{} {}",
+                series[k],
+                truth[k]
+            );
         }
         assert_eq!(series[700], 0.0);
-        assert!(filler.variance[302] < 0.01 && filler.variance[700] > 0.9 && filler.variance[10] == 0.0);
+        assert!(
+            filler.variance[302] < 0.01 && filler.variance[700] > 0.9 && filler.variance[10] == 0.0
+        );
     }
 }

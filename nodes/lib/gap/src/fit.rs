@@ -8,7 +8,8 @@ use crate::gram::{Gram, Linear, dot};
 use crate::problem::{FOLDS, Prediction, Problem, axis_of, stage_of};
 use crate::whiten::{NoiseBasis, NoiseModel, Whitener};
 
-/// Factor on the standard errors of the normal equations: the predicted noise is stationary, that of real motion is not. From withheld cases.
+/// Factor on the standard errors of the normal equations: the predicted noise is stationary, that
+/// of real motion is not. From withheld cases.
 const WIDENING: f64 = 1.12;
 /// Most steps of a fit.
 const STEPS: usize = 12;
@@ -79,11 +80,19 @@ pub(crate) fn free_values(kind: EffectKind) -> Vec<usize> {
 
 /// Bounds and step of each value of an effect.
 fn limits(kind: EffectKind) -> Vec<(f64, f64, f64)> {
-    kind.spec().parameters.iter().flat_map(|p| std::iter::repeat_n((p.lower, p.upper, p.step), p.shape.len())).collect()
+    kind.spec()
+        .parameters
+        .iter()
+        .flat_map(|p| std::iter::repeat_n((p.lower, p.upper, p.step), p.shape.len()))
+        .collect()
 }
 
 /// A set with one value changed, kept within its bounds; none where the effect refuses it.
-pub(crate) fn changed(set: &EffectSet, kind: EffectKind, changes: &[(usize, f64)]) -> Option<EffectSet> {
+pub(crate) fn changed(
+    set: &EffectSet,
+    kind: EffectKind,
+    changes: &[(usize, f64)],
+) -> Option<EffectSet> {
     let effect = set.get(kind)?;
     let bounds = limits(kind);
     let mut values = effect.values().to_vec();
@@ -97,16 +106,31 @@ pub(crate) fn changed(set: &EffectSet, kind: EffectKind, changes: &[(usize, f64)
 }
 
 impl<'a> Context<'a> {
-    pub fn new(problem: &'a Problem, track: KinematicTrack, basis: NoiseBasis, noise: NoiseModel) -> Self {
+    pub fn new(
+        problem: &'a Problem,
+        track: KinematicTrack,
+        basis: NoiseBasis,
+        noise: NoiseModel,
+    ) -> Self {
         let whitener = Whitener::new(problem, &noise);
-        let folds: Vec<usize> = (0..problem.length).map(|place| problem.fold(place)).collect();
+        let folds: Vec<usize> = (0..problem.length)
+            .map(|place| problem.fold(place))
+            .collect();
         let mut counts = vec![[0.0; 2]; FOLDS];
         for axis in 0..6 {
             for (place, weight) in whitener.weight[axis].iter().enumerate() {
                 counts[folds[place]][axis / 3] += weight * weight;
             }
         }
-        Self { problem, track, basis, noise, whitener, folds, counts }
+        Self {
+            problem,
+            track,
+            basis,
+            noise,
+            whitener,
+            folds,
+            counts,
+        }
     }
 
     /// Whitened measured less predicted.
@@ -116,32 +140,63 @@ impl<'a> Context<'a> {
 
     /// Columns of the free values of one effect of `set`, whose prediction is `base`.
     pub fn columns(&self, set: &EffectSet, base: &Prediction, kind: EffectKind) -> Vec<Vec<f64>> {
-        free_values(kind).into_iter().map(|index| self.column(set, base, kind, index)).collect()
+        free_values(kind)
+            .into_iter()
+            .map(|index| self.column(set, base, kind, index))
+            .collect()
     }
 
-    fn column(&self, set: &EffectSet, base: &Prediction, kind: EffectKind, index: usize) -> Vec<f64> {
+    fn column(
+        &self,
+        set: &EffectSet,
+        base: &Prediction,
+        kind: EffectKind,
+        index: usize,
+    ) -> Vec<f64> {
         let (lower, upper, size) = limits(kind)[index];
         let value = set.get(kind).map_or(0.0, |effect| effect.values()[index]);
         // Away from a bound; a value of the order of its size moves by a fraction of itself.
-        let size = if (lower..=upper).contains(&(value + size)) { size } else { -size };
-        let Some(moved) = changed(set, kind, &[(index, size)]) else { return vec![0.0; 6 * self.problem.length] };
-        let readings = self.problem.predict_from(&self.track, base, &moved, stage_of(kind));
-        let difference = self.problem.raster(|k, axis| (axis_of(&readings[k], axis) - axis_of(&base.readings[k], axis)) / size);
+        let size = if (lower..=upper).contains(&(value + size)) {
+            size
+        } else {
+            -size
+        };
+        let Some(moved) = changed(set, kind, &[(index, size)]) else {
+            return vec![0.0; 6 * self.problem.length];
+        };
+        let readings = self
+            .problem
+            .predict_from(&self.track, base, &moved, stage_of(kind));
+        let difference = self.problem.raster(|k, axis| {
+            (axis_of(&readings[k], axis) - axis_of(&base.readings[k], axis)) / size
+        });
         self.whitener.apply(&difference)
     }
 
     pub fn gram(&self, columns: &[&[f64]], residual: &[f64], prior: Vec<f64>) -> Gram {
-        Gram::new(columns, residual, self.problem.length, &self.folds, &self.counts, prior)
+        Gram::new(
+            columns,
+            residual,
+            self.problem.length,
+            &self.folds,
+            &self.counts,
+            prior,
+        )
     }
 
     fn squares(&self, residual: &[f64]) -> [f64; 2] {
         let half = 3 * self.problem.length;
-        [dot(&residual[..half], &residual[..half]), dot(&residual[half..], &residual[half..])]
+        [
+            dot(&residual[..half], &residual[..half]),
+            dot(&residual[half..], &residual[half..]),
+        ]
     }
 
     fn cost(&self, residual: &[f64]) -> f64 {
         let squares = self.squares(residual);
-        -(0..2).map(|c| crate::gram::channel_likelihood(self.whitener.count[c], squares[c])).sum::<f64>()
+        -(0..2)
+            .map(|c| crate::gram::channel_likelihood(self.whitener.count[c], squares[c]))
+            .sum::<f64>()
     }
 
     /// Gauss-Newton steps with halving from the values in `set`.
@@ -151,15 +206,27 @@ impl<'a> Context<'a> {
 
     /// As [`Context::fit`], with another limit on the steps.
     pub fn fit_steps(&self, mut set: EffectSet, steps: usize) -> Fit {
-        let layout: Vec<(EffectKind, usize)> =
-            set.iter().flat_map(|effect| free_values(effect.kind()).into_iter().map(|index| (effect.kind(), index))).collect();
+        let layout: Vec<(EffectKind, usize)> = set
+            .iter()
+            .flat_map(|effect| {
+                free_values(effect.kind())
+                    .into_iter()
+                    .map(|index| (effect.kind(), index))
+            })
+            .collect();
         let mut prediction = self.problem.predict(&self.track, &set);
         let mut residual = self.residual(&prediction.readings);
         let mut cost = self.cost(&residual);
         loop_steps(steps, |last| {
-            let columns: Vec<Vec<f64>> = layout.iter().map(|&(kind, index)| self.column(&set, &prediction, kind, index)).collect();
+            let columns: Vec<Vec<f64>> = layout
+                .iter()
+                .map(|&(kind, index)| self.column(&set, &prediction, kind, index))
+                .collect();
             let slices: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
-            let prior = layout.iter().map(|&(kind, index)| prior_deviation(kind, index).powi(-2)).collect();
+            let prior = layout
+                .iter()
+                .map(|&(kind, index)| prior_deviation(kind, index).powi(-2))
+                .collect();
             let linear = self.gram(&slices, &residual, prior).solve();
             let finished = |set: &EffectSet, prediction: &Prediction, residual: &[f64]| Fit {
                 set: set.clone(),
@@ -180,7 +247,8 @@ impl<'a> Context<'a> {
                 let next_residual = self.residual(&next_prediction.readings);
                 let next_cost = self.cost(&next_residual);
                 if next_cost < cost {
-                    (set, prediction, residual, cost) = (next, next_prediction, next_residual, next_cost);
+                    (set, prediction, residual, cost) =
+                        (next, next_prediction, next_residual, next_cost);
                     return None;
                 }
                 share *= 0.3;
@@ -190,10 +258,20 @@ impl<'a> Context<'a> {
     }
 
     /// How well columns beside those of a fit would do, in one linear step.
-    pub fn extended(&self, fit: &Fit, residual: &[f64], extra: &[Vec<f64>], extra_prior: &[f64]) -> Linear {
+    pub fn extended(
+        &self,
+        fit: &Fit,
+        residual: &[f64],
+        extra: &[Vec<f64>],
+        extra_prior: &[f64],
+    ) -> Linear {
         let slices: Vec<&[f64]> = fit.columns.iter().chain(extra).map(Vec::as_slice).collect();
-        let prior =
-            fit.layout.iter().map(|&(kind, index)| prior_deviation(kind, index).powi(-2)).chain(extra_prior.iter().copied()).collect();
+        let prior = fit
+            .layout
+            .iter()
+            .map(|&(kind, index)| prior_deviation(kind, index).powi(-2))
+            .chain(extra_prior.iter().copied())
+            .collect();
         self.gram(&slices, residual, prior).solve()
     }
 }
@@ -209,7 +287,12 @@ fn loop_steps<T>(steps: usize, mut step: impl FnMut(bool) -> Option<T>) -> T {
     }
 }
 
-fn moved(set: &EffectSet, layout: &[(EffectKind, usize)], step: &DVector<f64>, share: f64) -> EffectSet {
+fn moved(
+    set: &EffectSet,
+    layout: &[(EffectKind, usize)],
+    step: &DVector<f64>,
+    share: f64,
+) -> EffectSet {
     let mut next = set.clone();
     for (position, &(kind, index)) in layout.iter().enumerate() {
         if let Some(changed) = changed(&next, kind, &[(index, share * step[position])]) {
@@ -220,7 +303,8 @@ fn moved(set: &EffectSet, layout: &[(EffectKind, usize)], step: &DVector<f64>, s
 }
 
 impl Fit {
-    /// Mean square of the whitened residual by channel, on data that each part of the fit did not see.
+    /// Mean square of the whitened residual by channel, on data that each part of the fit did not
+    /// see.
     pub fn held_out_ratio(&self) -> [f64; 2] {
         self.linear.held_out_ratio
     }
@@ -235,7 +319,8 @@ impl Fit {
         let mut errors = vec![0.0; effect.values().len()];
         for (position, &(kind, index)) in self.layout.iter().enumerate() {
             if kind == effect.kind() {
-                errors[index] = WIDENING * self.linear.covariance[(position, position)].max(0.0).sqrt();
+                errors[index] =
+                    WIDENING * self.linear.covariance[(position, position)].max(0.0).sqrt();
             }
         }
         errors

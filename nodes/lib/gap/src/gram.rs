@@ -1,4 +1,5 @@
-//! Normal equations by channel and part of time: training and held-out residuals without another pass over the series.
+//! Normal equations by channel and part of time: training and held-out residuals without another
+//! pass over the series.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -31,8 +32,9 @@ pub(crate) struct Linear {
     pub covariance: DMatrix<f64>,
 }
 
-/// Log-likelihood of a channel: unit variance, or a common factor q where the residual is larger than noise.
-/// A channel whose noise is a factor too large everywhere tells little; it is never believed to be quieter than predicted.
+/// Log-likelihood of a channel: unit variance, or a common factor q where the residual is larger
+/// than noise. A channel whose noise is a factor too large everywhere tells little; it is never
+/// believed to be quieter than predicted.
 pub(crate) fn channel_likelihood(count: f64, squares: f64) -> f64 {
     if count <= 0.0 {
         return 0.0;
@@ -43,16 +45,30 @@ pub(crate) fn channel_likelihood(count: f64, squares: f64) -> f64 {
 }
 
 impl Gram {
-    /// Of columns over the flat whitened raster; `fold_of` a raster entry, `length` entries an axis. `counts` as in the whitener, by fold.
-    pub fn new(columns: &[&[f64]], residual: &[f64], length: usize, fold_of: &[usize], counts: &[[f64; 2]], prior: Vec<f64>) -> Self {
+    /// Of columns over the flat whitened raster; `fold_of` a raster entry, `length` entries an
+    /// axis. `counts` as in the whitener, by fold.
+    pub fn new(
+        columns: &[&[f64]],
+        residual: &[f64],
+        length: usize,
+        fold_of: &[usize],
+        counts: &[[f64; 2]],
+        prior: Vec<f64>,
+    ) -> Self {
         let size = columns.len() + 1;
-        let all: Vec<&[f64]> = columns.iter().copied().chain(std::iter::once(residual)).collect();
+        let all: Vec<&[f64]> = columns
+            .iter()
+            .copied()
+            .chain(std::iter::once(residual))
+            .collect();
         let mut parts = vec![[DMatrix::zeros(size, size), DMatrix::zeros(size, size)]; FOLDS];
         // Runs of one fold are contiguous: inner products over slices.
         let mut from = 0;
         while from < length {
             let fold = fold_of[from];
-            let to = (from..length).find(|&k| fold_of[k] != fold).unwrap_or(length);
+            let to = (from..length)
+                .find(|&k| fold_of[k] != fold)
+                .unwrap_or(length);
             for axis in 0..6 {
                 let range = axis * length + from..axis * length + to;
                 let part = &mut parts[fold][axis / 3];
@@ -70,19 +86,27 @@ impl Gram {
                 part.fill_upper_triangle_with_lower_triangle();
             }
         }
-        Self { parts, counts: counts.to_vec(), prior }
+        Self {
+            parts,
+            counts: counts.to_vec(),
+            prior,
+        }
     }
 
     fn size(&self) -> usize {
         self.prior.len()
     }
 
-    /// Solves with each channel in units of its own residual, then scores each part of time under the fit to the others.
+    /// Solves with each channel in units of its own residual, then scores each part of time under
+    /// the fit to the others.
     pub fn solve(&self) -> Linear {
         let total = self.sum(None);
         let count = self.count(None);
         let (step, ratio, covariance) = self.minimise(&total, &count);
-        let trained = (0..2).map(|c| channel_likelihood(count[c], ratio[c] * count[c])).sum::<f64>() - self.prior_cost(&step);
+        let trained = (0..2)
+            .map(|c| channel_likelihood(count[c], ratio[c] * count[c]))
+            .sum::<f64>()
+            - self.prior_cost(&step);
         let mut squares = [0.0; 2];
         let mut fold_steps = Vec::with_capacity(FOLDS);
         for (fold, part) in self.parts.iter().enumerate() {
@@ -92,19 +116,40 @@ impl Gram {
             }
             fold_steps.push(step);
         }
-        let held_out_ratio = [squares[0] / count[0].max(1.0), squares[1] / count[1].max(1.0)];
-        let held_out = (0..2).map(|c| channel_likelihood(count[c], squares[c])).sum();
-        Linear { step, trained, held_out, held_out_ratio, fold_steps, covariance }
+        let held_out_ratio = [
+            squares[0] / count[0].max(1.0),
+            squares[1] / count[1].max(1.0),
+        ];
+        let held_out = (0..2)
+            .map(|c| channel_likelihood(count[c], squares[c]))
+            .sum();
+        Linear {
+            step,
+            trained,
+            held_out,
+            held_out_ratio,
+            fold_steps,
+            covariance,
+        }
     }
 
     fn prior_cost(&self, step: &DVector<f64>) -> f64 {
-        0.5 * step.iter().zip(&self.prior).map(|(value, weight)| value * value * weight).sum::<f64>()
+        0.5 * step
+            .iter()
+            .zip(&self.prior)
+            .map(|(value, weight)| value * value * weight)
+            .sum::<f64>()
     }
 
     fn sum(&self, without: Option<usize>) -> [DMatrix<f64>; 2] {
         let size = self.size() + 1;
         let mut total = [DMatrix::zeros(size, size), DMatrix::zeros(size, size)];
-        for (_, part) in self.parts.iter().enumerate().filter(|(fold, _)| Some(*fold) != without) {
+        for (_, part) in self
+            .parts
+            .iter()
+            .enumerate()
+            .filter(|(fold, _)| Some(*fold) != without)
+        {
             total[0] += &part[0];
             total[1] += &part[1];
         }
@@ -112,13 +157,25 @@ impl Gram {
     }
 
     fn count(&self, without: Option<usize>) -> [f64; 2] {
-        let kept = self.counts.iter().enumerate().filter(|(fold, _)| Some(*fold) != without);
-        kept.fold([0.0; 2], |sum, (_, count)| [sum[0] + count[0], sum[1] + count[1]])
+        let kept = self
+            .counts
+            .iter()
+            .enumerate()
+            .filter(|(fold, _)| Some(*fold) != without);
+        kept.fold([0.0; 2], |sum, (_, count)| {
+            [sum[0] + count[0], sum[1] + count[1]]
+        })
     }
 
-    fn minimise(&self, total: &[DMatrix<f64>; 2], count: &[f64; 2]) -> (DVector<f64>, [f64; 2], DMatrix<f64>) {
+    fn minimise(
+        &self,
+        total: &[DMatrix<f64>; 2],
+        count: &[f64; 2],
+    ) -> (DVector<f64>, [f64; 2], DMatrix<f64>) {
         let size = self.size();
-        let ratio_of = |step: &DVector<f64>| [0, 1].map(|c| left(&total[c], step).max(0.0) / count[c].max(1.0));
+        let ratio_of = |step: &DVector<f64>| {
+            [0, 1].map(|c| left(&total[c], step).max(0.0) / count[c].max(1.0))
+        };
         let mut step = DVector::zeros(size);
         let mut ratio = ratio_of(&step);
         let mut covariance = DMatrix::zeros(size, size);
@@ -133,7 +190,9 @@ impl Gram {
             for k in 0..size {
                 normal[(k, k)] += self.prior[k] + 1e-12 * normal[(k, k)];
             }
-            let Some(factor) = normal.cholesky() else { break };
+            let Some(factor) = normal.cholesky() else {
+                break;
+            };
             step = factor.solve(&right);
             covariance = factor.inverse();
             let next = ratio_of(&step);
@@ -164,7 +223,12 @@ fn left(gram: &DMatrix<f64>, step: &DVector<f64>) -> f64 {
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut lanes = [0.0; 8];
     let (left, right) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f64 = left.remainder().iter().zip(right.remainder()).map(|(x, y)| x * y).sum();
+    let rest: f64 = left
+        .remainder()
+        .iter()
+        .zip(right.remainder())
+        .map(|(x, y)| x * y)
+        .sum();
     for (x, y) in left.zip(right) {
         for lane in 0..8 {
             lanes[lane] += x[lane] * y[lane];

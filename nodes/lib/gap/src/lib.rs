@@ -1,4 +1,5 @@
-//! The gap between simulated and real IMUs: where it lies, which effect causes it, how far it shrinks once that effect is added.
+//! The gap between simulated and real IMUs: where it lies, which effect causes it, how far it
+//! shrinks once that effect is added.
 
 mod answer;
 mod diagnose;
@@ -26,7 +27,10 @@ mod unknown;
 mod whiten;
 
 pub use diagnose::{DiagnoseOptions, PlacementAnswer, diagnose};
-pub use diagnosis::{Cause, Diagnosis, Gap, Interval, Metrics, Place, PlacementDiagnosis, SCHEMA, Unexplained, Unidentifiable};
+pub use diagnosis::{
+    Cause, Diagnosis, Gap, Interval, Metrics, Place, PlacementDiagnosis, SCHEMA, Unexplained,
+    Unidentifiable,
+};
 pub use error::GapError;
 pub use evidence::{AXES, CoursePoint, Evidence, Spectra};
 pub use record::{ImuSeries, PlacementRecord, PoseSeries};

@@ -29,7 +29,12 @@ impl Comparison<'_> {
     }
 
     /// All distances; `simulated` without noise, `noisy` with it.
-    pub fn metrics(&self, simulated: &[Reading], noisy: &[Reading], nll_per_sample: f64) -> Metrics {
+    pub fn metrics(
+        &self,
+        simulated: &[Reading],
+        noisy: &[Reading],
+        nll_per_sample: f64,
+    ) -> Metrics {
         let spectral = |channel| self.spectral_distance(noisy, channel);
         let distribution = |channel| self.wasserstein(noisy, channel);
         Metrics {
@@ -61,12 +66,19 @@ impl Comparison<'_> {
         series
     }
 
-    /// Root mean square over frequency (from two windows' resolution to Nyquist) of the difference in dB, mean over axes.
+    /// Root mean square over frequency (from two windows' resolution to Nyquist) of the difference
+    /// in dB, mean over axes.
     fn spectral_distance(&self, noisy: &[Reading], channel: usize) -> f64 {
-        let window = ((2.56 * self.problem.rate_hz) as usize).min(self.problem.length / 2).max(8);
+        let window = ((2.56 * self.problem.rate_hz) as usize)
+            .min(self.problem.length / 2)
+            .max(8);
         let axes = 3 * channel..3 * channel + 3;
         let distances = axes.map(|axis| {
-            let a = welch(&self.series(self.measured, axis), self.problem.rate_hz, window);
+            let a = welch(
+                &self.series(self.measured, axis),
+                self.problem.rate_hz,
+                window,
+            );
             let b = welch(&self.series(noisy, axis), self.problem.rate_hz, window);
             let pairs = a.density.iter().zip(&b.density).skip(2);
             let (sum, count) = pairs.fold((0.0, 0.0_f64), |(sum, count), (a, b)| {
@@ -81,7 +93,10 @@ impl Comparison<'_> {
     /// First Wasserstein distance: mean distance of the sorted values, mean over axes.
     fn wasserstein(&self, noisy: &[Reading], channel: usize) -> f64 {
         let sorted = |readings: &[Reading], axis: usize| {
-            let covered = readings.iter().zip(self.covered).filter(|(_, covered)| covered[axis]);
+            let covered = readings
+                .iter()
+                .zip(self.covered)
+                .filter(|(_, covered)| covered[axis]);
             let mut values: Vec<f64> = covered.map(|(reading, _)| axis_of(reading, axis)).collect();
             values.sort_unstable_by(f64::total_cmp);
             values

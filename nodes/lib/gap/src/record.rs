@@ -33,6 +33,7 @@ pub struct ImuSeries {
     pub stamps: Vec<Stamp>,
     /// Specific force [m/s2] and angular velocity [rad/s], in the device's units.
     pub readings: Vec<Reading>,
-    /// Declared standard deviation of the white noise per sample: accelerometer, gyroscope; none where the covariance is zero.
+    /// Declared standard deviation of the white noise per sample: accelerometer, gyroscope; none
+    /// where the covariance is zero.
     pub declared: [Option<f64>; 2],
 }

@@ -39,7 +39,8 @@ pub(crate) struct Candidate {
 }
 
 impl Context<'_> {
-    /// The best start of one effect beside `fit`: its set and the held-out log-likelihood after one linear step.
+    /// The best start of one effect beside `fit`: its set and the held-out log-likelihood after one
+    /// linear step.
     pub fn screen(&self, fit: &Fit, kind: EffectKind) -> Option<Candidate> {
         if kind == EffectKind::MountSlip {
             return self.screen_slip(fit);
@@ -55,16 +56,28 @@ impl Context<'_> {
             } else {
                 let prediction = self.problem.predict(&self.track, &set);
                 let columns = self.columns(&set, &prediction, kind);
-                self.extended(fit, &self.residual(&prediction.readings), &columns, &prior(kind))
+                self.extended(
+                    fit,
+                    &self.residual(&prediction.readings),
+                    &columns,
+                    &prior(kind),
+                )
             };
-            Some(Candidate { set: self.stepped(&set, fit, kind, &linear), promise: linear.held_out })
+            Some(Candidate {
+                set: self.stepped(&set, fit, kind, &linear),
+                promise: linear.held_out,
+            })
         });
         candidates.max_by(|a, b| a.promise.total_cmp(&b.promise))
     }
 
     /// `set` after the linear step of the fit's own values and the candidate's.
     fn stepped(&self, set: &EffectSet, fit: &Fit, kind: EffectKind, linear: &Linear) -> EffectSet {
-        let layout = fit.layout.iter().copied().chain(free_values(kind).into_iter().map(|index| (kind, index)));
+        let layout = fit
+            .layout
+            .iter()
+            .copied()
+            .chain(free_values(kind).into_iter().map(|index| (kind, index)));
         let mut next = set.clone();
         for ((kind, index), change) in layout.zip(linear.step.iter()) {
             if let Some(changed) = crate::fit::changed(&next, kind, &[(index, *change)]) {
@@ -84,7 +97,8 @@ impl Context<'_> {
         }
     }
 
-    /// The time after which turning the mount helps most: all times are tried, by sums of the mount rotation's columns from there on.
+    /// The time after which turning the mount helps most: all times are tried, by sums of the mount
+    /// rotation's columns from there on.
     fn screen_slip(&self, fit: &Fit) -> Option<Candidate> {
         let problem = self.problem;
         let mut set = fit.set.clone();
@@ -105,7 +119,11 @@ impl Context<'_> {
             }
             inner[(i, i)] *= 1.0 + 1e-9;
         }
-        let factor = if size > 0 { Some(inner.cholesky()?) } else { None };
+        let factor = if size > 0 {
+            Some(inner.cholesky()?)
+        } else {
+            None
+        };
         // Sums over the raster from the end: C'C, C'e, C'J.
         let mut own = nalgebra::Matrix3::<f64>::zeros();
         let mut right = nalgebra::Vector3::<f64>::zeros();
@@ -115,7 +133,8 @@ impl Context<'_> {
         for place in (0..length).rev() {
             for axis in 0..6 {
                 let at = axis * length + place;
-                let c = nalgebra::Vector3::new(columns[0][at], columns[1][at], columns[2][at]) * weight[axis / 3];
+                let c = nalgebra::Vector3::new(columns[0][at], columns[1][at], columns[2][at])
+                    * weight[axis / 3];
                 let plain = nalgebra::Vector3::new(columns[0][at], columns[1][at], columns[2][at]);
                 own += c * plain.transpose();
                 right += c * fit.residual[at];
@@ -129,7 +148,11 @@ impl Context<'_> {
                 continue;
             }
             let schur = match &factor {
-                Some(factor) => own - nalgebra::Matrix3::from_iterator((mixed.transpose() * factor.solve(&mixed)).iter().copied()),
+                Some(factor) => {
+                    own - nalgebra::Matrix3::from_iterator(
+                        (mixed.transpose() * factor.solve(&mixed)).iter().copied(),
+                    )
+                }
                 None => own,
             };
             if let Some(factor) = (schur + nalgebra::Matrix3::identity()).cholesky() {
@@ -143,19 +166,39 @@ impl Context<'_> {
         if best.0 <= 0.0 {
             return None;
         }
-        let at = problem.epoch.plus_seconds((best.1 as f64 - 0.5) / problem.rate_hz);
-        let lag_s = fit.set.get(EffectKind::TimeOffset).and_then(|effect| effect.values().first().copied()).unwrap_or(0.0);
+        let at = problem
+            .epoch
+            .plus_seconds((best.1 as f64 - 0.5) / problem.rate_hz);
+        let lag_s = fit
+            .set
+            .get(EffectKind::TimeOffset)
+            .and_then(|effect| effect.values().first().copied())
+            .unwrap_or(0.0);
         let mut with_slip = fit.set.clone();
-        crate::gross::insert(&mut with_slip, EffectKind::MountSlip, vec![at.as_seconds() - lag_s, best.2.x, best.2.y, best.2.z]);
+        crate::gross::insert(
+            &mut with_slip,
+            EffectKind::MountSlip,
+            vec![at.as_seconds() - lag_s, best.2.x, best.2.y, best.2.z],
+        );
         let prediction = problem.predict(&self.track, &with_slip);
         let own_columns = self.columns(&with_slip, &prediction, EffectKind::MountSlip);
-        let linear = self.extended(fit, &self.residual(&prediction.readings), &own_columns, &prior(EffectKind::MountSlip));
-        Some(Candidate { set: self.stepped(&with_slip, fit, EffectKind::MountSlip, &linear), promise: linear.held_out })
+        let linear = self.extended(
+            fit,
+            &self.residual(&prediction.readings),
+            &own_columns,
+            &prior(EffectKind::MountSlip),
+        );
+        Some(Candidate {
+            set: self.stepped(&with_slip, fit, EffectKind::MountSlip, &linear),
+            promise: linear.held_out,
+        })
     }
 
     /// The time of a slip to the sample: whichever of the times around leaves least.
     pub fn sharpen_slip(&self, fit: Fit) -> Fit {
-        let Some(slip) = fit.set.get(EffectKind::MountSlip).cloned() else { return fit };
+        let Some(slip) = fit.set.get(EffectKind::MountSlip).cloned() else {
+            return fit;
+        };
         let score = |at: f64| {
             let mut set = fit.set.clone();
             let mut values = slip.values().to_vec();
@@ -163,7 +206,14 @@ impl Context<'_> {
             crate::gross::insert(&mut set, EffectKind::MountSlip, values);
             let residual = self.residual(&self.problem.predict(&self.track, &set).readings);
             let ratio = fit.held_out_ratio();
-            (weighted(&residual, &residual, [ratio[0].max(1.0).recip(), ratio[1].max(1.0).recip()]), set)
+            (
+                weighted(
+                    &residual,
+                    &residual,
+                    [ratio[0].max(1.0).recip(), ratio[1].max(1.0).recip()],
+                ),
+                set,
+            )
         };
         let period = 1.0 / self.problem.rate_hz;
         let mut best = (score(slip.values()[0]).0, fit.set.clone(), slip.values()[0]);
@@ -177,29 +227,48 @@ impl Context<'_> {
                 }
             }
         }
-        if best.1 == fit.set { fit } else { self.fit(best.1) }
+        if best.1 == fit.set {
+            fit
+        } else {
+            self.fit(best.1)
+        }
     }
 }
 
 impl Context<'_> {
-    /// Whether a vibration in the set is more than motion that the reference does not resolve: stronger than a tenth of the white noise, alone in
-    /// the accelerometer, and one sinusoid that takes most of the line away.
+    /// Whether a vibration in the set is more than motion that the reference does not resolve:
+    /// stronger than a tenth of the white noise, alone in the accelerometer, and one sinusoid that
+    /// takes most of the line away.
     pub fn true_vibration(&self, fit: &Fit) -> bool {
         let kind = EffectKind::Vibration;
-        let Some(vibration) = fit.set.get(kind) else { return true };
+        let Some(vibration) = fit.set.get(kind) else {
+            return true;
+        };
         let values = vibration.values();
-        let power: f64 = values[1..4].iter().map(|amplitude| 0.5 * amplitude * amplitude).sum();
+        let power: f64 = values[1..4]
+            .iter()
+            .map(|amplitude| 0.5 * amplitude * amplitude)
+            .sum();
         // Slow lines are gait.
         if power < 0.3 * self.basis.sigma[0].powi(2) || values[0] < LEAST_VIBRATION_HZ {
             return false;
         }
         let without = self.problem.predict(&self.track, &fit.set.without(kind));
-        let (before, after) = (self.problem.residual(&without.readings), self.problem.residual(&fit.prediction.readings));
+        let (before, after) = (
+            self.problem.residual(&without.readings),
+            self.problem.residual(&fit.prediction.readings),
+        );
         let line = |series: &[Vec<f64>], channel: usize| {
             let spectrum = self.problem.channel_spectrum(series, channel);
-            let around = spectrum.median(values[0] - 4.0, values[0] + 4.0).unwrap_or(0.0).max(1e-30);
+            let around = spectrum
+                .median(values[0] - 4.0, values[0] + 4.0)
+                .unwrap_or(0.0)
+                .max(1e-30);
             let band = spectrum.band(values[0] - 0.75, values[0] + 1.0);
-            (band.iter().copied().fold(0.0, f64::max) / around, band.iter().sum::<f64>() - around * band.len() as f64)
+            (
+                band.iter().copied().fold(0.0, f64::max) / around,
+                band.iter().sum::<f64>() - around * band.len() as f64,
+            )
         };
         let (height, power_before) = line(&before, 0);
         let (_, power_after) = line(&after, 0);
@@ -209,7 +278,10 @@ impl Context<'_> {
 }
 
 fn prior(kind: EffectKind) -> Vec<f64> {
-    free_values(kind).into_iter().map(|index| prior_deviation(kind, index).powi(-2)).collect()
+    free_values(kind)
+        .into_iter()
+        .map(|index| prior_deviation(kind, index).powi(-2))
+        .collect()
 }
 
 /// Inner product of flat whitened series, each channel with its weight.

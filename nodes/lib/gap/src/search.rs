@@ -13,7 +13,8 @@ const REFITS: usize = 3;
 const LEAST_GAIN: f64 = 12.0;
 /// And for each of its values.
 const LEAST_GAIN_PER_VALUE: f64 = 2.0;
-/// And as a share of what is still to be explained: what is left of a gap that no effect fits is nibbled at by all.
+/// And as a share of what is still to be explained: what is left of a gap that no effect fits is
+/// nibbled at by all.
 const LEAST_SHARE: f64 = 0.02;
 
 /// A fitted set and its worth.
@@ -38,30 +39,51 @@ fn price(set: &EffectSet, coarse: f64) -> f64 {
 
 /// Effects that may be tried: all fitted ones but those that the caller takes out of the library.
 pub(crate) fn library(without: &[EffectKind]) -> Vec<EffectKind> {
-    FITTED.into_iter().filter(|kind| !without.contains(kind)).collect()
+    FITTED
+        .into_iter()
+        .filter(|kind| !without.contains(kind))
+        .collect()
 }
 
 impl Context<'_> {
-    /// What a set costs. Coarse rounding and a smoothing whose shape is only guessed leave errors that are no white noise, and are fitted by many
-    /// effects: everything costs more.
+    /// What a set costs. Coarse rounding and a smoothing whose shape is only guessed leave errors
+    /// that are no white noise, and are fitted by many effects: everything costs more.
     fn price(&self, set: &EffectSet) -> f64 {
         let steps = self.basis.steps[0].max(self.basis.steps[1]);
-        let coarse = (1.0 + steps / 3.0) * if self.basis.undone_hz.is_some() { 5.0 } else { 1.0 };
+        let coarse = (1.0 + steps / 3.0)
+            * if self.basis.undone_hz.is_some() {
+                5.0
+            } else {
+                1.0
+            };
         price(set, coarse)
     }
 
-    /// The fitted set and its worth; what no such effect looks like is worth nothing, wherever it comes from.
+    /// The fitted set and its worth; what no such effect looks like is worth nothing, wherever it
+    /// comes from.
     pub fn state(&self, set: EffectSet) -> State {
         let fit = self.sharpen_slip(self.fit(set));
         let sound = plausible(&fit.set) && self.true_vibration(&fit);
-        let score = if sound { fit.linear.held_out - self.price(&fit.set) } else { f64::NEG_INFINITY };
-        State { fit, score, margins: Vec::new() }
+        let score = if sound {
+            fit.linear.held_out - self.price(&fit.set)
+        } else {
+            f64::NEG_INFINITY
+        };
+        State {
+            fit,
+            score,
+            margins: Vec::new(),
+        }
     }
 
     /// A set with the values that it has.
     pub fn state_as_it_is(&self, set: EffectSet) -> State {
         let fit = self.fit_steps(set, 0);
-        State { score: fit.linear.held_out - self.price(&fit.set), fit, margins: Vec::new() }
+        State {
+            score: fit.linear.held_out - self.price(&fit.set),
+            fit,
+            margins: Vec::new(),
+        }
     }
 
     /// Log-likelihood that is still to be gained: of the held-out residual down to noise alone.
@@ -86,7 +108,12 @@ impl Context<'_> {
             grown.truncate(BEAM);
             debug(|| {
                 for state in &grown {
-                    eprintln!("  grown {:?} score {:.1} ratio {:.2?}", kinds(&state.fit.set), state.score, state.fit.held_out_ratio());
+                    eprintln!(
+                        "  grown {:?} score {:.1} ratio {:.2?}",
+                        kinds(&state.fit.set),
+                        state.score,
+                        state.fit.held_out_ratio()
+                    );
                 }
             });
             let Some(first) = grown.first() else { break };
@@ -111,16 +138,24 @@ impl Context<'_> {
             .collect();
         candidates.sort_by(|a, b| b.0.total_cmp(&a.0));
         debug(|| {
-            let list: Vec<String> =
-                candidates.iter().take(6).map(|(promise, c)| format!("{:?}:{:.0}", kinds(&c.set), promise - state.score)).collect();
+            let list: Vec<String> = candidates
+                .iter()
+                .take(6)
+                .map(|(promise, c)| format!("{:?}:{:.0}", kinds(&c.set), promise - state.score))
+                .collect();
             eprintln!("  screen {:?}: {}", kinds(&state.fit.set), list.join(" "));
         });
-        let best = candidates.first().map_or(0.0, |(promise, _)| promise - state.score);
+        let best = candidates
+            .first()
+            .map_or(0.0, |(promise, _)| promise - state.score);
         candidates
             .into_iter()
             .take(REFITS)
-            // One linear step says little of a large turn or delay: half the best promise is still worth a fit.
-            .filter(|(promise, _)| *promise > state.score + (0.3 * best).min(best - 20.0).max(-10.0))
+            // One linear step says little of a large turn or delay: half the best promise is still
+            // worth a fit.
+            .filter(|(promise, _)| {
+                *promise > state.score + (0.3 * best).min(best - 20.0).max(-10.0)
+            })
             .map(|(_, candidate)| self.state(candidate.set))
             .filter(|state| state.score > f64::NEG_INFINITY)
             .collect()
@@ -129,9 +164,14 @@ impl Context<'_> {
     /// Without the effects that do not earn their place beside the others.
     pub fn pruned(&self, mut state: State) -> State {
         loop {
-            let members: Vec<EffectKind> = state.fit.set.iter().map(|effect| effect.kind()).collect();
-            let smaller = members.iter().map(|kind| self.state(state.fit.set.without(*kind)));
-            let Some(best) = smaller.max_by(|a, b| a.score.total_cmp(&b.score)) else { return state };
+            let members: Vec<EffectKind> =
+                state.fit.set.iter().map(|effect| effect.kind()).collect();
+            let smaller = members
+                .iter()
+                .map(|kind| self.state(state.fit.set.without(*kind)));
+            let Some(best) = smaller.max_by(|a, b| a.score.total_cmp(&b.score)) else {
+                return state;
+            };
             if best.score < state.score {
                 return state;
             }
@@ -139,10 +179,12 @@ impl Context<'_> {
         }
     }
 
-    /// Tries every member against every effect outside; at the end, by how much each member beats the best set without it.
+    /// Tries every member against every effect outside; at the end, by how much each member beats
+    /// the best set without it.
     pub fn exchanged(&self, mut state: State, library: &[EffectKind]) -> State {
         for _ in 0..3 {
-            let members: Vec<EffectKind> = state.fit.set.iter().map(|effect| effect.kind()).collect();
+            let members: Vec<EffectKind> =
+                state.fit.set.iter().map(|effect| effect.kind()).collect();
             let mut best: Option<State> = None;
             state.margins.clear();
             for kind in members {
@@ -176,10 +218,14 @@ impl Context<'_> {
     }
 }
 
-/// Whether the fitted values are what such effects have: a filter that passes all motion, a tissue stiffer than any, or a filter's attenuation
-/// without its delay are no causes but the reference's own smoothing error in their disguise.
+/// Whether the fitted values are what such effects have: a filter that passes all motion, a tissue
+/// stiffer than any, or a filter's attenuation without its delay are no causes but the reference's
+/// own smoothing error in their disguise.
 pub(crate) fn plausible(set: &EffectSet) -> bool {
-    let value = |kind: EffectKind, index: usize| set.get(kind).and_then(|effect| effect.values().get(index).copied());
+    let value = |kind: EffectKind, index: usize| {
+        set.get(kind)
+            .and_then(|effect| effect.values().get(index).copied())
+    };
     let cutoff_hz = value(EffectKind::LowPass, 0);
     if cutoff_hz.is_some_and(|hz| hz > 45.0) {
         return false;
@@ -189,15 +235,21 @@ pub(crate) fn plausible(set: &EffectSet) -> bool {
     {
         return false;
     }
-    if let (Some(hz), Some(ratio)) = (value(EffectKind::SoftTissue, 0), value(EffectKind::SoftTissue, 1))
-        && (hz > 22.0 || !(0.04..=1.5).contains(&ratio))
+    if let (Some(hz), Some(ratio)) = (
+        value(EffectKind::SoftTissue, 0),
+        value(EffectKind::SoftTissue, 1),
+    ) && (hz > 22.0 || !(0.04..=1.5).contains(&ratio))
     {
         return false;
     }
     // Gravity left out is no scale, nor is a unit.
-    let scales =
-        [EffectKind::AccelScale, EffectKind::GyroScale].into_iter().flat_map(|kind| (0..3).filter_map(move |axis| value(kind, axis)));
-    if scales.chain(value(EffectKind::ReferenceScale, 0)).any(|factor| !(0.5..=2.0).contains(&factor)) {
+    let scales = [EffectKind::AccelScale, EffectKind::GyroScale]
+        .into_iter()
+        .flat_map(|kind| (0..3).filter_map(move |axis| value(kind, axis)));
+    if scales
+        .chain(value(EffectKind::ReferenceScale, 0))
+        .any(|factor| !(0.5..=2.0).contains(&factor))
+    {
         return false;
     }
     value(EffectKind::ReferenceScale, 0).is_none_or(|factor| (factor - 1.0).abs() > 0.006)

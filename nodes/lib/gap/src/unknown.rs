@@ -11,7 +11,8 @@ use crate::probes::{Probe, probes, with_probes};
 use crate::problem::{Problem, axis_of};
 use crate::search::debug;
 
-/// Mean square of a whitened residual in a band from which on it is structure. Without any effect none of a hundred placements reached 3.
+/// Mean square of a whitened residual in a band from which on it is structure. Without any effect
+/// none of a hundred placements reached 3.
 const BAND: f64 = 12.0;
 /// Held-out gain of a regression, nats, likewise; without any effect none reached 0.
 const PROBE: f64 = 200.0;
@@ -26,14 +27,17 @@ const JITTER: f64 = 0.05;
 const GUESSED: f64 = 20.0;
 /// Part of all that is explained from which on an effect is more than an imitation.
 const MAIN_PART: f64 = 0.3;
-/// Steps of quantisation, in units of the white noise, beyond which a channel's residual says nothing.
+/// Steps of quantisation, in units of the white noise, beyond which a channel's residual says
+/// nothing.
 const COARSE_STEPS: f64 = 3.0;
 /// Part of the strongest regression's gain from which on another counts.
 const SPECIAL_CASE: f64 = 0.3;
-/// Part of its gain that an effect keeps beside what the residual depends on, if it is more than an imitation of that.
+/// Part of its gain that an effect keeps beside what the residual depends on, if it is more than an
+/// imitation of that.
 const OWN_GAIN: f64 = 0.1;
 
-/// Part of what regressions in its place would gain that a calibration has to gain, if it is to stand beside them.
+/// Part of what regressions in its place would gain that a calibration has to gain, if it is to
+/// stand beside them.
 const NEARLY_ALL: f64 = 0.7;
 
 /// Structure that no named effect explains.
@@ -44,7 +48,8 @@ pub(crate) struct Unknown {
     pub axes: Vec<String>,
     pub depends_on: String,
     pub probability: f64,
-    /// Part of the rest that regressions predict on held-out time, or, without any, that stands out of the noise.
+    /// Part of the rest that regressions predict on held-out time, or, without any, that stands out
+    /// of the noise.
     pub predictable: f64,
     /// Fitted effects that only imitate it.
     pub imitations: Vec<EffectKind>,
@@ -65,26 +70,45 @@ pub(crate) struct Signs {
     pub jitter: f64,
 }
 
-/// Looks for structure in the whitened residual. `calibrations`: whether these may pass for imitations as well; they stand in for each other and
-/// for filters, and are judged once the others are gone.
+/// Looks for structure in the whitened residual. `calibrations`: whether these may pass for
+/// imitations as well; they stand in for each other and for filters, and are judged once the others
+/// are gone.
 pub(crate) fn look(findings: &Findings, calibrations: bool) -> Option<Unknown> {
     let signs = Signs::of(findings);
     let mut probes = probes(findings);
     probes.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     debug(|| {
-        let list: Vec<String> = probes.iter().take(4).map(|p| format!("{}/{}:{:.0}", p.depends_on, p.channel, p.gain)).collect();
+        let list: Vec<String> = probes
+            .iter()
+            .take(4)
+            .map(|p| format!("{}/{}:{:.0}", p.depends_on, p.channel, p.gain))
+            .collect();
         eprintln!("SIGNS {signs:.3?} {}", list.join(" "));
     });
-    // A smoothing whose shape is only guessed leaves much that is none of its own; rounding errors of slow motion are no noise at all.
+    // A smoothing whose shape is only guessed leaves much that is none of its own; rounding errors
+    // of slow motion are no noise at all.
     let basis = &findings.context.basis;
-    let vague = if basis.undone_hz.is_some() { GUESSED } else { 1.0 };
+    let vague = if basis.undone_hz.is_some() {
+        GUESSED
+    } else {
+        1.0
+    };
     let coarse = |c: usize| basis.steps[c] > COARSE_STEPS;
-    let strong: Vec<&Probe> = probes.iter().filter(|probe| probe.gain > PROBE * vague && !coarse(probe.channel)).collect();
-    let noisy = |c: usize| !coarse(c) && (signs.band[c] > BAND * vague || (signs.burst[c] > BURST * vague && signs.outliers[c] > OUTLIERS));
+    let strong: Vec<&Probe> = probes
+        .iter()
+        .filter(|probe| probe.gain > PROBE * vague && !coarse(probe.channel))
+        .collect();
+    let noisy = |c: usize| {
+        !coarse(c)
+            && (signs.band[c] > BAND * vague
+                || (signs.burst[c] > BURST * vague && signs.outliers[c] > OUTLIERS))
+    };
     let stuck = |c: usize| signs.frozen[c] > FROZEN && findings.digital[c].lsb.is_none();
-    let jittery =
-        signs.jitter > JITTER || (findings.without.contains(&EffectKind::DroppedSamples) && findings.context.problem.dropped.0 > FROZEN);
-    let of_channel = |c: usize| noisy(c) || stuck(c) || strong.iter().any(|probe| probe.channel == c);
+    let jittery = signs.jitter > JITTER
+        || (findings.without.contains(&EffectKind::DroppedSamples)
+            && findings.context.problem.dropped.0 > FROZEN);
+    let of_channel =
+        |c: usize| noisy(c) || stuck(c) || strong.iter().any(|probe| probe.channel == c);
     if !of_channel(0) && !of_channel(1) && !jittery {
         return None;
     }
@@ -97,14 +121,38 @@ pub(crate) fn look(findings: &Findings, calibrations: bool) -> Option<Unknown> {
     } else {
         "time"
     };
-    let place = place(&findings.state.fit.residual, findings.context.problem, &findings.context.whitener);
-    let channels: Vec<&str> = [(0, "accel"), (1, "gyro")].into_iter().filter(|(c, _)| of_channel(*c)).map(|(_, name)| name).collect();
-    let channel = if channels.len() == 1 { channels[0] } else { "both" };
-    let axes = place.axes.iter().filter(|(_, share)| **share > 0.1).map(|(name, _)| name.clone()).collect();
+    let place = place(
+        &findings.state.fit.residual,
+        findings.context.problem,
+        &findings.context.whitener,
+    );
+    let channels: Vec<&str> = [(0, "accel"), (1, "gyro")]
+        .into_iter()
+        .filter(|(c, _)| of_channel(*c))
+        .map(|(_, name)| name)
+        .collect();
+    let channel = if channels.len() == 1 {
+        channels[0]
+    } else {
+        "both"
+    };
+    let axes = place
+        .axes
+        .iter()
+        .filter(|(_, share)| **share > 0.1)
+        .map(|(name, _)| name.clone())
+        .collect();
     let (mut imitations, sound) = imitations(findings, &strong);
     let most = strong.first().map_or(0.0, |probe| probe.gain);
-    for probe in strong.iter().filter(|probe| probe.gain > SPECIAL_CASE * most && changes_over_time(probe, &probes)) {
-        imitations.extend(special_cases(probe).into_iter().filter(|kind| !sound.contains(kind)));
+    for probe in strong
+        .iter()
+        .filter(|probe| probe.gain > SPECIAL_CASE * most && changes_over_time(probe, &probes))
+    {
+        imitations.extend(
+            special_cases(probe)
+                .into_iter()
+                .filter(|kind| !sound.contains(kind)),
+        );
     }
     for (c, kind) in [(0, EffectKind::AccelNoise), (1, EffectKind::GyroNoise)] {
         if of_channel(c) || jittery {
@@ -117,11 +165,24 @@ pub(crate) fn look(findings: &Findings, calibrations: bool) -> Option<Unknown> {
     if !calibrations {
         imitations.retain(|kind| !CALIBRATIONS.contains(kind));
     }
-    let gain = strong.first().map_or(0.0, |probe| probe.gain).max(signs.band[0].max(signs.band[1]) * 10.0);
+    let gain = strong
+        .first()
+        .map_or(0.0, |probe| probe.gain)
+        .max(signs.band[0].max(signs.band[1]) * 10.0);
     let probability = 0.97 * (1.0 - 1.0 / (2.0 + gain / 20.0));
     let excess = findings.context.excess(&findings.state.fit).max(1.0);
-    let predictable = strong.first().map_or(0.5, |probe| (probe.gain / excess).clamp(0.05, 1.0));
-    Some(Unknown { predictable, place, channel: channel.to_owned(), axes, depends_on: depends_on.to_owned(), probability, imitations })
+    let predictable = strong
+        .first()
+        .map_or(0.5, |probe| (probe.gain / excess).clamp(0.05, 1.0));
+    Some(Unknown {
+        predictable,
+        place,
+        channel: channel.to_owned(),
+        axes,
+        depends_on: depends_on.to_owned(),
+        probability,
+        imitations,
+    })
 }
 
 /// Whether a family over time says more than the same without time.
@@ -131,7 +192,9 @@ fn changes_over_time(probe: &Probe, all: &[Probe]) -> bool {
         "mount over time" => "other axes",
         _ => return true,
     };
-    let other = all.iter().find(|other| other.channel == probe.channel && other.depends_on == steady);
+    let other = all
+        .iter()
+        .find(|other| other.channel == probe.channel && other.depends_on == steady);
     other.is_none_or(|other| probe.gain > 1.5 * other.gain)
 }
 
@@ -139,9 +202,19 @@ fn changes_over_time(probe: &Probe, all: &[Probe]) -> bool {
 fn special_cases(probe: &Probe) -> Vec<EffectKind> {
     use EffectKind as K;
     let [bias, drift, scale, misalignment] = if probe.channel == 0 {
-        [K::AccelBias, K::AccelBiasDrift, K::AccelScale, K::AccelMisalignment]
+        [
+            K::AccelBias,
+            K::AccelBiasDrift,
+            K::AccelScale,
+            K::AccelMisalignment,
+        ]
     } else {
-        [K::GyroBias, K::GyroBiasDrift, K::GyroScale, K::GyroMisalignment]
+        [
+            K::GyroBias,
+            K::GyroBiasDrift,
+            K::GyroScale,
+            K::GyroMisalignment,
+        ]
     };
     match (probe.depends_on, probe.channel) {
         ("delay over time", _) => vec![K::TimeOffset, K::ClockDrift, K::LowPass],
@@ -156,14 +229,19 @@ fn special_cases(probe: &Probe) -> Vec<EffectKind> {
     }
 }
 
-/// Fitted effects which beside the strongest probes gain less than a tenth of what they gain without them; and calibrations that explain nearly all
-/// that the probes in their place would.
+/// Fitted effects which beside the strongest probes gain less than a tenth of what they gain
+/// without them; and calibrations that explain nearly all that the probes in their place would.
 fn imitations(findings: &Findings, strong: &[&Probe]) -> (Vec<EffectKind>, Vec<EffectKind>) {
     let fit = &findings.state.fit;
     let context = &findings.context;
     // The strongest two of each channel say what the residual depends on; more only cost time.
     let chosen: Vec<&Vec<Vec<f64>>> = (0..2)
-        .flat_map(|c| strong.iter().filter(move |probe| probe.channel == c && probe.depends_on != "rate of change").take(2))
+        .flat_map(|c| {
+            strong
+                .iter()
+                .filter(move |probe| probe.channel == c && probe.depends_on != "rate of change")
+                .take(2)
+        })
         .map(|probe| &probe.columns)
         .collect();
     let (mut imitations, mut sound) = (Vec::new(), Vec::new());
@@ -185,7 +263,10 @@ fn imitations(findings: &Findings, strong: &[&Probe]) -> (Vec<EffectKind>, Vec<E
                 together - instead
             )
         });
-        if findings.mostly_explained && CALIBRATIONS.contains(&kind) && alone > NEARLY_ALL * of_probes {
+        if findings.mostly_explained
+            && CALIBRATIONS.contains(&kind)
+            && alone > NEARLY_ALL * of_probes
+        {
             sound.push(kind);
         } else if alone < MAIN_PART * explained && together - instead < OWN_GAIN * alone {
             // What explains much of the gap by itself is no imitation of what little is left.
@@ -200,16 +281,26 @@ impl Signs {
         let context = &findings.context;
         let problem = context.problem;
         let fit = &findings.state.fit;
-        let mut signs = Self { jitter: jitter(problem), ..Self::default() };
+        let mut signs = Self {
+            jitter: jitter(problem),
+            ..Self::default()
+        };
         for channel in 0..2 {
             let spectrum = spectrum_of(&fit.residual, problem, 3 * channel..3 * channel + 3);
             let kept = context.whitener.count[channel] / (3.0 * problem.length as f64);
             let level = |from: f64, to: f64| {
                 let band = spectrum.band(from, to);
-                band.iter().sum::<f64>() / band.len().max(1) as f64 * problem.rate_hz / 6.0 / kept.max(1e-9)
+                band.iter().sum::<f64>() / band.len().max(1) as f64 * problem.rate_hz
+                    / 6.0
+                    / kept.max(1e-9)
             };
-            signs.band[channel] = bands(problem.rate_hz / 2.0).into_iter().skip(1).map(|(a, b)| level(a, b)).fold(0.0, f64::max);
-            signs.outliers[channel] = outliers(fit, problem, channel, context.whitener.count[channel]);
+            signs.band[channel] = bands(problem.rate_hz / 2.0)
+                .into_iter()
+                .skip(1)
+                .map(|(a, b)| level(a, b))
+                .fold(0.0, f64::max);
+            signs.outliers[channel] =
+                outliers(fit, problem, channel, context.whitener.count[channel]);
             signs.burst[channel] = burst(findings, channel);
             signs.frozen[channel] = frozen(problem, channel);
         }
@@ -224,7 +315,9 @@ fn jitter(problem: &Problem) -> f64 {
         .map(|k| ((problem.stamps[k] - problem.stamps[k - 1]) / period - 1.0).abs())
         .collect();
     intervals.sort_unstable_by(f64::total_cmp);
-    intervals.get(intervals.len() / 2).map_or(0.0, |median| median / 0.6745)
+    intervals
+        .get(intervals.len() / 2)
+        .map_or(0.0, |median| median / 0.6745)
 }
 
 fn outliers(fit: &Fit, problem: &Problem, channel: usize, count: f64) -> f64 {
@@ -241,20 +334,39 @@ fn burst(findings: &Findings, channel: usize) -> f64 {
         .filter_map(|block| {
             let (mut sum, mut weight) = (0.0, 0.0);
             for axis in 3 * channel..3 * channel + 3 {
-                let range = axis * problem.length + block * step..axis * problem.length + (block + 1) * step;
-                sum += findings.state.fit.residual[range].iter().map(|e| e * e).sum::<f64>();
-                weight += findings.context.whitener.weight[axis][block * step..(block + 1) * step].iter().map(|w| w * w).sum::<f64>();
+                let range = axis * problem.length + block * step
+                    ..axis * problem.length + (block + 1) * step;
+                sum += findings.state.fit.residual[range]
+                    .iter()
+                    .map(|e| e * e)
+                    .sum::<f64>();
+                weight += findings.context.whitener.weight[axis][block * step..(block + 1) * step]
+                    .iter()
+                    .map(|w| w * w)
+                    .sum::<f64>();
             }
             (weight > step as f64).then(|| sum / weight)
         })
         .collect();
     blocks.sort_unstable_by(f64::total_cmp);
-    let median = blocks.get(blocks.len() / 2).copied().unwrap_or(1.0).max(1.0);
+    let median = blocks
+        .get(blocks.len() / 2)
+        .copied()
+        .unwrap_or(1.0)
+        .max(1.0);
     blocks.last().copied().unwrap_or(1.0) / median
 }
 
-/// Readings equal to the one before in all three axes: a live sensor's noise forbids it, unless it rounds coarsely.
+/// Readings equal to the one before in all three axes: a live sensor's noise forbids it, unless it
+/// rounds coarsely.
 fn frozen(problem: &Problem, channel: usize) -> f64 {
-    let same = |a: &Reading, b: &Reading| (3 * channel..3 * channel + 3).all(|axis| axis_of(a, axis) == axis_of(b, axis));
-    problem.measured.windows(2).filter(|pair| same(&pair[0], &pair[1])).count() as f64 / problem.measured.len() as f64
+    let same = |a: &Reading, b: &Reading| {
+        (3 * channel..3 * channel + 3).all(|axis| axis_of(a, axis) == axis_of(b, axis))
+    };
+    problem
+        .measured
+        .windows(2)
+        .filter(|pair| same(&pair[0], &pair[1]))
+        .count() as f64
+        / problem.measured.len() as f64
 }

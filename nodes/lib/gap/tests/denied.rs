@@ -11,10 +11,21 @@ use support::judge::{names, shares_add_up};
 
 /// Without the effect the gap holds structure that nothing explains.
 fn denied(kind: K, values: &[f64]) -> PlacementAnswer {
-    let options = DiagnoseOptions { without: vec![kind], ..DiagnoseOptions::default() };
-    let answer = diagnose(&Scene::new(kind as u64).with(kind, values).record(), &options).unwrap();
+    let options = DiagnoseOptions {
+        without: vec![kind],
+        ..DiagnoseOptions::default()
+    };
+    let answer = diagnose(
+        &Scene::new(kind as u64).with(kind, values).record(),
+        &options,
+    )
+    .unwrap();
     let diagnosis = &answer.diagnosis;
-    assert!(names(diagnosis).contains(&"unknown") && diagnosis.unexplained.significant, "{}", diagnosis.verdict);
+    assert!(
+        names(diagnosis).contains(&"unknown") && diagnosis.unexplained.significant,
+        "{}",
+        diagnosis.verdict
+    );
     assert!(!names(diagnosis).contains(&kind.name()) && !answer.effects.effects.contains(kind));
     shares_add_up(diagnosis);
     answer
@@ -25,7 +36,11 @@ fn denied_alone(kind: K, values: &[f64]) {
     let answer = denied(kind, values);
     let diagnosis = &answer.diagnosis;
     assert_eq!(names(diagnosis), ["unknown"], "{}", diagnosis.verdict);
-    assert!(answer.effects.effects.is_empty(), "{:?}", answer.effects.effects);
+    assert!(
+        answer.effects.effects.is_empty(),
+        "{:?}",
+        answer.effects.effects
+    );
     let unknown = &diagnosis.causes[0];
     assert!(unknown.gap_share > 0.0);
     let channel = unknown.parameters["channel"].as_str().unwrap();
@@ -52,7 +67,8 @@ macro_rules! denied {
     };
 }
 
-// Not here, because another effect says the same: time_offset (a low-pass of that delay), gyro_quantization (white noise).
+// Not here, because another effect says the same: time_offset (a low-pass of that delay),
+// gyro_quantization (white noise).
 denied! {
     mount_rotation: MountRotation [0.2, -0.15, 0.3];
     lever_arm: LeverArm [0.05, 0.02, -0.06];

@@ -18,11 +18,19 @@ fn found(scene: &Scene) -> PlacementAnswer {
     answer
 }
 
-/// The same, and the simulation follows: the gap of the channels (accelerometer, gyroscope) falls at least to this part.
+/// The same, and the simulation follows: the gap of the channels (accelerometer, gyroscope) falls
+/// at least to this part.
 fn followed(scene: &Scene, parts: [f64; 2]) {
     let gap = found(scene).diagnosis.gap;
-    let [accel, gyro] = [gap.after.accel_rmse / gap.before.accel_rmse, gap.after.gyro_rmse / gap.before.gyro_rmse];
-    assert!(accel < parts[0] && gyro < parts[1], "{:?}: gaps fall to {accel:.3} and {gyro:.3}", scene.effects);
+    let [accel, gyro] = [
+        gap.after.accel_rmse / gap.before.accel_rmse,
+        gap.after.gyro_rmse / gap.before.gyro_rmse,
+    ];
+    assert!(
+        accel < parts[0] && gyro < parts[1],
+        "{:?}: gaps fall to {accel:.3} and {gyro:.3}",
+        scene.effects
+    );
     assert!(gap.after.nll_per_sample < gap.before.nll_per_sample);
 }
 
@@ -71,12 +79,18 @@ followed! {
 fn mount_slip() {
     let scene = Scene::new(40);
     let at = scene.epoch.as_seconds() + 31.3;
-    followed(&scene.with(K::MountSlip, &[at, 0.1, -0.12, 0.15]), [0.2, 0.3]);
+    followed(
+        &scene.with(K::MountSlip, &[at, 0.1, -0.12, 0.15]),
+        [0.2, 0.3],
+    );
 }
 
 #[test]
 fn gravity_negated() {
-    followed(&Scene::new(41).with(K::GravityConvention, &[2.0]), [0.1, KEPT]);
+    followed(
+        &Scene::new(41).with(K::GravityConvention, &[2.0]),
+        [0.1, KEPT],
+    );
 }
 
 #[test]
@@ -112,16 +126,45 @@ fn dropped_samples() {
     let record = scene.record();
     let diagnosis = answer(&record).diagnosis;
     names_exactly(&diagnosis, &scene.effects);
-    let steps: Vec<f64> = record.imu.stamps.windows(2).map(|pair| ((pair[1] - pair[0]) * IMU_HZ).round() - 1.0).collect();
-    let (lost, holes) = (steps.iter().sum::<f64>(), steps.iter().filter(|lost| **lost > 0.0).count() as f64);
+    let steps: Vec<f64> = record
+        .imu
+        .stamps
+        .windows(2)
+        .map(|pair| ((pair[1] - pair[0]) * IMU_HZ).round() - 1.0)
+        .collect();
+    let (lost, holes) = (
+        steps.iter().sum::<f64>(),
+        steps.iter().filter(|lost| **lost > 0.0).count() as f64,
+    );
     let parameters = &cause(&diagnosis, K::DroppedSamples).parameters;
     let all = lost + record.imu.stamps.len() as f64;
-    near(parameters["fraction"].as_f64().unwrap(), lost / all, 1e-9, "fraction");
-    near(parameters["mean_burst"].as_f64().unwrap(), lost / holes, 1e-9, "mean burst");
+    near(
+        parameters["fraction"].as_f64().unwrap(),
+        lost / all,
+        1e-9,
+        "fraction",
+    );
+    near(
+        parameters["mean_burst"].as_f64().unwrap(),
+        lost / holes,
+        1e-9,
+        "mean burst",
+    );
 }
 
 #[test]
 fn none_is_left_out() {
-    let tested = |kind: &K| FOLLOWED.contains(kind) || NOISE_LIKE.contains(kind) || [K::MountSlip, K::DroppedSamples].contains(kind);
-    assert!(K::ALL.iter().all(tested), "{:?}", K::ALL.iter().filter(|kind| !tested(kind)).collect::<Vec<_>>());
+    let tested = |kind: &K| {
+        FOLLOWED.contains(kind)
+            || NOISE_LIKE.contains(kind)
+            || [K::MountSlip, K::DroppedSamples].contains(kind)
+    };
+    assert!(
+        K::ALL.iter().all(tested),
+        "{:?}",
+        K::ALL
+            .iter()
+            .filter(|kind| !tested(kind))
+            .collect::<Vec<_>>()
+    );
 }

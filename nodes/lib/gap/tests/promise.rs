@@ -13,31 +13,55 @@ use support::judge::{answer, names_exactly, values_are};
 fn pair(scene: &Scene) {
     let diagnosis = answer(&scene.record()).diagnosis;
     names_exactly(&diagnosis, &scene.effects);
-    scene.effects.iter().for_each(|effect| values_are(&diagnosis, effect));
+    scene
+        .effects
+        .iter()
+        .for_each(|effect| values_are(&diagnosis, effect));
     let last = diagnosis.causes.last().unwrap();
-    assert_eq!(last.after, diagnosis.gap.after, "the last cause brings the gap to its end");
+    assert_eq!(
+        last.after, diagnosis.gap.after,
+        "the last cause brings the gap to its end"
+    );
 }
 
 #[test]
 fn a_low_pass_and_a_delay_are_told_apart() {
-    pair(&Scene::new(60).with(K::LowPass, &[8.0]).with(K::TimeOffset, &[0.02]));
+    pair(
+        &Scene::new(60)
+            .with(K::LowPass, &[8.0])
+            .with(K::TimeOffset, &[0.02]),
+    );
 }
 
 #[test]
 fn a_tilt_and_a_bias_are_told_apart() {
-    pair(&Scene::new(61).with(K::ReferenceTilt, &[0.04, -0.05, 0.0]).with(K::AccelBias, &[0.2, -0.15, 0.1]));
+    pair(
+        &Scene::new(61)
+            .with(K::ReferenceTilt, &[0.04, -0.05, 0.0])
+            .with(K::AccelBias, &[0.2, -0.15, 0.1]),
+    );
 }
 
 #[test]
 fn a_delay_and_a_lever_arm() {
-    pair(&Scene::new(62).with(K::TimeOffset, &[-0.035]).with(K::LeverArm, &[0.05, 0.02, -0.06]));
+    pair(
+        &Scene::new(62)
+            .with(K::TimeOffset, &[-0.035])
+            .with(K::LeverArm, &[0.05, 0.02, -0.06]),
+    );
 }
 
-/// Root mean squares of the vector residuals (accelerometer, gyroscope) of a record and its simulation from its own reference, without noise and
-/// without the reference's first and last second.
+/// Root mean squares of the vector residuals (accelerometer, gyroscope) of a record and its
+/// simulation from its own reference, without noise and without the reference's first and last
+/// second.
 fn simulated_gap(record: &PlacementRecord, effects: &EffectSet, epoch: Stamp) -> [f64; 2] {
     let reference = &record.reference;
-    let estimate = PoseEstimate::fit(&reference.stamps, &reference.positions, &reference.rotations).unwrap();
+    let estimate = PoseEstimate::fit(
+        &reference.stamps,
+        &reference.positions,
+        &reference.rotations,
+    )
+    .unwrap();
     let readings = SensorModel::new(effects, epoch).run(&estimate.track(200.0), &record.imu.stamps);
     let kept = |stamp: &Stamp| *stamp - estimate.start() > 1.0 && estimate.end() - *stamp > 1.0;
     let residuals: Vec<(&Reading, &Reading)> = record
@@ -48,23 +72,49 @@ fn simulated_gap(record: &PlacementRecord, effects: &EffectSet, epoch: Stamp) ->
         .filter_map(|(stamp, pair)| kept(stamp).then_some(pair))
         .collect();
     let rms = |of: &dyn Fn(&Reading, &Reading) -> f64| {
-        (residuals.iter().map(|(measured, simulated)| of(measured, simulated)).sum::<f64>() / residuals.len() as f64).sqrt()
+        (residuals
+            .iter()
+            .map(|(measured, simulated)| of(measured, simulated))
+            .sum::<f64>()
+            / residuals.len() as f64)
+            .sqrt()
     };
-    [rms(&|m, s| (m.force - s.force).norm_squared()), rms(&|m, s| (m.rate - s.rate).norm_squared())]
+    [
+        rms(&|m, s| (m.force - s.force).norm_squared()),
+        rms(&|m, s| (m.rate - s.rate).norm_squared()),
+    ]
 }
 
-/// Right after, in other poses (a vibration's phase cannot be foretold for longer than it was seen) and with other noise: the gap is what was promised, and what the true effects would reach, both within 15 %.
+/// Right after, in other poses (a vibration's phase cannot be foretold for longer than it was seen)
+/// and with other noise: the gap is what was promised, and what the true effects would reach, both
+/// within 15 %.
 fn kept(scene: &Scene) {
-    let PlacementAnswer { diagnosis, effects, .. } = answer(&scene.record());
+    let PlacementAnswer {
+        diagnosis, effects, ..
+    } = answer(&scene.record());
     names_exactly(&diagnosis, &scene.effects);
     let later = scene.again(90.0).record();
     let measured = simulated_gap(&later, &effects.effects, effects.epoch);
     let ideal = simulated_gap(&later, &scene.effects, scene.epoch);
-    let promised = [diagnosis.gap.after.accel_rmse, diagnosis.gap.after.gyro_rmse];
+    let promised = [
+        diagnosis.gap.after.accel_rmse,
+        diagnosis.gap.after.gyro_rmse,
+    ];
     for channel in 0..2 {
-        let [promise, truth] = [promised[channel], ideal[channel]].map(|other| measured[channel] / other);
-        assert!((0.85..1.15).contains(&promise), "channel {channel}: {} measured, {} promised", measured[channel], promised[channel]);
-        assert!(truth < 1.15, "channel {channel}: {} measured, {} by the true effects", measured[channel], ideal[channel]);
+        let [promise, truth] =
+            [promised[channel], ideal[channel]].map(|other| measured[channel] / other);
+        assert!(
+            (0.85..1.15).contains(&promise),
+            "channel {channel}: {} measured, {} promised",
+            measured[channel],
+            promised[channel]
+        );
+        assert!(
+            truth < 1.15,
+            "channel {channel}: {} measured, {} by the true effects",
+            measured[channel],
+            ideal[channel]
+        );
     }
 }
 

@@ -12,7 +12,9 @@ use support::motion::Motion;
 use support::{IMU_HZ, SIGMA, Scene};
 
 fn lever_and_bias(seed: u64) -> Scene {
-    Scene::new(seed).with(K::LeverArm, &[0.05, 0.02, -0.06]).with(K::AccelBias, &[0.2, -0.15, 0.1])
+    Scene::new(seed)
+        .with(K::LeverArm, &[0.05, 0.02, -0.06])
+        .with(K::AccelBias, &[0.2, -0.15, 0.1])
 }
 
 #[test]
@@ -23,7 +25,8 @@ fn the_motions_derivatives_are_those_of_its_values() {
         let [before, now, after] = [t - h, t, t + h].map(|t| motion.at(t));
         let acceleration = (after.position - now.position * 2.0 + before.position) / (h * h);
         assert!((acceleration - now.acceleration_in_world).norm() < 1e-4);
-        let turned = (before.world_from_segment.inverse() * after.world_from_segment).scaled_axis() / (2.0 * h);
+        let turned = (before.world_from_segment.inverse() * after.world_from_segment).scaled_axis()
+            / (2.0 * h);
         assert!((turned - now.angular_velocity).norm() < 1e-5);
         let change = (after.angular_velocity - before.angular_velocity) / (2.0 * h);
         assert!((change - now.angular_acceleration).norm() < 1e-3);
@@ -38,9 +41,17 @@ fn no_effect_has_no_cause() {
         assert_eq!(names(&diagnosis), [""; 0], "{}", diagnosis.verdict);
         assert!(!diagnosis.unexplained.significant);
         shares_add_up(&diagnosis);
-        // What is left is the sensor's noise and the reference's own error, of which noise is the least.
-        assert!(diagnosis.gap.before.accel_rmse > SIGMA[0] && diagnosis.gap.before.gyro_rmse > SIGMA[1]);
-        near(diagnosis.gap.after.accel_rmse, diagnosis.gap.before.accel_rmse, 1e-12, "nothing is added");
+        // What is left is the sensor's noise and the reference's own error, of which noise is the
+        // least.
+        assert!(
+            diagnosis.gap.before.accel_rmse > SIGMA[0] && diagnosis.gap.before.gyro_rmse > SIGMA[1]
+        );
+        near(
+            diagnosis.gap.after.accel_rmse,
+            diagnosis.gap.before.accel_rmse,
+            1e-12,
+            "nothing is added",
+        );
     }
 }
 
@@ -50,10 +61,22 @@ fn undeclared_noise_counts_as_declared() {
     scene.declared = [None; 2];
     assert_eq!(names(&answer(&scene.record()).diagnosis), [""; 0]);
     // Even where it is large.
-    let loud = scene.with(K::AccelNoise, &[0.01]).with(K::GyroNoise, &[1e-3]);
+    let loud = scene
+        .with(K::AccelNoise, &[0.01])
+        .with(K::GyroNoise, &[1e-3]);
     let answer = answer(&loud.record());
-    assert_eq!(names(&answer.diagnosis), [""; 0], "{}", answer.diagnosis.verdict);
-    near(answer.effects.declared_noise.accel_density, 0.01f64.hypot(SIGMA[0] / IMU_HZ.sqrt()), 5e-4, "density that was found");
+    assert_eq!(
+        names(&answer.diagnosis),
+        [""; 0],
+        "{}",
+        answer.diagnosis.verdict
+    );
+    near(
+        answer.effects.declared_noise.accel_density,
+        0.01f64.hypot(SIGMA[0] / IMU_HZ.sqrt()),
+        5e-4,
+        "density that was found",
+    );
 }
 
 #[test]
@@ -65,7 +88,10 @@ fn holes_in_the_reference_are_no_cause() {
     scene.lost = vec![7.0..7.5, 21.2..21.7, 33.3..33.8, 50.0..50.5];
     let diagnosis = answer(&scene.record()).diagnosis;
     names_exactly(&diagnosis, &scene.effects);
-    scene.effects.iter().for_each(|effect| values_are(&diagnosis, effect));
+    scene
+        .effects
+        .iter()
+        .for_each(|effect| values_are(&diagnosis, effect));
 }
 
 #[test]
@@ -79,12 +105,22 @@ fn dropped_messages_hide_no_other_cause() {
 #[test]
 fn a_quarter_turn_is_axes_named_otherwise() {
     let quarter = std::f64::consts::FRAC_PI_2;
-    let record = Scene::new(9).with(K::MountRotation, &[0.0, 0.0, quarter]).record();
+    let record = Scene::new(9)
+        .with(K::MountRotation, &[0.0, 0.0, quarter])
+        .record();
     let diagnosis = answer(&record).diagnosis;
-    assert_eq!(names(&diagnosis), ["axis_convention"], "{}", diagnosis.verdict);
+    assert_eq!(
+        names(&diagnosis),
+        ["axis_convention"],
+        "{}",
+        diagnosis.verdict
+    );
     // M = R_mount^T
     let matrix = serde_json::json!([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]);
-    assert_eq!(cause(&diagnosis, K::AxisConvention).parameters["matrix"], matrix);
+    assert_eq!(
+        cause(&diagnosis, K::AxisConvention).parameters["matrix"],
+        matrix
+    );
     // Ten degrees beside it is a mount.
     let scene = Scene::new(9).with(K::MountRotation, &[0.0, 0.0, quarter - 0.18]);
     names_exactly(&answer(&scene.record()).diagnosis, &scene.effects);
@@ -93,10 +129,18 @@ fn a_quarter_turn_is_axes_named_otherwise() {
 #[test]
 fn other_epoch_same_answer() {
     let today = lever_and_bias(10).with(K::ClockDrift, &[300.0]).record();
-    let shift = |stamps: &[Stamp], nanos: i64| stamps.iter().map(|stamp| Stamp::from_nanos(stamp.nanos - nanos)).collect::<Vec<_>>();
+    let shift = |stamps: &[Stamp], nanos: i64| {
+        stamps
+            .iter()
+            .map(|stamp| Stamp::from_nanos(stamp.nanos - nanos))
+            .collect::<Vec<_>>()
+    };
     let json = |record: &PlacementRecord| {
         let mut diagnosis = answer(record).diagnosis;
-        assert_eq!(names(&diagnosis), ["accel_bias", "clock_drift", "lever_arm"]);
+        assert_eq!(
+            names(&diagnosis),
+            ["accel_bias", "clock_drift", "lever_arm"]
+        );
         diagnosis.verdict.clear();
         serde_json::to_string(&diagnosis).unwrap()
     };
@@ -113,10 +157,19 @@ fn same_input_same_bytes_and_any_number_of_threads() {
     let record = lever_and_bias(11).record();
     let json = || {
         let answer = answer(&record);
-        (serde_json::to_string(&answer.diagnosis).unwrap(), answer.effects)
+        (
+            serde_json::to_string(&answer.diagnosis).unwrap(),
+            answer.effects,
+        )
     };
-    let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    let four = rayon::ThreadPoolBuilder::new().num_threads(4).build().unwrap();
+    let alone = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build()
+        .unwrap();
+    let four = rayon::ThreadPoolBuilder::new()
+        .num_threads(4)
+        .build()
+        .unwrap();
     let first = json();
     assert!(first == alone.install(json) && first == four.install(json));
 }
@@ -127,15 +180,43 @@ fn rest_has_no_cause_and_cannot_tell_the_lever_arm() {
     scene.motion = Motion::rest();
     let diagnosis = answer(&scene.record()).diagnosis;
     assert_eq!(names(&diagnosis), [""; 0], "{}", diagnosis.verdict);
-    let unidentifiable: Vec<&str> = diagnosis.unidentifiable.iter().map(|item| item.effect.as_str()).collect();
-    for kind in [K::LeverArm, K::ClockDrift, K::GyroScale, K::AccelScale, K::ReferenceScale] {
-        assert!(unidentifiable.contains(&kind.name()), "{kind} of {unidentifiable:?}");
+    let unidentifiable: Vec<&str> = diagnosis
+        .unidentifiable
+        .iter()
+        .map(|item| item.effect.as_str())
+        .collect();
+    for kind in [
+        K::LeverArm,
+        K::ClockDrift,
+        K::GyroScale,
+        K::AccelScale,
+        K::ReferenceScale,
+    ] {
+        assert!(
+            unidentifiable.contains(&kind.name()),
+            "{kind} of {unidentifiable:?}"
+        );
     }
-    assert!(!unidentifiable.contains(&"gyro_bias"), "rest shows a gyroscope's bias best");
-    assert!(diagnosis.unidentifiable.iter().all(|item| !item.would_tell.is_empty()));
+    assert!(
+        !unidentifiable.contains(&"gyro_bias"),
+        "rest shows a gyroscope's bias best"
+    );
+    assert!(
+        diagnosis
+            .unidentifiable
+            .iter()
+            .all(|item| !item.would_tell.is_empty())
+    );
     // Motion tells all of them but what only rest in several orientations would.
     let moving = answer(&Scene::new(13).record()).diagnosis;
-    assert!(moving.unidentifiable.iter().all(|item| item.effect != "lever_arm"), "{:?}", moving.unidentifiable);
+    assert!(
+        moving
+            .unidentifiable
+            .iter()
+            .all(|item| item.effect != "lever_arm"),
+        "{:?}",
+        moving.unidentifiable
+    );
 }
 
 #[test]
@@ -149,19 +230,35 @@ fn what_is_known_at_rest_is_found_there() {
 }
 
 fn refusal(record: &PlacementRecord) -> GapError {
-    diagnose(record, &DiagnoseOptions::default()).map(|_| ()).unwrap_err()
+    diagnose(record, &DiagnoseOptions::default())
+        .map(|_| ())
+        .unwrap_err()
 }
 
 fn short() -> PlacementRecord {
-    Scene { seconds: 12.0, ..Scene::new(15) }.record()
+    Scene {
+        seconds: 12.0,
+        ..Scene::new(15)
+    }
+    .record()
 }
 
 #[test]
 fn recordings_that_do_not_meet_are_refused() {
     let mut record = short();
-    record.imu.stamps.iter_mut().for_each(|stamp| *stamp = stamp.plus_seconds(1e4));
-    // A clock that is off by hours may still be aligned by the motion; a reference of another motion may not.
-    record.reference = Scene { seconds: 2.0, ..Scene::new(16) }.record().reference;
+    record
+        .imu
+        .stamps
+        .iter_mut()
+        .for_each(|stamp| *stamp = stamp.plus_seconds(1e4));
+    // A clock that is off by hours may still be aligned by the motion; a reference of another
+    // motion may not.
+    record.reference = Scene {
+        seconds: 2.0,
+        ..Scene::new(16)
+    }
+    .record()
+    .reference;
     let error = refusal(&record);
     assert!(matches!(error, GapError::NoOverlap { .. }), "{error}");
     assert!(error.to_string().contains("wrist"));
@@ -172,9 +269,22 @@ fn too_few_messages_are_refused() {
     let mut record = short();
     record.imu.stamps.truncate(49);
     record.imu.readings.truncate(49);
-    assert!(matches!(refusal(&record), GapError::TooFewMessages { messages: 49, needed: 50, .. }));
-    let empty = PlacementRecord { imu: Default::default(), ..short() };
-    assert!(matches!(refusal(&empty), GapError::TooFewMessages { messages: 0, .. }));
+    assert!(matches!(
+        refusal(&record),
+        GapError::TooFewMessages {
+            messages: 49,
+            needed: 50,
+            ..
+        }
+    ));
+    let empty = PlacementRecord {
+        imu: Default::default(),
+        ..short()
+    };
+    assert!(matches!(
+        refusal(&empty),
+        GapError::TooFewMessages { messages: 0, .. }
+    ));
     let mut blind = short();
     blind.reference = Default::default();
     assert!(matches!(refusal(&blind), GapError::Reference { .. }));
@@ -183,22 +293,47 @@ fn too_few_messages_are_refused() {
 #[test]
 fn readings_that_are_no_numbers_are_refused_or_left_out() {
     let mut record = short();
-    record.imu.readings.iter_mut().for_each(|reading| reading.force.x = f64::NAN);
+    record
+        .imu
+        .readings
+        .iter_mut()
+        .for_each(|reading| reading.force.x = f64::NAN);
     assert!(matches!(refusal(&record), GapError::NotFinite { .. }));
     let mut record = Scene::new(17).record();
-    record.imu.readings.iter_mut().step_by(700).for_each(|reading| reading.rate.y = f64::INFINITY);
+    record
+        .imu
+        .readings
+        .iter_mut()
+        .step_by(700)
+        .for_each(|reading| reading.rate.y = f64::INFINITY);
     let diagnosis = answer(&record).diagnosis;
-    let other: Vec<&str> = names(&diagnosis).into_iter().filter(|name| *name != "dropped_samples").collect();
+    let other: Vec<&str> = names(&diagnosis)
+        .into_iter()
+        .filter(|name| *name != "dropped_samples")
+        .collect();
     assert_eq!(other, [""; 0], "{}", diagnosis.verdict);
-    assert!(diagnosis.gap.after.accel_rmse.is_finite() && diagnosis.gap.after.nll_per_sample.is_finite());
+    assert!(
+        diagnosis.gap.after.accel_rmse.is_finite()
+            && diagnosis.gap.after.nll_per_sample.is_finite()
+    );
 }
 
 #[test]
 fn a_stuck_sensor_is_refused() {
     let mut record = short();
-    record.imu.readings.iter_mut().for_each(|reading| reading.rate = Vector3::new(0.01, -0.02, 0.0));
+    record
+        .imu
+        .readings
+        .iter_mut()
+        .for_each(|reading| reading.rate = Vector3::new(0.01, -0.02, 0.0));
     let error = refusal(&record);
-    assert!(matches!(error, GapError::Stuck { .. }) && error.to_string().contains("gyro_x, gyro_y, gyro_z never change"), "{error}");
+    assert!(
+        matches!(error, GapError::Stuck { .. })
+            && error
+                .to_string()
+                .contains("gyro_x, gyro_y, gyro_z never change"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -206,7 +341,13 @@ fn the_order_of_messages_does_not_matter() {
     let record = lever_and_bias(18).record();
     let mut shuffled = record.clone();
     // Bursts arrive in turned order, and one twice.
-    for (stamps, readings) in shuffled.imu.stamps.chunks_mut(50).zip(shuffled.imu.readings.chunks_mut(50)).skip(1) {
+    for (stamps, readings) in shuffled
+        .imu
+        .stamps
+        .chunks_mut(50)
+        .zip(shuffled.imu.readings.chunks_mut(50))
+        .skip(1)
+    {
         stamps.reverse();
         readings.reverse();
     }
@@ -218,10 +359,20 @@ fn the_order_of_messages_does_not_matter() {
 #[test]
 fn effects_of_the_answer_are_the_causes() {
     let answer = answer(&lever_and_bias(19).record());
-    let mut kinds: Vec<&str> = answer.effects.effects.iter().map(|effect| effect.kind().name()).collect();
+    let mut kinds: Vec<&str> = answer
+        .effects
+        .effects
+        .iter()
+        .map(|effect| effect.kind().name())
+        .collect();
     kinds.sort_unstable();
     assert_eq!(kinds, names(&answer.diagnosis));
     assert!(answer.effects.effects != EffectSet::new());
-    near(answer.effects.declared_noise.accel_density * IMU_HZ.sqrt(), SIGMA[0], 1e-6, "declared noise");
+    near(
+        answer.effects.declared_noise.accel_density * IMU_HZ.sqrt(),
+        SIGMA[0],
+        1e-6,
+        "declared noise",
+    );
     assert_eq!(answer.effects.epoch, Scene::new(19).start);
 }

@@ -1,4 +1,5 @@
-//! All stages of the sensor model over 60 s at a grid of 200 Hz and 6000 readings: `cargo bench -p cromosim_imu --bench effects`. Goal: 3 ms.
+//! All stages of the sensor model over 60 s at a grid of 200 Hz and 6000 readings: `cargo bench -p
+//! cromosim_imu --bench effects`. Goal: 3 ms.
 #![allow(missing_docs)]
 
 use criterion::{Criterion, criterion_group, criterion_main};
@@ -7,20 +8,33 @@ use cromosim_spatial::{KinematicTrack, Stamp, so3};
 use nalgebra::Vector3;
 
 fn track() -> KinematicTrack {
-    let mut track = KinematicTrack { rate_hz: 200.0, ..KinematicTrack::default() };
+    let mut track = KinematicTrack {
+        rate_hz: 200.0,
+        ..KinematicTrack::default()
+    };
     for k in 0..12_001 {
         let t = f64::from(k) / 200.0;
-        track.world_from_segment.push(so3::exp(&Vector3::new((2.0 * t).sin(), 0.3, 0.5 * t.cos())));
-        track.acceleration.push(Vector3::new((9.0 * t).sin(), t.cos(), (3.0 * t).sin()) * 5.0);
-        track.angular_velocity.push(Vector3::new((5.0 * t).cos(), t.sin(), 0.1));
-        track.angular_acceleration.push(Vector3::new(-5.0 * (5.0 * t).sin(), t.cos(), 0.0));
+        track
+            .world_from_segment
+            .push(so3::exp(&Vector3::new((2.0 * t).sin(), 0.3, 0.5 * t.cos())));
+        track
+            .acceleration
+            .push(Vector3::new((9.0 * t).sin(), t.cos(), (3.0 * t).sin()) * 5.0);
+        track
+            .angular_velocity
+            .push(Vector3::new((5.0 * t).cos(), t.sin(), 0.1));
+        track
+            .angular_acceleration
+            .push(Vector3::new(-5.0 * (5.0 * t).sin(), t.cos(), 0.0));
     }
     track
 }
 
 fn effects(criterion: &mut Criterion) {
     let track = track();
-    let stamps: Vec<Stamp> = (0..6000).map(|k| Stamp::from_seconds(0.003 + 0.01 * f64::from(k))).collect();
+    let stamps: Vec<Stamp> = (0..6000)
+        .map(|k| Stamp::from_seconds(0.003 + 0.01 * f64::from(k)))
+        .collect();
     let one = |kind, values: &[f64]| Effect::new(kind, values.to_vec()).expect("valid values");
     let all = EffectSet::try_from(vec![
         one(EffectKind::LeverArm, &[0.05, 0.0, -0.06]),
@@ -41,11 +55,19 @@ fn effects(criterion: &mut Criterion) {
     .expect("one of each");
     let nominal = SensorModel::new(&EffectSet::new(), Stamp::default());
     let model = SensorModel::new(&all, Stamp::default());
-    criterion.bench_function("nominal", |bencher| bencher.iter(|| nominal.run(&track, &stamps)));
-    criterion.bench_function("fourteen effects", |bencher| bencher.iter(|| model.run(&track, &stamps)));
-    criterion.bench_function("fourteen effects: segment", |bencher| bencher.iter(|| model.segment(&track)));
+    criterion.bench_function("nominal", |bencher| {
+        bencher.iter(|| nominal.run(&track, &stamps))
+    });
+    criterion.bench_function("fourteen effects", |bencher| {
+        bencher.iter(|| model.run(&track, &stamps))
+    });
+    criterion.bench_function("fourteen effects: segment", |bencher| {
+        bencher.iter(|| model.segment(&track))
+    });
     let trace = model.sensor(model.tissue(model.segment(&track)));
-    criterion.bench_function("fourteen effects: read", |bencher| bencher.iter(|| model.read(&trace, &stamps)));
+    criterion.bench_function("fourteen effects: read", |bencher| {
+        bencher.iter(|| model.read(&trace, &stamps))
+    });
 }
 
 criterion_group!(benches, effects);

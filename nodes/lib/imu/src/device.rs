@@ -10,9 +10,18 @@ const SCHEMA: &str = "cromosim/device/1";
 
 /// The embedded devices by name.
 pub const EMBEDDED_DEVICES: [(&str, &str); 3] = [
-    ("ideal", include_str!("../../../../config/devices/ideal.yaml")),
-    ("consumer_mems", include_str!("../../../../config/devices/consumer_mems.yaml")),
-    ("precision_mems", include_str!("../../../../config/devices/precision_mems.yaml")),
+    (
+        "ideal",
+        include_str!("../../../../config/devices/ideal.yaml"),
+    ),
+    (
+        "consumer_mems",
+        include_str!("../../../../config/devices/consumer_mems.yaml"),
+    ),
+    (
+        "precision_mems",
+        include_str!("../../../../config/devices/precision_mems.yaml"),
+    ),
 ];
 
 /// White noise and further effects of a device, with values as a data sheet has them.
@@ -24,8 +33,9 @@ pub const EMBEDDED_DEVICES: [(&str, &str); 3] = [
 ///   - {effect: accel_bias, bias: [0.05, -0.03, 0.08]}
 ///   - {effect: gyro_bias, bias: [0.004, -0.006, 0.003]}
 /// ```
-/// Densities are one-sided, (m/s2)/sqrt(Hz) and (rad/s)/sqrt(Hz); the list is that of an [`crate::EffectsFile`],
-/// without the effects of a reference. What depends on time is anchored at the first sample.
+/// Densities are one-sided, (m/s2)/sqrt(Hz) and (rad/s)/sqrt(Hz); the list is that of an
+/// [`crate::EffectsFile`], without the effects of a reference. What depends on time is anchored at
+/// the first sample.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Device {
     accel_density: f64,
@@ -55,32 +65,77 @@ struct RawNoise {
 impl Device {
     /// A device without error.
     pub fn ideal() -> Self {
-        Self { accel_density: 0.0, gyro_density: 0.0, orientation_stddev: 0.0, effects: EffectSet::new() }
+        Self {
+            accel_density: 0.0,
+            gyro_density: 0.0,
+            orientation_stddev: 0.0,
+            effects: EffectSet::new(),
+        }
     }
 
-    /// A device with white noise alone: densities in (m/s2)/sqrt(Hz) and (rad/s)/sqrt(Hz), at least 0.
+    /// A device with white noise alone: densities in (m/s2)/sqrt(Hz) and (rad/s)/sqrt(Hz), at least
+    /// 0.
     pub fn white(accel_density: f64, gyro_density: f64) -> Self {
-        Self { accel_density, gyro_density, ..Self::ideal() }
+        Self {
+            accel_density,
+            gyro_density,
+            ..Self::ideal()
+        }
     }
 
     /// Parses a file's text; `file` names it in errors.
     ///
     /// # Errors
-    /// [`ImuError::Yaml`], [`ImuError::Schema`], [`ImuError::DeviceNumber`], [`ImuError::ReferenceEffect`].
+    /// [`ImuError::Yaml`], [`ImuError::Schema`], [`ImuError::DeviceNumber`],
+    /// [`ImuError::ReferenceEffect`].
     pub fn parse(text: &str, file: &str) -> Result<Self, ImuError> {
-        let raw: RawDevice = serde_norway::from_str(text).map_err(|source| ImuError::Yaml { file: file.to_owned(), source })?;
+        let raw: RawDevice = serde_norway::from_str(text).map_err(|source| ImuError::Yaml {
+            file: file.to_owned(),
+            source,
+        })?;
         if raw.schema != SCHEMA {
-            return Err(ImuError::Schema { file: file.to_owned(), expected: SCHEMA, found: raw.schema });
+            return Err(ImuError::Schema {
+                file: file.to_owned(),
+                expected: SCHEMA,
+                found: raw.schema,
+            });
         }
-        let RawNoise { accel_density, gyro_density, orientation_stddev } = raw.declared_noise;
-        let fields = [("accel_density", accel_density), ("gyro_density", gyro_density), ("orientation_stddev", orientation_stddev)];
-        if let Some((field, value)) = fields.into_iter().find(|(_, value)| !(*value >= 0.0 && value.is_finite())) {
-            return Err(ImuError::DeviceNumber { file: file.to_owned(), field, value });
+        let RawNoise {
+            accel_density,
+            gyro_density,
+            orientation_stddev,
+        } = raw.declared_noise;
+        let fields = [
+            ("accel_density", accel_density),
+            ("gyro_density", gyro_density),
+            ("orientation_stddev", orientation_stddev),
+        ];
+        if let Some((field, value)) = fields
+            .into_iter()
+            .find(|(_, value)| !(*value >= 0.0 && value.is_finite()))
+        {
+            return Err(ImuError::DeviceNumber {
+                file: file.to_owned(),
+                field,
+                value,
+            });
         }
-        if let Some(effect) = raw.effects.iter().find(|effect| effect.kind().spec().stage == Stage::Reference) {
-            return Err(ImuError::ReferenceEffect { file: file.to_owned(), effect: effect.kind().name() });
+        if let Some(effect) = raw
+            .effects
+            .iter()
+            .find(|effect| effect.kind().spec().stage == Stage::Reference)
+        {
+            return Err(ImuError::ReferenceEffect {
+                file: file.to_owned(),
+                effect: effect.kind().name(),
+            });
         }
-        Ok(Self { accel_density, gyro_density, orientation_stddev, effects: raw.effects })
+        Ok(Self {
+            accel_density,
+            gyro_density,
+            orientation_stddev,
+            effects: raw.effects,
+        })
     }
 
     /// Reads a file.
@@ -88,7 +143,10 @@ impl Device {
     /// # Errors
     /// As [`Device::parse`], and [`ImuError::Unreadable`].
     pub fn read(path: &Path) -> Result<Self, ImuError> {
-        let text = std::fs::read_to_string(path).map_err(|source| ImuError::Unreadable { file: path.to_owned(), source })?;
+        let text = std::fs::read_to_string(path).map_err(|source| ImuError::Unreadable {
+            file: path.to_owned(),
+            source,
+        })?;
         Self::parse(&text, &path.display().to_string())
     }
 
@@ -101,20 +159,25 @@ impl Device {
             Some((_, text)) => Self::parse(text, &format!("{name}.yaml")),
             None => {
                 let known = EMBEDDED_DEVICES.map(|(known, _)| known).join(", ");
-                Err(ImuError::UnknownDevice { name: name.to_owned(), known })
+                Err(ImuError::UnknownDevice {
+                    name: name.to_owned(),
+                    known,
+                })
             }
         }
     }
 
-    /// What a placement's `device` means: a name that ends in .yaml or .yml is a file, relative to `folder`; any other an embedded device;
-    /// `None` a device without error.
+    /// What a placement's `device` means: a name that ends in .yaml or .yml is a file, relative to
+    /// `folder`; any other an embedded device; `None` a device without error.
     ///
     /// # Errors
     /// As [`Device::read`] and [`Device::embedded`].
     pub fn resolve(name: Option<&str>, folder: &Path) -> Result<Self, ImuError> {
         match name {
             None => Ok(Self::ideal()),
-            Some(file) if file.ends_with(".yaml") || file.ends_with(".yml") => Self::read(&folder.join(file)),
+            Some(file) if file.ends_with(".yaml") || file.ends_with(".yml") => {
+                Self::read(&folder.join(file))
+            }
             Some(name) => Self::embedded(name),
         }
     }
@@ -129,7 +192,8 @@ impl Device {
         self.gyro_density
     }
 
-    /// Standard deviation of the reported orientation about each axis, rad; 0 where it is exact and its covariance unknown.
+    /// Standard deviation of the reported orientation about each axis, rad; 0 where it is exact and
+    /// its covariance unknown.
     pub fn orientation_stddev(&self) -> f64 {
         self.orientation_stddev
     }

@@ -64,7 +64,9 @@ pub enum ImuError {
         triangle: u32,
     },
     /// An unknown scheme.
-    #[error("unknown scheme `{name}`; known are richardson, normal_tracking, triangle, spline, second_difference")]
+    #[error(
+        "unknown scheme `{name}`; known are richardson, normal_tracking, triangle, spline, second_difference"
+    )]
     UnknownScheme {
         /// The name given.
         name: String,
@@ -126,7 +128,9 @@ pub enum EffectError {
         effect: String,
     },
     /// The name of what a diagnosis could not explain.
-    #[error("`unknown` says that a gap has a cause without a model; it cannot be simulated: take the entry out")]
+    #[error(
+        "`unknown` says that a gap has a cause without a model; it cannot be simulated: take the entry out"
+    )]
     NotSimulated,
     /// Two of one kind.
     #[error("a second `{effect}`; give each effect once")]
@@ -211,7 +215,9 @@ pub enum PlacementProblem {
     #[error("missing; give it here or under `defaults`")]
     Missing,
     /// None or several of `site`, `triangle` with `barycentrics`, and `point`.
-    #[error("{given} of `site`, `triangle` with `barycentrics` and `point` given; give exactly one")]
+    #[error(
+        "{given} of `site`, `triangle` with `barycentrics` and `point` given; give exactly one"
+    )]
     OneSite {
         /// How many are given.
         given: usize,
@@ -223,7 +229,9 @@ pub enum PlacementProblem {
         given: usize,
     },
     /// A name that cannot be part of a ROS topic.
-    #[error("`{name}` is no ROS name: letters, digits and single underscores, not starting with a digit")]
+    #[error(
+        "`{name}` is no ROS name: letters, digits and single underscores, not starting with a digit"
+    )]
     BadName {
         /// The name.
         name: String,

@@ -1,11 +1,12 @@
 //! From a placement on a body to an inertial measurement unit.
 //!
-//! A [`Placement`] says where a sensor sits; a [`MountedSite`] gives its frame for any [`cromosim_body::BodyPose`]; a [`Scheme`]
-//! differentiates the frames, offline by [`simulate`] or live by [`StreamingImu`]; a [`Device`] adds noise and further [`effects`];
-//! [`SampleVariance`] is what
-//! errors of the poses ([`PoseStd`]) leave in a sample.
+//! A [`Placement`] says where a sensor sits; a [`MountedSite`] gives its frame for any
+//! [`cromosim_body::BodyPose`]; a [`Scheme`] differentiates the frames, offline by [`simulate`] or
+//! live by [`StreamingImu`]; a [`Device`] adds noise and further [`effects`]; [`SampleVariance`] is
+//! what errors of the poses ([`PoseStd`]) leave in a sample.
 //!
-//! The sensor reads, in its own axes (S sensor, B site on the body, G world; R_BG turns site axes into world axes),
+//! The sensor reads, in its own axes (S sensor, B site on the body, G world; R_BG turns site axes
+//! into world axes),
 //!
 //! ```text
 //! a_S = R_SB^-1 R_BG^-1 (a_G - g)      specific force, m/s2: +9.80665 along "up" at rest
@@ -61,8 +62,9 @@ mod test_motions;
 
 pub use device::{Device, EMBEDDED_DEVICES};
 pub use effects::{
-    DeclaredNoise, Dropouts, Effect, EffectKind, EffectSet, EffectSpec, EffectsFile, GridTrace, ParameterSpec, PlacementEffects, Reading,
-    ResidualView, SensorModel, Shape, Stage, StreamingEffects, lattice_spacing,
+    DeclaredNoise, Dropouts, Effect, EffectKind, EffectSet, EffectSpec, EffectsFile, GridTrace,
+    ParameterSpec, PlacementEffects, Reading, ResidualView, SensorModel, Shape, Stage,
+    StreamingEffects, lattice_spacing,
 };
 pub use error::{EffectError, ImuError, PlacementProblem};
 pub use mount::{MountedSite, MountedSites, SiteFrame};

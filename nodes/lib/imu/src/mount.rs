@@ -11,7 +11,8 @@ use crate::{Follow, ImuError, Placement, PoseStd, SensorFrame, SensorTrajectory,
 pub struct SiteFrame {
     /// The sensor's frame, m.
     pub world_from_sensor: Isometry3<f64>,
-    /// Outward unit normal of what the sensor follows: of the triangle, or of the rest triangle carried along by the segment.
+    /// Outward unit normal of what the sensor follows: of the triangle, or of the rest triangle
+    /// carried along by the segment.
     pub normal_in_world: Vector3<f64>,
     /// Corners of the site's triangle, m.
     pub triangle_in_world: [Vector3<f64>; 3],
@@ -20,15 +21,22 @@ pub struct SiteFrame {
 impl SiteFrame {
     /// The frame with its time.
     pub fn at(&self, stamp: Stamp) -> SensorFrame {
-        SensorFrame { stamp, world_from_sensor: self.world_from_sensor, normal_in_world: self.normal_in_world, pose_std: PoseStd::NONE }
+        SensorFrame {
+            stamp,
+            world_from_sensor: self.world_from_sensor,
+            normal_in_world: self.normal_in_world,
+            pose_std: PoseStd::NONE,
+        }
     }
 }
 
 /// A placement on a body of one shape.
 ///
-/// The site's frame at rest: z along the outward normal of the triangle, x along the bone towards its far end (the next joint; of the last
-/// segments the direction in which the limb arrives) as far as it is tangential, y = z cross x. Where bone and normal are parallel, x is
-/// forward instead. The sensor's frame is the site's turned by the placement's mount, moved outward by its distance from the skin.
+/// The site's frame at rest: z along the outward normal of the triangle, x along the bone towards
+/// its far end (the next joint; of the last segments the direction in which the limb arrives) as
+/// far as it is tangential, y = z cross x. Where bone and normal are parallel, x is forward
+/// instead. The sensor's frame is the site's turned by the placement's mount, moved outward by its
+/// distance from the skin.
 #[derive(Clone, Debug)]
 pub struct MountedSite {
     name: String,
@@ -50,21 +58,31 @@ impl MountedSite {
     /// # Errors
     /// [`ImuError::Site`] for a site that this body does not have, [`ImuError::FlatTriangle`].
     pub fn new(body: &ShapedBody, placement: &Placement) -> Result<Self, ImuError> {
-        let refuse = |source| ImuError::Site { placement: placement.name().to_owned(), source: Box::new(source) };
+        let refuse = |source| ImuError::Site {
+            placement: placement.name().to_owned(),
+            source: Box::new(source),
+        };
         let model = body.model();
         let site = match placement.site() {
             SiteChoice::Named(name) => model.site(name),
-            SiteChoice::Triangle { triangle, barycentrics } => model.site_at(*triangle, *barycentrics),
+            SiteChoice::Triangle {
+                triangle,
+                barycentrics,
+            } => model.site_at(*triangle, *barycentrics),
             SiteChoice::NearestTo(point) => model.nearest_site(*point),
         }
         .map_err(refuse)?;
         let vertices = model.triangle(&site).map_err(refuse)?;
         let subset = body.subset(&vertices).map_err(refuse)?;
         let corners = vertices.map(|vertex| body.rest_vertices()[vertex as usize]);
-        let flat = || ImuError::FlatTriangle { placement: placement.name().to_owned(), triangle: site.triangle };
+        let flat = || ImuError::FlatTriangle {
+            placement: placement.name().to_owned(),
+            triangle: site.triangle,
+        };
         let (triangle, model_from_triangle) = RestTriangle::new(&corners).ok_or_else(flat)?;
         let normal = model_from_triangle * Vector3::z();
-        let model_from_sensor = site_axes(&normal, &bone_direction(body, site.joint)) * placement.mount();
+        let model_from_sensor =
+            site_axes(&normal, &bone_direction(body, site.joint)) * placement.mount();
         let position = point_of(&corners, &site.barycentrics) + normal * placement.skin_distance();
         let sensor_in_segment = position - body.joints_in_model()[site.joint.index()];
         Ok(Self {
@@ -104,29 +122,66 @@ impl MountedSite {
     /// The frame for one pose of the body.
     pub fn frame(&self, pose: &BodyPose) -> SiteFrame {
         let mut positions = Vec::with_capacity(3);
-        let segments = self.subset.positions_and_segments_into(pose, &mut positions);
-        self.frame_of(&segments[self.site.joint.index()], [positions[0], positions[1], positions[2]])
+        let segments = self
+            .subset
+            .positions_and_segments_into(pose, &mut positions);
+        self.frame_of(
+            &segments[self.site.joint.index()],
+            [positions[0], positions[1], positions[2]],
+        )
     }
 
     /// The frames for a whole motion.
     ///
     /// # Errors
-    /// As [`SensorTrajectory::new`]; stamps beyond the poses, or poses beyond the stamps, are left out.
-    pub fn trajectory(&self, stamps: &[Stamp], poses: &[BodyPose]) -> Result<SensorTrajectory, ImuError> {
-        SensorTrajectory::new(stamps.iter().zip(poses).map(|(stamp, pose)| self.frame(pose).at(*stamp)).collect())
+    /// As [`SensorTrajectory::new`]; stamps beyond the poses, or poses beyond the stamps, are left
+    /// out.
+    pub fn trajectory(
+        &self,
+        stamps: &[Stamp],
+        poses: &[BodyPose],
+    ) -> Result<SensorTrajectory, ImuError> {
+        SensorTrajectory::new(
+            stamps
+                .iter()
+                .zip(poses)
+                .map(|(stamp, pose)| self.frame(pose).at(*stamp))
+                .collect(),
+        )
     }
 
-    fn frame_of(&self, world_from_segment: &Isometry3<f64>, corners: [Vector3<f64>; 3]) -> SiteFrame {
+    fn frame_of(
+        &self,
+        world_from_segment: &Isometry3<f64>,
+        corners: [Vector3<f64>; 3],
+    ) -> SiteFrame {
         let (world_from_sensor, normal_in_world) = match self.follow {
-            Follow::Segment => (world_from_segment * self.segment_from_sensor, world_from_segment.rotation * self.normal_in_segment),
+            Follow::Segment => (
+                world_from_segment * self.segment_from_sensor,
+                world_from_segment.rotation * self.normal_in_segment,
+            ),
             Follow::Skin => {
-                let world_from_triangle = self.triangle.frame(&corners).unwrap_or(world_from_segment.rotation);
+                let world_from_triangle = self
+                    .triangle
+                    .frame(&corners)
+                    .unwrap_or(world_from_segment.rotation);
                 let normal = world_from_triangle * Vector3::z();
-                let position = point_of(&corners, &self.site.barycentrics) + normal * self.skin_distance;
-                (Isometry3::from_parts(position.into(), world_from_triangle * self.triangle_from_sensor), normal)
+                let position =
+                    point_of(&corners, &self.site.barycentrics) + normal * self.skin_distance;
+                (
+                    Isometry3::from_parts(
+                        position.into(),
+                        world_from_triangle * self.triangle_from_sensor,
+                    ),
+                    normal,
+                )
             }
         };
-        SiteFrame { world_from_sensor, normal_in_world, triangle_in_world: corners }
+        SiteFrame {
+            world_from_sensor,
+            normal_in_world,
+            triangle_in_world: corners,
+        }
     }
 }
 
@@ -143,10 +198,23 @@ impl MountedSites {
     /// # Errors
     /// As [`MountedSite::new`].
     pub fn new(body: &ShapedBody, placements: &[Placement]) -> Result<Self, ImuError> {
-        let sites = placements.iter().map(|placement| MountedSite::new(body, placement)).collect::<Result<Vec<_>, _>>()?;
-        let vertices: Vec<u32> = sites.iter().flat_map(|site| site.subset.vertices()).collect();
-        let refuse = |source| ImuError::Site { placement: "(all)".to_owned(), source: Box::new(source) };
-        let subset = if sites.is_empty() { None } else { Some(body.subset(&vertices).map_err(refuse)?) };
+        let sites = placements
+            .iter()
+            .map(|placement| MountedSite::new(body, placement))
+            .collect::<Result<Vec<_>, _>>()?;
+        let vertices: Vec<u32> = sites
+            .iter()
+            .flat_map(|site| site.subset.vertices())
+            .collect();
+        let refuse = |source| ImuError::Site {
+            placement: "(all)".to_owned(),
+            source: Box::new(source),
+        };
+        let subset = if sites.is_empty() {
+            None
+        } else {
+            Some(body.subset(&vertices).map_err(refuse)?)
+        };
         Ok(Self { sites, subset })
     }
 
@@ -165,9 +233,18 @@ impl MountedSites {
     /// The frames of all placements for a whole motion.
     ///
     /// # Errors
-    /// As [`SensorTrajectory::new`]; stamps beyond the poses, or poses beyond the stamps, are left out.
-    pub fn trajectories(&self, stamps: &[Stamp], poses: &[BodyPose]) -> Result<Vec<SensorTrajectory>, ImuError> {
-        let mut by_site: Vec<Vec<SensorFrame>> = self.sites.iter().map(|_| Vec::with_capacity(stamps.len())).collect();
+    /// As [`SensorTrajectory::new`]; stamps beyond the poses, or poses beyond the stamps, are left
+    /// out.
+    pub fn trajectories(
+        &self,
+        stamps: &[Stamp],
+        poses: &[BodyPose],
+    ) -> Result<Vec<SensorTrajectory>, ImuError> {
+        let mut by_site: Vec<Vec<SensorFrame>> = self
+            .sites
+            .iter()
+            .map(|_| Vec::with_capacity(stamps.len()))
+            .collect();
         let (mut positions, mut frames) = (Vec::new(), Vec::new());
         for (stamp, pose) in stamps.iter().zip(poses) {
             self.frames_into(pose, &mut positions, &mut frames);
@@ -178,12 +255,22 @@ impl MountedSites {
         by_site.into_iter().map(SensorTrajectory::new).collect()
     }
 
-    fn frames_into(&self, pose: &BodyPose, positions: &mut Vec<Vector3<f64>>, frames: &mut Vec<SiteFrame>) {
+    fn frames_into(
+        &self,
+        pose: &BodyPose,
+        positions: &mut Vec<Vector3<f64>>,
+        frames: &mut Vec<SiteFrame>,
+    ) {
         frames.clear();
         let Some(subset) = &self.subset else { return };
         let segments = subset.positions_and_segments_into(pose, positions);
         let corners = positions.chunks_exact(3).map(|c| [c[0], c[1], c[2]]);
-        frames.extend(self.sites.iter().zip(corners).map(|(site, corners)| site.frame_of(&segments[site.site.joint.index()], corners)));
+        frames.extend(
+            self.sites
+                .iter()
+                .zip(corners)
+                .map(|(site, corners)| site.frame_of(&segments[site.site.joint.index()], corners)),
+        );
     }
 }
 
@@ -200,17 +287,22 @@ impl RestTriangle {
         let [x, y, z] = edge_axes(corners)?;
         let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, y, z]));
         let edges_inverse = edges_in_plane(corners, &x, &y).try_inverse()?;
-        Some((Self { edges_inverse }, UnitQuaternion::from_rotation_matrix(&rotation)))
+        Some((
+            Self { edges_inverse },
+            UnitQuaternion::from_rotation_matrix(&rotation),
+        ))
     }
 
-    /// world_from_triangle of moved corners: z is their normal; about it, the rotation part (polar decomposition) of what turned the rest
-    /// triangle into the moved one, so that a stretched triangle turns as a whole and not as its first edge does.
+    /// world_from_triangle of moved corners: z is their normal; about it, the rotation part (polar
+    /// decomposition) of what turned the rest triangle into the moved one, so that a stretched
+    /// triangle turns as a whole and not as its first edge does.
     fn frame(&self, corners: &[Vector3<f64>; 3]) -> Option<UnitQuaternion<f64>> {
         let [edge, across, normal] = edge_axes(corners)?;
         let gradient = edges_in_plane(corners, &edge, &across) * self.edges_inverse;
         let (sine, cosine) = (gradient.m21 - gradient.m12, gradient.m11 + gradient.m22);
         let x = (edge * cosine + across * sine) / sine.hypot(cosine);
-        let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, normal.cross(&x), normal]));
+        let rotation =
+            Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, normal.cross(&x), normal]));
         Some(UnitQuaternion::from_rotation_matrix(&rotation))
     }
 }
@@ -228,10 +320,15 @@ fn edges_in_plane(corners: &[Vector3<f64>; 3], x: &Vector3<f64>, y: &Vector3<f64
 }
 
 fn point_of(corners: &[Vector3<f64>; 3], barycentrics: &[f64; 3]) -> Vector3<f64> {
-    corners.iter().zip(barycentrics).map(|(corner, weight)| corner * *weight).sum()
+    corners
+        .iter()
+        .zip(barycentrics)
+        .map(|(corner, weight)| corner * *weight)
+        .sum()
 }
 
-/// From a joint to the next one towards the far end; of a last joint the way from its parent. Model frame, unit length.
+/// From a joint to the next one towards the far end; of a last joint the way from its parent. Model
+/// frame, unit length.
 fn bone_direction(body: &ShapedBody, joint: Joint) -> Vector3<f64> {
     let joints = body.joints_in_model();
     let next = match joint {
@@ -243,15 +340,23 @@ fn bone_direction(body: &ShapedBody, joint: Joint) -> Vector3<f64> {
         (Some(next), _) => (joint, next),
         (None, parent) => (parent.unwrap_or(joint), joint),
     };
-    (joints[to.index()] - joints[from.index()]).try_normalize(1e-9).unwrap_or_else(Vector3::zeros)
+    (joints[to.index()] - joints[from.index()])
+        .try_normalize(1e-9)
+        .unwrap_or_else(Vector3::zeros)
 }
 
 /// model_from_site at rest: z the normal, x the bone's tangent.
 fn site_axes(normal: &Vector3<f64>, bone: &Vector3<f64>) -> UnitQuaternion<f64> {
-    let tangent = |direction: &Vector3<f64>| (direction - normal * normal.dot(direction)).try_normalize(0.2);
+    let tangent =
+        |direction: &Vector3<f64>| (direction - normal * normal.dot(direction)).try_normalize(0.2);
     // One of left and forward is at least 45 degrees off any normal.
-    let x = tangent(bone).or_else(|| tangent(&Vector3::z())).or_else(|| tangent(&Vector3::x())).unwrap_or_else(Vector3::x);
-    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, normal.cross(&x), *normal])))
+    let x = tangent(bone)
+        .or_else(|| tangent(&Vector3::z()))
+        .or_else(|| tangent(&Vector3::x()))
+        .unwrap_or_else(Vector3::x);
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(Matrix3::from_columns(
+        &[x, normal.cross(&x), *normal],
+    )))
 }
 
 #[cfg(test)]

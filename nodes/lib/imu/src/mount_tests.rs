@@ -7,12 +7,19 @@ use cromosim_spatial::so3;
 use super::*;
 use crate::PlacementSet;
 
-static BODY: LazyLock<ShapedBody> = LazyLock::new(|| ShapedBody::new(BodyModel::embedded(), &[0.5, -0.3]).unwrap());
+static BODY: LazyLock<ShapedBody> =
+    LazyLock::new(|| ShapedBody::new(BodyModel::embedded(), &[0.5, -0.3]).unwrap());
 
 /// Parses one placement from its fields.
 fn placement(fields: &str) -> Placement {
-    let text = format!("schema: cromosim/placements/1\nplacements: {{here: {{rate_hz: 100, {fields}}}}}\n");
-    PlacementSet::parse(&text, "test").unwrap().get("here").unwrap().clone()
+    let text = format!(
+        "schema: cromosim/placements/1\nplacements: {{here: {{rate_hz: 100, {fields}}}}}\n"
+    );
+    PlacementSet::parse(&text, "test")
+        .unwrap()
+        .get("here")
+        .unwrap()
+        .clone()
 }
 
 fn mounted(fields: &str) -> MountedSite {
@@ -24,7 +31,9 @@ fn bent() -> BodyPose {
     let mut pose = BodyPose::rest(Vector3::new(1.0, 2.0, 0.9));
     for k in 0..JOINT_COUNT {
         let k_f = k as f64;
-        pose.local_rotations[k] = so3::exp(&(Vector3::new((k_f * 1.7).sin(), (k_f * 2.3).cos(), (k_f * 0.9).sin()) * 0.4));
+        pose.local_rotations[k] = so3::exp(
+            &(Vector3::new((k_f * 1.7).sin(), (k_f * 2.3).cos(), (k_f * 0.9).sin()) * 0.4),
+        );
     }
     pose
 }
@@ -33,8 +42,10 @@ fn bent() -> BodyPose {
 fn at_rest_the_frame_stands_on_the_skin_along_the_bone() {
     let site = mounted("site: left_watch");
     let frame = site.frame(&BodyPose::rest(BODY.joints_in_model()[0]));
-    let [x, y, z] = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| frame.world_from_sensor * axis);
-    // The body lies with its model axes along the world's: the left arm points to +x, its back of the hand up (+y).
+    let [x, y, z] =
+        [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| frame.world_from_sensor * axis);
+    // The body lies with its model axes along the world's: the left arm points to +x, its back of
+    // the hand up (+y).
     assert!(z.dot(&Vector3::y()) > 0.95, "out of the skin: {z}");
     assert!(x.dot(&Vector3::x()) > 0.95, "towards the hand: {x}");
     assert!((y - z.cross(&x)).norm() < 1e-12);
@@ -52,40 +63,76 @@ fn at_rest_skin_and_segment_agree_and_give_the_mount() {
             let world_from_segment = BODY.world_from_segments(&pose)[site.joint().index()];
             let by_segment = world_from_segment * site.segment_from_sensor();
             let by_skin = site.frame(&pose).world_from_sensor;
-            assert!((by_segment.translation.vector - by_skin.translation.vector).norm() < 1e-6, "{}", site.name());
-            assert!(by_segment.rotation.angle_to(&by_skin.rotation) < 1e-4, "{}", site.name());
+            assert!(
+                (by_segment.translation.vector - by_skin.translation.vector).norm() < 1e-6,
+                "{}",
+                site.name()
+            );
+            assert!(
+                by_segment.rotation.angle_to(&by_skin.rotation) < 1e-4,
+                "{}",
+                site.name()
+            );
         }
     }
 }
 
 #[test]
 fn a_segments_follower_is_rigid_and_a_skins_follower_nearly() {
-    let (rigid, soft) = (mounted("site: right_shank_front, follow: segment"), mounted("site: right_shank_front"));
+    let (rigid, soft) = (
+        mounted("site: right_shank_front, follow: segment"),
+        mounted("site: right_shank_front"),
+    );
     let pose = bent();
     let world_from_segment = BODY.world_from_segments(&pose)[rigid.joint().index()];
     let expected = world_from_segment * rigid.segment_from_sensor();
     let (rigid, soft) = (rigid.frame(&pose), soft.frame(&pose));
-    assert!((rigid.world_from_sensor.translation.vector - expected.translation.vector).norm() < 1e-12);
-    assert!(rigid.world_from_sensor.rotation.angle_to(&expected.rotation) < 1e-7);
+    assert!(
+        (rigid.world_from_sensor.translation.vector - expected.translation.vector).norm() < 1e-12
+    );
+    assert!(
+        rigid
+            .world_from_sensor
+            .rotation
+            .angle_to(&expected.rotation)
+            < 1e-7
+    );
     let (moved, turned) = (
         (soft.world_from_sensor.translation.vector - expected.translation.vector).norm(),
         soft.world_from_sensor.rotation.angle_to(&expected.rotation),
     );
-    assert!(moved > 1e-6 && moved < 0.02 && turned > 1e-6 && turned < 0.2, "{moved} m, {turned} rad");
+    assert!(
+        moved > 1e-6 && moved < 0.02 && turned > 1e-6 && turned < 0.2,
+        "{moved} m, {turned} rad"
+    );
 }
 
 #[test]
 fn turning_the_whole_body_turns_the_frames() {
-    let turn = Isometry3::from_parts(Vector3::new(0.0, -3.0, 0.5).into(), so3::exp(&Vector3::new(0.7, -1.0, 2.0)));
+    let turn = Isometry3::from_parts(
+        Vector3::new(0.0, -3.0, 0.5).into(),
+        so3::exp(&Vector3::new(0.7, -1.0, 2.0)),
+    );
     let pose = bent();
     let mut turned = pose.clone();
     turned.root_position = (turn * nalgebra::Point3::from(pose.root_position)).coords;
     turned.local_rotations[0] = turn.rotation * pose.local_rotations[0];
     for placement in PlacementSet::full17().placements() {
         let site = MountedSite::new(&BODY, placement).unwrap();
-        let (before, after) = (turn * site.frame(&pose).world_from_sensor, site.frame(&turned).world_from_sensor);
-        assert!((before.translation.vector - after.translation.vector).norm() < 1e-9, "{}", site.name());
-        assert!(before.rotation.angle_to(&after.rotation) < 1e-7, "{}", site.name());
+        let (before, after) = (
+            turn * site.frame(&pose).world_from_sensor,
+            site.frame(&turned).world_from_sensor,
+        );
+        assert!(
+            (before.translation.vector - after.translation.vector).norm() < 1e-9,
+            "{}",
+            site.name()
+        );
+        assert!(
+            before.rotation.angle_to(&after.rotation) < 1e-7,
+            "{}",
+            site.name()
+        );
     }
 }
 
@@ -93,45 +140,85 @@ fn turning_the_whole_body_turns_the_frames() {
 fn mount_and_distance_act_in_the_sites_frame() {
     let pose = bent();
     let plain = mounted("site: sternum").frame(&pose);
-    let turned = mounted("site: sternum, skin_distance: 0.03, mount: {rotvec: [0.2, -0.5, 1.0]}").frame(&pose);
+    let turned = mounted("site: sternum, skin_distance: 0.03, mount: {rotvec: [0.2, -0.5, 1.0]}")
+        .frame(&pose);
     let expected = plain.world_from_sensor.rotation * so3::exp(&Vector3::new(0.2, -0.5, 1.0));
     assert!(turned.world_from_sensor.rotation.angle_to(&expected) < 1e-7);
-    let step = turned.world_from_sensor.translation.vector - plain.world_from_sensor.translation.vector;
+    let step =
+        turned.world_from_sensor.translation.vector - plain.world_from_sensor.translation.vector;
     assert!((step - plain.normal_in_world * 0.03).norm() < 1e-12);
     assert!((turned.normal_in_world - plain.normal_in_world).norm() < 1e-12);
 }
 
 #[test]
 fn the_frame_of_a_stretched_triangle_turns_as_a_whole() {
-    let rest = [Vector3::new(0.0, 0.0, 0.0), Vector3::new(1.0, 0.0, 0.0), Vector3::new(0.2, 0.8, 0.0)];
+    let rest = [
+        Vector3::new(0.0, 0.0, 0.0),
+        Vector3::new(1.0, 0.0, 0.0),
+        Vector3::new(0.2, 0.8, 0.0),
+    ];
     let (triangle, _) = RestTriangle::new(&rest).unwrap();
     // A symmetric stretch has no rotation, though it turns every edge.
     let stretch = Matrix3::new(1.3, 0.2, 0.0, 0.2, 0.9, 0.0, 0.0, 0.0, 1.0);
-    assert!(triangle.frame(&rest.map(|corner| stretch * corner)).unwrap().angle() < 1e-7);
+    assert!(
+        triangle
+            .frame(&rest.map(|corner| stretch * corner))
+            .unwrap()
+            .angle()
+            < 1e-7
+    );
     let turn = so3::exp(&Vector3::new(0.3, 0.9, -2.0));
-    assert!(triangle.frame(&rest.map(|corner| turn * corner)).unwrap().angle_to(&turn) < 1e-7);
+    assert!(
+        triangle
+            .frame(&rest.map(|corner| turn * corner))
+            .unwrap()
+            .angle_to(&turn)
+            < 1e-7
+    );
 }
 
 #[test]
 fn sites_are_chosen_by_triangle_and_by_point_too() {
     let named = mounted("site: left_shank_front");
-    let Site { triangle, barycentrics: [a, b, c], .. } = *named.site();
-    let same = mounted(&format!("triangle: {triangle}, barycentrics: [{a}, {b}, {c}]"));
+    let Site {
+        triangle,
+        barycentrics: [a, b, c],
+        ..
+    } = *named.site();
+    let same = mounted(&format!(
+        "triangle: {triangle}, barycentrics: [{a}, {b}, {c}]"
+    ));
     let pose = bent();
     assert!(
-        (named.frame(&pose).world_from_sensor.translation.vector - same.frame(&pose).world_from_sensor.translation.vector).norm() < 1e-9
+        (named.frame(&pose).world_from_sensor.translation.vector
+            - same.frame(&pose).world_from_sensor.translation.vector)
+            .norm()
+            < 1e-9
     );
     let near = mounted("point: [0.092, -0.8736, 0.06]");
     assert_eq!(near.joint(), named.joint());
-    assert!((BODY.site_in_model(near.site()).unwrap() - BODY.site_in_model(named.site()).unwrap()).norm() < 0.02);
+    assert!(
+        (BODY.site_in_model(near.site()).unwrap() - BODY.site_in_model(named.site()).unwrap())
+            .norm()
+            < 0.02
+    );
 }
 
 #[test]
 fn sites_that_the_body_lacks_are_refused_by_name() {
-    let refusal = |fields: &str| MountedSite::new(&BODY, &placement(fields)).unwrap_err().to_string();
+    let refusal = |fields: &str| {
+        MountedSite::new(&BODY, &placement(fields))
+            .unwrap_err()
+            .to_string()
+    };
     let unknown = refusal("site: left_wach");
-    assert!(unknown.starts_with("placement `here`: ") && unknown.contains("left_watch"), "{unknown}");
-    assert!(refusal("triangle: 99999999, barycentrics: [1, 0, 0]").starts_with("placement `here`: "));
+    assert!(
+        unknown.starts_with("placement `here`: ") && unknown.contains("left_watch"),
+        "{unknown}"
+    );
+    assert!(
+        refusal("triangle: 99999999, barycentrics: [1, 0, 0]").starts_with("placement `here`: ")
+    );
     assert!(refusal("triangle: 3, barycentrics: [1, 1, 0]").starts_with("placement `here`: "));
 }
 
@@ -144,6 +231,11 @@ fn evaluated_together_or_alone_frames_are_the_same() {
         assert_eq!(site.frame(&pose), frame, "{}", site.name());
     }
     let stamps = [0.0, 0.1, 0.2].map(Stamp::from_seconds);
-    let trajectories = together.trajectories(&stamps, &[pose.clone(), pose.clone(), pose]).unwrap();
-    assert_eq!((trajectories.len(), trajectories[0].frames().len()), (17, 3));
+    let trajectories = together
+        .trajectories(&stamps, &[pose.clone(), pose.clone(), pose])
+        .unwrap();
+    assert_eq!(
+        (trajectories.len(), trajectories[0].frames().len()),
+        (17, 3)
+    );
 }

@@ -7,7 +7,8 @@ use rand_chacha::ChaCha12Rng;
 
 use crate::{Device, ImuError, ImuSample, Reading};
 
-/// Covariances of a sensor_msgs/Imu, row-major 3x3, as REP-145 reads them: all zero is unknown, -1 first is "not reported".
+/// Covariances of a sensor_msgs/Imu, row-major 3x3, as REP-145 reads them: all zero is unknown, -1
+/// first is "not reported".
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Covariances {
     /// rad2.
@@ -19,8 +20,9 @@ pub struct Covariances {
 }
 
 impl Covariances {
-    /// Of a device read at a rate: variance of the white noise per sample, density^2 rate, on the diagonals; a device without noise has
-    /// unknown (zero) covariances. The orientation is reported (`data`).
+    /// Of a device read at a rate: variance of the white noise per sample, density^2 rate, on the
+    /// diagonals; a device without noise has unknown (zero) covariances. The orientation is
+    /// reported (`data`).
     pub fn of(device: &Device, rate_hz: f64) -> Self {
         Self {
             orientation: diagonal(device.orientation_stddev().powi(2)),
@@ -34,7 +36,10 @@ impl Covariances {
     pub fn without_orientation(self) -> Self {
         let mut orientation = [0.0; 9];
         orientation[0] = -1.0;
-        Self { orientation, ..self }
+        Self {
+            orientation,
+            ..self
+        }
     }
 }
 
@@ -44,8 +49,9 @@ fn diagonal(variance: f64) -> [f64; 9] {
 
 /// White noise for readings, one after the other.
 ///
-/// Noise per sample: sigma = density sqrt(rate), independent per axis. Each channel of each placement has its own ChaCha stream, derived from
-/// seed, placement name and channel alone: the same bytes come out whatever else is simulated, in whatever order, on however many threads.
+/// Noise per sample: sigma = density sqrt(rate), independent per axis. Each channel of each
+/// placement has its own ChaCha stream, derived from seed, placement name and channel alone: the
+/// same bytes come out whatever else is simulated, in whatever order, on however many threads.
 #[derive(Clone, Debug)]
 pub struct NoiseSource {
     accel: Channel,
@@ -64,21 +70,42 @@ impl NoiseSource {
     ///
     /// # Errors
     /// [`ImuError::Trajectory`] for a rate that is not positive.
-    pub fn new(device: &Device, rate_hz: f64, seed: u64, placement: &str) -> Result<Self, ImuError> {
+    pub fn new(
+        device: &Device,
+        rate_hz: f64,
+        seed: u64,
+        placement: &str,
+    ) -> Result<Self, ImuError> {
         let densities = (device.accel_density(), device.gyro_density());
-        Self::white(densities, device.orientation_stddev(), rate_hz, seed, placement)
+        Self::white(
+            densities,
+            device.orientation_stddev(),
+            rate_hz,
+            seed,
+            placement,
+        )
     }
 
-    /// The source of densities, (m/s2)/sqrt(Hz) and (rad/s)/sqrt(Hz), and of the orientation's standard deviation, rad.
+    /// The source of densities, (m/s2)/sqrt(Hz) and (rad/s)/sqrt(Hz), and of the orientation's
+    /// standard deviation, rad.
     ///
     /// # Errors
     /// As [`NoiseSource::new`].
-    pub fn white(densities: (f64, f64), orientation_stddev: f64, rate_hz: f64, seed: u64, placement: &str) -> Result<Self, ImuError> {
+    pub fn white(
+        densities: (f64, f64),
+        orientation_stddev: f64,
+        rate_hz: f64,
+        seed: u64,
+        placement: &str,
+    ) -> Result<Self, ImuError> {
         if !(rate_hz > 0.0 && rate_hz.is_finite()) {
             return Err(SpatialError::BadRate { rate_hz }.into());
         }
         let root = rate_hz.sqrt();
-        let channel = |number, sigma| Channel { sigma, random: stream(seed, placement, number) };
+        let channel = |number, sigma| Channel {
+            sigma,
+            random: stream(seed, placement, number),
+        };
         Ok(Self {
             accel: channel(0, densities.0 * root),
             gyro: channel(1, densities.1 * root),
@@ -86,7 +113,8 @@ impl NoiseSource {
         })
     }
 
-    /// The reading with this noise; one call a sample, in order of time. The orientation's noise is a small turn in sensor axes.
+    /// The reading with this noise; one call a sample, in order of time. The orientation's noise is
+    /// a small turn in sensor axes.
     pub fn apply(&mut self, ideal: &ImuSample) -> ImuSample {
         let Reading { force, rate } = self.draw();
         ImuSample {
@@ -99,7 +127,10 @@ impl NoiseSource {
 
     /// The noise of the next reading.
     pub fn draw(&mut self) -> Reading {
-        Reading { force: self.accel.draw(), rate: self.gyro.draw() }
+        Reading {
+            force: self.accel.draw(),
+            rate: self.gyro.draw(),
+        }
     }
 
     /// The noise of the next orientation, in sensor axes.
@@ -133,7 +164,12 @@ pub(crate) const DROPOUT_CHANNEL: u64 = 3;
 
 /// A key of 32 bytes: seed, two hashes of the name, channel.
 pub(crate) fn stream(seed: u64, placement: &str, channel: u64) -> ChaCha12Rng {
-    let words = [seed, fnv1a(placement, 0xcbf2_9ce4_8422_2325), fnv1a(placement, 0x9e37_79b9_7f4a_7c15), channel];
+    let words = [
+        seed,
+        fnv1a(placement, 0xcbf2_9ce4_8422_2325),
+        fnv1a(placement, 0x9e37_79b9_7f4a_7c15),
+        channel,
+    ];
     let mut key = [0; 32];
     for (bytes, word) in key.chunks_exact_mut(8).zip(words) {
         bytes.copy_from_slice(&word.to_le_bytes());
@@ -143,7 +179,9 @@ pub(crate) fn stream(seed: u64, placement: &str, channel: u64) -> ChaCha12Rng {
 
 /// Fowler, Noll and Vo's hash, which no version of a compiler or library changes.
 fn fnv1a(text: &str, start: u64) -> u64 {
-    text.bytes().fold(start, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3))
+    text.bytes().fold(start, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
+    })
 }
 
 #[cfg(test)]

@@ -36,17 +36,36 @@ fn noise_has_the_data_sheets_density() {
     let check = |of: &dyn Fn(&ImuSample) -> f64, mean: f64, sigma: f64| {
         let found = samples.iter().map(of).sum::<f64>() / n;
         let deviation = (samples.iter().map(|s| (of(s) - found).powi(2)).sum::<f64>() / n).sqrt();
-        assert!((found - mean).abs() < 5.0 * sigma / n.sqrt(), "{found} against {mean}");
-        assert!((deviation / sigma - 1.0).abs() < 4.0 / (2.0 * n).sqrt(), "{deviation} against {sigma}");
+        assert!(
+            (found - mean).abs() < 5.0 * sigma / n.sqrt(),
+            "{found} against {mean}"
+        );
+        assert!(
+            (deviation / sigma - 1.0).abs() < 4.0 / (2.0 * n).sqrt(),
+            "{deviation} against {sigma}"
+        );
     };
     for axis in 0..3 {
         check(&|s| s.specific_force[axis], [0.0, 0.0, 9.80665][axis], 0.02);
         check(&|s| s.angular_velocity[axis], 0.0, 0.003);
         check(&|s| s.world_from_sensor.scaled_axis()[axis], 0.0, 0.01);
     }
-    let cross: f64 = samples.iter().map(|s| s.specific_force.x * s.specific_force.y).sum::<f64>() / n / 0.0004;
-    let lagged: f64 = samples.windows(2).map(|w| w[0].specific_force.x * w[1].specific_force.x).sum::<f64>() / n / 0.0004;
-    assert!(cross.abs() < 4.0 / n.sqrt() && lagged.abs() < 4.0 / n.sqrt(), "white: {cross} {lagged}");
+    let cross: f64 = samples
+        .iter()
+        .map(|s| s.specific_force.x * s.specific_force.y)
+        .sum::<f64>()
+        / n
+        / 0.0004;
+    let lagged: f64 = samples
+        .windows(2)
+        .map(|w| w[0].specific_force.x * w[1].specific_force.x)
+        .sum::<f64>()
+        / n
+        / 0.0004;
+    assert!(
+        cross.abs() < 4.0 / n.sqrt() && lagged.abs() < 4.0 / n.sqrt(),
+        "white: {cross} {lagged}"
+    );
 }
 
 #[test]
@@ -57,8 +76,14 @@ fn noise_depends_on_seed_and_name_alone() {
     assert_ne!(wrist, noisy(&device(), 1, "ankle", 50));
     let in_threads: Vec<_> = std::thread::scope(|scope| {
         let names = ["ankle", "wrist", "head"];
-        let handles: Vec<_> = names.map(|name| scope.spawn(move || noisy(&device(), 1, name, 50))).into_iter().collect();
-        handles.into_iter().map(|handle| handle.join().unwrap()).collect()
+        let handles: Vec<_> = names
+            .map(|name| scope.spawn(move || noisy(&device(), 1, name, 50)))
+            .into_iter()
+            .collect();
+        handles
+            .into_iter()
+            .map(|handle| handle.join().unwrap())
+            .collect()
     });
     assert_eq!(in_threads[1], wrist);
     // The very numbers, so that no new version changes recordings unnoticed.
@@ -66,24 +91,40 @@ fn noise_depends_on_seed_and_name_alone() {
     assert!((first - FIRST_DRAW).norm() < 1e-12, "{first:?}");
 }
 
-const FIRST_DRAW: Vector3<f64> = Vector3::new(0.0241159696835406, -0.014761299141022033, -0.020284809834530293);
+const FIRST_DRAW: Vector3<f64> = Vector3::new(
+    0.0241159696835406,
+    -0.014761299141022033,
+    -0.020284809834530293,
+);
 
 #[test]
 fn a_device_without_error_changes_nothing() {
-    assert_eq!(noisy(&Device::ideal(), 3, "wrist", 20), (0..20).map(still).collect::<Vec<_>>());
+    assert_eq!(
+        noisy(&Device::ideal(), 3, "wrist", 20),
+        (0..20).map(still).collect::<Vec<_>>()
+    );
 }
 
 #[test]
 fn covariances_follow_rep_145() {
     let covariances = Covariances::of(&device(), 100.0);
-    assert!((covariances.linear_acceleration[4] - 4e-4).abs() < 1e-15 && covariances.linear_acceleration[1] == 0.0);
+    assert!(
+        (covariances.linear_acceleration[4] - 4e-4).abs() < 1e-15
+            && covariances.linear_acceleration[1] == 0.0
+    );
     assert!((covariances.angular_velocity[8] - 9e-6).abs() < 1e-18);
     assert!((covariances.orientation[0] - 1e-4).abs() < 1e-18);
     let raw = covariances.without_orientation();
-    assert_eq!(raw.orientation, [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    assert_eq!(
+        raw.orientation,
+        [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    );
     assert_eq!(raw.linear_acceleration, covariances.linear_acceleration);
     let unknown = Covariances::of(&Device::ideal(), 100.0);
-    assert_eq!((unknown.orientation, unknown.linear_acceleration), ([0.0; 9], [0.0; 9]));
+    assert_eq!(
+        (unknown.orientation, unknown.linear_acceleration),
+        ([0.0; 9], [0.0; 9])
+    );
 }
 
 #[test]
@@ -91,18 +132,40 @@ fn shipped_devices_are_sound_and_bad_ones_refused() {
     for (name, _) in EMBEDDED_DEVICES {
         Device::embedded(name).unwrap();
     }
-    assert!((Device::embedded("consumer_mems").unwrap().gyro_density() - 0.007_f64.to_radians()).abs() < 5e-7);
+    assert!(
+        (Device::embedded("consumer_mems").unwrap().gyro_density() - 0.007_f64.to_radians()).abs()
+            < 5e-7
+    );
     let unknown = Device::embedded("bmi999").unwrap_err().to_string();
-    assert!(unknown.contains("`bmi999`") && unknown.contains("consumer_mems"), "{unknown}");
+    assert!(
+        unknown.contains("`bmi999`") && unknown.contains("consumer_mems"),
+        "{unknown}"
+    );
     let refusal = |text: &str| Device::parse(text, "d.yaml").unwrap_err().to_string();
     let negative = refusal(&YAML.replace("0.002", "-0.002"));
-    assert_eq!(negative, "d.yaml: accel_density: -0.002 is not a finite number of at least zero");
-    assert!(refusal(&YAML.replace("[0.1,", "[.nan,")).contains("accel_bias: bias: NaN is out of range"));
+    assert_eq!(
+        negative,
+        "d.yaml: accel_density: -0.002 is not a finite number of at least zero"
+    );
+    assert!(
+        refusal(&YAML.replace("[0.1,", "[.nan,")).contains("accel_bias: bias: NaN is out of range")
+    );
     assert!(refusal(&YAML.replace("bias: [0.1", "bais: [0.1")).starts_with("d.yaml: "));
-    assert!(refusal(&YAML.replace("accel_bias, bias", "reference_tilt, rotvec")).contains("`reference_tilt` is an effect of a recording"));
+    assert!(
+        refusal(&YAML.replace("accel_bias, bias", "reference_tilt, rotvec"))
+            .contains("`reference_tilt` is an effect of a recording")
+    );
     assert!(refusal(&YAML.replace("accel_density", "accel_densty")).starts_with("d.yaml: "));
     assert!(refusal(&YAML.replace("device/1", "device/2")).contains("found `cromosim/device/2`"));
-    assert!(Device::resolve(Some("none.yaml"), std::path::Path::new("nowhere")).unwrap_err().to_string().contains("none.yaml"));
-    assert_eq!(Device::resolve(None, std::path::Path::new("")).unwrap(), Device::ideal());
+    assert!(
+        Device::resolve(Some("none.yaml"), std::path::Path::new("nowhere"))
+            .unwrap_err()
+            .to_string()
+            .contains("none.yaml")
+    );
+    assert_eq!(
+        Device::resolve(None, std::path::Path::new("")).unwrap(),
+        Device::ideal()
+    );
     assert!(NoiseSource::new(&device(), 0.0, 1, "x").is_err());
 }

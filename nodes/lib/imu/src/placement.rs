@@ -10,7 +10,8 @@ use crate::{PlacementProblem, Scheme};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Follow {
-    /// To the triangle of the skin under it: it moves and turns with the soft tissue that the body model shows.
+    /// To the triangle of the skin under it: it moves and turns with the soft tissue that the body
+    /// model shows.
     #[default]
     Skin,
     /// To the segment, rigidly, where the site is at rest.
@@ -29,14 +30,16 @@ pub enum SiteChoice {
         /// Weights of its corners.
         barycentrics: [f64; 3],
     },
-    /// By the skin nearest to a point of the mean body in T-pose, m, model frame (x left, y up, z forward).
+    /// By the skin nearest to a point of the mean body in T-pose, m, model frame (x left, y up, z
+    /// forward).
     NearestTo(Vector3<f64>),
 }
 
 /// No IMU is read faster, Hz; higher rates are typing errors that would fill the memory.
 pub const MAX_RATE_HZ: f64 = 1e5;
 
-/// One sensor on a body; parsed, so valid: the name can stand in a ROS topic, the rate is positive, the mount is a rotation.
+/// One sensor on a body; parsed, so valid: the name can stand in a ROS topic, the rate is positive,
+/// the mount is a rotation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placement {
     pub(crate) name: String,
@@ -50,13 +53,24 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// A placement at a named site with the defaults: mounted as the site's frame, on the skin and following it, without noise.
+    /// A placement at a named site with the defaults: mounted as the site's frame, on the skin and
+    /// following it, without noise.
     ///
     /// # Errors
-    /// [`PlacementProblem`] for a name that is no ROS name, or a rate that is not positive; with the field's name.
-    pub fn at_site(name: &str, site: &str, rate_hz: f64) -> Result<Self, (&'static str, PlacementProblem)> {
-        RawPlacement { name: Some(name.to_owned()), site: Some(site.to_owned()), rate_hz: Some(rate_hz), ..RawPlacement::default() }
-            .parse(&RawDefaults::default())
+    /// [`PlacementProblem`] for a name that is no ROS name, or a rate that is not positive; with
+    /// the field's name.
+    pub fn at_site(
+        name: &str,
+        site: &str,
+        rate_hz: f64,
+    ) -> Result<Self, (&'static str, PlacementProblem)> {
+        RawPlacement {
+            name: Some(name.to_owned()),
+            site: Some(site.to_owned()),
+            rate_hz: Some(rate_hz),
+            ..RawPlacement::default()
+        }
+        .parse(&RawDefaults::default())
     }
 
     /// Name: of the topic `imu/NAME/data_raw` and the frame `NAME_imu`.
@@ -181,18 +195,35 @@ impl RawPlacement {
         if !is_ros_name(&name) {
             return Err(("name", PlacementProblem::BadName { name }));
         }
-        let rate_hz = self.rate_hz.or(defaults.rate_hz).ok_or(("rate_hz", PlacementProblem::Missing))?;
+        let rate_hz = self
+            .rate_hz
+            .or(defaults.rate_hz)
+            .ok_or(("rate_hz", PlacementProblem::Missing))?;
         if !(rate_hz > 0.0 && rate_hz <= MAX_RATE_HZ) {
-            return Err(("rate_hz", PlacementProblem::OutOfRange { value: rate_hz, range: "it must be positive, at most 100000" }));
+            return Err((
+                "rate_hz",
+                PlacementProblem::OutOfRange {
+                    value: rate_hz,
+                    range: "it must be positive, at most 100000",
+                },
+            ));
         }
         let skin_distance = self.skin_distance.unwrap_or(0.0);
         if !(-0.2..=0.2).contains(&skin_distance) {
-            return Err(("skin_distance", PlacementProblem::OutOfRange { value: skin_distance, range: "metres, from -0.2 to 0.2" }));
+            return Err((
+                "skin_distance",
+                PlacementProblem::OutOfRange {
+                    value: skin_distance,
+                    range: "metres, from -0.2 to 0.2",
+                },
+            ));
         }
         Ok(Placement {
             name,
             site,
-            mount: self.mount.map_or(Ok(UnitQuaternion::identity()), RawRotation::parse)?,
+            mount: self
+                .mount
+                .map_or(Ok(UnitQuaternion::identity()), RawRotation::parse)?,
             skin_distance,
             follow: self.follow.or(defaults.follow).unwrap_or_default(),
             rate_hz,
@@ -203,15 +234,26 @@ impl RawPlacement {
 
     fn parse_site(&self) -> Field<SiteChoice> {
         let by_triangle = self.triangle.is_some() || self.barycentrics.is_some();
-        let given = usize::from(self.site.is_some()) + usize::from(by_triangle) + usize::from(self.point.is_some());
+        let given = usize::from(self.site.is_some())
+            + usize::from(by_triangle)
+            + usize::from(self.point.is_some());
         match (&self.site, self.triangle, self.barycentrics, self.point) {
             _ if given != 1 => Err(("site", PlacementProblem::OneSite { given })),
             (Some(name), ..) => Ok(SiteChoice::Named(name.clone())),
             (_, _, _, Some(point)) => match point.iter().find(|x| !x.is_finite()) {
-                Some(&value) => Err(("point", PlacementProblem::OutOfRange { value, range: "metres, finite" })),
+                Some(&value) => Err((
+                    "point",
+                    PlacementProblem::OutOfRange {
+                        value,
+                        range: "metres, finite",
+                    },
+                )),
                 None => Ok(SiteChoice::NearestTo(point.into())),
             },
-            (_, Some(triangle), Some(barycentrics), _) => Ok(SiteChoice::Triangle { triangle, barycentrics }),
+            (_, Some(triangle), Some(barycentrics), _) => Ok(SiteChoice::Triangle {
+                triangle,
+                barycentrics,
+            }),
             (_, None, ..) => Err(("triangle", PlacementProblem::Missing)),
             (_, _, None, _) => Err(("barycentrics", PlacementProblem::Missing)),
         }
@@ -220,7 +262,14 @@ impl RawPlacement {
 
 impl RawRotation {
     fn parse(self) -> Field<UnitQuaternion<f64>> {
-        let given = [self.rotvec.is_some(), self.quaternion_xyzw.is_some(), self.matrix.is_some()].into_iter().filter(|g| *g).count();
+        let given = [
+            self.rotvec.is_some(),
+            self.quaternion_xyzw.is_some(),
+            self.matrix.is_some(),
+        ]
+        .into_iter()
+        .filter(|g| *g)
+        .count();
         if given != 1 {
             return Err(("mount", PlacementProblem::OneRotation { given }));
         }
@@ -233,13 +282,25 @@ impl RawRotation {
             let quaternion = Quaternion::new(w, x, y, z);
             let norm = quaternion.norm();
             if norm.is_nan() || (norm - 1.0).abs() > ROTATION_TOLERANCE {
-                return Err(("mount.quaternion_xyzw", PlacementProblem::OutOfRange { value: norm, range: "the norm must be 1" }));
+                return Err((
+                    "mount.quaternion_xyzw",
+                    PlacementProblem::OutOfRange {
+                        value: norm,
+                        range: "the norm must be 1",
+                    },
+                ));
             }
             return Ok(UnitQuaternion::new_normalize(quaternion));
         }
         let rotvec = Vector3::from(self.rotvec.unwrap_or_default());
         if !rotvec.norm().is_finite() {
-            return Err(("mount.rotvec", PlacementProblem::OutOfRange { value: rotvec.norm(), range: "radians, finite" }));
+            return Err((
+                "mount.rotvec",
+                PlacementProblem::OutOfRange {
+                    value: rotvec.norm(),
+                    range: "radians, finite",
+                },
+            ));
         }
         Ok(so3::exp(&rotvec))
     }
@@ -248,7 +309,10 @@ impl RawRotation {
 impl From<&Placement> for RawPlacement {
     fn from(placement: &Placement) -> Self {
         let mut raw = Self {
-            mount: Some(RawRotation { quaternion_xyzw: Some(placement.mount.coords.into()), ..RawRotation::default() }),
+            mount: Some(RawRotation {
+                quaternion_xyzw: Some(placement.mount.coords.into()),
+                ..RawRotation::default()
+            }),
             skin_distance: Some(placement.skin_distance),
             follow: Some(placement.follow),
             rate_hz: Some(placement.rate_hz),
@@ -258,15 +322,21 @@ impl From<&Placement> for RawPlacement {
         };
         match &placement.site {
             SiteChoice::Named(name) => raw.site = Some(name.clone()),
-            SiteChoice::Triangle { triangle, barycentrics } => (raw.triangle, raw.barycentrics) = (Some(*triangle), Some(*barycentrics)),
+            SiteChoice::Triangle {
+                triangle,
+                barycentrics,
+            } => (raw.triangle, raw.barycentrics) = (Some(*triangle), Some(*barycentrics)),
             SiteChoice::NearestTo(point) => raw.point = Some((*point).into()),
         }
         raw
     }
 }
 
-/// A token of a ROS 2 topic name: letters, digits and single underscores, not starting with a digit.
+/// A token of a ROS 2 topic name: letters, digits and single underscores, not starting with a
+/// digit.
 fn is_ros_name(name: &str) -> bool {
     let starts_well = name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_');
-    starts_well && !name.contains("__") && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+    starts_well
+        && !name.contains("__")
+        && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
 }

@@ -22,10 +22,12 @@ const FULL17: &str = include_str!("../../../../config/placements/full17.yaml");
 ///   pocket: {point: [0.17, -0.42, 0.07], skin_distance: 0.01, mount: {rotvec: [0, 0, 1.5708]}, follow: segment}
 ///   shin: {triangle: 1958, barycentrics: [0.7, 0.2, 0.1], rate_hz: 200, scheme: richardson}
 /// ```
-/// `placements` may also be a list whose entries have a `name`. A placement has one of `site`, `triangle` with `barycentrics` and `point`
-/// (m, model frame in T-pose); `mount` (site_from_sensor) is one of `rotvec` (rad), `quaternion_xyzw` and `matrix` (rows); `skin_distance`
-/// is in m (default 0); `follow` is `skin` (default) or `segment`; `scheme` as [`crate::Scheme`] (default spline); `device` as
-/// [`crate::Device::resolve`] (default: no error); `rate_hz` must be given here or under `defaults`.
+/// `placements` may also be a list whose entries have a `name`. A placement has one of `site`,
+/// `triangle` with `barycentrics` and `point` (m, model frame in T-pose); `mount`
+/// (site_from_sensor) is one of `rotvec` (rad), `quaternion_xyzw` and `matrix` (rows);
+/// `skin_distance` is in m (default 0); `follow` is `skin` (default) or `segment`; `scheme` as
+/// [`crate::Scheme`] (default spline); `device` as [`crate::Device::resolve`] (default: no error);
+/// `rate_hz` must be given here or under `defaults`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlacementSet {
     placements: Vec<Placement>,
@@ -44,25 +46,47 @@ impl PlacementSet {
     /// Parses a file's text; `file` names it in errors.
     ///
     /// # Errors
-    /// [`ImuError::Yaml`], [`ImuError::Schema`] or [`ImuError::Placement`], naming file, placement and field.
+    /// [`ImuError::Yaml`], [`ImuError::Schema`] or [`ImuError::Placement`], naming file, placement
+    /// and field.
     pub fn parse(text: &str, file: &str) -> Result<Self, ImuError> {
-        let raw: RawFile = serde_norway::from_str(text).map_err(|source| ImuError::Yaml { file: file.to_owned(), source })?;
+        let raw: RawFile = serde_norway::from_str(text).map_err(|source| ImuError::Yaml {
+            file: file.to_owned(),
+            source,
+        })?;
         if raw.schema != SCHEMA {
-            return Err(ImuError::Schema { file: file.to_owned(), expected: SCHEMA, found: raw.schema });
+            return Err(ImuError::Schema {
+                file: file.to_owned(),
+                expected: SCHEMA,
+                found: raw.schema,
+            });
         }
         let mut placements: Vec<Placement> = Vec::new();
         for (label, value) in entries(raw.placements, file)? {
-            let refuse = |(field, problem)| ImuError::Placement { file: file.to_owned(), placement: label.clone(), field, problem };
-            let raw_placement: RawPlacement = serde_norway::from_value(value).map_err(|error| refuse(malformed(&error)))?;
+            let refuse = |(field, problem)| ImuError::Placement {
+                file: file.to_owned(),
+                placement: label.clone(),
+                field,
+                problem,
+            };
+            let raw_placement: RawPlacement =
+                serde_norway::from_value(value).map_err(|error| refuse(malformed(&error)))?;
             let placement = raw_placement.parse(&raw.defaults).map_err(refuse)?;
-            if placements.iter().any(|other| other.name() == placement.name()) {
+            if placements
+                .iter()
+                .any(|other| other.name() == placement.name())
+            {
                 return Err(refuse(("name", PlacementProblem::Duplicate)));
             }
             placements.push(placement);
         }
         if placements.is_empty() {
             let (placement, field) = ("(all)".to_owned(), "placements");
-            return Err(ImuError::Placement { file: file.to_owned(), placement, field, problem: PlacementProblem::Missing });
+            return Err(ImuError::Placement {
+                file: file.to_owned(),
+                placement,
+                field,
+                problem: PlacementProblem::Missing,
+            });
         }
         Ok(Self { placements })
     }
@@ -72,7 +96,10 @@ impl PlacementSet {
     /// # Errors
     /// As [`PlacementSet::parse`], and [`ImuError::Unreadable`].
     pub fn read(path: &Path) -> Result<Self, ImuError> {
-        let text = std::fs::read_to_string(path).map_err(|source| ImuError::Unreadable { file: path.to_owned(), source })?;
+        let text = std::fs::read_to_string(path).map_err(|source| ImuError::Unreadable {
+            file: path.to_owned(),
+            source,
+        })?;
         Self::parse(&text, &path.display().to_string())
     }
 
@@ -93,55 +120,108 @@ impl PlacementSet {
 
     /// The placement of a name.
     pub fn get(&self, name: &str) -> Option<&Placement> {
-        self.placements.iter().find(|placement| placement.name() == name)
+        self.placements
+            .iter()
+            .find(|placement| placement.name() == name)
     }
 
     /// The placements with what `change` makes of each: one rate or one scheme for all, say.
     #[must_use]
     pub fn map(self, change: impl FnMut(Placement) -> Placement) -> Self {
-        Self { placements: self.placements.into_iter().map(change).collect() }
+        Self {
+            placements: self.placements.into_iter().map(change).collect(),
+        }
     }
 
     /// The resolved placements as a file, every value written out.
     pub fn to_yaml(&self) -> String {
-        let entry = |placement: &Placement| (Value::from(placement.name()), serde_norway::to_value(RawPlacement::from(placement)));
-        let map = |(name, value): (Value, Result<Value, _>)| (name, value.expect("numbers and strings can be written"));
+        let entry = |placement: &Placement| {
+            (
+                Value::from(placement.name()),
+                serde_norway::to_value(RawPlacement::from(placement)),
+            )
+        };
+        let map = |(name, value): (Value, Result<Value, _>)| {
+            (name, value.expect("numbers and strings can be written"))
+        };
         let placements: Mapping = self.placements.iter().map(entry).map(map).collect();
-        let file = RawFile { schema: SCHEMA.to_owned(), defaults: RawDefaults::default(), placements: Value::Mapping(placements) };
+        let file = RawFile {
+            schema: SCHEMA.to_owned(),
+            defaults: RawDefaults::default(),
+            placements: Value::Mapping(placements),
+        };
         serde_norway::to_string(&file).expect("numbers and strings can be written")
     }
 }
 
 /// The placements' labels and fields, with the key of a map as the name.
 fn entries(value: Value, file: &str) -> Result<Vec<(String, Value)>, ImuError> {
-    let refuse = |placement: String, field, problem| Err(ImuError::Placement { file: file.to_owned(), placement, field, problem });
+    let refuse = |placement: String, field, problem| {
+        Err(ImuError::Placement {
+            file: file.to_owned(),
+            placement,
+            field,
+            problem,
+        })
+    };
     match value {
         Value::Mapping(map) => {
             let mut entries = Vec::with_capacity(map.len());
             for (key, mut value) in map {
                 let Value::String(name) = key else {
-                    return refuse(format!("{key:?}"), "name", PlacementProblem::Malformed { message: "the name must be a string".into() });
+                    return refuse(
+                        format!("{key:?}"),
+                        "name",
+                        PlacementProblem::Malformed {
+                            message: "the name must be a string".into(),
+                        },
+                    );
                 };
                 if let Value::Mapping(fields) = &mut value
                     && fields.insert("name".into(), name.as_str().into()).is_some()
                 {
-                    return refuse(name, "name", PlacementProblem::Malformed { message: "given twice, as the key and inside".into() });
+                    return refuse(
+                        name,
+                        "name",
+                        PlacementProblem::Malformed {
+                            message: "given twice, as the key and inside".into(),
+                        },
+                    );
                 }
                 entries.push((name, value));
             }
             Ok(entries)
         }
         Value::Sequence(list) => {
-            let label =
-                |k: usize, value: &Value| value.get("name").and_then(Value::as_str).map_or_else(|| format!("#{}", k + 1), str::to_owned);
-            Ok(list.into_iter().enumerate().map(|(k, value)| (label(k, &value), value)).collect())
+            let label = |k: usize, value: &Value| {
+                value
+                    .get("name")
+                    .and_then(Value::as_str)
+                    .map_or_else(|| format!("#{}", k + 1), str::to_owned)
+            };
+            Ok(list
+                .into_iter()
+                .enumerate()
+                .map(|(k, value)| (label(k, &value), value))
+                .collect())
         }
-        _ => refuse("(all)".into(), "placements", PlacementProblem::Malformed { message: "expected a map or a list".into() }),
+        _ => refuse(
+            "(all)".into(),
+            "placements",
+            PlacementProblem::Malformed {
+                message: "expected a map or a list".into(),
+            },
+        ),
     }
 }
 
 fn malformed(error: &serde_norway::Error) -> (&'static str, PlacementProblem) {
-    ("fields", PlacementProblem::Malformed { message: error.to_string() })
+    (
+        "fields",
+        PlacementProblem::Malformed {
+            message: error.to_string(),
+        },
+    )
 }
 
 #[cfg(test)]

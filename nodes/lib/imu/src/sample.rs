@@ -42,9 +42,11 @@ pub struct ImuSample {
 }
 
 impl KinematicSample {
-    /// What an error-free sensor reads: `a_S = R_SB^-1 R_BG^-1 (a_G - g)` and `w_S = R_SB^-1 R_BG^-1 w_G`.
+    /// What an error-free sensor reads: `a_S = R_SB^-1 R_BG^-1 (a_G - g)` and `w_S = R_SB^-1
+    /// R_BG^-1 w_G`.
     pub fn imu(&self) -> ImuSample {
-        // world_from_sensor = world_from_site * site_from_sensor, so its inverse is R_SB^-1 R_BG^-1.
+        // world_from_sensor = world_from_site * site_from_sensor, so its inverse is R_SB^-1
+        // R_BG^-1.
         let sensor_from_world = self.world_from_sensor.rotation.inverse();
         ImuSample {
             stamp: self.stamp,

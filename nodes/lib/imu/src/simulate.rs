@@ -5,35 +5,55 @@ use nalgebra::{Isometry3, Vector3};
 
 use crate::schemes::spline::{self, SplineVariance};
 use crate::uncertainty::{FrameWeights, any_error};
-use crate::{ImuError, ImuSample, KinematicSample, SampleVariance, Scheme, SensorFrame, SensorTrajectory};
+use crate::{
+    ImuError, ImuSample, KinematicSample, SampleVariance, Scheme, SensorFrame, SensorTrajectory,
+};
 
-/// The error-free readings at `output` stamps, in any order. Stamps before the first or after the last frame read what the end reads.
+/// The error-free readings at `output` stamps, in any order. Stamps before the first or after the
+/// last frame read what the end reads.
 ///
-/// The spline is evaluated at the stamps. The other schemes exist at the frames alone; in between a cubic through the four nearest frames
-/// is taken of acceleration, angular velocity, position and the rotation vector since the frame before (errors O(h^4)). At a frame's own stamp its
-/// estimate comes out unchanged.
+/// The spline is evaluated at the stamps. The other schemes exist at the frames alone; in between a
+/// cubic through the four nearest frames is taken of acceleration, angular velocity, position and
+/// the rotation vector since the frame before (errors O(h^4)). At a frame's own stamp its estimate
+/// comes out unchanged.
 ///
 /// # Errors
 /// [`ImuError::Trajectory`] where the spline's equations cannot be solved.
-pub fn simulate(trajectory: &SensorTrajectory, scheme: Scheme, output: &[Stamp]) -> Result<Vec<ImuSample>, ImuError> {
-    Ok(simulate_kinematics(trajectory, scheme, output)?.iter().map(KinematicSample::imu).collect())
+pub fn simulate(
+    trajectory: &SensorTrajectory,
+    scheme: Scheme,
+    output: &[Stamp],
+) -> Result<Vec<ImuSample>, ImuError> {
+    Ok(simulate_kinematics(trajectory, scheme, output)?
+        .iter()
+        .map(KinematicSample::imu)
+        .collect())
 }
 
 /// As [`simulate`], in world axes and with the position.
 ///
 /// # Errors
 /// As [`simulate`].
-pub fn simulate_kinematics(trajectory: &SensorTrajectory, scheme: Scheme, output: &[Stamp]) -> Result<Vec<KinematicSample>, ImuError> {
+pub fn simulate_kinematics(
+    trajectory: &SensorTrajectory,
+    scheme: Scheme,
+    output: &[Stamp],
+) -> Result<Vec<KinematicSample>, ImuError> {
     match scheme {
         Scheme::Spline => {
-            let stamps: Vec<_> = trajectory.frames().iter().map(|frame| frame.stamp).collect();
+            let stamps: Vec<_> = trajectory
+                .frames()
+                .iter()
+                .map(|frame| frame.stamp)
+                .collect();
             simulate_kinematics_on(&PoseTimes::new(&stamps)?, trajectory, scheme, output)
         }
         _ => Ok(by_differences(trajectory, scheme, output)),
     }
 }
 
-/// As [`simulate_kinematics`], with the spline equations of the trajectory's stamps, which all placements of a clip can share.
+/// As [`simulate_kinematics`], with the spline equations of the trajectory's stamps, which all
+/// placements of a clip can share.
 ///
 /// # Errors
 /// As [`simulate`], also where `times` has another number of stamps than the trajectory has frames.
@@ -50,28 +70,53 @@ pub fn simulate_kinematics_on(
     let errors = SplineVariance::new(times, &fitted, trajectory.frames())?;
     let sample = |&stamp: &Stamp| {
         let held = stamp.clamp(trajectory.start(), trajectory.end());
-        let variance = errors.as_ref().map(|errors| errors.at(held)).unwrap_or_default();
-        KinematicSample { stamp, variance, ..spline::sample(&fitted, held) }
+        let variance = errors
+            .as_ref()
+            .map(|errors| errors.at(held))
+            .unwrap_or_default();
+        KinematicSample {
+            stamp,
+            variance,
+            ..spline::sample(&fitted, held)
+        }
     };
     Ok(output.iter().map(sample).collect())
 }
 
-fn by_differences(trajectory: &SensorTrajectory, scheme: Scheme, output: &[Stamp]) -> Vec<KinematicSample> {
+fn by_differences(
+    trajectory: &SensorTrajectory,
+    scheme: Scheme,
+    output: &[Stamp],
+) -> Vec<KinematicSample> {
     let frames = trajectory.frames();
-    let at_frames: Vec<_> = (0..frames.len()).map(|k| at_frame(scheme, frames, k)).collect();
+    let at_frames: Vec<_> = (0..frames.len())
+        .map(|k| at_frame(scheme, frames, k))
+        .collect();
     let sample = |&stamp: &Stamp| {
         let held = stamp.clamp(trajectory.start(), trajectory.end());
-        KinematicSample { stamp, variance: stencil_variance(scheme, frames, held), ..between_frames(&at_frames, held) }
+        KinematicSample {
+            stamp,
+            variance: stencil_variance(scheme, frames, held),
+            ..between_frames(&at_frames, held)
+        }
     };
     output.iter().map(sample).collect()
 }
 
 /// What errors of the frames leave in a stencil's sample.
-pub(crate) fn stencil_variance(scheme: Scheme, frames: &[SensorFrame], stamp: Stamp) -> SampleVariance {
+pub(crate) fn stencil_variance(
+    scheme: Scheme,
+    frames: &[SensorFrame],
+    stamp: Stamp,
+) -> SampleVariance {
     // A sample rests on the frames within two estimates and their reach.
     let after = frames.partition_point(|frame| frame.stamp < stamp);
     let near = &frames[after.saturating_sub(8)..(after + 8).min(frames.len())];
-    if any_error(near) { FrameWeights::of_stencil(scheme, frames, stamp).variance(frames) } else { SampleVariance::default() }
+    if any_error(near) {
+        FrameWeights::of_stencil(scheme, frames, stamp).variance(frames)
+    } else {
+        SampleVariance::default()
+    }
 }
 
 /// The estimate of a scheme with a stencil at one of its frames.
@@ -89,7 +134,9 @@ pub(crate) fn at_frame(scheme: Scheme, frames: &[SensorFrame], k: usize) -> Kine
 
 /// Cubic interpolation of estimates at frames; `stamp` lies within them.
 pub(crate) fn between_frames(at_frames: &[KinematicSample], stamp: Stamp) -> KinematicSample {
-    let after = at_frames.partition_point(|sample| sample.stamp < stamp).min(at_frames.len() - 1);
+    let after = at_frames
+        .partition_point(|sample| sample.stamp < stamp)
+        .min(at_frames.len() - 1);
     if at_frames[after].stamp == stamp {
         return at_frames[after];
     }
@@ -102,14 +149,23 @@ pub(crate) fn between_frames(at_frames: &[KinematicSample], stamp: Stamp) -> Kin
     }
     let weights = derivative_weights(&seconds[..width], 0.0)[0];
     let sum = |of: &dyn Fn(&KinematicSample) -> Vector3<f64>| -> Vector3<f64> {
-        around.iter().zip(weights).map(|(sample, weight)| of(sample) * weight).sum()
+        around
+            .iter()
+            .zip(weights)
+            .map(|(sample, weight)| of(sample) * weight)
+            .sum()
     };
     let before = at_frames[after.saturating_sub(1)].world_from_sensor;
-    let turn = sum(&|sample| so3::log(&(sample.world_from_sensor.rotation * before.rotation.inverse())));
-    let step = sum(&|sample| sample.world_from_sensor.translation.vector - before.translation.vector);
+    let turn =
+        sum(&|sample| so3::log(&(sample.world_from_sensor.rotation * before.rotation.inverse())));
+    let step =
+        sum(&|sample| sample.world_from_sensor.translation.vector - before.translation.vector);
     KinematicSample {
         stamp,
-        world_from_sensor: Isometry3::from_parts((before.translation.vector + step).into(), so3::exp(&turn) * before.rotation),
+        world_from_sensor: Isometry3::from_parts(
+            (before.translation.vector + step).into(),
+            so3::exp(&turn) * before.rotation,
+        ),
         acceleration: sum(&|sample| sample.acceleration),
         angular_velocity: sum(&|sample| sample.angular_velocity),
         angular_acceleration: None,

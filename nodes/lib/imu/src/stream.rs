@@ -13,30 +13,41 @@ use crate::{ImuError, ImuSample, KinematicSample, Scheme, SensorFrame};
 pub struct StreamOptions {
     /// Nominal rate of the frames, Hz: it sets the delay.
     pub input_rate_hz: f64,
-    /// Rate of the samples, Hz, on a grid that starts at the first frame; `None` gives a sample for every frame, at its stamp.
+    /// Rate of the samples, Hz, on a grid that starts at the first frame; `None` gives a sample for
+    /// every frame, at its stamp.
     pub output_rate_hz: Option<f64>,
-    /// A pause longer than this (s) between frames ends the series; another begins, and no sample is made up in between.
+    /// A pause longer than this (s) between frames ends the series; another begins, and no sample
+    /// is made up in between.
     pub longest_gap: f64,
 }
 
 impl StreamOptions {
     /// Samples at `output_rate_hz` from frames at `input_rate_hz`; series end at pauses of 0.5 s.
     pub fn resampled(input_rate_hz: f64, output_rate_hz: f64) -> Self {
-        Self { input_rate_hz, output_rate_hz: Some(output_rate_hz), longest_gap: 0.5 }
+        Self {
+            input_rate_hz,
+            output_rate_hz: Some(output_rate_hz),
+            longest_gap: 0.5,
+        }
     }
 
     /// A sample for every frame.
     pub fn at_frames(input_rate_hz: f64) -> Self {
-        Self { input_rate_hz, output_rate_hz: None, longest_gap: 0.5 }
+        Self {
+            input_rate_hz,
+            output_rate_hz: None,
+            longest_gap: 0.5,
+        }
     }
 }
 
-/// A scheme over a sliding window. The same frames give the same samples; a sample comes out with the first frame that is
-/// [`StreamingImu::delay_seconds`] later than it.
+/// A scheme over a sliding window. The same frames give the same samples; a sample comes out with
+/// the first frame that is [`StreamingImu::delay_seconds`] later than it.
 ///
-/// Delay, in frames at the nominal rate: 2 for Richardson and 1 for the other stencils, 2 more where the output has its own rate (cubic
-/// interpolation); 10 for the spline, which is fitted to the last 43 frames and smoothed as the last 128 frames ask for. Away from the
-/// start, stencils read exactly what [`crate::simulate`] reads; the spline comes close.
+/// Delay, in frames at the nominal rate: 2 for Richardson and 1 for the other stencils, 2 more
+/// where the output has its own rate (cubic interpolation); 10 for the spline, which is fitted to
+/// the last 43 frames and smoothed as the last 128 frames ask for. Away from the start, stencils
+/// read exactly what [`crate::simulate`] reads; the spline comes close.
 #[derive(Clone, Debug)]
 pub struct StreamingImu {
     scheme: Scheme,
@@ -63,7 +74,11 @@ impl StreamingImu {
     /// [`ImuError::Trajectory`] for rates that are not positive.
     pub fn new(scheme: Scheme, options: StreamOptions) -> Result<Self, ImuError> {
         let rates = [Some(options.input_rate_hz), options.output_rate_hz];
-        if let Some(rate_hz) = rates.into_iter().flatten().find(|rate| !(*rate > 0.0 && rate.is_finite())) {
+        if let Some(rate_hz) = rates
+            .into_iter()
+            .flatten()
+            .find(|rate| !(*rate > 0.0 && rate.is_finite()))
+        {
             return Err(SpatialError::BadRate { rate_hz }.into());
         }
         let frames = match (scheme.reach(), options.output_rate_hz) {
@@ -73,7 +88,15 @@ impl StreamingImu {
         };
         let delay = frames as f64 / options.input_rate_hz;
         let (window, pending) = (Vec::with_capacity(2 * KEPT_FRAMES), VecDeque::new());
-        Ok(Self { scheme, options, delay, window, pending, grid: None, fixed_lag: FixedLag::default() })
+        Ok(Self {
+            scheme,
+            options,
+            delay,
+            window,
+            pending,
+            grid: None,
+            fixed_lag: FixedLag::default(),
+        })
     }
 
     /// Time between a sample's stamp and the frame that releases it, s.
@@ -89,23 +112,34 @@ impl StreamingImu {
     /// Takes a frame; returns the samples that it releases, in order.
     ///
     /// # Errors
-    /// [`ImuError::FrameNotIncreasing`] or [`ImuError::FrameNotFinite`]; the frame is then left out, and the stream goes on with the next.
+    /// [`ImuError::FrameNotIncreasing`] or [`ImuError::FrameNotFinite`]; the frame is then left
+    /// out, and the stream goes on with the next.
     pub fn push(&mut self, frame: SensorFrame) -> Result<Vec<ImuSample>, ImuError> {
-        Ok(self.push_kinematics(frame)?.iter().map(KinematicSample::imu).collect())
+        Ok(self
+            .push_kinematics(frame)?
+            .iter()
+            .map(KinematicSample::imu)
+            .collect())
     }
 
     /// As [`StreamingImu::push`], in world axes and with the position.
     ///
     /// # Errors
     /// As [`StreamingImu::push`].
-    pub fn push_kinematics(&mut self, frame: SensorFrame) -> Result<Vec<KinematicSample>, ImuError> {
+    pub fn push_kinematics(
+        &mut self,
+        frame: SensorFrame,
+    ) -> Result<Vec<KinematicSample>, ImuError> {
         if !frame.is_finite() {
             return Err(ImuError::FrameNotFinite { stamp: frame.stamp });
         }
         let mut released = Vec::new();
         if let Some(last) = self.window.last() {
             if frame.stamp <= last.stamp {
-                return Err(ImuError::FrameNotIncreasing { previous: last.stamp, next: frame.stamp });
+                return Err(ImuError::FrameNotIncreasing {
+                    previous: last.stamp,
+                    next: frame.stamp,
+                });
             }
             if frame.stamp - last.stamp > self.options.longest_gap {
                 released = self.finish_kinematics()?;
@@ -117,19 +151,27 @@ impl StreamingImu {
         }
         self.window.push(frame);
         if self.scheme == Scheme::Spline {
-            self.fixed_lag.learn(&self.window[self.window.len().saturating_sub(KEPT_FRAMES)..]);
+            self.fixed_lag
+                .learn(&self.window[self.window.len().saturating_sub(KEPT_FRAMES)..]);
         }
-        let limit = frame.stamp.plus_seconds(EARLY / self.options.input_rate_hz - self.delay);
+        let limit = frame
+            .stamp
+            .plus_seconds(EARLY / self.options.input_rate_hz - self.delay);
         self.release(limit, &mut released)?;
         Ok(released)
     }
 
-    /// Ends the series: the samples up to the last frame, as far as they are still to come. The output grid goes on where it was.
+    /// Ends the series: the samples up to the last frame, as far as they are still to come. The
+    /// output grid goes on where it was.
     ///
     /// # Errors
     /// As [`StreamingImu::push`].
     pub fn finish(&mut self) -> Result<Vec<ImuSample>, ImuError> {
-        Ok(self.finish_kinematics()?.iter().map(KinematicSample::imu).collect())
+        Ok(self
+            .finish_kinematics()?
+            .iter()
+            .map(KinematicSample::imu)
+            .collect())
     }
 
     /// As [`StreamingImu::finish`], in world axes and with the position.
@@ -155,7 +197,8 @@ impl StreamingImu {
         self.fixed_lag = FixedLag::default();
     }
 
-    /// Notes the samples that fall after the last frame and up to `now`; within a series, so not into a gap.
+    /// Notes the samples that fall after the last frame and up to `now`; within a series, so not
+    /// into a gap.
     fn note_pending(&mut self, now: Stamp) {
         let Some(rate_hz) = self.options.output_rate_hz else {
             self.pending.push_back(now);
@@ -179,7 +222,11 @@ impl StreamingImu {
     }
 
     /// Estimates the pending samples up to `limit`.
-    fn release(&mut self, limit: Stamp, released: &mut Vec<KinematicSample>) -> Result<(), ImuError> {
+    fn release(
+        &mut self,
+        limit: Stamp,
+        released: &mut Vec<KinematicSample>,
+    ) -> Result<(), ImuError> {
         let count = self.pending.partition_point(|stamp| *stamp <= limit);
         if count == 0 || self.window.len() < 2 {
             return Ok(());
@@ -190,19 +237,27 @@ impl StreamingImu {
         }
         for stamp in due {
             let variance = stencil_variance(self.scheme, &self.window, stamp);
-            released.push(KinematicSample { variance, ..self.by_stencil(stamp) });
+            released.push(KinematicSample {
+                variance,
+                ..self.by_stencil(stamp)
+            });
         }
         Ok(())
     }
 
     fn by_stencil(&self, stamp: Stamp) -> KinematicSample {
-        let after = self.window.partition_point(|frame| frame.stamp < stamp).min(self.window.len() - 1);
+        let after = self
+            .window
+            .partition_point(|frame| frame.stamp < stamp)
+            .min(self.window.len() - 1);
         if self.window[after].stamp == stamp {
             return at_frame(self.scheme, &self.window, after);
         }
         let width = self.window.len().min(4);
         let start = after.saturating_sub(2).min(self.window.len() - width);
-        let around: Vec<_> = (start..start + width).map(|k| at_frame(self.scheme, &self.window, k)).collect();
+        let around: Vec<_> = (start..start + width)
+            .map(|k| at_frame(self.scheme, &self.window, k))
+            .collect();
         between_frames(&around, stamp)
     }
 }

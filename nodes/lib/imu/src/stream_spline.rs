@@ -1,7 +1,8 @@
 //! The spline scheme, live: a window with a fixed lag, smoothed as the frames so far ask for.
 
 use cromosim_spatial::{
-    PoseSmoothing, PoseSpline, PoseTimes, Smoothing, SplineSystem, Stamp, WeightSearch, position_channels, rotation_channels,
+    PoseSmoothing, PoseSpline, PoseTimes, Smoothing, SplineSystem, Stamp, WeightSearch,
+    position_channels, rotation_channels,
 };
 use nalgebra::Isometry3;
 
@@ -14,7 +15,8 @@ pub(crate) const LAG_FRAMES: usize = 10;
 const PAST_FRAMES: usize = 32;
 /// Frames before the first search for weights, which is done at once.
 const FIRST_SEARCH: usize = 16;
-/// Later searches score one weight on every so many frames, so that no frame has to wait for a whole one.
+/// Later searches score one weight on every so many frames, so that no frame has to wait for a
+/// whole one.
 const FRAMES_PER_SCORE: usize = 4;
 
 /// The weights of position and rotation, and the search for better ones.
@@ -76,32 +78,54 @@ impl FixedLag {
     }
 
     /// Samples at stamps within the window, by a spline over its last frames.
-    pub(crate) fn sample(&self, window: &[SensorFrame], due: &[Stamp], samples: &mut Vec<KinematicSample>) -> Result<(), ImuError> {
+    pub(crate) fn sample(
+        &self,
+        window: &[SensorFrame],
+        due: &[Stamp],
+        samples: &mut Vec<KinematicSample>,
+    ) -> Result<(), ImuError> {
         let first_due = due.first().copied().unwrap_or_default();
         let before = window.partition_point(|frame| frame.stamp <= first_due);
         let frames = &window[before.saturating_sub(PAST_FRAMES)..];
-        let (stamps, poses): (Vec<Stamp>, Vec<Isometry3<f64>>) = frames.iter().map(|frame| (frame.stamp, frame.world_from_sensor)).unzip();
+        let (stamps, poses): (Vec<Stamp>, Vec<Isometry3<f64>>) = frames
+            .iter()
+            .map(|frame| (frame.stamp, frame.world_from_sensor))
+            .unzip();
         let smoothing = match self.weights {
-            Some(Weights { position, rotation }) => {
-                PoseSmoothing { position: Smoothing::Weight(position), rotation: Smoothing::Weight(rotation) }
-            }
-            None => PoseSmoothing { position: Smoothing::Interpolate, rotation: Smoothing::Interpolate },
+            Some(Weights { position, rotation }) => PoseSmoothing {
+                position: Smoothing::Weight(position),
+                rotation: Smoothing::Weight(rotation),
+            },
+            None => PoseSmoothing {
+                position: Smoothing::Interpolate,
+                rotation: Smoothing::Interpolate,
+            },
         };
         let times = PoseTimes::new(&stamps)?;
         let spline = PoseSpline::fit_on(&times, &poses, smoothing)?;
         let errors = SplineVariance::new(&times, &spline, frames)?;
-        let variance = |stamp| errors.as_ref().map(|errors| errors.at(stamp)).unwrap_or_default();
-        samples.extend(due.iter().map(|&stamp| KinematicSample { variance: variance(stamp), ..sample(&spline, stamp) }));
+        let variance = |stamp| {
+            errors
+                .as_ref()
+                .map(|errors| errors.at(stamp))
+                .unwrap_or_default()
+        };
+        samples.extend(due.iter().map(|&stamp| KinematicSample {
+            variance: variance(stamp),
+            ..sample(&spline, stamp)
+        }));
         Ok(())
     }
 
-    /// The first search saw few frames, so the second replaces it; from then on each counts half, the ones before it the other half.
+    /// The first search saw few frames, so the second replaces it; from then on each counts half,
+    /// the ones before it the other half.
     fn take(&mut self, found: Weights) {
         let mean = |old: f64, new: f64| (old * new).sqrt();
         self.weights = Some(match self.weights {
-            Some(old) if self.search_count >= 2 => {
-                Weights { position: mean(old.position, found.position), rotation: mean(old.rotation, found.rotation) }
-            }
+            Some(old) if self.search_count >= 2 => Weights {
+                position: mean(old.position, found.position),
+                rotation: mean(old.rotation, found.rotation),
+            },
             _ => found,
         });
         self.search_count += 1;
@@ -132,17 +156,28 @@ impl Search {
     /// Scores one weight; false when both searches are over.
     fn step(&mut self) -> bool {
         if let Some(weight) = self.position.next_weight() {
-            self.position.record(self.system.score(&self.positions, weight).unwrap_or(f64::INFINITY));
+            self.position.record(
+                self.system
+                    .score(&self.positions, weight)
+                    .unwrap_or(f64::INFINITY),
+            );
             return true;
         }
         if let Some(weight) = self.rotation.next_weight() {
-            self.rotation.record(self.system.score(&self.rotations, weight).unwrap_or(f64::INFINITY));
+            self.rotation.record(
+                self.system
+                    .score(&self.rotations, weight)
+                    .unwrap_or(f64::INFINITY),
+            );
             return true;
         }
         false
     }
 
     fn best(&self) -> Weights {
-        Weights { position: self.position.best().unwrap_or(0.0), rotation: self.rotation.best().unwrap_or(0.0) }
+        Weights {
+            position: self.position.best().unwrap_or(0.0),
+            rotation: self.rotation.best().unwrap_or(0.0),
+        }
     }
 }

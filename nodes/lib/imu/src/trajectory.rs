@@ -21,7 +21,12 @@ pub struct SensorFrame {
 impl SensorFrame {
     /// A frame without a skin: its own z axis stands for the normal.
     pub fn new(stamp: Stamp, world_from_sensor: Isometry3<f64>) -> Self {
-        Self { stamp, world_from_sensor, normal_in_world: world_from_sensor * Vector3::z(), pose_std: PoseStd::NONE }
+        Self {
+            stamp,
+            world_from_sensor,
+            normal_in_world: world_from_sensor * Vector3::z(),
+            pose_std: PoseStd::NONE,
+        }
     }
 
     /// The same frame, off by so much.
@@ -33,7 +38,12 @@ impl SensorFrame {
     pub(crate) fn is_finite(&self) -> bool {
         let finite = |v: &Vector3<f64>| v.iter().all(|x| x.is_finite());
         finite(&self.world_from_sensor.translation.vector)
-            && self.world_from_sensor.rotation.coords.iter().all(|x| x.is_finite())
+            && self
+                .world_from_sensor
+                .rotation
+                .coords
+                .iter()
+                .all(|x| x.is_finite())
             && finite(&self.normal_in_world)
     }
 }
@@ -45,17 +55,26 @@ pub struct SensorTrajectory {
 }
 
 impl SensorTrajectory {
-    /// Parses frames: uneven stamps and gaps are welcome, duplicates and time going backwards are not.
+    /// Parses frames: uneven stamps and gaps are welcome, duplicates and time going backwards are
+    /// not.
     ///
     /// # Errors
     /// [`ImuError::Trajectory`] with the index of the frame.
     pub fn new(frames: Vec<SensorFrame>) -> Result<Self, ImuError> {
         if frames.len() < 2 {
-            return Err(SpatialError::TooFewSamples { got: frames.len(), needed: 2 }.into());
+            return Err(SpatialError::TooFewSamples {
+                got: frames.len(),
+                needed: 2,
+            }
+            .into());
         }
         check_times(&seconds(&frames))?;
         if let Some(index) = frames.iter().position(|frame| !frame.is_finite()) {
-            return Err(SpatialError::NotFinite { index, what: "pose" }.into());
+            return Err(SpatialError::NotFinite {
+                index,
+                what: "pose",
+            }
+            .into());
         }
         Ok(Self { frames })
     }
@@ -63,7 +82,10 @@ impl SensorTrajectory {
     /// The same frames, off by so much; frames beyond `pose_stds` are taken as they are.
     #[must_use]
     pub fn with_pose_stds(mut self, pose_stds: &[PoseStd]) -> Self {
-        self.frames.iter_mut().zip(pose_stds).for_each(|(frame, pose_std)| frame.pose_std = *pose_std);
+        self.frames
+            .iter_mut()
+            .zip(pose_stds)
+            .for_each(|(frame, pose_std)| frame.pose_std = *pose_std);
         self
     }
 
@@ -82,10 +104,13 @@ impl SensorTrajectory {
         self.frames[self.frames.len() - 1].stamp
     }
 
-    /// Pairs of stamps with more than `seconds` and nothing in between. Schemes bridge gaps smoothly, but what they say there is a guess.
+    /// Pairs of stamps with more than `seconds` and nothing in between. Schemes bridge gaps
+    /// smoothly, but what they say there is a guess.
     pub fn gaps(&self, seconds: f64) -> Vec<(Stamp, Stamp)> {
         let stamps = self.frames.windows(2).map(|w| (w[0].stamp, w[1].stamp));
-        stamps.filter(|(before, after)| *after - *before > seconds).collect()
+        stamps
+            .filter(|(before, after)| *after - *before > seconds)
+            .collect()
     }
 }
 
@@ -107,16 +132,25 @@ mod tests {
     #[test]
     fn frames_are_checked_once() {
         assert!(SensorTrajectory::new(vec![frame(0.0)]).is_err());
-        let backwards = SensorTrajectory::new(vec![frame(0.0), frame(0.2), frame(0.1)]).unwrap_err();
+        let backwards =
+            SensorTrajectory::new(vec![frame(0.0), frame(0.2), frame(0.1)]).unwrap_err();
         assert!(backwards.to_string().contains("sample 2"), "{backwards}");
         let mut broken = vec![frame(0.0), frame(0.1)];
         broken[1].world_from_sensor.translation.vector.y = f64::NAN;
-        assert!(SensorTrajectory::new(broken).unwrap_err().to_string().contains("sample 1: pose is not finite"));
+        assert!(
+            SensorTrajectory::new(broken)
+                .unwrap_err()
+                .to_string()
+                .contains("sample 1: pose is not finite")
+        );
     }
 
     #[test]
     fn gaps_are_found() {
         let trajectory = SensorTrajectory::new([0.0, 0.1, 0.9, 1.0].map(frame).to_vec()).unwrap();
-        assert_eq!(trajectory.gaps(0.2), [(Stamp::from_seconds(0.1), Stamp::from_seconds(0.9))]);
+        assert_eq!(
+            trajectory.gaps(0.2),
+            [(Stamp::from_seconds(0.1), Stamp::from_seconds(0.9))]
+        );
     }
 }

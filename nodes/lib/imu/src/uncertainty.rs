@@ -1,13 +1,16 @@
 //! What errors of the poses leave in a sample.
 
-use cromosim_spatial::{CONFIDENCE_LENGTH_M, Influence, SampleWeights, Stamp, derivative_weights, std_of_confidence};
+use cromosim_spatial::{
+    CONFIDENCE_LENGTH_M, Influence, SampleWeights, Stamp, derivative_weights, std_of_confidence,
+};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::schemes::stencil_range;
 use crate::{Covariances, ImuSample, Scheme, SensorFrame};
 
-/// Standard deviations of a frame's error, along and about each axis. Errors of frames dt apart have the correlation
-/// `exp(-(dt / correlation_s)^2 / 2)`; none at all with 0, the worst case for derivatives.
+/// Standard deviations of a frame's error, along and about each axis. Errors of frames dt apart
+/// have the correlation `exp(-(dt / correlation_s)^2 / 2)`; none at all with 0, the worst case for
+/// derivatives.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PoseStd {
     /// m; infinite where the place is not known.
@@ -20,17 +23,30 @@ pub struct PoseStd {
 
 impl PoseStd {
     /// No error, or none that is known of.
-    pub const NONE: Self = Self { position_m: 0.0, rotation_rad: 0.0, correlation_s: 0.0 };
+    pub const NONE: Self = Self {
+        position_m: 0.0,
+        rotation_rad: 0.0,
+        correlation_s: 0.0,
+    };
 
-    /// Of a message's confidence: `s = 0.1 m sqrt(1 / c - 1)` and `s / 0.5 m` in rad. NaN says nothing of errors, 0 that nothing is known.
+    /// Of a message's confidence: `s = 0.1 m sqrt(1 / c - 1)` and `s / 0.5 m` in rad. NaN says
+    /// nothing of errors, 0 that nothing is known.
     pub fn of_confidence(confidence: f64, correlation_s: f64) -> Self {
-        let position_m = if confidence.is_nan() { 0.0 } else { std_of_confidence(confidence) };
-        Self { position_m, rotation_rad: position_m / CONFIDENCE_LENGTH_M, correlation_s }
+        let position_m = if confidence.is_nan() {
+            0.0
+        } else {
+            std_of_confidence(confidence)
+        };
+        Self {
+            position_m,
+            rotation_rad: position_m / CONFIDENCE_LENGTH_M,
+            correlation_s,
+        }
     }
 }
 
-/// Variances, along or about each axis, that errors of the poses leave in a sample; 0 where none are known of, infinite where the sample rests
-/// on poses that are not known.
+/// Variances, along or about each axis, that errors of the poses leave in a sample; 0 where none
+/// are known of, infinite where the sample rests on poses that are not known.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SampleVariance {
     /// (m/s2)2.
@@ -41,7 +57,8 @@ pub struct SampleVariance {
     pub orientation: f64,
 }
 
-/// A frame that is not known spoils a sample where it makes up more than this part of the squared weights.
+/// A frame that is not known spoils a sample where it makes up more than this part of the squared
+/// weights.
 const SPOILING_SHARE: f64 = 0.01;
 
 /// How a scheme weighs frames in a sample, first order in their errors.
@@ -49,14 +66,18 @@ const SPOILING_SHARE: f64 = 0.01;
 pub(crate) struct FrameWeights {
     /// First frame.
     pub first: usize,
-    /// Of each frame: its orientation in the sample's, its rotation in the angular velocity (1/s), its position in the acceleration (1/s2).
+    /// Of each frame: its orientation in the sample's, its rotation in the angular velocity (1/s),
+    /// its position in the acceleration (1/s2).
     pub rows: Vec<[f64; 3]>,
 }
 
 impl FrameWeights {
-    /// Of a scheme with a stencil, at any stamp: its own weights at a frame, in between those of the four estimates around it.
+    /// Of a scheme with a stencil, at any stamp: its own weights at a frame, in between those of
+    /// the four estimates around it.
     pub(crate) fn of_stencil(scheme: Scheme, frames: &[SensorFrame], stamp: Stamp) -> Self {
-        let after = frames.partition_point(|frame| frame.stamp < stamp).min(frames.len() - 1);
+        let after = frames
+            .partition_point(|frame| frame.stamp < stamp)
+            .min(frames.len() - 1);
         if frames[after].stamp == stamp {
             return Self::at_frame(scheme, frames, after);
         }
@@ -67,12 +88,25 @@ impl FrameWeights {
             *seconds = frame.stamp - stamp;
         }
         let between = derivative_weights(&seconds[..width], 0.0)[0];
-        let estimates: Vec<Self> = (start..start + width).map(|k| Self::at_frame(scheme, frames, k)).collect();
-        let first = estimates.iter().map(|estimate| estimate.first).min().unwrap_or(start);
-        let end = estimates.iter().map(|estimate| estimate.first + estimate.rows.len()).max().unwrap_or(start);
+        let estimates: Vec<Self> = (start..start + width)
+            .map(|k| Self::at_frame(scheme, frames, k))
+            .collect();
+        let first = estimates
+            .iter()
+            .map(|estimate| estimate.first)
+            .min()
+            .unwrap_or(start);
+        let end = estimates
+            .iter()
+            .map(|estimate| estimate.first + estimate.rows.len())
+            .max()
+            .unwrap_or(start);
         let mut rows = vec![[0.0; 3]; end - first];
         for (estimate, share) in estimates.iter().zip(between) {
-            for (row, weights) in rows[estimate.first - first..].iter_mut().zip(&estimate.rows) {
+            for (row, weights) in rows[estimate.first - first..]
+                .iter_mut()
+                .zip(&estimate.rows)
+            {
                 (0..3).for_each(|m| row[m] += share * weights[m]);
             }
         }
@@ -86,29 +120,49 @@ impl FrameWeights {
             *seconds = frame.stamp - frames[k].stamp;
         }
         let [_, slope, second] = derivative_weights(&seconds[..range.len()], 0.0);
-        let row = |j: usize| [if range.start + j == k { 1.0 } else { 0.0 }, slope[j], second[j]];
-        Self { first: range.start, rows: (0..range.len()).map(row).collect() }
+        let row = |j: usize| {
+            [
+                if range.start + j == k { 1.0 } else { 0.0 },
+                slope[j],
+                second[j],
+            ]
+        };
+        Self {
+            first: range.start,
+            rows: (0..range.len()).map(row).collect(),
+        }
     }
 
-    /// Of a spline whose position and rotation have their own smoothing. The quaternion moves by half the turn, and the angular velocity is
-    /// twice its derivative, so that the weights are those of the channels.
+    /// Of a spline whose position and rotation have their own smoothing. The quaternion moves by
+    /// half the turn, and the angular velocity is twice its derivative, so that the weights are
+    /// those of the channels.
     pub(crate) fn of_spline(position: &Influence, rotation: &Influence, seconds: f64) -> Self {
         let (places, turns) = (position.at(seconds), rotation.at(seconds));
         let first = places.first.min(turns.first);
         let end = (places.first + places.rows.len()).max(turns.first + turns.rows.len());
-        let row = |weights: &SampleWeights, k: usize| k.checked_sub(weights.first).and_then(|k| weights.rows.get(k)).copied();
+        let row = |weights: &SampleWeights, k: usize| {
+            k.checked_sub(weights.first)
+                .and_then(|k| weights.rows.get(k))
+                .copied()
+        };
         let rows = (first..end).map(|k| {
             let [value, slope, _] = row(&turns, k).unwrap_or_default();
             let [_, _, second] = row(&places, k).unwrap_or_default();
             [value, slope, second]
         });
-        Self { first, rows: rows.collect() }
+        Self {
+            first,
+            rows: rows.collect(),
+        }
     }
 
-    /// The variances that the frames' errors leave: `sum_ij w_i w_j s_i s_j correlation(t_i - t_j)`.
+    /// The variances that the frames' errors leave: `sum_ij w_i w_j s_i s_j correlation(t_i -
+    /// t_j)`.
     pub(crate) fn variance(&self, frames: &[SensorFrame]) -> SampleVariance {
         let frames = &frames[self.first..self.first + self.rows.len()];
-        let sum = |m: usize, std: fn(&PoseStd) -> f64| variance(frames, self.rows.iter().map(|row| row[m]).collect(), std);
+        let sum = |m: usize, std: fn(&PoseStd) -> f64| {
+            variance(frames, self.rows.iter().map(|row| row[m]).collect(), std)
+        };
         SampleVariance {
             orientation: sum(0, |std| std.rotation_rad),
             angular_velocity: sum(1, |std| std.rotation_rad),
@@ -128,30 +182,42 @@ fn variance(frames: &[SensorFrame], weights: Vec<f64>, std: fn(&PoseStd) -> f64)
             return f64::INFINITY;
         }
     }
-    let correlation_s = frames.iter().map(|frame| frame.pose_std.correlation_s).fold(0.0, f64::max);
+    let correlation_s = frames
+        .iter()
+        .map(|frame| frame.pose_std.correlation_s)
+        .fold(0.0, f64::max);
     if correlation_s == 0.0 {
         return errors.iter().map(|(_, error)| error * error).sum();
     }
-    let pair = |(one, a): &(Stamp, f64), (other, b): &(Stamp, f64)| a * b * (-0.5 * ((*one - *other) / correlation_s).powi(2)).exp();
-    let sum: f64 = errors.iter().map(|one| errors.iter().map(|other| pair(one, other)).sum::<f64>()).sum();
+    let pair = |(one, a): &(Stamp, f64), (other, b): &(Stamp, f64)| {
+        a * b * (-0.5 * ((*one - *other) / correlation_s).powi(2)).exp()
+    };
+    let sum: f64 = errors
+        .iter()
+        .map(|one| errors.iter().map(|other| pair(one, other)).sum::<f64>())
+        .sum();
     // Weights that nearly cancel may leave a rounding error below 0.
     sum.max(0.0)
 }
 
 /// Whether errors of any of these frames are known of.
 pub(crate) fn any_error(frames: &[SensorFrame]) -> bool {
-    frames.iter().any(|frame| frame.pose_std.position_m != 0.0 || frame.pose_std.rotation_rad != 0.0)
+    frames
+        .iter()
+        .any(|frame| frame.pose_std.position_m != 0.0 || frame.pose_std.rotation_rad != 0.0)
 }
 
 impl Covariances {
-    /// What these covariances and the errors of the poses make together, for a reading in its own axes: an orientation that is off by a small
-    /// turn d tilts the reading f (gravity in it) by `f x d`, so that
+    /// What these covariances and the errors of the poses make together, for a reading in its own
+    /// axes: an orientation that is off by a small turn d tilts the reading f (gravity in it) by `f
+    /// x d`, so that
     ///
     /// ```text
     /// C_force = C + v_a I + v_o (|f|^2 I - f f^T)      C_rate = C + v_w I + v_o (|w|^2 I - w w^T)      C_orientation = C + v_o I
     /// ```
-    /// with the variances of acceleration, angular velocity and orientation. Where one is infinite, the covariance starts with -1: "no
-    /// estimate" (sensor_msgs/Imu), and whoever reads it leaves the values out. Without errors everything stays as it is.
+    /// with the variances of acceleration, angular velocity and orientation. Where one is infinite,
+    /// the covariance starts with -1: "no estimate" (sensor_msgs/Imu), and whoever reads it leaves
+    /// the values out. Without errors everything stays as it is.
     #[must_use]
     pub fn with_motion(self, variance: &SampleVariance, reading: &ImuSample) -> Self {
         if *variance == SampleVariance::default() {
@@ -159,17 +225,31 @@ impl Covariances {
         }
         let tilted = |base, own: f64, vector: &Vector3<f64>| {
             let turned = Matrix3::identity() * vector.norm_squared() - vector * vector.transpose();
-            grown(base, &(Matrix3::identity() * own + turned * variance.orientation))
+            grown(
+                base,
+                &(Matrix3::identity() * own + turned * variance.orientation),
+            )
         };
         let orientation = if self.orientation[0] < 0.0 {
             self.orientation
         } else {
-            grown(self.orientation, &(Matrix3::identity() * variance.orientation))
+            grown(
+                self.orientation,
+                &(Matrix3::identity() * variance.orientation),
+            )
         };
         Self {
             orientation,
-            angular_velocity: tilted(self.angular_velocity, variance.angular_velocity, &reading.angular_velocity),
-            linear_acceleration: tilted(self.linear_acceleration, variance.acceleration, &reading.specific_force),
+            angular_velocity: tilted(
+                self.angular_velocity,
+                variance.angular_velocity,
+                &reading.angular_velocity,
+            ),
+            linear_acceleration: tilted(
+                self.linear_acceleration,
+                variance.acceleration,
+                &reading.specific_force,
+            ),
         }
     }
 }

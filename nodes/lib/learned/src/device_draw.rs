@@ -1,6 +1,10 @@
-//! Devices that nobody has seen: effects drawn at random, and what such a device measures of a motion.
+//! Devices that nobody has seen: effects drawn at random, and what such a device measures of a
+//! motion.
 
-use cromosim_imu::{DeclaredNoise, Effect, EffectKind, EffectSet, KinematicSample, NoiseSource, Reading, SensorModel, normal_pair};
+use cromosim_imu::{
+    DeclaredNoise, Effect, EffectKind, EffectSet, KinematicSample, NoiseSource, Reading,
+    SensorModel, normal_pair,
+};
 use cromosim_spatial::{KinematicTrack, Stamp};
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
@@ -9,11 +13,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::LearnedError;
 
-/// What devices and their mounts differ by. A pair is the range of a uniform draw; a single number the standard deviation of a normal one.
+/// What devices and their mounts differ by. A pair is the range of a uniform draw; a single number
+/// the standard deviation of a normal one.
 ///
-/// Defaults: noise, bias, gain and cross-axis errors are what data sheets of consumer MEMS allow (BMI270, LSM6DSO, MPU-9250: zero-g offset
-/// 20 to 60 mg, zero-rate offset 0.5 to 5 deg/s, sensitivity 1 to 3 %, cross-axis 0.5 to 2 %); soft tissue under straps rings at 5 to 20 Hz
-/// with damping ratios of 0.2 to 0.6; wearables filter at 20 to 50 Hz; people mount within 10 degrees and stamps are late by up to 20 ms.
+/// Defaults: noise, bias, gain and cross-axis errors are what data sheets of consumer MEMS allow
+/// (BMI270, LSM6DSO, MPU-9250: zero-g offset 20 to 60 mg, zero-rate offset 0.5 to 5 deg/s,
+/// sensitivity 1 to 3 %, cross-axis 0.5 to 2 %); soft tissue under straps rings at 5 to 20 Hz with
+/// damping ratios of 0.2 to 0.6; wearables filter at 20 to 50 Hz; people mount within 10 degrees
+/// and stamps are late by up to 20 ms.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DeviceRanges {
@@ -84,33 +91,64 @@ impl DeviceRanges {
         let vector = |random: &mut ChaCha12Rng, sigma: f64| -> Vec<f64> {
             let [x, y] = normal_pair(random);
             let [z, _] = normal_pair(random);
-            [x, y, z].map(|value| (value * sigma).clamp(-3.0 * sigma, 3.0 * sigma)).to_vec()
+            [x, y, z]
+                .map(|value| (value * sigma).clamp(-3.0 * sigma, 3.0 * sigma))
+                .to_vec()
         };
-        let uniform = |random: &mut ChaCha12Rng, [low, high]: [f64; 2]| low + (high - low) * random.random::<f64>();
+        let uniform = |random: &mut ChaCha12Rng, [low, high]: [f64; 2]| {
+            low + (high - low) * random.random::<f64>()
+        };
         let mut drawn: Vec<(Kind, Vec<f64>)> = vec![
             (Kind::MountRotation, vector(&mut random, self.mount)),
             (Kind::LeverArm, vector(&mut random, self.lever_arm)),
             (Kind::TimeOffset, vec![uniform(&mut random, self.late)]),
             (Kind::AccelBias, vector(&mut random, self.accel_bias)),
             (Kind::GyroBias, vector(&mut random, self.gyro_bias)),
-            (Kind::AccelScale, vector(&mut random, self.scale).iter().map(|value| 1.0 + value).collect()),
-            (Kind::GyroScale, vector(&mut random, self.scale).iter().map(|value| 1.0 + value).collect()),
-            (Kind::AccelMisalignment, vector(&mut random, self.misalignment)),
-            (Kind::GyroMisalignment, vector(&mut random, self.misalignment)),
+            (
+                Kind::AccelScale,
+                vector(&mut random, self.scale)
+                    .iter()
+                    .map(|value| 1.0 + value)
+                    .collect(),
+            ),
+            (
+                Kind::GyroScale,
+                vector(&mut random, self.scale)
+                    .iter()
+                    .map(|value| 1.0 + value)
+                    .collect(),
+            ),
+            (
+                Kind::AccelMisalignment,
+                vector(&mut random, self.misalignment),
+            ),
+            (
+                Kind::GyroMisalignment,
+                vector(&mut random, self.misalignment),
+            ),
             (Kind::LowPass, vec![uniform(&mut random, self.low_pass_hz)]),
         ];
         // Drawn in any case, so that what follows does not hang on it.
-        let tissue = vec![uniform(&mut random, self.tissue_hz), uniform(&mut random, self.tissue_damping)];
+        let tissue = vec![
+            uniform(&mut random, self.tissue_hz),
+            uniform(&mut random, self.tissue_damping),
+        ];
         if random.random::<f64>() < self.tissue_probability {
             drawn.push((Kind::SoftTissue, tissue));
         }
-        let noise =
-            DeclaredNoise { accel_density: uniform(&mut random, self.accel_noise), gyro_density: uniform(&mut random, self.gyro_noise) };
+        let noise = DeclaredNoise {
+            accel_density: uniform(&mut random, self.accel_noise),
+            gyro_density: uniform(&mut random, self.gyro_noise),
+        };
         let mut effects = EffectSet::new();
         for (kind, values) in drawn {
             effects.insert(Effect::new(kind, values)?);
         }
-        Ok(DrawnDevice { effects, noise, seed })
+        Ok(DrawnDevice {
+            effects,
+            noise,
+            seed,
+        })
     }
 }
 
@@ -120,11 +158,17 @@ impl DrawnDevice {
         &self.effects
     }
 
-    /// Its readings at `stamps` of a sensor that moves along `kinematics` (world axes, on a uniform grid of `rate_hz`).
+    /// Its readings at `stamps` of a sensor that moves along `kinematics` (world axes, on a uniform
+    /// grid of `rate_hz`).
     ///
     /// # Errors
     /// [`LearnedError::Imu`] for stamps without a rate.
-    pub fn measure(&self, kinematics: &[KinematicSample], rate_hz: f64, stamps: &[Stamp]) -> Result<Vec<Reading>, LearnedError> {
+    pub fn measure(
+        &self,
+        kinematics: &[KinematicSample],
+        rate_hz: f64,
+        stamps: &[Stamp],
+    ) -> Result<Vec<Reading>, LearnedError> {
         let track = track(kinematics, rate_hz);
         let epoch = stamps.first().copied().unwrap_or_default();
         let model = SensorModel::new(&self.effects, epoch);
@@ -148,7 +192,10 @@ impl DrawnDevice {
 /// The same motion in the sensor's own axes.
 fn track(kinematics: &[KinematicSample], rate_hz: f64) -> KinematicTrack {
     let own = |of: &dyn Fn(&KinematicSample) -> Vector3<f64>| -> Vec<Vector3<f64>> {
-        kinematics.iter().map(|sample| sample.world_from_sensor.rotation.inverse() * of(sample)).collect()
+        kinematics
+            .iter()
+            .map(|sample| sample.world_from_sensor.rotation.inverse() * of(sample))
+            .collect()
     };
     let last = kinematics.len().saturating_sub(1);
     // Schemes without it: the central difference, in world axes.
@@ -156,14 +203,21 @@ fn track(kinematics: &[KinematicSample], rate_hz: f64) -> KinematicTrack {
         .map(|k| {
             let (from, to) = (k.saturating_sub(1), (k + 1).min(last));
             let seconds = (to - from).max(1) as f64 / rate_hz;
-            let change = (kinematics[to].angular_velocity - kinematics[from].angular_velocity) / seconds;
-            kinematics[k].world_from_sensor.rotation.inverse() * kinematics[k].angular_acceleration.unwrap_or(change)
+            let change =
+                (kinematics[to].angular_velocity - kinematics[from].angular_velocity) / seconds;
+            kinematics[k].world_from_sensor.rotation.inverse()
+                * kinematics[k].angular_acceleration.unwrap_or(change)
         })
         .collect();
     KinematicTrack {
-        start: kinematics.first().map_or_else(Stamp::default, |sample| sample.stamp),
+        start: kinematics
+            .first()
+            .map_or_else(Stamp::default, |sample| sample.stamp),
         rate_hz,
-        world_from_segment: kinematics.iter().map(|sample| sample.world_from_sensor.rotation).collect(),
+        world_from_segment: kinematics
+            .iter()
+            .map(|sample| sample.world_from_sensor.rotation)
+            .collect(),
         acceleration: own(&|sample| sample.acceleration),
         angular_velocity: own(&|sample| sample.angular_velocity),
         angular_acceleration: differences,
@@ -182,8 +236,10 @@ mod tests {
     fn kinematics(rate_hz: f64) -> Vec<KinematicSample> {
         let frame = |k: u32| {
             let t = f64::from(k) / 120.0;
-            let at =
-                Isometry3::new(Vector3::new(0.1 * (9.0 * t).sin(), 0.0, 0.05 * (7.0 * t).cos()), Vector3::new(0.0, (4.0 * t).sin(), 0.2));
+            let at = Isometry3::new(
+                Vector3::new(0.1 * (9.0 * t).sin(), 0.0, 0.05 * (7.0 * t).cos()),
+                Vector3::new(0.0, (4.0 * t).sin(), 0.2),
+            );
             SensorFrame::new(Stamp::from_seconds(t), at)
         };
         let trajectory = SensorTrajectory::new((0..600).map(frame).collect()).unwrap();
@@ -208,8 +264,16 @@ mod tests {
             ..DeviceRanges::default()
         };
         let kinematics = kinematics(400.0);
-        let stamps: Vec<Stamp> = kinematics.iter().step_by(4).map(|sample| sample.stamp).collect();
-        let readings = none.draw(5).unwrap().measure(&kinematics, 400.0, &stamps).unwrap();
+        let stamps: Vec<Stamp> = kinematics
+            .iter()
+            .step_by(4)
+            .map(|sample| sample.stamp)
+            .collect();
+        let readings = none
+            .draw(5)
+            .unwrap()
+            .measure(&kinematics, 400.0, &stamps)
+            .unwrap();
         for (reading, sample) in readings.iter().zip(kinematics.iter().step_by(4)) {
             let ideal = sample.imu();
             assert!((reading.force - ideal.specific_force).norm() < 1e-9);
@@ -220,11 +284,30 @@ mod tests {
     #[test]
     fn a_seed_is_a_device_and_another_seed_another() {
         let (ranges, kinematics) = (DeviceRanges::default(), kinematics(400.0));
-        let stamps: Vec<Stamp> = kinematics.iter().step_by(4).map(|sample| sample.stamp).collect();
-        let read = |seed| ranges.draw(seed).unwrap().measure(&kinematics, 400.0, &stamps).unwrap();
+        let stamps: Vec<Stamp> = kinematics
+            .iter()
+            .step_by(4)
+            .map(|sample| sample.stamp)
+            .collect();
+        let read = |seed| {
+            ranges
+                .draw(seed)
+                .unwrap()
+                .measure(&kinematics, 400.0, &stamps)
+                .unwrap()
+        };
         assert_eq!(read(1), read(1));
         assert_ne!(read(1), read(2));
-        let with_tissue = (0..200).filter(|seed| ranges.draw(*seed).unwrap().effects().get(EffectKind::SoftTissue).is_some()).count();
+        let with_tissue = (0..200)
+            .filter(|seed| {
+                ranges
+                    .draw(*seed)
+                    .unwrap()
+                    .effects()
+                    .get(EffectKind::SoftTissue)
+                    .is_some()
+            })
+            .count();
         assert!((140..180).contains(&with_tissue), "{with_tissue} of 200");
     }
 }

@@ -12,7 +12,9 @@ use cromosim_spatial::SpatialError;
 #[non_exhaustive]
 pub enum LearnedError {
     /// No model of this name comes with the suite.
-    #[error("{name}: neither a folder with networks nor a model that comes with the suite ({known})")]
+    #[error(
+        "{name}: neither a folder with networks nor a model that comes with the suite ({known})"
+    )]
     UnknownModel {
         /// What was asked for.
         name: String,
@@ -32,7 +34,9 @@ pub enum LearnedError {
         most: usize,
     },
     /// The shape as a whole is too large.
-    #[error("network shape: {found} parameters, at most {most} are supported: choose fewer channels, hidden units or layers")]
+    #[error(
+        "network shape: {found} parameters, at most {most} are supported: choose fewer channels, hidden units or layers"
+    )]
     TooLarge {
         /// How many there would be.
         found: u64,
@@ -40,7 +44,9 @@ pub enum LearnedError {
         most: u64,
     },
     /// An input's length does not fit.
-    #[error("network input: {found} numbers, {batch} sequences x {steps} steps x {inputs} inputs are {expected}")]
+    #[error(
+        "network input: {found} numbers, {batch} sequences x {steps} steps x {inputs} inputs are {expected}"
+    )]
     Input {
         /// How many there are.
         found: usize,
@@ -54,7 +60,9 @@ pub enum LearnedError {
         expected: usize,
     },
     /// A network that knows the future cannot run step by step.
-    #[error("streaming: the network reads its input in both directions; train one with `direction: forward` for live use")]
+    #[error(
+        "streaming: the network reads its input in both directions; train one with `direction: forward` for live use"
+    )]
     NotCausal,
     /// A file cannot be opened or read.
     #[error("{}: cannot be read: {source}", path.display())]
@@ -185,7 +193,9 @@ pub enum LearnedError {
         needed: usize,
     },
     /// A mesh on which no patch can be laid.
-    #[error("body `{body}`: fewer than three triangles without common corners around triangle {triangle}")]
+    #[error(
+        "body `{body}`: fewer than three triangles without common corners around triangle {triangle}"
+    )]
     NoPatch {
         /// The body.
         body: String,
@@ -193,7 +203,9 @@ pub enum LearnedError {
         triangle: u32,
     },
     /// A placement that is read at another rate than the networks know.
-    #[error("placement `{placement}`: {rate_hz} Hz; the networks run live at 100 Hz: set its rate_hz to 100")]
+    #[error(
+        "placement `{placement}`: {rate_hz} Hz; the networks run live at 100 Hz: set its rate_hz to 100"
+    )]
     WrongRate {
         /// The placement's name.
         placement: String,

@@ -11,7 +11,8 @@ const PATCH_SIZE: f64 = 0.03;
 /// Of unsmoothed acceleration, m/s2, which is mostly noise.
 const UNSMOOTHED: f64 = 15.0;
 
-/// So many samples later are the plain differences that [`Input::Streaming`] sees: for states of 60 Hz within the spline's own delay.
+/// So many samples later are the plain differences that [`Input::Streaming`] sees: for states of 60
+/// Hz within the spline's own delay.
 pub(crate) const AHEAD: usize = 8;
 
 /// What a network predicts, world axes.
@@ -49,16 +50,18 @@ impl Quantity {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Input {
-    /// The paper's: the nine points relative to the window, 27 channels. Their mean less its mean over the window, and eight points less
-    /// the mean of all nine (the ninth follows from them).
+    /// The paper's: the nine points relative to the window, 27 channels. Their mean less its mean
+    /// over the window, and eight points less the mean of all nine (the ninth follows from them).
     Points,
-    /// The same and the analytic acceleration and angular velocity, 33 channels; the network says what is to be added to these.
+    /// The same and the analytic acceleration and angular velocity, 33 channels; the network says
+    /// what is to be added to these.
     Residual,
-    /// The same and acceleration and angular velocity by plain differences, 39 channels: for motion whose scatter makes the analytic simulation
-    /// smooth much, video above all.
+    /// The same and acceleration and angular velocity by plain differences, 39 channels: for motion
+    /// whose scatter makes the analytic simulation smooth much, video above all.
     Differences,
-    /// Eight points less their mean, the analytic acceleration and angular velocity, and those by plain differences eight samples later, 36
-    /// channels: nothing that needs a window. The network says what is to be added.
+    /// Eight points less their mean, the analytic acceleration and angular velocity, and those by
+    /// plain differences eight samples later, 36 channels: nothing that needs a window. The network
+    /// says what is to be added.
     Streaming,
 }
 
@@ -75,7 +78,14 @@ impl Input {
 
     /// The input of a name.
     pub fn from_name(name: &str) -> Option<Self> {
-        [Self::Points, Self::Residual, Self::Differences, Self::Streaming].into_iter().find(|input| input.name() == name)
+        [
+            Self::Points,
+            Self::Residual,
+            Self::Differences,
+            Self::Streaming,
+        ]
+        .into_iter()
+        .find(|input| input.name() == name)
     }
 
     /// Channels.
@@ -93,23 +103,44 @@ impl Input {
         self != Self::Points
     }
 
-    /// Appends `count` samples from `first` on, (samples, channels), all turned by `turn`. Samples beyond the motion's end repeat its last.
-    pub fn fill(self, motion: &SiteMotion, first: usize, count: usize, turn: &UnitQuaternion<f64>, features: &mut Vec<f32>) {
+    /// Appends `count` samples from `first` on, (samples, channels), all turned by `turn`. Samples
+    /// beyond the motion's end repeat its last.
+    pub fn fill(
+        self,
+        motion: &SiteMotion,
+        first: usize,
+        count: usize,
+        turn: &UnitQuaternion<f64>,
+        features: &mut Vec<f32>,
+    ) {
         let last = motion.len().saturating_sub(1);
         let at = |k: usize| (first + k).min(last);
         let origin = match self {
             Self::Streaming => Vector3::zeros(),
-            _ => (0..count).map(|k| mean(&motion.points[at(k)])).sum::<Vector3<f64>>() / count.max(1) as f64,
+            _ => {
+                (0..count)
+                    .map(|k| mean(&motion.points[at(k)]))
+                    .sum::<Vector3<f64>>()
+                    / count.max(1) as f64
+            }
         };
         for k in 0..count {
             let ahead = if self == Self::Streaming { AHEAD } else { 0 };
             let unsmoothed = &motion.unsmoothed[(at(k) + ahead).min(last)];
-            self.sample(&motion.points[at(k)], &motion.kinematics[at(k)], unsmoothed, &origin, turn, features);
+            self.sample(
+                &motion.points[at(k)],
+                &motion.kinematics[at(k)],
+                unsmoothed,
+                &origin,
+                turn,
+                features,
+            );
         }
     }
 
-    /// Appends one sample; `origin` is the mean of the window's points (of no meaning to [`Self::Streaming`]), `unsmoothed` as in
-    /// [`SiteMotion::unsmoothed`] (of meaning to [`Self::Differences`] and, [`AHEAD`], to [`Self::Streaming`]).
+    /// Appends one sample; `origin` is the mean of the window's points (of no meaning to
+    /// [`Self::Streaming`]), `unsmoothed` as in [`SiteMotion::unsmoothed`] (of meaning to
+    /// [`Self::Differences`] and, [`AHEAD`], to [`Self::Streaming`]).
     pub(crate) fn sample(
         self,
         points: &[Vector3<f64>; PATCH_POINTS],
@@ -119,7 +150,9 @@ impl Input {
         turn: &UnitQuaternion<f64>,
         features: &mut Vec<f32>,
     ) {
-        let mut push = |value: Vector3<f64>, scale: f64| features.extend((turn * value / scale).iter().map(|x| *x as f32));
+        let mut push = |value: Vector3<f64>, scale: f64| {
+            features.extend((turn * value / scale).iter().map(|x| *x as f32))
+        };
         let centre = mean(points);
         if self != Self::Streaming {
             push(centre - origin, TRAVEL);
@@ -129,10 +162,14 @@ impl Input {
         }
         if self.on_top_of_analytic() {
             push(kinematic.acceleration, Quantity::Acceleration.scale());
-            push(kinematic.angular_velocity, Quantity::AngularVelocity.scale());
+            push(
+                kinematic.angular_velocity,
+                Quantity::AngularVelocity.scale(),
+            );
         }
         if matches!(self, Self::Differences | Self::Streaming) {
-            // How much to smooth changes within a motion, and the analytic simulation smooths all of it alike.
+            // How much to smooth changes within a motion, and the analytic simulation smooths all
+            // of it alike.
             let [acceleration, angular_velocity] = *unsmoothed;
             push(acceleration, UNSMOOTHED);
             push(angular_velocity, Quantity::AngularVelocity.scale());
@@ -156,10 +193,20 @@ mod tests {
     fn motion(shift: Vector3<f64>, turn: UnitQuaternion<f64>) -> SiteMotion {
         let frame = |k: u32| {
             let seconds = f64::from(k) / 100.0;
-            let at = Isometry3::new(Vector3::new((3.0 * seconds).sin(), seconds, 0.2), Vector3::new(0.0, seconds, 0.3));
-            SensorFrame::new(Stamp::from_seconds(seconds), Isometry3::from_parts(shift.into(), turn) * at)
+            let at = Isometry3::new(
+                Vector3::new((3.0 * seconds).sin(), seconds, 0.2),
+                Vector3::new(0.0, seconds, 0.3),
+            );
+            SensorFrame::new(
+                Stamp::from_seconds(seconds),
+                Isometry3::from_parts(shift.into(), turn) * at,
+            )
         };
-        SiteMotion::rigid(&SensorTrajectory::new((0..60).map(frame).collect()).unwrap(), Scheme::Richardson).unwrap()
+        SiteMotion::rigid(
+            &SensorTrajectory::new((0..60).map(frame).collect()).unwrap(),
+            Scheme::Richardson,
+        )
+        .unwrap()
     }
 
     fn features(input: Input, motion: &SiteMotion, turn: &UnitQuaternion<f64>) -> Vec<f32> {
@@ -170,20 +217,40 @@ mod tests {
     }
 
     fn largest_difference(a: &[f32], b: &[f32]) -> f32 {
-        a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+        a.iter()
+            .zip(b)
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f32::max)
     }
 
     #[test]
     fn features_do_not_know_where_in_the_world_they_are() {
-        let (none, turn) = (UnitQuaternion::identity(), UnitQuaternion::from_euler_angles(0.3, -1.0, 2.0));
+        let (none, turn) = (
+            UnitQuaternion::identity(),
+            UnitQuaternion::from_euler_angles(0.3, -1.0, 2.0),
+        );
         let here = motion(Vector3::zeros(), none);
         let there = motion(Vector3::new(12.0, -7.0, 3.0), none);
         let turned = motion(Vector3::zeros(), turn);
-        for input in [Input::Points, Input::Residual, Input::Differences, Input::Streaming] {
+        for input in [
+            Input::Points,
+            Input::Residual,
+            Input::Differences,
+            Input::Streaming,
+        ] {
             let own = features(input, &here, &none);
-            assert!(largest_difference(&own, &features(input, &there, &none)) < 1e-5, "{input:?}");
+            assert!(
+                largest_difference(&own, &features(input, &there, &none)) < 1e-5,
+                "{input:?}"
+            );
             // Turning the features is turning the motion.
-            assert!(largest_difference(&features(input, &here, &turn), &features(input, &turned, &none)) < 1e-5, "{input:?}");
+            assert!(
+                largest_difference(
+                    &features(input, &here, &turn),
+                    &features(input, &turned, &none)
+                ) < 1e-5,
+                "{input:?}"
+            );
             assert!(own.iter().all(|value| value.abs() < 10.0));
         }
     }

@@ -26,7 +26,11 @@ pub(crate) struct Tape {
 impl Layers {
     pub fn new(shape: &NetworkShape, parameters: &[f32]) -> Self {
         let places = shape.places();
-        let padding = if shape.direction == Direction::Both { Padding::Same } else { Padding::Causal };
+        let padding = if shape.direction == Direction::Both {
+            Padding::Same
+        } else {
+            Padding::Causal
+        };
         Self {
             convolutions: Convolutions::new(&places, parameters, shape.kernel, padding),
             recurrent: Recurrent::new(&places, parameters),
@@ -37,28 +41,67 @@ impl Layers {
 
     /// The convolutions, the LSTM layers in forward order, the linear layer.
     pub fn parts(&self) -> (&[Convolution], impl Iterator<Item = &Lstm>, &Linear) {
-        (self.convolutions.layers(), self.recurrent.layers(), &self.linear)
+        (
+            self.convolutions.layers(),
+            self.recurrent.layers(),
+            &self.linear,
+        )
     }
 
     /// input: (steps, batch, inputs) -> (steps, batch, outputs).
     pub fn forward(&self, input: Vec<f32>, batch: usize) -> Vec<f32> {
-        self.linear.forward(&self.recurrent.forward(self.convolutions.forward(input, batch, None), batch, None))
+        self.linear.forward(&self.recurrent.forward(
+            self.convolutions.forward(input, batch, None),
+            batch,
+            None,
+        ))
     }
 
     /// As [`Layers::forward`], with what the way back needs.
     pub fn forward_with_tape(&self, input: Vec<f32>, batch: usize) -> (Vec<f32>, Tape) {
         let mut tape = Tape::default();
-        let convolved = self.convolutions.forward(input, batch, Some(&mut tape.convolved));
-        tape.last = self.recurrent.forward(convolved, batch, Some(&mut tape.recurrent));
+        let convolved = self
+            .convolutions
+            .forward(input, batch, Some(&mut tape.convolved));
+        tape.last = self
+            .recurrent
+            .forward(convolved, batch, Some(&mut tape.recurrent));
         (self.linear.forward(&tape.last), tape)
     }
 
-    /// Adds the gradients of all parameters to `gradients`; output_gradient: (steps, batch, outputs). Returns the input's.
-    pub fn backward(&self, parameters: &[f32], tape: &Tape, output_gradient: &[f32], batch: usize, gradients: &mut [f32]) -> Vec<f32> {
-        let of_last = linear_backward(&self.linear, &self.places, parameters, (&tape.last, output_gradient), gradients);
-        let of_convolved = self.recurrent.backward(&self.places, parameters, &tape.recurrent, of_last, gradients);
+    /// Adds the gradients of all parameters to `gradients`; output_gradient: (steps, batch,
+    /// outputs). Returns the input's.
+    pub fn backward(
+        &self,
+        parameters: &[f32],
+        tape: &Tape,
+        output_gradient: &[f32],
+        batch: usize,
+        gradients: &mut [f32],
+    ) -> Vec<f32> {
+        let of_last = linear_backward(
+            &self.linear,
+            &self.places,
+            parameters,
+            (&tape.last, output_gradient),
+            gradients,
+        );
+        let of_convolved = self.recurrent.backward(
+            &self.places,
+            parameters,
+            &tape.recurrent,
+            of_last,
+            gradients,
+        );
         let convolved = (tape.convolved.as_slice(), tape.recurrent.input());
-        self.convolutions.backward(&self.places, parameters, convolved, of_convolved, batch, gradients)
+        self.convolutions.backward(
+            &self.places,
+            parameters,
+            convolved,
+            of_convolved,
+            batch,
+            gradients,
+        )
     }
 }
 
@@ -70,19 +113,44 @@ mod tests {
 
     #[test]
     fn gradients_of_a_whole_network_agree_with_differences() {
-        for (direction, convolutions, layers) in [(Direction::Both, 2, 2), (Direction::Forward, 1, 2), (Direction::Both, 0, 1)] {
-            let shape = NetworkShape { inputs: 3, channels: 4, kernel: 3, convolutions, hidden: 5, layers, direction, outputs: 2 };
+        for (direction, convolutions, layers) in [
+            (Direction::Both, 2, 2),
+            (Direction::Forward, 1, 2),
+            (Direction::Both, 0, 1),
+        ] {
+            let shape = NetworkShape {
+                inputs: 3,
+                channels: 4,
+                kernel: 3,
+                convolutions,
+                hidden: 5,
+                layers,
+                direction,
+                outputs: 2,
+            };
             let (steps, batch) = (4, 2);
             let network = Network::new(shape.clone(), 7).unwrap();
             let (input, along) = (values(steps * batch * 3, 1), values(steps * batch * 2, 2));
-            let loss =
-                |parameters: &[f32], input: &[f32]| weighted_sum(&Layers::new(&shape, parameters).forward(input.to_vec(), batch), &along);
+            let loss = |parameters: &[f32], input: &[f32]| {
+                weighted_sum(
+                    &Layers::new(&shape, parameters).forward(input.to_vec(), batch),
+                    &along,
+                )
+            };
             let layers = Layers::new(&shape, network.parameters());
             let (_, tape) = layers.forward_with_tape(input.clone(), batch);
             let mut gradients = vec![0.0; network.parameters().len()];
-            let of_input = layers.backward(network.parameters(), &tape, &along, batch, &mut gradients);
-            check_gradient("parameters", network.parameters(), &gradients, |parameters| loss(parameters, &input));
-            check_gradient("input", &input, &of_input, |input| loss(network.parameters(), input));
+            let of_input =
+                layers.backward(network.parameters(), &tape, &along, batch, &mut gradients);
+            check_gradient(
+                "parameters",
+                network.parameters(),
+                &gradients,
+                |parameters| loss(parameters, &input),
+            );
+            check_gradient("input", &input, &of_input, |input| {
+                loss(network.parameters(), input)
+            });
         }
     }
 }

@@ -1,14 +1,17 @@
-//! What the analytic simulation cannot know, learned from pairs of motion and measured IMU (CROMOSim, Hao, Wang, Zheng): networks, what they
-//! are fed, training, and the mapping of distributions.
+//! What the analytic simulation cannot know, learned from pairs of motion and measured IMU
+//! (CROMOSim, Hao, Wang, Zheng): networks, what they are fed, training, and the mapping of
+//! distributions.
 //!
-//! A [`Patch`] is three triangles of the skin around a site; a [`SiteMotion`] their nine points over time, with the analytic kinematics
-//! beside them. [`Input`] says what of it a [`Network`] sees. [`Pair`] adds what a real IMU measured, turned into the world by the reference
-//! orientation; [`PairBatches`] are windows of pairs, [`train::Training`] learns from them, and a [`LearnedSimulator`] applies what was learned,
-//! [`LivePlacements`] sample by sample. [`RankMapping`] maps distributions after the simulation. [`DeviceRanges`] and [`SourceErrors`] make
-//! devices and sources of motion that nobody has seen.
+//! A [`Patch`] is three triangles of the skin around a site; a [`SiteMotion`] their nine points
+//! over time, with the analytic kinematics beside them. [`Input`] says what of it a [`Network`]
+//! sees. [`Pair`] adds what a real IMU measured, turned into the world by the reference
+//! orientation; [`PairBatches`] are windows of pairs, [`train::Training`] learns from them, and a
+//! [`LearnedSimulator`] applies what was learned, [`LivePlacements`] sample by sample.
+//! [`RankMapping`] maps distributions after the simulation. [`DeviceRanges`] and [`SourceErrors`]
+//! make devices and sources of motion that nobody has seen.
 //!
-//! The [`kernels`] give the same bits on any number of threads and at any vector width. The feature `burn` adds an engine for Burn's backends,
-//! the feature `cuda` its NVIDIA one.
+//! The [`kernels`] give the same bits on any number of threads and at any vector width. The feature
+//! `burn` adds an engine for Burn's backends, the feature `cuda` its NVIDIA one.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod align;
@@ -42,7 +45,9 @@ mod windows;
 pub use align::{Alignment, align};
 #[cfg(feature = "burn")]
 pub use autodiff::BurnEngine;
-pub use classifier::{Classifier, ClassifierOptions, ClassifierShape, Examples, cross_entropy, train_classifier};
+pub use classifier::{
+    Classifier, ClassifierOptions, ClassifierShape, Examples, cross_entropy, train_classifier,
+};
 pub use degrade::SourceErrors;
 pub use device_draw::{DeviceRanges, DrawnDevice};
 pub use error::LearnedError;

@@ -9,17 +9,21 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use crate::features::AHEAD;
 use crate::site_motion::{Around, difference};
-use crate::{Input, LearnedError, LearnedSimulator, NETWORK_RATE_HZ, PATCH_POINTS, Patch, Quantity, StreamingBatch};
+use crate::{
+    Input, LearnedError, LearnedSimulator, NETWORK_RATE_HZ, PATCH_POINTS, Patch, Quantity,
+    StreamingBatch,
+};
 
 /// Frames that are kept at least: more than any scheme's delay.
 const KEPT: usize = 128;
 /// Between samples.
 const PERIOD: f64 = 1.0 / NETWORK_RATE_HZ;
 
-/// The patches of several placements over the last frames, and their networks' states. Poses go in as they come, and the skeleton is computed
-/// once for all; the samples of the schemes, which come later, are corrected in order, once the frames are there that the networks see ahead
-/// of a sample ([`Self::delay_seconds`]). Placements of one scheme, whose samples come together, are one batch to the networks. The samples
-/// have to come at [`NETWORK_RATE_HZ`].
+/// The patches of several placements over the last frames, and their networks' states. Poses go in
+/// as they come, and the skeleton is computed once for all; the samples of the schemes, which come
+/// later, are corrected in order, once the frames are there that the networks see ahead of a sample
+/// ([`Self::delay_seconds`]). Placements of one scheme, whose samples come together, are one batch
+/// to the networks. The samples have to come at [`NETWORK_RATE_HZ`].
 pub struct LivePlacements {
     /// The points of every patch, one after the other.
     subset: VertexSubset,
@@ -35,12 +39,18 @@ pub struct LivePlacements {
 }
 
 impl LivePlacements {
-    /// Placements before their first frame; frames more than `longest_gap` seconds apart belong to different series, as for the schemes.
+    /// Placements before their first frame; frames more than `longest_gap` seconds apart belong to
+    /// different series, as for the schemes.
     ///
     /// # Errors
-    /// [`LearnedError::NotCausal`] for networks that need a window, [`LearnedError::WrongRate`] for a placement of another rate,
-    /// [`LearnedError::NoPatch`].
-    pub fn new(simulator: &LearnedSimulator, body: &ShapedBody, placements: &[Placement], longest_gap: f64) -> Result<Self, LearnedError> {
+    /// [`LearnedError::NotCausal`] for networks that need a window, [`LearnedError::WrongRate`] for
+    /// a placement of another rate, [`LearnedError::NoPatch`].
+    pub fn new(
+        simulator: &LearnedSimulator,
+        body: &ShapedBody,
+        placements: &[Placement],
+        longest_gap: f64,
+    ) -> Result<Self, LearnedError> {
         if simulator.input() != Input::Streaming {
             return Err(LearnedError::NotCausal);
         }
@@ -48,10 +58,17 @@ impl LivePlacements {
         let mut schemes: Vec<(Scheme, Vec<usize>)> = Vec::new();
         for (number, placement) in placements.iter().enumerate() {
             if placement.rate_hz() != NETWORK_RATE_HZ {
-                return Err(LearnedError::WrongRate { placement: placement.name().to_owned(), rate_hz: placement.rate_hz() });
+                return Err(LearnedError::WrongRate {
+                    placement: placement.name().to_owned(),
+                    rate_hz: placement.rate_hz(),
+                });
             }
-            vertices.extend(Patch::new(body, MountedSite::new(body, placement)?.site())?.vertices());
-            match schemes.iter_mut().find(|(scheme, _)| *scheme == placement.scheme()) {
+            vertices
+                .extend(Patch::new(body, MountedSite::new(body, placement)?.site())?.vertices());
+            match schemes
+                .iter_mut()
+                .find(|(scheme, _)| *scheme == placement.scheme())
+            {
                 Some((_, members)) => members.push(number),
                 None => schemes.push((placement.scheme(), vec![number])),
             }
@@ -61,7 +78,10 @@ impl LivePlacements {
             positions: Vec::with_capacity(vertices.len()),
             frames: Frames::new(placements.len()),
             ended: None,
-            groups: schemes.into_iter().map(|(_, members)| Group::new(simulator, members)).collect::<Result<_, _>>()?,
+            groups: schemes
+                .into_iter()
+                .map(|(_, members)| Group::new(simulator, members))
+                .collect::<Result<_, _>>()?,
             waiting: vec![VecDeque::new(); placements.len()],
             longest_gap,
         })
@@ -78,30 +98,54 @@ impl LivePlacements {
     /// For another number of frames than placements.
     pub fn push(&mut self, stamp: Stamp, pose: &BodyPose, frames: &[SiteFrame]) {
         let placements = self.frames.placements;
-        assert_eq!(frames.len(), placements, "frames of {placements} placements");
-        if self.frames.stamps.last().is_some_and(|last| stamp - *last > self.longest_gap) {
+        assert_eq!(
+            frames.len(),
+            placements,
+            "frames of {placements} placements"
+        );
+        if self
+            .frames
+            .stamps
+            .last()
+            .is_some_and(|last| stamp - *last > self.longest_gap)
+        {
             self.ended = Some(std::mem::replace(&mut self.frames, Frames::new(placements)));
         }
         self.subset.positions_into(pose, &mut self.positions);
-        self.frames.push(stamp, self.positions.as_chunks::<PATCH_POINTS>().0, frames);
+        self.frames
+            .push(stamp, self.positions.as_chunks::<PATCH_POINTS>().0, frames);
     }
 
-    /// Takes samples of the placements' schemes, (placements, samples in order), and puts in their place those that can be corrected now, these
-    /// or earlier ones, with what the networks say added.
+    /// Takes samples of the placements' schemes, (placements, samples in order), and puts in their
+    /// place those that can be corrected now, these or earlier ones, with what the networks say
+    /// added.
     ///
     /// # Errors
     /// As [`StreamingBatch::step`].
     pub fn correct(&mut self, released: &mut [Vec<KinematicSample>]) -> Result<(), LearnedError> {
-        let Self { frames, ended, groups, waiting, .. } = self;
+        let Self {
+            frames,
+            ended,
+            groups,
+            waiting,
+            ..
+        } = self;
         for (waiting, released) in waiting.iter_mut().zip(released.iter_mut()) {
             waiting.extend(released.drain(..));
         }
         // What waited for frames when the pause began gets none.
         if let Some(ended) = ended.take() {
-            let belongs = |sample: &KinematicSample| ended.stamps.last().is_some_and(|last| sample.stamp <= *last);
+            let belongs = |sample: &KinematicSample| {
+                ended
+                    .stamps
+                    .last()
+                    .is_some_and(|last| sample.stamp <= *last)
+            };
             correct_those((groups, waiting), &ended, released, belongs)?;
         }
-        correct_those((groups, waiting), frames, released, |sample| frames.reach(sample.stamp))
+        correct_those((groups, waiting), frames, released, |sample| {
+            frames.reach(sample.stamp)
+        })
     }
 
     /// Forgets everything: a series ends here, and another begins.
@@ -130,7 +174,11 @@ fn correct_those(
         }
     }
     for group in groups {
-        let count = |member: &usize| released.get(*member).map_or(0, |own| own.len() - begin[*member]);
+        let count = |member: &usize| {
+            released
+                .get(*member)
+                .map_or(0, |own| own.len() - begin[*member])
+        };
         let most = group.members.iter().map(count).max().unwrap_or(0);
         for index in 0..most {
             group.step(frames, released, &begin, index)?;
@@ -151,10 +199,20 @@ struct Frames {
 
 impl Frames {
     fn new(placements: usize) -> Self {
-        Self { placements, stamps: Vec::new(), points: Vec::new(), poses: Vec::new() }
+        Self {
+            placements,
+            stamps: Vec::new(),
+            points: Vec::new(),
+            poses: Vec::new(),
+        }
     }
 
-    fn push(&mut self, stamp: Stamp, points: &[[Vector3<f64>; PATCH_POINTS]], frames: &[SiteFrame]) {
+    fn push(
+        &mut self,
+        stamp: Stamp,
+        points: &[[Vector3<f64>; PATCH_POINTS]],
+        frames: &[SiteFrame],
+    ) {
         if self.stamps.len() == 2 * KEPT {
             self.stamps.drain(..KEPT);
             self.points.drain(..KEPT * self.placements);
@@ -162,19 +220,26 @@ impl Frames {
         }
         self.stamps.push(stamp);
         self.points.extend_from_slice(points);
-        self.poses.extend(frames.iter().map(|frame| frame.world_from_sensor));
+        self.poses
+            .extend(frames.iter().map(|frame| frame.world_from_sensor));
     }
 
-    /// Whether the frames are there that make up the pose one sample after the differences, which the networks see ahead of a sample.
+    /// Whether the frames are there that make up the pose one sample after the differences, which
+    /// the networks see ahead of a sample.
     fn reach(&self, sample: Stamp) -> bool {
         let needed = sample.plus_seconds((AHEAD + 1) as f64 * PERIOD);
         let after = self.stamps.partition_point(|stamp| *stamp < needed);
-        self.stamps.get(after).is_some_and(|stamp| *stamp == needed || after + 1 < self.stamps.len())
+        self.stamps
+            .get(after)
+            .is_some_and(|stamp| *stamp == needed || after + 1 < self.stamps.len())
     }
 
     /// Around a stamp, or around the end that is nearer to it.
     fn around(&self, stamp: Stamp) -> Around {
-        Around::new(&self.stamps, stamp.clamp(self.stamps[0], self.stamps[self.stamps.len() - 1]))
+        Around::new(
+            &self.stamps,
+            stamp.clamp(self.stamps[0], self.stamps[self.stamps.len() - 1]),
+        )
     }
 
     fn points(&self, around: &Around, placement: usize) -> [Vector3<f64>; PATCH_POINTS] {
@@ -182,7 +247,8 @@ impl Frames {
     }
 
     fn pose(&self, stamp: Stamp, placement: usize) -> Isometry3<f64> {
-        self.around(stamp).blend_pose(|frame| &self.poses[frame * self.placements + placement])
+        self.around(stamp)
+            .blend_pose(|frame| &self.poses[frame * self.placements + placement])
     }
 }
 
@@ -207,8 +273,14 @@ struct Recent {
 }
 
 impl Recent {
-    /// Whether the sample goes on with the series, or begins one; and the differences that the networks see with it.
-    fn advance(&mut self, sample: Stamp, end: Stamp, pose: impl Fn(Stamp) -> Isometry3<f64>) -> (bool, [Vector3<f64>; 2]) {
+    /// Whether the sample goes on with the series, or begins one; and the differences that the
+    /// networks see with it.
+    fn advance(
+        &mut self,
+        sample: Stamp,
+        end: Stamp,
+        pose: impl Fn(Stamp) -> Isometry3<f64>,
+    ) -> (bool, [Vector3<f64>; 2]) {
         let goes_on = self.last.is_some_and(|last| sample - last <= 1.5 * PERIOD);
         self.last = Some(sample);
         let next = sample.plus_seconds((AHEAD + 1) as f64 * PERIOD);
@@ -216,7 +288,8 @@ impl Recent {
         if goes_on && next <= end {
             self.poses = [self.poses[1], self.poses[2], pose(next)];
         } else if !goes_on {
-            self.poses = [2.0, 1.0, 0.0].map(|back| pose(next.min(end).plus_seconds(-back * PERIOD)));
+            self.poses =
+                [2.0, 1.0, 0.0].map(|back| pose(next.min(end).plus_seconds(-back * PERIOD)));
         }
         (goes_on, difference(&self.poses))
     }
@@ -227,7 +300,10 @@ impl Group {
         let [acceleration, angular_velocity] = simulator.networks();
         let count = members.len();
         Ok(Self {
-            networks: [StreamingBatch::new(acceleration, count)?, StreamingBatch::new(angular_velocity, count)?],
+            networks: [
+                StreamingBatch::new(acceleration, count)?,
+                StreamingBatch::new(angular_velocity, count)?,
+            ],
             recent: vec![Recent::default(); count],
             features: Vec::with_capacity(count * Input::Streaming.channels()),
             advance: vec![false; count],
@@ -236,17 +312,29 @@ impl Group {
     }
 
     /// Corrects the sample `index` of each member that has one, counted from where each begins.
-    fn step(&mut self, frames: &Frames, released: &mut [Vec<KinematicSample>], begin: &[usize], index: usize) -> Result<(), LearnedError> {
+    fn step(
+        &mut self,
+        frames: &Frames,
+        released: &mut [Vec<KinematicSample>],
+        begin: &[usize],
+        index: usize,
+    ) -> Result<(), LearnedError> {
         self.fill_features(frames, released, begin, index);
         let mut added = [&[][..]; 2];
         for (added, network) in added.iter_mut().zip(&mut self.networks) {
             *added = network.step_some(&self.features, &self.advance)?;
         }
         for (row, member) in self.members.iter().enumerate() {
-            let Some(sample) = released.get_mut(*member).and_then(|samples| samples.get_mut(begin[*member] + index)) else { continue };
+            let Some(sample) = released
+                .get_mut(*member)
+                .and_then(|samples| samples.get_mut(begin[*member] + index))
+            else {
+                continue;
+            };
             let [acceleration, rate] = [0, 1].map(|which| {
                 let output = &added[which][3 * row..][..3];
-                Vector3::new(output[0], output[1], output[2]).map(f64::from) * Quantity::BOTH[which].scale()
+                Vector3::new(output[0], output[1], output[2]).map(f64::from)
+                    * Quantity::BOTH[which].scale()
             });
             sample.acceleration += acceleration;
             sample.angular_velocity += rate;
@@ -255,14 +343,23 @@ impl Group {
         Ok(())
     }
 
-    fn fill_features(&mut self, frames: &Frames, released: &[Vec<KinematicSample>], begin: &[usize], index: usize) {
+    fn fill_features(
+        &mut self,
+        frames: &Frames,
+        released: &[Vec<KinematicSample>],
+        begin: &[usize],
+        index: usize,
+    ) {
         let mut around: Option<(Stamp, Around)> = None;
         self.features.clear();
         for (row, member) in self.members.iter().enumerate() {
-            let sample = released.get(*member).and_then(|samples| samples.get(begin[*member] + index));
+            let sample = released
+                .get(*member)
+                .and_then(|samples| samples.get(begin[*member] + index));
             self.advance[row] = sample.is_some();
             let Some(sample) = sample else {
-                self.features.resize(self.features.len() + Input::Streaming.channels(), 0.0);
+                self.features
+                    .resize(self.features.len() + Input::Streaming.channels(), 0.0);
                 continue;
             };
             // Most samples of a batch have the same stamp.
@@ -271,12 +368,22 @@ impl Group {
                 _ => frames.around(sample.stamp),
             };
             let end = frames.stamps[frames.stamps.len() - 1];
-            let (goes_on, unsmoothed) = self.recent[row].advance(sample.stamp, end, |stamp| frames.pose(stamp, *member));
+            let (goes_on, unsmoothed) =
+                self.recent[row].advance(sample.stamp, end, |stamp| frames.pose(stamp, *member));
             if !goes_on {
-                self.networks.iter_mut().for_each(|network| network.reset_sequence(row));
+                self.networks
+                    .iter_mut()
+                    .for_each(|network| network.reset_sequence(row));
             }
             let (points, origin) = (frames.points(&place, *member), Vector3::zeros());
-            Input::Streaming.sample(&points, sample, &unsmoothed, &origin, &UnitQuaternion::identity(), &mut self.features);
+            Input::Streaming.sample(
+                &points,
+                sample,
+                &unsmoothed,
+                &origin,
+                &UnitQuaternion::identity(),
+                &mut self.features,
+            );
             around = Some((sample.stamp, place));
         }
     }
@@ -296,8 +403,20 @@ mod tests {
     const GAP: f64 = 0.5;
 
     fn simulator(direction: Direction) -> Result<LearnedSimulator, LearnedError> {
-        let shape = NetworkShape { inputs: 36, channels: 8, kernel: 5, convolutions: 3, hidden: 8, layers: 2, direction, outputs: 3 };
-        LearnedSimulator::new(Input::Streaming, [Network::new(shape.clone(), 1)?, Network::new(shape, 2)?])
+        let shape = NetworkShape {
+            inputs: 36,
+            channels: 8,
+            kernel: 5,
+            convolutions: 3,
+            hidden: 8,
+            layers: 2,
+            direction,
+            outputs: 3,
+        };
+        LearnedSimulator::new(
+            Input::Streaming,
+            [Network::new(shape.clone(), 1)?, Network::new(shape, 2)?],
+        )
     }
 
     fn pose(stamp: &Stamp) -> BodyPose {
@@ -309,28 +428,52 @@ mod tests {
     }
 
     fn stamps(from: f64, to: f64) -> Vec<Stamp> {
-        uniform_stamps(Stamp::from_seconds(from), Stamp::from_seconds(to), STATES_HZ).unwrap()
+        uniform_stamps(
+            Stamp::from_seconds(from),
+            Stamp::from_seconds(to),
+            STATES_HZ,
+        )
+        .unwrap()
     }
 
-    /// What comes out of placements together, (placements, samples). `keep` says which samples of a frame get to the networks.
-    fn run(placements: &[Placement], stamps: &[Stamp], keep: impl Fn(&str, usize) -> bool) -> Vec<Vec<KinematicSample>> {
+    /// What comes out of placements together, (placements, samples). `keep` says which samples of a
+    /// frame get to the networks.
+    fn run(
+        placements: &[Placement],
+        stamps: &[Stamp],
+        keep: impl Fn(&str, usize) -> bool,
+    ) -> Vec<Vec<KinematicSample>> {
         let body = ShapedBody::new(BodyModel::embedded(), &[]).unwrap();
         let sites = MountedSites::new(&body, placements).unwrap();
         let options = StreamOptions::resampled(STATES_HZ, 100.0);
-        let mut streams: Vec<_> = placements.iter().map(|placement| StreamingImu::new(placement.scheme(), options).unwrap()).collect();
-        let mut live = LivePlacements::new(&simulator(Direction::Forward).unwrap(), &body, placements, GAP).unwrap();
+        let mut streams: Vec<_> = placements
+            .iter()
+            .map(|placement| StreamingImu::new(placement.scheme(), options).unwrap())
+            .collect();
+        let mut live = LivePlacements::new(
+            &simulator(Direction::Forward).unwrap(),
+            &body,
+            placements,
+            GAP,
+        )
+        .unwrap();
         let mut all = vec![Vec::new(); placements.len()];
         for (number, stamp) in stamps.iter().enumerate() {
             let pose = pose(stamp);
             let frames = sites.frames(&pose);
             live.push(*stamp, &pose, &frames);
-            let mut released: Vec<_> =
-                streams.iter_mut().zip(&frames).map(|(stream, frame)| stream.push_kinematics(frame.at(*stamp)).unwrap()).collect();
+            let mut released: Vec<_> = streams
+                .iter_mut()
+                .zip(&frames)
+                .map(|(stream, frame)| stream.push_kinematics(frame.at(*stamp)).unwrap())
+                .collect();
             for (placement, samples) in placements.iter().zip(&mut released) {
                 samples.retain(|_| keep(placement.name(), number));
             }
             live.correct(&mut released).unwrap();
-            all.iter_mut().zip(released).for_each(|(all, released)| all.extend(released));
+            all.iter_mut()
+                .zip(released)
+                .for_each(|(all, released)| all.extend(released));
         }
         all
     }
@@ -338,17 +481,27 @@ mod tests {
     #[test]
     fn live_is_what_the_whole_series_gives() {
         let body = ShapedBody::new(BodyModel::embedded(), &[]).unwrap();
-        let placement = Placement::at_site("left_wrist", "left_watch", 100.0).unwrap().with_scheme(Scheme::Richardson);
+        let placement = Placement::at_site("left_wrist", "left_watch", 100.0)
+            .unwrap()
+            .with_scheme(Scheme::Richardson);
         let stamps = stamps(1.0, 4.0);
         let poses: Vec<BodyPose> = stamps.iter().map(pose).collect();
         let motion = SiteMotion::on_body(&body, &placement, &stamps, &poses).unwrap();
-        let whole = simulator(Direction::Forward).unwrap().simulate(&motion).unwrap();
+        let whole = simulator(Direction::Forward)
+            .unwrap()
+            .simulate(&motion)
+            .unwrap();
         let samples = &run(&[placement], &stamps, |_, _| true)[0];
         assert!(samples.len() > 290);
         // The stream begins with a shorter stencil; the networks' state forgets that.
         for (one, all) in samples.iter().zip(&whole).skip(60) {
             assert_eq!(one.stamp, all.stamp);
-            assert!((one.acceleration - all.acceleration).norm() < 1e-3, "{} {}", one.acceleration, all.acceleration);
+            assert!(
+                (one.acceleration - all.acceleration).norm() < 1e-3,
+                "{} {}",
+                one.acceleration,
+                all.acceleration
+            );
             assert!((one.angular_velocity - all.angular_velocity).norm() < 1e-4);
         }
     }
@@ -356,19 +509,39 @@ mod tests {
     #[test]
     fn a_series_before_a_pause_is_corrected_to_its_end() {
         let body = ShapedBody::new(BodyModel::embedded(), &[]).unwrap();
-        for scheme in [Scheme::SecondDifference, Scheme::Richardson, Scheme::Triangle] {
-            let placement = Placement::at_site("left_wrist", "left_watch", 100.0).unwrap().with_scheme(scheme);
+        for scheme in [
+            Scheme::SecondDifference,
+            Scheme::Richardson,
+            Scheme::Triangle,
+        ] {
+            let placement = Placement::at_site("left_wrist", "left_watch", 100.0)
+                .unwrap()
+                .with_scheme(scheme);
             let (before, after) = (stamps(1.0, 3.0), stamps(4.0, 4.2));
             let poses: Vec<BodyPose> = before.iter().map(pose).collect();
             let motion = SiteMotion::on_body(&body, &placement, &before, &poses).unwrap();
-            let whole = simulator(Direction::Forward).unwrap().simulate(&motion).unwrap();
+            let whole = simulator(Direction::Forward)
+                .unwrap()
+                .simulate(&motion)
+                .unwrap();
             let samples = &run(&[placement], &[before, after].concat(), |_, _| true)[0];
-            let found: Vec<_> = samples.iter().filter(|sample| sample.stamp <= Stamp::from_seconds(3.0)).collect();
+            let found: Vec<_> = samples
+                .iter()
+                .filter(|sample| sample.stamp <= Stamp::from_seconds(3.0))
+                .collect();
             assert_eq!(found.len(), whole.len(), "{scheme}");
             for (one, all) in found.iter().zip(&whole).skip(60) {
                 assert_eq!(one.stamp, all.stamp);
-                assert!((one.acceleration - all.acceleration).norm() < 1e-3, "{scheme}: {} {}", one.acceleration, all.acceleration);
-                assert!((one.angular_velocity - all.angular_velocity).norm() < 1e-4, "{scheme}");
+                assert!(
+                    (one.acceleration - all.acceleration).norm() < 1e-3,
+                    "{scheme}: {} {}",
+                    one.acceleration,
+                    all.acceleration
+                );
+                assert!(
+                    (one.angular_velocity - all.angular_velocity).norm() < 1e-4,
+                    "{scheme}"
+                );
             }
             assert!(samples.len() > whole.len() + 8);
         }
@@ -376,7 +549,12 @@ mod tests {
 
     #[test]
     fn placements_together_are_what_each_is_alone() {
-        let schemes = [Scheme::Spline, Scheme::Richardson, Scheme::Triangle, Scheme::Richardson];
+        let schemes = [
+            Scheme::Spline,
+            Scheme::Richardson,
+            Scheme::Triangle,
+            Scheme::Richardson,
+        ];
         let placements: Vec<Placement> = PlacementSet::full17()
             .placements()
             .iter()
@@ -401,10 +579,22 @@ mod tests {
 
     #[test]
     fn what_cannot_run_live_is_refused() {
-        assert!(simulator(Direction::Both).unwrap_err().to_string().contains("direction: forward"));
+        assert!(
+            simulator(Direction::Both)
+                .unwrap_err()
+                .to_string()
+                .contains("direction: forward")
+        );
         let body = ShapedBody::new(BodyModel::embedded(), &[]).unwrap();
         let fast = Placement::at_site("left_wrist", "left_watch", 200.0).unwrap();
-        let error = LivePlacements::new(&simulator(Direction::Forward).unwrap(), &body, &[fast], GAP).err().unwrap().to_string();
-        assert!(error.contains("left_wrist") && error.contains("100"), "{error}");
+        let error =
+            LivePlacements::new(&simulator(Direction::Forward).unwrap(), &body, &[fast], GAP)
+                .err()
+                .unwrap()
+                .to_string();
+        assert!(
+            error.contains("left_wrist") && error.contains("100"),
+            "{error}"
+        );
     }
 }

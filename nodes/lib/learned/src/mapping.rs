@@ -1,8 +1,10 @@
-//! Distribution mapping by ranks (Conover and Iman 1981): a simulated value takes the measured value of the same rank.
+//! Distribution mapping by ranks (Conover and Iman 1981): a simulated value takes the measured
+//! value of the same rank.
 //!
-//! Per channel `y = Q_measured(F_simulated(x))`, F and Q the empirical distribution functions with the ranks' places (i - 1/2) / n, linear in
-//! between; equal simulated values share their mean rank. Beyond the ends `y = x + (end_measured - end_simulated)`. The map rises, and takes
-//! the simulated sample it was fitted on to the measured one's quantiles.
+//! Per channel `y = Q_measured(F_simulated(x))`, F and Q the empirical distribution functions with
+//! the ranks' places (i - 1/2) / n, linear in between; equal simulated values share their mean
+//! rank. Beyond the ends `y = x + (end_measured - end_simulated)`. The map rises, and takes the
+//! simulated sample it was fitted on to the measured one's quantiles.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -20,7 +22,9 @@ const MAX_KNOTS: usize = 512;
 /// Fewer values say nothing of a distribution.
 const LEAST: usize = 20;
 /// Names of the channels, in order.
-const CHANNELS: [&str; 6] = ["accel_x", "accel_y", "accel_z", "gyro_x", "gyro_y", "gyro_z"];
+const CHANNELS: [&str; 6] = [
+    "accel_x", "accel_y", "accel_z", "gyro_x", "gyro_y", "gyro_z",
+];
 
 /// The map of one channel: knots that rise.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,7 +34,8 @@ pub struct RankMapping {
 }
 
 impl RankMapping {
-    /// Fits the map; the samples need neither be paired nor equally many. Values that are not finite are left out.
+    /// Fits the map; the samples need neither be paired nor equally many. Values that are not
+    /// finite are left out.
     ///
     /// # Errors
     /// [`LearnedError::TooFew`] for less than 20 values on a side.
@@ -38,12 +43,19 @@ impl RankMapping {
         let (simulated, measured) = (sorted(simulated), sorted(measured));
         let found = simulated.len().min(measured.len());
         if found < LEAST {
-            return Err(LearnedError::TooFew { what: format!("distribution mapping of {what}"), found, needed: LEAST });
+            return Err(LearnedError::TooFew {
+                what: format!("distribution mapping of {what}"),
+                found,
+                needed: LEAST,
+            });
         }
         let mut knots: Vec<(f64, f64)> = Vec::new();
         let mut first = 0;
         while first < simulated.len() {
-            let equal = simulated[first..].iter().take_while(|value| **value == simulated[first]).count();
+            let equal = simulated[first..]
+                .iter()
+                .take_while(|value| **value == simulated[first])
+                .count();
             let mean_rank = (first as f64 + 0.5 * equal as f64) / simulated.len() as f64;
             knots.push((simulated[first], quantile(&measured, mean_rank)));
             first += equal;
@@ -53,7 +65,10 @@ impl RankMapping {
 
     fn of(knots: Vec<(f64, f64)>) -> Self {
         let (simulated, measured) = knots.into_iter().unzip();
-        Self { simulated, measured }
+        Self {
+            simulated,
+            measured,
+        }
     }
 
     /// The mapped value.
@@ -77,7 +92,11 @@ impl RankMapping {
 }
 
 fn sorted(values: &[f64]) -> Vec<f64> {
-    let mut values: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
+    let mut values: Vec<f64> = values
+        .iter()
+        .copied()
+        .filter(|value| value.is_finite())
+        .collect();
     values.sort_by(f64::total_cmp);
     values
 }
@@ -101,10 +120,13 @@ fn thinned(knots: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
         return knots;
     }
     let last = knots.len() - 1;
-    (0..MAX_KNOTS).map(|k| knots[(k * last + (MAX_KNOTS - 1) / 2) / (MAX_KNOTS - 1)]).collect()
+    (0..MAX_KNOTS)
+        .map(|k| knots[(k * last + (MAX_KNOTS - 1) / 2) / (MAX_KNOTS - 1)])
+        .collect()
 }
 
-/// The maps of one placement: specific force x, y, z (m/s2), angular velocity x, y, z (rad/s), sensor axes.
+/// The maps of one placement: specific force x, y, z (m/s2), angular velocity x, y, z (rad/s),
+/// sensor axes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlacementMapping([RankMapping; 6]);
 
@@ -113,10 +135,23 @@ impl PlacementMapping {
     ///
     /// # Errors
     /// As [`RankMapping::fit`].
-    pub fn fit(simulated: &[Reading], measured: &[Reading], placement: &str) -> Result<Self, LearnedError> {
+    pub fn fit(
+        simulated: &[Reading],
+        measured: &[Reading],
+        placement: &str,
+    ) -> Result<Self, LearnedError> {
         let fit = |channel: usize| {
-            let of = |readings: &[Reading]| readings.iter().map(|reading| values(reading)[channel]).collect::<Vec<_>>();
-            RankMapping::fit(&of(simulated), &of(measured), &format!("{placement}, {}", CHANNELS[channel]))
+            let of = |readings: &[Reading]| {
+                readings
+                    .iter()
+                    .map(|reading| values(reading)[channel])
+                    .collect::<Vec<_>>()
+            };
+            RankMapping::fit(
+                &of(simulated),
+                &of(measured),
+                &format!("{placement}, {}", CHANNELS[channel]),
+            )
         };
         Ok(Self([fit(0)?, fit(1)?, fit(2)?, fit(3)?, fit(4)?, fit(5)?]))
     }
@@ -124,13 +159,24 @@ impl PlacementMapping {
     /// The mapped reading.
     pub fn apply(&self, reading: &Reading) -> Reading {
         let values = values(reading);
-        let mapped: [f64; 6] = std::array::from_fn(|channel| self.0[channel].apply(values[channel]));
-        Reading { force: [mapped[0], mapped[1], mapped[2]].into(), rate: [mapped[3], mapped[4], mapped[5]].into() }
+        let mapped: [f64; 6] =
+            std::array::from_fn(|channel| self.0[channel].apply(values[channel]));
+        Reading {
+            force: [mapped[0], mapped[1], mapped[2]].into(),
+            rate: [mapped[3], mapped[4], mapped[5]].into(),
+        }
     }
 }
 
 fn values(reading: &Reading) -> [f64; 6] {
-    [reading.force.x, reading.force.y, reading.force.z, reading.rate.x, reading.rate.y, reading.rate.z]
+    [
+        reading.force.x,
+        reading.force.y,
+        reading.force.z,
+        reading.rate.x,
+        reading.rate.y,
+        reading.rate.z,
+    ]
 }
 
 /// The maps of several placements.
@@ -179,14 +225,26 @@ impl MappingFile {
     /// # Errors
     /// [`LearnedError::Yaml`], [`LearnedError::Schema`], [`LearnedError::Knots`].
     pub fn parse(text: &str, file: &str) -> Result<Self, LearnedError> {
-        let raw: RawFile = serde_norway::from_str(text).map_err(|source| LearnedError::Yaml { file: file.to_owned(), source })?;
+        let raw: RawFile = serde_norway::from_str(text).map_err(|source| LearnedError::Yaml {
+            file: file.to_owned(),
+            source,
+        })?;
         if raw.schema != SCHEMA {
-            return Err(LearnedError::Schema { file: file.to_owned(), expected: SCHEMA, found: raw.schema });
+            return Err(LearnedError::Schema {
+                file: file.to_owned(),
+                expected: SCHEMA,
+                found: raw.schema,
+            });
         }
         let mut placements = BTreeMap::new();
         for (name, raw) in raw.placements {
             let check = |channel: &'static str, raw: RawChannel| {
-                checked(raw).map_err(|problem| LearnedError::Knots { file: file.to_owned(), placement: name.clone(), channel, problem })
+                checked(raw).map_err(|problem| LearnedError::Knots {
+                    file: file.to_owned(),
+                    placement: name.clone(),
+                    channel,
+                    problem,
+                })
             };
             let [ax, ay, az, gx, gy, gz] = CHANNELS;
             let mapping = PlacementMapping([
@@ -207,7 +265,10 @@ impl MappingFile {
     /// # Errors
     /// As [`MappingFile::parse`], and [`LearnedError::Read`].
     pub fn read(path: &Path) -> Result<Self, LearnedError> {
-        let text = std::fs::read_to_string(path).map_err(|source| LearnedError::Read { path: path.to_owned(), source })?;
+        let text = std::fs::read_to_string(path).map_err(|source| LearnedError::Read {
+            path: path.to_owned(),
+            source,
+        })?;
         Self::parse(&text, &path.display().to_string())
     }
 
@@ -221,14 +282,35 @@ impl MappingFile {
 
     /// The file's text; parsed again it is the same to the last digit.
     pub fn to_yaml(&self) -> String {
-        let mut text = format!("schema: {SCHEMA}\nplacements:{}\n", if self.placements.is_empty() { " {}" } else { "" });
+        let mut text = format!(
+            "schema: {SCHEMA}\nplacements:{}\n",
+            if self.placements.is_empty() {
+                " {}"
+            } else {
+                ""
+            }
+        );
         for (name, placement) in &self.placements {
             // Writing to a string cannot fail.
-            let _ = writeln!(text, "  \"{}\":", name.replace('\\', "\\\\").replace('"', "\\\""));
+            let _ = writeln!(
+                text,
+                "  \"{}\":",
+                name.replace('\\', "\\\\").replace('"', "\\\"")
+            );
             for (channel, mapping) in CHANNELS.iter().zip(&placement.0) {
-                let list = |values: &[f64]| values.iter().map(|value| format!("{value:?}")).collect::<Vec<_>>().join(", ");
-                let _ =
-                    writeln!(text, "    {channel}: {{simulated: [{}], measured: [{}]}}", list(&mapping.simulated), list(&mapping.measured));
+                let list = |values: &[f64]| {
+                    values
+                        .iter()
+                        .map(|value| format!("{value:?}"))
+                        .collect::<Vec<_>>()
+                        .join(", ")
+                };
+                let _ = writeln!(
+                    text,
+                    "    {channel}: {{simulated: [{}], measured: [{}]}}",
+                    list(&mapping.simulated),
+                    list(&mapping.measured)
+                );
             }
         }
         text
@@ -239,13 +321,21 @@ fn checked(raw: RawChannel) -> Result<RankMapping, &'static str> {
     if raw.simulated.is_empty() || raw.simulated.len() != raw.measured.len() {
         return Err("expected as many measured as simulated values, at least one");
     }
-    if !raw.simulated.iter().chain(&raw.measured).all(|value| value.is_finite()) {
+    if !raw
+        .simulated
+        .iter()
+        .chain(&raw.measured)
+        .all(|value| value.is_finite())
+    {
         return Err("a value is not finite");
     }
     if !raw.simulated.is_sorted_by(|a, b| a < b) || !raw.measured.is_sorted() {
         return Err("simulated values must rise, measured ones must not fall");
     }
-    Ok(RankMapping { simulated: raw.simulated, measured: raw.measured })
+    Ok(RankMapping {
+        simulated: raw.simulated,
+        measured: raw.measured,
+    })
 }
 
 #[cfg(test)]
@@ -259,14 +349,25 @@ mod tests {
 
     fn draw(count: usize, seed: u64) -> Vec<f64> {
         let mut random = ChaCha12Rng::seed_from_u64(seed);
-        (0..count).map(|_| cromosim_imu::normal_pair(&mut random)[0]).collect()
+        (0..count)
+            .map(|_| cromosim_imu::normal_pair(&mut random)[0])
+            .collect()
     }
 
     #[test]
     fn the_simulated_sample_becomes_the_measured_one() {
-        let (simulated, measured) = (draw(400, 1), draw(400, 2).iter().map(|x| 3.0 * x.powi(3) + 1.0).collect::<Vec<_>>());
+        let (simulated, measured) = (
+            draw(400, 1),
+            draw(400, 2)
+                .iter()
+                .map(|x| 3.0 * x.powi(3) + 1.0)
+                .collect::<Vec<_>>(),
+        );
         let mapping = RankMapping::fit(&simulated, &measured, "test").unwrap();
-        let mapped: Vec<f64> = sorted(&simulated).into_iter().map(|value| mapping.apply(value)).collect();
+        let mapped: Vec<f64> = sorted(&simulated)
+            .into_iter()
+            .map(|value| mapping.apply(value))
+            .collect();
         assert_eq!(mapped, sorted(&measured));
     }
 
@@ -281,9 +382,14 @@ mod tests {
     fn the_map_rises_and_is_defined_everywhere() {
         let mut random = ChaCha12Rng::seed_from_u64(4);
         // Many equal values, as from a coarse converter, and more of them than knots.
-        let coarse: Vec<f64> = draw(5000, 5).iter().map(|x| (x * 8.0).round() / 8.0).collect();
+        let coarse: Vec<f64> = draw(5000, 5)
+            .iter()
+            .map(|x| (x * 8.0).round() / 8.0)
+            .collect();
         let mapping = RankMapping::fit(&coarse, &draw(777, 6), "test").unwrap();
-        let mut values: Vec<f64> = (0..2000).map(|_| random.random_range(-40.0..40.0)).collect();
+        let mut values: Vec<f64> = (0..2000)
+            .map(|_| random.random_range(-40.0..40.0))
+            .collect();
         values.sort_by(f64::total_cmp);
         let mapped: Vec<f64> = values.iter().map(|value| mapping.apply(*value)).collect();
         assert!(mapped.is_sorted() && mapped.iter().all(|value| value.is_finite()));
@@ -294,26 +400,50 @@ mod tests {
 
     #[test]
     fn thinned_knots_stay_close() {
-        let (simulated, measured) = (draw(20_000, 7), draw(20_000, 8).iter().map(|x| 2.0 * x).collect::<Vec<_>>());
+        let (simulated, measured) = (
+            draw(20_000, 7),
+            draw(20_000, 8).iter().map(|x| 2.0 * x).collect::<Vec<_>>(),
+        );
         let mapping = RankMapping::fit(&simulated, &measured, "test").unwrap();
         assert_eq!(mapping.simulated.len(), MAX_KNOTS);
         for value in [-1.5, -0.4, 0.0, 0.9, 1.7] {
-            assert!((mapping.apply(value) - 2.0 * value).abs() < 0.1, "{value}: {}", mapping.apply(value));
+            assert!(
+                (mapping.apply(value) - 2.0 * value).abs() < 0.1,
+                "{value}: {}",
+                mapping.apply(value)
+            );
         }
     }
 
     #[test]
     fn files_keep_every_digit_and_bad_ones_are_named() {
-        let reading = |x: f64| Reading { force: Vector3::new(x, 2.0 * x, 9.8 + x), rate: Vector3::new(-x, 0.1 * x, x * x) };
+        let reading = |x: f64| Reading {
+            force: Vector3::new(x, 2.0 * x, 9.8 + x),
+            rate: Vector3::new(-x, 0.1 * x, x * x),
+        };
         let of = |seed| draw(64, seed).into_iter().map(reading).collect::<Vec<_>>();
         let mapping = PlacementMapping::fit(&of(1), &of(2), "wrist").unwrap();
-        let file = MappingFile { placements: BTreeMap::from([("wrist".to_owned(), mapping)]) };
+        let file = MappingFile {
+            placements: BTreeMap::from([("wrist".to_owned(), mapping)]),
+        };
         let text = file.to_yaml();
         assert_eq!(MappingFile::parse(&text, "m.yaml").unwrap(), file);
-        let falls = text.replacen("measured: [", "measured: [1e9, ", 1).replacen("simulated: [", "simulated: [-1e9, ", 1);
-        let error = MappingFile::parse(&falls, "m.yaml").unwrap_err().to_string();
-        assert!(error.contains("m.yaml: placement `wrist`, accel_x"), "{error}");
-        let few = RankMapping::fit(&[1.0; 3], &[2.0; 100], "wrist, accel_x").unwrap_err().to_string();
-        assert!(few.contains("wrist, accel_x: 3 samples, at least 20"), "{few}");
+        let falls = text
+            .replacen("measured: [", "measured: [1e9, ", 1)
+            .replacen("simulated: [", "simulated: [-1e9, ", 1);
+        let error = MappingFile::parse(&falls, "m.yaml")
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("m.yaml: placement `wrist`, accel_x"),
+            "{error}"
+        );
+        let few = RankMapping::fit(&[1.0; 3], &[2.0; 100], "wrist, accel_x")
+            .unwrap_err()
+            .to_string();
+        assert!(
+            few.contains("wrist, accel_x: 3 samples, at least 20"),
+            "{few}"
+        );
     }
 }

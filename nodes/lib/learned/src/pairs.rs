@@ -29,7 +29,8 @@ pub struct Pair {
     pub motion: SiteMotion,
     /// As many as the motion has samples.
     pub targets: Vec<Option<Target>>,
-    /// What was measured, in the axes of the reference's sensor frame: what a simulation is compared with.
+    /// What was measured, in the axes of the reference's sensor frame: what a simulation is
+    /// compared with.
     pub measured: Vec<Option<Reading>>,
 }
 
@@ -45,9 +46,10 @@ pub struct PairNames {
 }
 
 impl Pair {
-    /// Turns readings into the world: `a_G = R_GB R_BS a_S + g`, `w_G = R_GB R_BS w_S`, at the reference's time, where R_GB is the
-    /// reference's orientation and R_BS the fitted mount. Time and mount are fitted to `reference`, the best motion that is known; `motion`
-    /// is what the simulation is given, which may be worse (from video), on the same stamps.
+    /// Turns readings into the world: `a_G = R_GB R_BS a_S + g`, `w_G = R_GB R_BS w_S`, at the
+    /// reference's time, where R_GB is the reference's orientation and R_BS the fitted mount. Time
+    /// and mount are fitted to `reference`, the best motion that is known; `motion` is what the
+    /// simulation is given, which may be worse (from video), on the same stamps.
     ///
     /// # Errors
     /// As [`align()`].
@@ -60,9 +62,16 @@ impl Pair {
     ) -> Result<Self, LearnedError> {
         let alignment = align(&reference.kinematics, stamps, readings)?;
         let turned = |sample: &KinematicSample| {
-            let reading = reading_at(stamps, readings, sample.stamp.plus_seconds(alignment.time_offset))?;
+            let reading = reading_at(
+                stamps,
+                readings,
+                sample.stamp.plus_seconds(alignment.time_offset),
+            )?;
             let reference_from_chip = alignment.reference_from_chip;
-            Some(Reading { force: reference_from_chip * reading.force, rate: reference_from_chip * reading.rate })
+            Some(Reading {
+                force: reference_from_chip * reading.force,
+                rate: reference_from_chip * reading.rate,
+            })
         };
         let mut measured: Vec<_> = reference.kinematics.iter().map(turned).collect();
         measured.resize(motion.len(), None);
@@ -73,14 +82,36 @@ impl Pair {
                 angular_velocity: world_from_sensor * rate,
             })
         };
-        let mut targets: Vec<_> = measured.iter().zip(&reference.kinematics).map(in_world).collect();
+        let mut targets: Vec<_> = measured
+            .iter()
+            .zip(&reference.kinematics)
+            .map(in_world)
+            .collect();
         targets.resize(motion.len(), None);
-        let PairNames { name, subject, position } = names;
-        Ok(Self { name, subject, position, motion, targets, measured })
+        let PairNames {
+            name,
+            subject,
+            position,
+        } = names;
+        Ok(Self {
+            name,
+            subject,
+            position,
+            motion,
+            targets,
+            measured,
+        })
     }
 
-    /// The target of a sample, turned, in units of [`Quantity::scale`]; on top of the analytic value where `residual`.
-    pub fn target(&self, sample: usize, quantity: Quantity, residual: bool, turn: &UnitQuaternion<f64>) -> Option<[f32; 3]> {
+    /// The target of a sample, turned, in units of [`Quantity::scale`]; on top of the analytic
+    /// value where `residual`.
+    pub fn target(
+        &self,
+        sample: usize,
+        quantity: Quantity,
+        residual: bool,
+        turn: &UnitQuaternion<f64>,
+    ) -> Option<[f32; 3]> {
         let target = (*self.targets.get(sample)?)?;
         let kinematic = self.motion.kinematics.get(sample)?;
         let (value, analytic) = match quantity {

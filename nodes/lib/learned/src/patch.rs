@@ -8,12 +8,14 @@ use crate::LearnedError;
 /// Points of a patch: three triangles of three corners.
 pub const PATCH_POINTS: usize = 9;
 
-/// Triangles whose normals differ by more than this (cosine) from the site's lie on another side of the limb.
+/// Triangles whose normals differ by more than this (cosine) from the site's lie on another side of
+/// the limb.
 const SAME_SIDE: f64 = 0.5;
 /// Half the edge of the patch that stands for the skin on a rigid body, m.
 const RIGID_HALF_WIDTH: f64 = 0.03;
 
-/// The site's triangle and the two nearest that share no corner with it or each other, on the same side of the limb where there are such.
+/// The site's triangle and the two nearest that share no corner with it or each other, on the same
+/// side of the limb where there are such.
 #[derive(Clone, Debug)]
 pub struct Patch {
     subset: VertexSubset,
@@ -23,7 +25,8 @@ impl Patch {
     /// The patch around a site.
     ///
     /// # Errors
-    /// [`LearnedError::Body`] for a site of another body, [`LearnedError::NoPatch`] for a mesh of too few triangles.
+    /// [`LearnedError::Body`] for a site of another body, [`LearnedError::NoPatch`] for a mesh of
+    /// too few triangles.
     pub fn new(body: &ShapedBody, site: &Site) -> Result<Self, LearnedError> {
         let own = body.model().triangle(site)?;
         let centre = body.site_in_model(site)?;
@@ -36,7 +39,10 @@ impl Patch {
             .iter()
             .map(|face| {
                 let [a, b, c] = corners(face);
-                let side = (b - a).cross(&(c - a)).try_normalize(0.0).map_or(0.0, |other| other.dot(&normal));
+                let side = (b - a)
+                    .cross(&(c - a))
+                    .try_normalize(0.0)
+                    .map_or(0.0, |other| other.dot(&normal));
                 let far = if side < SAME_SIDE { 1e3 } else { 0.0 };
                 (((a + b + c) / 3.0 - centre).norm() + far, *face)
             })
@@ -50,9 +56,14 @@ impl Patch {
             }
         }
         if chosen.len() < PATCH_POINTS {
-            return Err(LearnedError::NoPatch { body: body.model().id().to_owned(), triangle: site.triangle });
+            return Err(LearnedError::NoPatch {
+                body: body.model().id().to_owned(),
+                triangle: site.triangle,
+            });
         }
-        Ok(Self { subset: body.subset(&chosen)? })
+        Ok(Self {
+            subset: body.subset(&chosen)?,
+        })
     }
 
     /// The nine corners' vertices.
@@ -66,12 +77,23 @@ impl Patch {
         std::array::from_fn(|point| positions[point])
     }
 
-    /// Nine points that stand for the skin under a sensor on a rigid body: corners of three triangles in its xy plane.
+    /// Nine points that stand for the skin under a sensor on a rigid body: corners of three
+    /// triangles in its xy plane.
     pub fn rigid(world_from_sensor: &Isometry3<f64>) -> [Vector3<f64>; PATCH_POINTS] {
         let h = RIGID_HALF_WIDTH;
         let corner = |x: f64, y: f64| world_from_sensor * nalgebra::Point3::new(x * h, y * h, 0.0);
-        [(0.4, 0.0), (-0.2, 0.35), (-0.2, -0.35), (1.0, 0.0), (1.0, 1.0), (0.3, 1.0), (-1.0, 0.0), (-1.0, -1.0), (-0.3, -1.0)]
-            .map(|(x, y)| corner(x, y).coords)
+        [
+            (0.4, 0.0),
+            (-0.2, 0.35),
+            (-0.2, -0.35),
+            (1.0, 0.0),
+            (1.0, 1.0),
+            (0.3, 1.0),
+            (-1.0, 0.0),
+            (-1.0, -1.0),
+            (-0.3, -1.0),
+        ]
+        .map(|(x, y)| corner(x, y).coords)
     }
 }
 
@@ -92,10 +114,18 @@ mod tests {
             let patch = Patch::new(&body, &site).unwrap();
             let points = patch.points(&pose);
             let centre = body.site_in_model(&site).unwrap() - shift;
-            let farthest = points.iter().map(|point| (point - centre).norm()).fold(0.0, f64::max);
+            let farthest = points
+                .iter()
+                .map(|point| (point - centre).norm())
+                .fold(0.0, f64::max);
             assert!(farthest < 0.12, "{name}: {farthest:.3} m away");
             for (index, point) in points.iter().enumerate() {
-                assert!(points[..index].iter().all(|other| (other - point).norm() > 1e-4), "{name}: a point stands twice");
+                assert!(
+                    points[..index]
+                        .iter()
+                        .all(|other| (other - point).norm() > 1e-4),
+                    "{name}: a point stands twice"
+                );
             }
         }
     }

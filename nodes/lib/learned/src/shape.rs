@@ -19,7 +19,8 @@ pub enum Direction {
     Forward,
 }
 
-/// Convolutions with ReLU along time, LSTM layers, a linear layer at every step: (batch, steps, inputs) -> (batch, steps, outputs).
+/// Convolutions with ReLU along time, LSTM layers, a linear layer at every step: (batch, steps,
+/// inputs) -> (batch, steps, outputs).
 ///
 /// The network that CROMOSim (Hao, Wang, Zheng) learns the gap with, its sizes free.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -46,13 +47,15 @@ pub struct NetworkShape {
 /// A tensor of a network.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tensor {
-    /// As PyTorch's modules `conv`, `lstm` and `linear` call it: `conv.0.weight`, `lstm.weight_ih_l0_reverse`.
+    /// As PyTorch's modules `conv`, `lstm` and `linear` call it: `conv.0.weight`,
+    /// `lstm.weight_ih_l0_reverse`.
     pub name: String,
     /// Its axes.
     pub shape: Vec<usize>,
     /// Where it lies among all parameters.
     pub range: Range<usize>,
-    /// Initial values are uniform within this of 0: 1 / sqrt(numbers that go into a unit), as PyTorch does.
+    /// Initial values are uniform within this of 0: 1 / sqrt(numbers that go into a unit), as
+    /// PyTorch does.
     pub(crate) initial_bound: f32,
 }
 
@@ -87,7 +90,11 @@ impl NetworkShape {
 
     /// Numbers a step that go into the first LSTM layer.
     pub(crate) fn lstm_inputs(&self) -> usize {
-        if self.convolutions == 0 { self.inputs } else { self.channels }
+        if self.convolutions == 0 {
+            self.inputs
+        } else {
+            self.channels
+        }
     }
 
     /// All numbers within their ranges, and no more parameters than [`MOST_PARAMETERS`].
@@ -118,13 +125,23 @@ impl NetworkShape {
     pub fn tensors(&self) -> Vec<Tensor> {
         let mut list = TensorList::default();
         list.convolutions(self.inputs, self.channels, self.kernel, self.convolutions);
-        list.recurrent(self.lstm_inputs(), self.hidden, self.layers, self.directions());
+        list.recurrent(
+            self.lstm_inputs(),
+            self.hidden,
+            self.layers,
+            self.directions(),
+        );
         list.linear(self.hidden * self.directions(), self.outputs);
         list.0
     }
 
     pub(crate) fn places(&self) -> Places {
-        Places::of(self.tensors(), self.convolutions, self.layers, self.directions())
+        Places::of(
+            self.tensors(),
+            self.convolutions,
+            self.layers,
+            self.directions(),
+        )
     }
 }
 
@@ -138,7 +155,12 @@ impl Places {
             lstm: (0..layers)
                 .map(|_| {
                     (0..directions)
-                        .map(|_| LstmPlace { input: next(), recurrent: next(), input_bias: next(), recurrent_bias: next() })
+                        .map(|_| LstmPlace {
+                            input: next(),
+                            recurrent: next(),
+                            input_bias: next(),
+                            recurrent_bias: next(),
+                        })
                         .collect()
                 })
                 .collect(),
@@ -147,17 +169,31 @@ impl Places {
     }
 }
 
-/// Numbers (name, found, least, most) within their ranges, and no more parameters than [`MOST_PARAMETERS`]; within the ranges no sum or product
-/// of the tensors' sizes may overflow.
-pub(crate) fn check(numbers: &[(&'static str, usize, usize, usize)], tensors: impl FnOnce() -> Vec<Tensor>) -> Result<(), LearnedError> {
+/// Numbers (name, found, least, most) within their ranges, and no more parameters than
+/// [`MOST_PARAMETERS`]; within the ranges no sum or product of the tensors' sizes may overflow.
+pub(crate) fn check(
+    numbers: &[(&'static str, usize, usize, usize)],
+    tensors: impl FnOnce() -> Vec<Tensor>,
+) -> Result<(), LearnedError> {
     for &(field, found, least, most) in numbers {
         if !(least..=most).contains(&found) {
-            return Err(LearnedError::Shape { field, found, least, most });
+            return Err(LearnedError::Shape {
+                field,
+                found,
+                least,
+                most,
+            });
         }
     }
-    let found: u64 = tensors().iter().map(|tensor| tensor.range.len() as u64).sum();
+    let found: u64 = tensors()
+        .iter()
+        .map(|tensor| tensor.range.len() as u64)
+        .sum();
     if found > MOST_PARAMETERS {
-        return Err(LearnedError::TooLarge { found, most: MOST_PARAMETERS });
+        return Err(LearnedError::TooLarge {
+            found,
+            most: MOST_PARAMETERS,
+        });
     }
     Ok(())
 }
@@ -174,7 +210,12 @@ impl TensorList {
     fn push(&mut self, name: String, shape: &[usize], initial_bound: f32) {
         let start = self.0.last().map_or(0, |tensor| tensor.range.end);
         let range = start..start + shape.iter().product::<usize>();
-        self.0.push(Tensor { name, shape: shape.to_vec(), range, initial_bound });
+        self.0.push(Tensor {
+            name,
+            shape: shape.to_vec(),
+            range,
+            initial_bound,
+        });
     }
 
     /// `conv`: Conv1d layers.
@@ -182,7 +223,11 @@ impl TensorList {
         for index in 0..count {
             let inputs = if index == 0 { inputs } else { channels };
             let bound = bound(inputs * kernel);
-            self.push(format!("conv.{index}.weight"), &[channels, inputs, kernel], bound);
+            self.push(
+                format!("conv.{index}.weight"),
+                &[channels, inputs, kernel],
+                bound,
+            );
             self.push(format!("conv.{index}.bias"), &[channels], bound);
         }
     }
@@ -190,11 +235,23 @@ impl TensorList {
     /// `lstm`: one LSTM of several layers.
     pub fn recurrent(&mut self, inputs: usize, hidden: usize, layers: usize, directions: usize) {
         for layer in 0..layers {
-            let inputs = if layer == 0 { inputs } else { hidden * directions };
+            let inputs = if layer == 0 {
+                inputs
+            } else {
+                hidden * directions
+            };
             for suffix in ["", "_reverse"].into_iter().take(directions) {
                 let (gates, bound) = (4 * hidden, bound(hidden));
-                self.push(format!("lstm.weight_ih_l{layer}{suffix}"), &[gates, inputs], bound);
-                self.push(format!("lstm.weight_hh_l{layer}{suffix}"), &[gates, hidden], bound);
+                self.push(
+                    format!("lstm.weight_ih_l{layer}{suffix}"),
+                    &[gates, inputs],
+                    bound,
+                );
+                self.push(
+                    format!("lstm.weight_hh_l{layer}{suffix}"),
+                    &[gates, hidden],
+                    bound,
+                );
                 self.push(format!("lstm.bias_ih_l{layer}{suffix}"), &[gates], bound);
                 self.push(format!("lstm.bias_hh_l{layer}{suffix}"), &[gates], bound);
             }
@@ -203,7 +260,11 @@ impl TensorList {
 
     /// `linear`: a Linear layer.
     pub fn linear(&mut self, inputs: usize, outputs: usize) {
-        self.push("linear.weight".to_owned(), &[outputs, inputs], bound(inputs));
+        self.push(
+            "linear.weight".to_owned(),
+            &[outputs, inputs],
+            bound(inputs),
+        );
         self.push("linear.bias".to_owned(), &[outputs], bound(inputs));
     }
 }
@@ -230,7 +291,11 @@ mod tests {
         let convolutions = (27 * 64 * 5 + 64) + 2 * (64 * 64 * 5 + 64);
         let lstm = 2 * (512 * (64 + 128) + 1024) + 2 * (512 * (256 + 128) + 1024);
         assert_eq!(shape().parameters(), convolutions + lstm + 256 * 3 + 3);
-        let names: Vec<String> = shape().tensors().into_iter().map(|tensor| tensor.name).collect();
+        let names: Vec<String> = shape()
+            .tensors()
+            .into_iter()
+            .map(|tensor| tensor.name)
+            .collect();
         assert_eq!(names[0..2], ["conv.0.weight", "conv.0.bias"]);
         assert_eq!(names[14], "lstm.weight_ih_l1");
         assert_eq!(names[21], "lstm.bias_hh_l1_reverse");
@@ -239,16 +304,45 @@ mod tests {
     #[test]
     fn refuses_what_cannot_be() {
         let message = |shape: NetworkShape| shape.check().unwrap_err().to_string();
-        assert_eq!(message(NetworkShape { hidden: 0, ..shape() }), "network shape: hidden is 0, it may be 1 to 16384");
-        assert!(message(NetworkShape { inputs: usize::MAX, ..shape() }).contains("inputs"));
-        assert!(message(NetworkShape { hidden: 16_384, ..shape() }).contains("parameters, at most 268435456"));
-        assert!(shape().check().is_ok() && NetworkShape { convolutions: 0, ..shape() }.check().is_ok());
+        assert_eq!(
+            message(NetworkShape {
+                hidden: 0,
+                ..shape()
+            }),
+            "network shape: hidden is 0, it may be 1 to 16384"
+        );
+        assert!(
+            message(NetworkShape {
+                inputs: usize::MAX,
+                ..shape()
+            })
+            .contains("inputs")
+        );
+        assert!(
+            message(NetworkShape {
+                hidden: 16_384,
+                ..shape()
+            })
+            .contains("parameters, at most 268435456")
+        );
+        assert!(
+            shape().check().is_ok()
+                && NetworkShape {
+                    convolutions: 0,
+                    ..shape()
+                }
+                .check()
+                .is_ok()
+        );
     }
 
     #[test]
     fn unknown_fields_are_refused() {
         let text = serde_json::to_string(&shape()).unwrap();
-        assert_eq!(serde_json::from_str::<NetworkShape>(&text).unwrap(), shape());
+        assert_eq!(
+            serde_json::from_str::<NetworkShape>(&text).unwrap(),
+            shape()
+        );
         assert!(serde_json::from_str::<NetworkShape>(&text.replace("kernel", "kernels")).is_err());
     }
 }

@@ -8,7 +8,8 @@ use cromosim_spatial::{Stamp, derivative_weights};
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::{
-    Blend, Direction, Input, LearnedError, NETWORK_RATE_HZ, Network, PreparedNetwork, Quantity, SiteMotion, WINDOW, window_starts,
+    Blend, Direction, Input, LearnedError, NETWORK_RATE_HZ, Network, PreparedNetwork, Quantity,
+    SiteMotion, WINDOW, window_starts,
 };
 
 /// Notes in the weights' files that say what a network is for.
@@ -27,27 +28,41 @@ impl LearnedSimulator {
     /// Networks in the order of [`Quantity::BOTH`].
     ///
     /// # Errors
-    /// [`LearnedError::WrongNetwork`] for other widths than the input's, or a streaming network that reads both ways.
+    /// [`LearnedError::WrongNetwork`] for other widths than the input's, or a streaming network
+    /// that reads both ways.
     pub fn new(input: Input, networks: [Network; 2]) -> Result<Self, LearnedError> {
         for (network, quantity) in networks.iter().zip(Quantity::BOTH) {
             let shape = network.shape();
-            let wrong = |problem: String| LearnedError::WrongNetwork { network: quantity.name(), problem };
+            let wrong = |problem: String| LearnedError::WrongNetwork {
+                network: quantity.name(),
+                problem,
+            };
             if (shape.inputs, shape.outputs) != (input.channels(), 3) {
                 let (inputs, outputs) = (shape.inputs, shape.outputs);
-                return Err(wrong(format!("{inputs} inputs and {outputs} outputs, {input:?} needs {} and 3", input.channels())));
+                return Err(wrong(format!(
+                    "{inputs} inputs and {outputs} outputs, {input:?} needs {} and 3",
+                    input.channels()
+                )));
             }
             if input == Input::Streaming && shape.direction == Direction::Both {
-                return Err(wrong("it reads both ways; live it needs `direction: forward`".to_owned()));
+                return Err(wrong(
+                    "it reads both ways; live it needs `direction: forward`".to_owned(),
+                ));
             }
         }
         let prepared = [networks[0].prepare(), networks[1].prepare()];
-        Ok(Self { input, networks, prepared })
+        Ok(Self {
+            input,
+            networks,
+            prepared,
+        })
     }
 
     /// Reads FOLDER/acceleration.safetensors and FOLDER/angular_velocity.safetensors.
     ///
     /// # Errors
-    /// Those of [`Network::read`] and [`LearnedSimulator::new`]; a note on input or quantity that is absent or differs.
+    /// Those of [`Network::read`] and [`LearnedSimulator::new`]; a note on input or quantity that
+    /// is absent or differs.
     pub fn read(folder: &Path) -> Result<Self, LearnedError> {
         let [acceleration, angular_velocity] = Quantity::BOTH.map(|quantity| {
             let path = folder.join(format!("{}.safetensors", quantity.name()));
@@ -57,22 +72,42 @@ impl LearnedSimulator {
     }
 
     /// Files in the order of [`Quantity::BOTH`], with their notes.
-    pub(crate) fn of_files(files: [(PathBuf, Network, BTreeMap<String, String>); 2]) -> Result<Self, LearnedError> {
+    pub(crate) fn of_files(
+        files: [(PathBuf, Network, BTreeMap<String, String>); 2],
+    ) -> Result<Self, LearnedError> {
         let mut inputs = Vec::new();
         for ((path, _, notes), quantity) in files.iter().zip(Quantity::BOTH) {
-            let wrong = |reason: String| LearnedError::Metadata { path: path.clone(), key: "cromosim", reason };
-            let note = |key: &str| notes.get(key).ok_or_else(|| wrong(format!("no note `{key}`")));
+            let wrong = |reason: String| LearnedError::Metadata {
+                path: path.clone(),
+                key: "cromosim",
+                reason,
+            };
+            let note = |key: &str| {
+                notes
+                    .get(key)
+                    .ok_or_else(|| wrong(format!("no note `{key}`")))
+            };
             let stated = note(QUANTITY)?;
             if stated != quantity.name() {
-                return Err(wrong(format!("it predicts `{stated}`, not `{}`", quantity.name())));
+                return Err(wrong(format!(
+                    "it predicts `{stated}`, not `{}`",
+                    quantity.name()
+                )));
             }
             let stated = note(INPUT)?;
-            let known = || wrong(format!("input `{stated}`, known are points, residual, differences and streaming"));
+            let known = || {
+                wrong(format!(
+                    "input `{stated}`, known are points, residual, differences and streaming"
+                ))
+            };
             inputs.push(Input::from_name(stated).ok_or_else(known)?);
         }
         if inputs[0] != inputs[1] {
             let problem = format!("its input is {:?}, the other's {:?}", inputs[1], inputs[0]);
-            return Err(LearnedError::WrongNetwork { network: Quantity::AngularVelocity.name(), problem });
+            return Err(LearnedError::WrongNetwork {
+                network: Quantity::AngularVelocity.name(),
+                problem,
+            });
         }
         Self::new(inputs[0], files.map(|(_, network, _)| network))
     }
@@ -81,12 +116,19 @@ impl LearnedSimulator {
     ///
     /// # Errors
     /// As [`Network::write`].
-    pub fn write(&self, folder: &Path, notes: &BTreeMap<String, String>) -> Result<(), LearnedError> {
+    pub fn write(
+        &self,
+        folder: &Path,
+        notes: &BTreeMap<String, String>,
+    ) -> Result<(), LearnedError> {
         for (network, quantity) in self.networks.iter().zip(Quantity::BOTH) {
             let mut notes = notes.clone();
             notes.insert(INPUT.to_owned(), self.input.name().to_owned());
             notes.insert(QUANTITY.to_owned(), quantity.name().to_owned());
-            network.write(&folder.join(format!("{}.safetensors", quantity.name())), &notes)?;
+            network.write(
+                &folder.join(format!("{}.safetensors", quantity.name())),
+                &notes,
+            )?;
         }
         Ok(())
     }
@@ -101,39 +143,59 @@ impl LearnedSimulator {
         &self.networks
     }
 
-    /// The motion's kinematics with acceleration and angular velocity as the networks say; frames stay as they are. Windows of 2 s that
-    /// overlap by 80 % are blended; a streaming network runs through.
+    /// The motion's kinematics with acceleration and angular velocity as the networks say; frames
+    /// stay as they are. Windows of 2 s that overlap by 80 % are blended; a streaming network runs
+    /// through.
     ///
     /// # Errors
     /// None but what [`PreparedNetwork::forward`] names.
     pub fn simulate(&self, motion: &SiteMotion) -> Result<Vec<KinematicSample>, LearnedError> {
         let [accelerations, rates] = [self.predict(motion, 0)?, self.predict(motion, 1)?];
-        let samples = motion.kinematics.iter().zip(accelerations.iter().zip(&rates));
-        let learned = |(sample, (acceleration, rate)): (&KinematicSample, (&Vector3<f64>, &Vector3<f64>))| {
-            let (base_acceleration, base_rate) =
-                if self.input.on_top_of_analytic() { (sample.acceleration, sample.angular_velocity) } else { Default::default() };
-            KinematicSample {
-                acceleration: base_acceleration + acceleration,
-                angular_velocity: base_rate + rate,
-                angular_acceleration: None,
-                ..*sample
-            }
-        };
+        let samples = motion
+            .kinematics
+            .iter()
+            .zip(accelerations.iter().zip(&rates));
+        let learned =
+            |(sample, (acceleration, rate)): (&KinematicSample, (&Vector3<f64>, &Vector3<f64>))| {
+                let (base_acceleration, base_rate) = if self.input.on_top_of_analytic() {
+                    (sample.acceleration, sample.angular_velocity)
+                } else {
+                    Default::default()
+                };
+                KinematicSample {
+                    acceleration: base_acceleration + acceleration,
+                    angular_velocity: base_rate + rate,
+                    angular_acceleration: None,
+                    ..*sample
+                }
+            };
         Ok(samples.map(learned).collect())
     }
 
-    /// Kinematics at any stamps: `analytic` there, corrected by what the networks change on their own grid of 100 Hz, in between by cubics.
+    /// Kinematics at any stamps: `analytic` there, corrected by what the networks change on their
+    /// own grid of 100 Hz, in between by cubics.
     ///
     /// # Errors
     /// As [`LearnedSimulator::simulate`].
-    pub fn correct(&self, motion: &SiteMotion, analytic: &[KinematicSample]) -> Result<Vec<KinematicSample>, LearnedError> {
+    pub fn correct(
+        &self,
+        motion: &SiteMotion,
+        analytic: &[KinematicSample],
+    ) -> Result<Vec<KinematicSample>, LearnedError> {
         let learned = self.simulate(motion)?;
         let corrections: Vec<[Vector3<f64>; 2]> = learned
             .iter()
             .zip(&motion.kinematics)
-            .map(|(new, old)| [new.acceleration - old.acceleration, new.angular_velocity - old.angular_velocity])
+            .map(|(new, old)| {
+                [
+                    new.acceleration - old.acceleration,
+                    new.angular_velocity - old.angular_velocity,
+                ]
+            })
             .collect();
-        let Some(start) = motion.kinematics.first().map(|sample| sample.stamp) else { return Ok(analytic.to_vec()) };
+        let Some(start) = motion.kinematics.first().map(|sample| sample.stamp) else {
+            return Ok(analytic.to_vec());
+        };
         let corrected = |sample: &KinematicSample| {
             let [acceleration, rate] = between(&corrections, start, sample.stamp);
             KinematicSample {
@@ -147,7 +209,11 @@ impl LearnedSimulator {
     }
 
     /// The network's own output, SI units.
-    fn predict(&self, motion: &SiteMotion, which: usize) -> Result<Vec<Vector3<f64>>, LearnedError> {
+    fn predict(
+        &self,
+        motion: &SiteMotion,
+        which: usize,
+    ) -> Result<Vec<Vector3<f64>>, LearnedError> {
         let (network, scale) = (&self.prepared[which], Quantity::BOTH[which].scale());
         let none = UnitQuaternion::identity();
         let samples = motion.len();
@@ -155,7 +221,12 @@ impl LearnedSimulator {
         if self.input == Input::Streaming {
             self.input.fill(motion, 0, samples, &none, &mut features);
             let output = network.forward(&features, 1, samples)?;
-            return Ok(output.as_chunks::<3>().0.iter().map(|value| Vector3::from(value.map(f64::from)) * scale).collect());
+            return Ok(output
+                .as_chunks::<3>()
+                .0
+                .iter()
+                .map(|value| Vector3::from(value.map(f64::from)) * scale)
+                .collect());
         }
         let (starts, steps) = (window_starts(samples), samples.min(WINDOW));
         for start in &starts {
@@ -166,7 +237,11 @@ impl LearnedSimulator {
         for (start, window) in starts.iter().zip(output.chunks(3 * steps.max(1))) {
             blend.add(*start, window);
         }
-        Ok(blend.finish().into_iter().map(|value| Vector3::from(value) * scale).collect())
+        Ok(blend
+            .finish()
+            .into_iter()
+            .map(|value| Vector3::from(value) * scale)
+            .collect())
     }
 }
 
@@ -179,11 +254,19 @@ fn between(values: &[[Vector3<f64>; 2]], start: Stamp, stamp: Stamp) -> [Vector3
         return values[nearest as usize];
     }
     let width = values.len().min(4);
-    let first = (position.floor() as usize).saturating_sub(1).min(values.len() - width);
+    let first = (position.floor() as usize)
+        .saturating_sub(1)
+        .min(values.len() - width);
     let mut places = [0.0; 4];
     for (index, place) in places.iter_mut().enumerate() {
         *place = (first + index) as f64 - position;
     }
     let weights = derivative_weights(&places[..width], 0.0)[0];
-    std::array::from_fn(|which| values[first..first + width].iter().zip(weights).map(|(value, weight)| value[which] * weight).sum())
+    std::array::from_fn(|which| {
+        values[first..first + width]
+            .iter()
+            .zip(weights)
+            .map(|(value, weight)| value[which] * weight)
+            .sum()
+    })
 }

@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use crate::kernels::{
-    Convolution, ConvolutionGradients, Linear, LinearGradients, Lstm, LstmGradients, LstmTape, LstmWeights, Order, Padding, relu,
-    relu_backward,
+    Convolution, ConvolutionGradients, Linear, LinearGradients, Lstm, LstmGradients, LstmTape,
+    LstmWeights, Order, Padding, relu, relu_backward,
 };
 use crate::shape::{LstmPlace, Places};
 
@@ -15,7 +15,12 @@ pub(crate) struct Convolutions(Vec<Convolution>);
 impl Convolutions {
     pub fn new(places: &Places, parameters: &[f32], kernel: usize, padding: Padding) -> Self {
         let convolution = |(weight, bias): &(Range<usize>, Range<usize>)| {
-            Convolution::new(&parameters[weight.clone()], &parameters[bias.clone()], kernel, padding)
+            Convolution::new(
+                &parameters[weight.clone()],
+                &parameters[bias.clone()],
+                kernel,
+                padding,
+            )
         };
         Self(places.convolutions.iter().map(convolution).collect())
     }
@@ -24,8 +29,14 @@ impl Convolutions {
         &self.0
     }
 
-    /// input: (steps, batch, inputs) -> (steps out, batch, channels); what went into each goes to `tape`.
-    pub fn forward(&self, input: Vec<f32>, batch: usize, mut tape: Option<&mut Vec<Vec<f32>>>) -> Vec<f32> {
+    /// input: (steps, batch, inputs) -> (steps out, batch, channels); what went into each goes to
+    /// `tape`.
+    pub fn forward(
+        &self,
+        input: Vec<f32>,
+        batch: usize,
+        mut tape: Option<&mut Vec<Vec<f32>>>,
+    ) -> Vec<f32> {
         let mut current = input;
         for convolution in &self.0 {
             let mut next = convolution.forward(&current, batch);
@@ -38,7 +49,8 @@ impl Convolutions {
         current
     }
 
-    /// Adds the gradients of the weights, returns the input's; inputs: what went into each; output: what came out of the last.
+    /// Adds the gradients of the weights, returns the input's; inputs: what went into each; output:
+    /// what came out of the last.
     pub fn backward(
         &self,
         places: &Places,
@@ -50,11 +62,23 @@ impl Convolutions {
     ) -> Vec<f32> {
         let mut current = output_gradient;
         for (index, convolution) in self.0.iter().enumerate().rev() {
-            relu_backward(inputs.get(index + 1).map_or(output, Vec::as_slice), &mut current);
+            relu_backward(
+                inputs.get(index + 1).map_or(output, Vec::as_slice),
+                &mut current,
+            );
             let (weight, bias) = &places.convolutions[index];
             let [of_weight, of_bias] = disjoint(gradients, [weight, bias]);
-            let of_convolution = ConvolutionGradients { weight: of_weight, bias: of_bias };
-            current = convolution.backward(&parameters[weight.clone()], &inputs[index], &current, batch, of_convolution);
+            let of_convolution = ConvolutionGradients {
+                weight: of_weight,
+                bias: of_bias,
+            };
+            current = convolution.backward(
+                &parameters[weight.clone()],
+                &inputs[index],
+                &current,
+                batch,
+                of_convolution,
+            );
         }
         current
     }
@@ -83,7 +107,8 @@ impl Recurrent {
     pub fn new(places: &Places, parameters: &[f32]) -> Self {
         let directions = |layer: &Vec<LstmPlace>| {
             let both = layer.iter().zip([Order::Forward, Order::Reverse]);
-            both.map(|(place, order)| Lstm::new(lstm_weights(parameters, place), order)).collect()
+            both.map(|(place, order)| Lstm::new(lstm_weights(parameters, place), order))
+                .collect()
         };
         Self(places.lstm.iter().map(directions).collect())
     }
@@ -94,7 +119,12 @@ impl Recurrent {
     }
 
     /// input: (steps, batch, inputs) -> (steps, batch, hidden x directions).
-    pub fn forward(&self, input: Vec<f32>, batch: usize, mut tape: Option<&mut RecurrentTape>) -> Vec<f32> {
+    pub fn forward(
+        &self,
+        input: Vec<f32>,
+        batch: usize,
+        mut tape: Option<&mut RecurrentTape>,
+    ) -> Vec<f32> {
         let mut current = input;
         for layer in &self.0 {
             let tapes = run_directions(layer, &current, batch);
@@ -121,7 +151,14 @@ impl Recurrent {
         let mut current = output_gradient;
         for (index, layer) in self.0.iter().enumerate().rev() {
             let known = (tape.layers[index].as_slice(), tape.inputs[index].as_slice());
-            current = layer_backward(layer, &places.lstm[index], parameters, known, &current, gradients);
+            current = layer_backward(
+                layer,
+                &places.lstm[index],
+                parameters,
+                known,
+                &current,
+                gradients,
+            );
         }
         current
     }
@@ -142,13 +179,24 @@ fn layer_backward(
     let back = |direction: usize, gradients: &mut [f32]| {
         let (lstm, place) = (&layer[direction], &places[direction]);
         let gradient = part(output_gradient, lstm.hidden(), layer.len(), direction);
-        lstm_direction_backward(lstm, lstm_weights(parameters, place), &tapes[direction], input, &gradient, place, gradients)
+        lstm_direction_backward(
+            lstm,
+            lstm_weights(parameters, place),
+            &tapes[direction],
+            input,
+            &gradient,
+            place,
+            gradients,
+        )
     };
     if layer.len() == 1 {
         return back(0, first);
     }
     let (mut of_input, other) = rayon::join(|| back(0, first), || back(1, second));
-    of_input.iter_mut().zip(other).for_each(|(sum, other)| *sum += other);
+    of_input
+        .iter_mut()
+        .zip(other)
+        .for_each(|(sum, other)| *sum += other);
     of_input
 }
 
@@ -165,7 +213,11 @@ fn lstm_direction_backward(
     let (of_input_weights, rest) = gradients.split_at_mut(place.input.len());
     let (recurrent, rest) = rest.split_at_mut(place.recurrent.len());
     let (input_bias, rest) = rest.split_at_mut(place.input_bias.len());
-    let of_weights = LstmGradients { input: of_input_weights, recurrent, bias: input_bias };
+    let of_weights = LstmGradients {
+        input: of_input_weights,
+        recurrent,
+        bias: input_bias,
+    };
     let of_input = lstm.backward(weights, input, tape, output_gradient, of_weights);
     rest[..input_bias.len()].copy_from_slice(input_bias);
     of_input
@@ -174,16 +226,25 @@ fn lstm_direction_backward(
 fn run_directions(layer: &[Lstm], input: &[f32], batch: usize) -> Vec<LstmTape> {
     match layer {
         [first, second] => {
-            let (first, second) = rayon::join(|| first.forward(input, batch), || second.forward(input, batch));
+            let (first, second) = rayon::join(
+                || first.forward(input, batch),
+                || second.forward(input, batch),
+            );
             vec![first, second]
         }
-        layer => layer.iter().map(|lstm| lstm.forward(input, batch)).collect(),
+        layer => layer
+            .iter()
+            .map(|lstm| lstm.forward(input, batch))
+            .collect(),
     }
 }
 
 /// The linear layer behind them.
 pub(crate) fn linear_of(places: &Places, parameters: &[f32]) -> Linear {
-    Linear::new(&parameters[places.linear.0.clone()], &parameters[places.linear.1.clone()])
+    Linear::new(
+        &parameters[places.linear.0.clone()],
+        &parameters[places.linear.1.clone()],
+    )
 }
 
 /// Adds its weights' gradients, returns its input's.
@@ -196,7 +257,15 @@ pub(crate) fn linear_backward(
 ) -> Vec<f32> {
     let (weight, bias) = (&places.linear.0, &places.linear.1);
     let [of_weight, of_bias] = disjoint(gradients, [weight, bias]);
-    linear.backward(&parameters[weight.clone()], input, output_gradient, LinearGradients { weight: of_weight, bias: of_bias })
+    linear.backward(
+        &parameters[weight.clone()],
+        input,
+        output_gradient,
+        LinearGradients {
+            weight: of_weight,
+            bias: of_bias,
+        },
+    )
 }
 
 fn lstm_weights<'a>(parameters: &'a [f32], place: &LstmPlace) -> LstmWeights<'a> {
@@ -215,14 +284,20 @@ pub(crate) fn join(parts: &[&[f32]], width: usize) -> Vec<f32> {
     }
     let mut joined = Vec::with_capacity(parts.iter().map(|part| part.len()).sum());
     for row in 0..parts[0].len() / width {
-        parts.iter().for_each(|part| joined.extend_from_slice(&part[row * width..][..width]));
+        parts
+            .iter()
+            .for_each(|part| joined.extend_from_slice(&part[row * width..][..width]));
     }
     joined
 }
 
 /// What [`join`] joined.
 pub(crate) fn part(joined: &[f32], width: usize, parts: usize, index: usize) -> Vec<f32> {
-    joined.chunks_exact(width * parts).flat_map(|row| &row[index * width..][..width]).copied().collect()
+    joined
+        .chunks_exact(width * parts)
+        .flat_map(|row| &row[index * width..][..width])
+        .copied()
+        .collect()
 }
 
 /// Weight and bias, which lie one behind the other.

@@ -1,14 +1,16 @@
 //! Step by step, for live use: a causal network that remembers.
 //!
-//! Each convolution keeps its last inputs, each LSTM layer its state; a step costs one product a layer and allocates nothing. It computes
-//! what [`Network::forward`] computes over the sequence so far.
+//! Each convolution keeps its last inputs, each LSTM layer its state; a step costs one product a
+//! layer and allocates nothing. It computes what [`Network::forward`] computes over the sequence so
+//! far.
 
 use crate::kernels::{LstmState, PackedMatrix, View, add_product, fill_rows, relu};
 use crate::layers::Layers;
 use crate::shape::Direction;
 use crate::{LearnedError, Network, NetworkShape};
 
-/// A causal network over several sequences that advance together, such as the placements on one body.
+/// A causal network over several sequences that advance together, such as the placements on one
+/// body.
 #[derive(Debug, Clone)]
 pub struct StreamingBatch {
     shape: NetworkShape,
@@ -37,7 +39,15 @@ impl ConvolutionState {
         fill_rows(&mut self.output, bias);
         for (age, matrix) in taps.iter().rev().enumerate() {
             let place = (self.newest + taps.len() - age) % taps.len();
-            add_product(&mut self.output, View::new(&self.ring[place * wide..][..wide], sequences, wide / sequences), matrix);
+            add_product(
+                &mut self.output,
+                View::new(
+                    &self.ring[place * wide..][..wide],
+                    sequences,
+                    wide / sequences,
+                ),
+                matrix,
+            );
         }
         relu(&mut self.output);
     }
@@ -50,10 +60,14 @@ impl ConvolutionState {
         start..start + wide / sequences
     }
 
-    /// Undoes the last step for one sequence. Its oldest input, which that step overwrote, is not read again.
+    /// Undoes the last step for one sequence. Its oldest input, which that step overwrote, is not
+    /// read again.
     fn undo(&mut self, sequence: usize, sequences: usize) {
         for age in 1..self.taps {
-            let (newer, older) = (self.place(age - 1, sequence, sequences), self.place(age, sequence, sequences));
+            let (newer, older) = (
+                self.place(age - 1, sequence, sequences),
+                self.place(age, sequence, sequences),
+            );
             self.ring.copy_within(older, newer.start);
         }
     }
@@ -78,9 +92,18 @@ impl StreamingBatch {
         }
         let sequences = sequences.max(1);
         let convolution = |index: usize| {
-            let inputs = if index == 0 { shape.inputs } else { shape.channels };
+            let inputs = if index == 0 {
+                shape.inputs
+            } else {
+                shape.channels
+            };
             let ring = vec![0.0; shape.kernel * sequences * inputs];
-            ConvolutionState { ring, taps: shape.kernel, newest: 0, output: vec![0.0; sequences * shape.channels] }
+            ConvolutionState {
+                ring,
+                taps: shape.kernel,
+                newest: 0,
+                output: vec![0.0; sequences * shape.channels],
+            }
         };
         Ok(Self {
             layers: Layers::new(&shape, network.parameters()),
@@ -100,7 +123,9 @@ impl StreamingBatch {
 
     /// All states back to zero, as at a gap in the input.
     pub fn reset(&mut self) {
-        self.convolutions.iter_mut().for_each(|state| state.ring.fill(0.0));
+        self.convolutions
+            .iter_mut()
+            .for_each(|state| state.ring.fill(0.0));
         self.lstm.iter_mut().for_each(LstmState::reset);
     }
 
@@ -109,14 +134,22 @@ impl StreamingBatch {
     /// # Panics
     /// For a sequence that is not there.
     pub fn reset_sequence(&mut self, sequence: usize) {
-        assert!(sequence < self.sequences, "sequence {sequence} of {}", self.sequences);
-        self.convolutions.iter_mut().for_each(|state| state.reset_sequence(sequence, self.sequences));
-        self.lstm.iter_mut().for_each(|state| state.reset_sequence(sequence, self.sequences));
+        assert!(
+            sequence < self.sequences,
+            "sequence {sequence} of {}",
+            self.sequences
+        );
+        self.convolutions
+            .iter_mut()
+            .for_each(|state| state.reset_sequence(sequence, self.sequences));
+        self.lstm
+            .iter_mut()
+            .for_each(|state| state.reset_sequence(sequence, self.sequences));
     }
 
-    /// One step of the sequences that `advance` marks; the states of the others, and of those without a mark, stay as they are, and their rows
-    /// of the output mean nothing.
-    /// It costs as much as a step of all, and more than that where some stay.
+    /// One step of the sequences that `advance` marks; the states of the others, and of those
+    /// without a mark, stay as they are, and their rows of the output mean nothing. It costs as
+    /// much as a step of all, and more than that where some stay.
     ///
     /// # Errors
     /// Where the input's length does not fit; the states stay as they were.
@@ -128,7 +161,9 @@ impl StreamingBatch {
         let before = self.lstm.clone();
         self.step(input)?;
         for sequence in (0..self.sequences).filter(stays) {
-            self.convolutions.iter_mut().for_each(|state| state.undo(sequence, self.sequences));
+            self.convolutions
+                .iter_mut()
+                .for_each(|state| state.undo(sequence, self.sequences));
             for (state, before) in self.lstm.iter_mut().zip(&before) {
                 state.restore_sequence(before, sequence, self.sequences);
             }
@@ -212,14 +247,28 @@ mod tests {
         for (convolutions, kernel) in [(3, 5), (2, 4), (1, 1), (0, 3)] {
             let network = network(convolutions, kernel);
             let input = values(SEQUENCES * STEPS * 9, 1);
-            let expected = swap_leading_axes(&network.forward(&input, SEQUENCES, STEPS).unwrap(), SEQUENCES, STEPS, 3);
+            let expected = swap_leading_axes(
+                &network.forward(&input, SEQUENCES, STEPS).unwrap(),
+                SEQUENCES,
+                STEPS,
+                3,
+            );
             let by_steps = swap_leading_axes(&input, SEQUENCES, STEPS, 9);
             let mut batch = StreamingBatch::new(&network, SEQUENCES).unwrap();
             let mut single = StreamingNetwork::new(&network).unwrap();
             for _ in 0..2 {
-                for (input, expected) in by_steps.chunks(SEQUENCES * 9).zip(expected.chunks(SEQUENCES * 3)) {
+                for (input, expected) in by_steps
+                    .chunks(SEQUENCES * 9)
+                    .zip(expected.chunks(SEQUENCES * 3))
+                {
                     let found = batch.step(input).unwrap();
-                    assert!(found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-5), "{found:?} {expected:?}");
+                    assert!(
+                        found
+                            .iter()
+                            .zip(expected)
+                            .all(|(found, expected)| (found - expected).abs() < 1e-5),
+                        "{found:?} {expected:?}"
+                    );
                     assert_eq!(single.step(&input[..9]).unwrap(), &found[..3]);
                 }
                 batch.reset();
@@ -236,14 +285,24 @@ mod tests {
             let mut singles = vec![StreamingNetwork::new(&network).unwrap(); SEQUENCES];
             let input = values(SEQUENCES * STEPS * 9, 2);
             for (step, input) in input.chunks(SEQUENCES * 9).enumerate() {
-                let advance: Vec<bool> = (0..SEQUENCES).map(|sequence| (step * 5 + sequence * 3) % 7 > 2 || step % 4 == 0).collect();
+                let advance: Vec<bool> = (0..SEQUENCES)
+                    .map(|sequence| (step * 5 + sequence * 3) % 7 > 2 || step % 4 == 0)
+                    .collect();
                 if step % 9 == 5 {
                     batch.reset_sequence(step % SEQUENCES);
                     singles[step % SEQUENCES].reset();
                 }
                 let found = batch.step_some(input, &advance).unwrap();
-                for (sequence, single) in singles.iter_mut().enumerate().filter(|(sequence, _)| advance[*sequence]) {
-                    assert_eq!(single.step(&input[9 * sequence..][..9]).unwrap(), &found[3 * sequence..][..3], "step {step}");
+                for (sequence, single) in singles
+                    .iter_mut()
+                    .enumerate()
+                    .filter(|(sequence, _)| advance[*sequence])
+                {
+                    assert_eq!(
+                        single.step(&input[9 * sequence..][..9]).unwrap(),
+                        &found[3 * sequence..][..3],
+                        "step {step}"
+                    );
                 }
             }
         }
@@ -251,10 +310,16 @@ mod tests {
 
     #[test]
     fn refuses_both_directions_and_wrong_lengths() {
-        let both = NetworkShape { direction: Direction::Both, ..network(1, 3).shape().clone() };
+        let both = NetworkShape {
+            direction: Direction::Both,
+            ..network(1, 3).shape().clone()
+        };
         let error = StreamingNetwork::new(&Network::new(both, 1).unwrap()).unwrap_err();
         assert!(error.to_string().contains("both directions"));
         let mut streaming = StreamingNetwork::new(&network(1, 3)).unwrap();
-        assert_eq!(streaming.step(&[0.0; 8]).unwrap_err().to_string(), "network input: 8 numbers, 1 sequences x 1 steps x 9 inputs are 9");
+        assert_eq!(
+            streaming.step(&[0.0; 8]).unwrap_err().to_string(),
+            "network input: 8 numbers, 1 sequences x 1 steps x 9 inputs are 9"
+        );
     }
 }

@@ -1,10 +1,12 @@
-//! Pairs without a real device: known motion, worn by a body and measured by a device that are drawn at random.
+//! Pairs without a real device: known motion, worn by a body and measured by a device that are
+//! drawn at random.
 
 use std::sync::Arc;
 
 use cromosim_body::{BodyModel, BodyPose, ShapedBody};
 use cromosim_imu::{
-    KinematicSample, MountedSite, Placement, Reading, Scheme, SensorFrame, SensorTrajectory, normal_pair, simulate_kinematics,
+    KinematicSample, MountedSite, Placement, Reading, Scheme, SensorFrame, SensorTrajectory,
+    normal_pair, simulate_kinematics,
 };
 use cromosim_spatial::{Stamp, uniform_stamps};
 use nalgebra::Vector3;
@@ -12,11 +14,14 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 use serde::{Deserialize, Serialize};
 
-use crate::{DeviceRanges, LearnedError, NETWORK_RATE_HZ, Pair, PairNames, SiteMotion, SourceErrors};
+use crate::{
+    DeviceRanges, LearnedError, NETWORK_RATE_HZ, Pair, PairNames, SiteMotion, SourceErrors,
+};
 
 /// The device's grid of true time, Hz.
 const FINE_RATE_HZ: f64 = 400.0;
-/// A joint that flips (uncleaned motion capture) accelerates like no limb, m/s2; nothing is learned within [`AROUND`] samples of it.
+/// A joint that flips (uncleaned motion capture) accelerates like no limb, m/s2; nothing is learned
+/// within [`AROUND`] samples of it.
 const FASTEST: f64 = 60.0;
 const AROUND: usize = 15;
 /// Samples at each end.
@@ -49,8 +54,18 @@ pub struct Wearing {
 impl Wearing {
     /// A source with drawn devices and people.
     pub fn of(source: SourceErrors) -> Self {
-        let (shape, shape_error, speed) = (Self::usual_shape(), Self::usual_shape_error(), Self::as_recorded());
-        Self { devices: DeviceRanges::default(), source, shape, shape_error, speed }
+        let (shape, shape_error, speed) = (
+            Self::usual_shape(),
+            Self::usual_shape_error(),
+            Self::as_recorded(),
+        );
+        Self {
+            devices: DeviceRanges::default(),
+            source,
+            shape,
+            shape_error,
+            speed,
+        }
     }
 
     fn usual_shape() -> f64 {
@@ -65,19 +80,32 @@ impl Wearing {
         [1.0, 1.0]
     }
 
-    /// A person and a device in a motion; each seed another person, device and errors of the source.
+    /// A person and a device in a motion; each seed another person, device and errors of the
+    /// source.
     ///
     /// # Errors
     /// Those of the site, of kinematics and of effects.
-    pub fn draw(&self, model: &Arc<BodyModel>, motion: &KnownMotion<'_>, placement: &Placement, seed: u64) -> Result<Worn, LearnedError> {
+    pub fn draw(
+        &self,
+        model: &Arc<BodyModel>,
+        motion: &KnownMotion<'_>,
+        placement: &Placement,
+        seed: u64,
+    ) -> Result<Worn, LearnedError> {
         let mut random = ChaCha12Rng::seed_from_u64(seed);
         let speed = self.speed[0] + (self.speed[1] - self.speed[0]) * random.random::<f64>();
         let (poses, rate_hz) = (motion.poses, motion.rate_hz * speed);
         let betas = |random: &mut ChaCha12Rng, around: &[f64], sigma: f64| -> Vec<f64> {
-            let draw = |beta: &f64| (beta + sigma * normal_pair(random)[0]).clamp(-WIDEST_SHAPE, WIDEST_SHAPE);
+            let draw = |beta: &f64| {
+                (beta + sigma * normal_pair(random)[0]).clamp(-WIDEST_SHAPE, WIDEST_SHAPE)
+            };
             around.iter().map(draw).collect()
         };
-        let shape = betas(&mut random, &vec![0.0; model.beta_count().min(SHAPES)], self.shape);
+        let shape = betas(
+            &mut random,
+            &vec![0.0; model.beta_count().min(SHAPES)],
+            self.shape,
+        );
         let told = ShapedBody::new(model.clone(), &betas(&mut random, &shape, self.shape_error))?;
         let worn = ShapedBody::new(model.clone(), &shape)?;
         let stamps = stamps(poses.len(), rate_hz);
@@ -86,10 +114,17 @@ impl Wearing {
         let fine = uniform_stamps(trajectory.start(), trajectory.end(), FINE_RATE_HZ)?;
         let truth = simulate_kinematics(&trajectory, Scheme::Spline, &fine)?;
         let read_at = uniform_stamps(trajectory.start(), trajectory.end(), NETWORK_RATE_HZ)?;
-        let readings = self.devices.draw(random.random())?.measure(&truth, FINE_RATE_HZ, &read_at)?;
+        let readings =
+            self.devices
+                .draw(random.random())?
+                .measure(&truth, FINE_RATE_HZ, &read_at)?;
 
         let [near, far] = [random.random(), random.random()];
-        let mocap = SourceErrors { rate_hz, ..SourceErrors::MOCAP }.degrade(&told, poses, near);
+        let mocap = SourceErrors {
+            rate_hz,
+            ..SourceErrors::MOCAP
+        }
+        .degrade(&told, poses, near);
         let best = placement.clone().with_scheme(Scheme::Spline);
         let reference = SiteMotion::on_body(&told, &best, &stamps, &mocap)?;
         let (stamps, poses) = if self.source.rate_hz < 0.9 * rate_hz {
@@ -97,10 +132,26 @@ impl Wearing {
             let degraded = self.source.degrade(&told, &sampled, far);
             (self::stamps(degraded.len(), self.source.rate_hz), degraded)
         } else {
-            (stamps, SourceErrors { rate_hz, ..self.source }.degrade(&told, poses, near))
+            (
+                stamps,
+                SourceErrors {
+                    rate_hz,
+                    ..self.source
+                }
+                .degrade(&told, poses, near),
+            )
         };
         let doubtful = doubtful(motion, rate_hz, &truth, &read_at);
-        Ok(Worn { told, placement: placement.clone(), stamps, poses, reference, read_at, readings, doubtful })
+        Ok(Worn {
+            told,
+            placement: placement.clone(),
+            stamps,
+            poses,
+            reference,
+            read_at,
+            readings,
+            doubtful,
+        })
     }
 }
 
@@ -111,7 +162,8 @@ pub struct KnownMotion<'a> {
     pub poses: &'a [BodyPose],
     /// Frames per second, Hz.
     pub rate_hz: f64,
-    /// Frames in which it is not a person's, such as joints that flip; empty where nothing is known of that.
+    /// Frames in which it is not a person's, such as joints that flip; empty where nothing is known
+    /// of that.
     pub suspect: &'a [bool],
 }
 
@@ -137,7 +189,12 @@ impl Worn {
     /// # Errors
     /// As [`SiteMotion::on_body`].
     pub fn motion(&self, scheme: Scheme) -> Result<SiteMotion, LearnedError> {
-        SiteMotion::on_body(&self.told, &self.placement.clone().with_scheme(scheme), &self.stamps, &self.poses)
+        SiteMotion::on_body(
+            &self.told,
+            &self.placement.clone().with_scheme(scheme),
+            &self.stamps,
+            &self.poses,
+        )
     }
 
     /// The sensor's frames as the source gives them.
@@ -148,32 +205,51 @@ impl Worn {
         Ok(MountedSite::new(&self.told, &self.placement)?.trajectory(&self.stamps, &self.poses)?)
     }
 
-    /// The frames of the joint that carries the sensor, in the sensor's axes at rest: what a simulation without skin takes for the sensor.
+    /// The frames of the joint that carries the sensor, in the sensor's axes at rest: what a
+    /// simulation without skin takes for the sensor.
     ///
     /// # Errors
     /// As [`MountedSite::trajectory`].
     pub fn joint_trajectory(&self) -> Result<SensorTrajectory, LearnedError> {
         let mounted = MountedSite::new(&self.told, &self.placement)?;
-        let (joint, turn) = (mounted.joint().index(), mounted.segment_from_sensor().rotation);
-        let frame = |(stamp, pose): (&Stamp, &BodyPose)| SensorFrame::new(*stamp, self.told.world_from_segments(pose)[joint] * turn);
-        Ok(SensorTrajectory::new(self.stamps.iter().zip(&self.poses).map(frame).collect())?)
+        let (joint, turn) = (
+            mounted.joint().index(),
+            mounted.segment_from_sensor().rotation,
+        );
+        let frame = |(stamp, pose): (&Stamp, &BodyPose)| {
+            SensorFrame::new(*stamp, self.told.world_from_segments(pose)[joint] * turn)
+        };
+        Ok(SensorTrajectory::new(
+            self.stamps.iter().zip(&self.poses).map(frame).collect(),
+        )?)
     }
 
-    /// The pair of a motion of [`Worn::motion`]. The clock and mount of the device are fitted as a real one's would be, to the motion without
-    /// the errors of a source worse than motion capture.
+    /// The pair of a motion of [`Worn::motion`]. The clock and mount of the device are fitted as a
+    /// real one's would be, to the motion without the errors of a source worse than motion capture.
     ///
     /// # Errors
     /// As [`Pair::new`].
     pub fn pair(&self, names: PairNames, motion: SiteMotion) -> Result<Pair, LearnedError> {
-        let mut pair = Pair::new(names, motion, &self.reference, &self.read_at, &self.readings)?;
+        let mut pair = Pair::new(
+            names,
+            motion,
+            &self.reference,
+            &self.read_at,
+            &self.readings,
+        )?;
         pair.leave_out(|sample| self.doubtful.get(sample).is_none_or(|doubtful| *doubtful));
         Ok(pair)
     }
 }
 
-/// Which readings stand near a frame that is suspect, or where a limb accelerates like none, or so near an end that the true motion is itself
-/// extrapolated.
-fn doubtful(motion: &KnownMotion<'_>, rate_hz: f64, truth: &[KinematicSample], read_at: &[Stamp]) -> Vec<bool> {
+/// Which readings stand near a frame that is suspect, or where a limb accelerates like none, or so
+/// near an end that the true motion is itself extrapolated.
+fn doubtful(
+    motion: &KnownMotion<'_>,
+    rate_hz: f64,
+    truth: &[KinematicSample],
+    read_at: &[Stamp],
+) -> Vec<bool> {
     let start = truth[0].stamp;
     let wild: Vec<bool> = read_at
         .iter()
@@ -181,16 +257,23 @@ fn doubtful(motion: &KnownMotion<'_>, rate_hz: f64, truth: &[KinematicSample], r
             let seconds = *stamp - start;
             let at = ((seconds * FINE_RATE_HZ).round() as usize).min(truth.len() - 1);
             let frame = (seconds * rate_hz).round() as usize;
-            truth[at].acceleration.norm() > FASTEST || motion.suspect.get(frame).copied().unwrap_or(false)
+            truth[at].acceleration.norm() > FASTEST
+                || motion.suspect.get(frame).copied().unwrap_or(false)
         })
         .collect();
     let at_end = |sample: usize| sample < END || sample + END >= wild.len();
-    let near = |sample: usize| at_end(sample) || wild[sample.saturating_sub(AROUND)..(sample + AROUND + 1).min(wild.len())].contains(&true);
+    let near = |sample: usize| {
+        at_end(sample)
+            || wild[sample.saturating_sub(AROUND)..(sample + AROUND + 1).min(wild.len())]
+                .contains(&true)
+    };
     (0..wild.len()).map(near).collect()
 }
 
 fn stamps(count: usize, rate_hz: f64) -> Vec<Stamp> {
-    (0..count).map(|frame| Stamp::from_seconds(frame as f64 / rate_hz)).collect()
+    (0..count)
+        .map(|frame| Stamp::from_seconds(frame as f64 / rate_hz))
+        .collect()
 }
 
 /// The motion at a lower rate: spherical linear between the frames around.
@@ -224,11 +307,16 @@ impl Pair {
 
     /// Largest acceleration among the targets, m/s2; 0 without any.
     pub fn largest_acceleration(&self) -> f64 {
-        self.targets.iter().flatten().map(|target| target.acceleration.norm()).fold(0.0, f64::max)
+        self.targets
+            .iter()
+            .flatten()
+            .map(|target| target.acceleration.norm())
+            .fold(0.0, f64::max)
     }
 
-    /// Root mean square of what a simulation of the targets leaves, per axis: acceleration m/s2, angular velocity rad/s; `of` says what is
-    /// simulated at a sample, world axes. None without targets.
+    /// Root mean square of what a simulation of the targets leaves, per axis: acceleration m/s2,
+    /// angular velocity rad/s; `of` says what is simulated at a sample, world axes. None without
+    /// targets.
     pub fn rms(&self, of: impl Fn(usize) -> (Vector3<f64>, Vector3<f64>)) -> Option<[f64; 2]> {
         let (mut sums, mut count) = ([0.0; 2], 0.0);
         for (sample, target) in self.targets.iter().enumerate() {
@@ -260,11 +348,19 @@ mod tests {
     }
 
     fn known(poses: &[BodyPose]) -> KnownMotion<'_> {
-        KnownMotion { poses, rate_hz: 120.0, suspect: &[] }
+        KnownMotion {
+            poses,
+            rate_hz: 120.0,
+            suspect: &[],
+        }
     }
 
     fn names() -> PairNames {
-        PairNames { name: "test".to_owned(), subject: "s".to_owned(), position: "left_wrist".to_owned() }
+        PairNames {
+            name: "test".to_owned(),
+            subject: "s".to_owned(),
+            position: "left_wrist".to_owned(),
+        }
     }
 
     #[test]
@@ -272,12 +368,24 @@ mod tests {
         let (model, poses) = (BodyModel::embedded(), poses(120.0, 6.0));
         let placement = Placement::at_site("left_wrist", "left_watch", 100.0).unwrap();
         let analytic = |source, scheme| {
-            let worn = Wearing::of(source).draw(&model, &known(&poses), &placement, 7).unwrap();
+            let worn = Wearing::of(source)
+                .draw(&model, &known(&poses), &placement, 7)
+                .unwrap();
             let pair = worn.pair(names(), worn.motion(scheme).unwrap()).unwrap();
-            assert_eq!((pair.targets.len(), pair.measured.len()), (pair.motion.len(), pair.motion.len()));
+            assert_eq!(
+                (pair.targets.len(), pair.measured.len()),
+                (pair.motion.len(), pair.motion.len())
+            );
             let none = pair.rms(|_| (Vector3::zeros(), Vector3::zeros())).unwrap();
             let kinematics = &pair.motion.kinematics;
-            let left = pair.rms(|sample| (kinematics[sample].acceleration, kinematics[sample].angular_velocity)).unwrap();
+            let left = pair
+                .rms(|sample| {
+                    (
+                        kinematics[sample].acceleration,
+                        kinematics[sample].angular_velocity,
+                    )
+                })
+                .unwrap();
             [left[0] / none[0], left[1] / none[1]]
         };
         let mocap = analytic(SourceErrors::MOCAP, Scheme::Spline);
@@ -290,10 +398,16 @@ mod tests {
     fn a_seed_gives_the_same_pair_and_another_another() {
         let (model, poses) = (BodyModel::embedded(), poses(120.0, 3.0));
         let placement = Placement::at_site("left_wrist", "left_watch", 100.0).unwrap();
-        let wearing = Wearing { speed: [0.8, 1.25], ..Wearing::of(SourceErrors::WHAM) };
+        let wearing = Wearing {
+            speed: [0.8, 1.25],
+            ..Wearing::of(SourceErrors::WHAM)
+        };
         let pair = |seed| {
-            let worn = wearing.draw(&model, &known(&poses), &placement, seed).unwrap();
-            worn.pair(names(), worn.motion(Scheme::Spline).unwrap()).unwrap()
+            let worn = wearing
+                .draw(&model, &known(&poses), &placement, seed)
+                .unwrap();
+            worn.pair(names(), worn.motion(Scheme::Spline).unwrap())
+                .unwrap()
         };
         let (one, again, other) = (pair(1), pair(1), pair(2));
         assert_eq!(one.targets, again.targets);

@@ -1,5 +1,5 @@
-//! Weights in safetensors files, by PyTorch's names; the metadata's key `cromosim` holds JSON: `shape`, the network's shape, and `notes`, a
-//! map of texts.
+//! Weights in safetensors files, by PyTorch's names; the metadata's key `cromosim` holds JSON:
+//! `shape`, the network's shape, and `notes`, a map of texts.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -27,8 +27,17 @@ impl Network {
     ///
     /// # Errors
     /// Where they cannot be made; the message names `path`, under which they are meant to lie.
-    pub fn to_bytes(&self, notes: &BTreeMap<String, String>, path: &Path) -> Result<Vec<u8>, LearnedError> {
-        weights_to_bytes((self.shape(), self.shape().tensors()), self.parameters(), notes, path)
+    pub fn to_bytes(
+        &self,
+        notes: &BTreeMap<String, String>,
+        path: &Path,
+    ) -> Result<Vec<u8>, LearnedError> {
+        weights_to_bytes(
+            (self.shape(), self.shape().tensors()),
+            self.parameters(),
+            notes,
+            path,
+        )
     }
 
     /// Writes a safetensors file, whole or not at all.
@@ -47,11 +56,16 @@ impl Network {
         Self::from_bytes(&read_bounded(path, 1)?, path)
     }
 
-    /// As [`Network::read`], from bytes; `path` stands in messages. What is allocated is bounded by the bytes' length.
+    /// As [`Network::read`], from bytes; `path` stands in messages. What is allocated is bounded by
+    /// the bytes' length.
     ///
     /// # Errors
-    /// Where the bytes are not such a file, or its tensors are not those of the shape in its metadata.
-    pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<(Self, BTreeMap<String, String>), LearnedError> {
+    /// Where the bytes are not such a file, or its tensors are not those of the shape in its
+    /// metadata.
+    pub fn from_bytes(
+        bytes: &[u8],
+        path: &Path,
+    ) -> Result<(Self, BTreeMap<String, String>), LearnedError> {
         let sound = |shape: &NetworkShape| shape.check().map(|()| shape.tensors());
         let (shape, parameters, notes) = read_weights(bytes, path, sound)?;
         Ok((Self::from_parameters(shape, parameters), notes))
@@ -65,8 +79,15 @@ pub(crate) fn weights_to_bytes<S: Serialize + Clone>(
     notes: &BTreeMap<String, String>,
     path: &Path,
 ) -> Result<Vec<u8>, LearnedError> {
-    let header = Header { shape: shape.clone(), notes: notes.clone() };
-    let named = tensors.into_iter().map(|tensor| Named { name: tensor.name, shape: tensor.shape, values: &parameters[tensor.range] });
+    let header = Header {
+        shape: shape.clone(),
+        notes: notes.clone(),
+    };
+    let named = tensors.into_iter().map(|tensor| Named {
+        name: tensor.name,
+        shape: tensor.shape,
+        values: &parameters[tensor.range],
+    });
     to_bytes(named.collect(), KEY, &header, path)
 }
 
@@ -81,10 +102,16 @@ pub(crate) fn read_weights<S: DeserializeOwned>(
 ) -> Result<Weights<S>, LearnedError> {
     let file = TensorFile::parse(bytes, path)?;
     let Header { shape, notes } = file.header(KEY)?;
-    let tensors = sound(&shape).map_err(|error| LearnedError::Metadata { path: path.into(), key: KEY, reason: error.to_string() })?;
+    let tensors = sound(&shape).map_err(|error| LearnedError::Metadata {
+        path: path.into(),
+        key: KEY,
+        reason: error.to_string(),
+    })?;
     file.refuse_others(|name| tensors.iter().any(|tensor| tensor.name == name))?;
     // Every tensor is checked before memory is taken for any.
-    tensors.iter().try_for_each(|tensor| file.check(&tensor.name, &tensor.shape))?;
+    tensors
+        .iter()
+        .try_for_each(|tensor| file.check(&tensor.name, &tensor.shape))?;
     let mut parameters = Vec::new();
     for tensor in &tensors {
         parameters.extend(file.values(&tensor.name, &tensor.shape)?);

@@ -1,4 +1,5 @@
-//! The same network in PyTorch: golden files, and PyTorch itself where `CROMOSIM_TORCH_PYTHON` names an interpreter that has it.
+//! The same network in PyTorch: golden files, and PyTorch itself where `CROMOSIM_TORCH_PYTHON`
+//! names an interpreter that has it.
 #![allow(clippy::unwrap_used)]
 
 use std::collections::{BTreeMap, HashMap};
@@ -7,8 +8,12 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::atomic::AtomicBool;
 
-use cromosim_learned::train::{Batch, Batches, Data, Engine, Hooks, KernelEngine, Loss, Schedule, TrainOptions, Training};
-use cromosim_learned::{Classifier, ClassifierShape, Direction, LearnedError, Network, NetworkShape, StreamingBatch};
+use cromosim_learned::train::{
+    Batch, Batches, Data, Engine, Hooks, KernelEngine, Loss, Schedule, TrainOptions, Training,
+};
+use cromosim_learned::{
+    Classifier, ClassifierShape, Direction, LearnedError, Network, NetworkShape, StreamingBatch,
+};
 use safetensors::tensor::{Dtype, TensorView};
 use safetensors::{SafeTensors, serialize};
 
@@ -22,19 +27,43 @@ fn here(path: &str) -> PathBuf {
 }
 
 fn passes(direction: &str) -> HashMap<String, (Vec<usize>, Vec<f32>)> {
-    let bytes = fs::read(here(&format!("tests/data/torch_{direction}_passes.safetensors"))).unwrap();
-    let values = |bytes: &[u8]| bytes.as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
+    let bytes = fs::read(here(&format!(
+        "tests/data/torch_{direction}_passes.safetensors"
+    )))
+    .unwrap();
+    let values = |bytes: &[u8]| {
+        bytes
+            .as_chunks()
+            .0
+            .iter()
+            .map(|bytes| f32::from_le_bytes(*bytes))
+            .collect()
+    };
     let tensors = SafeTensors::deserialize(&bytes).unwrap();
-    tensors.iter().map(|(name, view)| (name.to_owned(), (view.shape().to_vec(), values(view.data())))).collect()
+    tensors
+        .iter()
+        .map(|(name, view)| {
+            (
+                name.to_owned(),
+                (view.shape().to_vec(), values(view.data())),
+            )
+        })
+        .collect()
 }
 
 fn network(direction: &str) -> Network {
-    Network::read(&here(&format!("tests/data/torch_{direction}.safetensors"))).unwrap().0
+    Network::read(&here(&format!("tests/data/torch_{direction}.safetensors")))
+        .unwrap()
+        .0
 }
 
 fn assert_close(what: &str, found: &[f32], expected: &[f32], tolerance: f32) {
     assert_eq!(found.len(), expected.len(), "{what}");
-    let worst = found.iter().zip(expected).map(|(found, expected)| (found - expected).abs()).fold(0.0, f32::max);
+    let worst = found
+        .iter()
+        .zip(expected)
+        .map(|(found, expected)| (found - expected).abs())
+        .fold(0.0, f32::max);
     assert!(worst <= tolerance, "{what}: greatest difference {worst}");
 }
 
@@ -49,14 +78,22 @@ impl Batches for One {
 fn batch(direction: &str) -> Batch {
     let passes = passes(direction);
     let (shape, inputs) = passes["input"].clone();
-    Batch { inputs, targets: passes["target"].1.clone(), weights: passes["weight"].1.clone(), sequences: shape[0], steps: shape[1] }
+    Batch {
+        inputs,
+        targets: passes["target"].1.clone(),
+        weights: passes["weight"].1.clone(),
+        sequences: shape[0],
+        steps: shape[1],
+    }
 }
 
 #[test]
 fn outputs_are_those_of_pytorch() {
     for direction in ["both", "forward"] {
         let (batch, passes) = (batch(direction), passes(direction));
-        let found = network(direction).forward(&batch.inputs, batch.sequences, batch.steps).unwrap();
+        let found = network(direction)
+            .forward(&batch.inputs, batch.sequences, batch.steps)
+            .unwrap();
         assert_close(direction, &found, &passes["output"].1, 1e-5);
     }
 }
@@ -65,7 +102,8 @@ fn outputs_are_those_of_pytorch() {
 fn a_classifier_says_what_pytorch_does() {
     let passes = passes("classifier");
     let (shape, input) = &passes["input"];
-    let (classifier, _) = Classifier::read(&here("tests/data/torch_classifier.safetensors")).unwrap();
+    let (classifier, _) =
+        Classifier::read(&here("tests/data/torch_classifier.safetensors")).unwrap();
     let found = classifier.logits(input, shape[0], shape[1]).unwrap();
     assert_close("logits", &found, &passes["output"].1, 1e-5);
 }
@@ -75,11 +113,20 @@ fn streaming_gives_the_outputs_of_pytorch() {
     let (batch, passes) = (batch("forward"), passes("forward"));
     let mut streaming = StreamingBatch::new(&network("forward"), batch.sequences).unwrap();
     let rows = |values: &[f32], width: usize, step: usize| -> Vec<f32> {
-        values.chunks(batch.steps * width).flat_map(|sequence| &sequence[step * width..][..width]).copied().collect()
+        values
+            .chunks(batch.steps * width)
+            .flat_map(|sequence| &sequence[step * width..][..width])
+            .copied()
+            .collect()
     };
     for step in 0..batch.steps {
         let found = streaming.step(&rows(&batch.inputs, 4, step)).unwrap();
-        assert_close(&format!("step {step}"), found, &rows(&passes["output"].1, 3, step), 1e-5);
+        assert_close(
+            &format!("step {step}"),
+            found,
+            &rows(&passes["output"].1, 3, step),
+            1e-5,
+        );
     }
 }
 
@@ -88,11 +135,18 @@ fn loss_and_gradients_are_those_of_pytorch() {
     for direction in ["both", "forward"] {
         let (network, passes) = (network(direction), passes(direction));
         let mut gradients = vec![0.0; network.parameters().len()];
-        let loss = KernelEngine.gradients(&network, &batch(direction), &[LOSS], &mut gradients).unwrap();
+        let loss = KernelEngine
+            .gradients(&network, &batch(direction), &[LOSS], &mut gradients)
+            .unwrap();
         assert_close("loss", &[loss as f32], &passes["loss"].1, 1e-6);
         for tensor in network.shape().tensors() {
             let expected = &passes[&format!("gradient.{}", tensor.name)].1;
-            assert_close(&format!("{direction}, {}", tensor.name), &gradients[tensor.range], expected, 1e-6);
+            assert_close(
+                &format!("{direction}, {}", tensor.name),
+                &gradients[tensor.range],
+                expected,
+                1e-6,
+            );
         }
     }
 }
@@ -114,12 +168,31 @@ fn adam_ends_where_pytorch_does() {
         };
         let mut training = Training::from_network(network(direction), options).unwrap();
         let mut progress = |_: &_| ();
-        let mut hooks = Hooks { progress: &mut progress, interrupt: &AtomicBool::new(false), checkpoint: None };
-        training.run(&mut KernelEngine, Data { training: &One(batch(direction)), validation: None }, &mut hooks).unwrap();
+        let mut hooks = Hooks {
+            progress: &mut progress,
+            interrupt: &AtomicBool::new(false),
+            checkpoint: None,
+        };
+        training
+            .run(
+                &mut KernelEngine,
+                Data {
+                    training: &One(batch(direction)),
+                    validation: None,
+                },
+                &mut hooks,
+            )
+            .unwrap();
         for tensor in training.network().shape().tensors() {
             let expected = &passes[&format!("trained.{}", tensor.name)].1;
-            // Adam divides by the gradient's size: where that is near its epsilon, the last bits of a gradient show.
-            assert_close(&format!("{direction}, {}", tensor.name), &training.network().parameters()[tensor.range], expected, 1e-4);
+            // Adam divides by the gradient's size: where that is near its epsilon, the last bits of
+            // a gradient show.
+            assert_close(
+                &format!("{direction}, {}", tensor.name),
+                &training.network().parameters()[tensor.range],
+                expected,
+                1e-4,
+            );
         }
     }
 }
@@ -131,17 +204,55 @@ fn pytorch_reads_our_files_and_computes_the_same() {
         return;
     };
     let folder = tempfile::tempdir().unwrap();
-    let (weights, passes) = (folder.path().join("weights.safetensors"), folder.path().join("passes.safetensors"));
+    let (weights, passes) = (
+        folder.path().join("weights.safetensors"),
+        folder.path().join("passes.safetensors"),
+    );
     let compare = |input: (Vec<usize>, Vec<f32>), output: (Vec<usize>, Vec<f32>)| {
-        let bytes = [&input, &output].map(|(_, values)| values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>());
-        let view = |index: usize, shape: &Vec<usize>| TensorView::new(Dtype::F32, shape.clone(), &bytes[index]).unwrap();
-        fs::write(&passes, serialize([("input", view(0, &input.0)), ("output", view(1, &output.0))], None).unwrap()).unwrap();
-        let run = Command::new(&python).arg(here("scripts/torch_exchange.py")).arg("compare").args([&weights, &passes]).output().unwrap();
-        assert!(run.status.success(), "{}{}", String::from_utf8_lossy(&run.stdout), String::from_utf8_lossy(&run.stderr));
+        let bytes = [&input, &output].map(|(_, values)| {
+            values
+                .iter()
+                .flat_map(|value| value.to_le_bytes())
+                .collect::<Vec<u8>>()
+        });
+        let view = |index: usize, shape: &Vec<usize>| {
+            TensorView::new(Dtype::F32, shape.clone(), &bytes[index]).unwrap()
+        };
+        fs::write(
+            &passes,
+            serialize(
+                [("input", view(0, &input.0)), ("output", view(1, &output.0))],
+                None,
+            )
+            .unwrap(),
+        )
+        .unwrap();
+        let run = Command::new(&python)
+            .arg(here("scripts/torch_exchange.py"))
+            .arg("compare")
+            .args([&weights, &passes])
+            .output()
+            .unwrap();
+        assert!(
+            run.status.success(),
+            "{}{}",
+            String::from_utf8_lossy(&run.stdout),
+            String::from_utf8_lossy(&run.stderr)
+        );
     };
-    let numbers = |count: usize| -> Vec<f32> { (0..count).map(|index| (index as f32 * 0.7).sin()).collect() };
+    let numbers =
+        |count: usize| -> Vec<f32> { (0..count).map(|index| (index as f32 * 0.7).sin()).collect() };
     for (direction, kernel) in [(Direction::Both, 5), (Direction::Forward, 3)] {
-        let shape = NetworkShape { inputs: 27, channels: 16, kernel, convolutions: 3, hidden: 32, layers: 2, direction, outputs: 3 };
+        let shape = NetworkShape {
+            inputs: 27,
+            channels: 16,
+            kernel,
+            convolutions: 3,
+            hidden: 32,
+            layers: 2,
+            direction,
+            outputs: 3,
+        };
         let network = Network::new(shape, 5).unwrap();
         network.write(&weights, &BTreeMap::new()).unwrap();
         let input = numbers(3 * 50 * 27);

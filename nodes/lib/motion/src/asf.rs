@@ -1,7 +1,8 @@
 //! ASF (Acclaim skeleton file): bones with lengths, directions, axes and degrees of freedom.
 //!
-//! A bone begins where its parent ends and goes `direction * length` further, in the skeleton's axes at rest. `axis` gives the bone's own
-//! axes C at rest by three angles about fixed axes, the first named first; the degrees of freedom in an AMC file turn about C's axes.
+//! A bone begins where its parent ends and goes `direction * length` further, in the skeleton's
+//! axes at rest. `axis` gives the bone's own axes C at rest by three angles about fixed axes, the
+//! first named first; the degrees of freedom in an AMC file turn about C's axes.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -22,7 +23,8 @@ pub enum AsfChannel {
 pub struct AsfBone {
     /// As in the file.
     pub name: String,
-    /// Index of the parent, always smaller than the bone's own; `None` for bones that begin at the root.
+    /// Index of the parent, always smaller than the bone's own; `None` for bones that begin at the
+    /// root.
     pub parent: Option<usize>,
     /// From the bone's beginning to its end at rest, skeleton axes, file units.
     pub rest_span: Vector3<f64>,
@@ -30,7 +32,8 @@ pub struct AsfBone {
     pub skeleton_from_bone: UnitQuaternion<f64>,
     /// The axes (0 x, 1 y, 2 z) that the bone turns about, in the order of an AMC line's numbers.
     pub freedoms: Vec<usize>,
-    /// Smallest and largest angle of each freedom, rad, where the file has them all; they are not enforced.
+    /// Smallest and largest angle of each freedom, rad, where the file has them all; they are not
+    /// enforced.
     pub limits: Vec<[f64; 2]>,
 }
 
@@ -56,15 +59,23 @@ pub struct AsfSkeleton {
 impl AsfSkeleton {
     /// The bone called `name` (as written, in any case).
     pub fn bone(&self, name: &str) -> Option<usize> {
-        self.bones.iter().position(|bone| bone.name.eq_ignore_ascii_case(name))
+        self.bones
+            .iter()
+            .position(|bone| bone.name.eq_ignore_ascii_case(name))
     }
 }
 
-/// The rotation of three angles (rad) about fixed axes, the first one first: R = R_last R_middle R_first.
+/// The rotation of three angles (rad) about fixed axes, the first one first: R = R_last R_middle
+/// R_first.
 pub(crate) fn turned(angles: impl IntoIterator<Item = (usize, f64)>) -> UnitQuaternion<f64> {
-    angles.into_iter().fold(UnitQuaternion::identity(), |before, (axis, angle)| {
-        UnitQuaternion::from_axis_angle(&[Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()][axis.min(2)], angle) * before
-    })
+    angles
+        .into_iter()
+        .fold(UnitQuaternion::identity(), |before, (axis, angle)| {
+            UnitQuaternion::from_axis_angle(
+                &[Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()][axis.min(2)],
+                angle,
+            ) * before
+        })
 }
 
 fn axis_index(letter: &str) -> Option<usize> {
@@ -79,11 +90,17 @@ struct Line<'a> {
 
 impl<'a> Line<'a> {
     fn keyword(&self) -> String {
-        self.words.first().map(|word| word.to_ascii_lowercase()).unwrap_or_default()
+        self.words
+            .first()
+            .map(|word| word.to_ascii_lowercase())
+            .unwrap_or_default()
     }
 
     fn token(&self) -> Token<'a> {
-        Token { text: self.words.first().copied().unwrap_or_default(), line: self.number }
+        Token {
+            text: self.words.first().copied().unwrap_or_default(),
+            line: self.number,
+        }
     }
 }
 
@@ -108,25 +125,38 @@ struct Parser<'a> {
 
 /// Parses the text of an ASF file; `name` stands in the errors. No file is touched.
 ///
-/// Read are `:units`, `:root`, `:bonedata` and `:hierarchy`; other sections (`:documentation`, `:skin`) are passed over. Lines may begin
-/// with `#`; keywords are read in any case.
+/// Read are `:units`, `:root`, `:bonedata` and `:hierarchy`; other sections (`:documentation`,
+/// `:skin`) are passed over. Lines may begin with `#`; keywords are read in any case.
 ///
 /// # Errors
-/// [`MotionError::Syntax`], [`MotionError::Value`] and [`MotionError::Limit`], each with the line. Memory stays proportional to the text.
+/// [`MotionError::Syntax`], [`MotionError::Value`] and [`MotionError::Limit`], each with the line.
+/// Memory stays proportional to the text.
 pub fn parse_asf(text: &str, name: &str) -> Result<AsfSkeleton, MotionError> {
     let skeleton = AsfSkeleton {
         name: name.to_owned(),
         length_unit: 1.0,
         degrees: true,
-        root_order: [0, 1, 2].map(AsfChannel::Translation).into_iter().chain([0, 1, 2].map(AsfChannel::Rotation)).collect(),
+        root_order: [0, 1, 2]
+            .map(AsfChannel::Translation)
+            .into_iter()
+            .chain([0, 1, 2].map(AsfChannel::Rotation))
+            .collect(),
         root_position: Vector3::zeros(),
         root_orientation: UnitQuaternion::identity(),
         bones: Vec::new(),
     };
     let cursor = Cursor::new(text.strip_prefix('\u{feff}').unwrap_or(text), name);
-    let mut parser = Parser { cursor, skeleton, raw: Vec::new(), edges: Vec::new() };
+    let mut parser = Parser {
+        cursor,
+        skeleton,
+        raw: Vec::new(),
+        edges: Vec::new(),
+    };
     let mut line = parser.next_line();
-    if !line.as_ref().is_some_and(|line| line.keyword().starts_with(':')) {
+    if !line
+        .as_ref()
+        .is_some_and(|line| line.keyword().starts_with(':'))
+    {
         return Err(parser.unexpected(":version or another section", line.as_ref()));
     }
     while let Some(section) = line {
@@ -147,10 +177,15 @@ impl<'a> Parser<'a> {
             let token = self.cursor.next_line()?;
             let content = token.text.split('#').next().unwrap_or_default();
             // Limits stand in parentheses, with or without spaces around them.
-            let words: Vec<&str> =
-                content.split(|c: char| c.is_whitespace() || "(),".contains(c)).filter(|word| !word.is_empty()).collect();
+            let words: Vec<&str> = content
+                .split(|c: char| c.is_whitespace() || "(),".contains(c))
+                .filter(|word| !word.is_empty())
+                .collect();
             if !words.is_empty() {
-                return Some(Line { words, number: token.line });
+                return Some(Line {
+                    words,
+                    number: token.line,
+                });
             }
         }
     }
@@ -169,22 +204,41 @@ impl<'a> Parser<'a> {
     }
 
     /// The numbers after a line's keyword: `count` of them.
-    fn numbers<const N: usize>(&self, line: &Line<'_>, what: &str) -> Result<[f64; N], MotionError> {
+    fn numbers<const N: usize>(
+        &self,
+        line: &Line<'_>,
+        what: &str,
+    ) -> Result<[f64; N], MotionError> {
         let mut numbers = [0.0; N];
         for (column, number) in numbers.iter_mut().enumerate() {
-            let Some(&word) = line.words.get(column + 1) else { return Err(self.unexpected(what, Some(line))) };
-            *number = self.cursor.parse_number(Token { text: word, line: line.number }, what, column + 1)?;
+            let Some(&word) = line.words.get(column + 1) else {
+                return Err(self.unexpected(what, Some(line)));
+            };
+            *number = self.cursor.parse_number(
+                Token {
+                    text: word,
+                    line: line.number,
+                },
+                what,
+                column + 1,
+            )?;
         }
         Ok(numbers)
     }
 
     fn angle(&self, value: f64) -> f64 {
-        if self.skeleton.degrees { value.to_radians() } else { value }
+        if self.skeleton.degrees {
+            value.to_radians()
+        } else {
+            value
+        }
     }
 
     fn units(&mut self) -> Result<Option<Line<'a>>, MotionError> {
         loop {
-            let Some(line) = self.next_line() else { return Ok(None) };
+            let Some(line) = self.next_line() else {
+                return Ok(None);
+            };
             match line.keyword().as_str() {
                 "length" => {
                     let [length] = self.numbers(&line, "a number of length")?;
@@ -207,17 +261,31 @@ impl<'a> Parser<'a> {
     fn root(&mut self) -> Result<Option<Line<'a>>, MotionError> {
         let (mut orientation, mut axis) = ([0.0; 3], [0, 1, 2]);
         let end = loop {
-            let Some(line) = self.next_line() else { break None };
+            let Some(line) = self.next_line() else {
+                break None;
+            };
             match line.keyword().as_str() {
                 "order" => self.skeleton.root_order = self.channels(&line)?,
                 "axis" => axis = self.axis_order(line.words.get(1), &line)?,
-                "position" => self.skeleton.root_position = self.numbers(&line, "three numbers of position")?.into(),
-                "orientation" => orientation = self.numbers(&line, "three numbers of orientation")?,
+                "position" => {
+                    self.skeleton.root_position =
+                        self.numbers(&line, "three numbers of position")?.into()
+                }
+                "orientation" => {
+                    orientation = self.numbers(&line, "three numbers of orientation")?
+                }
                 keyword if keyword.starts_with(':') => break Some(line),
-                _ => return Err(self.unexpected("order, axis, position or orientation", Some(&line))),
+                _ => {
+                    return Err(
+                        self.unexpected("order, axis, position or orientation", Some(&line))
+                    );
+                }
             }
         };
-        self.skeleton.root_orientation = turned(axis.into_iter().zip(orientation.map(|angle| self.angle(angle))));
+        self.skeleton.root_orientation = turned(
+            axis.into_iter()
+                .zip(orientation.map(|angle| self.angle(angle))),
+        );
         Ok(end)
     }
 
@@ -232,7 +300,15 @@ impl<'a> Parser<'a> {
             };
             match channel {
                 Some(channel) if !channels.contains(&channel) => channels.push(channel),
-                _ => return Err(self.cursor.unexpected("TX TY TZ RX RY RZ, each once", Some(Token { text: word, line: line.number }))),
+                _ => {
+                    return Err(self.cursor.unexpected(
+                        "TX TY TZ RX RY RZ, each once",
+                        Some(Token {
+                            text: word,
+                            line: line.number,
+                        }),
+                    ));
+                }
             }
         }
         Ok(channels)
@@ -240,7 +316,11 @@ impl<'a> Parser<'a> {
 
     fn axis_order(&self, word: Option<&&str>, line: &Line<'_>) -> Result<[usize; 3], MotionError> {
         let wrong = || self.unexpected("an order of axes like XYZ", Some(line));
-        let letters: Vec<usize> = word.ok_or_else(wrong)?.chars().filter_map(|letter| "xyz".find(letter.to_ascii_lowercase())).collect();
+        let letters: Vec<usize> = word
+            .ok_or_else(wrong)?
+            .chars()
+            .filter_map(|letter| "xyz".find(letter.to_ascii_lowercase()))
+            .collect();
         match letters[..] {
             [a, b, c] if a != b && b != c && a != c => Ok([a, b, c]),
             _ => Err(wrong()),
@@ -249,7 +329,9 @@ impl<'a> Parser<'a> {
 
     fn bones(&mut self) -> Result<Option<Line<'a>>, MotionError> {
         loop {
-            let Some(line) = self.next_line() else { return Ok(None) };
+            let Some(line) = self.next_line() else {
+                return Ok(None);
+            };
             match line.keyword().as_str() {
                 "begin" if self.raw.len() < MAX_JOINTS => {
                     let bone = self.bone(line.number)?;
@@ -257,7 +339,12 @@ impl<'a> Parser<'a> {
                 }
                 "begin" => {
                     let name = self.cursor.name().to_owned();
-                    return Err(MotionError::Limit { name, line: line.number, what: "bones", limit: MAX_JOINTS });
+                    return Err(MotionError::Limit {
+                        name,
+                        line: line.number,
+                        what: "bones",
+                        limit: MAX_JOINTS,
+                    });
                 }
                 keyword if keyword.starts_with(':') => return Ok(Some(line)),
                 _ => return Err(self.unexpected("begin of a bone", Some(&line))),
@@ -267,37 +354,65 @@ impl<'a> Parser<'a> {
 
     /// After `begin`, up to and with `end`.
     fn bone(&mut self, begin: usize) -> Result<RawBone, MotionError> {
-        let (mut name, mut direction, mut length, mut axis) = (None, None, None, UnitQuaternion::identity());
+        let (mut name, mut direction, mut length, mut axis) =
+            (None, None, None, UnitQuaternion::identity());
         let (mut freedoms, mut limits) = (Vec::new(), Vec::new());
         let mut in_limits = false;
         loop {
-            let Some(line) = self.next_line() else { return Err(self.unexpected("end of the bone", None)) };
+            let Some(line) = self.next_line() else {
+                return Err(self.unexpected("end of the bone", None));
+            };
             let keyword = line.keyword();
             let continues = in_limits && keyword.parse::<f64>().is_ok();
             in_limits = continues || keyword == "limits";
             match keyword.as_str() {
                 "name" if line.words.len() > 1 => name = Some(line.words[1..].join(" ")),
-                "direction" => direction = Some(Vector3::from(self.numbers::<3>(&line, "three numbers of direction")?)),
+                "direction" => {
+                    direction = Some(Vector3::from(
+                        self.numbers::<3>(&line, "three numbers of direction")?,
+                    ))
+                }
                 "length" => length = Some(self.numbers::<1>(&line, "a number of length")?[0]),
                 "axis" => {
                     let angles = self.numbers::<3>(&line, "three numbers and an order of axis")?;
-                    axis = turned(self.axis_order(line.words.get(4), &line)?.into_iter().zip(angles.map(|angle| self.angle(angle))));
+                    axis = turned(
+                        self.axis_order(line.words.get(4), &line)?
+                            .into_iter()
+                            .zip(angles.map(|angle| self.angle(angle))),
+                    );
                 }
                 "dof" => freedoms = self.freedoms(&line)?,
                 "limits" => limits.extend(self.limit(&line.words[1..], &line)?),
                 _ if continues => limits.extend(self.limit(&line.words, &line)?),
                 "id" | "bodymass" | "cofmass" => {}
                 "end" => break,
-                _ => return Err(self.unexpected("name, direction, length, axis, dof, limits or end", Some(&line))),
+                _ => {
+                    return Err(self.unexpected(
+                        "name, direction, length, axis, dof, limits or end",
+                        Some(&line),
+                    ));
+                }
             }
         }
-        let missing = |what: &str| self.cursor.unexpected(what, Some(Token { text: "a bone without it", line: begin }));
+        let missing = |what: &str| {
+            self.cursor.unexpected(
+                what,
+                Some(Token {
+                    text: "a bone without it",
+                    line: begin,
+                }),
+            )
+        };
         let bone = RawBone {
             name: name.ok_or_else(|| missing("a bone's name"))?,
             direction: direction.ok_or_else(|| missing("a bone's direction"))?,
             length: length.ok_or_else(|| missing("a bone's length"))?,
             skeleton_from_bone: axis,
-            limits: if limits.len() == freedoms.len() { limits } else { Vec::new() },
+            limits: if limits.len() == freedoms.len() {
+                limits
+            } else {
+                Vec::new()
+            },
             freedoms,
             line: begin,
         };
@@ -309,7 +424,10 @@ impl<'a> Parser<'a> {
         for channel in self.channels(line)? {
             match channel {
                 AsfChannel::Rotation(axis) => freedoms.push(axis),
-                AsfChannel::Translation(_) => return Err(self.unexpected("rotations only (rx ry rz); bones do not slide", Some(line))),
+                AsfChannel::Translation(_) => {
+                    return Err(self
+                        .unexpected("rotations only (rx ry rz); bones do not slide", Some(line)));
+                }
             }
         }
         Ok(freedoms)
@@ -318,7 +436,11 @@ impl<'a> Parser<'a> {
     /// `-160.0 20.0`; infinite ends are written `-inf` and `inf`.
     fn limit(&self, words: &[&str], line: &Line<'_>) -> Result<Option<[f64; 2]>, MotionError> {
         let number = |word: &&str| word.parse::<f64>().ok().filter(|number| !number.is_nan());
-        match (words, words.first().and_then(number), words.last().and_then(number)) {
+        match (
+            words,
+            words.first().and_then(number),
+            words.last().and_then(number),
+        ) {
             ([], ..) => Ok(None),
             ([_, _], Some(low), Some(high)) => Ok(Some([self.angle(low), self.angle(high)])),
             _ => Err(self.unexpected("limits (low high)", Some(line))),
@@ -327,16 +449,31 @@ impl<'a> Parser<'a> {
 
     fn hierarchy(&mut self) -> Result<Option<Line<'a>>, MotionError> {
         loop {
-            let Some(line) = self.next_line() else { return Ok(None) };
+            let Some(line) = self.next_line() else {
+                return Ok(None);
+            };
             match line.keyword().as_str() {
                 "begin" | "end" => {}
                 keyword if keyword.starts_with(':') => return Ok(Some(line)),
                 parent => {
-                    let parent = if parent == "root" { None } else { Some(line.words[0]) };
-                    self.edges.extend(line.words[1..].iter().map(|&child| (child, parent, line.number)));
+                    let parent = if parent == "root" {
+                        None
+                    } else {
+                        Some(line.words[0])
+                    };
+                    self.edges.extend(
+                        line.words[1..]
+                            .iter()
+                            .map(|&child| (child, parent, line.number)),
+                    );
                     if self.edges.len() > MAX_JOINTS {
                         let name = self.cursor.name().to_owned();
-                        return Err(MotionError::Limit { name, line: line.number, what: "children", limit: MAX_JOINTS });
+                        return Err(MotionError::Limit {
+                            name,
+                            line: line.number,
+                            what: "children",
+                            limit: MAX_JOINTS,
+                        });
                     }
                 }
             }
@@ -345,20 +482,30 @@ impl<'a> Parser<'a> {
 
     /// Brings the bones into an order with parents first. Each bone must hang on the root, once.
     fn finish(mut self) -> Result<AsfSkeleton, MotionError> {
-        let index_of = |name: &str| self.raw.iter().position(|bone| bone.name.eq_ignore_ascii_case(name));
+        let index_of = |name: &str| {
+            self.raw
+                .iter()
+                .position(|bone| bone.name.eq_ignore_ascii_case(name))
+        };
         let mut parents: Vec<Option<Option<usize>>> = vec![None; self.raw.len()];
         for &(child, parent, line) in &self.edges {
             let known = |name: &'a str| {
-                index_of(name).ok_or_else(|| self.cursor.unexpected("a bone of :bonedata", Some(Token { text: name, line })))
+                index_of(name).ok_or_else(|| {
+                    self.cursor
+                        .unexpected("a bone of :bonedata", Some(Token { text: name, line }))
+                })
             };
             let (child_index, parent) = (known(child)?, parent.map(known).transpose()?);
             if parents[child_index].replace(parent).is_some() {
-                return Err(self.cursor.unexpected("a bone with one parent", Some(Token { text: child, line })));
+                return Err(self
+                    .cursor
+                    .unexpected("a bone with one parent", Some(Token { text: child, line })));
             }
         }
         let mut placed: Vec<Option<usize>> = vec![None; self.raw.len()];
         let mut order = Vec::with_capacity(self.raw.len());
-        // Breadth first: level by level, so that a ring of bones ends the loop rather than keeping it.
+        // Breadth first: level by level, so that a ring of bones ends the loop rather than keeping
+        // it.
         loop {
             let ready = |bone: &usize| match parents[*bone] {
                 Some(None) => placed[*bone].is_none(),
@@ -376,7 +523,13 @@ impl<'a> Parser<'a> {
         }
         if let Some(loose) = (0..self.raw.len()).find(|&bone| placed[bone].is_none()) {
             let bone = &self.raw[loose];
-            return Err(self.cursor.unexpected("a bone that hangs on the root", Some(Token { text: &bone.name, line: bone.line })));
+            return Err(self.cursor.unexpected(
+                "a bone that hangs on the root",
+                Some(Token {
+                    text: &bone.name,
+                    line: bone.line,
+                }),
+            ));
         }
         if order.is_empty() {
             return Err(self.unexpected(":bonedata and :hierarchy with bones", None));

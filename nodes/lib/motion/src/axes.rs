@@ -2,7 +2,8 @@
 
 use nalgebra::{Matrix3, Rotation3, Unit, UnitQuaternion, Vector3};
 
-/// The rotation whose x axis is `x` and whose y axis is `y` made perpendicular to it. Identity where the two are parallel or zero.
+/// The rotation whose x axis is `x` and whose y axis is `y` made perpendicular to it. Identity
+/// where the two are parallel or zero.
 pub(crate) fn frame_of(x: Vector3<f64>, y: Vector3<f64>) -> UnitQuaternion<f64> {
     let z = x.cross(&y);
     match (x.try_normalize(1e-12), z.try_normalize(1e-12)) {
@@ -14,13 +15,22 @@ pub(crate) fn frame_of(x: Vector3<f64>, y: Vector3<f64>) -> UnitQuaternion<f64> 
     }
 }
 
-/// The smallest rotation that takes the direction `from` to the direction `to`; about some perpendicular axis where they are opposite,
-/// identity where one is zero.
+/// The smallest rotation that takes the direction `from` to the direction `to`; about some
+/// perpendicular axis where they are opposite, identity where one is zero.
 pub(crate) fn minimal_rotation(from: Vector3<f64>, to: Vector3<f64>) -> UnitQuaternion<f64> {
-    let (Some(from), Some(to)) = (from.try_normalize(1e-12), to.try_normalize(1e-12)) else { return UnitQuaternion::identity() };
+    let (Some(from), Some(to)) = (from.try_normalize(1e-12), to.try_normalize(1e-12)) else {
+        return UnitQuaternion::identity();
+    };
     UnitQuaternion::rotation_between(&from, &to).unwrap_or_else(|| {
-        let other = if from.x.abs() < 0.8 { Vector3::x() } else { Vector3::y() };
-        UnitQuaternion::from_axis_angle(&Unit::new_normalize(from.cross(&other)), std::f64::consts::PI)
+        let other = if from.x.abs() < 0.8 {
+            Vector3::x()
+        } else {
+            Vector3::y()
+        };
+        UnitQuaternion::from_axis_angle(
+            &Unit::new_normalize(from.cross(&other)),
+            std::f64::consts::PI,
+        )
     })
 }
 
@@ -38,5 +48,9 @@ pub(crate) fn nearest_axis(direction: Vector3<f64>) -> Vector3<f64> {
 /// `+y` for the axis nearest to a direction.
 pub(crate) fn axis_name(direction: Vector3<f64>) -> String {
     let axis = direction.iamax();
-    format!("{}{}", if direction[axis] < 0.0 { '-' } else { '+' }, ['x', 'y', 'z'][axis])
+    format!(
+        "{}{}",
+        if direction[axis] < 0.0 { '-' } else { '+' },
+        ['x', 'y', 'z'][axis]
+    )
 }

@@ -119,7 +119,9 @@ pub enum MotionError {
         labels: Vec<String>,
     },
     /// No frame shows three markers.
-    #[error("{name}: no frame shows three markers of the set; check the labels and the recording's gaps")]
+    #[error(
+        "{name}: no frame shows three markers of the set; check the labels and the recording's gaps"
+    )]
     NoMarkers {
         /// The file.
         name: String,
@@ -137,7 +139,9 @@ pub enum MotionError {
         found: usize,
     },
     /// The file holds another number of frames than it declares.
-    #[error("{name}, line {line}: expected {expected} frames (as line {declared_at} says), found {found}")]
+    #[error(
+        "{name}, line {line}: expected {expected} frames (as line {declared_at} says), found {found}"
+    )]
     FrameCount {
         /// The file.
         name: String,
@@ -151,7 +155,9 @@ pub enum MotionError {
         declared_at: usize,
     },
     /// A value is NaN, infinite or absurdly large.
-    #[error("{name}, line {line}: value {column} is {found}, expected a finite number below {limit:e} in size")]
+    #[error(
+        "{name}, line {line}: value {column} is {found}, expected a finite number below {limit:e} in size"
+    )]
     Value {
         /// The file.
         name: String,
@@ -238,7 +244,9 @@ pub enum MotionError {
         problem: String,
     },
     /// No rest pose can be told from the file.
-    #[error("{name}: no rest pose found: {problem}; set rest to zero_pose or to a frame that shows a T-pose, or give rest_axes in a map")]
+    #[error(
+        "{name}: no rest pose found: {problem}; set rest to zero_pose or to a frame that shows a T-pose, or give rest_axes in a map"
+    )]
     RestPose {
         /// The file.
         name: String,
@@ -254,7 +262,9 @@ pub enum MotionError {
         mean: [f64; 3],
     },
     /// The unit of length cannot be told from the file.
-    #[error("{name}: the skeleton is {height_units:.3} units tall, which is a human in no usual unit; set unit_scale_m (metres per unit)")]
+    #[error(
+        "{name}: the skeleton is {height_units:.3} units tall, which is a human in no usual unit; set unit_scale_m (metres per unit)"
+    )]
     Unit {
         /// The file.
         name: String,

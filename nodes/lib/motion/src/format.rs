@@ -10,7 +10,8 @@ pub enum MotionFormat {
     Bvh,
     /// Acclaim skeleton: begins with a section such as `:version`. No motion by itself.
     Asf,
-    /// Acclaim motion: begins with `:FULLY-SPECIFIED`, `:DEGREES` or the first frame's number and `root`.
+    /// Acclaim motion: begins with `:FULLY-SPECIFIED`, `:DEGREES` or the first frame's number and
+    /// `root`.
     Amc,
     /// Markers in binary: second byte 0x50.
     C3d,
@@ -26,19 +27,31 @@ impl MotionFormat {
         }
         let text = String::from_utf8_lossy(&bytes[..bytes.len().min(1 << 16)]);
         let start = text.trim_start_matches('\u{feff}').trim_start();
-        if start.get(..9).is_some_and(|word| word.eq_ignore_ascii_case("HIERARCHY")) {
+        if start
+            .get(..9)
+            .is_some_and(|word| word.eq_ignore_ascii_case("HIERARCHY"))
+        {
             return Some(Self::Bvh);
         }
         if trc::is_trc(start) {
             return Some(Self::Trc);
         }
-        let mut lines = start.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'));
+        let mut lines = start
+            .lines()
+            .map(str::trim)
+            .filter(|line| !line.is_empty() && !line.starts_with('#'));
         let first = lines.next()?.to_ascii_lowercase();
         let section = first.split_whitespace().next().unwrap_or_default();
         match section {
             ":fully-specified" | ":degrees" | ":radians" => Some(Self::Amc),
-            ":version" | ":name" | ":units" | ":documentation" | ":root" | ":bonedata" | ":hierarchy" => Some(Self::Asf),
-            number if number.parse::<u64>().is_ok() && lines.next().is_some_and(|line| line.starts_with("root ")) => Some(Self::Amc),
+            ":version" | ":name" | ":units" | ":documentation" | ":root" | ":bonedata"
+            | ":hierarchy" => Some(Self::Asf),
+            number
+                if number.parse::<u64>().is_ok()
+                    && lines.next().is_some_and(|line| line.starts_with("root ")) =>
+            {
+                Some(Self::Amc)
+            }
             _ => None,
         }
     }

@@ -1,15 +1,18 @@
 //! Motion files and the embedded walk, all in SMPL's joints.
 //!
-//! [`read_motion`] takes a file and finds out what it is by its content. Skeletons (BVH, ASF/AMC) are retargeted: a [`SmplMotion`] in a world
-//! with z up, feet on z = 0, with shape coefficients fitted to the source's bones; the [`RetargetReport`] says how a source was understood.
-//! To markers (C3D, TRC) a body is fitted, which stays on the recording's floor; the [`MarkerReport`] says how well. [`embedded_walk`] is a
-//! motion without a file.
+//! [`read_motion`] takes a file and finds out what it is by its content. Skeletons (BVH, ASF/AMC)
+//! are retargeted: a [`SmplMotion`] in a world with z up, feet on z = 0, with shape coefficients
+//! fitted to the source's bones; the [`RetargetReport`] says how a source was understood. To
+//! markers (C3D, TRC) a body is fitted, which stays on the recording's floor; the [`MarkerReport`]
+//! says how well. [`embedded_walk`] is a motion without a file.
 //!
-//! [`camera`] places in-place poses that were estimated from video in the world; [`rigid`] reads and writes trajectories and IMU files of rigid
-//! bodies; [`datasets`] imports recordings with real IMUs.
+//! [`camera`] places in-place poses that were estimated from video in the world; [`rigid`] reads
+//! and writes trajectories and IMU files of rigid bodies; [`datasets`] imports recordings with real
+//! IMUs.
 //!
-//! Files of SMPL parameters (AMASS, and estimates from video: VIBE, WHAM, GVHMR, TRAM, PHALP, SLAHMR) need no retargeting; the [`PoseReport`]
-//! says what was taken. Betas of another kind of body than the one at hand are left out or fitted ([`ShapeChoice`]). [`read_people`] takes
+//! Files of SMPL parameters (AMASS, and estimates from video: VIBE, WHAM, GVHMR, TRAM, PHALP,
+//! SLAHMR) need no retargeting; the [`PoseReport`] says what was taken. Betas of another kind of
+//! body than the one at hand are left out or fitted ([`ShapeChoice`]). [`read_people`] takes
 //! several people of a file, or everybody, [`read_camera_poses`] leaves poses in the camera's axes.
 //!
 //! ```
@@ -44,16 +47,22 @@ mod walk;
 pub use amass_write::write_amass;
 pub use amc::{AMC_RATE_HZ, parse_amc};
 pub use asf::{AsfBone, AsfChannel, AsfSkeleton, parse_asf};
-pub use bvh::{BvhClip, BvhJoint, Channel, MAX_JOINTS, MAX_VALUE, SkeletonPose, parse_bvh, write_bvh};
+pub use bvh::{
+    BvhClip, BvhJoint, Channel, MAX_JOINTS, MAX_VALUE, SkeletonPose, parse_bvh, write_bvh,
+};
 pub use c3d::parse_c3d;
 pub use error::MotionError;
 pub use format::MotionFormat;
-pub use markers::{MarkerClip, MarkerFit, MarkerOptions, MarkerPlace, MarkerReport, MarkerSet, SetMarker, fit_markers, place_markers};
+pub use markers::{
+    MarkerClip, MarkerFit, MarkerOptions, MarkerPlace, MarkerReport, MarkerSet, SetMarker,
+    fit_markers, place_markers,
+};
 pub use motion::SmplMotion;
 pub use options::{MotionOptions, RestChoice, UpAxis};
 pub use poses::{
-    CameraPoses, MAX_POSES, Person, PoseAxes, PoseFile, PoseFormat, PoseReport, PoseTrack, PoseView, RateOrigin, ShapeChoice, ShapeOrigin,
-    VIDEO_RATE_HZ, open_poses, read_camera_poses, read_people,
+    CameraPoses, MAX_POSES, Person, PoseAxes, PoseFile, PoseFormat, PoseReport, PoseTrack,
+    PoseView, RateOrigin, ShapeChoice, ShapeOrigin, VIDEO_RATE_HZ, open_poses, read_camera_poses,
+    read_people,
 };
 pub use read::{read_motion, read_motion_for};
 pub use report::RetargetReport;

@@ -14,7 +14,8 @@ pub struct SmplMotion {
     pub rate_hz: f64,
     /// The body's gender; neutral where the source does not say.
     pub gender: Gender,
-    /// Shape coefficients (standard deviations) for the body that the motion was made for; 10 for the embedded body.
+    /// Shape coefficients (standard deviations) for the body that the motion was made for; 10 for
+    /// the embedded body.
     pub betas: Vec<f64>,
     /// Whose shapes they tell: that body's.
     pub shape_space: ShapeSpace,
@@ -39,56 +40,90 @@ impl SmplMotion {
     /// How the source was read, in a line, where it has a report.
     pub fn how_read(&self) -> Option<String> {
         let skeleton = self.report.as_ref().map(ToString::to_string);
-        skeleton.or_else(|| Some(self.markers.as_ref()?.to_string())).or_else(|| Some(self.poses.as_ref()?.to_string()))
+        skeleton
+            .or_else(|| Some(self.markers.as_ref()?.to_string()))
+            .or_else(|| Some(self.poses.as_ref()?.to_string()))
     }
 
-    /// The part from `start_s` on, `duration_s` long (to the end where absent), frames on or after the start.
+    /// The part from `start_s` on, `duration_s` long (to the end where absent), frames on or after
+    /// the start.
     ///
     /// # Errors
     /// [`MotionError::Setting`] where the part lies outside the motion.
     pub fn slice(&self, start_s: f64, duration_s: Option<f64>) -> Result<Self, MotionError> {
         let whole_s = self.duration_s();
         if !(start_s >= 0.0 && start_s <= whole_s) {
-            return Err(self.setting("start_s", start_s, format!("0 to {whole_s:.3} s (the motion's end)")));
+            return Err(self.setting(
+                "start_s",
+                start_s,
+                format!("0 to {whole_s:.3} s (the motion's end)"),
+            ));
         }
-        if let Some(duration_s) = duration_s.filter(|&seconds| !(seconds > 0.0 && seconds.is_finite())) {
+        if let Some(duration_s) =
+            duration_s.filter(|&seconds| !(seconds > 0.0 && seconds.is_finite()))
+        {
             return Err(self.setting("duration_s", duration_s, "more than 0 s".to_owned()));
         }
-        // A frame's time is a quotient: half a microframe of slack keeps 0.1 s at 120 Hz on frame 12.
+        // A frame's time is a quotient: half a microframe of slack keeps 0.1 s at 120 Hz on frame
+        // 12.
         let first = (start_s * self.rate_hz - 1e-6).ceil().max(0.0) as usize;
         let end_s = duration_s.map_or(whole_s, |seconds| (start_s + seconds).min(whole_s));
-        let last = ((end_s * self.rate_hz + 1e-6).floor() as usize).clamp(first, self.frames.len() - 1);
+        let last =
+            ((end_s * self.rate_hz + 1e-6).floor() as usize).clamp(first, self.frames.len() - 1);
         Ok(Self {
             frames: self.frames[first..=last].to_vec(),
-            confidence: self.confidence.as_ref().map(|values| values[first..=last].to_vec()),
+            confidence: self
+                .confidence
+                .as_ref()
+                .map(|values| values[first..=last].to_vec()),
             ..self.clone_without_frames()
         })
     }
 
-    /// The pose at `time_s` after the first frame, clamped to the motion: spherical linear between the two frames around it.
-    /// `None` for a motion without frames.
+    /// The pose at `time_s` after the first frame, clamped to the motion: spherical linear between
+    /// the two frames around it. `None` for a motion without frames.
     pub fn pose_at(&self, time_s: f64) -> Option<BodyPose> {
         let (index, fraction) = self.place(time_s)?;
-        let (from, to) = (&self.frames[index], &self.frames[(index + 1).min(self.frames.len() - 1)]);
+        let (from, to) = (
+            &self.frames[index],
+            &self.frames[(index + 1).min(self.frames.len() - 1)],
+        );
         Some(BodyPose {
             root_position: from.root_position.lerp(&to.root_position, fraction),
-            local_rotations: std::array::from_fn(|joint| slerp(&from.local_rotations[joint], &to.local_rotations[joint], fraction)),
+            local_rotations: std::array::from_fn(|joint| {
+                slerp(
+                    &from.local_rotations[joint],
+                    &to.local_rotations[joint],
+                    fraction,
+                )
+            }),
         })
     }
 
-    /// The pose at `time_s`, clamped, by cubic Hermite splines through four frames (Catmull-Rom tangents; rotations in the tangent space of
-    /// the frame before): it passes through the frames, and velocities are continuous up to second order in the rotation per frame.
-    /// `None` for a motion without frames.
+    /// The pose at `time_s`, clamped, by cubic Hermite splines through four frames (Catmull-Rom
+    /// tangents; rotations in the tangent space of the frame before): it passes through the frames,
+    /// and velocities are continuous up to second order in the rotation per frame. `None` for a
+    /// motion without frames.
     pub fn smooth_pose_at(&self, time_s: f64) -> Option<BodyPose> {
         let (index, fraction) = self.place(time_s)?;
         let last = self.frames.len() - 1;
-        let around = [index.saturating_sub(1), index, (index + 1).min(last), (index + 2).min(last)].map(|frame| &self.frames[frame]);
+        let around = [
+            index.saturating_sub(1),
+            index,
+            (index + 1).min(last),
+            (index + 2).min(last),
+        ]
+        .map(|frame| &self.frames[frame]);
         let local_rotations = std::array::from_fn(|joint| {
             let base = around[1].local_rotations[joint];
-            let tangents = around.map(|frame| (base.inverse() * frame.local_rotations[joint]).scaled_axis());
+            let tangents =
+                around.map(|frame| (base.inverse() * frame.local_rotations[joint]).scaled_axis());
             base * UnitQuaternion::from_scaled_axis(catmull_rom(&tangents, fraction))
         });
-        Some(BodyPose { root_position: catmull_rom(&around.map(|frame| frame.root_position), fraction), local_rotations })
+        Some(BodyPose {
+            root_position: catmull_rom(&around.map(|frame| frame.root_position), fraction),
+            local_rotations,
+        })
     }
 
     /// The same motion at `rate_hz`, by [`Self::smooth_pose_at`].
@@ -101,12 +136,22 @@ impl SmplMotion {
         }
         let count = (self.duration_s() * rate_hz + 1e-6).floor() as usize + 1;
         let times = (0..count).map(|frame| frame as f64 / rate_hz);
-        let confidence = self
-            .confidence
-            .as_ref()
-            .map(|values| times.clone().filter_map(|time_s| self.place(time_s)).map(|(index, _)| values[index]).collect());
-        let frames: Vec<BodyPose> = times.filter_map(|time_s| self.smooth_pose_at(time_s)).collect();
-        Ok(Self { rate_hz, frames: continuous(frames), confidence, ..self.clone_without_frames() })
+        let confidence = self.confidence.as_ref().map(|values| {
+            times
+                .clone()
+                .filter_map(|time_s| self.place(time_s))
+                .map(|(index, _)| values[index])
+                .collect()
+        });
+        let frames: Vec<BodyPose> = times
+            .filter_map(|time_s| self.smooth_pose_at(time_s))
+            .collect();
+        Ok(Self {
+            rate_hz,
+            frames: continuous(frames),
+            confidence,
+            ..self.clone_without_frames()
+        })
     }
 
     /// Frame before `time_s` and how far it is to the next one, in [0, 1].
@@ -133,15 +178,25 @@ impl SmplMotion {
     }
 
     fn setting(&self, setting: &'static str, value: f64, expected: String) -> MotionError {
-        MotionError::Setting { name: self.name.clone(), setting, value, expected }
+        MotionError::Setting {
+            name: self.name.clone(),
+            setting,
+            value,
+            expected,
+        }
     }
 }
 
-/// Quaternions of each joint with signs chosen so that neighbours are near each other (q and -q are the same rotation).
+/// Quaternions of each joint with signs chosen so that neighbours are near each other (q and -q are
+/// the same rotation).
 pub(crate) fn continuous(mut frames: Vec<BodyPose>) -> Vec<BodyPose> {
     for index in 1..frames.len() {
         for joint in 0..JOINT_COUNT {
-            if frames[index].local_rotations[joint].coords.dot(&frames[index - 1].local_rotations[joint].coords) < 0.0 {
+            if frames[index].local_rotations[joint]
+                .coords
+                .dot(&frames[index - 1].local_rotations[joint].coords)
+                < 0.0
+            {
                 let turned = -frames[index].local_rotations[joint].into_inner();
                 frames[index].local_rotations[joint] = UnitQuaternion::new_unchecked(turned);
             }
@@ -150,13 +205,21 @@ pub(crate) fn continuous(mut frames: Vec<BodyPose>) -> Vec<BodyPose> {
     frames
 }
 
-/// Spherical linear interpolation the short way round; at 180 degrees, where the way is not unique, some one of them.
-pub(crate) fn slerp(from: &UnitQuaternion<f64>, to: &UnitQuaternion<f64>, fraction: f64) -> UnitQuaternion<f64> {
+/// Spherical linear interpolation the short way round; at 180 degrees, where the way is not unique,
+/// some one of them.
+pub(crate) fn slerp(
+    from: &UnitQuaternion<f64>,
+    to: &UnitQuaternion<f64>,
+    fraction: f64,
+) -> UnitQuaternion<f64> {
     from * UnitQuaternion::from_scaled_axis((from.inverse() * to).scaled_axis() * fraction)
 }
 
 fn catmull_rom(points: &[Vector3<f64>; 4], u: f64) -> Vector3<f64> {
     let (slope_from, slope_to) = (0.5 * (points[2] - points[0]), 0.5 * (points[3] - points[1]));
     let (u2, u3) = (u * u, u * u * u);
-    points[1] * (2.0 * u3 - 3.0 * u2 + 1.0) + slope_from * (u3 - 2.0 * u2 + u) + points[2] * (3.0 * u2 - 2.0 * u3) + slope_to * (u3 - u2)
+    points[1] * (2.0 * u3 - 3.0 * u2 + 1.0)
+        + slope_from * (u3 - 2.0 * u2 + u)
+        + points[2] * (3.0 * u2 - 2.0 * u3)
+        + slope_to * (u3 - u2)
 }

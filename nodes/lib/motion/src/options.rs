@@ -38,7 +38,8 @@ impl UpAxis {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RestChoice {
-    /// The zero pose where it is a standing human, else what the map says, else a T-pose in the first frame.
+    /// The zero pose where it is a standing human, else what the map says, else a T-pose in the
+    /// first frame.
     #[default]
     Detect,
     /// All channels zero.
@@ -69,17 +70,19 @@ pub struct MotionOptions {
     pub marker_set: Option<String>,
     /// Whose markers are taken; needed where the labels name several people.
     pub subject: Option<String>,
-    /// Takes markers to be stuck exactly where the marker set says, instead of about a centimetre around it.
+    /// Takes markers to be stuck exactly where the marker set says, instead of about a centimetre
+    /// around it.
     pub placements_as_given: bool,
     /// Where the body's shape comes from.
     pub shape: ShapeChoice,
-    /// The body file that the motion's betas are for, so that another body can be fitted to that person's bones (SMPL parameters only).
+    /// The body file that the motion's betas are for, so that another body can be fitted to that
+    /// person's bones (SMPL parameters only).
     pub source_body: Option<PathBuf>,
-    /// Which person of a file of several, by its name or number there; who is in it for the longest time, where absent. For
-    /// [`crate::read_people`] also `all`, or several with commas between.
+    /// Which person of a file of several, by its name or number there; who is in it for the longest
+    /// time, where absent. For [`crate::read_people`] also `all`, or several with commas between.
     pub person: Option<String>,
-    /// Frames per second, Hz, of AMC files (120 where absent) and SMPL parameters (video estimates do not say it: 30 where absent; where a file
-    /// does, this one counts). Not of BVH and markers.
+    /// Frames per second, Hz, of AMC files (120 where absent) and SMPL parameters (video estimates
+    /// do not say it: 30 where absent; where a file does, this one counts). Not of BVH and markers.
     pub rate_hz: Option<f64>,
     /// Where to begin, s after the first frame that is kept.
     pub start_s: f64,
@@ -90,23 +93,32 @@ pub struct MotionOptions {
 impl MotionOptions {
     /// The chosen map, from its file if it is no embedded one; `None` where it is to be detected.
     pub(crate) fn map(&self) -> Result<Option<SkeletonMap>, MotionError> {
-        let Some(given) = &self.skeleton_map else { return Ok(None) };
+        let Some(given) = &self.skeleton_map else {
+            return Ok(None);
+        };
         let embedded = SkeletonMap::embedded()?;
         if let Some(map) = embedded.iter().find(|map| map.name() == given) {
             return Ok(Some(map.clone()));
         }
         let path = Path::new(given);
         if !path.exists() {
-            return Err(MotionError::UnknownMap { given: given.clone(), known: embedded.into_iter().map(|map| map.name).collect() });
+            return Err(MotionError::UnknownMap {
+                given: given.clone(),
+                known: embedded.into_iter().map(|map| map.name).collect(),
+            });
         }
-        let yaml = std::fs::read_to_string(path).map_err(|source| MotionError::Read { path: path.to_owned(), source })?;
+        let yaml = std::fs::read_to_string(path).map_err(|source| MotionError::Read {
+            path: path.to_owned(),
+            source,
+        })?;
         SkeletonMap::from_yaml(&yaml, given).map(Some)
     }
 
     /// The chosen marker set, from its file if it is no embedded one.
     ///
     /// # Errors
-    /// [`MotionError::UnknownMarkerSet`], [`MotionError::Read`], and those of [`MarkerSet::from_yaml`].
+    /// [`MotionError::UnknownMarkerSet`], [`MotionError::Read`], and those of
+    /// [`MarkerSet::from_yaml`].
     pub fn markers_set(&self) -> Result<MarkerSet, MotionError> {
         let given = self.marker_set.as_deref().unwrap_or("plug_in_gait");
         let embedded = MarkerSet::embedded()?;
@@ -116,9 +128,15 @@ impl MotionOptions {
         let path = Path::new(given);
         if !path.exists() {
             let known = embedded.iter().map(|set| set.name().to_owned()).collect();
-            return Err(MotionError::UnknownMarkerSet { given: given.to_owned(), known });
+            return Err(MotionError::UnknownMarkerSet {
+                given: given.to_owned(),
+                known,
+            });
         }
-        let yaml = std::fs::read_to_string(path).map_err(|source| MotionError::Read { path: path.to_owned(), source })?;
+        let yaml = std::fs::read_to_string(path).map_err(|source| MotionError::Read {
+            path: path.to_owned(),
+            source,
+        })?;
         MarkerSet::from_yaml(&yaml, given)
     }
 

@@ -10,20 +10,22 @@ use cromosim_body::BodyModel;
 use crate::bvh::shortened;
 use crate::poses::read_poses;
 use crate::{
-    AMC_RATE_HZ, BvhClip, MarkerClip, MotionError, MotionFormat, MotionOptions, SmplMotion, fit_markers, parse_amc, parse_asf, parse_bvh,
-    parse_c3d, parse_trc, retarget,
+    AMC_RATE_HZ, BvhClip, MarkerClip, MotionError, MotionFormat, MotionOptions, SmplMotion,
+    fit_markers, parse_amc, parse_asf, parse_bvh, parse_c3d, parse_trc, retarget,
 };
 
 /// Larger files are refused: a thousand hours of BVH at 120 Hz are smaller.
 const MAX_BYTES: u64 = 4 << 30;
 
-/// Reads a motion file and retargets or fits it to the embedded body. What the file is, is told by its content ([`MotionFormat::of`]), not by
-/// its name's ending. BVH and ASF/AMC are retargeted; an AMC file takes its skeleton from [`MotionOptions::skeleton`] or from the ASF file
-/// beside it. To C3D and TRC a body is fitted ([`fit_markers`]).
-/// SMPL parameters are packed as npz, pickle, joblib, torch or npy and told by their keys.
+/// Reads a motion file and retargets or fits it to the embedded body. What the file is, is told by
+/// its content ([`MotionFormat::of`]), not by its name's ending. BVH and ASF/AMC are retargeted; an
+/// AMC file takes its skeleton from [`MotionOptions::skeleton`] or from the ASF file beside it. To
+/// C3D and TRC a body is fitted ([`fit_markers`]). SMPL parameters are packed as npz, pickle,
+/// joblib, torch or npy and told by their keys.
 ///
 /// # Errors
-/// One line that names the file and the place: unreadable, no motion file, wrong content ([`MotionError`]).
+/// One line that names the file and the place: unreadable, no motion file, wrong content
+/// ([`MotionError`]).
 pub fn read_motion(path: &Path, options: &MotionOptions) -> Result<SmplMotion, MotionError> {
     read_motion_for(path, &BodyModel::embedded(), options)
 }
@@ -32,7 +34,11 @@ pub fn read_motion(path: &Path, options: &MotionOptions) -> Result<SmplMotion, M
 ///
 /// # Errors
 /// As [`read_motion`].
-pub fn read_motion_for(path: &Path, body: &Arc<BodyModel>, options: &MotionOptions) -> Result<SmplMotion, MotionError> {
+pub fn read_motion_for(
+    path: &Path,
+    body: &Arc<BodyModel>,
+    options: &MotionOptions,
+) -> Result<SmplMotion, MotionError> {
     if let Some(motion) = read_poses(path, body, options)? {
         return motion.slice(options.start_s, options.duration_s);
     }
@@ -45,61 +51,126 @@ pub fn read_motion_for(path: &Path, body: &Arc<BodyModel>, options: &MotionOptio
         Some(MotionFormat::Amc) => skeletal(acclaim(path, &text(), options)?),
         Some(MotionFormat::C3d) => of_markers(&parse_c3d(&bytes, &name)?, body, options),
         Some(MotionFormat::Trc) => of_markers(&parse_trc(&text(), &name)?, body, options),
-        Some(MotionFormat::Asf) => Err(MotionError::SkeletonOnly { path: path.to_owned() }),
+        Some(MotionFormat::Asf) => Err(MotionError::SkeletonOnly {
+            path: path.to_owned(),
+        }),
         None => {
             let content = text();
             let start = content.trim_start_matches('\u{feff}').trim_start();
             let short: String = start.chars().take(60).collect();
-            let found = if bytes.is_empty() { "an empty file".to_owned() } else { format!("\"{}\"", shortened(&short)) };
-            Err(MotionError::UnknownFormat { path: path.to_owned(), found })
+            let found = if bytes.is_empty() {
+                "an empty file".to_owned()
+            } else {
+                format!("\"{}\"", shortened(&short))
+            };
+            Err(MotionError::UnknownFormat {
+                path: path.to_owned(),
+                found,
+            })
         }
     }?;
     motion.slice(options.start_s, options.duration_s)
 }
 
-fn of_markers(clip: &MarkerClip, body: &Arc<BodyModel>, options: &MotionOptions) -> Result<SmplMotion, MotionError> {
-    Ok(fit_markers(clip, body, &options.markers_set()?, &options.markers_options())?.0)
+fn of_markers(
+    clip: &MarkerClip,
+    body: &Arc<BodyModel>,
+    options: &MotionOptions,
+) -> Result<SmplMotion, MotionError> {
+    Ok(fit_markers(
+        clip,
+        body,
+        &options.markers_set()?,
+        &options.markers_options(),
+    )?
+    .0)
 }
 
 fn acclaim(path: &Path, text: &str, options: &MotionOptions) -> Result<BvhClip, MotionError> {
-    let asf = options.skeleton.clone().map_or_else(|| skeleton_beside(path), Ok)?;
+    let asf = options
+        .skeleton
+        .clone()
+        .map_or_else(|| skeleton_beside(path), Ok)?;
     let bytes = read_bytes(&asf)?;
     let skeleton = parse_asf(&String::from_utf8_lossy(&bytes), &asf.display().to_string())?;
-    parse_amc(text, &path.display().to_string(), &skeleton, options.rate_hz.unwrap_or(AMC_RATE_HZ))
+    parse_amc(
+        text,
+        &path.display().to_string(),
+        &skeleton,
+        options.rate_hz.unwrap_or(AMC_RATE_HZ),
+    )
 }
 
-/// The ASF file beside an AMC file whose stem is the longest beginning of the AMC's own: `02.asf` for `02_01.amc`.
+/// The ASF file beside an AMC file whose stem is the longest beginning of the AMC's own: `02.asf`
+/// for `02_01.amc`.
 fn skeleton_beside(path: &Path) -> Result<PathBuf, MotionError> {
-    let stem = |path: &Path| path.file_stem().map(|stem| stem.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    let stem = |path: &Path| {
+        path.file_stem()
+            .map(|stem| stem.to_string_lossy().to_ascii_lowercase())
+            .unwrap_or_default()
+    };
     let own = stem(path);
-    let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let entries = std::fs::read_dir(folder).map_err(|source| MotionError::Read { path: folder.to_owned(), source })?;
-    let mut skeletons: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
-    skeletons.retain(|path| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("asf")));
+    let folder = path
+        .parent()
+        .filter(|parent| !parent.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
+    let entries = std::fs::read_dir(folder).map_err(|source| MotionError::Read {
+        path: folder.to_owned(),
+        source,
+    })?;
+    let mut skeletons: Vec<PathBuf> = entries
+        .filter_map(|entry| Some(entry.ok()?.path()))
+        .collect();
+    skeletons.retain(|path| {
+        path.extension()
+            .is_some_and(|ending| ending.eq_ignore_ascii_case("asf"))
+    });
     skeletons.sort();
     let begins = |path: &&PathBuf| {
         let rest = own.strip_prefix(&stem(path));
-        rest.is_some_and(|rest| rest.is_empty() || !rest.starts_with(|next: char| next.is_alphanumeric()))
+        rest.is_some_and(|rest| {
+            rest.is_empty() || !rest.starts_with(|next: char| next.is_alphanumeric())
+        })
     };
-    let longest = skeletons.iter().filter(begins).max_by_key(|path| stem(path).len()).cloned();
+    let longest = skeletons
+        .iter()
+        .filter(begins)
+        .max_by_key(|path| stem(path).len())
+        .cloned();
     longest.ok_or_else(|| MotionError::NoSkeleton {
         path: path.to_owned(),
-        found: skeletons.iter().filter_map(|path| Some(path.file_name()?.to_string_lossy().into_owned())).collect(),
+        found: skeletons
+            .iter()
+            .filter_map(|path| Some(path.file_name()?.to_string_lossy().into_owned()))
+            .collect(),
     })
 }
 
 fn read_bytes(path: &Path) -> Result<Vec<u8>, MotionError> {
-    let unreadable = |source| MotionError::Read { path: path.to_owned(), source };
+    let unreadable = |source| MotionError::Read {
+        path: path.to_owned(),
+        source,
+    };
     let file = File::open(path).map_err(unreadable)?;
     let bytes = file.metadata().map_err(unreadable)?.len();
     if bytes > MAX_BYTES {
-        return Err(MotionError::TooLarge { path: path.to_owned(), bytes, limit: MAX_BYTES });
+        return Err(MotionError::TooLarge {
+            path: path.to_owned(),
+            bytes,
+            limit: MAX_BYTES,
+        });
     }
     // A pipe or device says that it has no bytes: the limit holds for what comes out of it, too.
     let mut content = Vec::new();
-    file.take(MAX_BYTES + 1).read_to_end(&mut content).map_err(unreadable)?;
+    file.take(MAX_BYTES + 1)
+        .read_to_end(&mut content)
+        .map_err(unreadable)?;
     if content.len() as u64 > MAX_BYTES {
-        return Err(MotionError::TooLarge { path: path.to_owned(), bytes: content.len() as u64, limit: MAX_BYTES });
+        return Err(MotionError::TooLarge {
+            path: path.to_owned(),
+            bytes: content.len() as u64,
+            limit: MAX_BYTES,
+        });
     }
     Ok(content)
 }

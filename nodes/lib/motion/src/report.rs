@@ -19,9 +19,10 @@ pub struct RetargetReport {
     pub leg_ratio: f64,
     /// Leading frames (T-pose and blend) that were left out.
     pub frames_left_out: usize,
-    /// Angle between corresponding bones over all frames and bones, median, degrees. The bones are upper arms, forearms, hands, thighs,
-    /// shins, feet and neck, and the lines through the hips, the shoulders and along the trunk; spine and collar joints sit at different
-    /// places in different skeletons, so the lines between them are not compared.
+    /// Angle between corresponding bones over all frames and bones, median, degrees. The bones are
+    /// upper arms, forearms, hands, thighs, shins, feet and neck, and the lines through the hips,
+    /// the shoulders and along the trunk; spine and collar joints sit at different places in
+    /// different skeletons, so the lines between them are not compared.
     pub bone_direction_median_deg: f64,
     /// The largest angle of any bone in any frame, degrees.
     pub bone_direction_max_deg: f64,

@@ -80,12 +80,14 @@ struct RawAxes {
     y: [f64; 3],
 }
 
-/// A skeleton's names. Names are compared without case, spaces, underscores and anything before a colon.
+/// A skeleton's names. Names are compared without case, spaces, underscores and anything before a
+/// colon.
 ///
-/// As YAML: `name`, `description`, `joints` (SMPL's name: the source's name), and where known `hand_point` (a joint in the middle of the
-/// knuckles), `thumb_side` (two points, from the little finger's side to the thumb's; `NAME/tip` is the end site of a joint), `feet` (`flat`
-/// or `with_shins`), `unit_scale_m` (metres per unit) and `rest_axes` (x and y axis of a joint's frame in a T-pose, in body axes [left, up,
-/// forward], for skeletons whose zero pose is no human pose).
+/// As YAML: `name`, `description`, `joints` (SMPL's name: the source's name), and where known
+/// `hand_point` (a joint in the middle of the knuckles), `thumb_side` (two points, from the little
+/// finger's side to the thumb's; `NAME/tip` is the end site of a joint), `feet` (`flat` or
+/// `with_shins`), `unit_scale_m` (metres per unit) and `rest_axes` (x and y axis of a joint's frame
+/// in a T-pose, in body axes [left, up, forward], for skeletons whose zero pose is no human pose).
 #[derive(Clone, Debug, PartialEq)]
 pub struct SkeletonMap {
     pub(crate) name: String,
@@ -126,7 +128,10 @@ impl SkeletonMap {
     /// # Errors
     /// None in practice: a test reads them all.
     pub fn embedded() -> Result<Vec<Self>, MotionError> {
-        EMBEDDED.iter().map(|(name, yaml)| Self::from_yaml(yaml, &format!("embedded map {name}"))).collect()
+        EMBEDDED
+            .iter()
+            .map(|(name, yaml)| Self::from_yaml(yaml, &format!("embedded map {name}")))
+            .collect()
     }
 
     /// From YAML; `origin` names the file in errors.
@@ -134,7 +139,11 @@ impl SkeletonMap {
     /// # Errors
     /// [`MotionError::MapSyntax`] and [`MotionError::MapContent`].
     pub fn from_yaml(yaml: &str, origin: &str) -> Result<Self, MotionError> {
-        let raw: RawMap = serde_norway::from_str(yaml).map_err(|source| MotionError::MapSyntax { origin: origin.to_owned(), source })?;
+        let raw: RawMap =
+            serde_norway::from_str(yaml).map_err(|source| MotionError::MapSyntax {
+                origin: origin.to_owned(),
+                source,
+            })?;
         let content = |key: &str, problem: &str| MotionError::MapContent {
             origin: origin.to_owned(),
             key: key.to_owned(),
@@ -142,25 +151,45 @@ impl SkeletonMap {
         };
         let mut joints: [Option<String>; JOINT_COUNT] = Default::default();
         for (smpl, source) in raw.joints {
-            let joint = Joint::from_name(&smpl).ok_or_else(|| content(&format!("joints.{smpl}"), "SMPL has no such joint"))?;
+            let joint = Joint::from_name(&smpl)
+                .ok_or_else(|| content(&format!("joints.{smpl}"), "SMPL has no such joint"))?;
             joints[joint.index()] = Some(source);
         }
-        let missing = INDISPENSABLE.iter().find(|joint| joints[joint.index()].is_none());
+        let missing = INDISPENSABLE
+            .iter()
+            .find(|joint| joints[joint.index()].is_none());
         if let Some(joint) = missing {
-            return Err(content(&format!("joints.{joint}"), "missing, and indispensable"));
+            return Err(content(
+                &format!("joints.{joint}"),
+                "missing, and indispensable",
+            ));
         }
         if joints[Joint::Neck.index()].is_none() && joints[Joint::Head.index()].is_none() {
-            return Err(content("joints.neck", "missing, and so is head; one of them is needed"));
+            return Err(content(
+                "joints.neck",
+                "missing, and so is head; one of them is needed",
+            ));
         }
-        if raw.unit_scale_m.is_some_and(|scale| !(scale > 0.0 && scale.is_finite())) {
-            return Err(content("unit_scale_m", "expected metres per unit, more than 0"));
+        if raw
+            .unit_scale_m
+            .is_some_and(|scale| !(scale > 0.0 && scale.is_finite()))
+        {
+            return Err(content(
+                "unit_scale_m",
+                "expected metres per unit, more than 0",
+            ));
         }
         let mut rest_axes = Vec::new();
         for (joint, RawAxes { x, y }) in raw.rest_axes {
             let (x, y) = (Vector3::from(x), Vector3::from(y));
-            let orthonormal = (x.norm() - 1.0).abs() < 1e-3 && (y.norm() - 1.0).abs() < 1e-3 && x.dot(&y).abs() < 1e-3;
+            let orthonormal = (x.norm() - 1.0).abs() < 1e-3
+                && (y.norm() - 1.0).abs() < 1e-3
+                && x.dot(&y).abs() < 1e-3;
             if !orthonormal {
-                return Err(content(&format!("rest_axes.{joint}"), "x and y are not of length 1 and perpendicular"));
+                return Err(content(
+                    &format!("rest_axes.{joint}"),
+                    "x and y are not of length 1 and perpendicular",
+                ));
             }
             rest_axes.push((joint, frame_of(x, y)));
         }
@@ -189,26 +218,54 @@ impl SkeletonMap {
     /// Joints of the map that `clip` does not have.
     pub fn missing_in(&self, clip: &BvhClip) -> Vec<String> {
         let names = Names::of(clip);
-        self.joints.iter().flatten().filter(|name| names.joint(name).is_none()).cloned().collect()
+        self.joints
+            .iter()
+            .flatten()
+            .filter(|name| names.joint(name).is_none())
+            .cloned()
+            .collect()
     }
 
     /// The map with the clip's joint indices; an error where an indispensable joint is not there.
     pub(crate) fn bind(&self, clip: &BvhClip) -> Result<BoundMap, MotionError> {
         let names = Names::of(clip);
-        let joints: [Option<usize>; JOINT_COUNT] =
-            std::array::from_fn(|index| self.joints[index].as_deref().and_then(|name| names.joint(name)));
+        let joints: [Option<usize>; JOINT_COUNT] = std::array::from_fn(|index| {
+            self.joints[index]
+                .as_deref()
+                .and_then(|name| names.joint(name))
+        });
         let missing = self.missing_indispensable(&joints);
         if !missing.is_empty() {
-            return Err(MotionError::MissingJoints { name: clip.name().to_owned(), map: self.name.clone(), missing });
+            return Err(MotionError::MissingJoints {
+                name: clip.name().to_owned(),
+                map: self.name.clone(),
+                missing,
+            });
         }
         let side = |wrist: Joint, given: Option<&String>| {
-            given.and_then(|name| names.point(name)).or_else(|| beyond(clip, joints[wrist.index()]?))
+            given
+                .and_then(|name| names.point(name))
+                .or_else(|| beyond(clip, joints[wrist.index()]?))
         };
         let hand = self.hand_point.as_ref();
-        let toe = |foot: Joint, ankle: Joint| joints[foot.index()].map(Point::Joint).or_else(|| side(ankle, None));
-        let thumb = |points: Option<&[String; 2]>| points.and_then(|[from, to]| Some([names.point(from)?, names.point(to)?]));
-        let axes: Vec<_> =
-            clip.joints().iter().map(|joint| self.rest_axes.iter().find(|(name, _)| same(name, &joint.name)).map(|(_, q)| *q)).collect();
+        let toe = |foot: Joint, ankle: Joint| {
+            joints[foot.index()]
+                .map(Point::Joint)
+                .or_else(|| side(ankle, None))
+        };
+        let thumb = |points: Option<&[String; 2]>| {
+            points.and_then(|[from, to]| Some([names.point(from)?, names.point(to)?]))
+        };
+        let axes: Vec<_> = clip
+            .joints()
+            .iter()
+            .map(|joint| {
+                self.rest_axes
+                    .iter()
+                    .find(|(name, _)| same(name, &joint.name))
+                    .map(|(_, q)| *q)
+            })
+            .collect();
         let all_have_axes = joints.iter().flatten().all(|&joint| axes[joint].is_some());
         Ok(BoundMap {
             name: self.name.clone(),
@@ -217,7 +274,10 @@ impl SkeletonMap {
                 left: side(Joint::LeftWrist, hand.map(|sides| &sides.left)),
                 right: side(Joint::RightWrist, hand.map(|sides| &sides.right)),
             },
-            toes: Sides { left: toe(Joint::LeftFoot, Joint::LeftAnkle), right: toe(Joint::RightFoot, Joint::RightAnkle) },
+            toes: Sides {
+                left: toe(Joint::LeftFoot, Joint::LeftAnkle),
+                right: toe(Joint::RightFoot, Joint::RightAnkle),
+            },
             thumb_sides: Sides {
                 left: thumb(self.thumb_side.as_ref().map(|sides| &sides.left)),
                 right: thumb(self.thumb_side.as_ref().map(|sides| &sides.right)),
@@ -231,21 +291,36 @@ impl SkeletonMap {
     /// Indispensable names that were not found.
     fn missing_indispensable(&self, found: &[Option<usize>; JOINT_COUNT]) -> Vec<String> {
         let name = |joint: Joint| self.joints[joint.index()].clone();
-        let mut missing: Vec<String> = INDISPENSABLE.into_iter().filter(|joint| found[joint.index()].is_none()).filter_map(name).collect();
+        let mut missing: Vec<String> = INDISPENSABLE
+            .into_iter()
+            .filter(|joint| found[joint.index()].is_none())
+            .filter_map(name)
+            .collect();
         if found[Joint::Neck.index()].is_none() && found[Joint::Head.index()].is_none() {
             missing.extend(name(Joint::Neck).or_else(|| name(Joint::Head)));
         }
         missing
     }
 
-    /// The embedded map that fits `clip` best: all its indispensable joints are there, and it leaves out the fewest.
+    /// The embedded map that fits `clip` best: all its indispensable joints are there, and it
+    /// leaves out the fewest.
     pub(crate) fn detect(clip: &BvhClip) -> Result<BoundMap, MotionError> {
         let maps = Self::embedded()?;
         let names = Names::of(clip);
-        let found = |map: &Self| map.joints.iter().flatten().filter(|name| names.joint(name).is_some()).count();
+        let found = |map: &Self| {
+            map.joints
+                .iter()
+                .flatten()
+                .filter(|name| names.joint(name).is_some())
+                .count()
+        };
         let total = |map: &Self| map.joints.iter().flatten().count();
         let fits = |map: &&Self| map.bind(clip).is_ok();
-        if let Some(best) = maps.iter().filter(fits).min_by_key(|map| (total(map) - found(map), usize::MAX - found(map))) {
+        if let Some(best) = maps
+            .iter()
+            .filter(fits)
+            .min_by_key(|map| (total(map) - found(map), usize::MAX - found(map)))
+        {
             return best.bind(clip);
         }
         match maps.iter().max_by_key(|map| found(map) * 100 / total(map)) {
@@ -256,18 +331,30 @@ impl SkeletonMap {
                 total: total(nearest),
                 missing: nearest.missing_in(clip),
             }),
-            None => Err(MotionError::UnknownMap { given: String::new(), known: Vec::new() }),
+            None => Err(MotionError::UnknownMap {
+                given: String::new(),
+                known: Vec::new(),
+            }),
         }
     }
 }
 
-/// The tip beyond a joint, or else its farthest child: of a hand's children a finger, not the thumb.
+/// The tip beyond a joint, or else its farthest child: of a hand's children a finger, not the
+/// thumb.
 fn beyond(clip: &BvhClip, joint: usize) -> Option<Point> {
     if clip.joints()[joint].tip.is_some_and(|tip| tip.norm() > 0.0) {
         return Some(Point::Tip(joint));
     }
-    let children = clip.joints().iter().enumerate().filter(|(_, child)| child.parent == Some(joint) && child.rest_in_parent.norm() > 0.0);
-    let farthest = children.max_by(|(_, left), (_, right)| left.rest_in_parent.norm().total_cmp(&right.rest_in_parent.norm()));
+    let children = clip
+        .joints()
+        .iter()
+        .enumerate()
+        .filter(|(_, child)| child.parent == Some(joint) && child.rest_in_parent.norm() > 0.0);
+    let farthest = children.max_by(|(_, left), (_, right)| {
+        left.rest_in_parent
+            .norm()
+            .total_cmp(&right.rest_in_parent.norm())
+    });
     farthest.map(|(index, _)| Point::Joint(index))
 }
 
@@ -276,7 +363,12 @@ struct Names(Vec<String>);
 
 impl Names {
     fn of(clip: &BvhClip) -> Self {
-        Self(clip.joints().iter().map(|joint| comparable(&joint.name)).collect())
+        Self(
+            clip.joints()
+                .iter()
+                .map(|joint| comparable(&joint.name))
+                .collect(),
+        )
     }
 
     fn joint(&self, name: &str) -> Option<usize> {
@@ -298,5 +390,8 @@ fn same(left: &str, right: &str) -> bool {
 
 fn comparable(name: &str) -> String {
     let bare = name.rsplit(':').next().unwrap_or(name);
-    bare.chars().filter(|character| !character.is_whitespace() && *character != '_').flat_map(char::to_lowercase).collect()
+    bare.chars()
+        .filter(|character| !character.is_whitespace() && *character != '_')
+        .flat_map(char::to_lowercase)
+        .collect()
 }

@@ -1,4 +1,5 @@
-//! The global trajectory on shots that the test makes itself: the error before and after each step, and what must be achieved.
+//! The global trajectory on shots that the test makes itself: the error before and after each step,
+//! and what must be achieved.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -7,8 +8,9 @@ use common::shot::{self, Errors, RATE_HZ, Shot};
 use cromosim_arrays::NpzWriter;
 use cromosim_body::{BodyModel, ShapedBody};
 use cromosim_motion::camera::{
-    CameraAxes, CameraClip, CameraError, CameraFolder, DepthEncoding, DepthMap, FolderLayout, GlobalTrajectory, Gravity, ObjectLength,
-    ScaleSource, Trajectory, TrajectoryOptions, confidence_of_std, global_trajectory, parse_camera, parse_depth, parse_openpose,
+    CameraAxes, CameraClip, CameraError, CameraFolder, DepthEncoding, DepthMap, FolderLayout,
+    GlobalTrajectory, Gravity, ObjectLength, ScaleSource, Trajectory, TrajectoryOptions,
+    confidence_of_std, global_trajectory, parse_camera, parse_depth, parse_openpose,
     standing_height, std_of_confidence, write_openpose, write_raw_depth,
 };
 use cromosim_motion::{MotionOptions, SmplMotion, embedded_walk, read_motion};
@@ -19,11 +21,13 @@ fn height(motion: &SmplMotion) -> f64 {
 }
 
 fn solve(shot: &Shot, options: &TrajectoryOptions) -> Result<GlobalTrajectory, CameraError> {
-    let mut depths = |frame: usize| -> Result<Option<DepthMap>, CameraError> { Ok(shot.depths[frame].clone()) };
+    let mut depths =
+        |frame: usize| -> Result<Option<DepthMap>, CameraError> { Ok(shot.depths[frame].clone()) };
     global_trajectory(&shot.clip, &mut depths, &BodyModel::embedded(), options)
 }
 
-/// Error of a track against the truth: of its position (m) and of its second differences (m/s2), root mean square.
+/// Error of a track against the truth: of its position (m) and of its second differences (m/s2),
+/// root mean square.
 #[derive(Clone, Copy, Debug)]
 struct TrackError {
     position: f64,
@@ -32,8 +36,14 @@ struct TrackError {
 
 fn track_error(track: &[Option<Vector3<f64>>], truth: &[Vector3<f64>]) -> TrackError {
     let rms = |squares: Vec<f64>| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
-    let error: Vec<Option<Vector3<f64>>> = track.iter().zip(truth).map(|(own, truth)| own.map(|own| own - truth)).collect();
-    let second = |triple: &[Option<Vector3<f64>>]| Some(((triple[2]? - triple[1]? * 2.0 + triple[0]?) * RATE_HZ * RATE_HZ).norm_squared());
+    let error: Vec<Option<Vector3<f64>>> = track
+        .iter()
+        .zip(truth)
+        .map(|(own, truth)| own.map(|own| own - truth))
+        .collect();
+    let second = |triple: &[Option<Vector3<f64>>]| {
+        Some(((triple[2]? - triple[1]? * 2.0 + triple[0]?) * RATE_HZ * RATE_HZ).norm_squared())
+    };
     TrackError {
         position: rms(error.iter().flatten().map(Vector3::norm_squared).collect()),
         acceleration: rms(error.windows(3).filter_map(second).collect()),
@@ -42,17 +52,42 @@ fn track_error(track: &[Option<Vector3<f64>>], truth: &[Vector3<f64>]) -> TrackE
 
 /// The errors after each step, printed.
 fn steps(name: &str, shot: &Shot, solved: &GlobalTrajectory) -> [TrackError; 5] {
-    let in_source = |world: &Vector3<f64>| (shot.source_from_world * nalgebra::Point3::from(*world)).coords;
-    let truth: Vec<Vector3<f64>> = shot.truth.iter().map(|pose| in_source(&pose.root_position)).collect();
+    let in_source =
+        |world: &Vector3<f64>| (shot.source_from_world * nalgebra::Point3::from(*world)).coords;
+    let truth: Vec<Vector3<f64>> = shot
+        .truth
+        .iter()
+        .map(|pose| in_source(&pose.root_position))
+        .collect();
     let track = solved.track.as_ref().unwrap();
     let scale = solved.report.scale.unwrap().metres_per_unit;
-    let scaled: Vec<Option<Vector3<f64>>> = track.measured.iter().map(|m| m.map(|m| m.position)).collect();
+    let scaled: Vec<Option<Vector3<f64>>> = track
+        .measured
+        .iter()
+        .map(|m| m.map(|m| m.position))
+        .collect();
     // Before the scale, in the reconstruction's unit taken as metres.
-    let raw: Vec<Option<Vector3<f64>>> = scaled.iter().map(|position| position.map(|position| position / scale)).collect();
-    let gated = scaled.iter().zip(&track.accepted).map(|(position, used)| position.filter(|_| *used)).collect::<Vec<_>>();
-    let filtered: Vec<_> = track.filtered.iter().map(|state| Some(state.position)).collect();
-    let smoothed: Vec<_> = track.smoothed.iter().map(|state| Some(state.position)).collect();
-    let errors = [&raw, &scaled, &gated, &filtered, &smoothed].map(|track| track_error(track, &truth));
+    let raw: Vec<Option<Vector3<f64>>> = scaled
+        .iter()
+        .map(|position| position.map(|position| position / scale))
+        .collect();
+    let gated = scaled
+        .iter()
+        .zip(&track.accepted)
+        .map(|(position, used)| position.filter(|_| *used))
+        .collect::<Vec<_>>();
+    let filtered: Vec<_> = track
+        .filtered
+        .iter()
+        .map(|state| Some(state.position))
+        .collect();
+    let smoothed: Vec<_> = track
+        .smoothed
+        .iter()
+        .map(|state| Some(state.position))
+        .collect();
+    let errors =
+        [&raw, &scaled, &gated, &filtered, &smoothed].map(|track| track_error(track, &truth));
     println!("{name}: {}", solved.report);
     println!(
         "  joints of the estimator: {:.0} mm off, {:.0} mm without the root's turn",
@@ -60,9 +95,18 @@ fn steps(name: &str, shot: &Shot, solved: &GlobalTrajectory) -> [TrackError; 5] 
         1e3 * shot.pose_error_m[1]
     );
     let still: Vec<_> = truth.iter().map(|_| Some(Vector3::zeros())).collect();
-    println!("  the root's own acceleration is {:.2} m/s2", track_error(&still, &truth).acceleration);
-    for (step, error) in ["raw", "scaled", "gated", "filtered", "smoothed"].iter().zip(&errors) {
-        println!("  {step:9} position {:.3} m, acceleration {:6.2} m/s2", error.position, error.acceleration);
+    println!(
+        "  the root's own acceleration is {:.2} m/s2",
+        track_error(&still, &truth).acceleration
+    );
+    for (step, error) in ["raw", "scaled", "gated", "filtered", "smoothed"]
+        .iter()
+        .zip(&errors)
+    {
+        println!(
+            "  {step:9} position {:.3} m, acceleration {:6.2} m/s2",
+            error.position, error.acceleration
+        );
     }
     errors
 }
@@ -71,7 +115,8 @@ fn options(motion: &SmplMotion) -> TrajectoryOptions {
     TrajectoryOptions::new(ScaleSource::BodyHeight(height(motion)))
 }
 
-/// Rigid motion that lays one track over another: best rotation about z and translation, least squares.
+/// Rigid motion that lays one track over another: best rotation about z and translation, least
+/// squares.
 fn upright_alignment(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Isometry3<f64> {
     let mean = |points: &[Vector3<f64>]| points.iter().sum::<Vector3<f64>>() / points.len() as f64;
     let (a, b) = (mean(from), mean(to));
@@ -93,16 +138,26 @@ fn check_published(name: &str, motion: &SmplMotion, seed: u64) {
     let off = solved.report.scale.unwrap().metres_per_unit * RECONSTRUCTION - 1.0;
     let tilt = solved_up(&shot, &solved).angle(&Vector3::z()).to_degrees();
     let truth: Vec<_> = shot.truth.iter().map(|pose| pose.root_position).collect();
-    let own: Vec<_> = solved.motion.frames.iter().map(|pose| pose.root_position).collect();
+    let own: Vec<_> = solved
+        .motion
+        .frames
+        .iter()
+        .map(|pose| pose.root_position)
+        .collect();
     let aligned = upright_alignment(&own, &truth);
-    let laid: Vec<_> = own.iter().map(|p| Some((aligned * nalgebra::Point3::from(*p)).coords)).collect();
+    let laid: Vec<_> = own
+        .iter()
+        .map(|p| Some((aligned * nalgebra::Point3::from(*p)).coords))
+        .collect();
     let whole = track_error(&laid, &truth);
     let inside = solved
         .states
         .iter()
         .zip(&laid)
         .zip(&truth)
-        .filter(|((state, own), truth)| (own.unwrap() - *truth).norm() < 2.8 * (state.position_covariance.trace() / 3.0).sqrt());
+        .filter(|((state, own), truth)| {
+            (own.unwrap() - *truth).norm() < 2.8 * (state.position_covariance.trace() / 3.0).sqrt()
+        });
     let inside = inside.count() as f64 / truth.len() as f64;
     println!(
         "  scale off by {:+.2} %, up by {tilt:.2} deg, after yaw and place: {:.3} m; {:.0} % within 2.8 std",
@@ -111,12 +166,29 @@ fn check_published(name: &str, motion: &SmplMotion, seed: u64) {
         100.0 * inside
     );
     // A clip of under 5 s does not average out the estimator's slow errors; it has to know so.
-    let allowed = if truth.len() as f64 > 5.0 * RATE_HZ { 0.02 } else { (2.5 * solved.report.scale.unwrap().relative_std).max(0.02) };
-    assert!(off.abs() < allowed, "{name}: scale off by {off}, allowed {allowed}");
-    assert!(smoothed.acceleration * 5.0 < raw.acceleration && smoothed.acceleration * 5.0 < scaled.acceleration, "{name}: fivefold");
-    assert!(smoothed.position < scaled.position && scaled.position < raw.position, "{name}");
+    let allowed = if truth.len() as f64 > 5.0 * RATE_HZ {
+        0.02
+    } else {
+        (2.5 * solved.report.scale.unwrap().relative_std).max(0.02)
+    };
+    assert!(
+        off.abs() < allowed,
+        "{name}: scale off by {off}, allowed {allowed}"
+    );
+    assert!(
+        smoothed.acceleration * 5.0 < raw.acceleration
+            && smoothed.acceleration * 5.0 < scaled.acceleration,
+        "{name}: fivefold"
+    );
+    assert!(
+        smoothed.position < scaled.position && scaled.position < raw.position,
+        "{name}"
+    );
     assert!(tilt < 5.0, "{name}: {tilt} deg");
-    assert!(inside > 0.8, "{name}: the covariance is too small: {inside}");
+    assert!(
+        inside > 0.8,
+        "{name}: the covariance is too small: {inside}"
+    );
 }
 
 /// The motion's up in the world of the result.
@@ -127,13 +199,19 @@ fn solved_up(shot: &Shot, solved: &GlobalTrajectory) -> Vector3<f64> {
 #[test]
 fn the_walk_is_found_again_through_published_errors() {
     for seed in 1..=3 {
-        check_published(&format!("embedded walk, seed {seed}"), &embedded_walk(), seed);
+        check_published(
+            &format!("embedded walk, seed {seed}"),
+            &embedded_walk(),
+            seed,
+        );
     }
 }
 
 #[test]
 fn recorded_motions_are_found_again_through_published_errors() {
-    let Some(folder) = common::shared_data("mocap_cmu") else { return };
+    let Some(folder) = common::shared_data("mocap_cmu") else {
+        return;
+    };
     for name in ["07_01.bvh", "06_10.bvh"] {
         let motion = read_motion(&folder.join(name), &MotionOptions::default()).unwrap();
         check_published(name, &motion, 7);
@@ -144,10 +222,16 @@ fn recorded_motions_are_found_again_through_published_errors() {
 fn without_errors_the_root_comes_back() {
     let walk = embedded_walk().slice(2.0, Some(3.0)).unwrap();
     let shot = shot::shoot(&walk, &shot::NONE, 1.0, 1);
-    let given = TrajectoryOptions { scale: ScaleSource::Given(1.0), ..options(&walk) };
+    let given = TrajectoryOptions {
+        scale: ScaleSource::Given(1.0),
+        ..options(&walk)
+    };
     let [raw, .., smoothed] = steps("no errors", &shot, &solve(&shot, &given).unwrap());
     // What is left: an arm that passes before half of the window.
-    assert!(raw.position < 0.03 && smoothed.position < 0.01, "{raw:?} {smoothed:?}");
+    assert!(
+        raw.position < 0.03 && smoothed.position < 0.01,
+        "{raw:?} {smoothed:?}"
+    );
     let by_height = solve(&shot, &options(&walk)).unwrap().report.scale.unwrap();
     println!("scale by height without errors: {by_height:?}");
     assert!((by_height.metres_per_unit - 1.0).abs() < 0.003);
@@ -156,12 +240,27 @@ fn without_errors_the_root_comes_back() {
 #[test]
 fn the_pose_stands_in_the_world_and_in_place_where_asked() {
     let walk = embedded_walk().slice(2.0, Some(3.0)).unwrap();
-    let errors = Errors { pose_slow_deg: 0.0, pose_white_deg: 0.0, camera_deg: 0.0, ..shot::PUBLISHED };
+    let errors = Errors {
+        pose_slow_deg: 0.0,
+        pose_white_deg: 0.0,
+        camera_deg: 0.0,
+        ..shot::PUBLISHED
+    };
     let shot = shot::shoot(&walk, &errors, 0.6, 3);
     let up = shot.source_from_world.rotation * Vector3::z();
-    let given = TrajectoryOptions { gravity: Gravity::Given(up * 3.0), ..options(&walk) };
+    let given = TrajectoryOptions {
+        gravity: Gravity::Given(up * 3.0),
+        ..options(&walk)
+    };
     let solved = solve(&shot, &given).unwrap();
-    let lite = solve(&shot, &TrajectoryOptions { trajectory: Trajectory::None, ..given }).unwrap();
+    let lite = solve(
+        &shot,
+        &TrajectoryOptions {
+            trajectory: Trajectory::None,
+            ..given
+        },
+    )
+    .unwrap();
     assert!(solved_up(&shot, &solved).angle(&Vector3::z()) < 1e-9);
     // Orientations against the truth differ by one yaw only.
     for motion in [&solved.motion, &lite.motion] {
@@ -173,8 +272,18 @@ fn the_pose_stands_in_the_world_and_in_place_where_asked() {
         }
     }
     let first = lite.motion.frames[0].root_position;
-    assert!(lite.motion.frames.iter().all(|pose| pose.root_position == first) && first.xy().norm() == 0.0);
-    assert!((first.z - shot.truth[0].root_position.z).abs() < 0.03, "stands on the floor: {}", first.z);
+    assert!(
+        lite.motion
+            .frames
+            .iter()
+            .all(|pose| pose.root_position == first)
+            && first.xy().norm() == 0.0
+    );
+    assert!(
+        (first.z - shot.truth[0].root_position.z).abs() < 0.03,
+        "stands on the floor: {}",
+        first.z
+    );
     assert_eq!((lite.motion.confidence, lite.states.len()), (None, 0));
     // Confidence and standard deviation say the same.
     let confidence = solved.motion.confidence.unwrap();
@@ -192,12 +301,25 @@ fn a_known_length_on_the_floor_gives_the_scale() {
     let place = shot.truth[0].root_position;
     let pixel = |frame: usize, point: Vector3<f64>| {
         let camera = &shot.true_cameras[frame];
-        camera.project(&(camera.world_from_camera.inverse() * nalgebra::Point3::from(point)).coords).unwrap()
+        camera
+            .project(&(camera.world_from_camera.inverse() * nalgebra::Point3::from(point)).coords)
+            .unwrap()
     };
     // Two marks on the floor beside the person, 1.2 m apart, seen in three frames.
-    let ends = [Vector3::new(place.x + 0.9, place.y - 0.6, 0.0), Vector3::new(place.x + 0.9, place.y + 0.6, 0.0)];
-    let object = |frame| ObjectLength { frame, from: pixel(frame, ends[0]), to: pixel(frame, ends[1]), length_m: 1.2 };
-    let options = TrajectoryOptions { scale: ScaleSource::Object([0, 7, 20].map(object).to_vec()), ..options(&walk) };
+    let ends = [
+        Vector3::new(place.x + 0.9, place.y - 0.6, 0.0),
+        Vector3::new(place.x + 0.9, place.y + 0.6, 0.0),
+    ];
+    let object = |frame| ObjectLength {
+        frame,
+        from: pixel(frame, ends[0]),
+        to: pixel(frame, ends[1]),
+        length_m: 1.2,
+    };
+    let options = TrajectoryOptions {
+        scale: ScaleSource::Object([0, 7, 20].map(object).to_vec()),
+        ..options(&walk)
+    };
     let scale = solve(&shot, &options).unwrap().report.scale.unwrap();
     println!("scale by an object: {scale:?}");
     assert!((scale.metres_per_unit * 0.6 - 1.0).abs() < 0.02 && scale.observations == 3);
@@ -216,13 +338,29 @@ fn the_same_shot_gives_the_same_bits() {
 fn what_is_missing_is_said() {
     let walk = embedded_walk().slice(2.0, Some(1.0)).unwrap();
     let mut shot = shot::shoot(&walk, &shot::NONE, 1.0, 1);
-    let message = |shot: &Shot, options: &TrajectoryOptions| solve(shot, options).unwrap_err().to_string();
-    assert!(message(&shot, &TrajectoryOptions::new(ScaleSource::Given(-1.0))).contains("scale is -1"));
-    assert!(message(&shot, &TrajectoryOptions::new(ScaleSource::Object(Vec::new()))).contains("no scale"));
-    let down = TrajectoryOptions { gravity: Gravity::Given(Vector3::zeros()), ..options(&walk) };
+    let message =
+        |shot: &Shot, options: &TrajectoryOptions| solve(shot, options).unwrap_err().to_string();
+    assert!(
+        message(&shot, &TrajectoryOptions::new(ScaleSource::Given(-1.0))).contains("scale is -1")
+    );
+    assert!(
+        message(
+            &shot,
+            &TrajectoryOptions::new(ScaleSource::Object(Vec::new()))
+        )
+        .contains("no scale")
+    );
+    let down = TrajectoryOptions {
+        gravity: Gravity::Given(Vector3::zeros()),
+        ..options(&walk)
+    };
     assert!(message(&shot, &down).contains("no up direction"));
     shot.depths.iter_mut().skip(5).for_each(|map| *map = None);
-    assert!(message(&shot, &options(&walk)).contains("5 of 31 frames"), "{}", message(&shot, &options(&walk)));
+    assert!(
+        message(&shot, &options(&walk)).contains("5 of 31 frames"),
+        "{}",
+        message(&shot, &options(&walk))
+    );
     shot.clip.cameras.pop();
     assert!(message(&shot, &options(&walk)).contains("cameras of 30 frames, but poses of 31"));
 }
@@ -234,16 +372,29 @@ fn a_folder_of_files_gives_what_the_shot_gave() {
     let folder = tempfile::tempdir().unwrap();
     for frame in 0..shot.clip.poses.len() {
         let path = |name: String| folder.path().join(name);
-        let depth = write_raw_depth(shot.depths[frame].as_ref().unwrap(), DepthEncoding::Disparity);
+        let depth = write_raw_depth(
+            shot.depths[frame].as_ref().unwrap(),
+            DepthEncoding::Disparity,
+        );
         std::fs::write(path(format!("frame_{frame:06}.raw")), depth).unwrap();
         let camera = shot.clip.cameras[frame].unwrap();
         let matrix = camera.world_from_camera.to_homogeneous().transpose();
         let mut npz = NpzWriter::new(std::io::Cursor::new(Vec::new()));
-        npz.floats("intrinsics", &[2], camera.focal_px.as_slice()).unwrap();
-        npz.floats("extrinsics", &[4, 4], matrix.as_slice()).unwrap();
-        std::fs::write(path(format!("frame_{frame:06}.npz")), npz.finish().unwrap().into_inner()).unwrap();
+        npz.floats("intrinsics", &[2], camera.focal_px.as_slice())
+            .unwrap();
+        npz.floats("extrinsics", &[4, 4], matrix.as_slice())
+            .unwrap();
+        std::fs::write(
+            path(format!("frame_{frame:06}.npz")),
+            npz.finish().unwrap().into_inner(),
+        )
+        .unwrap();
         let people: Vec<_> = shot.clip.keypoints[frame].into_iter().collect();
-        std::fs::write(path(format!("clip_{frame:012}_keypoints.json")), write_openpose(&people)).unwrap();
+        std::fs::write(
+            path(format!("clip_{frame:012}_keypoints.json")),
+            write_openpose(&people),
+        )
+        .unwrap();
     }
     let at = || folder.path().to_owned();
     let layout = FolderLayout {
@@ -254,30 +405,86 @@ fn a_folder_of_files_gives_what_the_shot_gave() {
         first_number: 0,
         plain_depth_px: None,
     };
-    let mut read = CameraFolder { keypoints: at(), depth: at(), cameras: at(), layout }.read(shot.clip.poses.len(), 0.3).unwrap();
-    let clip = CameraClip { keypoints: read.keypoints, cameras: read.cameras, ..shot.clip.clone() };
-    let from_files = global_trajectory(&clip, &mut read.depth, &BodyModel::embedded(), &options(&walk)).unwrap();
-    let from_memory = solve(&shot, &options(&walk)).unwrap();
-    for (a, b) in from_files.motion.frames.iter().zip(&from_memory.motion.frames) {
-        // Disparities are rounded to float32 once more.
-        assert!((a.root_position - b.root_position).norm() < 1e-4, "{} {}", a.root_position, b.root_position);
+    let mut read = CameraFolder {
+        keypoints: at(),
+        depth: at(),
+        cameras: at(),
+        layout,
     }
-    let nothing = CameraFolder { keypoints: at(), depth: std::env::temp_dir().join("none such"), cameras: at(), layout }.read(3, 0.3);
-    assert!(nothing.unwrap_err().to_string().contains("none such: cannot read"));
+    .read(shot.clip.poses.len(), 0.3)
+    .unwrap();
+    let clip = CameraClip {
+        keypoints: read.keypoints,
+        cameras: read.cameras,
+        ..shot.clip.clone()
+    };
+    let from_files = global_trajectory(
+        &clip,
+        &mut read.depth,
+        &BodyModel::embedded(),
+        &options(&walk),
+    )
+    .unwrap();
+    let from_memory = solve(&shot, &options(&walk)).unwrap();
+    for (a, b) in from_files
+        .motion
+        .frames
+        .iter()
+        .zip(&from_memory.motion.frames)
+    {
+        // Disparities are rounded to float32 once more.
+        assert!(
+            (a.root_position - b.root_position).norm() < 1e-4,
+            "{} {}",
+            a.root_position,
+            b.root_position
+        );
+    }
+    let nothing = CameraFolder {
+        keypoints: at(),
+        depth: std::env::temp_dir().join("none such"),
+        cameras: at(),
+        layout,
+    }
+    .read(3, 0.3);
+    assert!(
+        nothing
+            .unwrap_err()
+            .to_string()
+            .contains("none such: cannot read")
+    );
 }
 
 #[test]
 fn damaged_files_never_panic() {
     let walk = embedded_walk().slice(2.0, Some(0.1)).unwrap();
     let shot = shot::shoot(&walk, &shot::NONE, 1.0, 1);
-    let small = DepthMap::new(40, 30, shot.depths[0].as_ref().unwrap().depths()[..1200].to_vec()).unwrap();
-    common::damaged(&write_raw_depth(&small, DepthEncoding::Depth), 500, |bytes| drop(parse_depth(bytes, DepthEncoding::Disparity, "x")));
+    let small = DepthMap::new(
+        40,
+        30,
+        shot.depths[0].as_ref().unwrap().depths()[..1200].to_vec(),
+    )
+    .unwrap();
+    common::damaged(
+        &write_raw_depth(&small, DepthEncoding::Depth),
+        500,
+        |bytes| drop(parse_depth(bytes, DepthEncoding::Disparity, "x")),
+    );
     let people: Vec<_> = shot.clip.keypoints[0].into_iter().collect();
-    common::damaged(write_openpose(&people).as_bytes(), 500, |bytes| drop(parse_openpose(bytes, "x")));
+    common::damaged(write_openpose(&people).as_bytes(), 500, |bytes| {
+        drop(parse_openpose(bytes, "x"))
+    });
     let mut npz = NpzWriter::new(std::io::Cursor::new(Vec::new()));
     npz.floats("intrinsics", &[2], &[300.0, 300.0]).unwrap();
-    npz.floats("extrinsics", &[4, 4], nalgebra::Matrix4::<f64>::identity().as_slice()).unwrap();
+    npz.floats(
+        "extrinsics",
+        &[4, 4],
+        nalgebra::Matrix4::<f64>::identity().as_slice(),
+    )
+    .unwrap();
     let size = nalgebra::Vector2::new(40.0, 30.0);
     let bytes = npz.finish().unwrap().into_inner();
-    common::damaged(&bytes, 500, |bytes| drop(parse_camera(bytes, size, CameraAxes::OpenGl, "x")));
+    common::damaged(&bytes, 500, |bytes| {
+        drop(parse_camera(bytes, size, CameraAxes::OpenGl, "x"))
+    });
 }

@@ -4,8 +4,9 @@
 mod common;
 
 use cromosim_motion::rigid::{
-    EurocGroundTruth, ImuSeries, PoseTrajectory, RigidFormat, parse_euroc_ground_truth, parse_euroc_imu, parse_pose_csv, parse_tum,
-    sniff_rigid, write_euroc_ground_truth, write_euroc_imu, write_pose_csv, write_tum,
+    EurocGroundTruth, ImuSeries, PoseTrajectory, RigidFormat, parse_euroc_ground_truth,
+    parse_euroc_imu, parse_pose_csv, parse_tum, sniff_rigid, write_euroc_ground_truth,
+    write_euroc_imu, write_pose_csv, write_tum,
 };
 use cromosim_spatial::Stamp;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -13,17 +14,26 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 fn vector(random: &mut ChaCha8Rng) -> Vector3<f64> {
-    Vector3::from_fn(|_, _| (random.random::<f64>() - 0.5) * 10.0_f64.powi((random.random::<f64>() * 12.0) as i32 - 9))
+    Vector3::from_fn(|_, _| {
+        (random.random::<f64>() - 0.5) * 10.0_f64.powi((random.random::<f64>() * 12.0) as i32 - 9)
+    })
 }
 
 /// Stamps of today with odd nanoseconds, numbers of all sizes.
 fn trajectory(frame: &str) -> PoseTrajectory {
     let mut random = ChaCha8Rng::seed_from_u64(1);
-    let mut trajectory = PoseTrajectory { frame: frame.to_owned(), ..PoseTrajectory::default() };
+    let mut trajectory = PoseTrajectory {
+        frame: frame.to_owned(),
+        ..PoseTrajectory::default()
+    };
     for index in 0..500_i64 {
-        trajectory.stamps.push(Stamp::from_nanos(1_700_000_000_123_456_789 + index * 4_999_999 + index % 7));
+        trajectory.stamps.push(Stamp::from_nanos(
+            1_700_000_000_123_456_789 + index * 4_999_999 + index % 7,
+        ));
         trajectory.positions.push(vector(&mut random));
-        trajectory.rotations.push(UnitQuaternion::from_scaled_axis(vector(&mut random)));
+        trajectory
+            .rotations
+            .push(UnitQuaternion::from_scaled_axis(vector(&mut random)));
     }
     trajectory
 }
@@ -32,7 +42,11 @@ fn imu() -> ImuSeries {
     let mut random = ChaCha8Rng::seed_from_u64(2);
     let stamps = trajectory("").stamps;
     let list = |random: &mut ChaCha8Rng| stamps.iter().map(|_| vector(random)).collect();
-    ImuSeries { specific_force: list(&mut random), angular_velocity: list(&mut random), stamps }
+    ImuSeries {
+        specific_force: list(&mut random),
+        angular_velocity: list(&mut random),
+        stamps,
+    }
 }
 
 fn ground_truth() -> EurocGroundTruth {
@@ -52,13 +66,29 @@ fn everything_comes_back_bit_for_bit() {
     assert_eq!(write_tum(&parse_tum(tum.as_bytes(), "a.txt").unwrap()), tum);
     for frame in ["", "map", "odd, \"frame\""] {
         let csv = write_pose_csv(&trajectory(frame));
-        assert_eq!(parse_pose_csv(csv.as_bytes(), "a.csv").unwrap(), trajectory(frame));
+        assert_eq!(
+            parse_pose_csv(csv.as_bytes(), "a.csv").unwrap(),
+            trajectory(frame)
+        );
     }
     let truth = write_euroc_ground_truth(&ground_truth());
-    assert_eq!(parse_euroc_ground_truth(truth.as_bytes(), "a.csv").unwrap(), ground_truth());
-    let poses_only = EurocGroundTruth { trajectory: trajectory(""), ..EurocGroundTruth::default() };
-    assert_eq!(parse_euroc_ground_truth(write_euroc_ground_truth(&poses_only).as_bytes(), "a.csv").unwrap(), poses_only);
-    assert_eq!(parse_euroc_imu(write_euroc_imu(&imu()).as_bytes(), "a.csv").unwrap(), imu());
+    assert_eq!(
+        parse_euroc_ground_truth(truth.as_bytes(), "a.csv").unwrap(),
+        ground_truth()
+    );
+    let poses_only = EurocGroundTruth {
+        trajectory: trajectory(""),
+        ..EurocGroundTruth::default()
+    };
+    assert_eq!(
+        parse_euroc_ground_truth(write_euroc_ground_truth(&poses_only).as_bytes(), "a.csv")
+            .unwrap(),
+        poses_only
+    );
+    assert_eq!(
+        parse_euroc_imu(write_euroc_imu(&imu()).as_bytes(), "a.csv").unwrap(),
+        imu()
+    );
 }
 
 #[test]
@@ -73,9 +103,20 @@ fn formats_are_told_by_content() {
         ("header.stamp.sec;header.stamp.nanosec;pose.position.x;pose.position.y;pose.position.z;pose.orientation.x;pose.orientation.y;pose.orientation.z;pose.orientation.w\n".to_owned(), RigidFormat::PoseCsv),
     ];
     for (content, expected) in cases {
-        assert_eq!(sniff_rigid(content.as_bytes()), Some(expected), "{}", &content[..40.min(content.len())]);
+        assert_eq!(
+            sniff_rigid(content.as_bytes()),
+            Some(expected),
+            "{}",
+            &content[..40.min(content.len())]
+        );
     }
-    for other in ["", "HIERARCHY\nROOT hips\n", "a,b,c\n1,2,3\n", "{\"people\": []}", "1 2 3\n"] {
+    for other in [
+        "",
+        "HIERARCHY\nROOT hips\n",
+        "a,b,c\n1,2,3\n",
+        "{\"people\": []}",
+        "1 2 3\n",
+    ] {
         assert_eq!(sniff_rigid(other.as_bytes()), None, "{other}");
     }
 }
@@ -86,7 +127,10 @@ fn headers_of_many_hands_are_understood() {
     let expected_nanos = 1_700_000_000_250_000_000;
     for (header, time) in [
         ("time,x,y,z,qx,qy,qz,qw", "1700000000.25"),
-        ("Time [ms], pos_x [m], pos_y [m], pos_z [m], quat_x, quat_y, quat_z, quat_w", "1700000000250"),
+        (
+            "Time [ms], pos_x [m], pos_y [m], pos_z [m], quat_x, quat_y, quat_z, quat_w",
+            "1700000000250",
+        ),
         ("timestamp,tx,ty,tz,q_x,q_y,q_z,q_w", "1700000000250000"),
         ("stamp_ns,px,py,pz,qx,qy,qz,qw", "1700000000250000000"),
         (
@@ -100,10 +144,14 @@ fn headers_of_many_hands_are_understood() {
     ] {
         for delimiter in [",", ";", "\t"] {
             let content = format!("{header}\n{time},{pose}\n").replace(',', delimiter);
-            let read = parse_pose_csv(content.as_bytes(), "a.csv").unwrap_or_else(|error| panic!("{header}: {error}"));
+            let read = parse_pose_csv(content.as_bytes(), "a.csv")
+                .unwrap_or_else(|error| panic!("{header}: {error}"));
             assert_eq!(read.stamps[0].nanos, expected_nanos, "{header}");
             assert_eq!(read.positions[0], Vector3::new(0.1, 0.2, 0.3));
-            assert!((read.rotations[0].w - 0.8).abs() < 1e-15 && (read.rotations[0].k - 0.6).abs() < 1e-15);
+            assert!(
+                (read.rotations[0].w - 0.8).abs() < 1e-15
+                    && (read.rotations[0].k - 0.6).abs() < 1e-15
+            );
         }
     }
     let millimetres = "t [s],x [mm],y [mm],z [mm],qx,qy,qz,qw\n0.5,100,200,300,0,0,0,1\n";
@@ -114,34 +162,69 @@ fn headers_of_many_hands_are_understood() {
 #[test]
 fn bad_rows_get_a_verdict_with_line_and_column() {
     let tum = |text: &str| parse_tum(text.as_bytes(), "a.txt").unwrap_err().to_string();
-    assert_eq!(tum("# c\n1 0 0 0 0 0 0 1\n2 0 0 x 0 0 0 1\n"), "a.txt, line 3, column 4: expected a finite number, found \"x\"");
-    assert!(tum("1 0 0 0 0 0 0\n").contains("line 1: expected 8 (time, tx ty tz, qx qy qz qw) columns, found 7"));
-    assert!(tum("2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n").contains("line 2: stamp 1000000000 ns is not after the 2000000000 ns"));
+    assert_eq!(
+        tum("# c\n1 0 0 0 0 0 0 1\n2 0 0 x 0 0 0 1\n"),
+        "a.txt, line 3, column 4: expected a finite number, found \"x\""
+    );
+    assert!(
+        tum("1 0 0 0 0 0 0\n")
+            .contains("line 1: expected 8 (time, tx ty tz, qx qy qz qw) columns, found 7")
+    );
+    assert!(
+        tum("2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n")
+            .contains("line 2: stamp 1000000000 ns is not after the 2000000000 ns")
+    );
     assert!(tum("2 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n").contains("remove repeated"));
     assert!(tum("2 0 0 0 0 0 0 0.9\n").contains("the quaternion has length 0.9"));
     assert!(tum("2 0 inf 0 0 0 0 1\n").contains("column 3"));
     assert!(tum("99999999999 0 0 0 0 0 0 1\n").contains("column 1: expected a time"));
     assert!(tum("# nothing\n").contains("no rows"));
-    assert!(parse_tum(b"1 0 0 0 \xff", "a.txt").unwrap_err().to_string().contains("byte 8"));
+    assert!(
+        parse_tum(b"1 0 0 0 \xff", "a.txt")
+            .unwrap_err()
+            .to_string()
+            .contains("byte 8")
+    );
     let slightly_off = parse_tum(b"2 0 0 0 0.0 0.0 0.6001 0.8\n", "a.txt").unwrap();
-    assert!((slightly_off.rotations[0].norm() - 1.0).abs() < 1e-15, "printed digits are normalised");
+    assert!(
+        (slightly_off.rotations[0].norm() - 1.0).abs() < 1e-15,
+        "printed digits are normalised"
+    );
 
-    let csv = |text: &str| parse_pose_csv(text.as_bytes(), "a.csv").unwrap_err().to_string();
+    let csv = |text: &str| {
+        parse_pose_csv(text.as_bytes(), "a.csv")
+            .unwrap_err()
+            .to_string()
+    };
     assert!(csv("time,x,y,z,qx,qy,qz\n").contains("line 1: the header names no orientation w"));
     assert!(csv("x,y,z,qx,qy,qz,qw\n").contains("names no time"));
     assert!(csv("time,x,y,z,qx,qy,qz,qw\n1,2,3\n").contains("line 2"));
-    assert!(csv("time,x,y,z,qx,qy,qz,qw\n1,2,3,4,0,0,0,1\n2,2,3,,0,0,0,1\n").contains("line 3, column 4"));
-    let imu = parse_euroc_imu(b"#t\n1,2,3\n", "data.csv").unwrap_err().to_string();
+    assert!(
+        csv("time,x,y,z,qx,qy,qz,qw\n1,2,3,4,0,0,0,1\n2,2,3,,0,0,0,1\n")
+            .contains("line 3, column 4")
+    );
+    let imu = parse_euroc_imu(b"#t\n1,2,3\n", "data.csv")
+        .unwrap_err()
+        .to_string();
     assert!(imu.contains("data.csv, line 2: expected 7"), "{imu}");
-    let truth = parse_euroc_ground_truth(b"1,0,0,0,1,0,0,0\n2,0,0,0,1,0,0,0,1\n", "data.csv").unwrap_err().to_string();
+    let truth = parse_euroc_ground_truth(b"1,0,0,0,1,0,0,0\n2,0,0,0,1,0,0,0,1\n", "data.csv")
+        .unwrap_err()
+        .to_string();
     assert!(truth.contains("line 2: expected 8"), "{truth}");
 }
 
 #[test]
 fn damage_never_panics() {
     let parse_all = |bytes: &[u8]| {
-        let _ = (parse_tum(bytes, "x").is_ok(), parse_pose_csv(bytes, "x").is_ok(), parse_euroc_imu(bytes, "x").is_ok());
-        let _ = (parse_euroc_ground_truth(bytes, "x").is_ok(), sniff_rigid(bytes));
+        let _ = (
+            parse_tum(bytes, "x").is_ok(),
+            parse_pose_csv(bytes, "x").is_ok(),
+            parse_euroc_imu(bytes, "x").is_ok(),
+        );
+        let _ = (
+            parse_euroc_ground_truth(bytes, "x").is_ok(),
+            sniff_rigid(bytes),
+        );
     };
     let cut = |text: String| text.into_bytes()[..2000].to_vec();
     for sample in [

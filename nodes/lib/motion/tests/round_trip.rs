@@ -1,4 +1,5 @@
-//! A known SMPL motion, written in another skeleton and read back: rotations come back, roll included.
+//! A known SMPL motion, written in another skeleton and read back: rotations come back, roll
+//! included.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -38,8 +39,17 @@ const XSENS: &str = "Hips::pelvis Chest:Hips:spine1 Chest2:Chest:spine2 Chest3:C
 fn bones(words: &'static str) -> Vec<Bone> {
     let bone = |word: &'static str| {
         let mut parts = word.split(':');
-        let (name, parent, segment) = (parts.next().unwrap(), parts.next().unwrap(), parts.next().unwrap());
-        Bone { name, parent, segment: Joint::from_name(segment).unwrap(), body_from_joint: UnitQuaternion::identity() }
+        let (name, parent, segment) = (
+            parts.next().unwrap(),
+            parts.next().unwrap(),
+            parts.next().unwrap(),
+        );
+        Bone {
+            name,
+            parent,
+            segment: Joint::from_name(segment).unwrap(),
+            body_from_joint: UnitQuaternion::identity(),
+        }
     };
     words.split_whitespace().map(bone).collect()
 }
@@ -62,8 +72,11 @@ fn errors(exporter: &Exporter<'_>, known: &SmplMotion) -> Errors {
     let mut all = Vec::new();
     let mut worst = (Joint::Pelvis, 0.0);
     for joint in Joint::ALL {
-        let angle =
-            |(a, b): (&BodyPose, &BodyPose)| a.local_rotations[joint.index()].angle_to(&b.local_rotations[joint.index()]).to_degrees();
+        let angle = |(a, b): (&BodyPose, &BodyPose)| {
+            a.local_rotations[joint.index()]
+                .angle_to(&b.local_rotations[joint.index()])
+                .to_degrees()
+        };
         let of_joint: Vec<f64> = read.frames.iter().zip(&known.frames).map(angle).collect();
         let high = quantile(&of_joint, 0.95);
         if high > worst.1 {
@@ -72,26 +85,46 @@ fn errors(exporter: &Exporter<'_>, known: &SmplMotion) -> Errors {
         all.extend(of_joint);
     }
     let shift = |(a, b): (&BodyPose, &BodyPose)| {
-        let way = (a.root_position - read.frames[0].root_position) - (b.root_position - known.frames[0].root_position);
+        let way = (a.root_position - read.frames[0].root_position)
+            - (b.root_position - known.frames[0].root_position);
         way.norm()
     };
     Errors {
         median_deg: quantile(&all, 0.5),
         high_deg: quantile(&all, 0.95),
-        wrist_rate: [Joint::LeftWrist, Joint::RightWrist].map(|wrist| rate_error(&read, known, wrist)).into_iter().fold(0.0, f64::max),
+        wrist_rate: [Joint::LeftWrist, Joint::RightWrist]
+            .map(|wrist| rate_error(&read, known, wrist))
+            .into_iter()
+            .fold(0.0, f64::max),
         worst,
         report,
-        root_m: read.frames.iter().zip(&known.frames).map(shift).fold(0.0, f64::max),
+        root_m: read
+            .frames
+            .iter()
+            .zip(&known.frames)
+            .map(shift)
+            .fold(0.0, f64::max),
     }
 }
 
 /// Root mean square of the difference of angular velocities in segment axes, rad/s.
 fn rate_error(read: &SmplMotion, known: &SmplMotion, joint: Joint) -> f64 {
     let rates = |motion: &SmplMotion| -> Vec<Vector3<f64>> {
-        let rotations: Vec<_> = motion.frames.iter().map(|pose| pose.world_rotations()[joint.index()]).collect();
-        rotations.windows(2).map(|pair| (pair[0].inverse() * pair[1]).scaled_axis() * motion.rate_hz).collect()
+        let rotations: Vec<_> = motion
+            .frames
+            .iter()
+            .map(|pose| pose.world_rotations()[joint.index()])
+            .collect();
+        rotations
+            .windows(2)
+            .map(|pair| (pair[0].inverse() * pair[1]).scaled_axis() * motion.rate_hz)
+            .collect()
     };
-    let squares: Vec<f64> = rates(read).iter().zip(rates(known)).map(|(a, b)| (a - b).norm_squared()).collect();
+    let squares: Vec<f64> = rates(read)
+        .iter()
+        .zip(rates(known))
+        .map(|(a, b)| (a - b).norm_squared())
+        .collect();
     (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
 }
 
@@ -100,15 +133,45 @@ fn check(name: &str, exporter: &Exporter<'_>, keeps_toes: bool, rest_from: &str)
     let errors = errors(exporter, &known_motion(keeps_toes));
     println!(
         "{name}: median {:.3} deg, 95 % {:.3} deg (worst joint {} {:.2}), wrist {:.4} rad/s, root {:.4} m; {}",
-        errors.median_deg, errors.high_deg, errors.worst.0, errors.worst.1, errors.wrist_rate, errors.root_m, errors.report
+        errors.median_deg,
+        errors.high_deg,
+        errors.worst.0,
+        errors.worst.1,
+        errors.wrist_rate,
+        errors.root_m,
+        errors.report
     );
     assert_eq!(errors.report.rest, rest_from, "{name}");
-    assert_eq!(errors.report.frames_left_out, exporter.leading_rest_frames, "{name}");
-    assert!((errors.report.unit_scale_m / exporter.unit_m - 1.0).abs() < 1e-9, "{name}: {}", errors.report);
-    assert!(errors.median_deg < 2.0 && errors.high_deg < 5.0, "{name}: {} {}", errors.median_deg, errors.high_deg);
-    assert!(errors.wrist_rate < 0.1, "{name}: {} rad/s", errors.wrist_rate);
-    assert!(errors.report.bone_direction_median_deg < 1.0, "{name}: {}", errors.report);
-    assert!(errors.root_m < 0.1, "{name}: root off by {} m", errors.root_m);
+    assert_eq!(
+        errors.report.frames_left_out, exporter.leading_rest_frames,
+        "{name}"
+    );
+    assert!(
+        (errors.report.unit_scale_m / exporter.unit_m - 1.0).abs() < 1e-9,
+        "{name}: {}",
+        errors.report
+    );
+    assert!(
+        errors.median_deg < 2.0 && errors.high_deg < 5.0,
+        "{name}: {} {}",
+        errors.median_deg,
+        errors.high_deg
+    );
+    assert!(
+        errors.wrist_rate < 0.1,
+        "{name}: {} rad/s",
+        errors.wrist_rate
+    );
+    assert!(
+        errors.report.bone_direction_median_deg < 1.0,
+        "{name}: {}",
+        errors.report
+    );
+    assert!(
+        errors.root_m < 0.1,
+        "{name}: root off by {} m",
+        errors.root_m
+    );
 }
 
 fn body() -> ShapedBody {
@@ -134,22 +197,36 @@ fn exporter<'a>(body: &'a ShapedBody, words: &'static str) -> Exporter<'a> {
 fn cmu_with_splayed_legs_and_a_leading_t_pose() {
     let body = body();
     let unit_m = 0.0254 / 0.45;
-    let exporter = Exporter { rest: rest(0.0, 0.0, 20.0, 0.0), unit_m, order: [2, 1, 0], leading_rest_frames: 1, ..exporter(&body, CMU) };
+    let exporter = Exporter {
+        rest: rest(0.0, 0.0, 20.0, 0.0),
+        unit_m,
+        order: [2, 1, 0],
+        leading_rest_frames: 1,
+        ..exporter(&body, CMU)
+    };
     check("cmu", &exporter, true, "zero pose");
 }
 
 #[test]
 fn daz_with_forearms_forward() {
     let body = body();
-    let exporter = Exporter { rest: rest(3.0, 17.0, 0.0, 0.0), leading_rest_frames: 1, ..exporter(&body, DAZ) };
+    let exporter = Exporter {
+        rest: rest(3.0, 17.0, 0.0, 0.0),
+        leading_rest_frames: 1,
+        ..exporter(&body, DAZ)
+    };
     check("daz", &exporter, false, "zero pose");
 }
 
-/// Every bone along x, as in the data set: the legs' z axis to the right, the arms' z axis up on the left and down on the right.
+/// Every bone along x, as in the data set: the legs' z axis to the right, the arms' z axis up on
+/// the left and down on the right.
 #[test]
 fn lafan1_with_bones_along_x() {
     let body = body();
-    let mut exporter = Exporter { order: [2, 1, 0], ..exporter(&body, MIXAMO) };
+    let mut exporter = Exporter {
+        order: [2, 1, 0],
+        ..exporter(&body, MIXAMO)
+    };
     for bone in &mut exporter.bones {
         bone.name = match bone.name {
             "LeftToeBase" => "LeftToe",
@@ -159,11 +236,17 @@ fn lafan1_with_bones_along_x() {
         // Turned by hand from the body's axes: x about z to up or down, then about the bone.
         let (up, down) = (about(Vector3::z(), 90.0), about(Vector3::z(), -90.0));
         bone.body_from_joint = match bone.segment.name() {
-            "left_hip" | "right_hip" | "left_knee" | "right_knee" => down * about(Vector3::x(), 90.0),
+            "left_hip" | "right_hip" | "left_knee" | "right_knee" => {
+                down * about(Vector3::x(), 90.0)
+            }
             "left_ankle" | "right_ankle" => about(Vector3::x(), 21.45) * about(Vector3::y(), -90.0),
             "left_foot" | "right_foot" => about(Vector3::y(), -90.0),
-            "left_collar" | "left_shoulder" | "left_elbow" | "left_wrist" => about(Vector3::x(), -90.0),
-            "right_collar" | "right_shoulder" | "right_elbow" | "right_wrist" => about(Vector3::z(), 180.0) * about(Vector3::x(), -90.0),
+            "left_collar" | "left_shoulder" | "left_elbow" | "left_wrist" => {
+                about(Vector3::x(), -90.0)
+            }
+            "right_collar" | "right_shoulder" | "right_elbow" | "right_wrist" => {
+                about(Vector3::z(), 180.0) * about(Vector3::x(), -90.0)
+            }
             _ => up * about(Vector3::x(), 90.0),
         };
     }
@@ -173,29 +256,45 @@ fn lafan1_with_bones_along_x() {
 #[test]
 fn mixamo_in_an_a_pose() {
     let body = body();
-    let exporter = Exporter { prefix: "mixamorig:", rest: rest(45.0, 5.0, 8.0, 8.0), ..exporter(&body, MIXAMO) };
+    let exporter = Exporter {
+        prefix: "mixamorig:",
+        rest: rest(45.0, 5.0, 8.0, 8.0),
+        ..exporter(&body, MIXAMO)
+    };
     check("mixamo, A-pose", &exporter, true, "zero pose");
 }
 
-/// Frames with y along the bone and rolled at will: the zero pose is a heap, the first frame shows the T-pose.
+/// Frames with y along the bone and rolled at will: the zero pose is a heap, the first frame shows
+/// the T-pose.
 #[test]
 fn mixamo_with_rolled_frames_and_a_t_pose_frame() {
     let body = body();
-    let mut exporter = Exporter { prefix: "mixamorig:", leading_rest_frames: 3, unit_m: 1.0, ..exporter(&body, MIXAMO) };
+    let mut exporter = Exporter {
+        prefix: "mixamorig:",
+        leading_rest_frames: 3,
+        unit_m: 1.0,
+        ..exporter(&body, MIXAMO)
+    };
     for (index, bone) in exporter.bones.iter_mut().enumerate() {
         let child = bone.segment.children().next().unwrap_or(bone.segment);
-        let along = body.joints_in_model()[child.index()] - body.joints_in_model()[bone.segment.index()];
-        let to_bone = UnitQuaternion::rotation_between(&Vector3::y(), &along).unwrap_or_else(|| about(Vector3::x(), 180.0));
+        let along =
+            body.joints_in_model()[child.index()] - body.joints_in_model()[bone.segment.index()];
+        let to_bone = UnitQuaternion::rotation_between(&Vector3::y(), &along)
+            .unwrap_or_else(|| about(Vector3::x(), 180.0));
         bone.body_from_joint = to_bone * about(Vector3::y(), 40.0 * index as f64);
     }
     check("mixamo, rolled", &exporter, true, "frame 0");
 }
 
-/// The zero pose looks like a T-pose, but the limbs' frames are rolled about their bones; only the T-pose frame tells.
+/// The zero pose looks like a T-pose, but the limbs' frames are rolled about their bones; only the
+/// T-pose frame tells.
 #[test]
 fn mixamo_rolled_about_its_bones() {
     let body = body();
-    let mut exporter = Exporter { leading_rest_frames: 1, ..exporter(&body, MIXAMO) };
+    let mut exporter = Exporter {
+        leading_rest_frames: 1,
+        ..exporter(&body, MIXAMO)
+    };
     for bone in &mut exporter.bones {
         if bone.name.ends_with("Arm") || bone.name.ends_with("Hand") {
             bone.body_from_joint = about(Vector3::x(), 90.0);

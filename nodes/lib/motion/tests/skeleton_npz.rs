@@ -12,17 +12,34 @@ use cromosim_motion::{MotionOptions, parse_bvh, retarget};
 
 #[test]
 fn a_clip_is_the_bvh_it_was_made_from() {
-    let Some(folder) = shared_data("mocap_cmu") else { return };
+    let Some(folder) = shared_data("mocap_cmu") else {
+        return;
+    };
     for name in ["02_01", "13_36"] {
-        let npz = parse_skeleton_npz(File::open(folder.join(format!("{name}.npz"))).unwrap(), name).unwrap();
-        let bvh = parse_bvh(&std::fs::read_to_string(folder.join(format!("{name}.bvh"))).unwrap(), name).unwrap();
+        let npz = parse_skeleton_npz(
+            File::open(folder.join(format!("{name}.npz"))).unwrap(),
+            name,
+        )
+        .unwrap();
+        let bvh = parse_bvh(
+            &std::fs::read_to_string(folder.join(format!("{name}.bvh"))).unwrap(),
+            name,
+        )
+        .unwrap();
         let left_out = bvh.frame_count() - npz.clip.frame_count();
         for frame in (0..npz.clip.frame_count()).step_by(17) {
             let own = npz.clip.world_from_joints(frame);
             let theirs = bvh.world_from_joints(frame + left_out);
             for (joint, place) in npz.clip.joints().iter().zip(&own) {
-                let Some(index) = bvh.joints().iter().position(|other| other.name == joint.name) else { panic!("{}", joint.name) };
-                let away = (theirs[index].translation.vector * 0.01 - place.translation.vector).norm();
+                let Some(index) = bvh
+                    .joints()
+                    .iter()
+                    .position(|other| other.name == joint.name)
+                else {
+                    panic!("{}", joint.name)
+                };
+                let away =
+                    (theirs[index].translation.vector * 0.01 - place.translation.vector).norm();
                 assert!(away < 1e-4, "{name}, frame {frame}, {}: {away}", joint.name);
             }
         }
@@ -31,15 +48,42 @@ fn a_clip_is_the_bvh_it_was_made_from() {
 
 #[test]
 fn labels_name_frames_and_the_clip_can_be_retargeted() {
-    let Some(folder) = shared_data("mocap_cmu_har") else { return };
-    let labelled = parse_skeleton_npz(File::open(folder.join("14_30.npz")).unwrap(), "14_30").unwrap();
-    assert_eq!((labelled.subject.as_str(), labelled.atypical.as_str(), labelled.labels.len()), ("14", "", labelled.clip.frame_count()));
-    let seconds = |label: &str| labelled.labels.iter().flatten().filter(|name| *name == label).count() as f64 / 120.0;
+    let Some(folder) = shared_data("mocap_cmu_har") else {
+        return;
+    };
+    let labelled =
+        parse_skeleton_npz(File::open(folder.join("14_30.npz")).unwrap(), "14_30").unwrap();
+    assert_eq!(
+        (
+            labelled.subject.as_str(),
+            labelled.atypical.as_str(),
+            labelled.labels.len()
+        ),
+        ("14", "", labelled.clip.frame_count())
+    );
+    let seconds = |label: &str| {
+        labelled
+            .labels
+            .iter()
+            .flatten()
+            .filter(|name| *name == label)
+            .count() as f64
+            / 120.0
+    };
     assert!((seconds("SEATED") - 9.9).abs() < 0.06 && (seconds("TURNING") - 4.4).abs() < 0.06);
-    let motion =
-        retarget(&labelled.clip, &BodyModel::embedded(), &MotionOptions { keep_lead_in: true, ..MotionOptions::default() }).unwrap();
+    let motion = retarget(
+        &labelled.clip,
+        &BodyModel::embedded(),
+        &MotionOptions {
+            keep_lead_in: true,
+            ..MotionOptions::default()
+        },
+    )
+    .unwrap();
     assert_eq!(motion.frames.len(), labelled.labels.len());
-    let flips = parse_skeleton_npz(File::open(folder.join("03_02.npz")).unwrap(), "03_02").unwrap().suspect;
+    let flips = parse_skeleton_npz(File::open(folder.join("03_02.npz")).unwrap(), "03_02")
+        .unwrap()
+        .suspect;
     assert!(flips.len() > 100 && flips.contains(&true) && flips.contains(&false));
     let report = motion.report.unwrap();
     assert!(report.bone_direction_median_deg < 1.0, "{report}");

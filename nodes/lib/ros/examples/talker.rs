@@ -1,4 +1,5 @@
-//! Publishes `sensor_msgs/msg/Imu` on given topics: `talker [--messages N] [--rate-hz R] [--wait-for N] TOPIC... [--ros-args ...]`.
+//! Publishes `sensor_msgs/msg/Imu` on given topics: `talker [--messages N] [--rate-hz R]
+//! [--wait-for N] TOPIC... [--ros-args ...]`.
 //!
 //! Waits for `--wait-for` subscriptions on each topic, sends, and ends when all is confirmed.
 
@@ -11,10 +12,14 @@ use cromosim_ros::{Node, NodeOptions, Parameters, Qos, RosArgs, Shutdown, init_l
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let args = RosArgs::from_env()?;
     init_logging(&args.log_levels);
-    let (mut messages, mut rate_hz, mut wait_for, mut topics) = (100_u64, 100.0_f64, 1_usize, Vec::new());
+    let (mut messages, mut rate_hz, mut wait_for, mut topics) =
+        (100_u64, 100.0_f64, 1_usize, Vec::new());
     let mut rest = args.rest.iter();
     while let Some(argument) = rest.next() {
-        let mut value = || rest.next().ok_or_else(|| format!("{argument}: expected a value after it"));
+        let mut value = || {
+            rest.next()
+                .ok_or_else(|| format!("{argument}: expected a value after it"))
+        };
         match argument.as_str() {
             "--messages" => messages = value()?.parse()?,
             "--rate-hz" => rate_hz = value()?.parse()?,
@@ -23,13 +28,20 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
     }
     let shutdown = Shutdown::on_signals()?;
-    let node = Node::start(NodeOptions::new("talker", &args, &Parameters::new())?.shutdown(&shutdown))?;
-    let publishers = topics.iter().map(|topic| node.publisher::<Imu>(topic, Qos::reliable())).collect::<Result<Vec<_>, _>>()?;
+    let node =
+        Node::start(NodeOptions::new("talker", &args, &Parameters::new())?.shutdown(&shutdown))?;
+    let publishers = topics
+        .iter()
+        .map(|topic| node.publisher::<Imu>(topic, Qos::reliable()))
+        .collect::<Result<Vec<_>, _>>()?;
     for publisher in &publishers {
         if !publisher.wait_for_subscriptions(wait_for, Duration::from_secs(30)) {
-            return Err(
-                format!("{}: {} subscriptions after 30 s, expected {wait_for}", publisher.topic(), publisher.subscription_count()).into()
-            );
+            return Err(format!(
+                "{}: {} subscriptions after 30 s, expected {wait_for}",
+                publisher.topic(),
+                publisher.subscription_count()
+            )
+            .into());
         }
     }
     let start = Instant::now();

@@ -45,12 +45,16 @@ impl RosArgs {
         Self::parse(std::env::args().skip(1))
     }
 
-    /// Takes the ROS part out of a command line (without the program's name) and reads the parameter files it names.
+    /// Takes the ROS part out of a command line (without the program's name) and reads the
+    /// parameter files it names.
     ///
     /// # Errors
     /// One line that names the argument, or the file and its line.
     pub fn parse<S: Into<String>>(arguments: impl IntoIterator<Item = S>) -> RosResult<Self> {
-        let mut args = Self { rosout: true, ..Self::default() };
+        let mut args = Self {
+            rosout: true,
+            ..Self::default()
+        };
         let mut arguments = arguments.into_iter().map(Into::into);
         let mut of_ros = false;
         while let Some(argument) = arguments.next() {
@@ -64,18 +68,29 @@ impl RosArgs {
         Ok(args)
     }
 
-    fn ros_argument(&mut self, flag: &str, arguments: &mut impl Iterator<Item = String>) -> RosResult<()> {
-        let mut value = || arguments.next().ok_or_else(|| wrong(flag, "expected a value after it"));
+    fn ros_argument(
+        &mut self,
+        flag: &str,
+        arguments: &mut impl Iterator<Item = String>,
+    ) -> RosResult<()> {
+        let mut value = || {
+            arguments
+                .next()
+                .ok_or_else(|| wrong(flag, "expected a value after it"))
+        };
         match flag {
             "-r" | "--remap" => self.remap(&value()?),
             "-p" | "--param" => self.param(&value()?),
             "--params-file" => {
-                self.overrides.extend(read_params_file(&PathBuf::from(value()?))?);
+                self.overrides
+                    .extend(read_params_file(&PathBuf::from(value()?))?);
                 Ok(())
             }
             "--log-level" => {
                 let text = value()?;
-                self.log_levels.set(&text).map_err(|problem| wrong(&format!("--log-level {text}"), problem))
+                self.log_levels
+                    .set(&text)
+                    .map_err(|problem| wrong(&format!("--log-level {text}"), problem))
             }
             "-e" | "--enclave" | "--log-config-file" | "--log-file-name" => value().map(drop),
             "--disable-rosout-logs" => {
@@ -86,15 +101,26 @@ impl RosArgs {
                 self.rosout = true;
                 Ok(())
             }
-            "--enable-stdout-logs" | "--disable-stdout-logs" | "--enable-external-lib-logs" | "--disable-external-lib-logs" => Ok(()),
-            other if other.contains(":=") => Err(wrong(other, "expected '-r' (remap) or '-p' (parameter) before it")),
-            other => Err(wrong(other, "not a ROS argument; end the ROS arguments with '--'")),
+            "--enable-stdout-logs"
+            | "--disable-stdout-logs"
+            | "--enable-external-lib-logs"
+            | "--disable-external-lib-logs" => Ok(()),
+            other if other.contains(":=") => Err(wrong(
+                other,
+                "expected '-r' (remap) or '-p' (parameter) before it",
+            )),
+            other => Err(wrong(
+                other,
+                "not a ROS argument; end the ROS arguments with '--'",
+            )),
         }
     }
 
     fn remap(&mut self, text: &str) -> RosResult<()> {
         let place = format!("-r {text}");
-        let (from, to) = text.split_once(":=").ok_or_else(|| wrong(&place, "expected FROM:=TO"))?;
+        let (from, to) = text
+            .split_once(":=")
+            .ok_or_else(|| wrong(&place, "expected FROM:=TO"))?;
         let (node, from) = match from.split_once(':') {
             Some((node, from)) => (Some(node.to_owned()), from),
             None => (None, from),
@@ -102,23 +128,36 @@ impl RosArgs {
         let to = to.strip_prefix("rostopic://").unwrap_or(to);
         let from = from.strip_prefix("rostopic://").unwrap_or(from);
         if from.is_empty() || to.is_empty() || node.as_deref() == Some("") {
-            return Err(wrong(&place, "expected [NODE:]FROM:=TO, without empty parts"));
+            return Err(wrong(
+                &place,
+                "expected [NODE:]FROM:=TO, without empty parts",
+            ));
         }
-        self.remaps.push(Remap { node, from: from.to_owned(), to: to.to_owned() });
+        self.remaps.push(Remap {
+            node,
+            from: from.to_owned(),
+            to: to.to_owned(),
+        });
         Ok(())
     }
 
     fn param(&mut self, text: &str) -> RosResult<()> {
         let place = format!("-p {text}");
-        let (name, value) = text.split_once(":=").ok_or_else(|| wrong(&place, "expected NAME:=VALUE"))?;
+        let (name, value) = text
+            .split_once(":=")
+            .ok_or_else(|| wrong(&place, "expected NAME:=VALUE"))?;
         let (node, name) = match name.split_once(':') {
             Some((node, name)) => (node, name),
             None => ("/**", name),
         };
         if name.is_empty() || node.is_empty() {
-            return Err(wrong(&place, "expected [NODE:]NAME:=VALUE, without empty parts"));
+            return Err(wrong(
+                &place,
+                "expected [NODE:]NAME:=VALUE, without empty parts",
+            ));
         }
-        self.overrides.extend(Override::from_yaml(&place, node, name, value)?);
+        self.overrides
+            .extend(Override::from_yaml(&place, node, name, value)?);
         Ok(())
     }
 
@@ -128,20 +167,34 @@ impl RosArgs {
     /// Where the result is not a valid name.
     pub fn node_name(&self, default: &str) -> RosResult<NodeName> {
         let special = |names: &[&str]| {
-            let hit = |remap: &&Remap| names.contains(&remap.from.as_str()) && remap.node.as_deref().is_none_or(|node| node == default);
+            let hit = |remap: &&Remap| {
+                names.contains(&remap.from.as_str())
+                    && remap.node.as_deref().is_none_or(|node| node == default)
+            };
             self.remaps.iter().find(hit).map(|remap| remap.to.as_str())
         };
-        NodeName::new(special(&["__ns"]).unwrap_or("/"), special(&["__node", "__name"]).unwrap_or(default))
+        NodeName::new(
+            special(&["__ns"]).unwrap_or("/"),
+            special(&["__node", "__name"]).unwrap_or(default),
+        )
     }
 
-    /// The absolute name of a topic or service of `node`, after remapping; the first rule that fits counts.
+    /// The absolute name of a topic or service of `node`, after remapping; the first rule that fits
+    /// counts.
     ///
     /// # Errors
     /// Where a name breaks ROS 2's rules.
     pub fn resolve(&self, node: &NodeName, name: &str) -> RosResult<String> {
         let absolute = node.resolve(name)?;
-        for remap in self.remaps.iter().filter(|remap| !remap.from.starts_with("__")) {
-            let for_us = remap.node.as_deref().is_none_or(|wanted| wanted == node.name() || wanted == node.to_string());
+        for remap in self
+            .remaps
+            .iter()
+            .filter(|remap| !remap.from.starts_with("__"))
+        {
+            let for_us = remap
+                .node
+                .as_deref()
+                .is_none_or(|wanted| wanted == node.name() || wanted == node.to_string());
             if for_us && node.resolve(&remap.from)? == absolute {
                 return node.resolve(&remap.to);
             }
@@ -155,7 +208,10 @@ impl RosArgs {
 }
 
 fn wrong(place: &str, problem: &str) -> RosError {
-    RosError::Argument { place: format!("--ros-args {place}"), problem: problem.to_owned() }
+    RosError::Argument {
+        place: format!("--ros-args {place}"),
+        problem: problem.to_owned(),
+    }
 }
 
 #[cfg(test)]
@@ -165,7 +221,18 @@ mod tests {
 
     #[test]
     fn the_ros_part_is_taken_out_wherever_it_stands() {
-        let line = ["a", "--ros-args", "-r", "x:=y", "-e", "/enclave", "--", "b", "--ros-args", "--disable-rosout-logs"];
+        let line = [
+            "a",
+            "--ros-args",
+            "-r",
+            "x:=y",
+            "-e",
+            "/enclave",
+            "--",
+            "b",
+            "--ros-args",
+            "--disable-rosout-logs",
+        ];
         let args = RosArgs::parse(line).unwrap();
         assert_eq!(args.rest, ["a", "b"]);
         assert!(!args.rosout);
@@ -176,8 +243,19 @@ mod tests {
 
     #[test]
     fn nodes_are_renamed_and_topics_remapped() {
-        let line =
-            ["--ros-args", "-r", "__ns:=/left", "-r", "n:__node:=m", "-r", "other:imu:=/wrong", "-r", "m:imu:=~/imu", "-r", "/tf:=tf"];
+        let line = [
+            "--ros-args",
+            "-r",
+            "__ns:=/left",
+            "-r",
+            "n:__node:=m",
+            "-r",
+            "other:imu:=/wrong",
+            "-r",
+            "m:imu:=~/imu",
+            "-r",
+            "/tf:=tf",
+        ];
         let args = RosArgs::parse(line).unwrap();
         let node = args.node_name("n").unwrap();
         assert_eq!(node.to_string(), "/left/m");

@@ -12,7 +12,8 @@ use crate::wake::lock;
 
 /// The node's clock. Cloning shares it.
 ///
-/// With the parameter `use_sim_time` it shows what `/clock` (`rosgraph_msgs/msg/Clock`) said last, and zero before the first message.
+/// With the parameter `use_sim_time` it shows what `/clock` (`rosgraph_msgs/msg/Clock`) said last,
+/// and zero before the first message.
 #[derive(Clone, Debug)]
 pub struct Clock {
     inner: Arc<Inner>,
@@ -36,12 +37,18 @@ impl Clock {
             ticked: Condvar::new(),
             shutdown,
         };
-        Self { inner: Arc::new(inner) }
+        Self {
+            inner: Arc::new(inner),
+        }
     }
 
     /// Now.
     pub fn now(&self) -> Stamp {
-        if self.is_simulated() { Stamp::from_nanos(self.inner.sim_nanos.load(Ordering::SeqCst)) } else { system_now() }
+        if self.is_simulated() {
+            Stamp::from_nanos(self.inner.sim_nanos.load(Ordering::SeqCst))
+        } else {
+            system_now()
+        }
     }
 
     /// The system clock, whatever `use_sim_time` says: for measuring latency.
@@ -59,7 +66,8 @@ impl Clock {
         *lock(&self.inner.jumps)
     }
 
-    /// Sleeps until the clock shows `stamp` or more; returns at once where it does already. False where the process is ending.
+    /// Sleeps until the clock shows `stamp` or more; returns at once where it does already. False
+    /// where the process is ending.
     pub fn sleep_until(&self, stamp: Stamp) -> bool {
         let mut jumps = lock(&self.inner.jumps);
         while !self.inner.shutdown.is_requested() {
@@ -67,9 +75,19 @@ impl Clock {
             if left <= 0.0 {
                 return true;
             }
-            // A simulated clock may stand still or change its rate: then only its ticks count. The bound lets a shutdown through.
-            let bound = if self.is_simulated() { 0.1 } else { left.min(0.1) };
-            jumps = self.inner.ticked.wait_timeout(jumps, Duration::from_secs_f64(bound)).unwrap_or_else(PoisonError::into_inner).0;
+            // A simulated clock may stand still or change its rate: then only its ticks count. The
+            // bound lets a shutdown through.
+            let bound = if self.is_simulated() {
+                0.1
+            } else {
+                left.min(0.1)
+            };
+            jumps = self
+                .inner
+                .ticked
+                .wait_timeout(jumps, Duration::from_secs_f64(bound))
+                .unwrap_or_else(PoisonError::into_inner)
+                .0;
         }
         false
     }

@@ -19,8 +19,9 @@ pub trait NodeConfig: Default + Serialize + DeserializeOwned {
     const ABOUT: &'static [(&'static str, &'static str)];
 }
 
-/// Defines the parameters of a node: `/// description` then `pub name: Type = default,` for each. The descriptions become the struct's
-/// documentation, the node's `--help` and what `ros2 param describe` says.
+/// Defines the parameters of a node: `/// description` then `pub name: Type = default,` for each.
+/// The descriptions become the struct's documentation, the node's `--help` and what `ros2 param
+/// describe` says.
 #[macro_export]
 macro_rules! node_config {
     ($(#[$meta:meta])* pub struct $name:ident { $( $(#[doc = $about:literal])+ pub $field:ident: $ty:ty = $default:expr, )* }) => {
@@ -59,8 +60,9 @@ impl<C> Prepared<C> {
     }
 }
 
-/// Reads a node's command line: `--help` prints what it takes, `--check-config` checks and prints the configuration; both give `None`.
-/// `check` finds what is wrong beyond types: files that are not there, values out of range.
+/// Reads a node's command line: `--help` prints what it takes, `--check-config` checks and prints
+/// the configuration; both give `None`. `check` finds what is wrong beyond types: files that are
+/// not there, values out of range.
 ///
 /// # Errors
 /// One line that names the argument or the file, and what `check` says.
@@ -77,9 +79,19 @@ pub fn prepare<C: NodeConfig, E: From<RosError>>(
         return Ok(None);
     }
     let check_only = has("--check-config");
-    if let Some(unknown) = args.rest.iter().find(|argument| *argument != "--check-config") {
-        let problem = "not known here; parameters go after --ros-args as -p NAME:=VALUE (see --help)".to_owned();
-        return Err(RosError::Argument { place: unknown.clone(), problem }.into());
+    if let Some(unknown) = args
+        .rest
+        .iter()
+        .find(|argument| *argument != "--check-config")
+    {
+        let problem =
+            "not known here; parameters go after --ros-args as -p NAME:=VALUE (see --help)"
+                .to_owned();
+        return Err(RosError::Argument {
+            place: unknown.clone(),
+            problem,
+        }
+        .into());
     }
     init_logging(&args.log_levels);
     let parameters = Parameters::new();
@@ -105,7 +117,10 @@ fn plain(field: &str) -> &str {
 fn help<C: NodeConfig>(name: &str, about: &str) -> String {
     let defaults = serde_norway::to_value(C::default()).unwrap_or_default();
     let shown = |field: &str| {
-        let value = defaults.get(field).map(|value| serde_norway::to_string(value).unwrap_or_default()).unwrap_or_default();
+        let value = defaults
+            .get(field)
+            .map(|value| serde_norway::to_string(value).unwrap_or_default())
+            .unwrap_or_default();
         value.split_whitespace().collect::<Vec<_>>().join(" ")
     };
     let mut text = format!(
@@ -122,14 +137,18 @@ fn help<C: NodeConfig>(name: &str, about: &str) -> String {
     text
 }
 
-/// Prints the line `ready` on standard output once every publisher has `subscriptions` subscriptions, or the node ends; whoever started the
-/// process may wait for it. Does not block.
+/// Prints the line `ready` on standard output once every publisher has `subscriptions`
+/// subscriptions, or the node ends; whoever started the process may wait for it. Does not block.
 pub fn announce_ready(node: &Node, publishers: &[&RawPublisher], subscriptions: i64) {
     let subscriptions = usize::try_from(subscriptions).unwrap_or(0);
     let publishers: Vec<_> = publishers.iter().map(|publisher| publisher.gid()).collect();
     let watched = node.clone();
     let wait = move || {
-        let connected = || publishers.iter().all(|&gid| watched.matched(gid) >= subscriptions);
+        let connected = || {
+            publishers
+                .iter()
+                .all(|&gid| watched.matched(gid) >= subscriptions)
+        };
         while !watched.shutdown().is_requested() {
             if connected() || watched.wait_for_graph(Duration::from_secs(3600), connected) {
                 println!("ready");
@@ -150,20 +169,29 @@ pub struct Periodic {
 }
 
 impl Periodic {
-    /// Due at once, and then `rate_hz` times a second; never for a rate of 0, or one that is as good as 0.
+    /// Due at once, and then `rate_hz` times a second; never for a rate of 0, or one that is as
+    /// good as 0.
     pub fn new(rate_hz: f64) -> Self {
-        let interval = (rate_hz > 0.0).then(|| Duration::try_from_secs_f64(1.0 / rate_hz).ok()).flatten();
-        Self { interval, next: Instant::now() }
+        let interval = (rate_hz > 0.0)
+            .then(|| Duration::try_from_secs_f64(1.0 / rate_hz).ok())
+            .flatten();
+        Self {
+            interval,
+            next: Instant::now(),
+        }
     }
 
     /// How long until it is due; `None`: never.
     pub fn left(&self) -> Option<Duration> {
-        self.interval.map(|_| self.next.saturating_duration_since(Instant::now()))
+        self.interval
+            .map(|_| self.next.saturating_duration_since(Instant::now()))
     }
 
     /// True once in every interval. What was missed is not made up for.
     pub fn is_due(&mut self) -> bool {
-        let (Some(interval), now) = (self.interval, Instant::now()) else { return false };
+        let (Some(interval), now) = (self.interval, Instant::now()) else {
+            return false;
+        };
         let due = now >= self.next;
         if due {
             self.next = (self.next + interval).max(now);
@@ -195,10 +223,25 @@ mod tests {
 
     #[test]
     fn parameters_reach_the_config_and_unknown_ones_are_refused() {
-        let config = prepared(&["--ros-args", "-p", "rate_hz:=50.0", "-p", "loop:=true"]).unwrap().unwrap().config;
-        assert_eq!(config, Config { rate_hz: 50.0, r#loop: true });
+        let config = prepared(&["--ros-args", "-p", "rate_hz:=50.0", "-p", "loop:=true"])
+            .unwrap()
+            .unwrap()
+            .config;
+        assert_eq!(
+            config,
+            Config {
+                rate_hz: 50.0,
+                r#loop: true
+            }
+        );
         assert!(prepared(&["--check-config"]).unwrap().is_none());
-        for (arguments, expected) in [(vec!["--rate", "5"], "--rate"), (vec!["--ros-args", "-p", "rate:=5.0"], "did you mean 'rate_hz'?")] {
+        for (arguments, expected) in [
+            (vec!["--rate", "5"], "--rate"),
+            (
+                vec!["--ros-args", "-p", "rate:=5.0"],
+                "did you mean 'rate_hz'?",
+            ),
+        ] {
             let text = prepared(&arguments).err().unwrap().to_string();
             assert!(text.contains(expected), "{text}");
         }
@@ -207,7 +250,13 @@ mod tests {
     #[test]
     fn help_shows_every_parameter_with_its_default() {
         let text = help::<Config>("test", "A node for tests");
-        assert!(text.contains("rate_hz [100.0]\n      How often, Hz.\n"), "{text}");
-        assert!(text.contains("loop [false]\n      Begin again at the end.\n"), "{text}");
+        assert!(
+            text.contains("rate_hz [100.0]\n      How often, Hz.\n"),
+            "{text}"
+        );
+        assert!(
+            text.contains("loop [false]\n      Begin again at the end.\n"),
+            "{text}"
+        );
     }
 }

@@ -1,10 +1,14 @@
-//! What a node and all its endpoints share: ros2-client's context, the endpoints, and what peers are told about them.
+//! What a node and all its endpoints share: ros2-client's context, the endpoints, and what peers
+//! are told about them.
 //!
-//! The context owns the DDS participant, makes the topics, and takes the node back from `ros_discovery_info` when it goes. Writers and
-//! readers, and what is announced of them, are RustDDS's and our own, for ros2-client 0.12.1:
-//! - hides `wait_for_acknowledgments` of its publishers, without which the last messages of a process that ends are lost;
-//! - announces only endpoints that its `Node` has made, so not those writers, and a second announcer of the same participant would
-//!   contradict the first: of two, peers keep whichever arrives last;
+//! The context owns the DDS participant, makes the topics, and takes the node back from
+//! `ros_discovery_info` when it goes. Writers and readers, and what is announced of them, are
+//! RustDDS's and our own, for ros2-client 0.12.1:
+//! - hides `wait_for_acknowledgments` of its publishers, without which the last messages of a
+//!   process that ends are lost;
+//! - announces only endpoints that its `Node` has made, so not those writers, and a second
+//!   announcer of the same participant would contradict the first: of two, peers keep whichever
+//!   arrives last;
 //! - never takes dropped endpoints out of its announcement.
 
 use std::collections::BTreeMap;
@@ -27,7 +31,8 @@ use crate::reader::{Reader, ReaderOptions};
 use crate::shutdown::Shutdown;
 use crate::wake::{Bell, lock};
 
-/// A piece of the node thread's work: called at every ring of the node's bell, ends by returning false.
+/// A piece of the node thread's work: called at every ring of the node's bell, ends by returning
+/// false.
 pub(crate) type Worker = Box<dyn FnMut() -> bool + Send>;
 
 pub(crate) struct Core {
@@ -51,8 +56,9 @@ pub(crate) struct Core {
     pub(crate) participant: DomainParticipant,
 }
 
-/// `rmw_dds_common/msg/ParticipantEntitiesInfo` as it is received: which nodes live in a participant, and which endpoints are theirs.
-/// Ours for reading: ros2-client's type does not let the endpoints out.
+/// `rmw_dds_common/msg/ParticipantEntitiesInfo` as it is received: which nodes live in a
+/// participant, and which endpoints are theirs. Ours for reading: ros2-client's type does not let
+/// the endpoints out.
 #[derive(Debug, Deserialize)]
 pub(crate) struct ParticipantInfo {
     pub(crate) participant: Gid,
@@ -70,18 +76,29 @@ pub(crate) struct NodeInfo {
 use builtin_topics::ros_discovery::{TOPIC_NAME as INFO_TOPIC, TYPE_NAME as INFO_TYPE};
 
 impl Core {
-    pub(crate) fn new(name: NodeName, participant: DomainParticipant, clock: Clock, shutdown: Shutdown) -> RosResult<Self> {
+    pub(crate) fn new(
+        name: NodeName,
+        participant: DomainParticipant,
+        clock: Clock,
+        shutdown: Shutdown,
+    ) -> RosResult<Self> {
         let qos = Qos::reliable();
         let doing = |what: &str| format!("node {name}: create {what}");
-        let context = Context::from_domain_participant(participant.clone()).map_err(|error| dds(doing("ros2-client's context"), error))?;
-        let publisher = participant.create_publisher(&qos.to_dds()).map_err(|error| dds(doing("DDS publisher"), error))?;
-        let subscriber = participant.create_subscriber(&qos.to_dds()).map_err(|error| dds(doing("DDS subscriber"), error))?;
+        let context = Context::from_domain_participant(participant.clone())
+            .map_err(|error| dds(doing("ros2-client's context"), error))?;
+        let publisher = participant
+            .create_publisher(&qos.to_dds())
+            .map_err(|error| dds(doing("DDS publisher"), error))?;
+        let subscriber = participant
+            .create_subscriber(&qos.to_dds())
+            .map_err(|error| dds(doing("DDS subscriber"), error))?;
         let info_qos = Qos::tf_static().to_dds();
         let info_topic = make_topic(&participant, INFO_TOPIC.into(), INFO_TYPE.into(), &info_qos)?;
-        let info_writer =
-            publisher.create_datawriter_no_key(&info_topic, Some(info_qos)).map_err(|error| dds(doing("ros_discovery_info"), error))?;
-        let ros_name =
-            ros2_client::NodeName::new(name.namespace(), name.name()).map_err(|error| dds(doing("ros2-client's name"), error))?;
+        let info_writer = publisher
+            .create_datawriter_no_key(&info_topic, Some(info_qos))
+            .map_err(|error| dds(doing("ros_discovery_info"), error))?;
+        let ros_name = ros2_client::NodeName::new(name.namespace(), name.name())
+            .map_err(|error| dds(doing("ros2-client's name"), error))?;
         let bell = Bell::new();
         shutdown.ring_at_request(&bell);
         Ok(Self {
@@ -103,7 +120,8 @@ impl Core {
         })
     }
 
-    /// The reader of what other participants say about their nodes. Deep: every participant keeps its last word there.
+    /// The reader of what other participants say about their nodes. Deep: every participant keeps
+    /// its last word there.
     pub(crate) fn info_reader(self: &Arc<Self>) -> RosResult<Reader> {
         let qos = Qos::tf_static().depth(1000).to_dds();
         let topic = make_topic(&self.participant, INFO_TOPIC.into(), INFO_TYPE.into(), &qos)?;
@@ -111,12 +129,24 @@ impl Core {
             .subscriber
             .create_simple_datareader_no_key(&topic, Some(qos))
             .map_err(|error| dds(format!("node {}: read {INFO_TOPIC}", self.name), error))?;
-        let options = ReaderOptions { bell: Arc::clone(&self.bell), helper: None, limit: usize::MAX, skip_past: false };
+        let options = ReaderOptions {
+            bell: Arc::clone(&self.bell),
+            helper: None,
+            limit: usize::MAX,
+            skip_past: false,
+        };
         Ok(Reader::new(reader, None, options))
     }
 
     /// Makes a reader on an absolute name and tells peers that it is this node's.
-    pub(crate) fn reader(self: &Arc<Self>, kind: Kind, name: &str, type_name: &str, qos: Qos, bell: Arc<Bell>) -> RosResult<Reader> {
+    pub(crate) fn reader(
+        self: &Arc<Self>,
+        kind: Kind,
+        name: &str,
+        type_name: &str,
+        qos: Qos,
+        bell: Arc<Bell>,
+    ) -> RosResult<Reader> {
         let topic = self.topic(kind, name, type_name, qos)?;
         let reader: RawReader = self
             .subscriber
@@ -134,18 +164,35 @@ impl Core {
         let reader = Reader::new(reader, Some(guard), options);
         if helped {
             let inbox = reader.inbox();
-            self.add_worker(Box::new(move || inbox.upgrade().inspect(|inbox| inbox.pump()).is_some()));
+            self.add_worker(Box::new(move || {
+                inbox.upgrade().inspect(|inbox| inbox.pump()).is_some()
+            }));
         }
         Ok(reader)
     }
 
     /// Makes a writer on an absolute name and tells peers that it is this node's.
-    pub(crate) fn writer(self: &Arc<Self>, kind: Kind, name: &str, type_name: &str, qos: Qos) -> RosResult<(RawWriter, EndpointGuard)> {
+    pub(crate) fn writer(
+        self: &Arc<Self>,
+        kind: Kind,
+        name: &str,
+        type_name: &str,
+        qos: Qos,
+    ) -> RosResult<(RawWriter, EndpointGuard)> {
         use rustdds::RTPSEntity;
         let topic = self.topic(kind, name, type_name, qos)?;
-        let writer: RawWriter =
-            self.publisher.create_datawriter_no_key(&topic, Some(qos.to_dds())).map_err(|error| dds(format!("publish {name}"), error))?;
-        let guard = self.register(Gid::from(writer.guid()), Side::Writes, kind, name, type_name, qos);
+        let writer: RawWriter = self
+            .publisher
+            .create_datawriter_no_key(&topic, Some(qos.to_dds()))
+            .map_err(|error| dds(format!("publish {name}"), error))?;
+        let guard = self.register(
+            Gid::from(writer.guid()),
+            Side::Writes,
+            kind,
+            name,
+            type_name,
+            qos,
+        );
         Ok((writer, guard))
     }
 
@@ -153,14 +200,25 @@ impl Core {
         let (dds_name, dds_type) = (kind.dds_name(name), dds_type_name(type_name)?);
         let parts: Vec<&str> = type_name.split('/').collect();
         let [package, "msg", base_name] = parts[..] else {
-            // ros2-client names only the types of messages in public, not those of requests and responses.
+            // ros2-client names only the types of messages in public, not those of requests and
+            // responses.
             return make_topic(&self.participant, dds_name, dds_type, &qos.to_dds());
         };
         let type_name = MessageTypeName::new(package, base_name);
-        self.context.create_topic(dds_name, type_name, &qos.to_profile()).map_err(|error| dds(format!("create topic {name}"), error))
+        self.context
+            .create_topic(dds_name, type_name, &qos.to_profile())
+            .map_err(|error| dds(format!("create topic {name}"), error))
     }
 
-    fn register(self: &Arc<Self>, gid: Gid, side: Side, kind: Kind, name: &str, type_name: &str, qos: Qos) -> EndpointGuard {
+    fn register(
+        self: &Arc<Self>,
+        gid: Gid,
+        side: Side,
+        kind: Kind,
+        name: &str,
+        type_name: &str,
+        qos: Qos,
+    ) -> EndpointGuard {
         let endpoint = Endpoint {
             topic: name.to_owned(),
             type_name: type_name.to_owned(),
@@ -172,7 +230,10 @@ impl Core {
         };
         lock(&self.local).insert(gid, endpoint);
         self.announce();
-        EndpointGuard { core: Arc::clone(self), gid }
+        EndpointGuard {
+            core: Arc::clone(self),
+            gid,
+        }
     }
 
     /// Tells peers which endpoints this node has now; once it is stopping, that it has gone.
@@ -180,14 +241,29 @@ impl Core {
         let local = lock(&self.local);
         let mut node = NodeEntitiesInfo::new(self.ros_name.clone());
         for endpoint in local.values() {
-            if endpoint.writes { node.add_writer(endpoint.gid.into()) } else { node.add_reader(endpoint.gid.into()) }
+            if endpoint.writes {
+                node.add_writer(endpoint.gid.into())
+            } else {
+                node.add_reader(endpoint.gid.into())
+            }
         }
-        let nodes = if self.stopping.load(Ordering::SeqCst) { Vec::new() } else { vec![node] };
+        let nodes = if self.stopping.load(Ordering::SeqCst) {
+            Vec::new()
+        } else {
+            vec![node]
+        };
         let info = ParticipantEntitiesInfo::new(self.participant_gid().into(), nodes);
         // The lock is held: two threads must not announce in the wrong order.
-        let sent = RawMessage::encode(&info).and_then(|raw| self.info_writer.write(raw, None).map_err(|error| error.to_string()));
+        let sent = RawMessage::encode(&info).and_then(|raw| {
+            self.info_writer
+                .write(raw, None)
+                .map_err(|error| error.to_string())
+        });
         if let Err(problem) = sent {
-            log::warn!("node {}: cannot tell peers about its endpoints: {problem}", self.name);
+            log::warn!(
+                "node {}: cannot tell peers about its endpoints: {problem}",
+                self.name
+            );
         }
     }
 
@@ -215,10 +291,16 @@ struct Leaving {
 }
 
 impl Leaving {
-    /// True while a matched subscription may still lose something: RustDDS forgets unread messages of a publisher that has gone.
+    /// True while a matched subscription may still lose something: RustDDS forgets unread messages
+    /// of a publisher that has gone.
     fn stays(&self) -> bool {
         let since = self.since.elapsed();
-        since < Core::LEAVE_AFTER || (since < Core::LEAVE_AT_LAST && !self.writer.wait_for_acknowledgments(Duration::ZERO).unwrap_or(true))
+        since < Core::LEAVE_AFTER
+            || (since < Core::LEAVE_AT_LAST
+                && !self
+                    .writer
+                    .wait_for_acknowledgments(Duration::ZERO)
+                    .unwrap_or(true))
     }
 }
 
@@ -230,7 +312,11 @@ impl Core {
 
     /// Lets a writer go once its messages have arrived, in the background while the node runs.
     pub(crate) fn leave(self: &Arc<Self>, writer: RawWriter, guard: EndpointGuard) {
-        let leaving = Leaving { since: Instant::now(), writer, _guard: guard };
+        let leaving = Leaving {
+            since: Instant::now(),
+            writer,
+            _guard: guard,
+        };
         if self.graph.matched(leaving._guard.gid) == 0 {
             return;
         }
@@ -263,9 +349,16 @@ enum Side {
     Writes,
 }
 
-fn make_topic(participant: &DomainParticipant, name: String, type_name: String, qos: &QosPolicies) -> RosResult<Topic> {
+fn make_topic(
+    participant: &DomainParticipant,
+    name: String,
+    type_name: String,
+    qos: &QosPolicies,
+) -> RosResult<Topic> {
     let doing = format!("create DDS topic {name}");
-    participant.create_topic(name, type_name, qos, TopicKind::NoKey).map_err(|error| dds(doing, error))
+    participant
+        .create_topic(name, type_name, qos, TopicKind::NoKey)
+        .map_err(|error| dds(doing, error))
 }
 
 /// Takes the endpoint out of the node's announcement when it is dropped.

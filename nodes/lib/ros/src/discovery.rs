@@ -30,14 +30,19 @@ pub struct Network {
 
 impl Default for Network {
     fn default() -> Self {
-        Self { domain_id: 0, range: DiscoveryRange::Localhost }
+        Self {
+            domain_id: 0,
+            range: DiscoveryRange::Localhost,
+        }
     }
 }
 
 impl Network {
-    /// From `ROS_DOMAIN_ID`, `ROS_AUTOMATIC_DISCOVERY_RANGE` and `ROS_LOCALHOST_ONLY`. Nothing set: domain 0, this machine only.
+    /// From `ROS_DOMAIN_ID`, `ROS_AUTOMATIC_DISCOVERY_RANGE` and `ROS_LOCALHOST_ONLY`. Nothing set:
+    /// domain 0, this machine only.
     ///
-    /// As in ROS 2, `ROS_LOCALHOST_ONLY=1` wins over the range; `ROS_LOCALHOST_ONLY=0` alone means the subnet.
+    /// As in ROS 2, `ROS_LOCALHOST_ONLY=1` wins over the range; `ROS_LOCALHOST_ONLY=0` alone means
+    /// the subnet.
     ///
     /// # Errors
     /// Names the variable and what it may be.
@@ -47,7 +52,11 @@ impl Network {
 
     fn from_variables(get: impl Fn(&str) -> Option<String>) -> RosResult<Self> {
         let get = |variable: &str| get(variable).filter(|value| !value.is_empty());
-        let wrong = |variable, value: String, expected| RosError::Environment { variable, value, expected };
+        let wrong = |variable, value: String, expected| RosError::Environment {
+            variable,
+            value,
+            expected,
+        };
         let domain_id = match get("ROS_DOMAIN_ID") {
             None => 0,
             // Above 232 the ports of RTPS pass 65535.
@@ -69,7 +78,13 @@ impl Network {
                 "LOCALHOST" => DiscoveryRange::Localhost,
                 "SUBNET" => DiscoveryRange::Subnet,
                 "SYSTEM_DEFAULT" => DiscoveryRange::SystemDefault,
-                _ => return Err(wrong("ROS_AUTOMATIC_DISCOVERY_RANGE", text, "OFF, LOCALHOST, SUBNET or SYSTEM_DEFAULT")),
+                _ => {
+                    return Err(wrong(
+                        "ROS_AUTOMATIC_DISCOVERY_RANGE",
+                        text,
+                        "OFF, LOCALHOST, SUBNET or SYSTEM_DEFAULT",
+                    ));
+                }
             }),
         };
         let range = match (only_localhost, range) {
@@ -88,11 +103,15 @@ impl Network {
     pub(crate) fn participant(self) -> RosResult<DomainParticipant> {
         let builder = DomainParticipantBuilder::new(self.domain_id);
         let builder = match self.range {
-            DiscoveryRange::Off => builder.with_only_networks(std::iter::empty::<IpAddr>()).same_host_loopback(false),
+            DiscoveryRange::Off => builder
+                .with_only_networks(std::iter::empty::<IpAddr>())
+                .same_host_loopback(false),
             DiscoveryRange::Localhost => builder.with_only_networks([Ipv4Addr::LOCALHOST]),
             DiscoveryRange::Subnet | DiscoveryRange::SystemDefault => builder,
         };
-        builder.build().map_err(|error| dds(format!("join DDS domain {}", self.domain_id), error))
+        builder
+            .build()
+            .map_err(|error| dds(format!("join DDS domain {}", self.domain_id), error))
     }
 }
 
@@ -102,26 +121,61 @@ mod tests {
     use super::*;
 
     fn network(variables: &[(&str, &str)]) -> RosResult<Network> {
-        Network::from_variables(|name| variables.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned()))
+        Network::from_variables(|name| {
+            variables
+                .iter()
+                .find(|(key, _)| *key == name)
+                .map(|(_, value)| (*value).to_owned())
+        })
     }
 
     #[test]
     fn variables_are_read_as_in_ros() {
-        assert_eq!(network(&[]).unwrap(), Network { domain_id: 0, range: DiscoveryRange::Localhost });
+        assert_eq!(
+            network(&[]).unwrap(),
+            Network {
+                domain_id: 0,
+                range: DiscoveryRange::Localhost
+            }
+        );
         assert_eq!(network(&[("ROS_DOMAIN_ID", "42")]).unwrap().domain_id, 42);
         let range = |variables: &[(&str, &str)]| network(variables).unwrap().range;
-        assert_eq!(range(&[("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET")]), DiscoveryRange::Subnet);
-        assert_eq!(range(&[("ROS_AUTOMATIC_DISCOVERY_RANGE", "off")]), DiscoveryRange::Off);
-        assert_eq!(range(&[("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET"), ("ROS_LOCALHOST_ONLY", "1")]), DiscoveryRange::Localhost);
-        assert_eq!(range(&[("ROS_LOCALHOST_ONLY", "0")]), DiscoveryRange::Subnet);
-        assert_eq!(range(&[("ROS_LOCALHOST_ONLY", "0"), ("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")]), DiscoveryRange::Localhost);
+        assert_eq!(
+            range(&[("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET")]),
+            DiscoveryRange::Subnet
+        );
+        assert_eq!(
+            range(&[("ROS_AUTOMATIC_DISCOVERY_RANGE", "off")]),
+            DiscoveryRange::Off
+        );
+        assert_eq!(
+            range(&[
+                ("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET"),
+                ("ROS_LOCALHOST_ONLY", "1")
+            ]),
+            DiscoveryRange::Localhost
+        );
+        assert_eq!(
+            range(&[("ROS_LOCALHOST_ONLY", "0")]),
+            DiscoveryRange::Subnet
+        );
+        assert_eq!(
+            range(&[
+                ("ROS_LOCALHOST_ONLY", "0"),
+                ("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+            ]),
+            DiscoveryRange::Localhost
+        );
     }
 
     #[test]
     fn wrong_variables_are_named() {
-        for (variable, value) in
-            [("ROS_DOMAIN_ID", "233"), ("ROS_DOMAIN_ID", "x"), ("ROS_LOCALHOST_ONLY", "yes"), ("ROS_AUTOMATIC_DISCOVERY_RANGE", "near")]
-        {
+        for (variable, value) in [
+            ("ROS_DOMAIN_ID", "233"),
+            ("ROS_DOMAIN_ID", "x"),
+            ("ROS_LOCALHOST_ONLY", "yes"),
+            ("ROS_AUTOMATIC_DISCOVERY_RANGE", "near"),
+        ] {
             let text = network(&[(variable, value)]).unwrap_err().to_string();
             assert!(text.contains(variable) && text.contains(value), "{text}");
         }

@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Every error of this crate. The text is one line and names the place and, where there is one, the remedy.
+/// Every error of this crate. The text is one line and names the place and, where there is one, the
+/// remedy.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RosError {
@@ -87,7 +88,8 @@ pub enum RosError {
         /// What DDS says.
         problem: String,
     },
-    /// A reliable subscription holds the publisher back and the send window stayed full: the message was not sent.
+    /// A reliable subscription holds the publisher back and the send window stayed full: the
+    /// message was not sent.
     #[error("topic {topic}: a reliable subscription does not keep up, message not sent")]
     WindowFull {
         /// The topic.
@@ -125,5 +127,8 @@ pub enum RosError {
 pub type RosResult<T> = Result<T, RosError>;
 
 pub(crate) fn dds(doing: impl Into<String>, problem: impl std::fmt::Display) -> RosError {
-    RosError::Dds { doing: doing.into(), problem: problem.to_string() }
+    RosError::Dds {
+        doing: doing.into(),
+        problem: problem.to_string(),
+    }
 }

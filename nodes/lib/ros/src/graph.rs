@@ -61,14 +61,24 @@ struct State {
 
 impl Graph {
     pub(crate) fn new(shutdown: Shutdown) -> Self {
-        Self { state: Mutex::default(), changed: Condvar::new(), shutdown }
+        Self {
+            state: Mutex::default(),
+            changed: Condvar::new(),
+            shutdown,
+        }
     }
 
     pub(crate) fn handle(&self, event: &Event) {
         let mut state = lock(&self.state);
         match event {
-            Event::RemoteReaderMatched { local_writer, remote_reader } => state.add_match(*local_writer, *remote_reader),
-            Event::RemoteWriterMatched { local_reader, remote_writer } => state.add_match(*local_reader, *remote_writer),
+            Event::RemoteReaderMatched {
+                local_writer,
+                remote_reader,
+            } => state.add_match(*local_writer, *remote_reader),
+            Event::RemoteWriterMatched {
+                local_reader,
+                remote_writer,
+            } => state.add_match(*local_reader, *remote_writer),
             Event::ReaderLost { guid, .. } | Event::WriterLost { guid, .. } => {
                 let gid = Gid::from(*guid);
                 for (peers, _) in state.matched.values_mut() {
@@ -76,21 +86,31 @@ impl Graph {
                 }
             }
             Event::ParticipantLost { id, .. } => state.lose_participant(id.as_ref()),
-            Event::RemoteReaderQosIncompatible { local_writer, remote_reader, .. } => {
+            Event::RemoteReaderQosIncompatible {
+                local_writer,
+                remote_reader,
+                ..
+            } => {
                 log::warn!(
                     "publisher {:?}: subscription {:?} asks for more than it offers",
                     Gid::from(*local_writer),
                     Gid::from(*remote_reader)
                 );
             }
-            Event::RemoteWriterQosIncompatible { local_reader, remote_writer, .. } => {
+            Event::RemoteWriterQosIncompatible {
+                local_reader,
+                remote_writer,
+                ..
+            } => {
                 log::warn!(
                     "subscription {:?}: publisher {:?} offers less than it asks for",
                     Gid::from(*local_reader),
                     Gid::from(*remote_writer)
                 );
             }
-            Event::ParticipantDiscovered { .. } | Event::ReaderDetected { .. } | Event::WriterDetected { .. } => {}
+            Event::ParticipantDiscovered { .. }
+            | Event::ReaderDetected { .. }
+            | Event::WriterDetected { .. } => {}
             _ => return,
         }
         self.bump(state);
@@ -113,7 +133,9 @@ impl Graph {
 
     fn bump(&self, mut state: std::sync::MutexGuard<'_, State>) {
         state.generation += 1;
-        state.bells.retain(|bell| bell.upgrade().inspect(|bell| bell.ring()).is_some());
+        state
+            .bells
+            .retain(|bell| bell.upgrade().inspect(|bell| bell.ring()).is_some());
         drop(state);
         self.changed.notify_all();
     }
@@ -127,20 +149,27 @@ impl Graph {
     }
 
     pub(crate) fn matched(&self, local: Gid) -> usize {
-        lock(&self.state).matched.get(&local).map_or(0, |(peers, _)| peers.len())
+        lock(&self.state)
+            .matched
+            .get(&local)
+            .map_or(0, |(peers, _)| peers.len())
     }
 
-    /// Sleeps until the peers of a local endpoint have surely matched it too. They do so some milliseconds after it has matched them, and
-    /// what is sent in between is not for them.
+    /// Sleeps until the peers of a local endpoint have surely matched it too. They do so some
+    /// milliseconds after it has matched them, and what is sent in between is not for them.
     pub(crate) fn settle(&self, local: Gid) {
         const SETTLED: Duration = Duration::from_millis(100);
-        let since = lock(&self.state).matched.get(&local).map(|(_, since)| *since);
+        let since = lock(&self.state)
+            .matched
+            .get(&local)
+            .map(|(_, since)| *since);
         if let Some(since) = since {
             std::thread::sleep(SETTLED.saturating_sub(since.elapsed()));
         }
     }
 
-    /// Waits until `done`, for at most `timeout`. False where the time was over or the process is ending.
+    /// Waits until `done`, for at most `timeout`. False where the time was over or the process is
+    /// ending.
     pub(crate) fn wait_until(&self, timeout: Duration, mut done: impl FnMut() -> bool) -> bool {
         let deadline = Instant::now() + timeout;
         loop {
@@ -148,7 +177,8 @@ impl Graph {
             if done() {
                 return true;
             }
-            // Only after the generation was read: a request from here on changes it, and one before would change nothing any more.
+            // Only after the generation was read: a request from here on changes it, and one before
+            // would change nothing any more.
             if self.shutdown.is_requested() {
                 return false;
             }
@@ -158,7 +188,11 @@ impl Graph {
                 if left.is_zero() {
                     return false;
                 }
-                state = self.changed.wait_timeout(state, left).unwrap_or_else(PoisonError::into_inner).0;
+                state = self
+                    .changed
+                    .wait_timeout(state, left)
+                    .unwrap_or_else(PoisonError::into_inner)
+                    .0;
             }
         }
     }
@@ -166,19 +200,28 @@ impl Graph {
     pub(crate) fn node_of(&self, endpoint: Gid) -> Option<NodeName> {
         let state = lock(&self.state);
         let mut nodes = state.participants.values().flatten();
-        let node = nodes.find(|node| node.readers.contains(&endpoint) || node.writers.contains(&endpoint))?;
+        let node = nodes
+            .find(|node| node.readers.contains(&endpoint) || node.writers.contains(&endpoint))?;
         NodeName::new(&node.namespace, &node.name).ok()
     }
 
     pub(crate) fn nodes(&self) -> BTreeSet<NodeName> {
         let state = lock(&self.state);
-        state.participants.values().flatten().filter_map(|node| NodeName::new(&node.namespace, &node.name).ok()).collect()
+        state
+            .participants
+            .values()
+            .flatten()
+            .filter_map(|node| NodeName::new(&node.namespace, &node.name).ok())
+            .collect()
     }
 }
 
 impl State {
     fn add_match(&mut self, local: rustdds::GUID, remote: rustdds::GUID) {
-        let (peers, since) = self.matched.entry(local.into()).or_insert_with(|| (BTreeSet::new(), Instant::now()));
+        let (peers, since) = self
+            .matched
+            .entry(local.into())
+            .or_insert_with(|| (BTreeSet::new(), Instant::now()));
         peers.insert(remote.into());
         *since = Instant::now();
     }
@@ -186,7 +229,9 @@ impl State {
     fn lose_participant(&mut self, prefix: &[u8]) {
         let lost = |gid: &Gid| gid.bytes().starts_with(prefix);
         self.participants.retain(|gid, _| !lost(gid));
-        self.matched.values_mut().for_each(|(peers, _)| peers.retain(|gid| !lost(gid)));
+        self.matched
+            .values_mut()
+            .for_each(|(peers, _)| peers.retain(|gid| !lost(gid)));
     }
 }
 
@@ -194,17 +239,25 @@ impl State {
 pub(crate) fn count_topics(endpoints: &[Endpoint]) -> Vec<TopicInfo> {
     let mut counts: BTreeMap<(&str, &str), (usize, usize)> = BTreeMap::new();
     for endpoint in endpoints.iter().filter(|endpoint| endpoint.is_topic) {
-        let (publishers, subscriptions) = counts.entry((&endpoint.topic, &endpoint.type_name)).or_default();
-        *(if endpoint.writes { publishers } else { subscriptions }) += 1;
+        let (publishers, subscriptions) = counts
+            .entry((&endpoint.topic, &endpoint.type_name))
+            .or_default();
+        *(if endpoint.writes {
+            publishers
+        } else {
+            subscriptions
+        }) += 1;
     }
     counts
         .into_iter()
-        .map(|((name, type_name), (publishers, subscriptions))| TopicInfo {
-            name: name.to_owned(),
-            type_name: type_name.to_owned(),
-            publishers,
-            subscriptions,
-        })
+        .map(
+            |((name, type_name), (publishers, subscriptions))| TopicInfo {
+                name: name.to_owned(),
+                type_name: type_name.to_owned(),
+                publishers,
+                subscriptions,
+            },
+        )
         .collect()
 }
 
@@ -221,7 +274,9 @@ mod tests {
         // The node's thread has seen the request, and will not wake anybody again.
         graph.wake();
         let (ended, end) = std::sync::mpsc::channel();
-        std::thread::spawn(move || ended.send(graph.wait_until(Duration::from_secs(3600), || false)));
+        std::thread::spawn(move || {
+            ended.send(graph.wait_until(Duration::from_secs(3600), || false))
+        });
         assert!(!end.recv_timeout(Duration::from_secs(20)).unwrap());
     }
 }

@@ -1,11 +1,14 @@
-//! ROS 2 nodes over DDS, without ROS: names and remaps, parameters, topics, services, time and the graph.
+//! ROS 2 nodes over DDS, without ROS: names and remaps, parameters, topics, services, time and the
+//! graph.
 //!
-//! The one crate that names ros2-client and RustDDS. Bytes cross DDS; every typed publisher, subscription and service encodes and decodes
-//! around them, so that a recorder of unknown types and a node of known ones are the same thing.
+//! The one crate that names ros2-client and RustDDS. Bytes cross DDS; every typed publisher,
+//! subscription and service encodes and decodes around them, so that a recorder of unknown types
+//! and a node of known ones are the same thing.
 //!
-//! On ros2-client stand the context with the DDS participant, topics and their types, quality of service, the words of
-//! `ros_discovery_info`, `/rosout` and the parameter services, and parameter values. On RustDDS, which ros2-client stands on too, stands
-//! directly what ros2-client 0.12.1 lacks:
+//! On ros2-client stand the context with the DDS participant, topics and their types, quality of
+//! service, the words of `ros_discovery_info`, `/rosout` and the parameter services, and parameter
+//! values. On RustDDS, which ros2-client stands on too, stands directly what ros2-client 0.12.1
+//! lacks:
 //!
 //! | what | why |
 //! |---|---|

@@ -25,14 +25,21 @@ impl Default for LogLevels {
     /// Information, and from DDS errors alone.
     fn default() -> Self {
         let quiet = ["rustdds", "ros2_client", "cdr_encoding", "mio"];
-        Self { default: LevelFilter::Info, targets: quiet.map(|target| (target.to_owned(), LevelFilter::Error)).into() }
+        Self {
+            default: LevelFilter::Info,
+            targets: quiet
+                .map(|target| (target.to_owned(), LevelFilter::Error))
+                .into(),
+        }
     }
 }
 
 impl LogLevels {
     /// `debug`, or `rustdds:=warn` for one log target.
     pub(crate) fn set(&mut self, text: &str) -> Result<(), &'static str> {
-        let (target, level) = text.split_once(":=").map_or((None, text), |(target, level)| (Some(target), level));
+        let (target, level) = text
+            .split_once(":=")
+            .map_or((None, text), |(target, level)| (Some(target), level));
         let level = match level.to_ascii_lowercase().as_str() {
             "debug" => LevelFilter::Debug,
             "info" | "unset" => LevelFilter::Info,
@@ -49,11 +56,20 @@ impl LogLevels {
 
     fn of(&self, target: &str) -> LevelFilter {
         let root = target.split("::").next().unwrap_or(target);
-        *self.targets.get(target).or_else(|| self.targets.get(root)).unwrap_or(&self.default)
+        *self
+            .targets
+            .get(target)
+            .or_else(|| self.targets.get(root))
+            .unwrap_or(&self.default)
     }
 
     fn most(&self) -> LevelFilter {
-        self.targets.values().copied().chain([self.default]).max().unwrap_or(self.default)
+        self.targets
+            .values()
+            .copied()
+            .chain([self.default])
+            .max()
+            .unwrap_or(self.default)
     }
 }
 
@@ -65,11 +81,14 @@ struct Logger {
 
 fn logger() -> &'static Logger {
     static LOGGER: OnceLock<Logger> = OnceLock::new();
-    LOGGER.get_or_init(|| Logger { levels: Mutex::default(), rosout: Mutex::default() })
+    LOGGER.get_or_init(|| Logger {
+        levels: Mutex::default(),
+        rosout: Mutex::default(),
+    })
 }
 
-/// Sends the lines of the `log` crate to standard error, and to `/rosout` once a node runs. Does nothing where the program has another
-/// logger already. May be called again, with other levels.
+/// Sends the lines of the `log` crate to standard error, and to `/rosout` once a node runs. Does
+/// nothing where the program has another logger already. May be called again, with other levels.
 pub fn init_logging(levels: &LogLevels) {
     *lock(&logger().levels) = levels.clone();
     if log::set_logger(logger()).is_ok() || std::ptr::addr_eq(log::logger(), logger()) {
@@ -87,12 +106,21 @@ impl Log for Logger {
             return;
         }
         let rosout = lock(&self.rosout).as_ref().and_then(Weak::upgrade);
-        let name = rosout.as_ref().map_or_else(|| record.target().to_owned(), |rosout| rosout.node.clone());
+        let name = rosout
+            .as_ref()
+            .map_or_else(|| record.target().to_owned(), |rosout| rosout.node.clone());
         let now = system_now().nanos;
         let level = record.level();
-        eprintln!("[{level}] [{}.{:09}] [{name}]: {}", now / 1_000_000_000, now % 1_000_000_000, record.args());
+        eprintln!(
+            "[{level}] [{}.{:09}] [{name}]: {}",
+            now / 1_000_000_000,
+            now % 1_000_000_000,
+            record.args()
+        );
         // What DDS says about sending must not be sent by DDS.
-        let of_dds = ["rustdds", "ros2_client"].iter().any(|target| record.target().starts_with(target));
+        let of_dds = ["rustdds", "ros2_client"]
+            .iter()
+            .any(|target| record.target().starts_with(target));
         if let Some(rosout) = rosout.filter(|_| !of_dds) {
             rosout.publish(record, now);
         }
@@ -101,7 +129,8 @@ impl Log for Logger {
     fn flush(&self) {}
 }
 
-/// A node's publisher of `/rosout`. Ours, since ros2-client's own keeps only the last line, and loses the others of a burst.
+/// A node's publisher of `/rosout`. Ours, since ros2-client's own keeps only the last line, and
+/// loses the others of a burst.
 pub(crate) struct Rosout {
     publisher: RawPublisher,
     node: String,
@@ -111,7 +140,14 @@ impl Rosout {
     pub(crate) fn start(core: &Arc<Core>) -> RosResult<Arc<Self>> {
         let qos = Qos::reliable().depth(1000).transient_local();
         let publisher = RawPublisher::new(core, "/rosout".into(), "rcl_interfaces/msg/Log", qos)?;
-        let rosout = Arc::new(Self { publisher, node: core.name.to_string().trim_start_matches('/').replace('/', ".") });
+        let rosout = Arc::new(Self {
+            publisher,
+            node: core
+                .name
+                .to_string()
+                .trim_start_matches('/')
+                .replace('/', "."),
+        });
         let mut current = lock(&logger().rosout);
         if current.as_ref().and_then(Weak::upgrade).is_none() {
             *current = Some(Arc::downgrade(&rosout));

@@ -15,14 +15,20 @@ impl NodeName {
     /// From a namespace (`/`, `/left/arm`; the leading slash may be left out) and a name.
     ///
     /// # Errors
-    /// Where a part is empty, starts with a digit, or has other characters than letters, digits and underscores.
+    /// Where a part is empty, starts with a digit, or has other characters than letters, digits and
+    /// underscores.
     pub fn new(namespace: &str, name: &str) -> RosResult<Self> {
         let tokens = namespace.trim_start_matches('/');
         if !tokens.is_empty() {
-            tokens.split('/').try_for_each(|token| check_token(token, namespace))?;
+            tokens
+                .split('/')
+                .try_for_each(|token| check_token(token, namespace))?;
         }
         check_token(name, name)?;
-        Ok(Self { namespace: format!("/{tokens}"), name: name.to_owned() })
+        Ok(Self {
+            namespace: format!("/{tokens}"),
+            name: name.to_owned(),
+        })
     }
 
     /// The namespace: `/`, or `/left/arm`.
@@ -35,7 +41,8 @@ impl NodeName {
         &self.name
     }
 
-    /// The name of a topic or service as this node sees it, absolute: `~/x` stands below the node, `x` below its namespace.
+    /// The name of a topic or service as this node sees it, absolute: `~/x` stands below the node,
+    /// `x` below its namespace.
     ///
     /// # Errors
     /// Where the name breaks ROS 2's rules.
@@ -47,7 +54,10 @@ impl NodeName {
             None if name.starts_with('/') => name.to_owned(),
             None => join(&self.namespace, name),
         };
-        absolute.split('/').skip(1).try_for_each(|token| check_token(token, name))?;
+        absolute
+            .split('/')
+            .skip(1)
+            .try_for_each(|token| check_token(token, name))?;
         Ok(absolute)
     }
 }
@@ -59,22 +69,38 @@ impl fmt::Display for NodeName {
 }
 
 fn join(namespace: &str, name: &str) -> String {
-    if namespace.ends_with('/') { format!("{namespace}{name}") } else { format!("{namespace}/{name}") }
+    if namespace.ends_with('/') {
+        format!("{namespace}{name}")
+    } else {
+        format!("{namespace}/{name}")
+    }
 }
 
 fn bad_name(name: &str, problem: &str) -> RosError {
-    RosError::Name { name: name.to_owned(), problem: problem.to_owned() }
+    RosError::Name {
+        name: name.to_owned(),
+        problem: problem.to_owned(),
+    }
 }
 
 fn check_token(token: &str, whole: &str) -> RosResult<()> {
     if token.is_empty() {
-        return Err(bad_name(whole, "empty part (a slash too many, or nothing at all)"));
+        return Err(bad_name(
+            whole,
+            "empty part (a slash too many, or nothing at all)",
+        ));
     }
     if token.starts_with(|c: char| c.is_ascii_digit()) {
         return Err(bad_name(whole, "a part starts with a digit"));
     }
-    if let Some(bad) = token.chars().find(|c| !(c.is_ascii_alphanumeric() || *c == '_')) {
-        return Err(bad_name(whole, &format!("character '{bad}' is not allowed (letters, digits, underscores)")));
+    if let Some(bad) = token
+        .chars()
+        .find(|c| !(c.is_ascii_alphanumeric() || *c == '_'))
+    {
+        return Err(bad_name(
+            whole,
+            &format!("character '{bad}' is not allowed (letters, digits, underscores)"),
+        ));
     }
     Ok(())
 }
@@ -88,7 +114,8 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
-    /// `/imu/data` -> `rt/imu/data`; services have a suffix too: `/node/get_parameters` -> `rq/node/get_parametersRequest`.
+    /// `/imu/data` -> `rt/imu/data`; services have a suffix too: `/node/get_parameters` ->
+    /// `rq/node/get_parametersRequest`.
     pub(crate) fn dds_name(self, absolute: &str) -> String {
         match self {
             Kind::Topic => format!("rt{absolute}"),
@@ -98,9 +125,12 @@ impl Kind {
     }
 }
 
-/// The ROS 2 topic behind a DDS topic (`rt/imu/data` -> `/imu/data`); none for services and for what is not of ROS.
+/// The ROS 2 topic behind a DDS topic (`rt/imu/data` -> `/imu/data`); none for services and for
+/// what is not of ROS.
 pub(crate) fn topic_from_dds(dds_name: &str) -> Option<&str> {
-    dds_name.strip_prefix("rt").filter(|name| name.starts_with('/'))
+    dds_name
+        .strip_prefix("rt")
+        .filter(|name| name.starts_with('/'))
 }
 
 /// `sensor_msgs/msg/Imu` -> `sensor_msgs::msg::dds_::Imu_`.
@@ -110,18 +140,29 @@ pub(crate) fn topic_from_dds(dds_name: &str) -> Option<&str> {
 pub fn dds_type_name(ros_type: &str) -> RosResult<String> {
     let parts: Vec<&str> = ros_type.split('/').collect();
     let [package, kind, name] = parts[..] else {
-        return Err(bad_name(ros_type, "a type has three parts: package/msg/Name"));
+        return Err(bad_name(
+            ros_type,
+            "a type has three parts: package/msg/Name",
+        ));
     };
-    [package, kind, name].into_iter().try_for_each(|token| check_token(token, ros_type))?;
+    [package, kind, name]
+        .into_iter()
+        .try_for_each(|token| check_token(token, ros_type))?;
     Ok(format!("{package}::{kind}::dds_::{name}_"))
 }
 
-/// `sensor_msgs::msg::dds_::Imu_` -> `sensor_msgs/msg/Imu`; none where DDS has a type that is not of ROS.
+/// `sensor_msgs::msg::dds_::Imu_` -> `sensor_msgs/msg/Imu`; none where DDS has a type that is not
+/// of ROS.
 pub fn ros_type_name(dds_type: &str) -> Option<String> {
     let parts: Vec<&str> = dds_type.split("::").collect();
-    let [package, kind, "dds_", name] = parts[..] else { return None };
+    let [package, kind, "dds_", name] = parts[..] else {
+        return None;
+    };
     let name = name.strip_suffix('_')?;
-    [package, kind, name].into_iter().try_for_each(|token| check_token(token, dds_type)).ok()?;
+    [package, kind, name]
+        .into_iter()
+        .try_for_each(|token| check_token(token, dds_type))
+        .ok()?;
     Some(format!("{package}/{kind}/{name}"))
 }
 
@@ -138,7 +179,10 @@ mod tests {
         assert_eq!(node.resolve("/tf").unwrap(), "/tf");
         assert_eq!(node.resolve("~/pause").unwrap(), "/left/virtual_imu/pause");
         assert_eq!(NodeName::new("", "n").unwrap().resolve("a").unwrap(), "/a");
-        assert_eq!(NodeName::new("left/arm", "n").unwrap().namespace(), "/left/arm");
+        assert_eq!(
+            NodeName::new("left/arm", "n").unwrap().namespace(),
+            "/left/arm"
+        );
     }
 
     #[test]
@@ -153,9 +197,18 @@ mod tests {
 
     #[test]
     fn types_and_topics_go_to_dds_and_back() {
-        assert_eq!(dds_type_name("sensor_msgs/msg/Imu").unwrap(), "sensor_msgs::msg::dds_::Imu_");
-        assert_eq!(ros_type_name("sensor_msgs::msg::dds_::Imu_").unwrap(), "sensor_msgs/msg/Imu");
-        assert_eq!(dds_type_name("rcl_interfaces/srv/GetParameters_Request").unwrap(), "rcl_interfaces::srv::dds_::GetParameters_Request_");
+        assert_eq!(
+            dds_type_name("sensor_msgs/msg/Imu").unwrap(),
+            "sensor_msgs::msg::dds_::Imu_"
+        );
+        assert_eq!(
+            ros_type_name("sensor_msgs::msg::dds_::Imu_").unwrap(),
+            "sensor_msgs/msg/Imu"
+        );
+        assert_eq!(
+            dds_type_name("rcl_interfaces/srv/GetParameters_Request").unwrap(),
+            "rcl_interfaces::srv::dds_::GetParameters_Request_"
+        );
         for bad in ["Imu", "sensor_msgs/Imu", "sensor_msgs/msg/", "a/b/c/d"] {
             assert!(dds_type_name(bad).is_err(), "{bad}");
         }

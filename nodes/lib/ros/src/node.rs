@@ -30,7 +30,8 @@ use crate::spin::spawn_thread;
 use crate::subscription::{Listening, RawSubscription, Subscription};
 use crate::wake::{Bell, lock};
 
-/// What a node is started with. Everything is checked before DDS is touched, so `--check-config` needs no more than this.
+/// What a node is started with. Everything is checked before DDS is touched, so `--check-config`
+/// needs no more than this.
 #[derive(Clone)]
 pub struct NodeOptions {
     /// The node's name, after `__node` and `__ns`.
@@ -48,17 +49,25 @@ pub struct NodeOptions {
 }
 
 impl NodeOptions {
-    /// A node of this name, unless the command line renames it, with the network from the environment. Ended by its own
-    /// [`Shutdown`]; set [`Shutdown::on_signals`] in `main`.
+    /// A node of this name, unless the command line renames it, with the network from the
+    /// environment. Ended by its own [`Shutdown`]; set [`Shutdown::on_signals`] in `main`.
     ///
     /// # Errors
-    /// Where a parameter, a name or an environment variable is wrong; one line that names the place.
+    /// Where a parameter, a name or an environment variable is wrong; one line that names the
+    /// place.
     pub fn new(default_name: &str, args: &RosArgs, parameters: &Parameters) -> RosResult<Self> {
         let name = args.node_name(default_name)?;
         parameters.apply(args, &name)?;
         let network = Network::from_env()?;
         let (parameters, args) = (parameters.clone(), args.clone());
-        Ok(Self { name, parameters, network, shutdown: Shutdown::new(), args, parameter_services: true })
+        Ok(Self {
+            name,
+            parameters,
+            network,
+            shutdown: Shutdown::new(),
+            args,
+            parameter_services: true,
+        })
     }
 
     /// With this shutdown.
@@ -100,13 +109,36 @@ impl Node {
     /// # Errors
     /// Where DDS finds no network or no port.
     pub fn start(options: NodeOptions) -> RosResult<Self> {
-        let NodeOptions { name, parameters, network, shutdown, args, parameter_services } = options;
-        let clock = Clock::new(parameters.get(USE_SIM_TIME).unwrap_or(false), shutdown.clone());
+        let NodeOptions {
+            name,
+            parameters,
+            network,
+            shutdown,
+            args,
+            parameter_services,
+        } = options;
+        let clock = Clock::new(
+            parameters.get(USE_SIM_TIME).unwrap_or(false),
+            shutdown.clone(),
+        );
         let core = Arc::new(Core::new(name, network.participant()?, clock, shutdown)?);
         let thread = spawn_thread(&core, &parameters)?;
-        let services = if parameter_services { serve_parameters(&core, &parameters)? } else { Vec::new() };
+        let services = if parameter_services {
+            serve_parameters(&core, &parameters)?
+        } else {
+            Vec::new()
+        };
         let rosout = args.rosout.then(|| Rosout::start(&core)).transpose()?;
-        Ok(Self { running: Arc::new(Running { core, parameters, args, _services: services, _rosout: rosout, thread: Some(thread) }) })
+        Ok(Self {
+            running: Arc::new(Running {
+                core,
+                parameters,
+                args,
+                _services: services,
+                _rosout: rosout,
+                thread: Some(thread),
+            }),
+        })
     }
 
     fn core(&self) -> &Arc<Core> {
@@ -152,7 +184,8 @@ impl Node {
         Ok((topic, qos))
     }
 
-    /// Publishes messages of type `M`. The preset `qos` yields to `qos_overrides./TOPIC.publisher.*` parameters.
+    /// Publishes messages of type `M`. The preset `qos` yields to
+    /// `qos_overrides./TOPIC.publisher.*` parameters.
     ///
     /// # Errors
     /// Where the name is wrong or DDS refuses.
@@ -170,7 +203,8 @@ impl Node {
         RawPublisher::new(self.core(), topic, type_name, qos)
     }
 
-    /// Receives messages of type `M`. The preset `qos` yields to `qos_overrides./TOPIC.subscription.*` parameters.
+    /// Receives messages of type `M`. The preset `qos` yields to
+    /// `qos_overrides./TOPIC.subscription.*` parameters.
     ///
     /// # Errors
     /// Where the name is wrong or DDS refuses.
@@ -183,12 +217,18 @@ impl Node {
     ///
     /// # Errors
     /// Where a name is wrong or DDS refuses.
-    pub fn raw_subscription(&self, topic: &str, type_name: &str, qos: Qos) -> RosResult<RawSubscription> {
+    pub fn raw_subscription(
+        &self,
+        topic: &str,
+        type_name: &str,
+        qos: Qos,
+    ) -> RosResult<RawSubscription> {
         let (topic, qos) = self.topic(topic, "subscription", qos)?;
         RawSubscription::new(self.core(), topic, type_name, qos)
     }
 
-    /// Calls `callback` for every message, on a thread of its own, until the result is dropped or the process ends.
+    /// Calls `callback` for every message, on a thread of its own, until the result is dropped or
+    /// the process ends.
     ///
     /// # Errors
     /// Where the name is wrong or DDS refuses.
@@ -201,7 +241,8 @@ impl Node {
         self.subscription(topic, qos)?.run(callback)
     }
 
-    /// Offers a service. The handler runs on the node's thread, which answers the parameter services too: it should be short.
+    /// Offers a service. The handler runs on the node's thread, which answers the parameter
+    /// services too: it should be short.
     ///
     /// # Errors
     /// Where the name is wrong or DDS refuses.
@@ -217,7 +258,12 @@ impl Node {
     ///
     /// # Errors
     /// Where a name is wrong or DDS refuses.
-    pub fn serve_as<Q, A>(&self, name: &str, type_name: &str, handler: impl FnMut(Q) -> A + Send + 'static) -> RosResult<ServiceServer>
+    pub fn serve_as<Q, A>(
+        &self,
+        name: &str,
+        type_name: &str,
+        handler: impl FnMut(Q) -> A + Send + 'static,
+    ) -> RosResult<ServiceServer>
     where
         Q: DeserializeOwned,
         A: Serialize,
@@ -229,7 +275,10 @@ impl Node {
     ///
     /// # Errors
     /// Where the name is wrong or DDS refuses.
-    pub fn client<S: RosService>(&self, name: &str) -> RosResult<ServiceClient<S::Request, S::Response>> {
+    pub fn client<S: RosService>(
+        &self,
+        name: &str,
+    ) -> RosResult<ServiceClient<S::Request, S::Response>> {
         self.client_as(name, S::TYPE_NAME)
     }
 
@@ -237,7 +286,11 @@ impl Node {
     ///
     /// # Errors
     /// Where a name is wrong or DDS refuses.
-    pub fn client_as<Q: Serialize, A: DeserializeOwned>(&self, name: &str, type_name: &str) -> RosResult<ServiceClient<Q, A>> {
+    pub fn client_as<Q: Serialize, A: DeserializeOwned>(
+        &self,
+        name: &str,
+        type_name: &str,
+    ) -> RosResult<ServiceClient<Q, A>> {
         ServiceClient::new(self.core(), self.resolve(name)?, type_name)
     }
 
@@ -260,37 +313,71 @@ impl Node {
 
     /// Every publisher that can be seen, this node's own included.
     pub fn publishers(&self) -> Vec<Endpoint> {
-        self.endpoints().into_iter().filter(|endpoint| endpoint.is_topic && endpoint.writes).collect()
+        self.endpoints()
+            .into_iter()
+            .filter(|endpoint| endpoint.is_topic && endpoint.writes)
+            .collect()
     }
 
     /// Every subscription that can be seen, this node's own included.
     pub fn subscriptions(&self) -> Vec<Endpoint> {
-        self.endpoints().into_iter().filter(|endpoint| endpoint.is_topic && !endpoint.writes).collect()
+        self.endpoints()
+            .into_iter()
+            .filter(|endpoint| endpoint.is_topic && !endpoint.writes)
+            .collect()
     }
 
     fn endpoints(&self) -> Vec<Endpoint> {
         let core = self.core();
         let mut endpoints = core.local_endpoints();
-        let mut add = |gid: Gid, dds_topic: &str, dds_type: &str, qos: &rustdds::QosPolicies, writes: bool| {
-            let (Some(topic), Some(type_name)) = (topic_from_dds(dds_topic), ros_type_name(dds_type)) else { return };
+        let mut add = |gid: Gid,
+                       dds_topic: &str,
+                       dds_type: &str,
+                       qos: &rustdds::QosPolicies,
+                       writes: bool| {
+            let (Some(topic), Some(type_name)) =
+                (topic_from_dds(dds_topic), ros_type_name(dds_type))
+            else {
+                return;
+            };
             if !endpoints.iter().any(|known| known.gid == gid) {
                 let (node, qos) = (core.graph.node_of(gid), Qos::from_dds(qos));
-                endpoints.push(Endpoint { topic: topic.to_owned(), type_name, node, gid, qos, is_topic: true, writes });
+                endpoints.push(Endpoint {
+                    topic: topic.to_owned(),
+                    type_name,
+                    node,
+                    gid,
+                    qos,
+                    is_topic: true,
+                    writes,
+                });
             }
         };
         for writer in core.participant.discovered_writers() {
             let data = &writer.publication_topic_data;
-            add(data.key.into(), &data.topic_name, &data.type_name, &data.qos(), true);
+            add(
+                data.key.into(),
+                &data.topic_name,
+                &data.type_name,
+                &data.qos(),
+                true,
+            );
         }
         for reader in core.participant.discovered_readers() {
             let data = &reader.subscription_topic_data;
-            add(data.key().into(), data.topic_name(), data.type_name(), &data.qos(), false);
+            add(
+                data.key().into(),
+                data.topic_name(),
+                data.type_name(),
+                &data.qos(),
+                false,
+            );
         }
         endpoints
     }
 
-    /// Waits until `done`, looking again whenever a node or an endpoint comes or goes. False where `timeout` was over or the process is
-    /// ending.
+    /// Waits until `done`, looking again whenever a node or an endpoint comes or goes. False where
+    /// `timeout` was over or the process is ending.
     pub fn wait_for_graph(&self, timeout: Duration, done: impl FnMut() -> bool) -> bool {
         self.core().graph.wait_until(timeout, done)
     }
@@ -305,7 +392,9 @@ impl Node {
     /// # Errors
     /// Where DDS refuses.
     pub fn clock_publisher(&self) -> RosResult<ClockPublisher> {
-        Ok(ClockPublisher { publisher: self.publisher("/clock", Qos::clock())? })
+        Ok(ClockPublisher {
+            publisher: self.publisher("/clock", Qos::clock())?,
+        })
     }
 }
 
@@ -320,7 +409,9 @@ impl ClockPublisher {
     /// # Errors
     /// Where DDS refuses.
     pub fn publish(&self, now: Stamp) -> RosResult<()> {
-        self.publisher.publish(&ClockMessage { clock: cromosim_msgs::builtin_interfaces::Time::from_nanos(now.nanos) })
+        self.publisher.publish(&ClockMessage {
+            clock: cromosim_msgs::builtin_interfaces::Time::from_nanos(now.nanos),
+        })
     }
 
     /// The publisher itself.

@@ -29,26 +29,45 @@ pub struct RawPublisher {
 }
 
 impl RawPublisher {
-    pub(crate) fn new(core: &Arc<Core>, topic: String, type_name: &str, qos: Qos) -> RosResult<Self> {
+    pub(crate) fn new(
+        core: &Arc<Core>,
+        topic: String,
+        type_name: &str,
+        qos: Qos,
+    ) -> RosResult<Self> {
         let (writer, guard) = core.writer(Kind::Topic, &topic, type_name, qos)?;
         let (gid, core) = (guard.gid, Arc::clone(core));
-        Ok(Self { endpoint: Some((writer, guard)), gid, core, topic, type_name: type_name.to_owned(), qos })
+        Ok(Self {
+            endpoint: Some((writer, guard)),
+            gid,
+            core,
+            topic,
+            type_name: type_name.to_owned(),
+            qos,
+        })
     }
 
     /// Sends a message now. Its source stamp is the system clock's.
     ///
     /// # Errors
-    /// [`RosError::WindowFull`] where reliable subscriptions are too far behind; [`RosError::Encoding`] where the bytes are not
-    /// little-endian CDR, the only encoding that is sent.
+    /// [`RosError::WindowFull`] where reliable subscriptions are too far behind;
+    /// [`RosError::Encoding`] where the bytes are not little-endian CDR, the only encoding that is
+    /// sent.
     pub fn publish(&self, message: RawMessage) -> RosResult<()> {
         if !message.is_little_endian_cdr() {
             return Err(self.encoding_error("expected little-endian CDR (00 01)".into()));
         }
-        let Some((writer, _)) = &self.endpoint else { return Ok(()) };
-        writer.write(message, Some(Timestamp::now())).map_err(|error| match error {
-            WriteError::WouldBlock { .. } => RosError::WindowFull { topic: self.topic.clone() },
-            other => dds(format!("publish {}", self.topic), other),
-        })
+        let Some((writer, _)) = &self.endpoint else {
+            return Ok(());
+        };
+        writer
+            .write(message, Some(Timestamp::now()))
+            .map_err(|error| match error {
+                WriteError::WouldBlock { .. } => RosError::WindowFull {
+                    topic: self.topic.clone(),
+                },
+                other => dds(format!("publish {}", self.topic), other),
+            })
     }
 
     /// The topic, absolute, after remapping.
@@ -76,24 +95,35 @@ impl RawPublisher {
         self.core.graph.matched(self.gid)
     }
 
-    /// Waits for `count` matched subscriptions, and until 100 ms after the last match, for peers match a little later than this side and
-    /// would lose the first messages. False where `timeout` was over or the process is ending.
+    /// Waits for `count` matched subscriptions, and until 100 ms after the last match, for peers
+    /// match a little later than this side and would lose the first messages. False where `timeout`
+    /// was over or the process is ending.
     pub fn wait_for_subscriptions(&self, count: usize, timeout: Duration) -> bool {
-        let matched = self.core.graph.wait_until(timeout, || self.subscription_count() >= count);
+        let matched = self
+            .core
+            .graph
+            .wait_until(timeout, || self.subscription_count() >= count);
         if matched {
             self.core.graph.settle(self.gid);
         }
         matched
     }
 
-    /// Waits until the peers of every matched reliable subscription have confirmed every message; their programs may not have taken them
-    /// yet. False where `timeout` was over.
+    /// Waits until the peers of every matched reliable subscription have confirmed every message;
+    /// their programs may not have taken them yet. False where `timeout` was over.
     pub fn wait_for_acknowledgments(&self, timeout: Duration) -> bool {
-        self.endpoint.as_ref().is_none_or(|(writer, _)| writer.wait_for_acknowledgments(timeout).unwrap_or(false))
+        self.endpoint
+            .as_ref()
+            .is_none_or(|(writer, _)| writer.wait_for_acknowledgments(timeout).unwrap_or(false))
     }
 
     fn encoding_error(&self, problem: String) -> RosError {
-        RosError::Encoding { place: self.topic.clone(), action: "encode", type_name: self.type_name.clone(), problem }
+        RosError::Encoding {
+            place: self.topic.clone(),
+            action: "encode",
+            type_name: self.type_name.clone(),
+            problem,
+        }
     }
 }
 
@@ -113,7 +143,10 @@ pub struct Publisher<M> {
 
 impl<M: RosMessage> Publisher<M> {
     pub(crate) fn new(core: &Arc<Core>, topic: String, qos: Qos) -> RosResult<Self> {
-        Ok(Self { raw: RawPublisher::new(core, topic, M::TYPE_NAME, qos)?, message: PhantomData })
+        Ok(Self {
+            raw: RawPublisher::new(core, topic, M::TYPE_NAME, qos)?,
+            message: PhantomData,
+        })
     }
 }
 
@@ -123,7 +156,9 @@ impl<M: Serialize> Publisher<M> {
     /// # Errors
     /// [`RosError::WindowFull`] where reliable subscriptions are too far behind.
     pub fn publish(&self, message: &M) -> RosResult<()> {
-        self.raw.publish(RawMessage::encode(message).map_err(|problem| self.raw.encoding_error(problem))?)
+        self.raw.publish(
+            RawMessage::encode(message).map_err(|problem| self.raw.encoding_error(problem))?,
+        )
     }
 }
 

@@ -11,7 +11,8 @@ use crate::error::{RosError, RosResult};
 /// Whether lost messages are sent again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Reliability {
-    /// Lost messages stay lost; the publisher never waits. Does not match subscriptions that ask for `Reliable`.
+    /// Lost messages stay lost; the publisher never waits. Does not match subscriptions that ask
+    /// for `Reliable`.
     BestEffort,
     /// Lost messages are sent again.
     Reliable,
@@ -44,7 +45,8 @@ pub struct Qos {
     pub durability: Durability,
     /// How many messages are kept.
     pub history: History,
-    /// How long `publish` may wait for reliable subscriptions that are more than 8192 messages behind, before it gives up a message.
+    /// How long `publish` may wait for reliable subscriptions that are more than 8192 messages
+    /// behind, before it gives up a message.
     pub max_blocking: Duration,
 }
 
@@ -74,12 +76,14 @@ impl Qos {
         Self::reliable().depth(1).best_effort()
     }
 
-    /// The recorder's subscriptions: reliable, keep last 1000, volatile. They match only reliable publishers.
+    /// The recorder's subscriptions: reliable, keep last 1000, volatile. They match only reliable
+    /// publishers.
     pub const fn recorder() -> Self {
         Self::reliable().depth(1000)
     }
 
-    /// ROS 2's sensor data: best effort, keep last 5, volatile. As a subscription it matches every publisher.
+    /// ROS 2's sensor data: best effort, keep last 5, volatile. As a subscription it matches every
+    /// publisher.
     pub const fn sensor_data() -> Self {
         Self::reliable().depth(5).best_effort()
     }
@@ -110,13 +114,17 @@ impl Qos {
         self
     }
 
-    /// True where a subscription that asks for `requested` gets the messages of a publisher that offers `self`.
+    /// True where a subscription that asks for `requested` gets the messages of a publisher that
+    /// offers `self`.
     pub fn satisfies(&self, requested: &Qos) -> bool {
-        (self.reliability == Reliability::Reliable || requested.reliability == Reliability::BestEffort)
-            && (self.durability == Durability::TransientLocal || requested.durability == Durability::Volatile)
+        (self.reliability == Reliability::Reliable
+            || requested.reliability == Reliability::BestEffort)
+            && (self.durability == Durability::TransientLocal
+                || requested.durability == Durability::Volatile)
     }
 
-    /// A subscription for this offer that matches it and keeps at least `depth` messages: what a recorder asks for.
+    /// A subscription for this offer that matches it and keeps at least `depth` messages: what a
+    /// recorder asks for.
     #[must_use]
     pub fn matching_subscription(&self, depth: u32) -> Qos {
         let history = match self.history {
@@ -126,7 +134,8 @@ impl Qos {
         Qos { history, ..*self }
     }
 
-    /// How many received messages wait for the program: the depth, and at least 64, as RustDDS keeps them too.
+    /// How many received messages wait for the program: the depth, and at least 64, as RustDDS
+    /// keeps them too.
     pub(crate) fn queue_length(self) -> usize {
         match self.history {
             History::KeepLast(depth) => (depth as usize).max(64),
@@ -142,12 +151,16 @@ impl Qos {
                 Durability::TransientLocal => qos::Durability::TransientLocal,
             })
             .history(match self.history {
-                History::KeepLast(depth) => qos::History::KeepLast { depth: depth.clamp(1, i32::MAX as u32) as usize },
+                History::KeepLast(depth) => qos::History::KeepLast {
+                    depth: depth.clamp(1, i32::MAX as u32) as usize,
+                },
                 History::KeepAll => qos::History::KeepAll,
             });
         match self.reliability {
             Reliability::BestEffort => profile.reliability_best_effort(),
-            Reliability::Reliable => profile.reliability_reliable(WhenFull::Wait(self.max_blocking)),
+            Reliability::Reliable => {
+                profile.reliability_reliable(WhenFull::Wait(self.max_blocking))
+            }
         }
     }
 
@@ -171,11 +184,23 @@ impl Qos {
             Some(policy::History::KeepLast { depth }) => History::KeepLast(depth.max(0) as u32),
             None => History::KeepLast(0),
         };
-        Self { reliability, durability, history, ..Self::reliable() }
+        Self {
+            reliability,
+            durability,
+            history,
+            ..Self::reliable()
+        }
     }
 
-    /// Applies one policy of a `qos_overrides` parameter: `depth`, `reliability`, `durability` or `history`.
-    pub(crate) fn override_policy(&mut self, policy: &str, value: &str, place: &str, name: &str) -> RosResult<()> {
+    /// Applies one policy of a `qos_overrides` parameter: `depth`, `reliability`, `durability` or
+    /// `history`.
+    pub(crate) fn override_policy(
+        &mut self,
+        policy: &str,
+        value: &str,
+        place: &str,
+        name: &str,
+    ) -> RosResult<()> {
         let refuse = |expected: &str| RosError::ParameterValue {
             place: place.to_owned(),
             name: name.to_owned(),
@@ -184,7 +209,11 @@ impl Qos {
         };
         match policy {
             "depth" => {
-                let depth = value.parse::<u32>().ok().filter(|depth| *depth >= 1).ok_or_else(|| refuse("a whole number from 1"))?;
+                let depth = value
+                    .parse::<u32>()
+                    .ok()
+                    .filter(|depth| *depth >= 1)
+                    .ok_or_else(|| refuse("a whole number from 1"))?;
                 if self.history != History::KeepAll {
                     self.history = History::KeepLast(depth);
                 }
@@ -202,12 +231,18 @@ impl Qos {
                 _ => return Err(refuse("'volatile', 'transient_local' or 'system_default'")),
             },
             "history" => match value {
-                "keep_last" if self.history == History::KeepAll => self.history = History::KeepLast(10),
+                "keep_last" if self.history == History::KeepAll => {
+                    self.history = History::KeepLast(10)
+                }
                 "keep_all" => self.history = History::KeepAll,
                 "keep_last" | "system_default" => {}
                 _ => return Err(refuse("'keep_last', 'keep_all' or 'system_default'")),
             },
-            _ => return Err(refuse("one of the policies depth, reliability, durability, history")),
+            _ => {
+                return Err(refuse(
+                    "one of the policies depth, reliability, durability, history",
+                ));
+            }
         }
         Ok(())
     }
@@ -226,7 +261,14 @@ mod tests {
 
     #[test]
     fn policies_survive_dds() {
-        for qos in [Qos::reliable(), Qos::tf(), Qos::tf_static(), Qos::clock(), Qos::recorder(), Qos::sensor_data()] {
+        for qos in [
+            Qos::reliable(),
+            Qos::tf(),
+            Qos::tf_static(),
+            Qos::clock(),
+            Qos::recorder(),
+            Qos::sensor_data(),
+        ] {
             assert_eq!(Qos::from_dds(&qos.to_dds()), qos);
         }
         assert_eq!(Qos::tf().history, History::KeepLast(100));
@@ -249,11 +291,22 @@ mod tests {
     #[test]
     fn overrides_are_checked() {
         let mut qos = Qos::reliable();
-        for (policy, value) in [("depth", "5"), ("reliability", "best_effort"), ("durability", "transient_local")] {
+        for (policy, value) in [
+            ("depth", "5"),
+            ("reliability", "best_effort"),
+            ("durability", "transient_local"),
+        ] {
             qos.override_policy(policy, value, "here", "p").unwrap();
         }
         assert_eq!(qos, Qos::sensor_data().transient_local());
-        let error = qos.override_policy("reliability", "sometimes", "here", "qos_overrides./x.publisher.reliability").unwrap_err();
+        let error = qos
+            .override_policy(
+                "reliability",
+                "sometimes",
+                "here",
+                "qos_overrides./x.publisher.reliability",
+            )
+            .unwrap_err();
         assert!(error.to_string().contains("'best_effort'"), "{error}");
         assert!(qos.override_policy("depth", "0", "here", "p").is_err());
     }

@@ -1,8 +1,11 @@
-//! Messages as bytes: the one type that crosses DDS here. Typed publishers and subscriptions encode and decode around it.
+//! Messages as bytes: the one type that crosses DDS here. Typed publishers and subscriptions encode
+//! and decode around it.
 
 use byteorder::{BigEndian, LittleEndian};
 use rustdds::bytes::Bytes;
-use rustdds::no_key::{DataWriter, Decode, DefaultDecoder, DeserializerAdapter, SerializerAdapter, SimpleDataReader};
+use rustdds::no_key::{
+    DataWriter, Decode, DefaultDecoder, DeserializerAdapter, SerializerAdapter, SimpleDataReader,
+};
 use rustdds::{RepresentationIdentifier, Timestamp};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -17,8 +20,8 @@ pub(crate) type RawWriter = DataWriter<RawMessage, RawAdapter>;
 const HEADER_LENGTH: usize = 4;
 const LITTLE_ENDIAN_CDR: [u8; HEADER_LENGTH] = [0, 1, 0, 0];
 
-/// A message of any type as it travels: four bytes that name the encoding (`00 01 00 00`: little-endian CDR), then the encoded fields.
-/// These are the bytes that rosbag2 keeps.
+/// A message of any type as it travels: four bytes that name the encoding (`00 01 00 00`:
+/// little-endian CDR), then the encoded fields. These are the bytes that rosbag2 keeps.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct RawMessage {
     bytes: Vec<u8>,
@@ -31,8 +34,16 @@ impl RawMessage {
     /// Where the four bytes are missing.
     pub fn from_cdr(bytes: Vec<u8>) -> RosResult<Self> {
         if bytes.len() < HEADER_LENGTH {
-            let problem = format!("expected at least {HEADER_LENGTH} bytes of encoding header, found {}", bytes.len());
-            return Err(RosError::Encoding { place: "raw message".into(), action: "decode", type_name: "CDR".into(), problem });
+            let problem = format!(
+                "expected at least {HEADER_LENGTH} bytes of encoding header, found {}",
+                bytes.len()
+            );
+            return Err(RosError::Encoding {
+                place: "raw message".into(),
+                action: "decode",
+                type_name: "CDR".into(),
+                problem,
+            });
         }
         Ok(Self { bytes })
     }
@@ -43,8 +54,10 @@ impl RawMessage {
     /// Where serde meets something that CDR does not have, such as a map.
     pub fn encode<M: Serialize>(message: &M) -> Result<Self, String> {
         let mut bytes = LITTLE_ENDIAN_CDR.to_vec();
-        // A writer of its own: the encoder aligns by its count of bytes, which must start behind the header.
-        cdr_encoding::to_writer::<M, LittleEndian, _>(&mut bytes, message).map_err(|error| error.to_string())?;
+        // A writer of its own: the encoder aligns by its count of bytes, which must start behind
+        // the header.
+        cdr_encoding::to_writer::<M, LittleEndian, _>(&mut bytes, message)
+            .map_err(|error| error.to_string())?;
         Ok(Self { bytes })
     }
 
@@ -57,7 +70,11 @@ impl RawMessage {
         match self.bytes[..2] {
             [0, 1] => cdr_encoding::from_bytes::<M, LittleEndian>(fields),
             [0, 0] => cdr_encoding::from_bytes::<M, BigEndian>(fields),
-            [high, low] => return Err(format!("encoding {high:02x}{low:02x} is not plain CDR (0000 or 0001)")),
+            [high, low] => {
+                return Err(format!(
+                    "encoding {high:02x}{low:02x} is not plain CDR (0000 or 0001)"
+                ));
+            }
             _ => return Err("no encoding header".into()),
         }
         .map(|(message, _)| message)
@@ -84,7 +101,8 @@ impl RawMessage {
 pub struct Received<M> {
     /// The message.
     pub message: M,
-    /// When the publisher sent it, by the system clock of the publisher's machine; none where it does not say.
+    /// When the publisher sent it, by the system clock of the publisher's machine; none where it
+    /// does not say.
     pub source_stamp: Option<Stamp>,
     /// When it arrived here, by the system clock.
     pub received_stamp: Stamp,
@@ -95,7 +113,9 @@ pub struct Received<M> {
 }
 
 /// The 16 bytes by which DDS knows a publisher, a subscription or a participant.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
+)]
 pub struct Gid([u8; 16]);
 
 impl Gid {
@@ -123,7 +143,8 @@ impl From<Gid> for ros2_client::Gid {
     }
 }
 
-/// Ours, since ros2-client's conversion rounds down and loses a nanosecond. DDS counts fractions of 2^-32 s, rounded down; rounding up gives back the very nanosecond.
+/// Ours, since ros2-client's conversion rounds down and loses a nanosecond. DDS counts fractions of
+/// 2^-32 s, rounded down; rounding up gives back the very nanosecond.
 pub(crate) fn stamp_from_dds(timestamp: Timestamp) -> Option<Stamp> {
     if timestamp == Timestamp::INVALID || timestamp == Timestamp::INFINITE {
         return None;
@@ -158,8 +179,14 @@ impl DeserializerAdapter<RawMessage> for RawAdapter {
     type Decoded = RawMessage;
 
     fn supported_encodings() -> &'static [RepresentationIdentifier] {
-        const SUPPORTED: [RepresentationIdentifier; 6] =
-            [ENCODINGS[0].0, ENCODINGS[1].0, ENCODINGS[2].0, ENCODINGS[3].0, ENCODINGS[4].0, ENCODINGS[5].0];
+        const SUPPORTED: [RepresentationIdentifier; 6] = [
+            ENCODINGS[0].0,
+            ENCODINGS[1].0,
+            ENCODINGS[2].0,
+            ENCODINGS[3].0,
+            ENCODINGS[4].0,
+            ENCODINGS[5].0,
+        ];
         &SUPPORTED
     }
 
@@ -176,8 +203,15 @@ impl DefaultDecoder<RawMessage> for RawAdapter {
 impl<'de> Decode<'de, RawMessage> for RawDecoder {
     type Error = Never;
 
-    fn decode_bytes(self, fields: &'de [u8], encoding: RepresentationIdentifier) -> Result<RawMessage, Never> {
-        let low = ENCODINGS.iter().find(|(known, _)| *known == encoding).map_or(LITTLE_ENDIAN_CDR[1], |(_, low)| *low);
+    fn decode_bytes(
+        self,
+        fields: &'de [u8],
+        encoding: RepresentationIdentifier,
+    ) -> Result<RawMessage, Never> {
+        let low = ENCODINGS
+            .iter()
+            .find(|(known, _)| *known == encoding)
+            .map_or(LITTLE_ENDIAN_CDR[1], |(_, low)| *low);
         let mut bytes = Vec::with_capacity(HEADER_LENGTH + fields.len());
         bytes.extend_from_slice(&[0, low, 0, 0]);
         bytes.extend_from_slice(fields);
@@ -209,13 +243,48 @@ mod tests {
             small: u8,
             large: f64,
         }
-        let raw = RawMessage::encode(&Mixed { small: 7, large: 1.0 }).unwrap();
-        assert_eq!(raw.cdr(), [0, 1, 0, 0, 7, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xf0, 0x3f]);
-        assert_eq!(raw.decode::<Mixed>().unwrap(), Mixed { small: 7, large: 1.0 });
-        let big = RawMessage::from_cdr(vec![0, 0, 0, 0, 7, 0, 0, 0, 0, 0, 0, 0, 0x3f, 0xf0, 0, 0, 0, 0, 0, 0]).unwrap();
-        assert_eq!(big.decode::<Mixed>().unwrap(), Mixed { small: 7, large: 1.0 });
-        assert!(RawMessage::from_cdr(vec![0, 1, 0, 0, 7]).unwrap().decode::<Mixed>().is_err());
-        assert!(RawMessage::from_cdr(vec![0, 0x11, 0, 0, 7]).unwrap().decode::<u8>().unwrap_err().contains("0011"));
+        let raw = RawMessage::encode(&Mixed {
+            small: 7,
+            large: 1.0,
+        })
+        .unwrap();
+        assert_eq!(
+            raw.cdr(),
+            [
+                0, 1, 0, 0, 7, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xf0, 0x3f
+            ]
+        );
+        assert_eq!(
+            raw.decode::<Mixed>().unwrap(),
+            Mixed {
+                small: 7,
+                large: 1.0
+            }
+        );
+        let big = RawMessage::from_cdr(vec![
+            0, 0, 0, 0, 7, 0, 0, 0, 0, 0, 0, 0, 0x3f, 0xf0, 0, 0, 0, 0, 0, 0,
+        ])
+        .unwrap();
+        assert_eq!(
+            big.decode::<Mixed>().unwrap(),
+            Mixed {
+                small: 7,
+                large: 1.0
+            }
+        );
+        assert!(
+            RawMessage::from_cdr(vec![0, 1, 0, 0, 7])
+                .unwrap()
+                .decode::<Mixed>()
+                .is_err()
+        );
+        assert!(
+            RawMessage::from_cdr(vec![0, 0x11, 0, 0, 7])
+                .unwrap()
+                .decode::<u8>()
+                .unwrap_err()
+                .contains("0011")
+        );
         assert!(RawMessage::from_cdr(vec![0, 1]).is_err());
     }
 
@@ -224,7 +293,10 @@ mod tests {
         for nanos in [0_u64, 1, 2, 999_999_999, 123_456_789, 333_333_333] {
             let fraction = (nanos << 32) / 1_000_000_000;
             let timestamp = Timestamp::from_ticks((1_700_000_000_u64 << 32) | fraction);
-            assert_eq!(stamp_from_dds(timestamp), Some(Stamp::from_nanos(1_700_000_000_000_000_000 + nanos as i64)));
+            assert_eq!(
+                stamp_from_dds(timestamp),
+                Some(Stamp::from_nanos(1_700_000_000_000_000_000 + nanos as i64))
+            );
         }
         assert_eq!(stamp_from_dds(Timestamp::INVALID), None);
     }

@@ -14,10 +14,12 @@ use crate::core::EndpointGuard;
 use crate::raw::{Gid, RawMessage, RawReader, Received, stamp_from_dds};
 use crate::wake::{Bell, lock};
 
-/// The receiving end of an endpoint. RustDDS's, since only ros2-client's `Node` makes subscriptions (see the crate's table).
+/// The receiving end of an endpoint. RustDDS's, since only ros2-client's `Node` makes subscriptions
+/// (see the crate's table).
 ///
-/// RustDDS forgets what it has received and confirmed but not yet handed out as soon as the publisher goes. So messages are taken out of
-/// it at once: by the thread that waits for them or, while that one is busy, by the node's thread.
+/// RustDDS forgets what it has received and confirmed but not yet handed out as soon as the
+/// publisher goes. So messages are taken out of it at once: by the thread that waits for them or,
+/// while that one is busy, by the node's thread.
 pub(crate) struct Reader {
     inbox: Arc<Inbox>,
     _guard: Option<EndpointGuard>,
@@ -31,8 +33,8 @@ pub(crate) struct ReaderOptions {
     pub(crate) helper: Option<Arc<Bell>>,
     /// At most this many messages wait to be taken, the oldest go first.
     pub(crate) limit: usize,
-    /// Messages that arrived before are not for this reader: RustDDS keeps one cache for each topic of a participant, where a second
-    /// subscription would find what came in long before it.
+    /// Messages that arrived before are not for this reader: RustDDS keeps one cache for each topic
+    /// of a participant, where a second subscription would find what came in long before it.
     pub(crate) skip_past: bool,
 }
 
@@ -73,13 +75,36 @@ pub(crate) struct Sample {
 }
 
 impl Reader {
-    pub(crate) fn new(reader: RawReader, guard: Option<EndpointGuard>, options: ReaderOptions) -> Self {
-        let ReaderOptions { bell, helper, limit, skip_past } = options;
-        let ringer = Arc::new(Ringer { bell: Mutex::new(bell), helper });
+    pub(crate) fn new(
+        reader: RawReader,
+        guard: Option<EndpointGuard>,
+        options: ReaderOptions,
+    ) -> Self {
+        let ReaderOptions {
+            bell,
+            helper,
+            limit,
+            skip_past,
+        } = options;
+        let ringer = Arc::new(Ringer {
+            bell: Mutex::new(bell),
+            helper,
+        });
         let waker = Waker::from(Arc::clone(&ringer));
         let not_before = skip_past.then(system_now);
-        let inbox = Inbox { reader, ringer, waker, queue: Mutex::default(), limit, overflow: AtomicU64::new(0), not_before };
-        Self { inbox: Arc::new(inbox), _guard: guard }
+        let inbox = Inbox {
+            reader,
+            ringer,
+            waker,
+            queue: Mutex::default(),
+            limit,
+            overflow: AtomicU64::new(0),
+            not_before,
+        };
+        Self {
+            inbox: Arc::new(inbox),
+            _guard: guard,
+        }
     }
 
     pub(crate) fn gid(&self) -> Gid {
@@ -130,7 +155,12 @@ impl Inbox {
     }
 
     fn take_all(&self, queue: &mut VecDeque<Result<Sample, String>>) {
-        while let Some(taken) = self.reader.try_take_one().map_err(|error| error.to_string()).transpose() {
+        while let Some(taken) = self
+            .reader
+            .try_take_one()
+            .map_err(|error| error.to_string())
+            .transpose()
+        {
             let sample = taken.map(Sample::from);
             if let (Ok(sample), Some(start)) = (&sample, self.not_before)
                 && sample.received.received_stamp < start
@@ -148,7 +178,10 @@ impl Inbox {
 
 impl From<DeserializedCacheChange<RawMessage>> for Sample {
     fn from(change: DeserializedCacheChange<RawMessage>) -> Self {
-        let identity = SampleIdentity { writer_guid: change.writer_guid, sequence_number: change.sequence_number };
+        let identity = SampleIdentity {
+            writer_guid: change.writer_guid,
+            sequence_number: change.sequence_number,
+        };
         let related = change.related_sample_identity();
         let received = Received {
             source_stamp: change.source_timestamp().and_then(stamp_from_dds),
@@ -157,7 +190,11 @@ impl From<DeserializedCacheChange<RawMessage>> for Sample {
             publisher: Gid::from(change.writer_guid),
             message: change.into_value(),
         };
-        Sample { received, identity, related }
+        Sample {
+            received,
+            identity,
+            related,
+        }
     }
 }
 
@@ -169,6 +206,8 @@ impl Drop for Inbox {
 
 /// The system clock.
 pub(crate) fn system_now() -> Stamp {
-    let nanos = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos());
+    let nanos = SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .map_or(0, |since| since.as_nanos());
     Stamp::from_nanos(i64::try_from(nanos).unwrap_or(i64::MAX))
 }

@@ -1,8 +1,10 @@
 //! Services: requests and responses on two topics, told apart by the identity of the request.
 //!
-//! The identity travels in the DDS sample header ("enhanced" mapping of RPC over DDS), as Fast DDS does it for ROS 2.
-//! On RustDDS: only ros2-client's `Node` makes servers and clients, and its announcement would contradict ours (see the crate's table).
-//! With `RMW_IMPLEMENTATION=rmw_cyclonedds_cpp` it travels in the first 16 bytes of the payload, as Cyclone DDS does it for ROS 2.
+//! The identity travels in the DDS sample header ("enhanced" mapping of RPC over DDS), as Fast DDS
+//! does it for ROS 2. On RustDDS: only ros2-client's `Node` makes servers and clients, and its
+//! announcement would contradict ours (see the crate's table). With
+//! `RMW_IMPLEMENTATION=rmw_cyclonedds_cpp` it travels in the first 16 bytes of the payload, as
+//! Cyclone DDS does it for ROS 2.
 
 use std::marker::PhantomData;
 use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
@@ -40,7 +42,8 @@ impl Mapping {
     }
 }
 
-/// Cyclone's 16 bytes before the fields: the second half of the client's identity, then the count of its requests.
+/// Cyclone's 16 bytes before the fields: the second half of the client's identity, then the count
+/// of its requests.
 #[derive(Serialize, serde::Deserialize)]
 struct PayloadHeader<B> {
     client_half: [u8; 8],
@@ -53,7 +56,12 @@ impl<B> PayloadHeader<B> {
     fn new(identity: SampleIdentity, body: B) -> Self {
         let mut client_half = [0; 8];
         client_half.copy_from_slice(&identity.writer_guid.to_bytes()[8..]);
-        Self { client_half, count_high: identity.sequence_number.high(), count_low: identity.sequence_number.low(), body }
+        Self {
+            client_half,
+            count_high: identity.sequence_number.high(),
+            count_low: identity.sequence_number.low(),
+            body,
+        }
     }
 
     fn identity(&self, first_half: GUID) -> SampleIdentity {
@@ -105,9 +113,26 @@ where
     Q: DeserializeOwned,
     A: Serialize,
 {
-    let requests = core.reader(Kind::Request, &name, &format!("{type_name}_Request"), Qos::services(), Arc::clone(&core.bell))?;
-    let (responses, guard) = core.writer(Kind::Response, &name, &format!("{type_name}_Response"), Qos::services())?;
-    let serving = Serving { requests, responses, _guard: guard, mapping: Mapping::from_env(), name: name.clone() };
+    let requests = core.reader(
+        Kind::Request,
+        &name,
+        &format!("{type_name}_Request"),
+        Qos::services(),
+        Arc::clone(&core.bell),
+    )?;
+    let (responses, guard) = core.writer(
+        Kind::Response,
+        &name,
+        &format!("{type_name}_Response"),
+        Qos::services(),
+    )?;
+    let serving = Serving {
+        requests,
+        responses,
+        _guard: guard,
+        mapping: Mapping::from_env(),
+        name: name.clone(),
+    };
     let alive = Arc::new(AtomicBool::new(true));
     let goes_on = Arc::clone(&alive);
     core.add_worker(Box::new(move || {
@@ -124,11 +149,19 @@ where
         }
         false
     }));
-    Ok(ServiceServer { alive, core: Arc::clone(core), name })
+    Ok(ServiceServer {
+        alive,
+        core: Arc::clone(core),
+        name,
+    })
 }
 
 impl Serving {
-    fn answer<Q: DeserializeOwned, A: Serialize>(&self, sample: &Sample, handler: &mut impl FnMut(Q) -> A) -> Result<(), String> {
+    fn answer<Q: DeserializeOwned, A: Serialize>(
+        &self,
+        sample: &Sample,
+        handler: &mut impl FnMut(Q) -> A,
+    ) -> Result<(), String> {
         let message = &sample.received.message;
         let (identity, response) = match self.mapping {
             Mapping::Header => {
@@ -138,20 +171,39 @@ impl Serving {
             Mapping::Payload => {
                 let request: PayloadHeader<Q> = message.decode()?;
                 let identity = request.identity(sample.identity.writer_guid);
-                (identity, RawMessage::encode(&PayloadHeader::new(identity, handler(request.body)))?)
+                (
+                    identity,
+                    RawMessage::encode(&PayloadHeader::new(identity, handler(request.body)))?,
+                )
             }
         };
-        let options = WriteOptionsBuilder::new().source_timestamp(Timestamp::now()).related_sample_identity(identity).build();
-        self.responses.write_with_options(response, options).map(|_| ()).map_err(|error| error.to_string())
+        let options = WriteOptionsBuilder::new()
+            .source_timestamp(Timestamp::now())
+            .related_sample_identity(identity)
+            .build();
+        self.responses
+            .write_with_options(response, options)
+            .map(|_| ())
+            .map_err(|error| error.to_string())
     }
 }
 
-/// Who asked. Fast DDS names the reader of its answers as related identity and leaves the count open.
+/// Who asked. Fast DDS names the reader of its answers as related identity and leaves the count
+/// open.
 fn request_identity(sample: &Sample) -> SampleIdentity {
-    let Some(related) = sample.related else { return sample.identity };
+    let Some(related) = sample.related else {
+        return sample.identity;
+    };
     let count = related.sequence_number;
     let known = count != SequenceNumber::UNKNOWN && i64::from(count) > 0;
-    SampleIdentity { writer_guid: related.writer_guid, sequence_number: if known { count } else { sample.identity.sequence_number } }
+    SampleIdentity {
+        writer_guid: related.writer_guid,
+        sequence_number: if known {
+            count
+        } else {
+            sample.identity.sequence_number
+        },
+    }
 }
 
 /// Calls a service of another node.
@@ -171,11 +223,22 @@ pub struct ServiceClient<Q, A> {
 
 impl<Q: Serialize, A: DeserializeOwned> ServiceClient<Q, A> {
     pub(crate) fn new(core: &Arc<Core>, name: String, type_name: &str) -> RosResult<Self> {
-        let (requests, guard) = core.writer(Kind::Request, &name, &format!("{type_name}_Request"), Qos::services())?;
+        let (requests, guard) = core.writer(
+            Kind::Request,
+            &name,
+            &format!("{type_name}_Request"),
+            Qos::services(),
+        )?;
         let bell = Bell::new();
         core.shutdown.ring_at_request(&bell);
         core.graph.ring_at_change(&bell);
-        let responses = core.reader(Kind::Response, &name, &format!("{type_name}_Response"), Qos::services(), bell)?;
+        let responses = core.reader(
+            Kind::Response,
+            &name,
+            &format!("{type_name}_Response"),
+            Qos::services(),
+            bell,
+        )?;
         Ok(Self {
             requests,
             _guard: guard,
@@ -192,7 +255,8 @@ impl<Q: Serialize, A: DeserializeOwned> ServiceClient<Q, A> {
 
     /// True where a server reads requests and sends answers.
     pub fn is_available(&self) -> bool {
-        self.core.graph.matched(self._guard.gid) > 0 && self.core.graph.matched(self.responses.gid()) > 0
+        self.core.graph.matched(self._guard.gid) > 0
+            && self.core.graph.matched(self.responses.gid()) > 0
     }
 
     /// Waits for a server. False where `timeout` was over or the process is ending.
@@ -207,7 +271,10 @@ impl<Q: Serialize, A: DeserializeOwned> ServiceClient<Q, A> {
     pub fn call(&self, request: &Q, timeout: Duration) -> RosResult<A> {
         let _one_at_a_time = lock(&self.calling);
         let start = Instant::now();
-        let late = || RosError::ServiceTimeout { service: self.name.clone(), waited: timeout };
+        let late = || RosError::ServiceTimeout {
+            service: self.name.clone(),
+            waited: timeout,
+        };
         if !self.wait_for_service(timeout) {
             return Err(late());
         }
@@ -216,7 +283,10 @@ impl<Q: Serialize, A: DeserializeOwned> ServiceClient<Q, A> {
         self.core.graph.settle(self._guard.gid);
         let asked = self.send(request)?;
         loop {
-            let sample = self.responses.take().map_err(|problem| dds(format!("receive from service {}", self.name), problem))?;
+            let sample = self
+                .responses
+                .take()
+                .map_err(|problem| dds(format!("receive from service {}", self.name), problem))?;
             if let Some(sample) = sample {
                 match self.answer_to(asked, &sample) {
                     Some(answer) => return answer,
@@ -224,7 +294,9 @@ impl<Q: Serialize, A: DeserializeOwned> ServiceClient<Q, A> {
                 }
             }
             if self.core.shutdown.is_requested() {
-                return Err(RosError::Interrupted { doing: format!("service {}", self.name) });
+                return Err(RosError::Interrupted {
+                    doing: format!("service {}", self.name),
+                });
             }
             if !self.responses.bell().wait_until(Some(start + timeout)) {
                 return Err(late());
@@ -236,19 +308,28 @@ impl<Q: Serialize, A: DeserializeOwned> ServiceClient<Q, A> {
         let builder = WriteOptionsBuilder::new().source_timestamp(Timestamp::now());
         let written = match self.mapping {
             Mapping::Header => {
-                let raw = RawMessage::encode(request).map_err(|problem| self.encoding("encode", problem))?;
+                let raw = RawMessage::encode(request)
+                    .map_err(|problem| self.encoding("encode", problem))?;
                 self.requests.write_with_options(raw, builder.build())
             }
             Mapping::Payload => {
                 let count = SequenceNumber::new(self.count.fetch_add(1, Ordering::SeqCst) + 1);
                 use rustdds::RTPSEntity;
-                let identity = SampleIdentity { writer_guid: self.requests.guid(), sequence_number: count };
-                let raw = RawMessage::encode(&PayloadHeader::new(identity, request)).map_err(|problem| self.encoding("encode", problem))?;
-                self.requests.write_with_options(raw, builder.related_sample_identity(identity).build()).map(|_| identity)
+                let identity = SampleIdentity {
+                    writer_guid: self.requests.guid(),
+                    sequence_number: count,
+                };
+                let raw = RawMessage::encode(&PayloadHeader::new(identity, request))
+                    .map_err(|problem| self.encoding("encode", problem))?;
+                self.requests
+                    .write_with_options(raw, builder.related_sample_identity(identity).build())
+                    .map(|_| identity)
             }
         };
         written.map_err(|error| match error {
-            WriteError::WouldBlock { .. } => RosError::WindowFull { topic: self.name.clone() },
+            WriteError::WouldBlock { .. } => RosError::WindowFull {
+                topic: self.name.clone(),
+            },
             other => dds(format!("call service {}", self.name), other),
         })
     }
@@ -258,7 +339,11 @@ impl<Q: Serialize, A: DeserializeOwned> ServiceClient<Q, A> {
         let message = &sample.received.message;
         match self.mapping {
             Mapping::Header if sample.related != Some(asked) => None,
-            Mapping::Header => Some(message.decode().map_err(|problem| self.encoding("decode", problem))),
+            Mapping::Header => Some(
+                message
+                    .decode()
+                    .map_err(|problem| self.encoding("decode", problem)),
+            ),
             Mapping::Payload => match message.decode::<PayloadHeader<A>>() {
                 Ok(answer) if answer.identity(asked.writer_guid) == asked => Some(Ok(answer.body)),
                 Ok(_) => None,
@@ -268,7 +353,12 @@ impl<Q: Serialize, A: DeserializeOwned> ServiceClient<Q, A> {
     }
 
     fn encoding(&self, action: &'static str, problem: String) -> RosError {
-        RosError::Encoding { place: self.name.clone(), action, type_name: self.type_name.clone(), problem }
+        RosError::Encoding {
+            place: self.name.clone(),
+            action,
+            type_name: self.type_name.clone(),
+            problem,
+        }
     }
 
     /// The service, absolute.

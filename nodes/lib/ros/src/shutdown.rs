@@ -29,7 +29,8 @@ impl Shutdown {
         Self::default()
     }
 
-    /// The process's own request, made by the first SIGINT or SIGTERM; a second signal ends the process at once.
+    /// The process's own request, made by the first SIGINT or SIGTERM; a second signal ends the
+    /// process at once.
     ///
     /// # Errors
     /// Where the system refuses signal handlers.
@@ -38,7 +39,10 @@ impl Shutdown {
         INSTALLED
             .get_or_init(|| install().map_err(|error| error.to_string()))
             .clone()
-            .map_err(|problem| RosError::Argument { place: "signal handlers".into(), problem })
+            .map_err(|problem| RosError::Argument {
+                place: "signal handlers".into(),
+                problem,
+            })
     }
 
     /// Asks every loop to end.
@@ -79,18 +83,28 @@ fn install() -> std::io::Result<Shutdown> {
     let shutdown = Shutdown::new();
     let second_ends = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM] {
-        // In this order: the first signal finds the flag unset and sets it, the second finds it set.
+        // In this order: the first signal finds the flag unset and sets it, the second finds it
+        // set.
         signal_hook::flag::register_conditional_default(signal, Arc::clone(&second_ends))?;
         signal_hook::flag::register(signal, Arc::clone(&second_ends))?;
     }
     let mut signals = Signals::new([SIGINT, SIGTERM])?;
     let requester = shutdown.clone();
-    std::thread::Builder::new().name("signals".into()).spawn(move || {
-        if let Some(signal) = signals.forever().next() {
-            log::info!("{}: ending", if signal == SIGINT { "SIGINT" } else { "SIGTERM" });
-            requester.request();
-        }
-    })?;
+    std::thread::Builder::new()
+        .name("signals".into())
+        .spawn(move || {
+            if let Some(signal) = signals.forever().next() {
+                log::info!(
+                    "{}: ending",
+                    if signal == SIGINT {
+                        "SIGINT"
+                    } else {
+                        "SIGTERM"
+                    }
+                );
+                requester.request();
+            }
+        })?;
     Ok(shutdown)
 }
 

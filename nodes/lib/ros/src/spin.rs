@@ -19,7 +19,8 @@ use crate::parameter::{Parameters, USE_SIM_TIME};
 use crate::qos::Qos;
 use crate::wake::lock;
 
-/// Starts the node's thread: it keeps the graph, pumps subscriptions, answers services and follows `/clock`.
+/// Starts the node's thread: it keeps the graph, pumps subscriptions, answers services and follows
+/// `/clock`.
 pub(crate) fn spawn_thread(core: &Arc<Core>, parameters: &Parameters) -> RosResult<JoinHandle<()>> {
     let name = core.name.name().to_owned();
     let mut workers: Vec<Worker> = vec![discovery_worker(core)?, clock_worker(core, parameters)];
@@ -27,12 +28,15 @@ pub(crate) fn spawn_thread(core: &Arc<Core>, parameters: &Parameters) -> RosResu
     std::thread::Builder::new()
         .name(name.clone())
         .spawn(move || {
-            // RustDDS's own: ros2-client's Spinner reads `/clock` as a bare Time, whatever `use_sim_time` says, and needs its Node.
+            // RustDDS's own: ros2-client's Spinner reads `/clock` as a bare Time, whatever
+            // `use_sim_time` says, and needs its Node.
             let listener = core.participant.status_listener();
             let mut events = pin!(listener.as_async_status_stream());
             let waker = core.bell.waker();
             loop {
-                while let Poll::Ready(Some(event)) = events.as_mut().poll_next(&mut Context::from_waker(&waker)) {
+                while let Poll::Ready(Some(event)) =
+                    events.as_mut().poll_next(&mut Context::from_waker(&waker))
+                {
                     core.graph.handle(&event);
                 }
                 workers.append(&mut lock(&core.new_workers));
@@ -44,7 +48,8 @@ pub(crate) fn spawn_thread(core: &Arc<Core>, parameters: &Parameters) -> RosResu
                 if core.stopping.load(Ordering::SeqCst) && !some_stay {
                     return;
                 }
-                core.bell.wait(some_stay.then_some(Duration::from_millis(10)));
+                core.bell
+                    .wait(some_stay.then_some(Duration::from_millis(10)));
             }
         })
         .map_err(|error| dds(format!("start the thread of node {name}"), error))
@@ -55,12 +60,18 @@ fn discovery_worker(core: &Arc<Core>) -> RosResult<Worker> {
     let reader = core.info_reader()?;
     let core = Arc::downgrade(core);
     Ok(Box::new(move || {
-        let Some(core) = core.upgrade() else { return false };
+        let Some(core) = core.upgrade() else {
+            return false;
+        };
         loop {
-            match reader.take().map(|sample| sample.map(|sample| sample.received.message.decode::<ParticipantInfo>())) {
+            match reader.take().map(|sample| {
+                sample.map(|sample| sample.received.message.decode::<ParticipantInfo>())
+            }) {
                 Ok(None) => return true,
                 Ok(Some(Ok(info))) => core.graph.handle_info(info),
-                Ok(Some(Err(problem))) | Err(problem) => log::debug!("ros_discovery_info: {problem}"),
+                Ok(Some(Err(problem))) | Err(problem) => {
+                    log::debug!("ros_discovery_info: {problem}")
+                }
             }
         }
     }))
@@ -73,7 +84,9 @@ fn clock_worker(core: &Arc<Core>, parameters: &Parameters) -> Worker {
     let core = Arc::downgrade(core);
     let mut reader = None;
     Box::new(move || {
-        let Some(core) = core.upgrade() else { return false };
+        let Some(core) = core.upgrade() else {
+            return false;
+        };
         let simulated = parameters.get(USE_SIM_TIME).unwrap_or(false);
         if simulated != core.clock.is_simulated() {
             core.clock.set_simulated(simulated);
@@ -83,8 +96,16 @@ fn clock_worker(core: &Arc<Core>, parameters: &Parameters) -> Worker {
             return true;
         }
         if reader.is_none() {
-            let made = core.reader(Kind::Topic, "/clock", ClockMessage::TYPE_NAME, Qos::clock(), Arc::clone(&core.bell));
-            reader = made.inspect_err(|error: &RosError| log::error!("use_sim_time: {error}")).ok();
+            let made = core.reader(
+                Kind::Topic,
+                "/clock",
+                ClockMessage::TYPE_NAME,
+                Qos::clock(),
+                Arc::clone(&core.bell),
+            );
+            reader = made
+                .inspect_err(|error: &RosError| log::error!("use_sim_time: {error}"))
+                .ok();
         }
         while let Some(taken) = reader.as_ref().and_then(|reader| reader.take().transpose()) {
             match taken.and_then(|sample| sample.received.message.decode::<ClockMessage>()) {

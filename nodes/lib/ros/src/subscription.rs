@@ -27,11 +27,22 @@ pub struct RawSubscription {
 }
 
 impl RawSubscription {
-    pub(crate) fn new(core: &Arc<Core>, topic: String, type_name: &str, qos: Qos) -> RosResult<Self> {
+    pub(crate) fn new(
+        core: &Arc<Core>,
+        topic: String,
+        type_name: &str,
+        qos: Qos,
+    ) -> RosResult<Self> {
         let bell = Bell::new();
         core.shutdown.ring_at_request(&bell);
         let reader = core.reader(Kind::Topic, &topic, type_name, qos, bell)?;
-        Ok(Self { reader, core: Arc::clone(core), topic, type_name: type_name.to_owned(), qos })
+        Ok(Self {
+            reader,
+            core: Arc::clone(core),
+            topic,
+            type_name: type_name.to_owned(),
+            qos,
+        })
     }
 
     /// The next message, without waiting. Where there is none, the bell rings at the next one.
@@ -50,7 +61,9 @@ impl RawSubscription {
     /// # Errors
     /// Where DDS fails on one message; the next call goes on behind it.
     pub fn recv(&self) -> RosResult<Option<Received<RawMessage>>> {
-        wait_for(&self.reader.bell(), &self.core.shutdown, None, || self.try_recv())
+        wait_for(&self.reader.bell(), &self.core.shutdown, None, || {
+            self.try_recv()
+        })
     }
 
     /// The next message; none where `timeout` was over or the process is ending.
@@ -58,11 +71,17 @@ impl RawSubscription {
     /// # Errors
     /// Where DDS fails on one message; the next call goes on behind it.
     pub fn recv_timeout(&self, timeout: Duration) -> RosResult<Option<Received<RawMessage>>> {
-        wait_for(&self.reader.bell(), &self.core.shutdown, Some(Instant::now() + timeout), || self.try_recv())
+        wait_for(
+            &self.reader.bell(),
+            &self.core.shutdown,
+            Some(Instant::now() + timeout),
+            || self.try_recv(),
+        )
     }
 
-    /// From now on arriving messages ring this bell, so that one thread can wait for several subscriptions: wait for the bell, then
-    /// call `try_recv` of each until it has none. A shutdown rings it too.
+    /// From now on arriving messages ring this bell, so that one thread can wait for several
+    /// subscriptions: wait for the bell, then call `try_recv` of each until it has none. A shutdown
+    /// rings it too.
     pub fn ring(&self, bell: Arc<Bell>) {
         self.core.shutdown.ring_at_request(&bell);
         self.reader.ring(bell);
@@ -98,9 +117,12 @@ impl RawSubscription {
         self.core.graph.matched(self.gid())
     }
 
-    /// Waits for `count` matched publishers. False where `timeout` was over or the process is ending.
+    /// Waits for `count` matched publishers. False where `timeout` was over or the process is
+    /// ending.
     pub fn wait_for_publishers(&self, count: usize, timeout: Duration) -> bool {
-        self.core.graph.wait_until(timeout, || self.publisher_count() >= count)
+        self.core
+            .graph
+            .wait_until(timeout, || self.publisher_count() >= count)
     }
 
     fn decode<M: DeserializeOwned>(&self, raw: Received<RawMessage>) -> RosResult<Received<M>> {
@@ -144,7 +166,10 @@ pub struct Subscription<M> {
 
 impl<M: RosMessage> Subscription<M> {
     pub(crate) fn new(core: &Arc<Core>, topic: String, qos: Qos) -> RosResult<Self> {
-        Ok(Self { raw: RawSubscription::new(core, topic, M::TYPE_NAME, qos)?, message: PhantomData })
+        Ok(Self {
+            raw: RawSubscription::new(core, topic, M::TYPE_NAME, qos)?,
+            message: PhantomData,
+        })
     }
 
     /// The next message, without waiting. Where there is none, the bell rings at the next one.
@@ -152,7 +177,10 @@ impl<M: RosMessage> Subscription<M> {
     /// # Errors
     /// Where DDS fails on one message or its bytes are not an `M`; the next call goes on behind it.
     pub fn try_recv(&self) -> RosResult<Option<Received<M>>> {
-        self.raw.try_recv()?.map(|raw| self.raw.decode(raw)).transpose()
+        self.raw
+            .try_recv()?
+            .map(|raw| self.raw.decode(raw))
+            .transpose()
     }
 
     /// The next message, waiting for it as long as it takes; none once the process is ending.
@@ -160,7 +188,12 @@ impl<M: RosMessage> Subscription<M> {
     /// # Errors
     /// Where DDS fails on one message or its bytes are not an `M`; the next call goes on behind it.
     pub fn recv(&self) -> RosResult<Option<Received<M>>> {
-        wait_for(&self.raw.reader.bell(), &self.raw.core.shutdown, None, || self.try_recv())
+        wait_for(
+            &self.raw.reader.bell(),
+            &self.raw.core.shutdown,
+            None,
+            || self.try_recv(),
+        )
     }
 
     /// The next message; none where `timeout` was over or the process is ending.
@@ -168,7 +201,12 @@ impl<M: RosMessage> Subscription<M> {
     /// # Errors
     /// Where DDS fails on one message or its bytes are not an `M`; the next call goes on behind it.
     pub fn recv_timeout(&self, timeout: Duration) -> RosResult<Option<Received<M>>> {
-        wait_for(&self.raw.reader.bell(), &self.raw.core.shutdown, Some(Instant::now() + timeout), || self.try_recv())
+        wait_for(
+            &self.raw.reader.bell(),
+            &self.raw.core.shutdown,
+            Some(Instant::now() + timeout),
+            || self.try_recv(),
+        )
     }
 
     /// See [`RawSubscription::ring`].
@@ -176,7 +214,10 @@ impl<M: RosMessage> Subscription<M> {
         self.raw.ring(bell);
     }
 
-    pub(crate) fn run(self, mut callback: impl FnMut(Received<M>) + Send + 'static) -> RosResult<Listening>
+    pub(crate) fn run(
+        self,
+        mut callback: impl FnMut(Received<M>) + Send + 'static,
+    ) -> RosResult<Listening>
     where
         M: 'static,
     {
@@ -200,7 +241,10 @@ impl<M: RosMessage> Subscription<M> {
                 }
             })
             .map_err(|error| dds(format!("start a thread for {topic}"), error))?;
-        Ok(Listening { stop, thread: Some(thread) })
+        Ok(Listening {
+            stop,
+            thread: Some(thread),
+        })
     }
 }
 
@@ -212,7 +256,8 @@ impl<M> std::ops::Deref for Subscription<M> {
     }
 }
 
-/// A callback that is called for every message on its own thread; dropping it ends the subscription.
+/// A callback that is called for every message on its own thread; dropping it ends the
+/// subscription.
 pub struct Listening {
     stop: Shutdown,
     thread: Option<JoinHandle<()>>,

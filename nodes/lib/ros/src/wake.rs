@@ -4,7 +4,8 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::task::{Wake, Waker};
 use std::time::{Duration, Instant};
 
-/// A bell: rung by arriving messages, by a shutdown, or by hand; a thread sleeps until it rings. Rings before the wait are not lost.
+/// A bell: rung by arriving messages, by a shutdown, or by hand; a thread sleeps until it rings.
+/// Rings before the wait are not lost.
 #[derive(Debug, Default)]
 pub struct Bell {
     state: Mutex<State>,
@@ -49,9 +50,20 @@ impl Bell {
         state.waiting += 1;
         while !state.rung {
             match deadline.map(|deadline| deadline.saturating_duration_since(Instant::now())) {
-                None => state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner),
+                None => {
+                    state = self
+                        .changed
+                        .wait(state)
+                        .unwrap_or_else(PoisonError::into_inner)
+                }
                 Some(Duration::ZERO) => break,
-                Some(left) => state = self.changed.wait_timeout(state, left).unwrap_or_else(PoisonError::into_inner).0,
+                Some(left) => {
+                    state = self
+                        .changed
+                        .wait_timeout(state, left)
+                        .unwrap_or_else(PoisonError::into_inner)
+                        .0
+                }
             }
         }
         state.waiting -= 1;

@@ -13,11 +13,14 @@ pub(crate) struct Banded {
 
 impl Banded {
     pub(crate) fn zeros(size: usize) -> Self {
-        Self { rows: vec![[0.0; BANDWIDTH + 1]; size] }
+        Self {
+            rows: vec![[0.0; BANDWIDTH + 1]; size],
+        }
     }
 }
 
-/// L and D of `M = L D L^T`, L unit lower triangular: `rows[i][k]` is L's entry (i, i - k) for k > 0, `rows[i][0]` is 1 / D_i.
+/// L and D of `M = L D L^T`, L unit lower triangular: `rows[i][k]` is L's entry (i, i - k) for k >
+/// 0, `rows[i][0]` is 1 / D_i.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Factor {
     rows: Vec<[f64; BANDWIDTH + 1]>,
@@ -26,7 +29,12 @@ pub(crate) struct Factor {
 
 impl Factor {
     /// Factors `left + weight * right` in O(N), reusing this factor's memory.
-    pub(crate) fn factor_sum(&mut self, left: &Banded, weight: f64, right: &Banded) -> Result<(), SpatialError> {
+    pub(crate) fn factor_sum(
+        &mut self,
+        left: &Banded,
+        weight: f64,
+        right: &Banded,
+    ) -> Result<(), SpatialError> {
         self.rows.clear();
         self.rows.reserve(left.rows.len());
         let (mut log_determinant, mut product) = (0.0, 1.0_f64);
@@ -97,9 +105,14 @@ impl Factor {
         }
     }
 
-    /// The part that counts of `M^-1 right`, for a right side that is zero but for the rows from `first` on: rows and their first index. The
-    /// solution falls off geometrically on both sides; it is followed to `SMALL` of its largest entry, so that this costs its width and not N.
-    pub(crate) fn solve_near<const C: usize>(&self, first: usize, right: &[[f64; C]]) -> (usize, Vec<[f64; C]>) {
+    /// The part that counts of `M^-1 right`, for a right side that is zero but for the rows from
+    /// `first` on: rows and their first index. The solution falls off geometrically on both sides;
+    /// it is followed to `SMALL` of its largest entry, so that this costs its width and not N.
+    pub(crate) fn solve_near<const C: usize>(
+        &self,
+        first: usize,
+        right: &[[f64; C]],
+    ) -> (usize, Vec<[f64; C]>) {
         let mut forward: Vec<[f64; C]> = Vec::new();
         let mut most = [0.0_f64; C];
         for i in first..self.rows.len() {
@@ -111,7 +124,9 @@ impl Factor {
             (0..C).for_each(|c| most[c] = most[c].max(x[c].abs()));
             forward.push(x);
             let fallen = |row: &[f64; C]| (0..C).all(|c| row[c].abs() <= SMALL * most[c]);
-            if forward.len() > right.len() + BANDWIDTH && forward[forward.len() - BANDWIDTH..].iter().all(fallen) {
+            if forward.len() > right.len() + BANDWIDTH
+                && forward[forward.len() - BANDWIDTH..].iter().all(fallen)
+            {
                 break;
             }
         }
@@ -121,7 +136,11 @@ impl Factor {
         let mut most = [0.0_f64; C];
         for i in (0..end).rev() {
             let below = solved.len();
-            let mut x = if i >= first { forward[i - first].map(|z| z * self.rows[i][0]) } else { [0.0; C] };
+            let mut x = if i >= first {
+                forward[i - first].map(|z| z * self.rows[i][0])
+            } else {
+                [0.0; C]
+            };
             for k in 1..=BANDWIDTH.min(below) {
                 let (l, other) = (self.rows[i + k][k], solved[below - k]);
                 (0..C).for_each(|c| x[c] -= l * other[c]);
@@ -129,7 +148,11 @@ impl Factor {
             (0..C).for_each(|c| most[c] = most[c].max(x[c].abs()));
             solved.push(x);
             let fallen = |row: &[f64; C]| (0..C).all(|c| row[c].abs() <= SMALL * most[c]);
-            if i < first && solved[solved.len() - BANDWIDTH.min(solved.len())..].iter().all(fallen) {
+            if i < first
+                && solved[solved.len() - BANDWIDTH.min(solved.len())..]
+                    .iter()
+                    .all(fallen)
+            {
                 break;
             }
         }
@@ -192,8 +215,15 @@ mod tests {
             let (start, near) = factor.solve_near(first, &right);
             assert!(near.len() < 200, "{} rows of {size}", near.len());
             for (i, row) in whole.iter().enumerate() {
-                let found = i.checked_sub(start).and_then(|i| near.get(i)).copied().unwrap_or([0.0; 2]);
-                assert!((0..2).all(|c| (found[c] - row[c]).abs() < 1e-6), "row {i} from {first}: {found:?} {row:?}");
+                let found = i
+                    .checked_sub(start)
+                    .and_then(|i| near.get(i))
+                    .copied()
+                    .unwrap_or([0.0; 2]);
+                assert!(
+                    (0..2).all(|c| (found[c] - row[c]).abs() < 1e-6),
+                    "row {i} from {first}: {found:?} {row:?}"
+                );
             }
         }
     }
@@ -204,6 +234,9 @@ mod tests {
         left.rows[0][0] = 1.0;
         left.rows[1][0] = -1.0;
         let zero = Banded::zeros(3);
-        assert_eq!(Factor::default().factor_sum(&left, 0.0, &zero), Err(SpatialError::Singular { index: 1 }));
+        assert_eq!(
+            Factor::default().factor_sum(&left, 0.0, &zero),
+            Err(SpatialError::Singular { index: 1 })
+        );
     }
 }

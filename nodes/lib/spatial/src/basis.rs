@@ -9,7 +9,8 @@ pub(crate) const ORDER: usize = DEGREE + 1;
 /// Values, first and second derivatives of the basis functions at one point.
 pub(crate) type BasisValues = [[f64; ORDER]; 3];
 
-/// A quintic B-spline basis with a knot at every sample, six at each end: four functions more than samples.
+/// A quintic B-spline basis with a knot at every sample, six at each end: four functions more than
+/// samples.
 #[derive(Clone, Debug)]
 pub(crate) struct Basis {
     knots: Vec<f64>,
@@ -41,13 +42,15 @@ impl Basis {
         (self.knots[first + DEGREE], self.knots[first + DEGREE + 1])
     }
 
-    /// The interval that holds `t`, the first or last for times outside: also the first function over `t`.
+    /// The interval that holds `t`, the first or last for times outside: also the first function
+    /// over `t`.
     pub(crate) fn interval_of(&self, t: f64) -> usize {
         let inner = &self.knots[ORDER..self.count()];
         inner.partition_point(|&k| k <= t)
     }
 
-    /// The `order`-th derivatives at `t`, in interval `first`, of the functions `first ..= first + 5`; `order` at most five.
+    /// The `order`-th derivatives at `t`, in interval `first`, of the functions `first ..= first +
+    /// 5`; `order` at most five.
     pub(crate) fn derivatives(&self, first: usize, t: f64, order: usize) -> [f64; ORDER] {
         let mut values = [0.0; ORDER];
         values[0] = 1.0;
@@ -79,7 +82,8 @@ impl Basis {
         [value, slope, second]
     }
 
-    /// The ten knots that the functions over interval `first` depend on; the interval lies between the fifth and the sixth.
+    /// The ten knots that the functions over interval `first` depend on; the interval lies between
+    /// the fifth and the sixth.
     fn window(&self, first: usize) -> &[f64] {
         &self.knots[first + 1..first + 1 + 2 * DEGREE]
     }
@@ -97,8 +101,8 @@ fn raise_value(values: &mut [f64; ORDER], window: &[f64], q: usize, t: f64) {
     values[q] = carried;
 }
 
-/// Turns any derivative of the degree `q - 1` functions into the next derivative of those of degree `q`:
-/// `B'_i,q = q (B_i,q-1 / (k_i+q - k_i) - B_i+1,q-1 / (k_i+q+1 - k_i+1))`.
+/// Turns any derivative of the degree `q - 1` functions into the next derivative of those of degree
+/// `q`: `B'_i,q = q (B_i,q-1 / (k_i+q - k_i) - B_i+1,q-1 / (k_i+q+1 - k_i+1))`.
 fn raise_derivative(values: &mut [f64; ORDER], window: &[f64], q: usize) {
     let mut carried = 0.0;
     for j in 0..q {
@@ -115,7 +119,9 @@ mod tests {
     use super::*;
 
     fn uneven(count: usize) -> Vec<f64> {
-        (0..count).map(|k| k as f64 + 0.3 * (k as f64 * 1.7).sin()).collect()
+        (0..count)
+            .map(|k| k as f64 + 0.3 * (k as f64 * 1.7).sin())
+            .collect()
     }
 
     #[test]
@@ -123,7 +129,10 @@ mod tests {
         for count in [2, 3, 7, 30] {
             let times = uneven(count);
             let basis = Basis::new(&times);
-            assert_eq!((basis.count(), basis.interval_count()), (count + 4, count - 1));
+            assert_eq!(
+                (basis.count(), basis.interval_count()),
+                (count + 4, count - 1)
+            );
             for k in 0..=100 {
                 let t = times[0] + (times[count - 1] - times[0]) * f64::from(k) / 100.0;
                 let first = basis.interval_of(t);
@@ -131,10 +140,18 @@ mod tests {
                 assert!(start <= t && (t < end || first == count - 2));
                 let [value, slope, second] = basis.values(first, t);
                 assert!((value.iter().sum::<f64>() - 1.0).abs() < 1e-12);
-                assert!(slope.iter().sum::<f64>().abs() < 1e-11 && second.iter().sum::<f64>().abs() < 1e-10);
+                assert!(
+                    slope.iter().sum::<f64>().abs() < 1e-11
+                        && second.iter().sum::<f64>().abs() < 1e-10
+                );
                 for (order, expected) in [value, slope, second].iter().enumerate() {
                     let direct = basis.derivatives(first, t, order);
-                    assert!(direct.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12));
+                    assert!(
+                        direct
+                            .iter()
+                            .zip(expected)
+                            .all(|(a, b)| (a - b).abs() < 1e-12)
+                    );
                 }
             }
         }
@@ -146,9 +163,15 @@ mod tests {
         let (t, h) = (7.4, 1e-5);
         let first = basis.interval_of(t);
         for order in 0..5 {
-            let (before, after) = (basis.derivatives(first, t - h, order), basis.derivatives(first, t + h, order));
+            let (before, after) = (
+                basis.derivatives(first, t - h, order),
+                basis.derivatives(first, t + h, order),
+            );
             let next = basis.derivatives(first, t, order + 1);
-            assert!((0..ORDER).all(|j| ((after[j] - before[j]) / (2.0 * h) - next[j]).abs() < 1e-6), "order {order}");
+            assert!(
+                (0..ORDER).all(|j| ((after[j] - before[j]) / (2.0 * h) - next[j]).abs() < 1e-6),
+                "order {order}"
+            );
         }
     }
 }

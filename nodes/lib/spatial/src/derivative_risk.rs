@@ -16,7 +16,8 @@ pub enum Derivative {
     Second,
 }
 
-/// Step of the walk from the weight of the greatest likelihood, and how far it may go; decimal logarithms.
+/// Step of the walk from the weight of the greatest likelihood, and how far it may go; decimal
+/// logarithms.
 const STEP: f64 = 0.5;
 const FARTHEST: i32 = 8;
 /// The other half's derivative is taken with so much less smoothing that it is all but unbiased.
@@ -24,7 +25,8 @@ const PILOT_STEP: f64 = -1.0;
 /// Below this weight next to nothing is smoothed, and there is nothing to gain.
 const LEAST_WEIGHT: f64 = 1e-3;
 
-/// At a cut, where the series goes on beyond the run, so many samples are not compared: the run's end is none of the whole spline's.
+/// At a cut, where the series goes on beyond the run, so many samples are not compared: the run's
+/// end is none of the whole spline's.
 const CUT_MARGIN: usize = 32;
 
 /// One run of samples, split into every second sample and the others.
@@ -56,15 +58,25 @@ impl SplitRun {
         let margin = |cut: bool| if cut { CUT_MARGIN } else { 1 };
         let compared = margin(range.start > 0)..run.len() - margin(range.end < times.len());
         let half = |parity: usize| {
-            let system = SplineSystem::from_times(run[parity..].iter().step_by(2).copied().collect(), 1.0, 0.0);
+            let system = SplineSystem::from_times(
+                run[parity..].iter().step_by(2).copied().collect(),
+                1.0,
+                0.0,
+            );
             let row = |t: &f64| {
                 let first = system.basis.interval_of(*t);
-                (first as u32, system.basis.derivatives(first, *t, derivative.order()))
+                (
+                    first as u32,
+                    system.basis.derivatives(first, *t, derivative.order()),
+                )
             };
             let rows = run[compared.clone()].iter().map(row).collect();
             Half { system, rows }
         };
-        Self { halves: [half(0), half(1)], range }
+        Self {
+            halves: [half(0), half(1)],
+            range,
+        }
     }
 }
 
@@ -76,8 +88,9 @@ impl Derivative {
         }
     }
 
-    /// Variance of the derivative (per sample interval) that white noise of variance one leaves at a weight, away from the ends:
-    /// `1/pi integral of w^2k / (1 + weight w^10)^2 = weight^-a B(a, 2 - a) / (10 pi)`, a = (2 k + 1) / 10.
+    /// Variance of the derivative (per sample interval) that white noise of variance one leaves at
+    /// a weight, away from the ends: `1/pi integral of w^2k / (1 + weight w^10)^2 = weight^-a B(a,
+    /// 2 - a) / (10 pi)`, a = (2 k + 1) / 10.
     fn variance(self, weight: f64) -> f64 {
         let (a, beta) = match self {
             Self::First => (0.3, 2.718_255_454_215_654),
@@ -89,20 +102,36 @@ impl Derivative {
 
 /// The weight, near that of greatest `likelihood`, with the least error of the derivative.
 ///
-/// Likelihood trusts the prior; a derivative asks for more smoothing where the motion is smoother than the prior, for less where it is rougher.
-/// Each half of the samples is smoothed with a candidate, and its derivative compared with that of the other half, hardly smoothed: the noise
-/// of the halves is independent, so the mean square difference is bias^2 + variance of the candidate plus a constant. A half has twice the
-/// variance of the whole: once the variance that `noise` (of a sample and channel) leaves is taken off.
-pub(crate) fn refine<const C: usize>(runs: &[SplitRun], values: &[[f64; C]], likelihood: f64, noise: f64, derivative: Derivative) -> f64 {
+/// Likelihood trusts the prior; a derivative asks for more smoothing where the motion is smoother
+/// than the prior, for less where it is rougher. Each half of the samples is smoothed with a
+/// candidate, and its derivative compared with that of the other half, hardly smoothed: the noise
+/// of the halves is independent, so the mean square difference is bias^2 + variance of the
+/// candidate plus a constant. A half has twice the variance of the whole: once the variance that
+/// `noise` (of a sample and channel) leaves is taken off.
+pub(crate) fn refine<const C: usize>(
+    runs: &[SplitRun],
+    values: &[[f64; C]],
+    likelihood: f64,
+    noise: f64,
+    derivative: Derivative,
+) -> f64 {
     if likelihood < LEAST_WEIGHT {
         return likelihood;
     }
-    let Ok(mut works) = prepare(runs, values, likelihood * 10f64.powf(PILOT_STEP)) else { return likelihood };
+    let Ok(mut works) = prepare(runs, values, likelihood * 10f64.powf(PILOT_STEP)) else {
+        return likelihood;
+    };
     let count: usize = runs.iter().map(|run| 2 * run.halves[0].rows.len()).sum();
     let mut risk = |steps: i32| {
         let weight = likelihood * 10f64.powf(STEP * f64::from(steps));
-        let difference: Result<f64, SpatialError> = runs.iter().zip(&mut works).map(|(run, work)| difference(run, work, weight)).sum();
-        difference.map_or(f64::INFINITY, |sum| sum / count as f64 - C as f64 * noise * derivative.variance(weight))
+        let difference: Result<f64, SpatialError> = runs
+            .iter()
+            .zip(&mut works)
+            .map(|(run, work)| difference(run, work, weight))
+            .sum();
+        difference.map_or(f64::INFINITY, |sum| {
+            sum / count as f64 - C as f64 * noise * derivative.variance(weight)
+        })
     };
     // Downhill from the middle: left, here and right of the best so far.
     let mut steps: i32 = 0;
@@ -118,29 +147,58 @@ pub(crate) fn refine<const C: usize>(runs: &[SplitRun], values: &[[f64; C]], lik
     }
     let [left, here, right] = around;
     let bend = left - 2.0 * here + right;
-    let shift = if bend > 0.0 && bend.is_finite() { (0.5 * (left - right) / bend).clamp(-0.5, 0.5) } else { 0.0 };
+    let shift = if bend > 0.0 && bend.is_finite() {
+        (0.5 * (left - right) / bend).clamp(-0.5, 0.5)
+    } else {
+        0.0
+    };
     likelihood * 10f64.powf(STEP * (f64::from(steps) + shift))
 }
 
-fn prepare<const C: usize>(runs: &[SplitRun], values: &[[f64; C]], pilot_weight: f64) -> Result<Vec<[Work<C>; 2]>, SpatialError> {
+fn prepare<const C: usize>(
+    runs: &[SplitRun],
+    values: &[[f64; C]],
+    pilot_weight: f64,
+) -> Result<Vec<[Work<C>; 2]>, SpatialError> {
     let work = |run: &SplitRun, parity: usize| {
-        let values: Vec<[f64; C]> = values[run.range.clone()].iter().skip(parity).step_by(2).copied().collect();
+        let values: Vec<[f64; C]> = values[run.range.clone()]
+            .iter()
+            .skip(parity)
+            .step_by(2)
+            .copied()
+            .collect();
         let mut scratch = Scratch::default();
-        run.halves[parity].system.solve(&values, halved(pilot_weight), &mut scratch)?;
-        Ok(Work { values, pilot: scratch.coefficients.clone(), scratch })
+        run.halves[parity]
+            .system
+            .solve(&values, halved(pilot_weight), &mut scratch)?;
+        Ok(Work {
+            values,
+            pilot: scratch.coefficients.clone(),
+            scratch,
+        })
     };
-    runs.iter().map(|run| Ok([work(run, 0)?, work(run, 1)?])).collect()
+    runs.iter()
+        .map(|run| Ok([work(run, 0)?, work(run, 1)?]))
+        .collect()
 }
 
 /// Sum over a run of the square differences between each half's derivative and the other's pilot.
-fn difference<const C: usize>(run: &SplitRun, works: &mut [Work<C>; 2], weight: f64) -> Result<f64, SpatialError> {
+fn difference<const C: usize>(
+    run: &SplitRun,
+    works: &mut [Work<C>; 2],
+    weight: f64,
+) -> Result<f64, SpatialError> {
     for (half, work) in run.halves.iter().zip(works.iter_mut()) {
-        half.system.solve(&work.values, halved(weight), &mut work.scratch)?;
+        half.system
+            .solve(&work.values, halved(weight), &mut work.scratch)?;
     }
     let mut sum = 0.0;
     for parity in 0..2 {
         let (own, other) = (&run.halves[parity], &run.halves[1 - parity]);
-        let (smooth, pilot) = (&works[parity].scratch.coefficients, &works[1 - parity].pilot);
+        let (smooth, pilot) = (
+            &works[parity].scratch.coefficients,
+            &works[1 - parity].pilot,
+        );
         for (own_row, other_row) in own.rows.iter().zip(&other.rows) {
             let (a, b) = (apply(own_row, smooth), apply(other_row, pilot));
             sum += (0..C).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>();
@@ -154,7 +212,10 @@ fn halved(weight: f64) -> f64 {
     0.5 * weight
 }
 
-fn apply<const C: usize>((first, row): &(u32, [f64; ORDER]), coefficients: &[[f64; C]]) -> [f64; C] {
+fn apply<const C: usize>(
+    (first, row): &(u32, [f64; ORDER]),
+    coefficients: &[[f64; C]],
+) -> [f64; C] {
     let mut value = [0.0; C];
     for (coefficient, b) in coefficients[*first as usize..].iter().zip(row) {
         for c in 0..C {
@@ -175,43 +236,77 @@ mod tests {
     fn noise(count: usize) -> Vec<f64> {
         let mut state = 99_u64;
         let mut uniform = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             (state >> 11) as f64 / (1u64 << 53) as f64
         };
-        (0..count).map(|_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0).collect()
+        (0..count)
+            .map(|_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0)
+            .collect()
     }
 
-    /// Root mean square error of a derivative of a jittered sum of tones (), or of a jittered row of sharp bumps.
+    /// Root mean square error of a derivative of a jittered sum of tones (), or of a jittered row
+    /// of sharp bumps.
     fn error(smooth: bool, order: usize, smoothing: Smoothing) -> f64 {
         let signal = |t: f64| {
             if smooth {
                 let (w, v) = (TAU * 1.3, TAU * 2.9);
-                return [w * (w * t).cos() + 0.3 * v * (v * t).cos(), -w * w * (w * t).sin() - 0.3 * v * v * (v * t).sin()][order - 1];
+                return [
+                    w * (w * t).cos() + 0.3 * v * (v * t).cos(),
+                    -w * w * (w * t).sin() - 0.3 * v * v * (v * t).sin(),
+                ][order - 1];
             }
             let x = (t.fract() - 0.5) / 0.03;
             [-x / 0.03, (x * x - 1.0) / 0.0009][order - 1] * (-0.5 * x * x).exp()
         };
         let value = |t: f64| {
             let x = (t.fract() - 0.5) / 0.03;
-            if smooth { (TAU * 1.3 * t).sin() + 0.3 * (TAU * 2.9 * t).sin() } else { (-0.5 * x * x).exp() }
+            if smooth {
+                (TAU * 1.3 * t).sin() + 0.3 * (TAU * 2.9 * t).sin()
+            } else {
+                (-0.5 * x * x).exp()
+            }
         };
         let seconds: Vec<f64> = (0..1500).map(|k| 0.01 * f64::from(k)).collect();
-        let samples: Vec<[f64; 1]> = seconds.iter().zip(noise(1500)).map(|(t, n)| [value(*t) + 0.01 * n]).collect();
+        let samples: Vec<[f64; 1]> = seconds
+            .iter()
+            .zip(noise(1500))
+            .map(|(t, n)| [value(*t) + 0.01 * n])
+            .collect();
         let spline = SmoothingSpline::fit(&seconds, &samples, smoothing).unwrap();
         let inside = &seconds[50..1450];
-        (inside.iter().map(|t| (spline.evaluate(*t)[order][0] - signal(*t)).powi(2)).sum::<f64>() / 1400.0).sqrt()
+        (inside
+            .iter()
+            .map(|t| (spline.evaluate(*t)[order][0] - signal(*t)).powi(2))
+            .sum::<f64>()
+            / 1400.0)
+            .sqrt()
     }
 
     #[test]
     fn derivatives_are_within_a_tenth_of_the_best_that_any_weight_can_do() {
-        for (smooth, derivative, order) in
-            [(true, Derivative::First, 1), (true, Derivative::Second, 2), (false, Derivative::First, 1), (false, Derivative::Second, 2)]
-        {
+        for (smooth, derivative, order) in [
+            (true, Derivative::First, 1),
+            (true, Derivative::Second, 2),
+            (false, Derivative::First, 1),
+            (false, Derivative::Second, 2),
+        ] {
             let weights = (-24..=40).map(|e| Smoothing::Weight(10f64.powf(f64::from(e) * 0.25)));
-            let best = weights.map(|weight| error(smooth, order, weight)).fold(f64::INFINITY, f64::min);
-            let (likely, chosen) = (error(smooth, order, Smoothing::Automatic), error(smooth, order, Smoothing::AutomaticFor(derivative)));
-            println!("smooth {smooth}, derivative {order}: best {best:.4}, likelihood {likely:.4}, chosen {chosen:.4}");
-            assert!(chosen < 1.1 * best && chosen < 1.05 * likely, "{smooth} {order}");
+            let best = weights
+                .map(|weight| error(smooth, order, weight))
+                .fold(f64::INFINITY, f64::min);
+            let (likely, chosen) = (
+                error(smooth, order, Smoothing::Automatic),
+                error(smooth, order, Smoothing::AutomaticFor(derivative)),
+            );
+            println!(
+                "smooth {smooth}, derivative {order}: best {best:.4}, likelihood {likely:.4}, chosen {chosen:.4}"
+            );
+            assert!(
+                chosen < 1.1 * best && chosen < 1.05 * likely,
+                "{smooth} {order}"
+            );
         }
     }
 }

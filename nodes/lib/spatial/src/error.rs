@@ -14,7 +14,9 @@ pub enum SpatialError {
         needed: usize,
     },
     /// A time equals the one before it or goes backwards.
-    #[error("sample {index}: time {next} s does not come after {previous} s; sort the samples and drop duplicates")]
+    #[error(
+        "sample {index}: time {next} s does not come after {previous} s; sort the samples and drop duplicates"
+    )]
     TimeNotIncreasing {
         /// Index of the later sample.
         index: usize,
@@ -58,7 +60,9 @@ pub enum SpatialError {
         rate_hz: f64,
     },
     /// More samples than fit into memory.
-    #[error("{count:.3e} samples at {rate_hz} Hz; at most {limit:.0e} are made at once: lower the rate or cut the motion")]
+    #[error(
+        "{count:.3e} samples at {rate_hz} Hz; at most {limit:.0e} are made at once: lower the rate or cut the motion"
+    )]
     TooManyStamps {
         /// How many it would be.
         count: f64,
@@ -80,7 +84,9 @@ pub enum SpatialError {
         std: f64,
     },
     /// The normal equations are numerically singular: the times are too unevenly spaced.
-    #[error("the spline's equations are singular at sample {index}: intervals of very different lengths; split the series at its gaps")]
+    #[error(
+        "the spline's equations are singular at sample {index}: intervals of very different lengths; split the series at its gaps"
+    )]
     Singular {
         /// Row at which the factorisation broke down.
         index: usize,

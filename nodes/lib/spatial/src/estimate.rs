@@ -22,12 +22,16 @@ pub struct PoseNoise {
     pub rotation: f64,
 }
 
-/// A motion as poses at a steady rate report it, with what is noise in them told from what is motion.
+/// A motion as poses at a steady rate report it, with what is noise in them told from what is
+/// motion.
 ///
-/// Model: each coordinate (three of the position, four of the sign-continuous quaternion) is a stationary signal with white noise of density N.
-/// N is the floor of the Welch spectrum S; Wiener's filter `W(f) = max(0, 1 - N / S(f))`, zero where S is hardly above N, gives the estimate with the
-/// least mean square error, whose own error has the density `W N`. S is taken with short and long windows, whichever says more. Derivatives are taken in the Fourier domain, where they are exact.
-/// Holes between samples are filled by the likeliest series of the same spectrum and are reported by [`PoseEstimate::gaps`].
+/// Model: each coordinate (three of the position, four of the sign-continuous quaternion) is a
+/// stationary signal with white noise of density N. N is the floor of the Welch spectrum S;
+/// Wiener's filter `W(f) = max(0, 1 - N / S(f))`, zero where S is hardly above N, gives the
+/// estimate with the least mean square error, whose own error has the density `W N`. S is taken
+/// with short and long windows, whichever says more. Derivatives are taken in the Fourier domain,
+/// where they are exact. Holes between samples are filled by the likeliest series of the same
+/// spectrum and are reported by [`PoseEstimate::gaps`].
 #[derive(Clone, Debug)]
 pub struct PoseEstimate {
     start: Stamp,
@@ -47,18 +51,29 @@ pub struct PoseEstimate {
 }
 
 impl PoseEstimate {
-    /// Learns from poses in the order of time: `stamps`, positions [m], rotations (world_from_segment).
+    /// Learns from poses in the order of time: `stamps`, positions [m], rotations
+    /// (world_from_segment).
     ///
     /// # Errors
-    /// [`SpatialError::TooFewSamples`] below 16, [`SpatialError::TimeNotIncreasing`], [`SpatialError::NotFinite`],
-    /// [`SpatialError::LengthMismatch`].
-    pub fn fit(stamps: &[Stamp], positions: &[Vector3<f64>], rotations: &[UnitQuaternion<f64>]) -> Result<Self, SpatialError> {
+    /// [`SpatialError::TooFewSamples`] below 16, [`SpatialError::TimeNotIncreasing`],
+    /// [`SpatialError::NotFinite`], [`SpatialError::LengthMismatch`].
+    pub fn fit(
+        stamps: &[Stamp],
+        positions: &[Vector3<f64>],
+        rotations: &[UnitQuaternion<f64>],
+    ) -> Result<Self, SpatialError> {
         check(stamps, positions, rotations)?;
         let raster = Raster::new(stamps)?;
         let quaternions = so3::sign_continuous(rotations);
         let coordinates: Vec<Vec<f64>> = (0..7)
             .map(|channel| {
-                let of = |index: usize| if channel < 3 { positions[index][channel] } else { quaternions[index].coords[channel - 3] };
+                let of = |index: usize| {
+                    if channel < 3 {
+                        positions[index][channel]
+                    } else {
+                        quaternions[index].coords[channel - 3]
+                    }
+                };
                 raster.resample(stamps, of)
             })
             .collect();
@@ -69,18 +84,32 @@ impl PoseEstimate {
         let rate_hz = raster.rate_hz;
         let holes = raster.holes();
         let learn = |coordinates: &[Vec<f64>]| {
-            [Floor::learn(&coordinates[..3], rate_hz, LARGEST_RISE[0]), Floor::learn(&coordinates[3..], rate_hz, LARGEST_RISE[1])]
+            [
+                Floor::learn(&coordinates[..3], rate_hz, LARGEST_RISE[0]),
+                Floor::learn(&coordinates[3..], rate_hz, LARGEST_RISE[1]),
+            ]
         };
         let mut floors = learn(&coordinates);
         // Twice, because the first spectra saw straight lines across the holes.
         for _ in 0..if holes.is_empty() { 0 } else { 2 } {
-            let transform = FourierPair::new(FourierPair::good_length(raster.count + (4.0 * rate_hz) as usize));
+            let transform = FourierPair::new(FourierPair::good_length(
+                raster.count + (4.0 * rate_hz) as usize,
+            ));
             let (positions, quaternions) = coordinates.split_at_mut(3);
             fill_holes(positions, &holes, floors[0].spectrum(), &transform, rate_hz);
-            fill_holes(quaternions, &holes, floors[1].spectrum(), &transform, rate_hz);
+            fill_holes(
+                quaternions,
+                &holes,
+                floors[1].spectrum(),
+                &transform,
+                rate_hz,
+            );
             floors = learn(&coordinates);
         }
-        let local = [local_spectra(&coordinates[..3], rate_hz), local_spectra(&coordinates[3..], rate_hz)];
+        let local = [
+            local_spectra(&coordinates[..3], rate_hz),
+            local_spectra(&coordinates[3..], rate_hz),
+        ];
         let [mut position, mut rotation] = floors;
         // Beyond the ends as well: what is likely there keeps the last poses' derivatives sound.
         let lead = ((LEAD_S * rate_hz) as usize).min(300).min(raster.count / 4);
@@ -111,7 +140,8 @@ impl PoseEstimate {
 
     /// Time of the last pose.
     pub fn end(&self) -> Stamp {
-        self.start.plus_seconds((self.count - 1) as f64 / self.rate_hz)
+        self.start
+            .plus_seconds((self.count - 1) as f64 / self.rate_hz)
     }
 
     /// Rate of the poses, Hz.
@@ -124,112 +154,211 @@ impl PoseEstimate {
         &self.gaps
     }
 
-    /// White noise of the poses. A rotation vector's variance per axis is 4/3 of the quaternion components' sum.
+    /// White noise of the poses. A rotation vector's variance per axis is 4/3 of the quaternion
+    /// components' sum.
     pub fn noise(&self) -> PoseNoise {
         let sigma = |density: f64| (density * self.rate_hz / 2.0).sqrt();
-        PoseNoise { position: sigma(self.position.white), rotation: sigma(self.rotation.white * 16.0 / 3.0) }
+        PoseNoise {
+            position: sigma(self.position.white),
+            rotation: sigma(self.rotation.white * 16.0 / 3.0),
+        }
     }
 
-    /// Mean spectra of position per axis [m2/Hz] and of the rotation vector per axis [rad2/Hz], noise included.
+    /// Mean spectra of position per axis [m2/Hz] and of the rotation vector per axis [rad2/Hz],
+    /// noise included.
     pub fn spectra(&self) -> (Spectrum, Spectrum) {
         let mut rotation = self.rotation.spectrum().clone();
-        rotation.density.iter_mut().for_each(|value| *value *= 16.0 / 3.0);
+        rotation
+            .density
+            .iter_mut()
+            .for_each(|value| *value *= 16.0 / 3.0);
         (self.position.spectrum().clone(), rotation)
     }
 
-    /// The estimate with a zero-phase smoothing of the poses undone (second-order Butterworth of this cutoff, forwards and backwards), up to a
-    /// factor of 8.
+    /// The estimate with a zero-phase smoothing of the poses undone (second-order Butterworth of
+    /// this cutoff, forwards and backwards), up to a factor of 8.
     #[must_use]
     pub fn undoing(&self, cutoff_hz: f64) -> Self {
         let mut undone = self.clone();
         undone.position = self.position.undoing(cutoff_hz, self.rate_hz);
         undone.rotation = self.rotation.undoing(cutoff_hz, self.rate_hz);
-        undone.position.localise(&self.local[0], self.rate_hz, Some(cutoff_hz));
-        undone.rotation.localise(&self.local[1], self.rate_hz, Some(cutoff_hz));
+        undone
+            .position
+            .localise(&self.local[0], self.rate_hz, Some(cutoff_hz));
+        undone
+            .rotation
+            .localise(&self.local[1], self.rate_hz, Some(cutoff_hz));
         undone.undone_hz = Some(cutoff_hz);
         undone
     }
 
-    /// One-sided density per axis of the estimate's error at a frequency: position [m2/Hz], rotation vector [rad2/Hz].
+    /// One-sided density per axis of the estimate's error at a frequency: position [m2/Hz],
+    /// rotation vector [rad2/Hz].
     pub fn error_density(&self, frequency_hz: f64) -> (f64, f64) {
         let density = |floor: &Floor| floor.noise_at(frequency_hz) * floor.filter_at(frequency_hz);
-        (density(&self.position), density(&self.rotation) * 16.0 / 3.0)
+        (
+            density(&self.position),
+            density(&self.rotation) * 16.0 / 3.0,
+        )
     }
 
-    /// Share of the motion at a frequency that the estimate keeps, of position and of rotation, and the gain that undoes a smoothing.
+    /// Share of the motion at a frequency that the estimate keeps, of position and of rotation, and
+    /// the gain that undoes a smoothing.
     pub fn filter_at(&self, frequency_hz: f64) -> (f64, f64, f64) {
         let gain = undo(frequency_hz, self.undone_hz, self.rate_hz);
-        (self.position.filter_at(frequency_hz), self.rotation.filter_at(frequency_hz), gain.min(LARGEST_LOSS))
+        (
+            self.position.filter_at(frequency_hz),
+            self.rotation.filter_at(frequency_hz),
+            gain.min(LARGEST_LOSS),
+        )
     }
 
-    /// The kinematics on a grid that serves an IMU of some rate: at least that and 200 Hz, which resolves all motion that poses show.
+    /// The kinematics on a grid that serves an IMU of some rate: at least that and 200 Hz, which
+    /// resolves all motion that poses show.
     pub fn track_for(&self, imu_rate_hz: f64) -> KinematicTrack {
         self.track(imu_rate_hz.max(200.0))
     }
 
-    /// The kinematics on a grid of at least `least_rate_hz`, a whole multiple of the poses' rate, from the first pose to the last.
+    /// The kinematics on a grid of at least `least_rate_hz`, a whole multiple of the poses' rate,
+    /// from the first pose to the last.
     pub fn track(&self, least_rate_hz: f64) -> KinematicTrack {
         let factor = (least_rate_hz / self.rate_hz).ceil().max(1.0) as usize;
         let rate_hz = self.rate_hz * factor as f64;
         let count = (self.count - 1) * factor + 1;
-        let segments = Segments { rate_hz: self.rate_hz, factor, samples: self.count, lead: self.lead, count };
+        let segments = Segments {
+            rate_hz: self.rate_hz,
+            factor,
+            samples: self.count,
+            lead: self.lead,
+            count,
+        };
         let gain = |hz: f64| undo(hz, self.undone_hz, self.rate_hz).min(LARGEST_GAIN);
         let mut accelerations = Vec::new();
         for channel in 0..3 {
-            accelerations.extend(segments.derivatives(&self.coordinates[channel], &self.position.windows, &gain, &[2]));
+            accelerations.extend(segments.derivatives(
+                &self.coordinates[channel],
+                &self.position.windows,
+                &gain,
+                &[2],
+            ));
         }
         let (mut values, mut rates, mut seconds) = (Vec::new(), Vec::new(), Vec::new());
         for channel in 3..7 {
-            let mut all = segments.derivatives(&self.coordinates[channel], &self.rotation.windows, &gain, &[0, 1, 2]).into_iter();
+            let mut all = segments
+                .derivatives(
+                    &self.coordinates[channel],
+                    &self.rotation.windows,
+                    &gain,
+                    &[0, 1, 2],
+                )
+                .into_iter();
             values.extend(all.next());
             rates.extend(all.next());
             seconds.extend(all.next());
         }
-        let quaternion = |of: &[Vec<f64>], k: usize| Quaternion::new(of[3][k], of[0][k], of[1][k], of[2][k]);
-        let acceleration = |k: usize| Vector3::new(accelerations[0][k], accelerations[1][k], accelerations[2][k]);
-        let mut track = KinematicTrack { start: self.start, rate_hz, ..KinematicTrack::default() };
+        let quaternion =
+            |of: &[Vec<f64>], k: usize| Quaternion::new(of[3][k], of[0][k], of[1][k], of[2][k]);
+        let acceleration = |k: usize| {
+            Vector3::new(
+                accelerations[0][k],
+                accelerations[1][k],
+                accelerations[2][k],
+            )
+        };
+        let mut track = KinematicTrack {
+            start: self.start,
+            rate_hz,
+            ..KinematicTrack::default()
+        };
         for k in 0..count {
-            let (q, q_dot, q_ddot) = (quaternion(&values, k), quaternion(&rates, k), quaternion(&seconds, k));
+            let (q, q_dot, q_ddot) = (
+                quaternion(&values, k),
+                quaternion(&rates, k),
+                quaternion(&seconds, k),
+            );
             let world_from_segment = UnitQuaternion::from_quaternion(q);
             let segment_from_world = world_from_segment.inverse();
             track.world_from_segment.push(world_from_segment);
-            track.acceleration.push(segment_from_world * acceleration(k));
-            track.angular_velocity.push(so3::angular_velocity_in_body(&q, &q_dot));
-            track.angular_acceleration.push(segment_from_world * so3::angular_acceleration_in_world(&q, &q_dot, &q_ddot));
+            track
+                .acceleration
+                .push(segment_from_world * acceleration(k));
+            track
+                .angular_velocity
+                .push(so3::angular_velocity_in_body(&q, &q_dot));
+            track
+                .angular_acceleration
+                .push(segment_from_world * so3::angular_acceleration_in_world(&q, &q_dot, &q_ddot));
         }
         track
     }
 }
 
-/// Continues series by `lead` entries at both ends: oddly, then by what is likeliest under their spectrum.
+/// Continues series by `lead` entries at both ends: oddly, then by what is likeliest under their
+/// spectrum.
 fn lengthen(series: &mut [Vec<f64>], lead: usize, spectrum: &Spectrum, rate_hz: f64) {
     let count = series[0].len();
     for values in series.iter_mut() {
         let last = count - 1;
-        let before = (1..=lead).rev().map(|k| 2.0 * values[0] - values[k.min(last)]);
+        let before = (1..=lead)
+            .rev()
+            .map(|k| 2.0 * values[0] - values[k.min(last)]);
         let after = (1..=lead).map(|k| 2.0 * values[last] - values[last - k.min(last)]);
         *values = before.chain(values.iter().copied()).chain(after).collect();
     }
-    let transform = FourierPair::new(FourierPair::good_length(count + 2 * lead + (4.0 * rate_hz) as usize));
-    fill_holes(series, &[0..lead, lead + count..count + 2 * lead], spectrum, &transform, rate_hz);
+    let transform = FourierPair::new(FourierPair::good_length(
+        count + 2 * lead + (4.0 * rate_hz) as usize,
+    ));
+    fill_holes(
+        series,
+        &[0..lead, lead + count..count + 2 * lead],
+        spectrum,
+        &transform,
+        rate_hz,
+    );
 }
 
-fn check(stamps: &[Stamp], positions: &[Vector3<f64>], rotations: &[UnitQuaternion<f64>]) -> Result<(), SpatialError> {
-    for (what, found) in [("positions", positions.len()), ("rotations", rotations.len())] {
+fn check(
+    stamps: &[Stamp],
+    positions: &[Vector3<f64>],
+    rotations: &[UnitQuaternion<f64>],
+) -> Result<(), SpatialError> {
+    for (what, found) in [
+        ("positions", positions.len()),
+        ("rotations", rotations.len()),
+    ] {
         if found != stamps.len() {
-            return Err(SpatialError::LengthMismatch { what, expected: stamps.len(), found });
+            return Err(SpatialError::LengthMismatch {
+                what,
+                expected: stamps.len(),
+                found,
+            });
         }
     }
     if stamps.len() < 16 {
-        return Err(SpatialError::TooFewSamples { got: stamps.len(), needed: 16 });
+        return Err(SpatialError::TooFewSamples {
+            got: stamps.len(),
+            needed: 16,
+        });
     }
     if let Some(index) = (1..stamps.len()).find(|&k| stamps[k] <= stamps[k - 1]) {
         let (previous, next) = (stamps[index - 1].as_seconds(), stamps[index].as_seconds());
-        return Err(SpatialError::TimeNotIncreasing { index, previous, next });
+        return Err(SpatialError::TimeNotIncreasing {
+            index,
+            previous,
+            next,
+        });
     }
-    let finite = |k: &usize| positions[*k].iter().chain(rotations[*k].coords.iter()).all(|value| value.is_finite());
+    let finite = |k: &usize| {
+        positions[*k]
+            .iter()
+            .chain(rotations[*k].coords.iter())
+            .all(|value| value.is_finite())
+    };
     match (0..stamps.len()).find(|k| !finite(k)) {
-        Some(index) => Err(SpatialError::NotFinite { index, what: "pose" }),
+        Some(index) => Err(SpatialError::NotFinite {
+            index,
+            what: "pose",
+        }),
         None => Ok(()),
     }
 }

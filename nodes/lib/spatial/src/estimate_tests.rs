@@ -11,7 +11,10 @@ struct Normal(u64);
 impl Normal {
     fn draw(&mut self) -> f64 {
         let mut uniform = || {
-            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            self.0 = self
+                .0
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             (self.0 >> 11) as f64 / (1u64 << 53) as f64
         };
         (0..12).map(|_| uniform()).sum::<f64>() - 6.0
@@ -21,19 +24,33 @@ impl Normal {
 /// A swing about a turning axis with a known acceleration.
 fn motion(t: f64) -> (Vector3<f64>, UnitQuaternion<f64>, Vector3<f64>) {
     let w = TAU * 1.3;
-    let position = Vector3::new(0.2 * (w * t).sin(), 0.1 * (2.0 * w * t).cos(), 1.0 + 0.05 * (3.0 * w * t).sin());
-    let acceleration = Vector3::new(-0.2 * w * w * (w * t).sin(), -0.4 * w * w * (2.0 * w * t).cos(), -0.45 * w * w * (3.0 * w * t).sin());
-    let rotation = so3::exp(&Vector3::new(0.8 * (w * t).sin(), 0.0, 0.0)) * so3::exp(&Vector3::new(0.0, 0.0, 0.4 * t));
+    let position = Vector3::new(
+        0.2 * (w * t).sin(),
+        0.1 * (2.0 * w * t).cos(),
+        1.0 + 0.05 * (3.0 * w * t).sin(),
+    );
+    let acceleration = Vector3::new(
+        -0.2 * w * w * (w * t).sin(),
+        -0.4 * w * w * (2.0 * w * t).cos(),
+        -0.45 * w * w * (3.0 * w * t).sin(),
+    );
+    let rotation = so3::exp(&Vector3::new(0.8 * (w * t).sin(), 0.0, 0.0))
+        * so3::exp(&Vector3::new(0.0, 0.0, 0.4 * t));
     (position, rotation, acceleration)
 }
 
-fn poses(noise: PoseNoise, rate_hz: f64, keep: impl Fn(f64) -> bool) -> (Vec<Stamp>, Vec<Vector3<f64>>, Vec<UnitQuaternion<f64>>) {
+fn poses(
+    noise: PoseNoise,
+    rate_hz: f64,
+    keep: impl Fn(f64) -> bool,
+) -> (Vec<Stamp>, Vec<Vector3<f64>>, Vec<UnitQuaternion<f64>>) {
     let mut random = Normal(7);
     let (mut stamps, mut positions, mut rotations) = (Vec::new(), Vec::new(), Vec::new());
     for k in 0..(60.0 * rate_hz) as i64 {
         let t = k as f64 / rate_hz;
         let (position, rotation, _) = motion(t);
-        let mut draw = |sigma: f64| Vector3::new(random.draw(), random.draw(), random.draw()) * sigma;
+        let mut draw =
+            |sigma: f64| Vector3::new(random.draw(), random.draw(), random.draw()) * sigma;
         let (dp, dr) = (draw(noise.position), draw(noise.rotation));
         if keep(t) {
             stamps.push(Stamp::from_nanos(1_700_000_000_000_000_000).plus_seconds(t));
@@ -49,19 +66,30 @@ fn acceleration_error(track: &KinematicTrack) -> f64 {
         .map(|k| k as f64 / track.rate_hz)
         .enumerate()
         .filter(|(_, t)| (1.0..58.0).contains(t))
-        .map(|(k, t)| (track.world_from_segment[k] * track.acceleration[k] - motion(t).2).norm_squared())
+        .map(|(k, t)| {
+            (track.world_from_segment[k] * track.acceleration[k] - motion(t).2).norm_squared()
+        })
         .collect();
     (errors.iter().sum::<f64>() / errors.len() as f64).sqrt()
 }
 
 #[test]
 fn noise_is_found_and_kept_out_of_the_derivatives() {
-    let truth = PoseNoise { position: 1e-4, rotation: 8e-4 };
+    let truth = PoseNoise {
+        position: 1e-4,
+        rotation: 8e-4,
+    };
     let (stamps, positions, rotations) = poses(truth, 100.0, |_| true);
     let estimate = PoseEstimate::fit(&stamps, &positions, &rotations).unwrap();
     let found = estimate.noise();
-    assert!((found.position / truth.position - 1.0).abs() < 0.08, "{found:?}");
-    assert!((found.rotation / truth.rotation - 1.0).abs() < 0.08, "{found:?}");
+    assert!(
+        (found.position / truth.position - 1.0).abs() < 0.08,
+        "{found:?}"
+    );
+    assert!(
+        (found.rotation / truth.rotation - 1.0).abs() < 0.08,
+        "{found:?}"
+    );
     let track = estimate.track(200.0);
     assert_eq!(track.rate_hz, 200.0);
     let error = acceleration_error(&track);
@@ -81,8 +109,13 @@ fn without_noise_derivatives_are_exact() {
 
 #[test]
 fn holes_are_named_and_bridged() {
-    let noise = PoseNoise { position: 1e-4, rotation: 8e-4 };
-    let (stamps, positions, rotations) = poses(noise, 100.0, |t| !(20.0..20.3).contains(&t) && !(40.0..40.08).contains(&t));
+    let noise = PoseNoise {
+        position: 1e-4,
+        rotation: 8e-4,
+    };
+    let (stamps, positions, rotations) = poses(noise, 100.0, |t| {
+        !(20.0..20.3).contains(&t) && !(40.0..40.08).contains(&t)
+    });
     let estimate = PoseEstimate::fit(&stamps, &positions, &rotations).unwrap();
     assert_eq!(estimate.gaps().len(), 2);
     let (from, to) = estimate.gaps()[0];
@@ -94,7 +127,14 @@ fn holes_are_named_and_bridged() {
 #[test]
 fn a_smoothing_is_undone() {
     // Through the smoothing's own gain at the motion's frequencies.
-    let (stamps, mut positions, rotations) = poses(PoseNoise { position: 1e-6, rotation: 1e-6 }, 100.0, |_| true);
+    let (stamps, mut positions, rotations) = poses(
+        PoseNoise {
+            position: 1e-6,
+            rotation: 1e-6,
+        },
+        100.0,
+        |_| true,
+    );
     let gain = |f: f64| 1.0 / undo(f, Some(3.0), 100.0);
     assert!(undo(3.9, Some(3.0), 100.0) < LARGEST_GAIN);
     for (k, position) in positions.iter_mut().enumerate() {
@@ -103,7 +143,12 @@ fn a_smoothing_is_undone() {
         let noise = *position - clean;
         let rest = Vector3::new(0.0, 0.0, 1.0);
         let swing = clean - rest;
-        *position = rest + Vector3::new(swing.x * gain(1.3), swing.y * gain(2.6), swing.z * gain(3.9)) + noise;
+        *position =
+            rest + Vector3::new(
+                swing.x * gain(1.3),
+                swing.y * gain(2.6),
+                swing.z * gain(3.9),
+            ) + noise;
     }
     let estimate = PoseEstimate::fit(&stamps, &positions, &rotations).unwrap();
     assert!(acceleration_error(&estimate.track(100.0)) > 5.0);
@@ -114,28 +159,52 @@ fn a_smoothing_is_undone() {
 #[test]
 fn bad_input_is_refused() {
     let (stamps, positions, rotations) = poses(PoseNoise::default(), 100.0, |t| t < 1.0);
-    assert!(matches!(PoseEstimate::fit(&stamps[..4], &positions[..4], &rotations[..4]), Err(SpatialError::TooFewSamples { .. })));
-    assert!(matches!(PoseEstimate::fit(&stamps, &positions[..4], &rotations), Err(SpatialError::LengthMismatch { .. })));
+    assert!(matches!(
+        PoseEstimate::fit(&stamps[..4], &positions[..4], &rotations[..4]),
+        Err(SpatialError::TooFewSamples { .. })
+    ));
+    assert!(matches!(
+        PoseEstimate::fit(&stamps, &positions[..4], &rotations),
+        Err(SpatialError::LengthMismatch { .. })
+    ));
     let mut nan = positions.clone();
     nan[3].y = f64::NAN;
-    assert!(matches!(PoseEstimate::fit(&stamps, &nan, &rotations), Err(SpatialError::NotFinite { index: 3, .. })));
+    assert!(matches!(
+        PoseEstimate::fit(&stamps, &nan, &rotations),
+        Err(SpatialError::NotFinite { index: 3, .. })
+    ));
 }
 
 #[test]
 fn white_noise_alone_passes_nowhere() {
     let mut random = Normal(3);
     let count = 12_000;
-    let series: Vec<Vec<f64>> = (0..3).map(|_| (0..count).map(|_| random.draw()).collect()).collect();
+    let series: Vec<Vec<f64>> = (0..3)
+        .map(|_| (0..count).map(|_| random.draw()).collect())
+        .collect();
     let floor = Floor::learn(&series, 200.0, 1.0);
-    let passing: Vec<f64> =
-        floor.filter.iter().enumerate().skip(40).filter(|(_, w)| **w > 0.0).map(|(k, _)| k as f64 * floor.spacing_hz).collect();
+    let passing: Vec<f64> = floor
+        .filter
+        .iter()
+        .enumerate()
+        .skip(40)
+        .filter(|(_, w)| **w > 0.0)
+        .map(|(k, _)| k as f64 * floor.spacing_hz)
+        .collect();
     assert!(passing.is_empty(), "{passing:?}");
 }
 
 /// Series of a given one-sided density, unit^2/Hz, at `rate_hz`.
-fn coloured(random: &mut Normal, count: usize, rate_hz: f64, density: impl Fn(f64) -> f64) -> Vec<f64> {
+fn coloured(
+    random: &mut Normal,
+    count: usize,
+    rate_hz: f64,
+    density: impl Fn(f64) -> f64,
+) -> Vec<f64> {
     let transform = FourierPair::new(count);
-    let mut values: Vec<Complex64> = (0..count).map(|_| Complex64::new(random.draw(), 0.0)).collect();
+    let mut values: Vec<Complex64> = (0..count)
+        .map(|_| Complex64::new(random.draw(), 0.0))
+        .collect();
     transform.forward(&mut values);
     for (k, value) in values.iter_mut().enumerate() {
         let frequency_hz = k.min(count - k).max(1) as f64 * rate_hz / count as f64;
@@ -147,27 +216,64 @@ fn coloured(random: &mut Normal, count: usize, rate_hz: f64, density: impl Fn(f6
 
 #[test]
 fn noise_that_wanders_is_told_from_motion_by_its_knee() {
-    // As optical recordings that were resampled to the IMU's rate: motion falls by f^-9, noise by 1/f up to 15 Hz, then by f^-2.5.
+    // As optical recordings that were resampled to the IMU's rate: motion falls by f^-9, noise by
+    // 1/f up to 15 Hz, then by f^-2.5.
     let (count, rate_hz) = (18_000, 300.0);
     let motion = |f: f64| 1e-2 / (1.0 + (f / 2.0).powi(9));
-    let noise = |f: f64| 1e-10 * if f < 15.0 { 15.0 / f.max(0.5) } else { (15.0 / f).powf(2.5) };
+    let noise = |f: f64| {
+        1e-10
+            * if f < 15.0 {
+                15.0 / f.max(0.5)
+            } else {
+                (15.0 / f).powf(2.5)
+            }
+    };
     let mut random = Normal(5);
     let mut axis = |density: &dyn Fn(f64) -> f64| coloured(&mut random, count, rate_hz, density);
     let clean = [0; 3].map(|_| axis(&motion));
-    let noisy: Vec<Vec<f64>> = clean.iter().map(|series| series.iter().zip(axis(&noise)).map(|(a, b)| a + b).collect()).collect();
+    let noisy: Vec<Vec<f64>> = clean
+        .iter()
+        .map(|series| {
+            series
+                .iter()
+                .zip(axis(&noise))
+                .map(|(a, b)| a + b)
+                .collect()
+        })
+        .collect();
     let floor = Floor::learn(&noisy, rate_hz, 1.0);
     for hz in [8.0, 12.0, 20.0, 30.0] {
         let ratio = floor.noise_at(hz) / noise(hz);
         assert!((0.4..2.5).contains(&ratio), "{ratio} at {hz} Hz");
     }
     // Accelerations are as good as the best filter makes them, which knows both densities.
-    let stamps: Vec<Stamp> = (0..count).map(|k| Stamp::from_nanos((k as f64 * 1e9 / rate_hz).round() as i64)).collect();
-    let positions: Vec<Vector3<f64>> = (0..count).map(|k| Vector3::new(noisy[0][k], noisy[1][k], noisy[2][k])).collect();
-    let track = PoseEstimate::fit(&stamps, &positions, &vec![UnitQuaternion::identity(); count]).unwrap().track(rate_hz);
-    let truth: Vec<Vec<f64>> = clean.iter().map(|series| second_derivative(series, rate_hz)).collect();
+    let stamps: Vec<Stamp> = (0..count)
+        .map(|k| Stamp::from_nanos((k as f64 * 1e9 / rate_hz).round() as i64))
+        .collect();
+    let positions: Vec<Vector3<f64>> = (0..count)
+        .map(|k| Vector3::new(noisy[0][k], noisy[1][k], noisy[2][k]))
+        .collect();
+    let track = PoseEstimate::fit(
+        &stamps,
+        &positions,
+        &vec![UnitQuaternion::identity(); count],
+    )
+    .unwrap()
+    .track(rate_hz);
+    let truth: Vec<Vec<f64>> = clean
+        .iter()
+        .map(|series| second_derivative(series, rate_hz))
+        .collect();
     let inner = 1000..count - 1000;
     let every = (track.rate_hz / rate_hz).round() as usize;
-    let squares: f64 = inner.clone().map(|k| (0..3).map(|i| (track.acceleration[every * k][i] - truth[i][k]).powi(2)).sum::<f64>()).sum();
+    let squares: f64 = inner
+        .clone()
+        .map(|k| {
+            (0..3)
+                .map(|i| (track.acceleration[every * k][i] - truth[i][k]).powi(2))
+                .sum::<f64>()
+        })
+        .sum();
     let error = (squares / (3.0 * inner.len() as f64)).sqrt();
     let step_hz = 0.05;
     let best: f64 = (1..3000)
@@ -181,7 +287,10 @@ fn noise_that_wanders_is_told_from_motion_by_its_knee() {
 /// In the Fourier domain.
 fn second_derivative(series: &[f64], rate_hz: f64) -> Vec<f64> {
     let transform = FourierPair::new(series.len());
-    let mut values: Vec<Complex64> = series.iter().map(|value| Complex64::new(*value, 0.0)).collect();
+    let mut values: Vec<Complex64> = series
+        .iter()
+        .map(|value| Complex64::new(*value, 0.0))
+        .collect();
     transform.forward(&mut values);
     for (k, value) in values.iter_mut().enumerate() {
         *value *= -(TAU * k.min(series.len() - k) as f64 * rate_hz / series.len() as f64).powi(2);
@@ -192,10 +301,25 @@ fn second_derivative(series: &[f64], rate_hz: f64) -> Vec<f64> {
 
 #[test]
 fn the_ends_are_sound() {
-    let (stamps, positions, rotations) = poses(PoseNoise { position: 1e-4, rotation: 8e-4 }, 100.0, |_| true);
-    let track = PoseEstimate::fit(&stamps, &positions, &rotations).unwrap().track(200.0);
-    let at = |k: usize| (track.world_from_segment[k] * track.acceleration[k] - motion(k as f64 / track.rate_hz).2).norm();
-    let worst = (0..100).chain(track.len() - 100..track.len()).map(at).fold(0.0, f64::max);
+    let (stamps, positions, rotations) = poses(
+        PoseNoise {
+            position: 1e-4,
+            rotation: 8e-4,
+        },
+        100.0,
+        |_| true,
+    );
+    let track = PoseEstimate::fit(&stamps, &positions, &rotations)
+        .unwrap()
+        .track(200.0);
+    let at = |k: usize| {
+        (track.world_from_segment[k] * track.acceleration[k] - motion(k as f64 / track.rate_hz).2)
+            .norm()
+    };
+    let worst = (0..100)
+        .chain(track.len() - 100..track.len())
+        .map(at)
+        .fold(0.0, f64::max);
     // The motion reaches 27 m/s2; an odd continuation errs by as much.
     assert!(worst < 5.0, "{worst}");
 }

@@ -11,10 +11,17 @@ const MAX_STAMPS: f64 = 2e7;
 /// [`SpatialError::NotFinite`], [`SpatialError::TimeNotIncreasing`].
 pub fn check_times(seconds: &[f64]) -> Result<(), SpatialError> {
     if let Some(index) = seconds.iter().position(|t| !t.is_finite()) {
-        return Err(SpatialError::NotFinite { index, what: "time" });
+        return Err(SpatialError::NotFinite {
+            index,
+            what: "time",
+        });
     }
     match seconds.windows(2).position(|w| w[1] <= w[0]) {
-        Some(k) => Err(SpatialError::TimeNotIncreasing { index: k + 1, previous: seconds[k], next: seconds[k + 1] }),
+        Some(k) => Err(SpatialError::TimeNotIncreasing {
+            index: k + 1,
+            previous: seconds[k],
+            next: seconds[k + 1],
+        }),
         None => Ok(()),
     }
 }
@@ -24,17 +31,23 @@ pub fn relative_seconds(stamps: &[Stamp], origin: Stamp) -> Vec<f64> {
     stamps.iter().map(|stamp| *stamp - origin).collect()
 }
 
-/// Stamps `first + k / rate` for k = 0, 1, ... up to and including `last`; each rounded to its own nearest nanosecond, so that no error adds up.
+/// Stamps `first + k / rate` for k = 0, 1, ... up to and including `last`; each rounded to its own
+/// nearest nanosecond, so that no error adds up.
 ///
 /// # Errors
-/// [`SpatialError::BadRate`] for a rate that is not positive and finite, [`SpatialError::TooManyStamps`] beyond twenty million.
+/// [`SpatialError::BadRate`] for a rate that is not positive and finite,
+/// [`SpatialError::TooManyStamps`] beyond twenty million.
 pub fn uniform_stamps(first: Stamp, last: Stamp, rate_hz: f64) -> Result<Vec<Stamp>, SpatialError> {
     if !(rate_hz > 0.0 && rate_hz.is_finite()) {
         return Err(SpatialError::BadRate { rate_hz });
     }
     let expected = (last - first) * rate_hz + 1.0;
     if expected > MAX_STAMPS {
-        return Err(SpatialError::TooManyStamps { count: expected, limit: MAX_STAMPS, rate_hz });
+        return Err(SpatialError::TooManyStamps {
+            count: expected,
+            limit: MAX_STAMPS,
+            rate_hz,
+        });
     }
     let stamps = (0..).map_while(|k: i64| {
         let stamp = first.plus_seconds(k as f64 / rate_hz);
@@ -50,9 +63,29 @@ mod tests {
 
     #[test]
     fn duplicates_and_time_going_backwards_are_named() {
-        assert_eq!(check_times(&[0.0, 0.1, 0.1]), Err(SpatialError::TimeNotIncreasing { index: 2, previous: 0.1, next: 0.1 }));
-        assert_eq!(check_times(&[0.0, 0.1, 0.05]), Err(SpatialError::TimeNotIncreasing { index: 2, previous: 0.1, next: 0.05 }));
-        assert_eq!(check_times(&[0.0, f64::NAN]), Err(SpatialError::NotFinite { index: 1, what: "time" }));
+        assert_eq!(
+            check_times(&[0.0, 0.1, 0.1]),
+            Err(SpatialError::TimeNotIncreasing {
+                index: 2,
+                previous: 0.1,
+                next: 0.1
+            })
+        );
+        assert_eq!(
+            check_times(&[0.0, 0.1, 0.05]),
+            Err(SpatialError::TimeNotIncreasing {
+                index: 2,
+                previous: 0.1,
+                next: 0.05
+            })
+        );
+        assert_eq!(
+            check_times(&[0.0, f64::NAN]),
+            Err(SpatialError::NotFinite {
+                index: 1,
+                what: "time"
+            })
+        );
         assert_eq!(check_times(&[0.0, 0.1, 0.35]), Ok(()));
     }
 
@@ -64,6 +97,9 @@ mod tests {
         assert_eq!(stamps[300 * 1800] - first, 1800.0);
         assert!(uniform_stamps(first, first, -1.0).is_err());
         let many = uniform_stamps(first, first.plus_seconds(10.0), 1e9);
-        assert!(matches!(many, Err(SpatialError::TooManyStamps { .. })), "ten thousand million stamps are refused");
+        assert!(
+            matches!(many, Err(SpatialError::TooManyStamps { .. })),
+            "ten thousand million stamps are refused"
+        );
     }
 }

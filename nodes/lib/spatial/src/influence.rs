@@ -7,7 +7,8 @@ use crate::banded::Factor;
 use crate::basis::ORDER;
 use crate::system::SplineSystem;
 
-/// Weights of samples in an estimate: of value, first (1/s) and second derivative (1/s2), one row a sample.
+/// Weights of samples in an estimate: of value, first (1/s) and second derivative (1/s2), one row a
+/// sample.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SampleWeights {
     /// Number of the sample of the first row; those before it and after the last row do not count.
@@ -16,11 +17,13 @@ pub struct SampleWeights {
     pub rows: Vec<[f64; 3]>,
 }
 
-/// A spline is linear in its samples: `f^(m)(t) = sum_k w_k^(m)(t) y_k`. These weights carry a sample's error to the estimate, and so its noise:
-/// independent errors of variance `s_k^2` leave `sum_k (w_k s_k)^2`.
+/// A spline is linear in its samples: `f^(m)(t) = sum_k w_k^(m)(t) y_k`. These weights carry a
+/// sample's error to the estimate, and so its noise: independent errors of variance `s_k^2` leave
+/// `sum_k (w_k s_k)^2`.
 ///
-/// With `M = B^T B + weight P` of [`SplineSystem`] and `b` the basis at t, `w = (B + E) M^-1 b`, E the derivatives at the ends. `M^-1 b` falls off
-/// geometrically on both sides of t, and only that part is computed (to 1e-7): one call costs the smoothing's width.
+/// With `M = B^T B + weight P` of [`SplineSystem`] and `b` the basis at t, `w = (B + E) M^-1 b`, E
+/// the derivatives at the ends. `M^-1 b` falls off geometrically on both sides of t, and only that
+/// part is computed (to 1e-7): one call costs the smoothing's width.
 #[derive(Clone, Debug)]
 pub struct Influence {
     system: Arc<SplineSystem>,
@@ -33,7 +36,10 @@ impl Influence {
     /// # Errors
     /// [`SpatialError::Singular`] where the equations cannot be solved.
     pub fn new(system: &Arc<SplineSystem>, weight: f64) -> Result<Self, SpatialError> {
-        Ok(Self { system: system.clone(), factor: system.factor(weight)? })
+        Ok(Self {
+            system: system.clone(),
+            factor: system.factor(weight)?,
+        })
     }
 
     /// The weights at a time; times outside the samples are moved to the nearest end.
@@ -54,7 +60,9 @@ mod tests {
 
     #[test]
     fn the_weights_are_what_a_sample_moves_the_estimate_by() {
-        let seconds: Vec<f64> = (0..90).map(|k| 0.01 * f64::from(k) + if k > 40 { 0.004 } else { 0.0 }).collect();
+        let seconds: Vec<f64> = (0..90)
+            .map(|k| 0.01 * f64::from(k) + if k > 40 { 0.004 } else { 0.0 })
+            .collect();
         let system = Arc::new(SplineSystem::new(&seconds).unwrap());
         for weight in [1e-8, 1.0, 1e4] {
             let influence = Influence::new(&system, weight).unwrap();
@@ -63,12 +71,21 @@ mod tests {
                 for moved in 0..seconds.len() {
                     let mut values = vec![[0.0]; seconds.len()];
                     values[moved] = [1.0];
-                    let spline = SmoothingSpline::fit_on(&system, &values, Smoothing::Weight(weight)).unwrap();
+                    let spline =
+                        SmoothingSpline::fit_on(&system, &values, Smoothing::Weight(weight))
+                            .unwrap();
                     let estimate = spline.evaluate(time).map(|[value]| value);
-                    let found = moved.checked_sub(weights.first).and_then(|row| weights.rows.get(row)).copied().unwrap_or([0.0; 3]);
+                    let found = moved
+                        .checked_sub(weights.first)
+                        .and_then(|row| weights.rows.get(row))
+                        .copied()
+                        .unwrap_or([0.0; 3]);
                     // Derivatives are per s and s2 of frames at 100 Hz.
                     for (m, scale) in [1.0, 1e2, 1e4].into_iter().enumerate() {
-                        assert!((found[m] - estimate[m]).abs() < 1e-5 * scale, "weight {weight}, {time} s, sample {moved}, order {m}");
+                        assert!(
+                            (found[m] - estimate[m]).abs() < 1e-5 * scale,
+                            "weight {weight}, {time} s, sample {moved}, order {m}"
+                        );
                     }
                 }
             }
@@ -80,8 +97,15 @@ mod tests {
         let seconds: Vec<f64> = (0..5000).map(|k| 0.01 * f64::from(k)).collect();
         let system = Arc::new(SplineSystem::new(&seconds).unwrap());
         let weights = Influence::new(&system, 10.0).unwrap().at(25.0);
-        assert!(weights.rows.len() < 300, "{} of 5000 samples", weights.rows.len());
+        assert!(
+            weights.rows.len() < 300,
+            "{} of 5000 samples",
+            weights.rows.len()
+        );
         let sum: f64 = weights.rows.iter().map(|row| row[0]).sum();
-        assert!((sum - 1.0).abs() < 1e-4, "a constant stays a constant: {sum}");
+        assert!(
+            (sum - 1.0).abs() < 1e-4,
+            "a constant stays a constant: {sum}"
+        );
     }
 }

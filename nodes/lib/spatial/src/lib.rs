@@ -3,11 +3,16 @@
 //! Transforms read right to left: `world_from_sensor = world_from_segment * segment_from_sensor`.
 //!
 //! - [`Stamp`]: time, in whole nanoseconds.
-//! - [`so3`]: exponential, logarithm, angular velocity from quaternion derivatives, sign-continuous quaternion series.
-//! - [`SmoothingSpline`]: quintic B-spline through or near samples of several channels, on any increasing times, in O(N).
-//! - [`PoseSpline`]: position and rotation splines together; gives velocity, acceleration, angular velocity and acceleration at any time.
-//! - [`PoseEstimate`]: a motion from noisy poses, its noise learnt from them, with derivatives and their error; [`KinematicTrack`] is what it gives.
-//! - [`derivative_weights`]: finite-difference stencils on any times; [`uniform_stamps`]: output grids.
+//! - [`so3`]: exponential, logarithm, angular velocity from quaternion derivatives, sign-continuous
+//!   quaternion series.
+//! - [`SmoothingSpline`]: quintic B-spline through or near samples of several channels, on any
+//!   increasing times, in O(N).
+//! - [`PoseSpline`]: position and rotation splines together; gives velocity, acceleration, angular
+//!   velocity and acceleration at any time.
+//! - [`PoseEstimate`]: a motion from noisy poses, its noise learnt from them, with derivatives and
+//!   their error; [`KinematicTrack`] is what it gives.
+//! - [`derivative_weights`]: finite-difference stencils on any times; [`uniform_stamps`]: output
+//!   grids.
 //!
 //! ```
 //! use cromosim_spatial::{Smoothing, SmoothingSpline};
@@ -44,14 +49,18 @@ mod stamp;
 mod system;
 mod track;
 
-pub use confidence::{CONFIDENCE_LENGTH_M, HALF_CONFIDENCE_STD_M, confidence_of_std, std_of_confidence};
+pub use confidence::{
+    CONFIDENCE_LENGTH_M, HALF_CONFIDENCE_STD_M, confidence_of_std, std_of_confidence,
+};
 pub use derivative_risk::Derivative;
 pub use difference::{MAX_STENCIL, derivative_weights};
 pub use error::SpatialError;
 pub use estimate::{PoseEstimate, PoseNoise};
 pub use grid::{check_times, relative_seconds, uniform_stamps};
 pub use influence::{Influence, SampleWeights};
-pub use pose_spline::{Motion, PoseSmoothing, PoseSpline, PoseTimes, position_channels, rotation_channels};
+pub use pose_spline::{
+    Motion, PoseSmoothing, PoseSpline, PoseTimes, position_channels, rotation_channels,
+};
 pub use rustfft::num_complex::Complex64;
 pub use select::WeightSearch;
 pub use spectrum::{FourierPair, Spectrum, welch};

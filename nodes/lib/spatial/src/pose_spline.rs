@@ -36,11 +36,15 @@ pub struct PoseSmoothing {
 impl Default for PoseSmoothing {
     /// What the samples ask for, for the sake of acceleration and angular velocity.
     fn default() -> Self {
-        Self { position: Smoothing::AutomaticFor(Derivative::Second), rotation: Smoothing::AutomaticFor(Derivative::First) }
+        Self {
+            position: Smoothing::AutomaticFor(Derivative::Second),
+            rotation: Smoothing::AutomaticFor(Derivative::First),
+        }
     }
 }
 
-/// The spline equations for a series of stamps; made once and shared by every series of poses on them.
+/// The spline equations for a series of stamps; made once and shared by every series of poses on
+/// them.
 #[derive(Clone, Debug)]
 pub struct PoseTimes {
     origin: Stamp,
@@ -53,7 +57,10 @@ impl PoseTimes {
     pub fn new(stamps: &[Stamp]) -> Result<Self, SpatialError> {
         let origin = stamps.first().copied().unwrap_or_default();
         let seconds = relative_seconds(stamps, origin);
-        Ok(Self { origin, system: Arc::new(SplineSystem::new(&seconds)?) })
+        Ok(Self {
+            origin,
+            system: Arc::new(SplineSystem::new(&seconds)?),
+        })
     }
 
     /// The equations, with times in seconds since the first stamp.
@@ -62,8 +69,9 @@ impl PoseTimes {
     }
 }
 
-/// Position (3 channels) and rotation (the 4 components of the sign-continuous quaternion, normalised afterwards) as smoothing quintic splines.
-/// With `s(t)` the quaternion spline: `R = s/|s|`, `w = 2 vec(s' s*) / |s|^2`, world axes.
+/// Position (3 channels) and rotation (the 4 components of the sign-continuous quaternion,
+/// normalised afterwards) as smoothing quintic splines. With `s(t)` the quaternion spline: `R =
+/// s/|s|`, `w = 2 vec(s' s*) / |s|^2`, world axes.
 #[derive(Clone, Debug)]
 pub struct PoseSpline {
     times: PoseTimes,
@@ -76,7 +84,11 @@ impl PoseSpline {
     ///
     /// # Errors
     /// As [`SmoothingSpline::fit`].
-    pub fn fit(stamps: &[Stamp], world_from_body: &[Isometry3<f64>], smoothing: PoseSmoothing) -> Result<Self, SpatialError> {
+    pub fn fit(
+        stamps: &[Stamp],
+        world_from_body: &[Isometry3<f64>],
+        smoothing: PoseSmoothing,
+    ) -> Result<Self, SpatialError> {
         Self::fit_on(&PoseTimes::new(stamps)?, world_from_body, smoothing)
     }
 
@@ -84,18 +96,27 @@ impl PoseSpline {
     ///
     /// # Errors
     /// As [`SmoothingSpline::fit`].
-    pub fn fit_on(times: &PoseTimes, world_from_body: &[Isometry3<f64>], smoothing: PoseSmoothing) -> Result<Self, SpatialError> {
+    pub fn fit_on(
+        times: &PoseTimes,
+        world_from_body: &[Isometry3<f64>],
+        smoothing: PoseSmoothing,
+    ) -> Result<Self, SpatialError> {
         let positions = position_channels(world_from_body);
         let rotations = rotation_channels(world_from_body);
         let position = SmoothingSpline::fit_on(&times.system, &positions, smoothing.position)?;
         let rotation = SmoothingSpline::fit_on(&times.system, &rotations, smoothing.rotation)?;
-        Ok(Self { times: times.clone(), position, rotation })
+        Ok(Self {
+            times: times.clone(),
+            position,
+            rotation,
+        })
     }
 
     /// The motion at a stamp; stamps outside the samples are moved to the nearest end.
     pub fn evaluate(&self, stamp: Stamp) -> Motion {
         let (first, values) = self.times.system.basis_at(stamp - self.times.origin);
-        let [position, velocity, acceleration] = self.position.combine(first, &values).map(Vector3::from);
+        let [position, velocity, acceleration] =
+            self.position.combine(first, &values).map(Vector3::from);
         let [s, s_dot, s_ddot] = self.rotation.combine(first, &values).map(Quaternion::from);
         Motion {
             rotation: UnitQuaternion::new_normalize(s),
@@ -120,13 +141,22 @@ impl PoseSpline {
 
 /// The three channels of a pose series' position, m.
 pub fn position_channels(world_from_body: &[Isometry3<f64>]) -> Vec<[f64; 3]> {
-    world_from_body.iter().map(|isometry| isometry.translation.vector.into()).collect()
+    world_from_body
+        .iter()
+        .map(|isometry| isometry.translation.vector.into())
+        .collect()
 }
 
 /// The four channels (i, j, k, w) of a pose series' sign-continuous quaternion.
 pub fn rotation_channels(world_from_body: &[Isometry3<f64>]) -> Vec<[f64; 4]> {
-    let rotations: Vec<_> = world_from_body.iter().map(|isometry| isometry.rotation).collect();
-    so3::sign_continuous(&rotations).into_iter().map(|q| q.coords.into()).collect()
+    let rotations: Vec<_> = world_from_body
+        .iter()
+        .map(|isometry| isometry.rotation)
+        .collect();
+    so3::sign_continuous(&rotations)
+        .into_iter()
+        .map(|q| q.coords.into())
+        .collect()
 }
 
 #[cfg(test)]

@@ -21,9 +21,14 @@ fn cone(t: f64) -> Motion {
 
 fn fitted() -> (Vec<Stamp>, PoseSpline) {
     let start = Stamp::from_nanos(1_700_000_000_000_000_000);
-    let stamps: Vec<Stamp> = (0..600).map(|k| start.plus_seconds(f64::from(k) * 0.01)).collect();
-    let poses: Vec<_> =
-        stamps.iter().map(|s| cone(*s - start)).map(|m| Isometry3::from_parts(Translation3::from(m.position), m.rotation)).collect();
+    let stamps: Vec<Stamp> = (0..600)
+        .map(|k| start.plus_seconds(f64::from(k) * 0.01))
+        .collect();
+    let poses: Vec<_> = stamps
+        .iter()
+        .map(|s| cone(*s - start))
+        .map(|m| Isometry3::from_parts(Translation3::from(m.position), m.rotation))
+        .collect();
     let spline = PoseSpline::fit(&stamps, &poses, PoseSmoothing::default()).unwrap();
     (stamps, spline)
 }
@@ -36,9 +41,15 @@ fn motion_of_a_conical_pendulum_at_any_time() {
         let (found, known) = (spline.evaluate(stamps[0].plus_seconds(t)), cone(t));
         assert!((found.position - known.position).norm() < 1e-8, "{t}");
         assert!((found.velocity - known.velocity).norm() < 1e-6, "{t}");
-        assert!((found.acceleration - known.acceleration).norm() < 1e-4, "{t}");
+        assert!(
+            (found.acceleration - known.acceleration).norm() < 1e-4,
+            "{t}"
+        );
         assert!(found.rotation.angle_to(&known.rotation) < 1e-7, "{t}");
-        assert!((found.angular_velocity - known.angular_velocity).norm() < 1e-6, "{t}");
+        assert!(
+            (found.angular_velocity - known.angular_velocity).norm() < 1e-6,
+            "{t}"
+        );
         assert!(found.angular_acceleration.norm() < 1e-4, "{t}");
     }
 }
@@ -46,22 +57,37 @@ fn motion_of_a_conical_pendulum_at_any_time() {
 #[test]
 fn stamps_outside_are_moved_to_the_ends() {
     let (stamps, spline) = fitted();
-    assert_eq!(spline.evaluate(stamps[0].plus_seconds(-2.0)), spline.evaluate(stamps[0]));
-    assert_eq!(spline.evaluate(stamps[599].plus_seconds(0.5)), spline.evaluate(stamps[599]));
+    assert_eq!(
+        spline.evaluate(stamps[0].plus_seconds(-2.0)),
+        spline.evaluate(stamps[0])
+    );
+    assert_eq!(
+        spline.evaluate(stamps[599].plus_seconds(0.5)),
+        spline.evaluate(stamps[599])
+    );
 }
 
 #[test]
 fn turning_the_world_turns_the_result() {
     let mut state = 1_u64;
     let mut wobble = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         0.002 * ((state >> 11) as f64 / (1u64 << 53) as f64 - 0.5)
     };
-    let stamps: Vec<Stamp> = (0..300).map(|k| Stamp::from_seconds(f64::from(k) * 0.01)).collect();
+    let stamps: Vec<Stamp> = (0..300)
+        .map(|k| Stamp::from_seconds(f64::from(k) * 0.01))
+        .collect();
     let poses: Vec<Isometry3<f64>> = stamps
         .iter()
         .map(|s| cone(s.as_seconds()))
-        .map(|m| Isometry3::from_parts((m.position + Vector3::new(wobble(), wobble(), wobble())).into(), m.rotation))
+        .map(|m| {
+            Isometry3::from_parts(
+                (m.position + Vector3::new(wobble(), wobble(), wobble())).into(),
+                m.rotation,
+            )
+        })
         .collect();
     let turn = so3::exp(&Vector3::new(0.4, 1.2, -0.7));
     let turned: Vec<_> = poses.iter().map(|pose| turn * pose).collect();
@@ -70,6 +96,13 @@ fn turning_the_world_turns_the_result() {
         PoseSpline::fit(&stamps, &turned, PoseSmoothing::default()).unwrap(),
     );
     let stamp = Stamp::from_seconds(1.234);
-    assert!((turn * plain.evaluate(stamp).acceleration - turned.evaluate(stamp).acceleration).norm() < 1e-4);
-    assert!((turn * plain.evaluate(stamp).angular_velocity - turned.evaluate(stamp).angular_velocity).norm() < 1e-6);
+    assert!(
+        (turn * plain.evaluate(stamp).acceleration - turned.evaluate(stamp).acceleration).norm()
+            < 1e-4
+    );
+    assert!(
+        (turn * plain.evaluate(stamp).angular_velocity - turned.evaluate(stamp).angular_velocity)
+            .norm()
+            < 1e-6
+    );
 }

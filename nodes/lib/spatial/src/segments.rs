@@ -9,7 +9,8 @@ use crate::spectrum::interpolated;
 
 /// Distance of the windows' centres, s; each is cross-faded with its neighbours over this time.
 pub(crate) const HOP_S: f64 = 2.0;
-/// What is taken beyond the cross-fade on either side, s: room for the filter's response, then a taper.
+/// What is taken beyond the cross-fade on either side, s: room for the filter's response, then a
+/// taper.
 const MARGIN_S: f64 = 1.0;
 const TAPER_S: f64 = 1.5;
 
@@ -30,7 +31,9 @@ impl Filter {
 pub(crate) fn centres(count: usize, rate_hz: f64) -> Vec<usize> {
     let hop = HOP_S * rate_hz;
     let windows = ((count - 1) as f64 / hop).ceil() as usize + 1;
-    (0..windows).map(|k| ((k as f64 * hop).round() as usize).min(count - 1)).collect()
+    (0..windows)
+        .map(|k| ((k as f64 * hop).round() as usize).min(count - 1))
+        .collect()
 }
 
 /// How a series is cut, filtered and put together again.
@@ -47,9 +50,17 @@ pub(crate) struct Segments {
 }
 
 impl Segments {
-    /// Derivatives of several orders of a filtered series. Each window's stretch, less a straight line, continued oddly beyond the ends and tapered,
-    /// is filtered and differentiated in the Fourier domain (times `i 2 pi f` for each order); neighbours are cross-faded by raised cosines.
-    pub fn derivatives(&self, series: &[f64], filters: &[Filter], gain: &dyn Fn(f64) -> f64, orders: &[i32]) -> Vec<Vec<f64>> {
+    /// Derivatives of several orders of a filtered series. Each window's stretch, less a straight
+    /// line, continued oddly beyond the ends and tapered, is filtered and differentiated in the
+    /// Fourier domain (times `i 2 pi f` for each order); neighbours are cross-faded by raised
+    /// cosines.
+    pub fn derivatives(
+        &self,
+        series: &[f64],
+        filters: &[Filter],
+        gain: &dyn Fn(f64) -> f64,
+        orders: &[i32],
+    ) -> Vec<Vec<f64>> {
         let half = ((HOP_S + MARGIN_S + TAPER_S) * self.rate_hz).ceil() as usize;
         let length = FourierPair::good_length(2 * half + 1);
         let forward = FourierPair::new(length);
@@ -58,7 +69,11 @@ impl Segments {
         let mut results = vec![vec![0.0; self.count]; orders.len()];
         let mut values = vec![Complex64::default(); length];
         let mut filtered = vec![Complex64::default(); inverse.length()];
-        for (window, (filter, centre)) in filters.iter().zip(centres(self.samples, self.rate_hz)).enumerate() {
+        for (window, (filter, centre)) in filters
+            .iter()
+            .zip(centres(self.samples, self.rate_hz))
+            .enumerate()
+        {
             let first = centre as i64 - half as i64;
             let value = |k: usize| continued(series, first + (k + self.lead) as i64);
             let last = 2 * half;
@@ -66,7 +81,11 @@ impl Segments {
             values.fill(Complex64::default());
             for (k, slot) in values.iter_mut().enumerate().take(last + 1) {
                 let from_edge = k.min(last - k) as f64 / self.rate_hz;
-                let taper = if from_edge < TAPER_S { 0.5 - 0.5 * (PI * from_edge / TAPER_S).cos() } else { 1.0 };
+                let taper = if from_edge < TAPER_S {
+                    0.5 - 0.5 * (PI * from_edge / TAPER_S).cos()
+                } else {
+                    1.0
+                };
                 *slot = Complex64::new((value(k) - level - slope * k as f64) * taper, 0.0);
             }
             forward.forward(&mut values);
@@ -78,7 +97,9 @@ impl Segments {
                     if weight == 0.0 {
                         continue;
                     }
-                    let value = values[k] * Complex64::new(0.0, TAU * frequency_hz).powi(*order) * (weight * self.factor as f64);
+                    let value = values[k]
+                        * Complex64::new(0.0, TAU * frequency_hz).powi(*order)
+                        * (weight * self.factor as f64);
                     filtered[k] = value;
                     if k > 0 {
                         filtered[inverse.length() - k] = value.conj();

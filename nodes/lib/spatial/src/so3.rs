@@ -1,6 +1,7 @@
 //! Rotations: exponential and logarithm, angular velocity, series of quaternions.
 //!
-//! Rotation vectors are axis times angle, rad. `world_from_body` is written q below, and a product acts right to left.
+//! Rotation vectors are axis times angle, rad. `world_from_body` is written q below, and a product
+//! acts right to left.
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
@@ -41,8 +42,9 @@ pub fn vee(m: &Matrix3<f64>) -> Vector3<f64> {
     0.5 * Vector3::new(m.m32 - m.m23, m.m13 - m.m31, m.m21 - m.m12)
 }
 
-/// Angular velocity in world axes, rad/s, of a quaternion `s` (world_from_body, of any length but zero) with time derivative `s'`:
-/// with `q = s/|s|`, `w = 2 vec(q' q*) = 2 vec(s' s*) / |s|^2` (the change of length only enters the real part).
+/// Angular velocity in world axes, rad/s, of a quaternion `s` (world_from_body, of any length but
+/// zero) with time derivative `s'`: with `q = s/|s|`, `w = 2 vec(q' q*) = 2 vec(s' s*) / |s|^2`
+/// (the change of length only enters the real part).
 pub fn angular_velocity_in_world(s: &Quaternion<f64>, s_dot: &Quaternion<f64>) -> Vector3<f64> {
     (s_dot * s.conjugate()).imag() * (2.0 / s.norm_squared())
 }
@@ -52,46 +54,68 @@ pub fn angular_velocity_in_body(s: &Quaternion<f64>, s_dot: &Quaternion<f64>) ->
     (s.conjugate() * s_dot).imag() * (2.0 / s.norm_squared())
 }
 
-/// Angular acceleration in world axes, rad/s2: the time derivative of [`angular_velocity_in_world`],
-/// `alpha = 2 vec(s'' s*) / |s|^2 - w (|s|^2)' / |s|^2` (`s' s'*` is real).
-pub fn angular_acceleration_in_world(s: &Quaternion<f64>, s_dot: &Quaternion<f64>, s_ddot: &Quaternion<f64>) -> Vector3<f64> {
+/// Angular acceleration in world axes, rad/s2: the time derivative of
+/// [`angular_velocity_in_world`], `alpha = 2 vec(s'' s*) / |s|^2 - w (|s|^2)' / |s|^2` (`s' s'*` is
+/// real).
+pub fn angular_acceleration_in_world(
+    s: &Quaternion<f64>,
+    s_dot: &Quaternion<f64>,
+    s_ddot: &Quaternion<f64>,
+) -> Vector3<f64> {
     let squared = s.norm_squared();
     let growth = 2.0 * s.coords.dot(&s_dot.coords) / squared;
     (s_ddot * s.conjugate()).imag() * (2.0 / squared) - angular_velocity_in_world(s, s_dot) * growth
 }
 
-/// The smallest rotation that turns the direction `from` into `to`; about some axis across where they are opposite.
+/// The smallest rotation that turns the direction `from` into `to`; about some axis across where
+/// they are opposite.
 pub fn minimal_rotation(from: &Vector3<f64>, to: &Vector3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::rotation_between(from, to).unwrap_or_else(|| {
-        let across = if from.x.abs() < 0.7 * from.norm() { Vector3::x() } else { Vector3::y() };
+        let across = if from.x.abs() < 0.7 * from.norm() {
+            Vector3::x()
+        } else {
+            Vector3::y()
+        };
         exp(&(from.cross(&across).normalize() * std::f64::consts::PI))
     })
 }
 
-/// The quaternions of a series of rotations with signs chosen so that each lies within 90 degrees (on the 3-sphere) of the one before;
-/// the first has `w >= 0`. Components are then smooth wherever the rotation is, as long as it turns by under 180 degrees per sample.
+/// The quaternions of a series of rotations with signs chosen so that each lies within 90 degrees
+/// (on the 3-sphere) of the one before; the first has `w >= 0`. Components are then smooth wherever
+/// the rotation is, as long as it turns by under 180 degrees per sample.
 pub fn sign_continuous(rotations: &[UnitQuaternion<f64>]) -> Vec<Quaternion<f64>> {
     let mut previous = Quaternion::identity();
     rotations
         .iter()
         .map(|rotation| {
             let q = rotation.into_inner();
-            previous = if q.coords.dot(&previous.coords) < 0.0 { -q } else { q };
+            previous = if q.coords.dot(&previous.coords) < 0.0 {
+                -q
+            } else {
+                q
+            };
             previous
         })
         .collect()
 }
 
-/// Parses a matrix as a rotation: `|R^T R - I|` (Frobenius) and `|det R - 1|` at most `tolerance`, the rest is projected away.
+/// Parses a matrix as a rotation: `|R^T R - I|` (Frobenius) and `|det R - 1|` at most `tolerance`,
+/// the rest is projected away.
 ///
 /// # Errors
 /// [`SpatialError::NotARotation`], also for NaN.
-pub fn rotation_from_matrix(matrix: &Matrix3<f64>, tolerance: f64) -> Result<UnitQuaternion<f64>, SpatialError> {
+pub fn rotation_from_matrix(
+    matrix: &Matrix3<f64>,
+    tolerance: f64,
+) -> Result<UnitQuaternion<f64>, SpatialError> {
     let orthogonality_error = (matrix.transpose() * matrix - Matrix3::identity()).norm();
     let determinant = matrix.determinant();
     let near = orthogonality_error <= tolerance && (determinant - 1.0).abs() <= tolerance;
     if !near {
-        return Err(SpatialError::NotARotation { orthogonality_error, determinant });
+        return Err(SpatialError::NotARotation {
+            orthogonality_error,
+            determinant,
+        });
     }
     Ok(UnitQuaternion::from_matrix(matrix))
 }

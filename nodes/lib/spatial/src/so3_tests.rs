@@ -9,9 +9,15 @@ fn spin(t: f64) -> UnitQuaternion<f64> {
 fn exp_and_log_are_inverse_from_tiny_to_nearly_half_a_turn() {
     for scale in [0.0, 1e-12, 1e-9, 1e-5, 1e-4, 2e-4, 0.1, 1.0, 3.1] {
         let rotvec = Vector3::new(0.36, -0.48, 0.8) * scale;
-        assert!((log(&exp(&rotvec)) - rotvec).norm() <= 4e-16 + 2e-15 * scale, "{scale}");
+        assert!(
+            (log(&exp(&rotvec)) - rotvec).norm() <= 4e-16 + 2e-15 * scale,
+            "{scale}"
+        );
         let doubly_covered = UnitQuaternion::new_unchecked(-exp(&rotvec).into_inner());
-        assert!((log(&doubly_covered) - rotvec).norm() <= 4e-16 + 2e-15 * scale, "{scale}");
+        assert!(
+            (log(&doubly_covered) - rotvec).norm() <= 4e-16 + 2e-15 * scale,
+            "{scale}"
+        );
     }
 }
 
@@ -41,23 +47,56 @@ fn angular_velocity_and_acceleration_follow_from_quaternion_derivatives_of_any_l
 
 #[test]
 fn sign_continuous_series_do_not_jump() {
-    let rotations: Vec<_> = (0..300).map(|k| exp(&(Vector3::new(0.0, 0.6, 0.8) * (0.05 * f64::from(k))))).map(canonical).collect();
+    let rotations: Vec<_> = (0..300)
+        .map(|k| exp(&(Vector3::new(0.0, 0.6, 0.8) * (0.05 * f64::from(k)))))
+        .map(canonical)
+        .collect();
     let series = sign_continuous(&rotations);
-    assert!(rotations.windows(2).any(|w| w[0].coords.dot(&w[1].coords) < 0.0), "the input jumps");
-    assert!(series.windows(2).all(|w| (w[1].coords - w[0].coords).norm() < 0.03));
-    assert!(series.iter().zip(&rotations).all(|(q, r)| UnitQuaternion::new_unchecked(*q).angle_to(r) < 1e-7));
+    assert!(
+        rotations
+            .windows(2)
+            .any(|w| w[0].coords.dot(&w[1].coords) < 0.0),
+        "the input jumps"
+    );
+    assert!(
+        series
+            .windows(2)
+            .all(|w| (w[1].coords - w[0].coords).norm() < 0.03)
+    );
+    assert!(
+        series
+            .iter()
+            .zip(&rotations)
+            .all(|(q, r)| UnitQuaternion::new_unchecked(*q).angle_to(r) < 1e-7)
+    );
 }
 
 fn canonical(q: UnitQuaternion<f64>) -> UnitQuaternion<f64> {
-    if q.w < 0.0 { UnitQuaternion::new_unchecked(-q.into_inner()) } else { q }
+    if q.w < 0.0 {
+        UnitQuaternion::new_unchecked(-q.into_inner())
+    } else {
+        q
+    }
 }
 
 #[test]
 fn matrices_that_do_not_rotate_are_refused() {
     let good = spin(0.3).to_rotation_matrix().into_inner();
-    assert!(rotation_from_matrix(&good, 1e-6).unwrap().angle_to(&spin(0.3)) < 1e-7);
-    for bad in [Matrix3::identity() * 1.1, Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, -1.0)), Matrix3::repeat(f64::NAN)] {
-        assert!(matches!(rotation_from_matrix(&bad, 1e-3), Err(SpatialError::NotARotation { .. })));
+    assert!(
+        rotation_from_matrix(&good, 1e-6)
+            .unwrap()
+            .angle_to(&spin(0.3))
+            < 1e-7
+    );
+    for bad in [
+        Matrix3::identity() * 1.1,
+        Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, -1.0)),
+        Matrix3::repeat(f64::NAN),
+    ] {
+        assert!(matches!(
+            rotation_from_matrix(&bad, 1e-3),
+            Err(SpatialError::NotARotation { .. })
+        ));
     }
 }
 

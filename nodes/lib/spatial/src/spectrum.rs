@@ -30,7 +30,8 @@ impl Spectrum {
 
     /// The entries between two frequencies, Hz.
     pub fn band(&self, from_hz: f64, to_hz: f64) -> &[f64] {
-        let index = |hz: f64| ((hz / self.spacing_hz).round().max(0.0) as usize).min(self.density.len());
+        let index =
+            |hz: f64| ((hz / self.spacing_hz).round().max(0.0) as usize).min(self.density.len());
         let (from, to) = (index(from_hz), index(to_hz));
         &self.density[from.min(to)..to]
     }
@@ -45,19 +46,24 @@ impl Spectrum {
 
 /// Value of a series between its entries; held at the ends.
 pub(crate) fn interpolated(values: &[f64], position: f64) -> f64 {
-    let Some(last) = values.len().checked_sub(1) else { return 0.0 };
+    let Some(last) = values.len().checked_sub(1) else {
+        return 0.0;
+    };
     let position = position.clamp(0.0, last as f64);
     let index = (position as usize).min(last.saturating_sub(1));
     let share = position - index as f64;
     values[index] * (1.0 - share) + values[(index + 1).min(last)] * share
 }
 
-/// Welch's estimate (1967) with Hann windows that overlap by half; each window's straight line is taken off first.
+/// Welch's estimate (1967) with Hann windows that overlap by half; each window's straight line is
+/// taken off first.
 ///
 /// A series shorter than the window is one window. Resolution: 1.5 / window length.
 pub fn welch(series: &[f64], rate_hz: f64, window: usize) -> Spectrum {
     let window = window.min(series.len()).max(2);
-    let hann: Vec<f64> = (0..window).map(|k| 0.5 - 0.5 * (TAU * (k as f64 + 0.5) / window as f64).cos()).collect();
+    let hann: Vec<f64> = (0..window)
+        .map(|k| 0.5 - 0.5 * (TAU * (k as f64 + 0.5) / window as f64).cos())
+        .collect();
     let power: f64 = hann.iter().map(|weight| weight * weight).sum();
     let fft = FftPlanner::new().plan_fft_forward(window);
     let mut density = vec![0.0; window / 2 + 1];
@@ -79,7 +85,11 @@ pub fn welch(series: &[f64], rate_hz: f64, window: usize) -> Spectrum {
     }
     let factor = 2.0 / (rate_hz * power * windows.max(1) as f64);
     density.iter_mut().for_each(|value| *value *= factor);
-    Spectrum { spacing_hz: rate_hz / window as f64, density, windows }
+    Spectrum {
+        spacing_hz: rate_hz / window as f64,
+        density,
+        windows,
+    }
 }
 
 /// Level at the first entry and slope per entry of the least-squares line.
@@ -88,7 +98,16 @@ fn line(values: &[f64]) -> (f64, f64) {
     let centre = (n - 1.0) / 2.0;
     let mean = values.iter().sum::<f64>() / n;
     let spread = n * (n * n - 1.0) / 12.0;
-    let slope = if spread > 0.0 { values.iter().enumerate().map(|(k, v)| (k as f64 - centre) * v).sum::<f64>() / spread } else { 0.0 };
+    let slope = if spread > 0.0 {
+        values
+            .iter()
+            .enumerate()
+            .map(|(k, v)| (k as f64 - centre) * v)
+            .sum::<f64>()
+            / spread
+    } else {
+        0.0
+    };
     (mean - slope * centre, slope)
 }
 
@@ -110,7 +129,11 @@ impl FourierPair {
     /// Plans both.
     pub fn new(length: usize) -> Self {
         let mut planner = FftPlanner::new();
-        Self { forward: planner.plan_fft_forward(length), inverse: planner.plan_fft_inverse(length), length }
+        Self {
+            forward: planner.plan_fft_forward(length),
+            inverse: planner.plan_fft_inverse(length),
+            length,
+        }
     }
 
     /// Number of entries.
@@ -156,11 +179,15 @@ mod tests {
     #[test]
     fn a_sine_and_its_power_are_found() {
         let rate_hz = 100.0;
-        let series: Vec<f64> = (0..6000).map(|k| 3.0 * (TAU * 7.0 * f64::from(k) / rate_hz).sin()).collect();
+        let series: Vec<f64> = (0..6000)
+            .map(|k| 3.0 * (TAU * 7.0 * f64::from(k) / rate_hz).sin())
+            .collect();
         let spectrum = welch(&series, rate_hz, 500);
         let power: f64 = spectrum.density.iter().sum::<f64>() * spectrum.spacing_hz;
         assert!((power - 4.5).abs() < 0.02, "{power}");
-        let peak = (0..spectrum.density.len()).max_by(|&a, &b| spectrum.density[a].total_cmp(&spectrum.density[b])).unwrap_or(0);
+        let peak = (0..spectrum.density.len())
+            .max_by(|&a, &b| spectrum.density[a].total_cmp(&spectrum.density[b]))
+            .unwrap_or(0);
         assert!((spectrum.frequency(peak) - 7.0).abs() <= spectrum.spacing_hz);
     }
 

@@ -11,20 +11,24 @@ use crate::system::SplineSystem;
 /// How much a spline smooths.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Smoothing {
-    /// As much as the samples themselves ask for (REML, see [`crate::WeightSearch`]): exact samples are interpolated, jittered ones smoothed.
+    /// As much as the samples themselves ask for (REML, see [`crate::WeightSearch`]): exact samples
+    /// are interpolated, jittered ones smoothed.
     #[default]
     Automatic,
-    /// The same, for the sake of a derivative: near the weight of the greatest likelihood that with the least error of this derivative, found
-    /// by comparing the halves of the samples.
+    /// The same, for the sake of a derivative: near the weight of the greatest likelihood that with
+    /// the least error of this derivative, found by comparing the halves of the samples.
     AutomaticFor(Derivative),
-    /// Not at all: the spline passes through the samples (up to 1e-8 of the fifth derivative's penalty, which steadies gaps).
+    /// Not at all: the spline passes through the samples (up to 1e-8 of the fifth derivative's
+    /// penalty, which steadies gaps).
     Interpolate,
-    /// A low-pass of zero phase whose response `1 / (1 + (f / cutoff)^10)` is one half at this frequency, Hz.
+    /// A low-pass of zero phase whose response `1 / (1 + (f / cutoff)^10)` is one half at this
+    /// frequency, Hz.
     CutoffHz(f64),
     /// The penalty's weight itself, for times counted in median sample intervals; no unit.
     Weight(f64),
-    /// As smooth as can be within this root mean square distance per channel from the samples, in their unit (Reinsch 1967): for samples whose
-    /// errors are known to be so large. IMUSim's splines choose so, with 1 mm.
+    /// As smooth as can be within this root mean square distance per channel from the samples, in
+    /// their unit (Reinsch 1967): for samples whose errors are known to be so large. IMUSim's
+    /// splines choose so, with 1 mm.
     ResidualStd(f64),
 }
 
@@ -32,25 +36,36 @@ impl Smoothing {
     /// The weight for samples on these times.
     ///
     /// # Errors
-    /// [`SpatialError::BadRate`], [`SpatialError::BadWeight`] or [`SpatialError::BadDistance`] for numbers that are negative or not finite, zero
-    /// cutoffs too.
-    pub fn weight<const C: usize>(self, system: &SplineSystem, values: &[[f64; C]]) -> Result<f64, SpatialError> {
+    /// [`SpatialError::BadRate`], [`SpatialError::BadWeight`] or [`SpatialError::BadDistance`] for
+    /// numbers that are negative or not finite, zero cutoffs too.
+    pub fn weight<const C: usize>(
+        self,
+        system: &SplineSystem,
+        values: &[[f64; C]],
+    ) -> Result<f64, SpatialError> {
         let lowest = 10f64.powf(LOWEST_LOG_WEIGHT);
         match self {
             Self::Automatic => system.search(values, None),
             Self::AutomaticFor(derivative) => system.search(values, Some(derivative)),
             Self::Interpolate => Ok(lowest),
-            Self::CutoffHz(rate_hz) if !(rate_hz > 0.0 && rate_hz.is_finite()) => Err(SpatialError::BadRate { rate_hz }),
+            Self::CutoffHz(rate_hz) if !(rate_hz > 0.0 && rate_hz.is_finite()) => {
+                Err(SpatialError::BadRate { rate_hz })
+            }
             Self::CutoffHz(cutoff_hz) => Ok(system.weight_of_cutoff(cutoff_hz).max(lowest)),
-            Self::Weight(weight) if !(weight >= 0.0 && weight.is_finite()) => Err(SpatialError::BadWeight { weight }),
+            Self::Weight(weight) if !(weight >= 0.0 && weight.is_finite()) => {
+                Err(SpatialError::BadWeight { weight })
+            }
             Self::Weight(weight) => Ok(weight.max(lowest)),
-            Self::ResidualStd(std) if !(std >= 0.0 && std.is_finite()) => Err(SpatialError::BadDistance { std }),
+            Self::ResidualStd(std) if !(std >= 0.0 && std.is_finite()) => {
+                Err(SpatialError::BadDistance { std })
+            }
             Self::ResidualStd(std) => system.weight_of_residual(values, std),
         }
     }
 }
 
-/// A quintic spline through or near samples of C channels, which share one smoothing weight (so that turning the axes turns the result).
+/// A quintic spline through or near samples of C channels, which share one smoothing weight (so
+/// that turning the axes turns the result).
 #[derive(Clone, Debug)]
 pub struct SmoothingSpline<const C: usize> {
     system: Arc<SplineSystem>,
@@ -62,8 +77,13 @@ impl<const C: usize> SmoothingSpline<C> {
     /// Fits samples (N, C) at `seconds` (N), uneven and with gaps as they may be. O(N).
     ///
     /// # Errors
-    /// Times that do not increase, anything not finite, lengths that differ, fewer than two samples, a bad weight.
-    pub fn fit(seconds: &[f64], values: &[[f64; C]], smoothing: Smoothing) -> Result<Self, SpatialError> {
+    /// Times that do not increase, anything not finite, lengths that differ, fewer than two
+    /// samples, a bad weight.
+    pub fn fit(
+        seconds: &[f64],
+        values: &[[f64; C]],
+        smoothing: Smoothing,
+    ) -> Result<Self, SpatialError> {
         Self::fit_on(&Arc::new(SplineSystem::new(seconds)?), values, smoothing)
     }
 
@@ -71,7 +91,11 @@ impl<const C: usize> SmoothingSpline<C> {
     ///
     /// # Errors
     /// As [`SmoothingSpline::fit`].
-    pub fn fit_on(system: &Arc<SplineSystem>, values: &[[f64; C]], smoothing: Smoothing) -> Result<Self, SpatialError> {
+    pub fn fit_on(
+        system: &Arc<SplineSystem>,
+        values: &[[f64; C]],
+        smoothing: Smoothing,
+    ) -> Result<Self, SpatialError> {
         system.check(values)?;
         let weight = smoothing.weight(system, values)?;
         let mut scratch = Scratch::default();
@@ -83,10 +107,15 @@ impl<const C: usize> SmoothingSpline<C> {
                 coefficient[c] += first[c];
             }
         }
-        Ok(Self { system: system.clone(), coefficients: scratch.coefficients, weight })
+        Ok(Self {
+            system: system.clone(),
+            coefficients: scratch.coefficients,
+            weight,
+        })
     }
 
-    /// Value, first and second derivative (per s, per s^2) at a time; times outside the samples are moved to the nearest end.
+    /// Value, first and second derivative (per s, per s^2) at a time; times outside the samples are
+    /// moved to the nearest end.
     pub fn evaluate(&self, seconds: f64) -> [[f64; C]; 3] {
         let (first, values) = self.system.basis_at(seconds);
         self.combine(first, &values)
@@ -95,7 +124,10 @@ impl<const C: usize> SmoothingSpline<C> {
     /// As [`SmoothingSpline::evaluate`], from what [`SplineSystem::basis_at`] gave.
     pub(crate) fn combine(&self, first: usize, values: &BasisValues) -> [[f64; C]; 3] {
         let mut result = [[0.0; C]; 3];
-        for (j, coefficient) in self.coefficients[first..first + values[0].len()].iter().enumerate() {
+        for (j, coefficient) in self.coefficients[first..first + values[0].len()]
+            .iter()
+            .enumerate()
+        {
             for (derivative, row) in result.iter_mut().zip(values) {
                 for c in 0..C {
                     derivative[c] += row[j] * coefficient[c];
@@ -117,14 +149,22 @@ impl<const C: usize> SmoothingSpline<C> {
 }
 
 impl SplineSystem {
-    /// First function and the basis' values and derivatives, per s and s^2, at a time moved into the range.
+    /// First function and the basis' values and derivatives, per s and s^2, at a time moved into
+    /// the range.
     pub(crate) fn basis_at(&self, seconds: f64) -> (usize, BasisValues) {
         let end = self.basis.interval(self.basis.interval_count() - 1).1;
         let t = ((seconds - self.origin) / self.interval).clamp(0.0, end);
         let first = self.basis.interval_of(t);
         let [value, slope, second] = self.basis.values(first, t);
         let per_second = 1.0 / self.interval;
-        (first, [value, slope.map(|s| s * per_second), second.map(|s| s * per_second * per_second)])
+        (
+            first,
+            [
+                value,
+                slope.map(|s| s * per_second),
+                second.map(|s| s * per_second * per_second),
+            ],
+        )
     }
 }
 

@@ -2,7 +2,8 @@
 
 use std::ops::Sub;
 
-/// A point in time: nanoseconds since the epoch of its clock (UNIX for live data, the recording's own for replays).
+/// A point in time: nanoseconds since the epoch of its clock (UNIX for live data, the recording's
+/// own for replays).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct Stamp {
     /// Nanoseconds since the clock's epoch.
@@ -17,10 +18,13 @@ impl Stamp {
 
     /// The stamp `seconds` after the epoch, rounded to the nearest nanosecond.
     pub fn from_seconds(seconds: f64) -> Self {
-        Self { nanos: (seconds * 1e9).round() as i64 }
+        Self {
+            nanos: (seconds * 1e9).round() as i64,
+        }
     }
 
-    /// Seconds since the epoch. For stamps of today the result resolves 0.24 microseconds; subtract stamps first where that matters.
+    /// Seconds since the epoch. For stamps of today the result resolves 0.24 microseconds; subtract
+    /// stamps first where that matters.
     pub fn as_seconds(self) -> f64 {
         self.nanos as f64 * 1e-9
     }
@@ -28,7 +32,9 @@ impl Stamp {
     /// This stamp moved by `seconds`, rounded to the nearest nanosecond.
     #[must_use]
     pub fn plus_seconds(self, seconds: f64) -> Self {
-        Self { nanos: self.nanos + (seconds * 1e9).round() as i64 }
+        Self {
+            nanos: self.nanos + (seconds * 1e9).round() as i64,
+        }
     }
 }
 

@@ -11,22 +11,27 @@ use crate::difference::{MAX_STENCIL, derivative_weights};
 use crate::grid::check_times;
 use crate::select::{Scratch, searched_ranges};
 
-/// Derivative that smoothing penalises. Five is the highest that a quintic has; the response to noise, `1 / (1 + weight w^10)`, then falls
-/// the most sharply, and motion below the cutoff passes with the least loss.
+/// Derivative that smoothing penalises. Five is the highest that a quintic has; the response to
+/// noise, `1 / (1 + weight w^10)`, then falls the most sharply, and motion below the cutoff passes
+/// with the least loss.
 pub(crate) const PENALTY_ORDER: usize = 5;
 
-/// Towards the ends the penalty falls linearly over so many intervals: with samples on one side only, the same weight would let the fifth
-/// derivative's natural condition bend the curve (measured: the error of a smoothed acceleration there falls by a third).
+/// Towards the ends the penalty falls linearly over so many intervals: with samples on one side
+/// only, the same weight would let the fifth derivative's natural condition bend the curve
+/// (measured: the error of a smoothed acceleration there falls by a third).
 const EASED_INTERVALS: f64 = 40.0;
 
-/// The equations of smoothing splines on one set of times, made once and shared by all series on these times.
+/// The equations of smoothing splines on one set of times, made once and shared by all series on
+/// these times.
 ///
-/// A spline `f = sum_j c_j B_j` minimises `sum_k |y_k - f(t_k)|^2 + weight * integral of |f^(5)|^2` (eased off at the ends), that is
-/// `(B^T B + weight P) c = B^T y`, eleven bands wide, solved in O(N). Times count in median sample intervals, so the weight has no unit.
+/// A spline `f = sum_j c_j B_j` minimises `sum_k |y_k - f(t_k)|^2 + weight * integral of |f^(5)|^2`
+/// (eased off at the ends), that is `(B^T B + weight P) c = B^T y`, eleven bands wide, solved in
+/// O(N). Times count in median sample intervals, so the weight has no unit.
 ///
-/// Ends: a knot at every sample leaves four coefficients free. First and second derivative at each end, by one-sided differences over eight
-/// samples, are added to the observations with the weights that their noise deserves (1 over the sum of squared difference weights): between
-/// exact samples they settle the ends to sixth order, among noisy ones they weigh next to nothing.
+/// Ends: a knot at every sample leaves four coefficients free. First and second derivative at each
+/// end, by one-sided differences over eight samples, are added to the observations with the weights
+/// that their noise deserves (1 over the sum of squared difference weights): between exact samples
+/// they settle the ends to sixth order, among noisy ones they weigh next to nothing.
 #[derive(Clone, Debug)]
 pub struct SplineSystem {
     pub(crate) basis: Basis,
@@ -35,10 +40,12 @@ pub struct SplineSystem {
     /// Time of the first sample, s.
     pub(crate) origin: f64,
     sample_count: usize,
-    /// Values of the basis functions at the samples: sample k lies under the functions from min(k, N - 2) on.
+    /// Values of the basis functions at the samples: sample k lies under the functions from min(k,
+    /// N - 2) on.
     collocation: Vec<[f64; ORDER]>,
     ends: [EndDerivative; 4],
-    /// Fifth derivative over each knot interval, times the root of its share in the penalty: `|rows c|^2 = c^T P c`.
+    /// Fifth derivative over each knot interval, times the root of its share in the penalty: `|rows
+    /// c|^2 = c^T P c`.
     penalty_rows: Vec<[f64; ORDER]>,
     gram: Banded,
     penalty: Banded,
@@ -64,11 +71,17 @@ impl SplineSystem {
     /// Fewer than two times, times that are not finite or do not increase.
     pub fn new(seconds: &[f64]) -> Result<Self, SpatialError> {
         if seconds.len() < 2 {
-            return Err(SpatialError::TooFewSamples { got: seconds.len(), needed: 2 });
+            return Err(SpatialError::TooFewSamples {
+                got: seconds.len(),
+                needed: 2,
+            });
         }
         check_times(seconds)?;
         let interval = median_interval(seconds);
-        let times = seconds.iter().map(|t| (t - seconds[0]) / interval).collect();
+        let times = seconds
+            .iter()
+            .map(|t| (t - seconds[0]) / interval)
+            .collect();
         Ok(Self::from_times(times, interval, seconds[0]))
     }
 
@@ -76,7 +89,11 @@ impl SplineSystem {
     pub(crate) fn from_times(times: Vec<f64>, interval: f64, origin: f64) -> Self {
         let basis = Basis::new(&times);
         let last_interval = basis.interval_count() - 1;
-        let collocation: Vec<_> = times.iter().enumerate().map(|(k, &t)| basis.derivatives(k.min(last_interval), t, 0)).collect();
+        let collocation: Vec<_> = times
+            .iter()
+            .enumerate()
+            .map(|(k, &t)| basis.derivatives(k.min(last_interval), t, 0))
+            .collect();
         let mut gram = Banded::zeros(basis.count());
         for (k, row) in collocation.iter().enumerate() {
             add_outer_product(&mut gram, k.min(last_interval), row, 1.0);
@@ -91,7 +108,20 @@ impl SplineSystem {
             add_outer_product(&mut penalty, first, row, 1.0);
         }
         let (sample_count, runs, split_runs) = (times.len(), OnceLock::new(), Default::default());
-        Self { basis, interval, origin, sample_count, collocation, ends, penalty_rows, gram, penalty, times, runs, split_runs }
+        Self {
+            basis,
+            interval,
+            origin,
+            sample_count,
+            collocation,
+            ends,
+            penalty_rows,
+            gram,
+            penalty,
+            times,
+            runs,
+            split_runs,
+        }
     }
 
     /// Number of samples.
@@ -104,23 +134,35 @@ impl SplineSystem {
         self.interval
     }
 
-    /// The runs of samples that a search for a weight looks at, empty where it looks at all; made when first asked for.
-    /// Their times count in this system's interval, so that a weight means the same in all of them.
+    /// The runs of samples that a search for a weight looks at, empty where it looks at all; made
+    /// when first asked for. Their times count in this system's interval, so that a weight means
+    /// the same in all of them.
     pub(crate) fn runs(&self) -> &[(Range<usize>, SplineSystem)] {
         self.runs.get_or_init(|| {
             let ranges = searched_ranges(self.sample_count).into_iter();
-            ranges.map(|range| (range.clone(), Self::from_times(self.times[range].to_vec(), self.interval, self.origin))).collect()
+            ranges
+                .map(|range| {
+                    (
+                        range.clone(),
+                        Self::from_times(self.times[range].to_vec(), self.interval, self.origin),
+                    )
+                })
+                .collect()
         })
     }
 
-    /// The same runs, or the whole, split into halves for [`Derivative`]; made when first asked for.
+    /// The same runs, or the whole, split into halves for [`Derivative`]; made when first asked
+    /// for.
     pub(crate) fn split_runs(&self, derivative: Derivative) -> &[SplitRun] {
         self.split_runs[derivative as usize].get_or_init(|| {
             let ranges = match searched_ranges(self.sample_count) {
                 ranges if ranges.is_empty() => std::iter::once(0..self.sample_count).collect(),
                 ranges => ranges,
             };
-            ranges.into_iter().map(|range| SplitRun::new(&self.times, range, derivative)).collect()
+            ranges
+                .into_iter()
+                .map(|range| SplitRun::new(&self.times, range, derivative))
+                .collect()
         })
     }
 
@@ -137,27 +179,51 @@ impl SplineSystem {
     /// Checks that `values` belong to these times and are finite.
     pub(crate) fn check<const C: usize>(&self, values: &[[f64; C]]) -> Result<(), SpatialError> {
         if values.len() != self.sample_count {
-            return Err(SpatialError::LengthMismatch { what: "values", expected: self.sample_count, found: values.len() });
+            return Err(SpatialError::LengthMismatch {
+                what: "values",
+                expected: self.sample_count,
+                found: values.len(),
+            });
         }
-        match values.iter().position(|value| value.iter().any(|v| !v.is_finite())) {
-            Some(index) => Err(SpatialError::NotFinite { index, what: "value" }),
+        match values
+            .iter()
+            .position(|value| value.iter().any(|v| !v.is_finite()))
+        {
+            Some(index) => Err(SpatialError::NotFinite {
+                index,
+                what: "value",
+            }),
             None => Ok(()),
         }
     }
 
     /// Minimises `|y - B c|^2 + weight c^T P c`; the coefficients come in `scratch`.
     ///
-    /// A large weight drowns B in the sum `B^T B + weight P`: solutions are then refined with the residual of the least-squares problem itself,
-    /// in which B and P are apart, to an error that grows with the root of the weight only.
-    pub(crate) fn solve<const C: usize>(&self, values: &[[f64; C]], weight: f64, scratch: &mut Scratch<C>) -> Result<(), SpatialError> {
-        scratch.factor.factor_sum(&self.gram, weight, &self.penalty)?;
+    /// A large weight drowns B in the sum `B^T B + weight P`: solutions are then refined with the
+    /// residual of the least-squares problem itself, in which B and P are apart, to an error that
+    /// grows with the root of the weight only.
+    pub(crate) fn solve<const C: usize>(
+        &self,
+        values: &[[f64; C]],
+        weight: f64,
+        scratch: &mut Scratch<C>,
+    ) -> Result<(), SpatialError> {
+        scratch
+            .factor
+            .factor_sum(&self.gram, weight, &self.penalty)?;
         scratch.coefficients.clear();
         scratch.coefficients.resize(self.basis.count(), [0.0; C]);
-        let refinements = if weight < 1e2 { 0 } else { 1 + usize::from(weight > 1e8) };
+        let refinements = if weight < 1e2 {
+            0
+        } else {
+            1 + usize::from(weight > 1e8)
+        };
         for _ in 0..=refinements {
             self.residual(values, weight, scratch);
             scratch.factor.solve(&mut scratch.correction);
-            for (coefficient, correction) in scratch.coefficients.iter_mut().zip(&scratch.correction) {
+            for (coefficient, correction) in
+                scratch.coefficients.iter_mut().zip(&scratch.correction)
+            {
                 for c in 0..C {
                     coefficient[c] += correction[c];
                 }
@@ -173,23 +239,44 @@ impl SplineSystem {
         Ok(factor)
     }
 
-    /// What the samples are multiplied with in `x^T B^T y`, the derivatives at the ends included, for coefficients x that are zero but from
-    /// `start` on: one row a sample, and the first sample.
-    pub(crate) fn transposed<const C: usize>(&self, start: usize, x: &[[f64; C]]) -> (usize, Vec<[f64; C]>) {
+    /// What the samples are multiplied with in `x^T B^T y`, the derivatives at the ends included,
+    /// for coefficients x that are zero but from `start` on: one row a sample, and the first
+    /// sample.
+    pub(crate) fn transposed<const C: usize>(
+        &self,
+        start: usize,
+        x: &[[f64; C]],
+    ) -> (usize, Vec<[f64; C]>) {
         let last_interval = self.basis.interval_count() - 1;
         let dot = |first: usize, row: &[f64; ORDER]| -> [f64; C] {
-            let entry = |j: usize| (first + j).checked_sub(start).and_then(|i| x.get(i)).copied().unwrap_or([0.0; C]);
-            (0..ORDER).fold([0.0; C], |sum, j| std::array::from_fn(|c| sum[c] + row[j] * entry(j)[c]))
+            let entry = |j: usize| {
+                (first + j)
+                    .checked_sub(start)
+                    .and_then(|i| x.get(i))
+                    .copied()
+                    .unwrap_or([0.0; C])
+            };
+            (0..ORDER).fold([0.0; C], |sum, j| {
+                std::array::from_fn(|c| sum[c] + row[j] * entry(j)[c])
+            })
         };
-        let (mut low, mut high) = (start.saturating_sub(DEGREE), (start + x.len()).min(self.sample_count));
-        let reached = self.ends.iter().filter(|end| end.first < start + x.len() && start < end.first + ORDER);
+        let (mut low, mut high) = (
+            start.saturating_sub(DEGREE),
+            (start + x.len()).min(self.sample_count),
+        );
+        let reached = self
+            .ends
+            .iter()
+            .filter(|end| end.first < start + x.len() && start < end.first + ORDER);
         let reached: Vec<&EndDerivative> = reached.collect();
         for end in &reached {
             low = low.min(end.start);
             high = high.max((end.start + MAX_STENCIL).min(self.sample_count));
         }
         low = low.min(high);
-        let mut rows: Vec<[f64; C]> = (low..high).map(|k| dot(k.min(last_interval), &self.collocation[k])).collect();
+        let mut rows: Vec<[f64; C]> = (low..high)
+            .map(|k| dot(k.min(last_interval), &self.collocation[k]))
+            .collect();
         for end in reached {
             let weighted = dot(end.first, &end.row).map(|d| d * end.weight);
             for (row, w) in rows[end.start - low..].iter_mut().zip(end.stencil) {
@@ -199,36 +286,82 @@ impl SplineSystem {
         (low, rows)
     }
 
-    /// `B^T (y - B c) - weight P c` of the coefficients in `scratch`, into its correction; returns `|y - B c|^2 + weight c^T P c`, over all
-    /// channels, summed from the residuals themselves.
-    pub(crate) fn residual<const C: usize>(&self, values: &[[f64; C]], weight: f64, scratch: &mut Scratch<C>) -> f64 {
-        let Scratch { coefficients, correction, .. } = scratch;
+    /// `B^T (y - B c) - weight P c` of the coefficients in `scratch`, into its correction; returns
+    /// `|y - B c|^2 + weight c^T P c`, over all channels, summed from the residuals themselves.
+    pub(crate) fn residual<const C: usize>(
+        &self,
+        values: &[[f64; C]],
+        weight: f64,
+        scratch: &mut Scratch<C>,
+    ) -> f64 {
+        let Scratch {
+            coefficients,
+            correction,
+            ..
+        } = scratch;
         correction.clear();
         correction.resize(self.basis.count(), [0.0; C]);
         let last_interval = self.basis.interval_count() - 1;
         let mut sum = 0.0;
         for (k, (value, row)) in values.iter().zip(&self.collocation).enumerate() {
             let first = k.min(last_interval);
-            sum += add_residual(&coefficients[first..], row, value, 1.0, &mut correction[first..]);
+            sum += add_residual(
+                &coefficients[first..],
+                row,
+                value,
+                1.0,
+                &mut correction[first..],
+            );
         }
         for end in &self.ends {
             let target = end.target(values);
-            sum += add_residual(&coefficients[end.first..], &end.row, &target, end.weight, &mut correction[end.first..]);
+            sum += add_residual(
+                &coefficients[end.first..],
+                &end.row,
+                &target,
+                end.weight,
+                &mut correction[end.first..],
+            );
         }
         for (first, row) in self.penalty_rows.iter().enumerate() {
-            sum += add_residual(&coefficients[first..], row, &[0.0; C], weight, &mut correction[first..]);
+            sum += add_residual(
+                &coefficients[first..],
+                row,
+                &[0.0; C],
+                weight,
+                &mut correction[first..],
+            );
         }
         sum
     }
 
     /// `|y - B c|^2` over the samples and channels alone.
-    pub(crate) fn distance<const C: usize>(&self, values: &[[f64; C]], coefficients: &[[f64; C]]) -> f64 {
+    pub(crate) fn distance<const C: usize>(
+        &self,
+        values: &[[f64; C]],
+        coefficients: &[[f64; C]],
+    ) -> f64 {
         let last_interval = self.basis.interval_count() - 1;
         let square = |(k, (value, row)): (usize, (&[f64; C], &[f64; ORDER]))| -> f64 {
             let near = &coefficients[k.min(last_interval)..];
-            (0..C).map(|c| (value[c] - row.iter().zip(near).map(|(w, near)| w * near[c]).sum::<f64>()).powi(2)).sum()
+            (0..C)
+                .map(|c| {
+                    (value[c]
+                        - row
+                            .iter()
+                            .zip(near)
+                            .map(|(w, near)| w * near[c])
+                            .sum::<f64>())
+                    .powi(2)
+                })
+                .sum()
         };
-        values.iter().zip(&self.collocation).enumerate().map(square).sum()
+        values
+            .iter()
+            .zip(&self.collocation)
+            .enumerate()
+            .map(square)
+            .sum()
     }
 }
 
@@ -244,7 +377,8 @@ impl EndDerivative {
     }
 }
 
-/// Residual of one row: its weighted square is returned, its weighted product with the row added to `correction`.
+/// Residual of one row: its weighted square is returned, its weighted product with the row added to
+/// `correction`.
 #[inline]
 fn add_residual<const C: usize>(
     coefficients: &[[f64; C]],
@@ -281,10 +415,21 @@ fn end_derivatives(basis: &Basis, times: &[f64]) -> [EndDerivative; 4] {
         let stencil = derivative_weights(&times[start..start + used], t)[order];
         let square: f64 = stencil.iter().map(|w| w * w).sum();
         let weight = if square > 0.0 { 1.0 / square } else { 1.0 };
-        EndDerivative { first, row: basis.derivatives(first, t, order), start, stencil, weight }
+        EndDerivative {
+            first,
+            row: basis.derivatives(first, t, order),
+            start,
+            stencil,
+            weight,
+        }
     };
     let (start, end) = (times[0], times[count - 1]);
-    [at(0, 0, start, 1), at(0, 0, start, 2), at(count - used, last_interval, end, 1), at(count - used, last_interval, end, 2)]
+    [
+        at(0, 0, start, 1),
+        at(0, 0, start, 2),
+        at(count - used, last_interval, end, 1),
+        at(count - used, last_interval, end, 2),
+    ]
 }
 
 fn add_outer_product(matrix: &mut Banded, first: usize, row: &[f64; ORDER], weight: f64) {
@@ -301,7 +446,9 @@ fn penalty_rows(basis: &Basis) -> Vec<[f64; ORDER]> {
         let (start, end) = basis.interval(first);
         let from_end = first.min(basis.interval_count() - 1 - first) as f64 + 0.5;
         let share = (end - start) * (from_end / EASED_INTERVALS).min(1.0);
-        basis.derivatives(first, 0.5 * (start + end), PENALTY_ORDER).map(|d| d * share.sqrt())
+        basis
+            .derivatives(first, 0.5 * (start + end), PENALTY_ORDER)
+            .map(|d| d * share.sqrt())
     };
     (0..basis.interval_count()).map(row).collect()
 }

@@ -4,7 +4,8 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::Stamp;
 
-/// Kinematics of a segment's frame on a uniform grid, in the segment's own axes: what an IMU model starts from.
+/// Kinematics of a segment's frame on a uniform grid, in the segment's own axes: what an IMU model
+/// starts from.
 ///
 /// All vectors have the same length; entry k belongs to `start + k / rate_hz`.
 #[derive(Clone, Debug, Default, PartialEq)]

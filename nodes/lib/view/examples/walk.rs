@@ -1,7 +1,9 @@
-//! The embedded walk with the five demo placements, or with 17 where a second argument is `full17`, as the viewer shows it.
+//! The embedded walk with the five demo placements, or with 17 where a second argument is `full17`,
+//! as the viewer shows it.
 //!
-//! `cargo run -p cromosim_view --example walk -- OUT.rrd` writes a file; with `live` instead of a file it goes, in real time, to the viewer
-//! that listens on 127.0.0.1:9876, with `serve` to whoever connects.
+//! `cargo run -p cromosim_view --example walk -- OUT.rrd` writes a file; with `live` instead of a
+//! file it goes, in real time, to the viewer that listens on 127.0.0.1:9876, with `serve` to
+//! whoever connects.
 
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -17,12 +19,19 @@ use cromosim_view::{Destination, Recording, RecordingOptions};
 const RATE_HZ: f64 = 100.0;
 
 fn main() -> anyhow::Result<()> {
-    let target = std::env::args().nth(1).context("usage: walk (OUT.rrd | live | serve) [full17]")?;
+    let target = std::env::args()
+        .nth(1)
+        .context("usage: walk (OUT.rrd | live | serve) [full17]")?;
     let address = Destination::LOCAL_VIEWER;
     let destination = match target.as_str() {
         "live" => Destination::Connect { address },
-        "serve" => Destination::Serve { address, history_bytes: 512 << 20 },
-        path => Destination::File { path: PathBuf::from(path) },
+        "serve" => Destination::Serve {
+            address,
+            history_bytes: 512 << 20,
+        },
+        path => Destination::File {
+            path: PathBuf::from(path),
+        },
     };
     let live = destination.is_live();
 
@@ -33,13 +42,30 @@ fn main() -> anyhow::Result<()> {
         _ => PlacementSet::demo(),
     };
     let sites = MountedSites::new(&body, placements.placements())?;
-    let stamps = uniform_stamps(Stamp::default(), Stamp::from_seconds(walk.duration_s()), RATE_HZ)?;
-    let pose_at = |stamp: &Stamp| walk.smooth_pose_at(stamp.as_seconds()).context("a pose within the walk");
-    let poses = stamps.iter().map(pose_at).collect::<anyhow::Result<Vec<_>>>()?;
+    let stamps = uniform_stamps(
+        Stamp::default(),
+        Stamp::from_seconds(walk.duration_s()),
+        RATE_HZ,
+    )?;
+    let pose_at = |stamp: &Stamp| {
+        walk.smooth_pose_at(stamp.as_seconds())
+            .context("a pose within the walk")
+    };
+    let poses = stamps
+        .iter()
+        .map(pose_at)
+        .collect::<anyhow::Result<Vec<_>>>()?;
     let trajectories = sites.trajectories(&stamps, &poses)?;
-    let imus = trajectories.iter().map(|trajectory| simulate(trajectory, Scheme::Spline, &stamps)).collect::<Result<Vec<_>, _>>()?;
+    let imus = trajectories
+        .iter()
+        .map(|trajectory| simulate(trajectory, Scheme::Spline, &stamps))
+        .collect::<Result<Vec<_>, _>>()?;
 
-    let names: Vec<String> = placements.placements().iter().map(|placement| placement.name().to_owned()).collect();
+    let names: Vec<String> = placements
+        .placements()
+        .iter()
+        .map(|placement| placement.name().to_owned())
+        .collect();
     let options = RecordingOptions {
         name: "embedded walk".into(),
         placements: names.clone(),
@@ -47,13 +73,19 @@ fn main() -> anyhow::Result<()> {
         ..RecordingOptions::default()
     };
     let mut recording = Recording::open(&[destination], options)?;
-    let rest: Vec<[f32; 3]> = body.rest_vertices().iter().map(|point| point.cast::<f32>().into()).collect();
+    let rest: Vec<[f32; 3]> = body
+        .rest_vertices()
+        .iter()
+        .map(|point| point.cast::<f32>().into())
+        .collect();
     recording.set_body(&rest, body.model().faces())?;
 
     let (started, mut vertices) = (Instant::now(), Vec::new());
     for (index, (&stamp, pose)) in stamps.iter().zip(&poses).enumerate() {
         if live {
-            std::thread::sleep(Duration::from_secs_f64(stamp.as_seconds()).saturating_sub(started.elapsed()));
+            std::thread::sleep(
+                Duration::from_secs_f64(stamp.as_seconds()).saturating_sub(started.elapsed()),
+            );
         }
         if recording.wants_body(stamp) {
             body.skin(pose, &mut vertices);
@@ -62,10 +94,18 @@ fn main() -> anyhow::Result<()> {
         for ((name, trajectory), samples) in names.iter().zip(&trajectories).zip(&imus) {
             recording.log_sensor(stamp, name, &trajectory.frames()[index].world_from_sensor)?;
             let sample = &samples[index];
-            recording.log_imu(stamp, name, &sample.specific_force, &sample.angular_velocity)?;
+            recording.log_imu(
+                stamp,
+                name,
+                &sample.specific_force,
+                &sample.angular_velocity,
+            )?;
         }
     }
     let summary = recording.finish()?;
-    println!("{target}: {summary:?} in {:.2} s", started.elapsed().as_secs_f64());
+    println!(
+        "{target}: {summary:?} in {:.2} s",
+        started.elapsed().as_secs_f64()
+    );
     Ok(())
 }

@@ -1,14 +1,17 @@
 //! Writes a viewer layout as the messages of a blueprint store.
 //!
-//! The SDK's own layout builder cannot set the properties of a view (camera, floor, axes), so the blueprint archetypes are logged here
-//! directly: a container or view stands at `container/UUID` or `view/UUID`, a view's properties under it by archetype name.
+//! The SDK's own layout builder cannot set the properties of a view (camera, floor, axes), so the
+//! blueprint archetypes are logged here directly: a container or view stands at `container/UUID` or
+//! `view/UUID`, a view's properties under it by archetype name.
 
 use re_sdk::external::re_log_types::BlueprintActivationCommand;
 use re_sdk::log::LogMsg;
 use re_sdk::sink::MemorySinkStorage;
 use re_sdk::{AsComponents, EntityPath, RecordingStream, RecordingStreamBuilder, StoreId};
 use re_sdk_types::Archetype;
-use re_sdk_types::blueprint::archetypes::{ContainerBlueprint, PanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint};
+use re_sdk_types::blueprint::archetypes::{
+    ContainerBlueprint, PanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint,
+};
 use re_sdk_types::blueprint::components::{ContainerKind, PanelState, RootContainer};
 use re_sdk_types::datatypes::Uuid;
 
@@ -57,7 +60,9 @@ pub(crate) struct View<'a> {
 impl BlueprintStore {
     /// An empty store.
     pub(crate) fn new() -> Result<Self, ViewError> {
-        let builder = RecordingStreamBuilder::new(APPLICATION).enabled(true).send_properties(false);
+        let builder = RecordingStreamBuilder::new(APPLICATION)
+            .enabled(true)
+            .send_properties(false);
         let (stream, storage) = builder.blueprint().memory()?;
         stream.set_time_sequence(TIMELINE, 0);
         Ok(Self { stream, storage })
@@ -66,25 +71,42 @@ impl BlueprintStore {
     /// Writes a view.
     pub(crate) fn view(&self, view: &View<'_>) -> Result<Part, ViewError> {
         let part = Part::new("view");
-        let blueprint = ViewBlueprint::new(view.class).with_display_name(view.name.as_str()).with_space_origin(view.origin.to_string());
+        let blueprint = ViewBlueprint::new(view.class)
+            .with_display_name(view.name.as_str())
+            .with_space_origin(view.origin.to_string());
         self.stream.log(part.path.as_str(), &blueprint)?;
-        self.stream.log(format!("{}/ViewContents", part.path), &ViewContents::new(view.contents.iter().copied()))?;
+        self.stream.log(
+            format!("{}/ViewContents", part.path),
+            &ViewContents::new(view.contents.iter().copied()),
+        )?;
         for Property(name, archetype) in &view.properties {
-            self.stream.log(format!("{}/{name}", part.path), archetype.as_ref())?;
+            self.stream
+                .log(format!("{}/{name}", part.path), archetype.as_ref())?;
         }
         Ok(part)
     }
 
     /// Writes a container; `shares` are the relative widths or heights of its contents.
-    pub(crate) fn container(&self, kind: ContainerKind, name: Option<&str>, parts: &[Part], shares: &[f32]) -> Result<Part, ViewError> {
+    pub(crate) fn container(
+        &self,
+        kind: ContainerKind,
+        name: Option<&str>,
+        parts: &[Part],
+        shares: &[f32],
+    ) -> Result<Part, ViewError> {
         let container = Part::new("container");
-        let mut blueprint = ContainerBlueprint::new(kind).with_contents(parts.iter().map(|part| part.path.as_str()));
+        let mut blueprint = ContainerBlueprint::new(kind)
+            .with_contents(parts.iter().map(|part| part.path.as_str()));
         if let Some(name) = name {
             blueprint = blueprint.with_display_name(name);
         }
         match kind {
-            ContainerKind::Horizontal if !shares.is_empty() => blueprint = blueprint.with_col_shares(shares.iter().copied()),
-            ContainerKind::Vertical if !shares.is_empty() => blueprint = blueprint.with_row_shares(shares.iter().copied()),
+            ContainerKind::Horizontal if !shares.is_empty() => {
+                blueprint = blueprint.with_col_shares(shares.iter().copied())
+            }
+            ContainerKind::Vertical if !shares.is_empty() => {
+                blueprint = blueprint.with_row_shares(shares.iter().copied())
+            }
             _ => {}
         }
         self.stream.log(container.path.as_str(), &blueprint)?;
@@ -95,14 +117,19 @@ impl BlueprintStore {
     pub(crate) fn tabs(&self, name: &str, parts: &[Part], open: usize) -> Result<Part, ViewError> {
         let tabs = self.container(ContainerKind::Tabs, Some(name), parts, &[])?;
         if let Some(part) = parts.get(open) {
-            self.stream.log(tabs.path.as_str(), &ContainerBlueprint::update_fields().with_active_tab(part.path.as_str()))?;
+            self.stream.log(
+                tabs.path.as_str(),
+                &ContainerBlueprint::update_fields().with_active_tab(part.path.as_str()),
+            )?;
         }
         Ok(tabs)
     }
 
     /// Writes the state of a panel: "blueprint_panel" or "selection_panel".
     pub(crate) fn panel(&self, path: &str, state: PanelState) -> Result<(), ViewError> {
-        Ok(self.stream.log(path, &PanelBlueprint::new().with_state(state))?)
+        Ok(self
+            .stream
+            .log(path, &PanelBlueprint::new().with_state(state))?)
     }
 
     /// Writes any archetype, for instance the time panel's.
@@ -110,13 +137,24 @@ impl BlueprintStore {
         Ok(self.stream.log(path, archetype)?)
     }
 
-    /// Sends the whole store to `recording`, with `root` as the outermost container, and makes it the layout in use.
+    /// Sends the whole store to `recording`, with `root` as the outermost container, and makes it
+    /// the layout in use.
     pub(crate) fn send(self, root: &Part, recording: &RecordingStream) -> Result<(), ViewError> {
-        let viewport = ViewportBlueprint::new().with_root_container(RootContainer(root.id)).with_auto_layout(false).with_auto_views(false);
+        let viewport = ViewportBlueprint::new()
+            .with_root_container(RootContainer(root.id))
+            .with_auto_layout(false)
+            .with_auto_views(false);
         self.stream.log("viewport", &viewport)?;
         let messages = self.storage.take();
         if let Some(blueprint_id) = store_id(&messages) {
-            recording.send_blueprint(messages, BlueprintActivationCommand { blueprint_id, make_active: true, make_default: true });
+            recording.send_blueprint(
+                messages,
+                BlueprintActivationCommand {
+                    blueprint_id,
+                    make_active: true,
+                    make_default: true,
+                },
+            );
         }
         Ok(())
     }
@@ -125,7 +163,10 @@ impl BlueprintStore {
 impl Part {
     fn new(kind: &str) -> Self {
         let id = Uuid::random();
-        Self { id, path: format!("{kind}/{id}") }
+        Self {
+            id,
+            path: format!("{kind}/{id}"),
+        }
     }
 }
 

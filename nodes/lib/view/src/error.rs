@@ -17,7 +17,9 @@ pub enum ViewError {
         source: Box<dyn Error + Send + Sync>,
     },
     /// No viewer listens at the address.
-    #[error("{address}: no Rerun viewer answers ({source}); start one with `rerun --bind 127.0.0.1`, or write a file")]
+    #[error(
+        "{address}: no Rerun viewer answers ({source}); start one with `rerun --bind 127.0.0.1`, or write a file"
+    )]
     NoViewer {
         /// Where the viewer was looked for.
         address: SocketAddr,

@@ -1,4 +1,5 @@
-//! A diagnosis of the gap between simulated and real IMUs as a recording: curves, residuals, spectra and words.
+//! A diagnosis of the gap between simulated and real IMUs as a recording: curves, residuals,
+//! spectra and words.
 
 use std::path::Path;
 use std::time::Duration;
@@ -15,8 +16,14 @@ use crate::layout::TIMELINE;
 use crate::{Destination, ViewError, sinks, style};
 
 /// Paths of the six axes below a placement, and the unit of each.
-pub(crate) const GAP_AXES: [(&str, &str); 6] =
-    [("accel_x", "m/s²"), ("accel_y", "m/s²"), ("accel_z", "m/s²"), ("gyro_x", "rad/s"), ("gyro_y", "rad/s"), ("gyro_z", "rad/s")];
+pub(crate) const GAP_AXES: [(&str, &str); 6] = [
+    ("accel_x", "m/s²"),
+    ("accel_y", "m/s²"),
+    ("accel_z", "m/s²"),
+    ("gyro_x", "rad/s"),
+    ("gyro_y", "rad/s"),
+    ("gyro_z", "rad/s"),
+];
 /// How long the last flush may take before it counts as lost.
 const FLUSH_TIMEOUT: Duration = Duration::from_secs(20);
 
@@ -59,7 +66,8 @@ pub struct GapSpectrum {
     pub title: String,
     /// Hz.
     pub frequencies: Vec<f64>,
-    /// Lines on these frequencies: name and density. `measured`, `before`, `after` and `predicted` have the colours of the curves.
+    /// Lines on these frequencies: name and density. `measured`, `before`, `after` and `predicted`
+    /// have the colours of the curves.
     pub lines: Vec<(String, Vec<f64>)>,
 }
 
@@ -69,7 +77,8 @@ pub(crate) fn gap_path(placement: &str, parts: &[&str]) -> EntityPath {
     EntityPath::new(parts.map(Into::into).collect())
 }
 
-/// Writes a diagnosis to an `.rrd` file, with a layout: a page of words, and a tab for each placement; the first placement is open.
+/// Writes a diagnosis to an `.rrd` file, with a layout: a page of words, and a tab for each
+/// placement; the first placement is open.
 ///
 /// | path | what |
 /// |---|---|
@@ -82,28 +91,55 @@ pub(crate) fn gap_path(placement: &str, parts: &[&str]) -> EntityPath {
 ///
 /// # Errors
 /// Where the file cannot be created or written; [`ViewError::Count`] where lists differ in length.
-pub fn write_gap(path: &Path, title: &str, summary: &str, placements: &[GapPlacement]) -> Result<(), ViewError> {
+pub fn write_gap(
+    path: &Path,
+    title: &str,
+    summary: &str,
+    placements: &[GapPlacement],
+) -> Result<(), ViewError> {
     for placement in placements {
         let expected = placement.stamps.len();
-        for (what, found) in [("measured", placement.measured.len()), ("before", placement.before.len()), ("after", placement.after.len())]
-        {
+        for (what, found) in [
+            ("measured", placement.measured.len()),
+            ("before", placement.before.len()),
+            ("after", placement.after.len()),
+        ] {
             if found != expected {
-                return Err(ViewError::Count { what, expected, found });
+                return Err(ViewError::Count {
+                    what,
+                    expected,
+                    found,
+                });
             }
         }
     }
-    let destination = Destination::File { path: path.to_owned() };
+    let destination = Destination::File {
+        path: path.to_owned(),
+    };
     let stream = sinks::open(std::slice::from_ref(&destination), title)?;
     stream.log_static(gap_layout::SUMMARY, &markdown(summary))?;
     // One zero for all, so that what happened together stands together.
-    let start = placements.iter().filter_map(|placement| placement.stamps.first()).min().copied().unwrap_or_default();
+    let start = placements
+        .iter()
+        .filter_map(|placement| placement.stamps.first())
+        .min()
+        .copied()
+        .unwrap_or_default();
     for placement in placements {
-        Writer { stream: &stream, start, placement }.write()?;
+        Writer {
+            stream: &stream,
+            start,
+            placement,
+        }
+        .write()?;
     }
     GapLayout { placements }.send(&stream)?;
     stream
         .flush_with_timeout(FLUSH_TIMEOUT)
-        .map_err(|error| ViewError::Lost { destination: destination.to_string(), reason: error.to_string() })?;
+        .map_err(|error| ViewError::Lost {
+            destination: destination.to_string(),
+            reason: error.to_string(),
+        })?;
     stream.finalize_deferred_sinks();
     Ok(())
 }
@@ -120,28 +156,80 @@ struct Writer<'a> {
 
 impl Writer<'_> {
     fn write(&self) -> Result<(), ViewError> {
-        let GapPlacement { name, words, stamps, measured, before, after, course, spectra } = self.placement;
-        self.stream.log_static(gap_path(name, &["words"]), &markdown(words))?;
-        let times: Vec<i64> = stamps.iter().map(|stamp| stamp.nanos.saturating_sub(self.start.nanos)).collect();
+        let GapPlacement {
+            name,
+            words,
+            stamps,
+            measured,
+            before,
+            after,
+            course,
+            spectra,
+        } = self.placement;
+        self.stream
+            .log_static(gap_path(name, &["words"]), &markdown(words))?;
+        let times: Vec<i64> = stamps
+            .iter()
+            .map(|stamp| stamp.nanos.saturating_sub(self.start.nanos))
+            .collect();
         for (axis, (axis_name, _)) in GAP_AXES.into_iter().enumerate() {
-            let curves: Vec<[f64; 3]> = (0..stamps.len()).map(|k| [measured[k][axis], before[k][axis], after[k][axis]]).collect();
-            let series = [("measured", style::MEASURED), ("before", style::BEFORE), ("after", style::AFTER)];
+            let curves: Vec<[f64; 3]> = (0..stamps.len())
+                .map(|k| [measured[k][axis], before[k][axis], after[k][axis]])
+                .collect();
+            let series = [
+                ("measured", style::MEASURED),
+                ("before", style::BEFORE),
+                ("after", style::AFTER),
+            ];
             self.lines(&["curves", axis_name], series, &times, &curves)?;
-            let residuals: Vec<[f64; 2]> =
-                (0..stamps.len()).map(|k| [measured[k][axis] - before[k][axis], measured[k][axis] - after[k][axis]]).collect();
-            self.lines(&["residual", axis_name], [("before", style::BEFORE), ("after", style::AFTER)], &times, &residuals)?;
+            let residuals: Vec<[f64; 2]> = (0..stamps.len())
+                .map(|k| {
+                    [
+                        measured[k][axis] - before[k][axis],
+                        measured[k][axis] - after[k][axis],
+                    ]
+                })
+                .collect();
+            self.lines(
+                &["residual", axis_name],
+                [("before", style::BEFORE), ("after", style::AFTER)],
+                &times,
+                &residuals,
+            )?;
         }
         let first = times.first().copied().unwrap_or(0);
-        let times: Vec<i64> = course.iter().map(|point| first + (point.seconds * 1e9).round() as i64).collect();
-        let decibels = |[before, after]: [f64; 2]| [before, after].map(|value| 10.0 * value.max(1e-3).log10());
+        let times: Vec<i64> = course
+            .iter()
+            .map(|point| first + (point.seconds * 1e9).round() as i64)
+            .collect();
+        let decibels =
+            |[before, after]: [f64; 2]| [before, after].map(|value| 10.0 * value.max(1e-3).log10());
         for (channel, values) in [
-            ("accel", course.iter().map(|point| decibels(point.accel)).collect::<Vec<_>>()),
-            ("gyro", course.iter().map(|point| decibels(point.gyro)).collect()),
+            (
+                "accel",
+                course
+                    .iter()
+                    .map(|point| decibels(point.accel))
+                    .collect::<Vec<_>>(),
+            ),
+            (
+                "gyro",
+                course.iter().map(|point| decibels(point.gyro)).collect(),
+            ),
         ] {
-            self.lines(&["course", channel], [("before", style::BEFORE), ("after", style::AFTER)], &times, &values)?;
+            self.lines(
+                &["course", channel],
+                [("before", style::BEFORE), ("after", style::AFTER)],
+                &times,
+                &values,
+            )?;
         }
         for (index, spectrum) in spectra.iter().enumerate() {
-            log_spectrum(self.stream, &gap_path(name, &["spectrum", &index.to_string()]), spectrum)?;
+            log_spectrum(
+                self.stream,
+                &gap_path(name, &["spectrum", &index.to_string()]),
+                spectrum,
+            )?;
         }
         Ok(())
     }
@@ -155,14 +243,21 @@ impl Writer<'_> {
         values: &[[f64; N]],
     ) -> Result<(), ViewError> {
         let path = gap_path(&self.placement.name, path);
-        let look = SeriesLines::new().with_names(series.map(|(name, _)| name)).with_colors(series.map(|(_, color)| style::color(color)));
-        self.stream.log_static(path.clone(), &look.with_widths([1.5; N].map(|width: f32| width)))?;
+        let look = SeriesLines::new()
+            .with_names(series.map(|(name, _)| name))
+            .with_colors(series.map(|(_, color)| style::color(color)));
+        self.stream.log_static(
+            path.clone(),
+            &look.with_widths([1.5; N].map(|width: f32| width)),
+        )?;
         if nanos.is_empty() {
             return Ok(());
         }
         let times = TimeColumn::new_duration_nanos(TIMELINE, nanos.iter().copied());
         let scalars = Scalars::new(values.iter().flatten().copied());
-        let columns = scalars.columns(values.iter().map(|_| N)).map_err(|error| ViewError::Sdk(Box::new(error)))?;
+        let columns = scalars
+            .columns(values.iter().map(|_| N))
+            .map_err(|error| ViewError::Sdk(Box::new(error)))?;
         Ok(self.stream.send_columns(path, [times], columns)?)
     }
 }

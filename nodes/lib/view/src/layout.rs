@@ -2,9 +2,12 @@
 
 use re_sdk::{EntityPath, RecordingStream};
 use re_sdk_types::blueprint::archetypes::{
-    Background, EyeControls3D, LineGrid3D, PlotLegend, SpatialInformation, TimeAxis, TimePanelBlueprint, VisibleTimeRanges,
+    Background, EyeControls3D, LineGrid3D, PlotLegend, SpatialInformation, TimeAxis,
+    TimePanelBlueprint, VisibleTimeRanges,
 };
-use re_sdk_types::blueprint::components::{BackgroundKind, ContainerKind, Corner2D, Eye3DKind, LinkAxis, LoopMode, PanelState, PlayState};
+use re_sdk_types::blueprint::components::{
+    BackgroundKind, ContainerKind, Corner2D, Eye3DKind, LinkAxis, LoopMode, PanelState, PlayState,
+};
 use re_sdk_types::datatypes::{TimeInt, TimeRange, TimeRangeBoundary, VisibleTimeRange};
 
 use crate::ViewError;
@@ -18,16 +21,21 @@ pub(crate) const WORLD: &str = "/world";
 /// What the camera follows.
 pub(crate) const ANCHOR: &str = "/world/anchor";
 /// The two quantities of an IMU: last part of the path and title with unit.
-pub(crate) const QUANTITIES: [(&str, &str); 2] =
-    [("specific_force", "specific force (m/s²)"), ("angular_velocity", "angular velocity (rad/s)")];
+pub(crate) const QUANTITIES: [(&str, &str); 2] = [
+    ("specific_force", "specific force (m/s²)"),
+    ("angular_velocity", "angular velocity (rad/s)"),
+];
 
-/// Where the camera looks from, m: before a body that faces along x, a little to its right, above breast height.
+/// Where the camera looks from, m: before a body that faces along x, a little to its right, above
+/// breast height.
 const EYE: [f32; 3] = [2.26, -1.05, 1.4];
-/// What it looks at, m: the middle of an adult at the origin. From there on it keeps its direction and follows the anchor.
+/// What it looks at, m: the middle of an adult at the origin. From there on it keeps its direction
+/// and follows the anchor.
 const TARGET: [f32; 3] = [0.0, 0.0, 0.88];
-/// The anchor's points, m, over its place on the ground. The viewer follows the middle of their bounding box from 1.5 times its diagonal
-/// away, whatever the distance from eye to target.
-pub(crate) const ANCHOR_POINTS: [[f32; 3]; 2] = [[0.0, 0.0, TARGET[2] - 0.78], [0.0, 0.0, TARGET[2] + 0.78]];
+/// The anchor's points, m, over its place on the ground. The viewer follows the middle of their
+/// bounding box from 1.5 times its diagonal away, whatever the distance from eye to target.
+pub(crate) const ANCHOR_POINTS: [[f32; 3]; 2] =
+    [[0.0, 0.0, TARGET[2] - 0.78], [0.0, 0.0, TARGET[2] + 0.78]];
 /// Rows of curves that still can be read on one page; more placements than that are dealt to tabs.
 const ROWS_PER_PAGE: usize = 6;
 
@@ -57,22 +65,44 @@ impl Layout<'_> {
         let store = BlueprintStore::new()?;
         let space = Self::space(&store)?;
         let root = match self.curves(&store)? {
-            Some(curves) => store.container(ContainerKind::Horizontal, None, &[space, curves], &[1.0, 1.15])?,
+            Some(curves) => store.container(
+                ContainerKind::Horizontal,
+                None,
+                &[space, curves],
+                &[1.0, 1.15],
+            )?,
             None => store.container(ContainerKind::Horizontal, None, &[space], &[])?,
         };
         store.panel("blueprint_panel", PanelState::Hidden)?;
         store.panel("selection_panel", PanelState::Hidden)?;
-        let play_state = if self.live { PlayState::Following } else { PlayState::Playing };
-        let loop_mode = if self.live { LoopMode::Off } else { LoopMode::All };
-        let time_panel = TimePanelBlueprint::new().with_state(PanelState::Collapsed).with_timeline(TIMELINE);
-        store.log("time_panel", &time_panel.with_play_state(play_state).with_loop_mode(loop_mode))?;
+        let play_state = if self.live {
+            PlayState::Following
+        } else {
+            PlayState::Playing
+        };
+        let loop_mode = if self.live {
+            LoopMode::Off
+        } else {
+            LoopMode::All
+        };
+        let time_panel = TimePanelBlueprint::new()
+            .with_state(PanelState::Collapsed)
+            .with_timeline(TIMELINE);
+        store.log(
+            "time_panel",
+            &time_panel
+                .with_play_state(play_state)
+                .with_loop_mode(loop_mode),
+        )?;
         store.send(&root, recording)
     }
 
     fn space(store: &BlueprintStore) -> Result<Part, ViewError> {
         let [red, green, blue, alpha] = style::GRID;
         let properties = vec![
-            Property::new(Background::new(BackgroundKind::SolidColor).with_color(style::BACKGROUND)),
+            Property::new(
+                Background::new(BackgroundKind::SolidColor).with_color(style::BACKGROUND),
+            ),
             Property::new(
                 LineGrid3D::new()
                     .with_visible(true)
@@ -88,10 +118,20 @@ impl Layout<'_> {
                     .with_eye_up([0.0, 0.0, 1.0])
                     .with_tracking_entity(ANCHOR),
             ),
-            Property::new(SpatialInformation::update_fields().with_show_axes(false).with_show_bounding_box(false)),
+            Property::new(
+                SpatialInformation::update_fields()
+                    .with_show_axes(false)
+                    .with_show_bounding_box(false),
+            ),
         ];
         let name = "body and sensors".into();
-        store.view(&View { class: "3D", name, origin: &EntityPath::from(WORLD), contents: &["$origin/**"], properties })
+        store.view(&View {
+            class: "3D",
+            name,
+            origin: &EntityPath::from(WORLD),
+            contents: &["$origin/**"],
+            properties,
+        })
     }
 
     fn curves(&self, store: &BlueprintStore) -> Result<Option<Part>, ViewError> {
@@ -99,30 +139,67 @@ impl Layout<'_> {
         let mut parts = Vec::with_capacity(pages);
         for page in 0..pages {
             // Pages of like size: 17 placements are 6 + 6 + 5.
-            let (start, end) = (self.placements.len() * page / pages, self.placements.len() * (page + 1) / pages);
+            let (start, end) = (
+                self.placements.len() * page / pages,
+                self.placements.len() * (page + 1) / pages,
+            );
             let placements = &self.placements[start..end];
-            let rows = placements.iter().enumerate().map(|(row, name)| self.row(store, name, row == 0)).collect::<Result<Vec<_>, _>>()?;
+            let rows = placements
+                .iter()
+                .enumerate()
+                .map(|(row, name)| self.row(store, name, row == 0))
+                .collect::<Result<Vec<_>, _>>()?;
             let name = format!("{} … {}", self.placements[start], self.placements[end - 1]);
             parts.push(store.container(ContainerKind::Vertical, Some(&name), &rows, &[])?);
         }
         if parts.len() > 1 {
-            return Ok(Some(store.container(ContainerKind::Tabs, Some("IMUs"), &parts, &[])?));
+            return Ok(Some(store.container(
+                ContainerKind::Tabs,
+                Some("IMUs"),
+                &parts,
+                &[],
+            )?));
         }
         Ok(parts.pop())
     }
 
-    fn row(&self, store: &BlueprintStore, placement: &str, with_legend: bool) -> Result<Part, ViewError> {
+    fn row(
+        &self,
+        store: &BlueprintStore,
+        placement: &str,
+        with_legend: bool,
+    ) -> Result<Part, ViewError> {
         let views = QUANTITIES.map(|(quantity, title)| {
-            let mut properties = vec![Property::new(PlotLegend::new().with_corner(Corner2D::RightTop).with_visible(with_legend))];
+            let mut properties = vec![Property::new(
+                PlotLegend::new()
+                    .with_corner(Corner2D::RightTop)
+                    .with_visible(with_legend),
+            )];
             match self.curve_window_s {
-                None => properties.push(Property::new(TimeAxis::new().with_link(LinkAxis::LinkToGlobal))),
+                None => properties.push(Property::new(
+                    TimeAxis::new().with_link(LinkAxis::LinkToGlobal),
+                )),
                 Some(window) => properties.extend(window_properties(window)),
             }
-            let (name, origin) = (format!("{placement} · {title}"), imu_path(placement, quantity));
-            store.view(&View { class: "TimeSeries", name, origin: &origin, contents: &["$origin/**"], properties })
+            let (name, origin) = (
+                format!("{placement} · {title}"),
+                imu_path(placement, quantity),
+            );
+            store.view(&View {
+                class: "TimeSeries",
+                name,
+                origin: &origin,
+                contents: &["$origin/**"],
+                properties,
+            })
         });
         let [specific_force, angular_velocity] = views;
-        store.container(ContainerKind::Horizontal, Some(placement), &[specific_force?, angular_velocity?], &[])
+        store.container(
+            ContainerKind::Horizontal,
+            Some(placement),
+            &[specific_force?, angular_velocity?],
+            &[],
+        )
     }
 }
 
@@ -132,6 +209,12 @@ fn window_properties(window_s: f64) -> [Property; 2] {
         start: TimeRangeBoundary::CursorRelative(TimeInt((-window_s * 1e9) as i64)),
         end: TimeRangeBoundary::CursorRelative(TimeInt(0)),
     };
-    let visible = VisibleTimeRange { timeline: TIMELINE.into(), range };
-    [Property::new(VisibleTimeRanges::new([visible])), Property::new(TimeAxis::new().with_view_range(range))]
+    let visible = VisibleTimeRange {
+        timeline: TIMELINE.into(),
+        range,
+    };
+    [
+        Property::new(VisibleTimeRanges::new([visible])),
+        Property::new(TimeAxis::new().with_view_range(range)),
+    ]
 }

@@ -1,8 +1,10 @@
-//! Everything Rerun: the moving body, the sensors' frames and the IMU curves, to an `.rrd` file or to a viewer.
+//! Everything Rerun: the moving body, the sensors' frames and the IMU curves, to an `.rrd` file or
+//! to a viewer.
 //!
-//! A [`Recording`] takes plain numbers and stamps and writes them to one or more [`Destination`]s, together with a layout, so that the
-//! viewer opens with the body at the left, a camera that follows it, and one row of curves per placement at the right. Nothing here starts
-//! a viewer, and no usage data is collected: the SDK crate used has no analytics.
+//! A [`Recording`] takes plain numbers and stamps and writes them to one or more [`Destination`]s,
+//! together with a layout, so that the viewer opens with the body at the left, a camera that
+//! follows it, and one row of curves per placement at the right. Nothing here starts a viewer, and
+//! no usage data is collected: the SDK crate used has no analytics.
 //!
 //! Entities (Rerun's paths), all on the one timeline `time`:
 //!
@@ -15,7 +17,8 @@
 //! | `/world/sensors/NAME` | box, label, axes (x red, y green, z blue); world_from_sensor | static; at the frame rate |
 //! | `/imu/NAME/specific_force`, `/imu/NAME/angular_velocity` | three series, m/s² and rad/s | every sample |
 //!
-//! [`write_gap`] writes a diagnosis of the gap between simulated and real IMUs, with a layout of its own.
+//! [`write_gap`] writes a diagnosis of the gap between simulated and real IMUs, with a layout of
+//! its own.
 //!
 //! ```
 //! use cromosim_spatial::Stamp;

@@ -21,7 +21,8 @@ pub enum Destination {
         /// Where it listens.
         address: SocketAddr,
     },
-    /// A gRPC server in this process, for viewers that connect with `rerun --connect`; late ones get the history.
+    /// A gRPC server in this process, for viewers that connect with `rerun --connect`; late ones
+    /// get the history.
     Serve {
         /// Where to listen.
         address: SocketAddr,
@@ -32,7 +33,10 @@ pub enum Destination {
 
 impl Destination {
     /// Where a viewer started by `rerun` listens on this machine: 127.0.0.1:9876.
-    pub const LOCAL_VIEWER: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), re_sdk::DEFAULT_SERVER_PORT);
+    pub const LOCAL_VIEWER: SocketAddr = SocketAddr::new(
+        std::net::IpAddr::V4(Ipv4Addr::LOCALHOST),
+        re_sdk::DEFAULT_SERVER_PORT,
+    );
 
     /// Whether a viewer shows the data as it comes.
     pub fn is_live(&self) -> bool {
@@ -44,7 +48,9 @@ impl fmt::Display for Destination {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::File { path } => write!(formatter, "{}", path.display()),
-            Self::Connect { address } | Self::Serve { address, .. } => write!(formatter, "rerun+http://{address}/proxy"),
+            Self::Connect { address } | Self::Serve { address, .. } => {
+                write!(formatter, "rerun+http://{address}/proxy")
+            }
         }
     }
 }
@@ -64,15 +70,18 @@ pub enum TimeAxis {
 pub struct RecordingOptions {
     /// Shown as the recording's name.
     pub name: String,
-    /// Placements in the order of their curves. Others are added, after these, when they are first logged.
+    /// Placements in the order of their curves. Others are added, after these, when they are first
+    /// logged.
     pub placements: Vec<String>,
     /// How the timeline counts.
     pub time_axis: TimeAxis,
     /// Zero of [`TimeAxis::SinceStart`]; the first stamp logged where none is given.
     pub start: Option<Stamp>,
-    /// Frames per second, Hz, of the body, the skeleton and the sensor frames; frames in between are dropped.
+    /// Frames per second, Hz, of the body, the skeleton and the sensor frames; frames in between
+    /// are dropped.
     pub frame_rate_hz: f64,
-    /// The shown body has at most about this many vertices (24 bytes each and frame); 0 leaves the mesh as it is.
+    /// The shown body has at most about this many vertices (24 bytes each and frame); 0 leaves the
+    /// mesh as it is.
     pub display_vertices: usize,
     /// Seconds of curves shown up to the time cursor; all of them where none is given.
     pub curve_window_s: Option<f64>,
@@ -102,9 +111,14 @@ impl RecordingOptions {
             if value.is_finite() && value > 0.0 {
                 return Ok(());
             }
-            Err(ViewError::Option { option, expected: "a positive number", found: value.to_string() })
+            Err(ViewError::Option {
+                option,
+                expected: "a positive number",
+                found: value.to_string(),
+            })
         };
         positive("frame_rate_hz", self.frame_rate_hz)?;
-        self.curve_window_s.map_or(Ok(()), |window| positive("curve_window_s", window))
+        self.curve_window_s
+            .map_or(Ok(()), |window| positive("curve_window_s", window))
     }
 }

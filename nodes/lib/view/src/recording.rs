@@ -8,18 +8,24 @@ use nalgebra::{Isometry3, Vector3};
 use re_sdk::log::TimeColumn;
 use re_sdk::time::TimeCell;
 use re_sdk::{EntityPath, RecordingStream};
-use re_sdk_types::archetypes::{Arrows3D, Boxes3D, LineStrips3D, Mesh3D, Points3D, Scalars, SeriesLines, Transform3D, ViewCoordinates};
+use re_sdk_types::archetypes::{
+    Arrows3D, Boxes3D, LineStrips3D, Mesh3D, Points3D, Scalars, SeriesLines, Transform3D,
+    ViewCoordinates,
+};
 use re_sdk_types::components::{FillMode, RotationQuat};
 use re_sdk_types::datatypes::Quaternion;
 
-use crate::layout::{ANCHOR, ANCHOR_POINTS, Layout, QUANTITIES, TIMELINE, WORLD, imu_path, sensor_path};
+use crate::layout::{
+    ANCHOR, ANCHOR_POINTS, Layout, QUANTITIES, TIMELINE, WORLD, imu_path, sensor_path,
+};
 use crate::{Destination, DisplayMesh, RecordingOptions, TimeAxis, ViewError, sinks, style};
 
 const BODY: &str = "/world/body";
 const SKELETON: &str = "/world/skeleton";
 /// How long a flush may take before it counts as lost.
 const FLUSH_TIMEOUT: Duration = Duration::from_secs(20);
-/// Placements that are first seen while logging get their curves together, this long after the last of them, s.
+/// Placements that are first seen while logging get their curves together, this long after the last
+/// of them, s.
 const LAYOUT_DELAY_S: f64 = 0.5;
 
 /// What went into a recording.
@@ -35,8 +41,8 @@ pub struct Summary {
 
 /// A recording being written: see the [crate's page](crate) for its entities.
 ///
-/// Stamps may come in any order, and may jump back when a replay loops. Dropping a recording finishes it too, but only
-/// [`Recording::finish`] says whether all went well.
+/// Stamps may come in any order, and may jump back when a replay loops. Dropping a recording
+/// finishes it too, but only [`Recording::finish`] says whether all went well.
 pub struct Recording {
     stream: RecordingStream,
     destinations: Vec<Destination>,
@@ -55,13 +61,19 @@ impl Recording {
     /// Opens the destinations, writes what does not change and the layout.
     ///
     /// # Errors
-    /// Where a file cannot be created, no viewer answers, a port is taken, or an option is out of range.
-    pub fn open(destinations: &[Destination], options: RecordingOptions) -> Result<Self, ViewError> {
+    /// Where a file cannot be created, no viewer answers, a port is taken, or an option is out of
+    /// range.
+    pub fn open(
+        destinations: &[Destination],
+        options: RecordingOptions,
+    ) -> Result<Self, ViewError> {
         options.check()?;
         let stream = sinks::open(destinations, &options.name)?;
         stream.log_static(WORLD, &ViewCoordinates::FLU())?;
         // A viewer follows what it can see; these points are too small and too dark for that.
-        let points = Points3D::new(ANCHOR_POINTS).with_radii([0.001]).with_colors([style::color(style::BACKGROUND)]);
+        let points = Points3D::new(ANCHOR_POINTS)
+            .with_radii([0.001])
+            .with_colors([style::color(style::BACKGROUND)]);
         stream.log_static(ANCHOR, &points)?;
         let mut recording = Self {
             stream,
@@ -81,21 +93,29 @@ impl Recording {
         Ok(recording)
     }
 
-    /// States the body's mesh, and reduces it for display. Needed before [`Self::log_body`]; may be called again for another body.
+    /// States the body's mesh, and reduces it for display. Needed before [`Self::log_body`]; may be
+    /// called again for another body.
     ///
     /// `rest_vertices`: (V, 3), m, any frame; `faces`: (F, 3), outward.
     ///
     /// # Errors
     /// [`ViewError::Face`] where a face names a vertex that is not there.
-    pub fn set_body(&mut self, rest_vertices: &[[f32; 3]], faces: &[[u32; 3]]) -> Result<(), ViewError> {
+    pub fn set_body(
+        &mut self,
+        rest_vertices: &[[f32; 3]],
+        faces: &[[u32; 3]],
+    ) -> Result<(), ViewError> {
         let mesh = DisplayMesh::new(rest_vertices, faces, self.options.display_vertices)?;
-        let shape = Mesh3D::update_fields().with_triangle_indices(mesh.faces().iter().copied()).with_albedo_factor(style::BODY);
+        let shape = Mesh3D::update_fields()
+            .with_triangle_indices(mesh.faces().iter().copied())
+            .with_albedo_factor(style::BODY);
         self.stream.log_static(BODY, &shape)?;
         self.body = Some(mesh);
         Ok(())
     }
 
-    /// Whether [`Self::log_body`] would show a body of this stamp, so that others need not be skinned.
+    /// Whether [`Self::log_body`] would show a body of this stamp, so that others need not be
+    /// skinned.
     pub fn wants_body(&mut self, stamp: Stamp) -> bool {
         let frame = self.frame(stamp);
         self.body.is_some() && self.last_frame.get(&EntityPath::from(BODY)) != Some(&frame)
@@ -107,38 +127,68 @@ impl Recording {
     ///
     /// # Errors
     /// [`ViewError::Count`] where no body was set or the number of vertices is another one.
-    pub fn log_body(&mut self, stamp: Stamp, vertices_in_world: &[[f32; 3]]) -> Result<bool, ViewError> {
+    pub fn log_body(
+        &mut self,
+        stamp: Stamp,
+        vertices_in_world: &[[f32; 3]],
+    ) -> Result<bool, ViewError> {
         let path = EntityPath::from(BODY);
         let Some(mesh) = &self.body else {
-            return Err(ViewError::Count { what: "body vertices (no body is set)", expected: 0, found: vertices_in_world.len() });
+            return Err(ViewError::Count {
+                what: "body vertices (no body is set)",
+                expected: 0,
+                found: vertices_in_world.len(),
+            });
         };
         let shown = mesh.pick(vertices_in_world)?;
         if !self.next_frame(&path, stamp)? {
             return Ok(false);
         }
         self.log_anchor(&shown)?;
-        let normals = self.body.as_ref().map(|mesh| mesh.normals(&shown)).unwrap_or_default();
-        self.stream.log(path, &Mesh3D::update_fields().with_vertex_positions(shown).with_vertex_normals(normals))?;
+        let normals = self
+            .body
+            .as_ref()
+            .map(|mesh| mesh.normals(&shown))
+            .unwrap_or_default();
+        self.stream.log(
+            path,
+            &Mesh3D::update_fields()
+                .with_vertex_positions(shown)
+                .with_vertex_normals(normals),
+        )?;
         self.summary.body_frames += 1;
         Ok(true)
     }
 
-    /// Shows the skeleton as lines from each joint to its parent; says whether, as [`Self::log_body`] does. A body hides most of it: meant
-    /// for recordings without one.
+    /// Shows the skeleton as lines from each joint to its parent; says whether, as
+    /// [`Self::log_body`] does. A body hides most of it: meant for recordings without one.
     ///
     /// `joints_in_world`: m; `parents`: the index of each joint's parent, none for a root.
     ///
     /// # Errors
     /// [`ViewError::Count`] where the lists differ in length or a parent is not one of the joints.
-    pub fn log_skeleton(&mut self, stamp: Stamp, joints_in_world: &[[f32; 3]], parents: &[Option<usize>]) -> Result<bool, ViewError> {
+    pub fn log_skeleton(
+        &mut self,
+        stamp: Stamp,
+        joints_in_world: &[[f32; 3]],
+        parents: &[Option<usize>],
+    ) -> Result<bool, ViewError> {
         if parents.len() != joints_in_world.len() {
-            return Err(ViewError::Count { what: "parents of joints", expected: joints_in_world.len(), found: parents.len() });
+            return Err(ViewError::Count {
+                what: "parents of joints",
+                expected: joints_in_world.len(),
+                found: parents.len(),
+            });
         }
         let mut bones = Vec::with_capacity(parents.len());
         for (joint, parent) in joints_in_world.iter().zip(parents) {
             let Some(parent) = *parent else { continue };
             let end = joints_in_world.get(parent);
-            let end = end.ok_or(ViewError::Count { what: "joints up to a parent", expected: parent + 1, found: joints_in_world.len() })?;
+            let end = end.ok_or(ViewError::Count {
+                what: "joints up to a parent",
+                expected: parent + 1,
+                found: joints_in_world.len(),
+            })?;
             bones.push([*joint, *end]);
         }
         if !self.next_frame(&EntityPath::from(SKELETON), stamp)? {
@@ -147,7 +197,12 @@ impl Recording {
         if self.body.is_none() {
             self.log_anchor(joints_in_world)?;
         }
-        self.stream.log(SKELETON, &LineStrips3D::new(bones).with_colors([style::color(style::SKELETON)]).with_radii([0.012]))?;
+        self.stream.log(
+            SKELETON,
+            &LineStrips3D::new(bones)
+                .with_colors([style::color(style::SKELETON)])
+                .with_radii([0.012]),
+        )?;
         Ok(true)
     }
 
@@ -155,7 +210,12 @@ impl Recording {
     ///
     /// # Errors
     /// [`ViewError::Sdk`] alone.
-    pub fn log_sensor(&mut self, stamp: Stamp, placement: &str, world_from_sensor: &Isometry3<f64>) -> Result<bool, ViewError> {
+    pub fn log_sensor(
+        &mut self,
+        stamp: Stamp,
+        placement: &str,
+        world_from_sensor: &Isometry3<f64>,
+    ) -> Result<bool, ViewError> {
         self.see_placement(stamp, placement)?;
         let path = sensor_path(placement);
         if !self.next_frame(&path, stamp)? {
@@ -164,13 +224,16 @@ impl Recording {
         let translation = world_from_sensor.translation.vector.cast::<f32>();
         let [x, y, z, w] = world_from_sensor.rotation.coords.cast::<f32>().into();
         let rotation = RotationQuat(Quaternion::from_xyzw([x, y, z, w]));
-        let pose = Transform3D::new().with_translation(<[f32; 3]>::from(translation)).with_quaternion(rotation);
+        let pose = Transform3D::new()
+            .with_translation(<[f32; 3]>::from(translation))
+            .with_quaternion(rotation);
         self.stream.log(path, &pose)?;
         self.summary.sensor_frames += 1;
         Ok(true)
     }
 
-    /// Adds one IMU sample to its curves: specific force, m/s², and angular velocity, rad/s, both on the sensor's axes.
+    /// Adds one IMU sample to its curves: specific force, m/s², and angular velocity, rad/s, both
+    /// on the sensor's axes.
     ///
     /// # Errors
     /// [`ViewError::Sdk`] alone.
@@ -183,14 +246,21 @@ impl Recording {
     ) -> Result<(), ViewError> {
         self.see_placement(stamp, placement)?;
         self.set_time(stamp);
-        for ((quantity, _), value) in QUANTITIES.into_iter().zip([specific_force, angular_velocity]) {
-            self.stream.log(imu_path(placement, quantity), &Scalars::new(value.iter().copied()))?;
+        for ((quantity, _), value) in QUANTITIES
+            .into_iter()
+            .zip([specific_force, angular_velocity])
+        {
+            self.stream.log(
+                imu_path(placement, quantity),
+                &Scalars::new(value.iter().copied()),
+            )?;
         }
         self.summary.imu_samples += 1;
         Ok(())
     }
 
-    /// Adds many IMU samples at once, as one chunk per quantity: far cheaper than one by one, for data that are all there.
+    /// Adds many IMU samples at once, as one chunk per quantity: far cheaper than one by one, for
+    /// data that are all there.
     ///
     /// # Errors
     /// [`ViewError::Count`] where the lists differ in length.
@@ -201,37 +271,69 @@ impl Recording {
         specific_forces: &[Vector3<f64>],
         angular_velocities: &[Vector3<f64>],
     ) -> Result<(), ViewError> {
-        for (what, found) in [("specific forces", specific_forces.len()), ("angular velocities", angular_velocities.len())] {
+        for (what, found) in [
+            ("specific forces", specific_forces.len()),
+            ("angular velocities", angular_velocities.len()),
+        ] {
             if found != stamps.len() {
-                return Err(ViewError::Count { what, expected: stamps.len(), found });
+                return Err(ViewError::Count {
+                    what,
+                    expected: stamps.len(),
+                    found,
+                });
             }
         }
-        let Some(&first) = stamps.first() else { return Ok(()) };
+        let Some(&first) = stamps.first() else {
+            return Ok(());
+        };
         self.see_placement(first, placement)?;
-        let nanos: Vec<i64> = stamps.iter().map(|&stamp| self.nanos_on_timeline(stamp)).collect();
-        for ((quantity, _), values) in QUANTITIES.into_iter().zip([specific_forces, angular_velocities]) {
+        let nanos: Vec<i64> = stamps
+            .iter()
+            .map(|&stamp| self.nanos_on_timeline(stamp))
+            .collect();
+        for ((quantity, _), values) in QUANTITIES
+            .into_iter()
+            .zip([specific_forces, angular_velocities])
+        {
             let times = match self.options.time_axis {
-                TimeAxis::SinceStart => TimeColumn::new_duration_nanos(TIMELINE, nanos.iter().copied()),
-                TimeAxis::Date => TimeColumn::new_timestamp_nanos_since_epoch(TIMELINE, nanos.iter().copied()),
+                TimeAxis::SinceStart => {
+                    TimeColumn::new_duration_nanos(TIMELINE, nanos.iter().copied())
+                }
+                TimeAxis::Date => {
+                    TimeColumn::new_timestamp_nanos_since_epoch(TIMELINE, nanos.iter().copied())
+                }
             };
             let scalars = Scalars::new(values.iter().flat_map(|value| value.iter().copied()));
-            let columns = scalars.columns(values.iter().map(|_| 3)).map_err(|error| ViewError::Sdk(Box::new(error)))?;
-            self.stream.send_columns(imu_path(placement, quantity), [times], columns)?;
+            let columns = scalars
+                .columns(values.iter().map(|_| 3))
+                .map_err(|error| ViewError::Sdk(Box::new(error)))?;
+            self.stream
+                .send_columns(imu_path(placement, quantity), [times], columns)?;
         }
         self.summary.imu_samples += stamps.len() as u64;
         Ok(())
     }
 
-    /// Hands everything logged so far to the destinations. Worth calling now and then in a long run: only here, and at the end, does a full
-    /// disk or a viewer that went away become known.
+    /// Hands everything logged so far to the destinations. Worth calling now and then in a long
+    /// run: only here, and at the end, does a full disk or a viewer that went away become known.
     ///
     /// # Errors
     /// [`ViewError::Lost`].
     pub fn flush(&self) -> Result<(), ViewError> {
-        self.stream.flush_with_timeout(FLUSH_TIMEOUT).map_err(|error| {
-            let destination = self.destinations.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
-            ViewError::Lost { destination, reason: error.to_string() }
-        })
+        self.stream
+            .flush_with_timeout(FLUSH_TIMEOUT)
+            .map_err(|error| {
+                let destination = self
+                    .destinations
+                    .iter()
+                    .map(ToString::to_string)
+                    .collect::<Vec<_>>()
+                    .join(", ");
+                ViewError::Lost {
+                    destination,
+                    reason: error.to_string(),
+                }
+            })
     }
 
     /// What went in so far.
@@ -252,7 +354,8 @@ impl Recording {
         Ok(self.summary)
     }
 
-    /// The stamp in nanoseconds on the timeline. The first one ever asked for is the start, where none was given.
+    /// The stamp in nanoseconds on the timeline. The first one ever asked for is the start, where
+    /// none was given.
     fn nanos_on_timeline(&mut self, stamp: Stamp) -> i64 {
         let start = *self.start.get_or_insert(stamp);
         match self.options.time_axis {
@@ -261,7 +364,8 @@ impl Recording {
         }
     }
 
-    /// The number of the frame that a stamp falls into. All entities share it, so that body and sensors are shown at the same stamps.
+    /// The number of the frame that a stamp falls into. All entities share it, so that body and
+    /// sensors are shown at the same stamps.
     fn frame(&mut self, stamp: Stamp) -> i64 {
         let start = *self.start.get_or_insert(stamp);
         // A hundredth of a frame of tolerance, for stamps that were rounded to nanoseconds.
@@ -274,7 +378,10 @@ impl Recording {
         if self.last_frame.insert(path.clone(), frame) == Some(frame) {
             return Ok(false);
         }
-        if self.layout_outdated_since.is_some_and(|since| (stamp - since).abs() > LAYOUT_DELAY_S) {
+        if self
+            .layout_outdated_since
+            .is_some_and(|since| (stamp - since).abs() > LAYOUT_DELAY_S)
+        {
             self.send_layout()?;
         }
         self.set_time(stamp);
@@ -292,10 +399,13 @@ impl Recording {
 
     /// Puts the camera's target on the ground under the mean of the points, at the stamp set last.
     fn log_anchor(&mut self, points: &[[f32; 3]]) -> Result<(), ViewError> {
-        let sum = points.iter().fold([0.0_f64; 2], |sum, point| [sum[0] + f64::from(point[0]), sum[1] + f64::from(point[1])]);
+        let sum = points.iter().fold([0.0_f64; 2], |sum, point| {
+            [sum[0] + f64::from(point[0]), sum[1] + f64::from(point[1])]
+        });
         let [x, y] = sum.map(|value| (value / points.len() as f64) as f32);
         if x.is_finite() && y.is_finite() {
-            self.stream.log(ANCHOR, &Transform3D::from_translation([x, y, 0.0]))?;
+            self.stream
+                .log(ANCHOR, &Transform3D::from_translation([x, y, 0.0]))?;
         }
         Ok(())
     }
@@ -313,16 +423,33 @@ impl Recording {
         let color = style::sensor_color(self.placements.len());
         let path = sensor_path(name);
         let [_, _, half_height] = style::HALF_BOX;
-        let case = Boxes3D::from_centers_and_half_sizes([[0.0, 0.0, half_height]], [style::HALF_BOX]);
-        self.stream.log_static(path.join(&"case".into()), &case.with_colors([color]).with_fill_mode(FillMode::Solid))?;
-        let vectors: [[f32; 3]; 3] = std::array::from_fn(|axis| std::array::from_fn(|k| if k == axis { style::AXIS_LENGTH } else { 0.0 }));
-        let axes = Arrows3D::from_vectors(vectors).with_colors(style::AXES.map(style::color)).with_radii([style::AXIS_RADIUS]);
+        let case =
+            Boxes3D::from_centers_and_half_sizes([[0.0, 0.0, half_height]], [style::HALF_BOX]);
+        self.stream.log_static(
+            path.join(&"case".into()),
+            &case.with_colors([color]).with_fill_mode(FillMode::Solid),
+        )?;
+        let vectors: [[f32; 3]; 3] = std::array::from_fn(|axis| {
+            std::array::from_fn(|k| if k == axis { style::AXIS_LENGTH } else { 0.0 })
+        });
+        let axes = Arrows3D::from_vectors(vectors)
+            .with_colors(style::AXES.map(style::color))
+            .with_radii([style::AXIS_RADIUS]);
         self.stream.log_static(path.join(&"axes".into()), &axes)?;
-        let label = Points3D::new([style::LABEL_POINT]).with_radii([0.001]).with_colors([color]).with_labels([name]);
-        self.stream.log_static(path.join(&"name".into()), &label.with_show_labels(true))?;
+        let label = Points3D::new([style::LABEL_POINT])
+            .with_radii([0.001])
+            .with_colors([color])
+            .with_labels([name]);
+        self.stream
+            .log_static(path.join(&"name".into()), &label.with_show_labels(true))?;
         for (quantity, _) in QUANTITIES {
-            let series = SeriesLines::new().with_names(["x", "y", "z"]).with_colors(style::AXES.map(style::color));
-            self.stream.log_static(imu_path(name, quantity), &series.with_widths([1.5, 1.5, 1.5]))?;
+            let series = SeriesLines::new()
+                .with_names(["x", "y", "z"])
+                .with_colors(style::AXES.map(style::color));
+            self.stream.log_static(
+                imu_path(name, quantity),
+                &series.with_widths([1.5, 1.5, 1.5]),
+            )?;
         }
         self.placements.push(name.to_owned());
         Ok(())

@@ -20,16 +20,29 @@ const FILE_FLUSH_TICK: Duration = Duration::from_millis(500);
 /// Opens a stream to all destinations.
 pub(crate) fn open(destinations: &[Destination], name: &str) -> Result<RecordingStream, ViewError> {
     if destinations.is_empty() {
-        return Err(ViewError::Option { option: "destinations", expected: "at least one file or address", found: "none".into() });
+        return Err(ViewError::Option {
+            option: "destinations",
+            expected: "at least one file or address",
+            found: "none".into(),
+        });
     }
-    let sinks = destinations.iter().map(sink).collect::<Result<Vec<_>, _>>()?;
+    let sinks = destinations
+        .iter()
+        .map(sink)
+        .collect::<Result<Vec<_>, _>>()?;
     let batching = if destinations.iter().any(Destination::is_live) {
         ChunkBatcherConfig::LOW_LATENCY
     } else {
         // Fewer and longer chunks: each costs its schema.
-        ChunkBatcherConfig { flush_tick: FILE_FLUSH_TICK, ..ChunkBatcherConfig::DEFAULT }
+        ChunkBatcherConfig {
+            flush_tick: FILE_FLUSH_TICK,
+            ..ChunkBatcherConfig::DEFAULT
+        }
     };
-    let builder = RecordingStreamBuilder::new(APPLICATION).enabled(true).recording_name(name).batcher_config(batching);
+    let builder = RecordingStreamBuilder::new(APPLICATION)
+        .enabled(true)
+        .recording_name(name)
+        .batcher_config(batching);
     let stream = builder.set_sinks(sinks)?;
     // The wall clock of the writer says nothing here; the timeline `time` alone is kept.
     stream.set_log_time_enabled(false);
@@ -40,29 +53,42 @@ fn sink(destination: &Destination) -> Result<Box<dyn LogSink>, ViewError> {
     match destination {
         Destination::File { path } => match FileSink::new(path) {
             Ok(sink) => Ok(Box::new(sink)),
-            Err(source) => Err(ViewError::Create { path: path.clone(), source: Box::new(source) }),
+            Err(source) => Err(ViewError::Create {
+                path: path.clone(),
+                source: Box::new(source),
+            }),
         },
         Destination::Connect { address } => connect(*address),
-        Destination::Serve { address, history_bytes } => serve(*address, *history_bytes),
+        Destination::Serve {
+            address,
+            history_bytes,
+        } => serve(*address, *history_bytes),
     }
 }
 
 /// The SDK's own client retries for ever and quietly, so we look first.
 fn connect(address: SocketAddr) -> Result<Box<dyn LogSink>, ViewError> {
-    TcpStream::connect_timeout(&address, CONNECT_TIMEOUT).map_err(|source| ViewError::NoViewer { address, source })?;
+    TcpStream::connect_timeout(&address, CONNECT_TIMEOUT)
+        .map_err(|source| ViewError::NoViewer { address, source })?;
     let url = Destination::Connect { address }.to_string();
-    let uri = url.parse().map_err(|error| ViewError::Sdk(Box::new(error)))?;
+    let uri = url
+        .parse()
+        .map_err(|error| ViewError::Sdk(Box::new(error)))?;
     Ok(Box::new(GrpcSink::new(uri)))
 }
 
 /// The SDK's server only logs that its port is taken, so we try first.
 fn serve(address: SocketAddr, history_bytes: u64) -> Result<Box<dyn LogSink>, ViewError> {
     TcpListener::bind(address).map_err(|source| ViewError::Bind { address, source })?;
-    let options = ServerOptions { memory_limit: MemoryLimit::from_bytes(history_bytes), ..ServerOptions::default() };
+    let options = ServerOptions {
+        memory_limit: MemoryLimit::from_bytes(history_bytes),
+        ..ServerOptions::default()
+    };
     let ip = match address {
         SocketAddr::V4(v4) => v4.ip().to_string(),
         SocketAddr::V6(v6) => format!("[{}]", v6.ip()),
     };
-    let sink = GrpcServerSink::new(&ip, address.port(), options).map_err(|error| ViewError::Sdk(Box::new(error)))?;
+    let sink = GrpcServerSink::new(&ip, address.port(), options)
+        .map_err(|error| ViewError::Sdk(Box::new(error)))?;
     Ok(Box::new(sink))
 }

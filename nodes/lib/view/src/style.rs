@@ -14,7 +14,8 @@ pub(crate) const BODY: [u8; 3] = [176, 187, 200];
 pub(crate) const SKELETON: [u8; 3] = [240, 200, 120];
 /// x, y and z, of axes and of curves alike.
 pub(crate) const AXES: [[u8; 3]; 3] = [[240, 98, 92], [106, 200, 120], [92, 150, 250]];
-/// What was measured, the simulation before and after its causes are added, and what noise alone would be.
+/// What was measured, the simulation before and after its causes are added, and what noise alone
+/// would be.
 pub(crate) const MEASURED: [u8; 3] = [190, 196, 205];
 pub(crate) const BEFORE: [u8; 3] = [245, 139, 69];
 pub(crate) const AFTER: [u8; 3] = [88, 176, 242];
@@ -32,8 +33,16 @@ pub(crate) const HALF_BOX: [f32; 3] = [0.022, 0.016, 0.008];
 pub(crate) const LABEL_POINT: [f32; 3] = [0.0, 0.0, 0.18];
 
 /// The colours of the sensors, in the order of their placements.
-const SENSORS: [[u8; 3]; 8] =
-    [[255, 184, 77], [94, 214, 214], [214, 140, 255], [170, 220, 90], [255, 130, 160], [120, 180, 255], [255, 225, 120], [150, 235, 180]];
+const SENSORS: [[u8; 3]; 8] = [
+    [255, 184, 77],
+    [94, 214, 214],
+    [214, 140, 255],
+    [170, 220, 90],
+    [255, 130, 160],
+    [120, 180, 255],
+    [255, 225, 120],
+    [150, 235, 180],
+];
 
 /// The colour of the placement with this index.
 pub(crate) fn sensor_color(index: usize) -> Color {

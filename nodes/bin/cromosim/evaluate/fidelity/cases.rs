@@ -16,7 +16,8 @@ use crate::progress::Interrupt;
 use crate::train::config::Source;
 use crate::train::data;
 
-/// IMUSim takes positions for good to 1 mm and quaternion components for good to 0.001 (its defaults `positionStdDev`, `rotationStdDev`).
+/// IMUSim takes positions for good to 1 mm and quaternion components for good to 0.001 (its
+/// defaults `positionStdDev`, `rotationStdDev`).
 const IMUSIM_STD: f64 = 0.001;
 
 /// Ways from a motion to readings.
@@ -35,13 +36,22 @@ pub enum Simulator {
     Learned,
     /// The networks, then the distribution mapping.
     Mapped,
-    /// What networks would leave that say exactly what was measured: the errors of the source's orientation, which they do not touch.
+    /// What networks would leave that say exactly what was measured: the errors of the source's
+    /// orientation, which they do not touch.
     Perfect,
 }
 
 impl Simulator {
     /// In the table's order.
-    pub const ALL: [Self; 7] = [Self::Joint, Self::Imusim, Self::Analytic, Self::Spline, Self::Learned, Self::Mapped, Self::Perfect];
+    pub const ALL: [Self; 7] = [
+        Self::Joint,
+        Self::Imusim,
+        Self::Analytic,
+        Self::Spline,
+        Self::Learned,
+        Self::Mapped,
+        Self::Perfect,
+    ];
 
     /// As the table says it.
     pub fn title(self) -> &'static str {
@@ -83,14 +93,22 @@ impl Case {
         learned: Option<&LearnedSimulator>,
         mapping: &MappingFile,
     ) -> anyhow::Result<Option<Vec<Reading>>> {
-        let stamps: Vec<Stamp> = self.pair.motion.kinematics.iter().map(|sample| sample.stamp).collect();
+        let stamps: Vec<Stamp> = self
+            .pair
+            .motion
+            .kinematics
+            .iter()
+            .map(|sample| sample.stamp)
+            .collect();
         let kinematics = match simulator {
             Simulator::Joint => match &self.joint {
                 Some(joint) => simulate_kinematics(joint, Scheme::Richardson, &stamps)?,
                 None => return Ok(None),
             },
             Simulator::Imusim => imusim(&self.trajectory, &stamps)?,
-            Simulator::Analytic => simulate_kinematics(&self.trajectory, Scheme::Richardson, &stamps)?,
+            Simulator::Analytic => {
+                simulate_kinematics(&self.trajectory, Scheme::Richardson, &stamps)?
+            }
             Simulator::Spline => self.pair.motion.kinematics.clone(),
             Simulator::Learned | Simulator::Mapped => match learned {
                 Some(networks) => networks.simulate(&self.pair.motion)?,
@@ -103,29 +121,51 @@ impl Case {
             return Ok(Some(readings));
         }
         let mapping = mapping.placements.get(&self.pair.position);
-        Ok(mapping.map(|mapping| readings.iter().map(|reading| mapping.apply(reading)).collect()))
+        Ok(mapping.map(|mapping| {
+            readings
+                .iter()
+                .map(|reading| mapping.apply(reading))
+                .collect()
+        }))
     }
 
     /// The frames as the source gives them, moved as was measured.
     fn perfect(&self) -> Vec<KinematicSample> {
         let moved = |(sample, target): (&KinematicSample, &Option<Target>)| match target {
-            Some(Target { acceleration, angular_velocity }) => {
-                KinematicSample { acceleration: *acceleration, angular_velocity: *angular_velocity, ..*sample }
-            }
+            Some(Target {
+                acceleration,
+                angular_velocity,
+            }) => KinematicSample {
+                acceleration: *acceleration,
+                angular_velocity: *angular_velocity,
+                ..*sample
+            },
             None => *sample,
         };
-        self.pair.motion.kinematics.iter().zip(&self.pair.targets).map(moved).collect()
+        self.pair
+            .motion
+            .kinematics
+            .iter()
+            .zip(&self.pair.targets)
+            .map(moved)
+            .collect()
     }
 }
 
 fn reading(sample: &KinematicSample) -> Reading {
     let imu = sample.imu();
-    Reading { force: imu.specific_force, rate: imu.angular_velocity }
+    Reading {
+        force: imu.specific_force,
+        rate: imu.angular_velocity,
+    }
 }
 
 /// Smoothing splines that stay within 1 mm and 0.001 of the frames, root mean square.
 fn imusim(trajectory: &SensorTrajectory, stamps: &[Stamp]) -> anyhow::Result<Vec<KinematicSample>> {
-    let smoothing = PoseSmoothing { position: Smoothing::ResidualStd(IMUSIM_STD), rotation: Smoothing::ResidualStd(IMUSIM_STD) };
+    let smoothing = PoseSmoothing {
+        position: Smoothing::ResidualStd(IMUSIM_STD),
+        rotation: Smoothing::ResidualStd(IMUSIM_STD),
+    };
     let frames = trajectory.frames();
     let at: Vec<Stamp> = frames.iter().map(|frame| frame.stamp).collect();
     let poses: Vec<Isometry3<f64>> = frames.iter().map(|frame| frame.world_from_sensor).collect();
@@ -158,16 +198,33 @@ pub fn all(
     for (index, source) in sources.iter().enumerate() {
         if source.motions.is_empty() {
             for piece in data::recorded(source, folder, given)? {
-                let pair = piece.pair(&source.subject).with_context(|| piece.name.clone())?;
-                cases.push(Case { pair, trajectory: piece.trajectory, joint: None });
+                let pair = piece
+                    .pair(&source.subject)
+                    .with_context(|| piece.name.clone())?;
+                cases.push(Case {
+                    pair,
+                    trajectory: piece.trajectory,
+                    joint: None,
+                });
             }
             continue;
         }
-        let source = if quick { &Source { repeats: 1, ..source.clone() } } else { source };
+        let source = if quick {
+            &Source {
+                repeats: 1,
+                ..source.clone()
+            }
+        } else {
+            source
+        };
         let seed = data::mix(&[seed, index as u64]);
         let drawn = data::draw(source, folder, model, seed, interrupt, |worn, names| {
             let pair = worn.pair(names, worn.motion(Scheme::Spline)?)?;
-            Ok(Case { pair, trajectory: worn.trajectory()?, joint: Some(worn.joint_trajectory()?) })
+            Ok(Case {
+                pair,
+                trajectory: worn.trajectory()?,
+                joint: Some(worn.joint_trajectory()?),
+            })
         })?;
         cases.extend(drawn);
     }
@@ -178,7 +235,9 @@ pub fn all(
 pub fn fit_mapping(cases: &[Case], learned: &LearnedSimulator) -> anyhow::Result<MappingFile> {
     let mut pooled: BTreeMap<&str, (Vec<Reading>, Vec<Reading>)> = BTreeMap::new();
     for case in cases {
-        let simulated = case.simulate(Simulator::Learned, Some(learned), &MappingFile::default())?.unwrap_or_default();
+        let simulated = case
+            .simulate(Simulator::Learned, Some(learned), &MappingFile::default())?
+            .unwrap_or_default();
         let (all_simulated, all_measured) = pooled.entry(case.position()).or_default();
         for (simulated, measured) in simulated.iter().zip(case.measured()) {
             let Some(measured) = measured else { continue };
@@ -188,7 +247,10 @@ pub fn fit_mapping(cases: &[Case], learned: &LearnedSimulator) -> anyhow::Result
     }
     let mut file = MappingFile::default();
     for (position, (simulated, measured)) in pooled {
-        file.placements.insert(position.to_owned(), PlacementMapping::fit(&simulated, &measured, position)?);
+        file.placements.insert(
+            position.to_owned(),
+            PlacementMapping::fit(&simulated, &measured, position)?,
+        );
     }
     Ok(file)
 }

@@ -33,7 +33,8 @@ pub struct Study {
     pub model: String,
     /// What is scored.
     pub test: Vec<Source>,
-    /// The little data that the distribution mapping is fitted on, at the same positions; none: no mapping.
+    /// The little data that the distribution mapping is fitted on, at the same positions; none: no
+    /// mapping.
     #[serde(default)]
     pub mapping: Vec<Source>,
 }
@@ -42,21 +43,31 @@ impl Protocol {
     /// Reads a file, or the one that comes with the suite.
     pub fn read(path: Option<&Path>) -> anyhow::Result<Self> {
         let (text, name) = match path {
-            Some(path) => {
-                (std::fs::read_to_string(path).with_context(|| format!("{}: cannot be read", path.display()))?, path.display().to_string())
-            }
-            None => (DEFAULT.to_owned(), "config/evaluation/fidelity.yaml".to_owned()),
+            Some(path) => (
+                std::fs::read_to_string(path)
+                    .with_context(|| format!("{}: cannot be read", path.display()))?,
+                path.display().to_string(),
+            ),
+            None => (
+                DEFAULT.to_owned(),
+                "config/evaluation/fidelity.yaml".to_owned(),
+            ),
         };
         let protocol: Self = serde_norway::from_str(&text).with_context(|| name.clone())?;
         if protocol.schema != SCHEMA {
-            bail!("{name}: schema: expected `{SCHEMA}`, found `{}`", protocol.schema);
+            bail!(
+                "{name}: schema: expected `{SCHEMA}`, found `{}`",
+                protocol.schema
+            );
         }
         for study in &protocol.studies {
             if study.test.is_empty() {
                 bail!("{name}: study {}: no test data", study.name);
             }
             for source in study.test.iter().chain(&study.mapping) {
-                source.check().with_context(|| format!("{name}: study {}", study.name))?;
+                source
+                    .check()
+                    .with_context(|| format!("{name}: study {}", study.name))?;
             }
         }
         Ok(protocol)
@@ -71,7 +82,11 @@ mod tests {
     #[test]
     fn files_that_come_with_the_suite_are_sound() {
         assert_eq!(Protocol::read(None).unwrap().studies.len(), 8);
-        let totalcapture = Path::new(env!("CARGO_MANIFEST_DIR")).join("config/evaluation/totalcapture.yaml");
-        assert_eq!(Protocol::read(Some(&totalcapture)).unwrap().studies[0].test[0].sites, ["L_LowArm", "R_LowArm"]);
+        let totalcapture =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("config/evaluation/totalcapture.yaml");
+        assert_eq!(
+            Protocol::read(Some(&totalcapture)).unwrap().studies[0].test[0].sites,
+            ["L_LowArm", "R_LowArm"]
+        );
     }
 }

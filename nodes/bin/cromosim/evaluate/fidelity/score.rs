@@ -7,7 +7,8 @@ use super::cases::{Case, Simulator};
 use super::protocol::{Protocol, Study};
 use crate::evaluate::bootstrap::intervals;
 
-/// Squared errors of the six channels: specific force x, y, z (m/s2)^2, angular velocity x, y, z (rad/s)^2.
+/// Squared errors of the six channels: specific force x, y, z (m/s2)^2, angular velocity x, y, z
+/// (rad/s)^2.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sums {
     squares: [f64; 6],
@@ -20,7 +21,10 @@ impl Sums {
         let mut sums = Self::default();
         for (simulated, measured) in simulated.iter().zip(measured) {
             let Some(measured) = measured else { continue };
-            let (force, rate) = (simulated.force - measured.force, simulated.rate - measured.rate);
+            let (force, rate) = (
+                simulated.force - measured.force,
+                simulated.rate - measured.rate,
+            );
             for (square, error) in sums.squares.iter_mut().zip(force.iter().chain(rate.iter())) {
                 *square += error * error;
             }
@@ -30,17 +34,22 @@ impl Sums {
     }
 
     fn add(&mut self, other: &Self) {
-        self.squares.iter_mut().zip(other.squares).for_each(|(sum, other)| *sum += other);
+        self.squares
+            .iter_mut()
+            .zip(other.squares)
+            .for_each(|(sum, other)| *sum += other);
         self.count += other.count;
     }
 
     fn channels(&self) -> [f64; 6] {
-        self.squares.map(|square| (square / self.count.max(1.0)).sqrt())
+        self.squares
+            .map(|square| (square / self.count.max(1.0)).sqrt())
     }
 
     /// Root mean square per axis: specific force, m/s2, and angular velocity, rad/s.
     fn both(&self) -> [f64; 2] {
-        let mean = |squares: &[f64]| (squares.iter().sum::<f64>() / (3.0 * self.count.max(1.0))).sqrt();
+        let mean =
+            |squares: &[f64]| (squares.iter().sum::<f64>() / (3.0 * self.count.max(1.0))).sqrt();
         [mean(&self.squares[..3]), mean(&self.squares[3..])]
     }
 }
@@ -93,7 +102,8 @@ pub struct PositionResults {
 pub struct SimulatorResults {
     /// Which.
     pub simulator: Simulator,
-    /// Root mean square errors of specific force x, y, z, m/s2, and angular velocity x, y, z, rad/s; sensor axes.
+    /// Root mean square errors of specific force x, y, z, m/s2, and angular velocity x, y, z,
+    /// rad/s; sensor axes.
     pub channels: [f64; 6],
     /// Specific force, m/s2, and angular velocity, rad/s, per axis.
     pub rmse: [f64; 2],
@@ -108,8 +118,17 @@ pub struct SimulatorResults {
 impl Results {
     /// Of studies.
     pub fn new(protocol: &Protocol, quick: bool, studies: Vec<StudyResults>) -> Self {
-        let (schema, version) = ("cromosim/fidelity-results/1".to_owned(), env!("CARGO_PKG_VERSION").to_owned());
-        Self { schema, version, seed: protocol.seed, quick, studies }
+        let (schema, version) = (
+            "cromosim/fidelity-results/1".to_owned(),
+            env!("CARGO_PKG_VERSION").to_owned(),
+        );
+        Self {
+            schema,
+            version,
+            seed: protocol.seed,
+            quick,
+            studies,
+        }
     }
 }
 
@@ -120,23 +139,44 @@ impl StudyResults {
         names.sort_unstable();
         names.dedup();
         let of = |name: &str, keep: &dyn Fn(&Case) -> bool| {
-            let kept: Vec<usize> = (0..cases.len()).filter(|index| keep(&cases[*index])).collect();
+            let kept: Vec<usize> = (0..cases.len())
+                .filter(|index| keep(&cases[*index]))
+                .collect();
             PositionResults::new(name, &kept, cases, sums, seed)
         };
-        let mut positions: Vec<PositionResults> = names.iter().map(|name| of(name, &|case| case.position() == *name)).collect();
+        let mut positions: Vec<PositionResults> = names
+            .iter()
+            .map(|name| of(name, &|case| case.position() == *name))
+            .collect();
         if names.len() > 1 {
             positions.push(of("all", &|_| true));
         }
-        Self { name: study.name.clone(), measured: study.measured.clone(), model: study.model.clone(), positions }
+        Self {
+            name: study.name.clone(),
+            measured: study.measured.clone(),
+            model: study.model.clone(),
+            positions,
+        }
     }
 }
 
 impl PositionResults {
-    fn new(name: &str, kept: &[usize], cases: &[Case], sums: &[Vec<Option<Sums>>], seed: u64) -> Self {
-        let analytic = Simulator::ALL.iter().position(|simulator| *simulator == Simulator::Analytic).unwrap_or(0);
+    fn new(
+        name: &str,
+        kept: &[usize],
+        cases: &[Case],
+        sums: &[Vec<Option<Sums>>],
+        seed: u64,
+    ) -> Self {
+        let analytic = Simulator::ALL
+            .iter()
+            .position(|simulator| *simulator == Simulator::Analytic)
+            .unwrap_or(0);
         let pooled = |draw: &[usize], simulator: usize| {
             let mut all = Sums::default();
-            draw.iter().filter_map(|index| sums[*index][simulator].as_ref()).for_each(|own| all.add(own));
+            draw.iter()
+                .filter_map(|index| sums[*index][simulator].as_ref())
+                .for_each(|own| all.add(own));
             all
         };
         let results = |(index, simulator): (usize, &Simulator)| {
@@ -145,12 +185,14 @@ impl PositionResults {
                 // Errors, then their ratios.
                 let values = |draw: &[usize]| {
                     let kept: Vec<usize> = draw.iter().map(|place| kept[*place]).collect();
-                    let ([a, b], [c, d]) = (pooled(&kept, index).both(), pooled(&kept, analytic).both());
+                    let ([a, b], [c, d]) =
+                        (pooled(&kept, index).both(), pooled(&kept, analytic).both());
                     [a, b, a / c, b / d]
                 };
                 let all: Vec<usize> = (0..kept.len()).collect();
                 let [.., first, second] = values(&all);
-                let [rmse_first, rmse_second, ratio_first, ratio_second] = intervals(kept.len(), seed, values);
+                let [rmse_first, rmse_second, ratio_first, ratio_second] =
+                    intervals(kept.len(), seed, values);
                 SimulatorResults {
                     simulator: *simulator,
                     channels: own.channels(),
@@ -161,18 +203,38 @@ impl PositionResults {
                 }
             })
         };
-        let simulators = Simulator::ALL.iter().enumerate().filter_map(results).collect();
-        let measured = kept.iter().flat_map(|index| cases[*index].measured().iter().flatten());
+        let simulators = Simulator::ALL
+            .iter()
+            .enumerate()
+            .filter_map(results)
+            .collect();
+        let measured = kept
+            .iter()
+            .flat_map(|index| cases[*index].measured().iter().flatten());
         let seconds = measured.clone().count() as f64 / cromosim_learned::NETWORK_RATE_HZ;
-        Self { position: name.to_owned(), recordings: kept.len(), seconds, signal: signal(measured), simulators }
+        Self {
+            position: name.to_owned(),
+            recordings: kept.len(),
+            seconds,
+            signal: signal(measured),
+            simulators,
+        }
     }
 }
 
 /// Spread of readings about their mean.
 fn signal<'a>(readings: impl Iterator<Item = &'a Reading> + Clone) -> [f64; 2] {
     let count = readings.clone().count().max(1) as f64;
-    let force = readings.clone().map(|reading| reading.force).sum::<nalgebra::Vector3<f64>>() / count;
-    let rate = readings.clone().map(|reading| reading.rate).sum::<nalgebra::Vector3<f64>>() / count;
+    let force = readings
+        .clone()
+        .map(|reading| reading.force)
+        .sum::<nalgebra::Vector3<f64>>()
+        / count;
+    let rate = readings
+        .clone()
+        .map(|reading| reading.rate)
+        .sum::<nalgebra::Vector3<f64>>()
+        / count;
     let mut sums = [0.0; 2];
     for reading in readings {
         sums[0] += (reading.force - force).norm_squared();
@@ -188,7 +250,10 @@ mod tests {
     use super::*;
 
     fn reading(x: f64) -> Reading {
-        Reading { force: Vector3::new(x, 0.0, 9.0), rate: Vector3::new(0.0, 2.0 * x, 0.0) }
+        Reading {
+            force: Vector3::new(x, 0.0, 9.0),
+            rate: Vector3::new(0.0, 2.0 * x, 0.0),
+        }
     }
 
     #[test]
@@ -196,7 +261,13 @@ mod tests {
         let simulated = [reading(3.0), reading(4.0), reading(100.0)];
         let measured = [Some(reading(0.0)), Some(reading(0.0)), None];
         let sums = Sums::of(&simulated, &measured);
-        assert_eq!(sums.channels(), [12.5f64.sqrt(), 0.0, 0.0, 0.0, 50f64.sqrt(), 0.0]);
-        assert_eq!(sums.both(), [(25.0f64 / 6.0).sqrt(), (100.0f64 / 6.0).sqrt()]);
+        assert_eq!(
+            sums.channels(),
+            [12.5f64.sqrt(), 0.0, 0.0, 0.0, 50f64.sqrt(), 0.0]
+        );
+        assert_eq!(
+            sums.both(),
+            [(25.0f64 / 6.0).sqrt(), (100.0f64 / 6.0).sqrt()]
+        );
     }
 }

@@ -26,7 +26,8 @@ pub struct Clip {
     pub labels: Vec<Option<u8>>,
 }
 
-/// Reads labelled clips; those that are named atypical only where they are asked for. Gives the names of those left out, too.
+/// Reads labelled clips; those that are named atypical only where they are asked for. Gives the
+/// names of those left out, too.
 pub fn read(
     files: &[PathBuf],
     model: &Arc<BodyModel>,
@@ -35,16 +36,40 @@ pub fn read(
 ) -> anyhow::Result<(Vec<Clip>, Vec<String>)> {
     let (mut clips, mut left_out) = (Vec::new(), Vec::new());
     for path in files {
-        let Skeleton { motion: Motion { name, poses, rate_hz, .. }, labels, atypical: why } = read_skeleton(path, model)?;
+        let Skeleton {
+            motion:
+                Motion {
+                    name,
+                    poses,
+                    rate_hz,
+                    ..
+                },
+            labels,
+            atypical: why,
+        } = read_skeleton(path, model)?;
         if labels.is_empty() {
-            bail!("{}: no labels; a clip of the virtual side needs `label` and `label_names`", path.display());
+            bail!(
+                "{}: no labels; a clip of the virtual side needs `label` and `label_names`",
+                path.display()
+            );
         }
         if !atypical && !why.is_empty() {
             left_out.push(name);
             continue;
         }
-        let labels = labels.iter().map(|label| label.as_ref().and_then(|label| activities.class_named(label))).collect();
-        clips.push(Clip { poses, rate_hz, labels });
+        let labels = labels
+            .iter()
+            .map(|label| {
+                label
+                    .as_ref()
+                    .and_then(|label| activities.class_named(label))
+            })
+            .collect();
+        clips.push(Clip {
+            poses,
+            rate_hz,
+            labels,
+        });
     }
     Ok((clips, left_out))
 }
@@ -64,11 +89,19 @@ pub struct Draw {
     pub windows: Vec<(usize, u8)>,
 }
 
-/// Draws until every class that the clips show has its windows: each round plays every clip that shows a class which still lacks some, in drawn
-/// order. Scarce classes come from more draws of the same clips.
+/// Draws until every class that the clips show has its windows: each round plays every clip that
+/// shows a class which still lacks some, in drawn order. Scarce classes come from more draws of the
+/// same clips.
 pub fn draws(clips: &[Clip], classes: usize, settings: &Settings, seed: u64) -> Vec<Draw> {
-    let mut lacking: Vec<usize> =
-        (0..classes).map(|class| if clips.iter().any(|clip| shows(clip, class)) { settings.virtual_windows } else { 0 }).collect();
+    let mut lacking: Vec<usize> = (0..classes)
+        .map(|class| {
+            if clips.iter().any(|clip| shows(clip, class)) {
+                settings.virtual_windows
+            } else {
+                0
+            }
+        })
+        .collect();
     let mut random = ChaCha12Rng::seed_from_u64(mix(&[seed, 1]));
     let mut draws = Vec::new();
     for round in 0..MOST_ROUNDS {
@@ -91,7 +124,13 @@ pub fn draws(clips: &[Clip], classes: usize, settings: &Settings, seed: u64) -> 
                 taken
             });
             if !windows.is_empty() {
-                draws.push(Draw { clip, seed: mix(&[seed, 2, round, clip as u64]), speed, samples, windows });
+                draws.push(Draw {
+                    clip,
+                    seed: mix(&[seed, 2, round, clip as u64]),
+                    speed,
+                    samples,
+                    windows,
+                });
             }
         }
         if lacking.iter().all(|count| *count == 0) {
@@ -102,15 +141,22 @@ pub fn draws(clips: &[Clip], classes: usize, settings: &Settings, seed: u64) -> 
 }
 
 fn shows(clip: &Clip, class: usize) -> bool {
-    clip.labels.iter().flatten().any(|label| usize::from(*label) == class)
+    clip.labels
+        .iter()
+        .flatten()
+        .any(|label| usize::from(*label) == class)
 }
 
 fn windows(clip: &Clip, speed: f64, phase: usize, grid: &Grid) -> (usize, Vec<(usize, u8)>) {
     let rate_hz = clip.rate_hz * speed;
     let last = clip.labels.len().saturating_sub(1);
     let samples = grid.samples(last as f64 / rate_hz);
-    let label =
-        |sample: usize| clip.labels.get(((sample as f64 / grid.rate_hz as f64 * rate_hz).round() as usize).min(last)).copied().flatten();
+    let label = |sample: usize| {
+        clip.labels
+            .get(((sample as f64 / grid.rate_hz as f64 * rate_hz).round() as usize).min(last))
+            .copied()
+            .flatten()
+    };
     let labels: Vec<Option<u8>> = (0..samples).map(label).collect();
     (samples, grid.windows(&labels, phase))
 }
@@ -122,31 +168,66 @@ mod tests {
     use super::*;
 
     fn clip(labels: &[(Option<u8>, usize)]) -> Clip {
-        let labels: Vec<Option<u8>> = labels.iter().flat_map(|(label, frames)| std::iter::repeat_n(*label, *frames)).collect();
-        Clip { poses: vec![BodyPose::rest(Vector3::zeros()); labels.len()], rate_hz: 120.0, labels }
+        let labels: Vec<Option<u8>> = labels
+            .iter()
+            .flat_map(|(label, frames)| std::iter::repeat_n(*label, *frames))
+            .collect();
+        Clip {
+            poses: vec![BodyPose::rest(Vector3::zeros()); labels.len()],
+            rate_hz: 120.0,
+            labels,
+        }
     }
 
     #[test]
     fn scarce_classes_are_drawn_more_often() {
-        let clips = [clip(&[(Some(0), 3600)]), clip(&[(Some(0), 600), (Some(1), 180), (None, 300)]), clip(&[(None, 600)])];
-        let settings = Settings { virtual_windows: 50, ..Settings::full(1) };
+        let clips = [
+            clip(&[(Some(0), 3600)]),
+            clip(&[(Some(0), 600), (Some(1), 180), (None, 300)]),
+            clip(&[(None, 600)]),
+        ];
+        let settings = Settings {
+            virtual_windows: 50,
+            ..Settings::full(1)
+        };
         let draws = draws(&clips, 3, &settings, 7);
-        let count = |class: u8| draws.iter().flat_map(|draw| &draw.windows).filter(|(_, label)| *label == class).count();
+        let count = |class: u8| {
+            draws
+                .iter()
+                .flat_map(|draw| &draw.windows)
+                .filter(|(_, label)| *label == class)
+                .count()
+        };
         assert_eq!([count(0), count(1), count(2)], [50, 50, 0]);
         let of = |clip: usize| draws.iter().filter(|draw| draw.clip == clip).count();
-        assert!(of(0) <= 2 && of(1) > 10 && of(2) == 0, "{} {}", of(0), of(1));
+        assert!(
+            of(0) <= 2 && of(1) > 10 && of(2) == 0,
+            "{} {}",
+            of(0),
+            of(1)
+        );
         // People differ, the same seed gives the same, and windows lie within their samples.
         assert!(draws.windows(2).all(|pair| pair[0].seed != pair[1].seed));
         assert_eq!(draws, super::draws(&clips, 3, &settings, 7));
         assert_ne!(draws, super::draws(&clips, 3, &settings, 8));
-        assert!(draws.iter().all(|draw| draw.windows.iter().all(|(start, _)| start + settings.window <= draw.samples)));
+        assert!(draws.iter().all(|draw| {
+            draw.windows
+                .iter()
+                .all(|(start, _)| start + settings.window <= draw.samples)
+        }));
     }
 
     #[test]
     fn a_faster_person_has_fewer_windows() {
         let (clip, grid) = (clip(&[(Some(2), 1200)]), Settings::full(1).grid());
-        let (slow, fast) = (windows(&clip, 0.8, 0, &grid), windows(&clip, 1.25, 0, &grid));
-        assert_eq!((slow.0, fast.0), (grid.samples(1199.0 / 96.0), grid.samples(1199.0 / 150.0)));
+        let (slow, fast) = (
+            windows(&clip, 0.8, 0, &grid),
+            windows(&clip, 1.25, 0, &grid),
+        );
+        assert_eq!(
+            (slow.0, fast.0),
+            (grid.samples(1199.0 / 96.0), grid.samples(1199.0 / 150.0))
+        );
         assert!(slow.1.len() > fast.1.len() && fast.1.iter().all(|(_, label)| *label == 2));
     }
 }

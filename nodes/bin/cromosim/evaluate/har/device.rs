@@ -1,12 +1,16 @@
-//! What recordings of IMUs alone tell of a device, and virtual readings with it: noise, biases, resolution and stamps.
+//! What recordings of IMUs alone tell of a device, and virtual readings with it: noise, biases,
+//! resolution and stamps.
 //!
-//! Without a reference nothing is known of gains, delays, low-passes, or of how soft the flesh under a device is: `cromosim diagnose` needs pairs
-//! for that. What does not hang on the motion is read off: white noise from the median third difference while the device is at rest, constant
-//! angular velocities there as biases (of the accelerometer they cannot be told from tilts), the resolution from the lattice that all readings
-//! lie on, and the intervals between stamps with their gaps.
+//! Without a reference nothing is known of gains, delays, low-passes, or of how soft the flesh
+//! under a device is: `cromosim diagnose` needs pairs for that. What does not hang on the motion is
+//! read off: white noise from the median third difference while the device is at rest, constant
+//! angular velocities there as biases (of the accelerometer they cannot be told from tilts), the
+//! resolution from the lattice that all readings lie on, and the intervals between stamps with
+//! their gaps.
 
 use cromosim_imu::{
-    Effect, EffectKind, EffectSet, GridTrace, NoiseSource, Reading, ResidualView, SensorModel, lattice_spacing, normal_pair,
+    Effect, EffectKind, EffectSet, GridTrace, NoiseSource, Reading, ResidualView, SensorModel,
+    lattice_spacing, normal_pair,
 };
 use cromosim_spatial::Stamp;
 use nalgebra::Vector3;
@@ -37,7 +41,8 @@ pub struct DeviceEstimate {
     /// Steps of the readings, m/s2 and rad/s; 0 where they lie on no lattice.
     pub accel_step: f64,
     pub gyro_step: f64,
-    /// Median interval between stamps, s, and the share of time in intervals of more than twice that.
+    /// Median interval between stamps, s, and the share of time in intervals of more than twice
+    /// that.
     pub interval: f64,
     pub in_gaps: f64,
     /// The stretches' intervals, s.
@@ -50,17 +55,39 @@ impl DeviceEstimate {
     pub fn of(stretches: &[&Series]) -> Self {
         let rests: Vec<Rest> = stretches.iter().flat_map(|series| rests(series)).collect();
         let over = |of: fn(&Rest) -> f64| median(rests.iter().map(of).collect());
-        let biases: Vec<Vector3<f64>> = rests.iter().map(|rest| rest.mean_rate).filter(|rate| rate.amax() < MOST_BIAS).collect();
+        let biases: Vec<Vector3<f64>> = rests
+            .iter()
+            .map(|rest| rest.mean_rate)
+            .filter(|rate| rate.amax() < MOST_BIAS)
+            .collect();
         let axis = |axis: usize| biases.iter().map(|bias| bias[axis]).collect::<Vec<_>>();
         let gyro_bias = [0, 1, 2].map(|k| mean(&axis(k)));
-        let gyro_bias_std = [0, 1, 2].map(|k| mean(&axis(k).iter().map(|bias| (bias - gyro_bias[k]).powi(2)).collect::<Vec<_>>()).sqrt());
+        let gyro_bias_std = [0, 1, 2].map(|k| {
+            mean(
+                &axis(k)
+                    .iter()
+                    .map(|bias| (bias - gyro_bias[k]).powi(2))
+                    .collect::<Vec<_>>(),
+            )
+            .sqrt()
+        });
         let step = |channels: std::ops::Range<usize>| {
             let readings = stretches.iter().flat_map(|series| &series.values);
-            let mut values: Vec<f64> = readings.flat_map(|value| value[channels.clone()].to_vec()).collect();
+            let mut values: Vec<f64> = readings
+                .flat_map(|value| value[channels.clone()].to_vec())
+                .collect();
             lattice_spacing(&mut values).unwrap_or(0.0)
         };
-        let intervals: Vec<Vec<f64>> =
-            stretches.iter().map(|series| series.seconds.windows(2).map(|pair| pair[1] - pair[0]).collect()).collect();
+        let intervals: Vec<Vec<f64>> = stretches
+            .iter()
+            .map(|series| {
+                series
+                    .seconds
+                    .windows(2)
+                    .map(|pair| pair[1] - pair[0])
+                    .collect()
+            })
+            .collect();
         let all: Vec<f64> = intervals.iter().flatten().copied().collect();
         let interval = median(all.clone());
         let long: f64 = all.iter().filter(|own| **own > 2.0 * interval).sum();
@@ -74,42 +101,68 @@ impl DeviceEstimate {
             gyro_step: step(3..6),
             interval,
             in_gaps: long / all.iter().sum::<f64>().max(f64::MIN_POSITIVE),
-            intervals: intervals.into_iter().filter(|own| !own.is_empty()).collect(),
+            intervals: intervals
+                .into_iter()
+                .filter(|own| !own.is_empty())
+                .collect(),
         }
     }
 
-    /// What such a device reads where an error-free one reads `ideal`, which begins at 0 s; each seed another device.
+    /// What such a device reads where an error-free one reads `ideal`, which begins at 0 s; each
+    /// seed another device.
     ///
     /// # Errors
-    /// [`cromosim_imu::EffectError`], [`cromosim_imu::ImuError`] for estimates beyond what an effect allows.
+    /// [`cromosim_imu::EffectError`], [`cromosim_imu::ImuError`] for estimates beyond what an
+    /// effect allows.
     pub fn read(&self, ideal: &GridTrace, seed: u64) -> anyhow::Result<Series> {
         let mut random = ChaCha12Rng::seed_from_u64(seed);
         let mut effects = EffectSet::new();
         let ([x, y], [z, _]) = (normal_pair(&mut random), normal_pair(&mut random));
-        let bias =
-            [x, y, z].into_iter().zip(self.gyro_bias.iter().zip(self.gyro_bias_std)).map(|(normal, (mean, std))| mean + std * normal);
+        let bias = [x, y, z]
+            .into_iter()
+            .zip(self.gyro_bias.iter().zip(self.gyro_bias_std))
+            .map(|(normal, (mean, std))| mean + std * normal);
         effects.insert(Effect::new(EffectKind::GyroBias, bias.collect())?);
-        for (kind, step) in [(EffectKind::AccelQuantization, self.accel_step), (EffectKind::GyroQuantization, self.gyro_step)] {
+        for (kind, step) in [
+            (EffectKind::AccelQuantization, self.accel_step),
+            (EffectKind::GyroQuantization, self.gyro_step),
+        ] {
             effects.insert(Effect::new(kind, vec![step])?);
         }
-        let stamps = self.stamps((ideal.force.len().max(1) - 1) as f64 / ideal.rate_hz, &mut random);
+        let stamps = self.stamps(
+            (ideal.force.len().max(1) - 1) as f64 / ideal.rate_hz,
+            &mut random,
+        );
         let model = SensorModel::new(&effects, Stamp::default());
         let mut readings = model.read(ideal, &stamps);
         model.linear(&mut readings, &stamps);
         if self.interval > 0.0 {
-            let mut noise = NoiseSource::white((self.accel_noise, self.gyro_noise), 0.0, self.interval.recip(), seed, "estimated")?;
+            let mut noise = NoiseSource::white(
+                (self.accel_noise, self.gyro_noise),
+                0.0,
+                self.interval.recip(),
+                seed,
+                "estimated",
+            )?;
             for reading in &mut readings {
                 let added = noise.draw();
-                *reading = Reading { force: reading.force + added.force, rate: reading.rate + added.rate };
+                *reading = Reading {
+                    force: reading.force + added.force,
+                    rate: reading.rate + added.rate,
+                };
             }
         }
         model.digital(&mut readings);
         let mut series = Series::default();
-        stamps.iter().zip(&readings).for_each(|(stamp, reading)| series.push(stamp.as_seconds(), reading));
+        stamps
+            .iter()
+            .zip(&readings)
+            .for_each(|(stamp, reading)| series.push(stamp.as_seconds(), reading));
         Ok(series)
     }
 
-    /// From 0 on: the intervals of a stretch from a drawn place on, and of the next ones where it ends.
+    /// From 0 on: the intervals of a stretch from a drawn place on, and of the next ones where it
+    /// ends.
     fn stamps(&self, seconds: f64, random: &mut ChaCha12Rng) -> Vec<Stamp> {
         let mut at = 0.0;
         let mut stamps = vec![Stamp::from_seconds(at)];
@@ -140,9 +193,14 @@ struct Rest {
 fn rests(series: &Series) -> Vec<Rest> {
     let (mut found, mut first) = (Vec::new(), 0);
     while first < series.seconds.len() {
-        let end = series.seconds.partition_point(|seconds| *seconds < series.seconds[first] + REST_SECONDS);
+        let end = series
+            .seconds
+            .partition_point(|seconds| *seconds < series.seconds[first] + REST_SECONDS);
         if end < series.seconds.len() && end - first >= 20 {
-            found.extend(rest(&series.seconds[first..end], &series.values[first..end]));
+            found.extend(rest(
+                &series.seconds[first..end],
+                &series.values[first..end],
+            ));
         }
         first = end;
     }
@@ -150,22 +208,55 @@ fn rests(series: &Series) -> Vec<Rest> {
 }
 
 fn rest(seconds: &[f64], values: &[[f64; 6]]) -> Option<Rest> {
-    let readings: Vec<Reading> =
-        values.iter().map(|[a, b, c, x, y, z]| Reading { force: [*a, *b, *c].into(), rate: [*x, *y, *z].into() }).collect();
+    let readings: Vec<Reading> = values
+        .iter()
+        .map(|[a, b, c, x, y, z]| Reading {
+            force: [*a, *b, *c].into(),
+            rate: [*x, *y, *z].into(),
+        })
+        .collect();
     let count = readings.len() as f64;
-    let mean_rate = readings.iter().map(|reading| reading.rate).sum::<Vector3<f64>>() / count;
-    let scatter = readings.iter().map(|reading| (reading.rate - mean_rate).norm_squared()).sum::<f64>() / (3.0 * count);
+    let mean_rate = readings
+        .iter()
+        .map(|reading| reading.rate)
+        .sum::<Vector3<f64>>()
+        / count;
+    let scatter = readings
+        .iter()
+        .map(|reading| (reading.rate - mean_rate).norm_squared())
+        .sum::<f64>()
+        / (3.0 * count);
     if scatter.sqrt() > REST_SCATTER {
         return None;
     }
-    let stamps: Vec<Stamp> = seconds.iter().map(|seconds| Stamp::from_seconds(*seconds)).collect();
+    let stamps: Vec<Stamp> = seconds
+        .iter()
+        .map(|seconds| Stamp::from_seconds(*seconds))
+        .collect();
     let nothing = vec![Reading::default(); readings.len()];
     let rate_hz = (count - 1.0) / (seconds[seconds.len() - 1] - seconds[0]);
     let epoch = stamps[0];
-    let view =
-        ResidualView { stamps: &stamps, epoch, rate_hz, measured: &readings, simulated: &nothing, accel_sigma: 0.0, gyro_sigma: 0.0 };
-    let density = |kind: EffectKind| (kind.spec().starts)(&view).first().and_then(|values| values.first()).copied().unwrap_or_default();
-    Some(Rest { mean_rate, accel_noise: density(EffectKind::AccelNoise), gyro_noise: density(EffectKind::GyroNoise) })
+    let view = ResidualView {
+        stamps: &stamps,
+        epoch,
+        rate_hz,
+        measured: &readings,
+        simulated: &nothing,
+        accel_sigma: 0.0,
+        gyro_sigma: 0.0,
+    };
+    let density = |kind: EffectKind| {
+        (kind.spec().starts)(&view)
+            .first()
+            .and_then(|values| values.first())
+            .copied()
+            .unwrap_or_default()
+    };
+    Some(Rest {
+        mean_rate,
+        accel_noise: density(EffectKind::AccelNoise),
+        gyro_noise: density(EffectKind::GyroNoise),
+    })
 }
 
 /// 0 of nothing.
@@ -179,15 +270,21 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    /// A device of known noise and bias that rests, turns, and rests; every twentieth interval is three times as long.
+    /// A device of known noise and bias that rests, turns, and rests; every twentieth interval is
+    /// three times as long.
     fn recorded(seed: u64) -> Series {
         let mut noise = NoiseSource::white((0.003, 0.0004), 0.0, 100.0, seed, "test").unwrap();
         let (mut series, mut seconds) = (Series::default(), 0.0_f64);
         for k in 0..3000 {
             let added = noise.draw();
-            let turning = if (1000..2000).contains(&k) { (seconds * 7.0).sin() } else { 0.0 };
+            let turning = if (1000..2000).contains(&k) {
+                (seconds * 7.0).sin()
+            } else {
+                0.0
+            };
             let rate = Vector3::new(0.01 + turning, -0.02, 0.0) + added.rate;
-            let force = (Vector3::new(0.0, 9.8, 0.0) + added.force).map(|value| (value / 0.0625).round() * 0.0625);
+            let force = (Vector3::new(0.0, 9.8, 0.0) + added.force)
+                .map(|value| (value / 0.0625).round() * 0.0625);
             series.push(seconds, &Reading { force, rate });
             seconds += if k % 20 == 19 { 0.03 } else { 0.01 };
         }
@@ -199,10 +296,23 @@ mod tests {
         let (one, two) = (recorded(1), recorded(2));
         let estimate = DeviceEstimate::of(&[&one, &two]);
         assert!((30..42).contains(&estimate.rests), "{}", estimate.rests);
-        assert!((estimate.gyro_noise / 0.0004 - 1.0).abs() < 0.15, "{}", estimate.gyro_noise);
-        assert!((estimate.gyro_bias[0] - 0.01).abs() < 1e-3 && (estimate.gyro_bias[1] + 0.02).abs() < 1e-3, "{:?}", estimate.gyro_bias);
+        assert!(
+            (estimate.gyro_noise / 0.0004 - 1.0).abs() < 0.15,
+            "{}",
+            estimate.gyro_noise
+        );
+        assert!(
+            (estimate.gyro_bias[0] - 0.01).abs() < 1e-3
+                && (estimate.gyro_bias[1] + 0.02).abs() < 1e-3,
+            "{:?}",
+            estimate.gyro_bias
+        );
         assert!((estimate.accel_step - 0.0625).abs() < 1e-9 && estimate.gyro_step == 0.0);
-        assert!((estimate.interval - 0.01).abs() < 1e-9 && (estimate.in_gaps - 3.0 / 22.0).abs() < 0.01, "{}", estimate.in_gaps);
+        assert!(
+            (estimate.interval - 0.01).abs() < 1e-9 && (estimate.in_gaps - 3.0 / 22.0).abs() < 0.01,
+            "{}",
+            estimate.in_gaps
+        );
     }
 
     #[test]
@@ -214,13 +324,26 @@ mod tests {
             force: vec![Vector3::new(0.0, 0.0, 9.81); 2000],
             rate: vec![Vector3::zeros(); 2000],
         };
-        let (read, again, other) =
-            (estimate.read(&ideal, 5).unwrap(), estimate.read(&ideal, 5).unwrap(), estimate.read(&ideal, 6).unwrap());
+        let (read, again, other) = (
+            estimate.read(&ideal, 5).unwrap(),
+            estimate.read(&ideal, 5).unwrap(),
+            estimate.read(&ideal, 6).unwrap(),
+        );
         assert_eq!(read.values, again.values);
         assert_ne!(read.values, other.values);
         let same = DeviceEstimate::of(&[&read]);
-        assert!((same.gyro_noise / estimate.gyro_noise - 1.0).abs() < 0.2 && (same.accel_step - 0.0625).abs() < 1e-9);
-        assert!((same.in_gaps - estimate.in_gaps).abs() < 0.03 && *read.seconds.last().unwrap() <= 19.99);
-        assert!((same.gyro_bias[1] + 0.02).abs() < 2e-3, "{:?}", same.gyro_bias);
+        assert!(
+            (same.gyro_noise / estimate.gyro_noise - 1.0).abs() < 0.2
+                && (same.accel_step - 0.0625).abs() < 1e-9
+        );
+        assert!(
+            (same.in_gaps - estimate.in_gaps).abs() < 0.03
+                && *read.seconds.last().unwrap() <= 19.99
+        );
+        assert!(
+            (same.gyro_bias[1] + 0.02).abs() < 2e-3,
+            "{:?}",
+            same.gyro_bias
+        );
     }
 }

@@ -16,7 +16,8 @@ pub enum Training {
     /// Real windows.
     #[serde(rename = "R2R")]
     Real,
-    /// Real windows and the same turned, half of every batch each: what drawn ways of wearing devices give without any virtual ones.
+    /// Real windows and the same turned, half of every batch each: what drawn ways of wearing
+    /// devices give without any virtual ones.
     #[serde(rename = "R2R, turned")]
     Turned,
     /// Virtual windows.
@@ -55,13 +56,32 @@ pub struct Variant {
 impl Variant {
     /// Without anything further.
     pub const fn plain(simulator: Simulator) -> Self {
-        Self { simulator, mapped: false, in_place: false, effects: false }
+        Self {
+            simulator,
+            mapped: false,
+            in_place: false,
+            effects: false,
+        }
     }
 
     /// The simulator's four: plain, mapped, in place, with effects.
     pub fn all_of(simulator: Simulator) -> [Self; 4] {
         let plain = Self::plain(simulator);
-        [plain, Self { mapped: true, ..plain }, Self { in_place: true, ..plain }, Self { effects: true, ..plain }]
+        [
+            plain,
+            Self {
+                mapped: true,
+                ..plain
+            },
+            Self {
+                in_place: true,
+                ..plain
+            },
+            Self {
+                effects: true,
+                ..plain
+            },
+        ]
     }
 
     /// Whether real readings are needed to make it.
@@ -115,7 +135,8 @@ pub struct SubjectScore {
 pub struct Cell {
     /// What is learned from.
     pub training: Training,
-    /// How virtual windows are made; none of real ones, and where it was chosen for each person (`chosen`).
+    /// How virtual windows are made; none of real ones, and where it was chosen for each person
+    /// (`chosen`).
     pub variant: Option<Variant>,
     /// The variant of each tested person was chosen by the scores of the others.
     pub chosen: bool,
@@ -137,17 +158,29 @@ pub struct Cell {
 
 impl Cell {
     /// Puts runs together.
-    pub fn of(training: Training, variant: Option<Variant>, share: f64, chosen: bool, mut runs: Vec<Run>, seed: u64) -> Self {
+    pub fn of(
+        training: Training,
+        variant: Option<Variant>,
+        share: f64,
+        chosen: bool,
+        mut runs: Vec<Run>,
+        seed: u64,
+    ) -> Self {
         runs.sort_by(|a, b| (&a.subject, a.seed).cmp(&(&b.subject, b.seed)));
         let mut confusion = Confusion::default();
         let mut subjects: Vec<SubjectScore> = Vec::new();
         for own in runs.chunk_by(|a, b| a.subject == b.subject) {
             own.iter().for_each(|run| confusion.add(&run.confusion));
             let f1 = mean(&own.iter().map(|run| run.f1).collect::<Vec<_>>());
-            subjects.push(SubjectScore { subject: own[0].subject.clone(), f1 });
+            subjects.push(SubjectScore {
+                subject: own[0].subject.clone(),
+                f1,
+            });
         }
         let scores: Vec<f64> = subjects.iter().map(|score| score.f1).collect();
-        let class_f1 = (0..confusion.0.len()).map(|class| confusion.f1(class)).collect();
+        let class_f1 = (0..confusion.0.len())
+            .map(|class| confusion.f1(class))
+            .collect();
         Self {
             training,
             variant,
@@ -164,7 +197,10 @@ impl Cell {
 
     /// Score of a person.
     pub fn score(&self, subject: &str) -> Option<f64> {
-        self.subjects.iter().find(|score| score.subject == subject).map(|score| score.f1)
+        self.subjects
+            .iter()
+            .find(|score| score.subject == subject)
+            .map(|score| score.f1)
     }
 
     /// As in tables and messages.
@@ -174,7 +210,11 @@ impl Cell {
             (None, true) => " (chosen)".to_owned(),
             (None, false) => String::new(),
         };
-        format!("{}{variant}, {:.0} % of the training subjects", self.training.name(), 100.0 * self.share)
+        format!(
+            "{}{variant}, {:.0} % of the training subjects",
+            self.training.name(),
+            100.0 * self.share
+        )
     }
 }
 
@@ -194,8 +234,17 @@ pub struct Comparison {
 impl Comparison {
     /// Of two cells with the same people.
     pub fn of(one: &Cell, other: &Cell, seed: u64) -> Self {
-        let gains: Vec<f64> = one.subjects.iter().filter_map(|score| Some(score.f1 - other.score(&score.subject)?)).collect();
-        Self { of: one.name(), over: other.name(), gain: mean(&gains), interval: interval(&gains, seed) }
+        let gains: Vec<f64> = one
+            .subjects
+            .iter()
+            .filter_map(|score| Some(score.f1 - other.score(&score.subject)?))
+            .collect();
+        Self {
+            of: one.name(),
+            over: other.name(),
+            gain: mean(&gains),
+            interval: interval(&gains, seed),
+        }
     }
 }
 
@@ -279,8 +328,19 @@ pub struct Results {
 
 impl Results {
     /// The cell of a way of learning.
-    pub fn cell(&self, training: Training, variant: Option<Variant>, chosen: bool, share: f64) -> Option<&Cell> {
-        self.cells.iter().find(|cell| cell.training == training && cell.variant == variant && cell.chosen == chosen && cell.share == share)
+    pub fn cell(
+        &self,
+        training: Training,
+        variant: Option<Variant>,
+        chosen: bool,
+        share: f64,
+    ) -> Option<&Cell> {
+        self.cells.iter().find(|cell| {
+            cell.training == training
+                && cell.variant == variant
+                && cell.chosen == chosen
+                && cell.share == share
+        })
     }
 }
 
@@ -291,21 +351,56 @@ mod tests {
 
     fn run(subject: &str, seed: usize, right: u32) -> Run {
         let confusion = Confusion(vec![vec![right, 10 - right], vec![0, 10]]);
-        Run { seed, subject: subject.to_owned(), known: Vec::new(), f1: confusion.macro_f1(), confusion }
+        Run {
+            seed,
+            subject: subject.to_owned(),
+            known: Vec::new(),
+            f1: confusion.macro_f1(),
+            confusion,
+        }
     }
 
     #[test]
     fn seeds_are_averaged_before_subjects() {
-        let cell = Cell::of(Training::Real, None, 1.0, false, vec![run("b", 0, 4), run("a", 1, 10), run("a", 0, 10), run("b", 1, 4)], 1);
-        assert_eq!(cell.subjects.iter().map(|score| score.subject.as_str()).collect::<Vec<_>>(), ["a", "b"]);
+        let cell = Cell::of(
+            Training::Real,
+            None,
+            1.0,
+            false,
+            vec![
+                run("b", 0, 4),
+                run("a", 1, 10),
+                run("a", 0, 10),
+                run("b", 1, 4),
+            ],
+            1,
+        );
+        assert_eq!(
+            cell.subjects
+                .iter()
+                .map(|score| score.subject.as_str())
+                .collect::<Vec<_>>(),
+            ["a", "b"]
+        );
         assert!(
-            (cell.mean - (1.0 + run("b", 0, 4).f1) / 2.0).abs() < 1e-12 && cell.interval[0] < cell.mean && cell.mean < cell.interval[1]
+            (cell.mean - (1.0 + run("b", 0, 4).f1) / 2.0).abs() < 1e-12
+                && cell.interval[0] < cell.mean
+                && cell.mean < cell.interval[1]
         );
         assert_eq!(cell.confusion.0, [[28, 12], [0, 40]]);
-        let better =
-            Cell::of(Training::Mixed, Some(Variant::plain(Simulator::Joint)), 1.0, false, vec![run("b", 0, 9), run("a", 0, 10)], 1);
+        let better = Cell::of(
+            Training::Mixed,
+            Some(Variant::plain(Simulator::Joint)),
+            1.0,
+            false,
+            vec![run("b", 0, 9), run("a", 0, 10)],
+            1,
+        );
         let comparison = Comparison::of(&better, &cell, 1);
         assert!((comparison.gain - (run("b", 0, 9).f1 - run("b", 0, 4).f1) / 2.0).abs() < 1e-12);
-        assert_eq!(comparison.of, "Mix2R (joint, plain), 100 % of the training subjects");
+        assert_eq!(
+            comparison.of,
+            "Mix2R (joint, plain), 100 % of the training subjects"
+        );
     }
 }

@@ -13,7 +13,10 @@ impl Confusion {
     /// Of true and said classes.
     pub fn new(truth: &[u8], said: &[u8], classes: usize) -> Self {
         let mut counts = vec![vec![0; classes]; classes];
-        truth.iter().zip(said).for_each(|(truth, said)| counts[usize::from(*truth)][usize::from(*said)] += 1);
+        truth
+            .iter()
+            .zip(said)
+            .for_each(|(truth, said)| counts[usize::from(*truth)][usize::from(*said)] += 1);
         Self(counts)
     }
 
@@ -23,10 +26,15 @@ impl Confusion {
             self.0.clone_from(&other.0);
             return;
         }
-        self.0.iter_mut().zip(&other.0).for_each(|(own, other)| own.iter_mut().zip(other).for_each(|(own, other)| *own += other));
+        self.0.iter_mut().zip(&other.0).for_each(|(own, other)| {
+            own.iter_mut()
+                .zip(other)
+                .for_each(|(own, other)| *own += other)
+        });
     }
 
-    /// F1 = 2 TP / (2 TP + FP + FN) of a class; none where neither the truth has it nor anything was said to be it.
+    /// F1 = 2 TP / (2 TP + FP + FN) of a class; none where neither the truth has it nor anything
+    /// was said to be it.
     pub fn f1(&self, class: usize) -> Option<f64> {
         let hits = f64::from(self.0[class][class]);
         let truth: u32 = self.0[class].iter().sum();
@@ -37,7 +45,10 @@ impl Confusion {
     /// Mean F1 of the classes that the truth has.
     pub fn macro_f1(&self) -> f64 {
         let there = |class: &usize| self.0[*class].iter().sum::<u32>() > 0;
-        let scores: Vec<f64> = (0..self.0.len()).filter(there).filter_map(|class| self.f1(class)).collect();
+        let scores: Vec<f64> = (0..self.0.len())
+            .filter(there)
+            .filter_map(|class| self.f1(class))
+            .collect();
         mean(&scores)
     }
 }
@@ -49,7 +60,9 @@ pub fn mean(values: &[f64]) -> f64 {
 
 /// 95 % interval of the mean over values (subjects).
 pub fn interval(values: &[f64], seed: u64) -> [f64; 2] {
-    let mean = |places: &[usize]| [places.iter().map(|place| values[*place]).sum::<f64>() / values.len() as f64];
+    let mean = |places: &[usize]| {
+        [places.iter().map(|place| values[*place]).sum::<f64>() / values.len() as f64]
+    };
     intervals(values.len(), seed, mean)[0]
 }
 
@@ -60,8 +73,12 @@ mod tests {
     #[test]
     fn f1_is_its_definition() {
         let confusion = Confusion::new(&[0, 0, 0, 1, 1, 1], &[0, 0, 1, 1, 1, 2], 4);
-        assert_eq!(confusion.0, [vec![2, 1, 0, 0], vec![0, 2, 1, 0], vec![0; 4], vec![0; 4]]);
-        // Class 0: precision 1, recall 2/3. Class 1: both 2/3. Class 2 is said but not there, class 3 is neither.
+        assert_eq!(
+            confusion.0,
+            [vec![2, 1, 0, 0], vec![0, 2, 1, 0], vec![0; 4], vec![0; 4]]
+        );
+        // Class 0: precision 1, recall 2/3. Class 1: both 2/3. Class 2 is said but not there, class
+        // 3 is neither.
         assert!((confusion.f1(0).unwrap_or_default() - 0.8).abs() < 1e-12);
         assert_eq!((confusion.f1(2), confusion.f1(3)), (Some(0.0), None));
         assert!((confusion.macro_f1() - (0.8 + 2.0 / 3.0) / 2.0).abs() < 1e-12);

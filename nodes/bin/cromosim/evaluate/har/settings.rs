@@ -11,7 +11,8 @@ use super::signal::Grid;
 pub struct Settings {
     /// Of all that is drawn.
     pub seed: u64,
-    /// Repetitions, each with other initial weights, draws of virtual people and choices of training subjects.
+    /// Repetitions, each with other initial weights, draws of virtual people and choices of
+    /// training subjects.
     pub seeds: usize,
     /// Samples per second of the windows, Hz.
     pub rate_hz: usize,
@@ -22,7 +23,8 @@ pub struct Settings {
     pub hop: usize,
     /// Virtual windows of each class.
     pub virtual_windows: usize,
-    /// Standard deviation of the virtual people's shape coefficients, and how much faster than recorded they move.
+    /// Standard deviation of the virtual people's shape coefficients, and how much faster than
+    /// recorded they move.
     pub shape_std: f64,
     pub speed: [f64; 2],
     /// Shares of the training subjects on the learning curve, the whole last.
@@ -38,7 +40,8 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// Of the full run. A window of 24 samples is what the network was made for (0.8 s at 30 Hz there).
+    /// Of the full run. A window of 24 samples is what the network was made for (0.8 s at 30 Hz
+    /// there).
     pub fn full(seed: u64) -> Self {
         Self {
             seed,
@@ -70,18 +73,51 @@ impl Settings {
     /// A look at whether all of it runs; its scores say little.
     pub fn quick(seed: u64) -> Self {
         let full = Self::full(seed);
-        let training = ClassifierOptions { steps: 30, batch: 16, learning_rate: 5e-3, ..full.training };
-        Self { seeds: 1, virtual_windows: 20, shares: vec![0.5, 1.0], maps: 8, hidden: 16, training, ..full }
+        let training = ClassifierOptions {
+            steps: 30,
+            batch: 16,
+            learning_rate: 5e-3,
+            ..full.training
+        };
+        Self {
+            seeds: 1,
+            virtual_windows: 20,
+            shares: vec![0.5, 1.0],
+            maps: 8,
+            hidden: 16,
+            training,
+            ..full
+        }
     }
 
     /// The windows' grid.
     pub fn grid(&self) -> Grid {
-        Grid { rate_hz: self.rate_hz, low_pass_hz: self.low_pass_hz, window: self.window, hop: self.hop }
+        Grid {
+            rate_hz: self.rate_hz,
+            low_pass_hz: self.low_pass_hz,
+            window: self.window,
+            hop: self.hop,
+        }
     }
 
     /// The classifier for so many channels and classes.
     pub fn shape(&self, inputs: usize, classes: usize) -> ClassifierShape {
-        let Self { maps, kernel, convolutions, hidden, layers, .. } = *self;
-        ClassifierShape { inputs, maps, kernel, convolutions, hidden, layers, classes }
+        let Self {
+            maps,
+            kernel,
+            convolutions,
+            hidden,
+            layers,
+            ..
+        } = *self;
+        ClassifierShape {
+            inputs,
+            maps,
+            kernel,
+            convolutions,
+            hidden,
+            layers,
+            classes,
+        }
     }
 }

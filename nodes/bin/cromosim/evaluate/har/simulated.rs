@@ -5,7 +5,8 @@ use std::sync::Arc;
 use anyhow::bail;
 use cromosim_body::{BodyModel, BodyPose, ShapedBody};
 use cromosim_imu::{
-    GridTrace, KinematicSample, MountedSite, Placement, Scheme, SensorFrame, SensorTrajectory, normal_pair, simulate_kinematics,
+    GridTrace, KinematicSample, MountedSite, Placement, Scheme, SensorFrame, SensorTrajectory,
+    normal_pair, simulate_kinematics,
 };
 use cromosim_learned::{Examples, LearnedSimulator, NETWORK_RATE_HZ, SiteMotion};
 use cromosim_spatial::{Stamp, uniform_stamps};
@@ -75,7 +76,12 @@ impl Stage<'_> {
     ///
     /// # Errors
     /// Those of bodies, sites and kinematics.
-    pub fn play(&self, draw: &Draw, simulator: Simulator, in_place: bool) -> anyhow::Result<Played> {
+    pub fn play(
+        &self,
+        draw: &Draw,
+        simulator: Simulator,
+        in_place: bool,
+    ) -> anyhow::Result<Played> {
         let clip = &self.clips[draw.clip];
         let mut random = ChaCha12Rng::seed_from_u64(draw.seed);
         let spread = self.settings.shape_std;
@@ -83,18 +89,34 @@ impl Stage<'_> {
             .map(|_| (spread * normal_pair(&mut random)[0]).clamp(-WIDEST_SHAPE, WIDEST_SHAPE))
             .collect();
         let body = ShapedBody::new(self.model.clone(), &betas)?;
-        let worn: Vec<Worn> = self.wears.iter().map(|wear| wear.draw(&mut random)).collect();
+        let worn: Vec<Worn> = self
+            .wears
+            .iter()
+            .map(|wear| wear.draw(&mut random))
+            .collect();
         let rate_hz = clip.rate_hz * draw.speed;
-        let stamps: Vec<Stamp> = (0..clip.poses.len()).map(|frame| Stamp::from_seconds(frame as f64 / rate_hz)).collect();
+        let stamps: Vec<Stamp> = (0..clip.poses.len())
+            .map(|frame| Stamp::from_seconds(frame as f64 / rate_hz))
+            .collect();
         let still: Vec<BodyPose>;
         let poses = if in_place {
             let root_position = clip.poses[0].root_position;
-            still = clip.poses.iter().map(|pose| BodyPose { root_position, ..pose.clone() }).collect();
+            still = clip
+                .poses
+                .iter()
+                .map(|pose| BodyPose {
+                    root_position,
+                    ..pose.clone()
+                })
+                .collect();
             &still
         } else {
             &clip.poses
         };
-        let devices = worn.iter().map(|worn| self.device(&body, worn, simulator, &stamps, poses)).collect::<anyhow::Result<_>>()?;
+        let devices = worn
+            .iter()
+            .map(|worn| self.device(&body, worn, simulator, &stamps, poses))
+            .collect::<anyhow::Result<_>>()?;
         Ok(Played { devices })
     }
 
@@ -107,7 +129,11 @@ impl Stage<'_> {
         poses: &[BodyPose],
     ) -> anyhow::Result<GridTrace> {
         // The networks that come with the suite stand on the spline.
-        let scheme = if simulator == Simulator::Learned { Scheme::Spline } else { Scheme::Richardson };
+        let scheme = if simulator == Simulator::Learned {
+            Scheme::Spline
+        } else {
+            Scheme::Richardson
+        };
         let placement = match Placement::at_site(worn.site, worn.site, NETWORK_RATE_HZ) {
             Ok(placement) => placement.with_scheme(scheme).with_mount(worn.mount),
             Err((field, problem)) => bail!("site {}: {field}: {problem}", worn.site),
@@ -124,17 +150,35 @@ impl Stage<'_> {
                 let frame = |(stamp, pose): (&Stamp, &BodyPose)| {
                     let segments = body.world_from_segments(pose);
                     let rotation = segments[site.joint().index()].rotation * segment_from_sensor;
-                    SensorFrame::new(*stamp, Isometry3::from_parts(segments[worn.joint.index()].translation, rotation))
+                    SensorFrame::new(
+                        *stamp,
+                        Isometry3::from_parts(segments[worn.joint.index()].translation, rotation),
+                    )
                 };
-                on_grid(&SensorTrajectory::new(stamps.iter().zip(poses).map(frame).collect())?)?
+                on_grid(&SensorTrajectory::new(
+                    stamps.iter().zip(poses).map(frame).collect(),
+                )?)?
             }
-            (Simulator::Analytic, _) => on_grid(&MountedSite::new(body, &placement)?.trajectory(stamps, poses)?)?,
-            (Simulator::Learned, Some(networks)) => networks.simulate(&SiteMotion::on_body(body, &placement, stamps, poses)?)?,
-            (Simulator::Learned, None) => bail!("no networks were given; name their folder by --learned"),
+            (Simulator::Analytic, _) => {
+                on_grid(&MountedSite::new(body, &placement)?.trajectory(stamps, poses)?)?
+            }
+            (Simulator::Learned, Some(networks)) => {
+                networks.simulate(&SiteMotion::on_body(body, &placement, stamps, poses)?)?
+            }
+            (Simulator::Learned, None) => {
+                bail!("no networks were given; name their folder by --learned")
+            }
         };
         let ideal = kinematics.iter().map(KinematicSample::imu);
-        let (force, rate) = ideal.map(|sample| (sample.specific_force, sample.angular_velocity)).unzip();
-        Ok(GridTrace { start: Stamp::default(), rate_hz: NETWORK_RATE_HZ, force, rate })
+        let (force, rate) = ideal
+            .map(|sample| (sample.specific_force, sample.angular_velocity))
+            .unzip();
+        Ok(GridTrace {
+            start: Stamp::default(),
+            rate_hz: NETWORK_RATE_HZ,
+            force,
+            rate,
+        })
     }
 }
 
@@ -142,24 +186,46 @@ impl Stage<'_> {
 ///
 /// # Errors
 /// Those of the devices' effects.
-pub fn windows(draws: &[Draw], played: &[Played], devices: Option<&[DeviceEstimate]>, settings: &Settings) -> anyhow::Result<Examples> {
+pub fn windows(
+    draws: &[Draw],
+    played: &[Played],
+    devices: Option<&[DeviceEstimate]>,
+    settings: &Settings,
+) -> anyhow::Result<Examples> {
     let grid = settings.grid();
     let width = played.first().map_or(0, |played| played.devices.len());
     let mut examples = Examples::new(settings.window, width * PER_DEVICE);
     for (draw, played) in draws.iter().zip(played) {
-        let series = played.devices.iter().enumerate().map(|(index, ideal)| match devices {
-            Some(devices) => devices[index].read(ideal, mix(&[draw.seed, 3, index as u64])),
-            None => Ok(error_free(ideal)),
-        });
+        let series = played
+            .devices
+            .iter()
+            .enumerate()
+            .map(|(index, ideal)| match devices {
+                Some(devices) => devices[index].read(ideal, mix(&[draw.seed, 3, index as u64])),
+                None => Ok(error_free(ideal)),
+            });
         let series = series.collect::<anyhow::Result<Vec<Series>>>()?;
-        grid.cut(&grid.sampled(&series, 0.0, draw.samples), &draw.windows, &mut examples);
+        grid.cut(
+            &grid.sampled(&series, 0.0, draw.samples),
+            &draw.windows,
+            &mut examples,
+        );
     }
     Ok(examples)
 }
 
 fn error_free(ideal: &GridTrace) -> Series {
-    let values = ideal.force.iter().zip(&ideal.rate).map(|(force, rate)| [force.x, force.y, force.z, rate.x, rate.y, rate.z]);
-    Series { seconds: (0..ideal.force.len()).map(|k| k as f64 / ideal.rate_hz).collect(), values: values.collect() }
+    let values = ideal
+        .force
+        .iter()
+        .zip(&ideal.rate)
+        .map(|(force, rate)| [force.x, force.y, force.z, rate.x, rate.y, rate.z]);
+    Series {
+        seconds: (0..ideal.force.len())
+            .map(|k| k as f64 / ideal.rate_hz)
+            .collect(),
+        values: values.collect(),
+    }
 }
 
 #[cfg(test)]

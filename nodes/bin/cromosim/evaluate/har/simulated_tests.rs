@@ -7,28 +7,65 @@ use super::*;
 fn clip() -> Clip {
     let motion = embedded_walk().slice(1.0, Some(5.0)).unwrap();
     let labels = vec![Some(2); motion.frames.len()];
-    Clip { poses: motion.frames, rate_hz: motion.rate_hz, labels }
+    Clip {
+        poses: motion.frames,
+        rate_hz: motion.rate_hz,
+        labels,
+    }
 }
 
 fn draw(seed: u64) -> Draw {
-    Draw { clip: 0, seed, speed: 1.0, samples: 90, windows: vec![(15, 2), (45, 2)] }
+    Draw {
+        clip: 0,
+        seed,
+        speed: 1.0,
+        samples: 90,
+        windows: vec![(15, 2), (45, 2)],
+    }
 }
 
 fn mean_norm(examples: &Examples, channels: std::ops::Range<usize>) -> f32 {
     let rows: Vec<&[f32]> = examples.values.chunks(examples.channels).collect();
-    rows.iter().map(|row| row[channels.clone()].iter().map(|value| value * value).sum::<f32>().sqrt()).sum::<f32>() / rows.len() as f32
+    rows.iter()
+        .map(|row| {
+            row[channels.clone()]
+                .iter()
+                .map(|value| value * value)
+                .sum::<f32>()
+                .sqrt()
+        })
+        .sum::<f32>()
+        / rows.len() as f32
 }
 
 #[test]
 fn people_and_devices_differ_and_gravity_stays() {
     let (model, clips, settings) = (BodyModel::embedded(), [clip()], Settings::full(1));
     let wears = [wear("pocket").unwrap(), wear("wrist").unwrap()];
-    let stage = Stage { model: &model, clips: &clips, wears: &wears, learned: None, settings: &settings };
-    let of = |seed, simulator, in_place| {
-        windows(&[draw(seed)], &[stage.play(&draw(seed), simulator, in_place).unwrap()], None, &settings).unwrap()
+    let stage = Stage {
+        model: &model,
+        clips: &clips,
+        wears: &wears,
+        learned: None,
+        settings: &settings,
     };
-    let (one, other) = (of(1, Simulator::Analytic, false), of(2, Simulator::Analytic, false));
-    assert_eq!((one.len(), one.channels, one.steps), (2, 12, settings.window));
+    let of = |seed, simulator, in_place| {
+        windows(
+            &[draw(seed)],
+            &[stage.play(&draw(seed), simulator, in_place).unwrap()],
+            None,
+            &settings,
+        )
+        .unwrap()
+    };
+    let (one, other) = (
+        of(1, Simulator::Analytic, false),
+        of(2, Simulator::Analytic, false),
+    );
+    assert_eq!(
+        (one.len(), one.channels, one.steps),
+        (2, 12, settings.window)
+    );
     assert_ne!(one.values, other.values);
     assert_eq!(one, of(1, Simulator::Analytic, false));
     // Walking shakes a phone and a watch about the g that both feel.
@@ -38,14 +75,29 @@ fn people_and_devices_differ_and_gravity_stays() {
         assert!((felt - 9.8).abs() < 3.0, "{felt}");
     }
     // At the joint, and in place, the same person turns alike but feels other forces.
-    for another in [of(1, Simulator::Joint, false), of(1, Simulator::Analytic, true)] {
+    for another in [
+        of(1, Simulator::Joint, false),
+        of(1, Simulator::Analytic, true),
+    ] {
         let apart = |channels: std::ops::Range<usize>| {
             let mut difference = one.clone();
-            difference.values.iter_mut().zip(&another.values).for_each(|(value, other)| *value -= other);
+            difference
+                .values
+                .iter_mut()
+                .zip(&another.values)
+                .for_each(|(value, other)| *value -= other);
             mean_norm(&difference, channels) / mean_norm(&one, 3..6)
         };
-        assert!(apart(0..3) > 0.05 && apart(3..6) < 0.5, "{} {}", apart(0..3), apart(3..6));
+        assert!(
+            apart(0..3) > 0.05 && apart(3..6) < 0.5,
+            "{} {}",
+            apart(0..3),
+            apart(3..6)
+        );
     }
-    let refused = stage.play(&draw(1), Simulator::Learned, false).err().map(|error| error.to_string());
+    let refused = stage
+        .play(&draw(1), Simulator::Learned, false)
+        .err()
+        .map(|error| error.to_string());
     assert!(refused.unwrap().contains("--learned"));
 }

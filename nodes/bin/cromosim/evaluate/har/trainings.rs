@@ -63,8 +63,8 @@ pub struct Job {
     pub tested: Vec<usize>,
 }
 
-/// The training subjects for a tested one: so large a share of the others, at least one, in an order drawn for the seed; a smaller share's are
-/// among a larger one's.
+/// The training subjects for a tested one: so large a share of the others, at least one, in an
+/// order drawn for the seed; a smaller share's are among a larger one's.
 pub fn training_subjects(count: usize, tested: usize, share: f64, seed: u64) -> Vec<usize> {
     let mut others: Vec<usize> = (0..count).filter(|subject| *subject != tested).collect();
     let mut random = ChaCha12Rng::seed_from_u64(mix(&[seed, 11, tested as u64]));
@@ -80,13 +80,22 @@ impl Ground<'_> {
     /// Trains and tests.
     pub fn run(&self, job: &Job) -> anyhow::Result<Vec<Run>> {
         self.interrupt.check()?;
-        let known: Vec<&Subject> = job.known.iter().map(|index| &self.real.subjects[*index]).collect();
+        let known: Vec<&Subject> = job
+            .known
+            .iter()
+            .map(|index| &self.real.subjects[*index])
+            .collect();
         let mut pools = Vec::new();
         if job.training != Training::Virtual {
             pools.push(together(&known));
         }
         // The same for all that is compared.
-        let seed = mix(&[self.settings.seed, 12, job.seed as u64, job.tested[0] as u64]);
+        let seed = mix(&[
+            self.settings.seed,
+            12,
+            job.seed as u64,
+            job.tested[0] as u64,
+        ]);
         if job.training == Training::Turned {
             pools.push(turned(&pools[0], &self.real.placements, mix(&[seed, 1])));
         }
@@ -94,11 +103,21 @@ impl Ground<'_> {
             pools.push(self.virtual_windows(variant, job.seed, &known)?);
         }
         let scale = Scale::of(&pools);
-        pools.iter_mut().for_each(|pool| scale.apply(&mut pool.values));
+        pools
+            .iter_mut()
+            .for_each(|pool| scale.apply(&mut pool.values));
         let classes = self.real.activities.classes().len();
-        let shape = self.settings.shape(self.real.placements.len() * PER_DEVICE, classes);
+        let shape = self
+            .settings
+            .shape(self.real.placements.len() * PER_DEVICE, classes);
         let pools: Vec<&Examples> = pools.iter().collect();
-        let classifier = train_classifier(&shape, &self.settings.training, &pools, seed, self.interrupt.flag())?;
+        let classifier = train_classifier(
+            &shape,
+            &self.settings.training,
+            &pools,
+            seed,
+            self.interrupt.flag(),
+        )?;
         let Some(classifier) = classifier else {
             self.interrupt.check()?;
             return Ok(Vec::new());
@@ -110,21 +129,44 @@ impl Ground<'_> {
             let said = classifier.classes(&values, subject.windows.len(), subject.windows.steps)?;
             let confusion = Confusion::new(&subject.windows.labels, &said, classes);
             let known = known.iter().map(|subject| subject.name.clone()).collect();
-            Ok(Run { seed: job.seed, subject: subject.name.clone(), known, f1: confusion.macro_f1(), confusion })
+            Ok(Run {
+                seed: job.seed,
+                subject: subject.name.clone(),
+                known,
+                f1: confusion.macro_f1(),
+                confusion,
+            })
         };
         job.tested.iter().map(test).collect()
     }
 
-    fn virtual_windows(&self, variant: Variant, seed: usize, known: &[&Subject]) -> anyhow::Result<Examples> {
+    fn virtual_windows(
+        &self,
+        variant: Variant,
+        seed: usize,
+        known: &[&Subject],
+    ) -> anyhow::Result<Examples> {
         let side = &self.simulated[&(seed, variant.simulator, variant.in_place)];
         let mut windows = if variant.effects {
-            let devices: Vec<DeviceEstimate> = (0..self.real.placements.len()).map(|device| estimate(known, device)).collect();
-            simulated::windows(&self.draws[seed], &side.played, Some(&devices), self.settings)?
+            let devices: Vec<DeviceEstimate> = (0..self.real.placements.len())
+                .map(|device| estimate(known, device))
+                .collect();
+            simulated::windows(
+                &self.draws[seed],
+                &side.played,
+                Some(&devices),
+                self.settings,
+            )?
         } else {
             side.windows.clone()
         };
         if variant.mapped {
-            map(&mut windows, &together(known), &self.real.placements, self.real.activities.classes().len())?;
+            map(
+                &mut windows,
+                &together(known),
+                &self.real.placements,
+                self.real.activities.classes().len(),
+            )?;
         }
         Ok(windows)
     }
@@ -132,7 +174,11 @@ impl Ground<'_> {
 
 /// What is known of a device from people's recordings.
 pub fn estimate(known: &[&Subject], device: usize) -> DeviceEstimate {
-    let stretches: Vec<_> = known.iter().flat_map(|subject| &subject.stretches).map(|devices| &devices[device]).collect();
+    let stretches: Vec<_> = known
+        .iter()
+        .flat_map(|subject| &subject.stretches)
+        .map(|devices| &devices[device])
+        .collect();
     DeviceEstimate::of(&stretches)
 }
 
@@ -146,17 +192,28 @@ fn together(subjects: &[&Subject]) -> Examples {
     all
 }
 
-/// Maps virtual windows to the distributions of real ones, channel by channel; all classes that both have count alike in the fit, so that it is
-/// not the mixture of activities that is mapped.
-fn map(windows: &mut Examples, real: &Examples, placements: &[String], classes: usize) -> anyhow::Result<()> {
+/// Maps virtual windows to the distributions of real ones, channel by channel; all classes that
+/// both have count alike in the fit, so that it is not the mixture of activities that is mapped.
+fn map(
+    windows: &mut Examples,
+    real: &Examples,
+    placements: &[String],
+    classes: usize,
+) -> anyhow::Result<()> {
     let (own, others) = (windows.counts(classes), real.counts(classes));
-    let shared: Vec<usize> = (0..classes).filter(|class| own[*class] > 0 && others[*class] > 0).collect();
+    let shared: Vec<usize> = (0..classes)
+        .filter(|class| own[*class] > 0 && others[*class] > 0)
+        .collect();
     let maps = placements.iter().enumerate().map(|(device, name)| {
         let readings = |examples: &Examples| -> Vec<Reading> {
             let picked = shared.iter().flat_map(|class| picked(examples, *class));
             picked
                 .flat_map(|window| {
-                    examples.window(window).chunks_exact(examples.channels).map(|row| reading(row, device)).collect::<Vec<_>>()
+                    examples
+                        .window(window)
+                        .chunks_exact(examples.channels)
+                        .map(|row| reading(row, device))
+                        .collect::<Vec<_>>()
                 })
                 .collect()
         };
@@ -174,13 +231,21 @@ fn map(windows: &mut Examples, real: &Examples, placements: &[String], classes: 
 
 /// As many windows of a class on either side, spread evenly; where there are fewer, some twice.
 fn picked(examples: &Examples, class: usize) -> Vec<usize> {
-    let own: Vec<usize> = (0..examples.len()).filter(|index| usize::from(examples.labels[*index]) == class).collect();
-    (0..MAPPED_WINDOWS).map(|k| own[k * own.len() / MAPPED_WINDOWS]).collect()
+    let own: Vec<usize> = (0..examples.len())
+        .filter(|index| usize::from(examples.labels[*index]) == class)
+        .collect();
+    (0..MAPPED_WINDOWS)
+        .map(|k| own[k * own.len() / MAPPED_WINDOWS])
+        .collect()
 }
 
-/// Copies of windows whose devices are worn another way, drawn for each copy as the virtual people's are.
+/// Copies of windows whose devices are worn another way, drawn for each copy as the virtual
+/// people's are.
 fn turned(real: &Examples, placements: &[String], seed: u64) -> Examples {
-    let wears: Vec<_> = placements.iter().filter_map(|name| wear::wear(name)).collect();
+    let wears: Vec<_> = placements
+        .iter()
+        .filter_map(|name| wear::wear(name))
+        .collect();
     let mut random = ChaCha12Rng::seed_from_u64(seed);
     let mut all = Examples::new(real.steps, real.channels);
     for window in (0..COPIES).flat_map(|_| 0..real.len()) {
@@ -189,7 +254,14 @@ fn turned(real: &Examples, placements: &[String], seed: u64) -> Examples {
         for row in values.chunks_exact_mut(real.channels.max(1)) {
             for (device, turn) in turns.iter().enumerate() {
                 let Reading { force, rate } = reading(row, device);
-                write(row, device, &Reading { force: turn * force, rate: turn * rate });
+                write(
+                    row,
+                    device,
+                    &Reading {
+                        force: turn * force,
+                        rate: turn * rate,
+                    },
+                );
             }
         }
         all.push(&values, real.labels[window]);
@@ -199,15 +271,22 @@ fn turned(real: &Examples, placements: &[String], seed: u64) -> Examples {
 
 fn write(row: &mut [f32], device: usize, Reading { force, rate }: &Reading) {
     let values = force.iter().chain(rate.iter()).map(|value| *value as f32);
-    row[device * PER_DEVICE..(device + 1) * PER_DEVICE].iter_mut().zip(values).for_each(|(old, value)| *old = value);
+    row[device * PER_DEVICE..(device + 1) * PER_DEVICE]
+        .iter_mut()
+        .zip(values)
+        .for_each(|(old, value)| *old = value);
 }
 
 fn reading(row: &[f32], device: usize) -> Reading {
     let at = |channel: usize| f64::from(row[device * PER_DEVICE + channel]);
-    Reading { force: [at(0), at(1), at(2)].into(), rate: [at(3), at(4), at(5)].into() }
+    Reading {
+        force: [at(0), at(1), at(2)].into(),
+        rate: [at(3), at(4), at(5)].into(),
+    }
 }
 
-/// Each channel less its mean, by its standard deviation; of all pools together, each counting alike.
+/// Each channel less its mean, by its standard deviation; of all pools together, each counting
+/// alike.
 struct Scale {
     mean: Vec<f32>,
     inverse_std: Vec<f32>,
@@ -226,13 +305,19 @@ impl Scale {
                 }
             }
         }
-        let inverse = |(square, mean): (&f64, &f64)| 1.0 / (square - mean * mean).max(1e-12).sqrt() as f32;
-        Self { inverse_std: squares.iter().zip(&means).map(inverse).collect(), mean: means.iter().map(|mean| *mean as f32).collect() }
+        let inverse =
+            |(square, mean): (&f64, &f64)| 1.0 / (square - mean * mean).max(1e-12).sqrt() as f32;
+        Self {
+            inverse_std: squares.iter().zip(&means).map(inverse).collect(),
+            mean: means.iter().map(|mean| *mean as f32).collect(),
+        }
     }
 
     fn apply(&self, values: &mut [f32]) {
         for row in values.chunks_exact_mut(self.mean.len().max(1)) {
-            for (value, (mean, inverse)) in row.iter_mut().zip(self.mean.iter().zip(&self.inverse_std)) {
+            for (value, (mean, inverse)) in
+                row.iter_mut().zip(self.mean.iter().zip(&self.inverse_std))
+            {
                 *value = (*value - mean) * inverse;
             }
         }

@@ -4,7 +4,12 @@ use super::*;
 fn examples(of: impl Fn(usize) -> f32, labels: &[u8]) -> Examples {
     let mut examples = Examples::new(10, 6);
     for (window, label) in labels.iter().enumerate() {
-        examples.push(&(0..60).map(|k| of(window * 60 + k) + f32::from(*label)).collect::<Vec<_>>(), *label);
+        examples.push(
+            &(0..60)
+                .map(|k| of(window * 60 + k) + f32::from(*label))
+                .collect::<Vec<_>>(),
+            *label,
+        );
     }
     examples
 }
@@ -17,39 +22,82 @@ fn noise(k: usize) -> f32 {
 fn training_subjects_are_the_others_and_grow_with_the_share() {
     for tested in 0..12 {
         let of = |share| training_subjects(12, tested, share, 3);
-        assert_eq!([0.1, 0.25, 0.5, 1.0].map(|share| of(share).len()), [1, 3, 6, 11]);
-        assert!(!of(1.0).contains(&tested) && of(0.1).iter().all(|subject| of(0.25).contains(subject)));
+        assert_eq!(
+            [0.1, 0.25, 0.5, 1.0].map(|share| of(share).len()),
+            [1, 3, 6, 11]
+        );
+        assert!(
+            !of(1.0).contains(&tested) && of(0.1).iter().all(|subject| of(0.25).contains(subject))
+        );
     }
-    let ones: Vec<usize> = (0..12).map(|tested| training_subjects(12, tested, 0.1, 3)[0]).collect();
-    assert!(ones.iter().collect::<std::collections::BTreeSet<_>>().len() > 3, "{ones:?}");
+    let ones: Vec<usize> = (0..12)
+        .map(|tested| training_subjects(12, tested, 0.1, 3)[0])
+        .collect();
+    assert!(
+        ones.iter().collect::<std::collections::BTreeSet<_>>().len() > 3,
+        "{ones:?}"
+    );
 }
 
 #[test]
 fn channels_are_brought_to_mean_0_and_deviation_1_each_pool_counting_alike() {
-    let (one, two) = (examples(noise, &[0; 4]), examples(|k| 5.0 + 3.0 * noise(k), &[0; 40]));
+    let (one, two) = (
+        examples(noise, &[0; 4]),
+        examples(|k| 5.0 + 3.0 * noise(k), &[0; 40]),
+    );
     let mut pools = [one, two];
     let scale = Scale::of(&pools);
-    pools.iter_mut().for_each(|pool| scale.apply(&mut pool.values));
+    pools
+        .iter_mut()
+        .for_each(|pool| scale.apply(&mut pool.values));
     let moment = |power: i32| {
-        pools.iter().map(|pool| pool.values.iter().map(|value| value.powi(power)).sum::<f32>() / pool.values.len() as f32).sum::<f32>()
+        pools
+            .iter()
+            .map(|pool| {
+                pool.values
+                    .iter()
+                    .map(|value| value.powi(power))
+                    .sum::<f32>()
+                    / pool.values.len() as f32
+            })
+            .sum::<f32>()
             / 2.0
     };
-    assert!(moment(1).abs() < 1e-4 && (moment(2) - 1.0).abs() < 1e-3, "{} {}", moment(1), moment(2));
+    assert!(
+        moment(1).abs() < 1e-4 && (moment(2) - 1.0).abs() < 1e-3,
+        "{} {}",
+        moment(1),
+        moment(2)
+    );
 }
 
 #[test]
 fn turned_copies_are_the_same_motion_otherwise_worn() {
     let real = examples(noise, &[0, 1]);
     let copies = turned(&real, &["wrist".to_owned()], 1);
-    assert_eq!((copies.len(), copies.counts(2)), (2 * COPIES, vec![COPIES; 2]));
-    let rows = |examples: &Examples, window: usize| examples.window(window).chunks(6).map(|row| reading(row, 0)).collect::<Vec<_>>();
+    assert_eq!(
+        (copies.len(), copies.counts(2)),
+        (2 * COPIES, vec![COPIES; 2])
+    );
+    let rows = |examples: &Examples, window: usize| {
+        examples
+            .window(window)
+            .chunks(6)
+            .map(|row| reading(row, 0))
+            .collect::<Vec<_>>()
+    };
     for window in 0..copies.len() {
         let (own, copied) = (rows(&real, window % 2), rows(&copies, window));
         for (one, other) in own.iter().zip(&copied) {
-            assert!((one.force.norm() - other.force.norm()).abs() < 1e-5 && (one.force - other.force).norm() > 1e-3);
+            assert!(
+                (one.force.norm() - other.force.norm()).abs() < 1e-5
+                    && (one.force - other.force).norm() > 1e-3
+            );
             // Both sensors turn together, and all of a window does.
             assert!((one.force.dot(&one.rate) - other.force.dot(&other.rate)).abs() < 1e-5);
-            assert!((one.force.dot(&own[0].force) - other.force.dot(&copied[0].force)).abs() < 1e-5);
+            assert!(
+                (one.force.dot(&own[0].force) - other.force.dot(&copied[0].force)).abs() < 1e-5
+            );
         }
     }
     assert_ne!(copies.window(0), copies.window(2));
@@ -62,16 +110,24 @@ fn mapped_windows_have_the_real_distribution_whatever_the_mixture_of_classes() {
     let mut windows = examples(noise, &[0, 0, 0, 0, 0, 0, 0, 0, 0, 1]);
     let real = examples(|k| noise(k + 7), &[0, 1, 1, 1]);
     let mut scaled = real.clone();
-    scaled.values.iter_mut().for_each(|value| *value = 4.0 * *value + 1.0);
+    scaled
+        .values
+        .iter_mut()
+        .for_each(|value| *value = 4.0 * *value + 1.0);
     let before = windows.clone();
     map(&mut windows, &scaled, &["pocket".to_owned()], 3).unwrap();
     let mean = |examples: &Examples, label: u8| {
-        let own = (0..examples.len()).filter(|index| examples.labels[*index] == label).flat_map(|index| examples.window(index).to_vec());
+        let own = (0..examples.len())
+            .filter(|index| examples.labels[*index] == label)
+            .flat_map(|index| examples.window(index).to_vec());
         let own: Vec<f32> = own.collect();
         own.iter().sum::<f32>() / own.len() as f32
     };
     for label in [0, 1] {
         let (mapped, expected) = (mean(&windows, label), 4.0 * mean(&before, label) + 1.0);
-        assert!((mapped - expected).abs() < 0.8, "class {label}: {mapped} {expected}");
+        assert!(
+            (mapped - expected).abs() < 0.8,
+            "class {label}: {mapped} {expected}"
+        );
     }
 }

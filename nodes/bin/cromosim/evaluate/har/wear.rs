@@ -15,7 +15,8 @@ pub struct Wear {
     ways: Ways,
 }
 
-/// How a device may lie on the skin; the site's x axis points along the bone away from the trunk, z outward.
+/// How a device may lie on the skin; the site's x axis points along the bone away from the trunk, z
+/// outward.
 #[derive(Clone, Copy)]
 enum Ways {
     /// A phone along the thigh: screen outward or inward, its top up or down.
@@ -42,19 +43,63 @@ const KNOWN: [Wear; 10] = [
         ],
         ways: Ways::Phone,
     },
-    Wear { placement: "wrist", sites: &[("left_watch", Joint::LeftWrist)], ways: Ways::Watch },
-    Wear { placement: "hand", sites: &[("right_wrist", Joint::RightWrist)], ways: Ways::Any },
-    Wear { placement: "chest", sites: &[("sternum", Joint::Spine3)], ways: Ways::Any },
     Wear {
-        placement: "ankle",
-        sites: &[("left_ankle_lateral", Joint::LeftAnkle), ("right_ankle_lateral", Joint::RightAnkle)],
+        placement: "wrist",
+        sites: &[("left_watch", Joint::LeftWrist)],
+        ways: Ways::Watch,
+    },
+    Wear {
+        placement: "hand",
+        sites: &[("right_wrist", Joint::RightWrist)],
         ways: Ways::Any,
     },
-    Wear { placement: "thigh", sites: &[("left_thigh_front", Joint::LeftKnee), ("right_thigh_front", Joint::RightKnee)], ways: Ways::Any },
-    Wear { placement: "forearm", sites: &[("left_forearm", Joint::LeftElbow), ("right_forearm", Joint::RightElbow)], ways: Ways::Any },
-    Wear { placement: "head", sites: &[("head_back", Joint::Head)], ways: Ways::Any },
-    Wear { placement: "shin", sites: &[("left_shank_front", Joint::LeftKnee), ("right_shank_front", Joint::RightKnee)], ways: Ways::Any },
-    Wear { placement: "waist", sites: &[("belt_front", Joint::Pelvis)], ways: Ways::Any },
+    Wear {
+        placement: "chest",
+        sites: &[("sternum", Joint::Spine3)],
+        ways: Ways::Any,
+    },
+    Wear {
+        placement: "ankle",
+        sites: &[
+            ("left_ankle_lateral", Joint::LeftAnkle),
+            ("right_ankle_lateral", Joint::RightAnkle),
+        ],
+        ways: Ways::Any,
+    },
+    Wear {
+        placement: "thigh",
+        sites: &[
+            ("left_thigh_front", Joint::LeftKnee),
+            ("right_thigh_front", Joint::RightKnee),
+        ],
+        ways: Ways::Any,
+    },
+    Wear {
+        placement: "forearm",
+        sites: &[
+            ("left_forearm", Joint::LeftElbow),
+            ("right_forearm", Joint::RightElbow),
+        ],
+        ways: Ways::Any,
+    },
+    Wear {
+        placement: "head",
+        sites: &[("head_back", Joint::Head)],
+        ways: Ways::Any,
+    },
+    Wear {
+        placement: "shin",
+        sites: &[
+            ("left_shank_front", Joint::LeftKnee),
+            ("right_shank_front", Joint::RightKnee),
+        ],
+        ways: Ways::Any,
+    },
+    Wear {
+        placement: "waist",
+        sites: &[("belt_front", Joint::Pelvis)],
+        ways: Ways::Any,
+    },
 ];
 
 /// The placement of a data set's name.
@@ -64,7 +109,11 @@ pub fn wear(placement: &str) -> Option<&'static Wear> {
 
 /// All names, for messages.
 pub fn known() -> String {
-    KNOWN.iter().map(|wear| wear.placement).collect::<Vec<_>>().join(", ")
+    KNOWN
+        .iter()
+        .map(|wear| wear.placement)
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 /// A site with the joint nearest to it, and site_from_sensor.
@@ -87,17 +136,31 @@ impl Wear {
             Ways::Phone => {
                 let (screen, top) = (sign(random), sign(random));
                 // The phone's y axis, to its top, lies along the thigh, z out of its screen.
-                let turn = Vector3::new(0.5 * OTHER * first, PHONE_ABOUT_THIGH * second, PHONE_IN_PLANE * third);
+                let turn = Vector3::new(
+                    0.5 * OTHER * first,
+                    PHONE_ABOUT_THIGH * second,
+                    PHONE_IN_PLANE * third,
+                );
                 (from_axes(Vector3::x() * top, Vector3::z() * screen), turn)
             }
-            Ways::Watch => (UnitQuaternion::identity(), OTHER * Vector3::new(first, second, third)),
+            Ways::Watch => (
+                UnitQuaternion::identity(),
+                OTHER * Vector3::new(first, second, third),
+            ),
             Ways::Any => {
                 let quarter = std::f64::consts::FRAC_PI_2 * f64::from(random.random_range(0..4_u8));
                 let y = Vector3::new(-quarter.sin(), quarter.cos(), 0.0);
-                (from_axes(y, Vector3::z() * sign(random)), OTHER * Vector3::new(first, second, third))
+                (
+                    from_axes(y, Vector3::z() * sign(random)),
+                    OTHER * Vector3::new(first, second, third),
+                )
             }
         };
-        Worn { site, joint, mount: lying * UnitQuaternion::from_scaled_axis(turn) }
+        Worn {
+            site,
+            joint,
+            mount: lying * UnitQuaternion::from_scaled_axis(turn),
+        }
     }
 
     /// From one drawn way of wearing it to another: other_sensor_from_sensor.
@@ -143,7 +206,10 @@ mod tests {
             assert!(top.x.abs() > 0.6, "{top}");
             ways[usize::from(top.x > 0.0) + 2 * usize::from(screen.z > 0.0)] += 1;
         }
-        assert!(ways.iter().all(|count| (60..140).contains(count)), "{ways:?}");
+        assert!(
+            ways.iter().all(|count| (60..140).contains(count)),
+            "{ways:?}"
+        );
     }
 
     #[test]

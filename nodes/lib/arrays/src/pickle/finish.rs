@@ -17,16 +17,33 @@ const VALUE_BYTES: u64 = 64;
 const DEPTH_LIMIT: usize = 1000;
 
 /// The value of node `root`; `storage` fetches the bytes of a torch storage.
-pub(super) fn finish(machine: Machine<'_>, root: Id, storage: &mut dyn FnMut(&str) -> Result<Blob, String>) -> Result<Value, Fault> {
+pub(super) fn finish(
+    machine: Machine<'_>,
+    root: Id,
+    storage: &mut dyn FnMut(&str) -> Result<Blob, String>,
+) -> Result<Value, Fault> {
     let depth_limit = machine.budget.depth.min(DEPTH_LIMIT);
     let offset = machine.position;
     let mut done = Vec::new();
     done.resize_with(machine.nodes.len(), || State::Untouched);
-    let mut finisher = Finisher { machine, done, storage, depth_limit, offset, refused: None };
+    let mut finisher = Finisher {
+        machine,
+        done,
+        storage,
+        depth_limit,
+        offset,
+        refused: None,
+    };
     let value = finisher.value(root, 0);
     value.map(|(value, _)| value).map_err(|message| {
-        let refused = finisher.refused.take().map(|name| Reason::Refused(name.to_string()));
-        Fault { offset: finisher.offset, reason: refused.unwrap_or(Reason::Unsound(message)) }
+        let refused = finisher
+            .refused
+            .take()
+            .map(|name| Reason::Refused(name.to_string()));
+        Fault {
+            offset: finisher.offset,
+            reason: refused.unwrap_or(Reason::Unsound(message)),
+        }
     })
 }
 
@@ -51,19 +68,32 @@ struct Finisher<'a, 'b> {
 impl Finisher<'_, '_> {
     /// The value of a node and how many levels it has.
     fn value(&mut self, id: Id, depth: usize) -> Result<(Value, usize), String> {
-        let too_deep = || format!("objects lie within each other more than {} levels deep", self.depth_limit);
+        let too_deep = || {
+            format!(
+                "objects lie within each other more than {} levels deep",
+                self.depth_limit
+            )
+        };
         if depth > self.depth_limit {
             return Err(too_deep());
         }
         match self.done.get(id as usize) {
-            Some(State::Done(value, height)) if depth + height <= self.depth_limit => return Ok((value.clone(), *height)),
+            Some(State::Done(value, height)) if depth + height <= self.depth_limit => {
+                return Ok((value.clone(), *height));
+            }
             Some(State::Done(..)) => return Err(too_deep()),
             Some(State::InProgress) => return Err("an object contains itself".to_owned()),
             _ => {}
         }
         self.set(id, State::InProgress);
         // Each node is taken out once: what it becomes is kept instead.
-        let node = std::mem::replace(self.machine.nodes.get_mut(id as usize).ok_or("an object is missing")?, Node::None);
+        let node = std::mem::replace(
+            self.machine
+                .nodes
+                .get_mut(id as usize)
+                .ok_or("an object is missing")?,
+            Node::None,
+        );
         let (value, height) = self.made(node, depth)?;
         self.set(id, State::Done(value.clone(), height));
         Ok((value, height))
@@ -94,24 +124,47 @@ impl Finisher<'_, '_> {
             Node::Array(array) => Value::Array(array),
             Node::Value(value) => value,
             Node::Tensor(tensor) => self.tensor(&tensor)?,
-            Node::Storage(_) => return Err("a torch storage stands where a tensor was expected".to_owned()),
+            Node::Storage(_) => {
+                return Err("a torch storage stands where a tensor was expected".to_owned());
+            }
             Node::NewArray | Node::JoblibArray => return Err("an array has no content".to_owned()),
-            Node::List(items) => return self.items(&items, depth).map(|(items, height)| (Value::List(Arc::new(items)), height)),
-            Node::Tuple(items) => return self.items(&items, depth).map(|(items, height)| (Value::Tuple(Arc::new(items)), height)),
+            Node::List(items) => {
+                return self
+                    .items(&items, depth)
+                    .map(|(items, height)| (Value::List(Arc::new(items)), height));
+            }
+            Node::Tuple(items) => {
+                return self
+                    .items(&items, depth)
+                    .map(|(items, height)| (Value::Tuple(Arc::new(items)), height));
+            }
             Node::Objects(shape, items) => {
                 let (items, height) = self.items(&items, depth)?;
-                return Ok((Value::Array(Arc::new(ArrayData::objects(shape, items)?)), height));
+                return Ok((
+                    Value::Array(Arc::new(ArrayData::objects(shape, items)?)),
+                    height,
+                ));
             }
             Node::Dict(pairs) => {
                 let (keys, values): (Vec<_>, Vec<_>) = pairs.into_iter().unzip();
-                let ((keys, key_height), (values, height)) = (self.items(&keys, depth)?, self.items(&values, depth)?);
-                return Ok((Value::Dict(Arc::new(Dict::new(keys.into_iter().zip(values)))), height.max(key_height)));
+                let ((keys, key_height), (values, height)) =
+                    (self.items(&keys, depth)?, self.items(&values, depth)?);
+                return Ok((
+                    Value::Dict(Arc::new(Dict::new(keys.into_iter().zip(values)))),
+                    height.max(key_height),
+                ));
             }
             // It also lies where nothing is skipped.
             Node::Opaque(opaque) => return Err(self.refuse(*opaque)),
-            Node::Sparse(kind, state) => self.sparse(kind, state.ok_or("a sparse matrix has no content")?, depth)?,
-            Node::ChumpyArray(state) => self.attribute(state.ok_or("a chumpy array has no content")?, "x", depth)?,
-            Node::ChumpySelect(state) => self.select(state.ok_or("a chumpy array has no content")?, depth)?,
+            Node::Sparse(kind, state) => {
+                self.sparse(kind, state.ok_or("a sparse matrix has no content")?, depth)?
+            }
+            Node::ChumpyArray(state) => {
+                self.attribute(state.ok_or("a chumpy array has no content")?, "x", depth)?
+            }
+            Node::ChumpySelect(state) => {
+                self.select(state.ok_or("a chumpy array has no content")?, depth)?
+            }
         };
         Ok((value, 0))
     }
@@ -151,64 +204,128 @@ impl Finisher<'_, '_> {
     /// An object's attribute.
     fn attribute(&mut self, state: Id, name: &str, depth: usize) -> Result<Value, String> {
         let (state, _) = self.value(state, depth + 1)?;
-        let Value::Dict(state) = state else { return Err("an object's state is no dictionary".to_owned()) };
-        state.get(name).cloned().ok_or_else(|| format!("an object has no attribute `{name}`"))
+        let Value::Dict(state) = state else {
+            return Err("an object's state is no dictionary".to_owned());
+        };
+        state
+            .get(name)
+            .cloned()
+            .ok_or_else(|| format!("an object has no attribute `{name}`"))
     }
 
     /// Elements `idxs` of the flat `a`, in shape `preferred_shape`.
     fn select(&mut self, state: Id, depth: usize) -> Result<Value, String> {
-        let (from, picks) = (self.attribute(state, "a", depth)?, self.attribute(state, "idxs", depth)?);
-        let (Value::Array(from), Value::Array(picks)) = (from, picks) else { return Err("chumpy's Select is not of arrays".to_owned()) };
+        let (from, picks) = (
+            self.attribute(state, "a", depth)?,
+            self.attribute(state, "idxs", depth)?,
+        );
+        let (Value::Array(from), Value::Array(picks)) = (from, picks) else {
+            return Err("chumpy's Select is not of arrays".to_owned());
+        };
         let shape = match self.attribute(state, "preferred_shape", depth)? {
-            Value::Tuple(sizes) | Value::List(sizes) => sizes.iter().map(size).collect::<Option<Vec<_>>>(),
+            Value::Tuple(sizes) | Value::List(sizes) => {
+                sizes.iter().map(size).collect::<Option<Vec<_>>>()
+            }
             _ => None,
         };
         let shape = shape.unwrap_or_else(|| picks.shape().to_vec());
-        self.machine.budget.take(16 * (from.element_count() + picks.element_count()) as u64)?;
-        let (values, picks) =
-            (from.as_floats().ok_or("chumpy's Select is not of numbers")?, picks.as_integers().ok_or("idxs are no integers")?);
-        let picked = picks.iter().map(|&pick| values.get(usize::try_from(pick).ok()?)).collect::<Option<Vec<_>>>();
-        let bytes: Vec<u8> =
-            picked.ok_or("chumpy's Select picks elements that are not there")?.iter().flat_map(|v| v.to_le_bytes()).collect();
+        self.machine
+            .budget
+            .take(16 * (from.element_count() + picks.element_count()) as u64)?;
+        let (values, picks) = (
+            from.as_floats()
+                .ok_or("chumpy's Select is not of numbers")?,
+            picks.as_integers().ok_or("idxs are no integers")?,
+        );
+        let picked = picks
+            .iter()
+            .map(|&pick| values.get(usize::try_from(pick).ok()?))
+            .collect::<Option<Vec<_>>>();
+        let bytes: Vec<u8> = picked
+            .ok_or("chumpy's Select picks elements that are not there")?
+            .iter()
+            .flat_map(|v| v.to_le_bytes())
+            .collect();
         let array = ArrayData::contiguous(DType::new(Kind::Float, 8), shape, false, bytes.into())?;
         Ok(Value::Array(Arc::new(array)))
     }
 
     fn sparse(&mut self, kind: SparseKind, state: Id, depth: usize) -> Result<Value, String> {
-        let shape = self.attribute(state, "_shape", depth).or_else(|_| self.attribute(state, "shape", depth))?;
+        let shape = self
+            .attribute(state, "_shape", depth)
+            .or_else(|_| self.attribute(state, "shape", depth))?;
         let sizes = match &shape {
-            Value::Tuple(sizes) | Value::List(sizes) => sizes.iter().map(size).collect::<Option<Vec<_>>>(),
+            Value::Tuple(sizes) | Value::List(sizes) => {
+                sizes.iter().map(size).collect::<Option<Vec<_>>>()
+            }
             _ => None,
         };
-        let Some(&[rows, columns]) = sizes.as_deref() else { return Err("a sparse matrix has no shape of two sizes".to_owned()) };
+        let Some(&[rows, columns]) = sizes.as_deref() else {
+            return Err("a sparse matrix has no shape of two sizes".to_owned());
+        };
         let mut numbers = |name: &str| match self.attribute(state, name, depth)? {
             Value::Array(array) => Ok(array),
             _ => Err(format!("a sparse matrix' {name} is no array")),
         };
         let (content, indices, ends) = (numbers("data")?, numbers("indices")?, numbers("indptr")?);
-        self.machine.budget.take(16 * (content.element_count() + indices.element_count() + ends.element_count()) as u64)?;
-        let integers = |array: &ArrayData| array.as_integers().ok_or("a sparse matrix' indices are no integers");
-        let content = content.as_floats().ok_or("a sparse matrix is not of numbers")?;
+        self.machine.budget.take(
+            16 * (content.element_count() + indices.element_count() + ends.element_count()) as u64,
+        )?;
+        let integers = |array: &ArrayData| {
+            array
+                .as_integers()
+                .ok_or("a sparse matrix' indices are no integers")
+        };
+        let content = content
+            .as_floats()
+            .ok_or("a sparse matrix is not of numbers")?;
         let (indices, ends) = (integers(&indices)?, integers(&ends)?);
-        let entries = entries(kind, [rows, columns], &content, &indices, &ends).ok_or("a sparse matrix' indices do not suit its shape")?;
-        Ok(Value::Sparse(Arc::new(Sparse { shape: [rows, columns], entries, kind })))
+        let entries = entries(kind, [rows, columns], &content, &indices, &ends)
+            .ok_or("a sparse matrix' indices do not suit its shape")?;
+        Ok(Value::Sparse(Arc::new(Sparse {
+            shape: [rows, columns],
+            entries,
+            kind,
+        })))
     }
 }
 
 /// Row, column and value of each element; `None` where an index lies outside.
-fn entries(kind: SparseKind, shape: [usize; 2], content: &[f64], indices: &[i64], ends: &[i64]) -> Option<Vec<(u32, u32, f64)>> {
+fn entries(
+    kind: SparseKind,
+    shape: [usize; 2],
+    content: &[f64],
+    indices: &[i64],
+    ends: &[i64],
+) -> Option<Vec<(u32, u32, f64)>> {
     let [rows, columns] = shape;
-    let (lines, across) = if kind == SparseKind::Columns { (columns, rows) } else { (rows, columns) };
+    let (lines, across) = if kind == SparseKind::Columns {
+        (columns, rows)
+    } else {
+        (rows, columns)
+    };
     u32::try_from(rows.max(columns)).ok()?;
-    if ends.len() != lines.checked_add(1)? || content.len() != indices.len() || ends.first() != Some(&0) {
+    if ends.len() != lines.checked_add(1)?
+        || content.len() != indices.len()
+        || ends.first() != Some(&0)
+    {
         return None;
     }
     let mut entries = Vec::with_capacity(content.len());
     for (line, range) in ends.windows(2).enumerate() {
         let range = usize::try_from(range[0]).ok()?..usize::try_from(range[1]).ok()?;
         for (&index, &value) in indices.get(range.clone())?.iter().zip(content.get(range)?) {
-            let (line, index) = (line as u32, u32::try_from(index).ok().filter(|&index| (index as usize) < across)?);
-            entries.push(if kind == SparseKind::Columns { (index, line, value) } else { (line, index, value) });
+            let (line, index) = (
+                line as u32,
+                u32::try_from(index)
+                    .ok()
+                    .filter(|&index| (index as usize) < across)?,
+            );
+            entries.push(if kind == SparseKind::Columns {
+                (index, line, value)
+            } else {
+                (line, index, value)
+            });
         }
     }
     Some(entries)
@@ -218,7 +335,9 @@ fn entries(kind: SparseKind, shape: [usize; 2], content: &[f64], indices: &[i64]
 fn size(value: &Value) -> Option<usize> {
     match value {
         Value::Int(value) => usize::try_from(*value).ok(),
-        Value::Array(array) if array.shape().is_empty() => usize::try_from(*array.as_integers()?.first()?).ok(),
+        Value::Array(array) if array.shape().is_empty() => {
+            usize::try_from(*array.as_integers()?.first()?).ok()
+        }
         _ => None,
     }
 }

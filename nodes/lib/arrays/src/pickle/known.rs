@@ -59,14 +59,20 @@ pub(super) fn known(module: &str, name: &str) -> Option<Known> {
             "scalar" => Some(Known::Scalar),
             _ => None,
         },
-        "numpy.core.numeric" | "numpy._core.numeric" => (name == "_frombuffer").then_some(Known::FromBuffer),
+        "numpy.core.numeric" | "numpy._core.numeric" => {
+            (name == "_frombuffer").then_some(Known::FromBuffer)
+        }
         "numpy" => numpy_name(name),
         "numpy.matrixlib.defmatrix" => (name == "matrix").then_some(Known::Ndarray),
         "numpy.core.memmap" | "numpy._core.memmap" => (name == "memmap").then_some(Known::Ndarray),
-        "joblib.numpy_pickle" | "sklearn.externals.joblib.numpy_pickle" => (name == "NumpyArrayWrapper").then_some(Known::JoblibArray),
+        "joblib.numpy_pickle" | "sklearn.externals.joblib.numpy_pickle" => {
+            (name == "NumpyArrayWrapper").then_some(Known::JoblibArray)
+        }
         "chumpy.ch" | "chumpy" if name == "Ch" => Some(Known::ChumpyArray),
         "chumpy.reordering" if name == "Select" => Some(Known::ChumpySelect),
-        _ if module.starts_with("scipy.sparse.") || module == "scipy.sparse" => sparse(module, name),
+        _ if module.starts_with("scipy.sparse.") || module == "scipy.sparse" => {
+            sparse(module, name)
+        }
         _ if module == "torch" || module.starts_with("torch.") => torch(module, name),
         _ => None,
     }
@@ -90,14 +96,18 @@ fn numpy_name(name: &str) -> Option<Known> {
     Some(match name {
         "ndarray" | "matrix" | "memmap" => Known::Ndarray,
         "dtype" => Known::DTypeClass,
-        "bool_" | "bool" | "int8" | "int16" | "int32" | "int64" | "uint8" | "uint16" | "uint32" | "uint64" | "float16" | "float32"
-        | "float64" | "complex64" | "complex128" | "str_" | "bytes_" | "object_" => Known::Inert,
+        "bool_" | "bool" | "int8" | "int16" | "int32" | "int64" | "uint8" | "uint16" | "uint32"
+        | "uint64" | "float16" | "float32" | "float64" | "complex64" | "complex128" | "str_"
+        | "bytes_" | "object_" => Known::Inert,
         _ => return None,
     })
 }
 
 fn sparse(module: &str, name: &str) -> Option<Known> {
-    let module = module.strip_prefix("scipy.sparse").unwrap_or(module).trim_start_matches(['.', '_']);
+    let module = module
+        .strip_prefix("scipy.sparse")
+        .unwrap_or(module)
+        .trim_start_matches(['.', '_']);
     match (module, name) {
         ("" | "csc", "csc_matrix" | "csc_array") => Some(Known::Sparse(SparseKind::Columns)),
         ("" | "csr", "csr_matrix" | "csr_array") => Some(Known::Sparse(SparseKind::Rows)),
@@ -126,12 +136,16 @@ fn torch(module: &str, name: &str) -> Option<Known> {
         DType::parse(dtype).map(Known::Storage)
     };
     match (module, name) {
-        ("torch._utils", "_rebuild_tensor" | "_rebuild_tensor_v2" | "_rebuild_tensor_v3") => Some(Known::RebuildTensor),
+        ("torch._utils", "_rebuild_tensor" | "_rebuild_tensor_v2" | "_rebuild_tensor_v3") => {
+            Some(Known::RebuildTensor)
+        }
         ("torch._utils", "_rebuild_parameter") => Some(Known::RebuildParameter),
         ("torch.storage", "_load_from_bytes") => Some(Known::LoadFromBytes),
         ("torch", "Size") => Some(Known::Tuple),
         ("torch", "device") => Some(Known::Device),
-        ("torch", "Tensor") | ("torch._tensor", "Tensor") | ("torch.nn.parameter", "Parameter") => Some(Known::Inert),
+        ("torch", "Tensor") | ("torch._tensor", "Tensor") | ("torch.nn.parameter", "Parameter") => {
+            Some(Known::Inert)
+        }
         ("torch", _) => tensor_type(name).map(Known::TensorType).or_else(storage),
         ("torch.storage" | "torch.cuda", _) => storage(),
         _ => None,

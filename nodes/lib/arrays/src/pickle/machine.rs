@@ -27,15 +27,31 @@ pub(super) struct Machine<'a> {
 impl<'a> Machine<'a> {
     pub fn new(bytes: Blob, budget: &'a mut Budget, nesting: usize) -> Result<Self, Fault> {
         if nesting > NESTING_LIMIT {
-            return Err(Fault::new(0, format!("pickles lie within pickles more than {NESTING_LIMIT} levels deep")));
+            return Err(Fault::new(
+                0,
+                format!("pickles lie within pickles more than {NESTING_LIMIT} levels deep"),
+            ));
         }
         let (nodes, stack, marks, memo) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Ok(Self { bytes, position: 0, nodes, budget, nesting, opcode_at: 0, stack, marks, memo, memo_count: 0, opcodes: 0 })
+        Ok(Self {
+            bytes,
+            position: 0,
+            nodes,
+            budget,
+            nesting,
+            opcode_at: 0,
+            stack,
+            marks,
+            memo,
+            memo_count: 0,
+            opcodes: 0,
+        })
     }
 
     /// Runs to the end of the pickle; the result is what is left on the stack.
     pub fn run(&mut self) -> Result<Id, Fault> {
-        // One machine reads the pickles of a legacy torch file one after another: each starts afresh.
+        // One machine reads the pickles of a legacy torch file one after another: each starts
+        // afresh.
         (self.memo_count, self.opcodes) = (0, 0);
         self.memo.clear();
         self.stack.clear();
@@ -46,9 +62,20 @@ impl<'a> Machine<'a> {
             let fault = |reason: Reason| Fault { offset, reason };
             self.opcodes += 1;
             self.budget.opcodes = self.budget.opcodes.checked_sub(1).ok_or_else(|| {
-                fault(format!("more than {} opcodes; raise Limits::opcodes if the file is sound", self.budget.limits.opcodes).into())
+                fault(
+                    format!(
+                        "more than {} opcodes; raise Limits::opcodes if the file is sound",
+                        self.budget.limits.opcodes
+                    )
+                    .into(),
+                )
             })?;
-            let opcode = self.take(1).map_err(fault)?.first().copied().unwrap_or_default();
+            let opcode = self
+                .take(1)
+                .map_err(fault)?
+                .first()
+                .copied()
+                .unwrap_or_default();
             if opcode == b'.' {
                 return self.pop().map_err(fault);
             }
@@ -65,8 +92,12 @@ impl<'a> Machine<'a> {
             b'2' => self.stack.push(self.top()?),
             b'F' => self.push_line("a float", |line| text::float(line).map(Node::Float))?,
             b'I' | b'L' => self.push_line("an integer", text::integer)?,
-            b'S' => self.push_line("a quoted string", |line| text::quoted(line).map(|bytes| Node::OldText(bytes.into())))?,
-            b'V' => self.push_line("a string", |line| text::raw_unicode(line).map(|text| Node::Text(text.into())))?,
+            b'S' => self.push_line("a quoted string", |line| {
+                text::quoted(line).map(|bytes| Node::OldText(bytes.into()))
+            })?,
+            b'V' => self.push_line("a string", |line| {
+                text::raw_unicode(line).map(|text| Node::Text(text.into()))
+            })?,
             b'G' => self.push_fixed(|bytes: [u8; 8]| Node::Float(f64::from_be_bytes(bytes)))?,
             b'J' => self.push_fixed(|bytes| Node::Int(i32::from_le_bytes(bytes).into()))?,
             b'K' => self.push_fixed(|[byte]| Node::Int(byte.into()))?,
@@ -114,8 +145,12 @@ impl<'a> Machine<'a> {
             }
             0x88 => self.push(Node::Bool(true))?,
             0x89 => self.push(Node::Bool(false))?,
-            0x8a => self.sized::<1>(|bytes| text::long(&bytes).ok_or_else(|| "an integer is too long".into()))?,
-            0x8b => self.sized::<4>(|bytes| text::long(&bytes).ok_or_else(|| "an integer is too long".into()))?,
+            0x8a => self.sized::<1>(|bytes| {
+                text::long(&bytes).ok_or_else(|| "an integer is too long".into())
+            })?,
+            0x8b => self.sized::<4>(|bytes| {
+                text::long(&bytes).ok_or_else(|| "an integer is too long".into())
+            })?,
             b'B' => self.sized::<4>(|bytes| Ok(Node::Bytes(bytes)))?,
             b'C' => self.sized::<1>(|bytes| Ok(Node::Bytes(bytes)))?,
             0x8c => self.sized::<1>(utf8)?,
@@ -127,21 +162,36 @@ impl<'a> Machine<'a> {
             0x92 => {
                 let keywords = self.pop()?;
                 if !matches!(self.node(keywords), Node::Dict(pairs) if pairs.is_empty()) {
-                    return Err("an object is made with keywords, which this reader does not know".into());
+                    return Err(
+                        "an object is made with keywords, which this reader does not know".into(),
+                    );
                 }
                 self.new_object()?;
             }
             0x93 => {
                 let (name, module) = (self.pop()?, self.pop()?);
-                let (Some(module), Some(name)) = (self.text(module), self.text(name)) else { return Err("a name is no text".into()) };
+                let (Some(module), Some(name)) = (self.text(module), self.text(name)) else {
+                    return Err("a name is no text".into());
+                };
                 self.global(&module, &name)?;
             }
             0x94 => self.memoize()?,
             0x95 => drop(self.take(8)?), // a frame is a hint for reading ahead
             b'P' => return Err("a persistent id in text; only torch's are known".into()),
-            0x82..=0x84 => return Err("a name from Python's extension registry, which is not in the file".into()),
-            0x97 | 0x98 => return Err("a buffer outside of the pickle, which is not in the file".into()),
-            _ => return Err(format!("0x{opcode:02x} is no opcode; the file may be damaged, or be no pickle").into()),
+            0x82..=0x84 => {
+                return Err(
+                    "a name from Python's extension registry, which is not in the file".into(),
+                );
+            }
+            0x97 | 0x98 => {
+                return Err("a buffer outside of the pickle, which is not in the file".into());
+            }
+            _ => {
+                return Err(format!(
+                    "0x{opcode:02x} is no opcode; the file may be damaged, or be no pickle"
+                )
+                .into());
+            }
         }
         Ok(())
     }
@@ -154,7 +204,8 @@ impl<'a> Machine<'a> {
 
     pub fn add(&mut self, node: Node) -> Result<Id, Reason> {
         self.budget.take(NODE_BYTES)?;
-        let id = Id::try_from(self.nodes.len()).map_err(|_| "more objects than this reader numbers")?;
+        let id =
+            Id::try_from(self.nodes.len()).map_err(|_| "more objects than this reader numbers")?;
         self.nodes.push(node);
         Ok(id)
     }
@@ -185,8 +236,13 @@ impl<'a> Machine<'a> {
     }
 
     pub fn top(&self) -> Result<Id, Reason> {
-        let top = if self.stack.len() > self.floor() { self.stack.last() } else { None };
-        top.copied().ok_or_else(|| "the stack is empty; the file may be damaged".into())
+        let top = if self.stack.len() > self.floor() {
+            self.stack.last()
+        } else {
+            None
+        };
+        top.copied()
+            .ok_or_else(|| "the stack is empty; the file may be damaged".into())
     }
 
     /// `POP` also takes a mark off.
@@ -199,12 +255,21 @@ impl<'a> Machine<'a> {
     }
 
     fn pop_several(&mut self, count: usize) -> Result<Vec<Id>, Reason> {
-        let start = self.stack.len().checked_sub(count).filter(|&start| start >= self.floor());
-        Ok(self.stack.split_off(start.ok_or("the stack is empty; the file may be damaged")?))
+        let start = self
+            .stack
+            .len()
+            .checked_sub(count)
+            .filter(|&start| start >= self.floor());
+        Ok(self
+            .stack
+            .split_off(start.ok_or("the stack is empty; the file may be damaged")?))
     }
 
     pub fn pop_mark(&mut self) -> Result<Vec<Id>, Reason> {
-        let mark = self.marks.pop().ok_or("a mark is missing; the file may be damaged")?;
+        let mark = self
+            .marks
+            .pop()
+            .ok_or("a mark is missing; the file may be damaged")?;
         Ok(self.stack.split_off(mark.min(self.stack.len())))
     }
 
@@ -216,38 +281,57 @@ impl<'a> Machine<'a> {
     pub fn take(&mut self, count: usize) -> Result<Blob, Reason> {
         let left = self.bytes.len() - self.position;
         let part = self.bytes.part(self.position, count);
-        let part = part.ok_or_else(|| format!("{count} more bytes expected, but {left} are left; the file is cut short or damaged"))?;
+        let part = part.ok_or_else(|| {
+            format!(
+                "{count} more bytes expected, but {left} are left; the file is cut short or damaged"
+            )
+        })?;
         self.position += count;
         Ok(part)
     }
 
     fn fixed<const N: usize>(&mut self) -> Result<[u8; N], Reason> {
         let part = self.take(N)?;
-        part.first_chunk().copied().ok_or_else(|| "cut short".into())
+        part.first_chunk()
+            .copied()
+            .ok_or_else(|| "cut short".into())
     }
 
     /// Up to the end of the line, which is taken too.
     pub fn line(&mut self) -> Result<Blob, Reason> {
         let rest = self.bytes.get(self.position..).unwrap_or_default();
-        let length = rest.iter().position(|&byte| byte == b'\n').ok_or("a line has no end; the file is cut short or damaged")?;
+        let length = rest
+            .iter()
+            .position(|&byte| byte == b'\n')
+            .ok_or("a line has no end; the file is cut short or damaged")?;
         let line = self.take(length)?;
         self.position += 1;
         Ok(line)
     }
 
-    fn push_line(&mut self, what: &str, node: impl FnOnce(&[u8]) -> Option<Node>) -> Result<(), Reason> {
+    fn push_line(
+        &mut self,
+        what: &str,
+        node: impl FnOnce(&[u8]) -> Option<Node>,
+    ) -> Result<(), Reason> {
         let line = self.line()?;
         self.budget.take(line.len() as u64)?;
         self.push(node(&line).ok_or_else(|| format!("`{}` is not {what}", shortened(&line)))?)
     }
 
-    fn push_fixed<const N: usize>(&mut self, node: impl FnOnce([u8; N]) -> Node) -> Result<(), Reason> {
+    fn push_fixed<const N: usize>(
+        &mut self,
+        node: impl FnOnce([u8; N]) -> Node,
+    ) -> Result<(), Reason> {
         let bytes = self.fixed::<N>()?;
         self.push(node(bytes))
     }
 
     /// A length of N bytes, least significant first, and as many bytes.
-    fn sized<const N: usize>(&mut self, node: impl FnOnce(Blob) -> Result<Node, Reason>) -> Result<(), Reason> {
+    fn sized<const N: usize>(
+        &mut self,
+        node: impl FnOnce(Blob) -> Result<Node, Reason>,
+    ) -> Result<(), Reason> {
         let length = little_endian(self.fixed::<N>()?);
         let bytes = self.take(usize::try_from(length).unwrap_or(usize::MAX))?;
         self.budget.take(bytes.len() as u64)?;
@@ -275,7 +359,11 @@ impl<'a> Machine<'a> {
     }
 
     fn set_items(&mut self, many: bool) -> Result<(), Reason> {
-        let items = if many { self.pop_mark()? } else { self.pop_several(2)? };
+        let items = if many {
+            self.pop_mark()?
+        } else {
+            self.pop_several(2)?
+        };
         let (dict, pairs) = (self.top()?, pairs(&items)?);
         match self.nodes.get_mut(dict as usize) {
             Some(Node::Dict(dict)) => dict.extend(pairs),
@@ -287,7 +375,9 @@ impl<'a> Machine<'a> {
 
     fn memo_by_line(&mut self, get: bool) -> Result<(), Reason> {
         let line = self.line()?;
-        let index = std::str::from_utf8(&line).ok().and_then(|text| text.trim().parse().ok());
+        let index = std::str::from_utf8(&line)
+            .ok()
+            .and_then(|text| text.trim().parse().ok());
         self.memo(index.ok_or("a memo number is no number")?, get)
     }
 
@@ -298,7 +388,12 @@ impl<'a> Machine<'a> {
 
     fn memo(&mut self, index: usize, get: bool) -> Result<(), Reason> {
         if get {
-            let id = self.memo.get(index).copied().flatten().ok_or_else(|| format!("memo {index} is empty"))?;
+            let id = self
+                .memo
+                .get(index)
+                .copied()
+                .flatten()
+                .ok_or_else(|| format!("memo {index} is empty"))?;
             self.stack.push(id);
             return Ok(());
         }
@@ -323,17 +418,26 @@ impl<'a> Machine<'a> {
 
     fn global_by_lines(&mut self) -> Result<(), Reason> {
         let (module, name) = (self.line()?, self.line()?);
-        self.global(&String::from_utf8_lossy(&module), &String::from_utf8_lossy(&name))
+        self.global(
+            &String::from_utf8_lossy(&module),
+            &String::from_utf8_lossy(&name),
+        )
     }
 
     pub fn global(&mut self, module: &str, name: &str) -> Result<(), Reason> {
-        let full = format!("{}.{}", shortened(module.as_bytes()), shortened(name.as_bytes()));
+        let full = format!(
+            "{}.{}",
+            shortened(module.as_bytes()),
+            shortened(name.as_bytes())
+        );
         match known(module, name) {
             Some(known) => self.push(Node::Known(known, full.into())),
             // Whether it lies under a key that is skipped shows at the end.
-            None if self.skips() => {
-                self.push(Node::Opaque(Box::new(Opaque { name: full.into(), offset: self.opcode_at, parts: Vec::new() })))
-            }
+            None if self.skips() => self.push(Node::Opaque(Box::new(Opaque {
+                name: full.into(),
+                offset: self.opcode_at,
+                parts: Vec::new(),
+            }))),
             None => Err(Reason::Refused(full)),
         }
     }
@@ -351,15 +455,25 @@ fn utf8(bytes: Blob) -> Result<Node, Reason> {
 
 pub(super) fn pairs(items: &[Id]) -> Result<Vec<(Id, Id)>, Reason> {
     let (pairs, rest) = items.as_chunks::<2>();
-    if rest.is_empty() { Ok(pairs.iter().map(|&[key, value]| (key, value)).collect()) } else { Err("a key has no value".into()) }
+    if rest.is_empty() {
+        Ok(pairs.iter().map(|&[key, value]| (key, value)).collect())
+    } else {
+        Err("a key has no value".into())
+    }
 }
 
 fn little_endian<const N: usize>(bytes: [u8; N]) -> u64 {
-    bytes.iter().rev().fold(0, |sum, &byte| sum << 8 | u64::from(byte))
+    bytes
+        .iter()
+        .rev()
+        .fold(0, |sum, &byte| sum << 8 | u64::from(byte))
 }
 
 /// For messages: one line, not endless.
 pub(super) fn shortened(bytes: &[u8]) -> String {
     let start = bytes.get(..100).unwrap_or(bytes);
-    String::from_utf8_lossy(start).chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
+    String::from_utf8_lossy(start)
+        .chars()
+        .map(|c| if c.is_control() { '\u{fffd}' } else { c })
+        .collect()
 }

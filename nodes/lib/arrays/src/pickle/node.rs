@@ -39,7 +39,8 @@ pub(super) enum Node {
     JoblibArray,
     Storage(Arc<Storage>),
     Tensor(Box<Tensor>),
-    /// What an unknown name stands for or makes, with all that it was given. Nothing is made of it: it can only be skipped.
+    /// What an unknown name stands for or makes, with all that it was given. Nothing is made of it:
+    /// it can only be skipped.
     Opaque(Box<Opaque>),
     /// Out of a nested pickle.
     Value(Value),

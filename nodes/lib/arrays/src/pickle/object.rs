@@ -19,7 +19,9 @@ impl Machine<'_> {
         match self.node(id) {
             Node::Text(text) => Some(Arc::clone(text)),
             // A longer one is no name, and would be copied each time it is asked for.
-            Node::OldText(bytes) | Node::Bytes(bytes) if bytes.len() <= TEXT_LIMIT => std::str::from_utf8(bytes).ok().map(Arc::from),
+            Node::OldText(bytes) | Node::Bytes(bytes) if bytes.len() <= TEXT_LIMIT => {
+                std::str::from_utf8(bytes).ok().map(Arc::from)
+            }
             _ => None,
         }
     }
@@ -33,7 +35,9 @@ impl Machine<'_> {
 
     /// The items of a tuple or list, with what copying them costs.
     pub(super) fn items(&mut self, id: Id) -> Result<Vec<Id>, Reason> {
-        let (Node::List(items) | Node::Tuple(items)) = self.node(id) else { return Err("a tuple was expected".into()) };
+        let (Node::List(items) | Node::Tuple(items)) = self.node(id) else {
+            return Err("a tuple was expected".into());
+        };
         let items = items.clone();
         self.budget.take(ITEM_BYTES * items.len() as u64)?;
         Ok(items)
@@ -41,7 +45,9 @@ impl Machine<'_> {
 
     pub(super) fn size(&self, id: Id) -> Result<usize, Reason> {
         match self.node(id) {
-            Node::Int(value) => usize::try_from(*value).map_err(|_| format!("a size is {value}").into()),
+            Node::Int(value) => {
+                usize::try_from(*value).map_err(|_| format!("a size is {value}").into())
+            }
             _ => Err("a size is no number".into()),
         }
     }
@@ -56,8 +62,14 @@ impl Machine<'_> {
 
     /// What `name` finds in a dictionary whose keys are text.
     pub(super) fn lookup(&self, dict: Id, name: &str) -> Option<Id> {
-        let Node::Dict(pairs) = self.node(dict) else { return None };
-        pairs.iter().rev().find(|(key, _)| self.is_text(*key, name)).map(|&(_, value)| value)
+        let Node::Dict(pairs) = self.node(dict) else {
+            return None;
+        };
+        pairs
+            .iter()
+            .rev()
+            .find(|(key, _)| self.is_text(*key, name))
+            .map(|&(_, value)| value)
     }
 
     pub(super) fn is_text(&self, id: Id, expected: &str) -> bool {
@@ -85,7 +97,10 @@ impl Machine<'_> {
         if named {
             let (module, name) = (self.line()?, self.line()?);
             let arguments = self.pop_mark()?;
-            self.global(&String::from_utf8_lossy(&module), &String::from_utf8_lossy(&name))?;
+            self.global(
+                &String::from_utf8_lossy(&module),
+                &String::from_utf8_lossy(&name),
+            )?;
             let class = self.pop()?;
             return self.call(class, &arguments);
         }
@@ -96,10 +111,15 @@ impl Machine<'_> {
 
     fn call(&mut self, callable: Id, arguments: &[Id]) -> Result<(), Reason> {
         if let Node::Opaque(class) = self.node(callable) {
-            let made = Opaque { parts: [&[callable], arguments].concat(), ..Opaque::clone(class) };
+            let made = Opaque {
+                parts: [&[callable], arguments].concat(),
+                ..Opaque::clone(class)
+            };
             return self.push(Node::Opaque(Box::new(made)));
         }
-        let Node::Known(known, name) = self.node(callable).clone() else { return Err("what is called is no name".into()) };
+        let Node::Known(known, name) = self.node(callable).clone() else {
+            return Err("what is called is no name".into());
+        };
         let made = self.called(known, arguments)?;
         // The argument itself is handed on where nothing is to be made of it.
         match made {
@@ -108,7 +128,10 @@ impl Machine<'_> {
                 self.push_id(id);
                 Ok(())
             }
-            Made::Unsuitable => Err(format!("`{name}` is called with arguments that this reader does not know").into()),
+            Made::Unsuitable => Err(format!(
+                "`{name}` is called with arguments that this reader does not know"
+            )
+            .into()),
         }
     }
 
@@ -116,7 +139,9 @@ impl Machine<'_> {
         Ok(Made::Node(match (known, arguments) {
             (Known::ArrayReconstruct, _) | (Known::Ndarray, _) => Node::NewArray,
             (Known::Scalar, &[dtype, content]) => self.numpy_scalar(dtype, content)?,
-            (Known::FromBuffer, &[content, dtype, shape, order]) => self.numpy_from_buffer(content, dtype, shape, order)?,
+            (Known::FromBuffer, &[content, dtype, shape, order]) => {
+                self.numpy_from_buffer(content, dtype, shape, order)?
+            }
             (Known::DTypeClass, &[description, ..]) => self.numpy_dtype(description)?,
             (Known::Reconstructor, &[class, _, start]) => return self.reconstructed(class, start),
             (Known::List | Known::Dict | Known::Tuple, &[]) => empty(known),
@@ -126,9 +151,16 @@ impl Machine<'_> {
             (Known::DefaultDict, &[] | &[_]) => Node::Dict(Vec::new()),
             (Known::DefaultDict, &[_, items]) => self.dictionary(items)?,
             (Known::Bytes | Known::ByteArray, &[]) => Node::Bytes(Vec::new().into()),
-            (Known::Bytes | Known::ByteArray, &[content]) => Node::Bytes(self.blob(content).ok_or("bytes were expected")?),
-            (Known::Encode, &[text]) | (Known::Encode | Known::ByteArray | Known::Bytes, &[text, _]) => self.encoded(text, arguments)?,
-            (Known::Complex, &[real, imaginary]) => Node::Complex(self.float(real)?, self.float(imaginary)?),
+            (Known::Bytes | Known::ByteArray, &[content]) => {
+                Node::Bytes(self.blob(content).ok_or("bytes were expected")?)
+            }
+            (Known::Encode, &[text])
+            | (Known::Encode | Known::ByteArray | Known::Bytes, &[text, _]) => {
+                self.encoded(text, arguments)?
+            }
+            (Known::Complex, &[real, imaginary]) => {
+                Node::Complex(self.float(real)?, self.float(imaginary)?)
+            }
             (Known::Sparse(kind), _) => Node::Sparse(kind, None),
             (Known::ChumpyArray, _) => Node::ChumpyArray(None),
             (Known::ChumpySelect, _) => Node::ChumpySelect(None),
@@ -143,16 +175,24 @@ impl Machine<'_> {
         }))
     }
 
-    /// `copyreg._reconstructor(class, base, start)`: an empty object, or a subclass of a builtin with its content.
+    /// `copyreg._reconstructor(class, base, start)`: an empty object, or a subclass of a builtin
+    /// with its content.
     fn reconstructed(&mut self, class: Id, start: Id) -> Result<Made, Reason> {
         if let Node::Opaque(class) = self.node(class) {
             return Ok(Made::Node(Node::Opaque(class.clone())));
         }
-        let Node::Known(known, _) = self.node(class).clone() else { return Ok(Made::Unsuitable) };
+        let Node::Known(known, _) = self.node(class).clone() else {
+            return Ok(Made::Unsuitable);
+        };
         match (known, self.node(start)) {
             (Known::List | Known::Dict | Known::Tuple, Node::None) => Ok(Made::Node(empty(known))),
-            (Known::Dict, Node::Dict(_)) | (Known::List, Node::List(_)) | (Known::Tuple, Node::Tuple(_)) => Ok(Made::Same(start)),
-            (Known::Sparse(_) | Known::ChumpyArray | Known::ChumpySelect | Known::JoblibArray, _) => self.called(known, &[]),
+            (Known::Dict, Node::Dict(_))
+            | (Known::List, Node::List(_))
+            | (Known::Tuple, Node::Tuple(_)) => Ok(Made::Same(start)),
+            (
+                Known::Sparse(_) | Known::ChumpyArray | Known::ChumpySelect | Known::JoblibArray,
+                _,
+            ) => self.called(known, &[]),
             _ => Ok(Made::Unsuitable),
         }
     }
@@ -166,7 +206,9 @@ impl Machine<'_> {
         }
         let mut pairs = Vec::new();
         for pair in self.items(items)? {
-            let &[key, value] = self.items(pair)?.as_slice() else { return Err("a dictionary's item is no pair".into()) };
+            let &[key, value] = self.items(pair)?.as_slice() else {
+                return Err("a dictionary's item is no pair".into());
+            };
             pairs.push((key, value));
         }
         Ok(Node::Dict(pairs))
@@ -176,16 +218,27 @@ impl Machine<'_> {
     fn encoded(&mut self, text: Id, arguments: &[Id]) -> Result<Node, Reason> {
         let text = self.text(text).ok_or("text to encode was expected")?;
         let encoding = match arguments.get(1) {
-            Some(&encoding) => self.text(encoding).ok_or("an encoding's name was expected")?,
+            Some(&encoding) => self
+                .text(encoding)
+                .ok_or("an encoding's name was expected")?,
             None => "utf-8".into(),
         };
         self.budget.take(text.len() as u64)?;
         let bytes: Option<Vec<u8>> = match &*encoding {
-            "latin1" | "latin-1" | "iso-8859-1" => text.chars().map(|c| u8::try_from(u32::from(c)).ok()).collect(),
+            "latin1" | "latin-1" | "iso-8859-1" => text
+                .chars()
+                .map(|c| u8::try_from(u32::from(c)).ok())
+                .collect(),
             "utf-8" | "utf8" | "ascii" => Some(text.as_bytes().to_vec()),
-            other => return Err(format!("encoding `{}` is unknown", shortened(other.as_bytes())).into()),
+            other => {
+                return Err(
+                    format!("encoding `{}` is unknown", shortened(other.as_bytes())).into(),
+                );
+            }
         };
-        Ok(Node::Bytes(bytes.ok_or("text is not of single bytes")?.into()))
+        Ok(Node::Bytes(
+            bytes.ok_or("text is not of single bytes")?.into(),
+        ))
     }
 
     pub(super) fn float(&self, id: Id) -> Result<f64, Reason> {
@@ -203,7 +256,11 @@ impl Machine<'_> {
         if let Node::Dict(pairs) = self.node(state) {
             // It is searched through, and one dictionary can be the state of many objects.
             let searched = pairs.len() as u64;
-            self.budget.opcodes = self.budget.opcodes.checked_sub(searched).ok_or("more attributes than Limits::opcodes allows")?;
+            self.budget.opcodes = self
+                .budget
+                .opcodes
+                .checked_sub(searched)
+                .ok_or("more attributes than Limits::opcodes allows")?;
         }
         let built = match self.node(object).clone() {
             Node::NewArray => self.numpy_array(state)?,

@@ -52,7 +52,10 @@ pub(super) fn raw_unicode(line: &[u8]) -> Option<String> {
             }
         };
         let code = std::str::from_utf8(after.get(1..1 + digits)?).ok()?;
-        text.push(char::from_u32(u32::from_str_radix(code, 16).ok()?).unwrap_or(char::REPLACEMENT_CHARACTER));
+        text.push(
+            char::from_u32(u32::from_str_radix(code, 16).ok()?)
+                .unwrap_or(char::REPLACEMENT_CHARACTER),
+        );
         rest = after.get(1 + digits..)?;
     }
     Some(text)
@@ -71,7 +74,9 @@ pub(super) fn integer(line: &[u8]) -> Option<Node> {
         Ok(value) => Some(Node::Int(value)),
         Err(_) => {
             let digits = text.strip_prefix('-').unwrap_or(text);
-            let sound = !digits.is_empty() && digits.len() <= 1024 && digits.bytes().all(|byte| byte.is_ascii_digit());
+            let sound = !digits.is_empty()
+                && digits.len() <= 1024
+                && digits.bytes().all(|byte| byte.is_ascii_digit());
             sound.then(|| Node::BigInt(Arc::from(text)))
         }
     }
@@ -87,10 +92,16 @@ pub(super) fn long(bytes: &[u8]) -> Option<Node> {
     let negative = bytes.last().is_some_and(|byte| byte & 0x80 != 0);
     if bytes.len() <= 8 {
         let mut wide = if negative { [0xff; 8] } else { [0; 8] };
-        wide.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
+        wide.iter_mut()
+            .zip(bytes)
+            .for_each(|(to, from)| *to = *from);
         return Some(Node::Int(i64::from_le_bytes(wide)));
     }
-    let digits: String = bytes.iter().rev().map(|byte| format!("{byte:02x}")).collect();
+    let digits: String = bytes
+        .iter()
+        .rev()
+        .map(|byte| format!("{byte:02x}"))
+        .collect();
     (bytes.len() <= 1024).then(|| Node::BigInt(Arc::from(format!("0x{digits}"))))
 }
 
@@ -105,8 +116,18 @@ mod tests {
         assert!(quoted(b"'a").is_none() && quoted(br"'\x0'").is_none() && quoted(b"'").is_none());
         assert_eq!(raw_unicode(b"\\u20ac\xe9\\n").unwrap(), "€é\\n");
         assert!(raw_unicode(br"\u20").is_none());
-        assert!(matches!(long(&[0xff, 0x7f]), Some(Node::Int(32767))) && matches!(long(&[0xff]), Some(Node::Int(-1))));
-        assert!(matches!(integer(b"-12L"), Some(Node::Int(-12))) && integer(b"12x").is_none() && integer(b"").is_none());
-        assert!(matches!(integer(b"123456789012345678901"), Some(Node::BigInt(_))));
+        assert!(
+            matches!(long(&[0xff, 0x7f]), Some(Node::Int(32767)))
+                && matches!(long(&[0xff]), Some(Node::Int(-1)))
+        );
+        assert!(
+            matches!(integer(b"-12L"), Some(Node::Int(-12)))
+                && integer(b"12x").is_none()
+                && integer(b"").is_none()
+        );
+        assert!(matches!(
+            integer(b"123456789012345678901"),
+            Some(Node::BigInt(_))
+        ));
     }
 }

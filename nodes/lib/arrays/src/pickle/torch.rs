@@ -1,4 +1,5 @@
-//! torch's tensors: views of storages, which a zip archive holds beside the pickle, a legacy file after it, and a plain pickle as bytes.
+//! torch's tensors: views of storages, which a zip archive holds beside the pickle, a legacy file
+//! after it, and a plain pickle as bytes.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -14,7 +15,8 @@ use crate::dtype::DType;
 use crate::limits::Budget;
 use crate::value::Value;
 
-/// How files begin that torch wrote before version 1.6, and storages in plain pickles: a pickled number.
+/// How files begin that torch wrote before version 1.6, and storages in plain pickles: a pickled
+/// number.
 pub(crate) const LEGACY_START: &[u8] = b"\x80\x02\x8a\x0a\x6c\xfc\x9c\x46\xf9\x20\x6a\xa8\x50\x19.";
 
 impl Machine<'_> {
@@ -22,13 +24,23 @@ impl Machine<'_> {
     pub(super) fn persistent(&mut self) -> Result<(), Reason> {
         let id = self.pop()?;
         let items = self.items(id)?;
-        let unknown = || Reason::from("a persistent id that is not torch's ('storage', type, key, device, size)");
-        let &[tag, class, key, _device, _count, ref view @ ..] = items.as_slice() else { return Err(unknown()) };
+        let unknown = || {
+            Reason::from("a persistent id that is not torch's ('storage', type, key, device, size)")
+        };
+        let &[tag, class, key, _device, _count, ref view @ ..] = items.as_slice() else {
+            return Err(unknown());
+        };
         if self.text(tag).as_deref() != Some("storage") {
             return Err(unknown());
         }
-        if view.first().is_some_and(|&view| !matches!(self.node(view), Node::None)) {
-            return Err("a storage that is part of another, as torch before 0.4 wrote; save it again".into());
+        if view
+            .first()
+            .is_some_and(|&view| !matches!(self.node(view), Node::None))
+        {
+            return Err(
+                "a storage that is part of another, as torch before 0.4 wrote; save it again"
+                    .into(),
+            );
         }
         let dtype = match self.node(class) {
             Node::Known(Known::Storage(dtype), _) => Some(*dtype),
@@ -36,12 +48,24 @@ impl Machine<'_> {
             _ => return Err(unknown()),
         };
         let key = self.text(key).ok_or_else(unknown)?;
-        self.push(Node::Storage(Arc::new(Storage { dtype, source: Source::Key(key) })))
+        self.push(Node::Storage(Arc::new(Storage {
+            dtype,
+            source: Source::Key(key),
+        })))
     }
 
     /// `_rebuild_tensor_v2(storage, first element, shape, strides, …)`; `_v3` also tells the type.
-    pub(super) fn tensor(&mut self, storage: Id, first: Id, shape: Id, strides: Id, dtype: Option<&Id>) -> Result<Node, Reason> {
-        let Node::Storage(storage) = self.node(storage).clone() else { return Err("a tensor has no storage".into()) };
+    pub(super) fn tensor(
+        &mut self,
+        storage: Id,
+        first: Id,
+        shape: Id,
+        strides: Id,
+        dtype: Option<&Id>,
+    ) -> Result<Node, Reason> {
+        let Node::Storage(storage) = self.node(storage).clone() else {
+            return Err("a tensor has no storage".into());
+        };
         let dtype = match dtype.map(|&id| self.node(id)) {
             Some(Node::Known(Known::TensorType(dtype), _)) => Some(*dtype),
             _ => storage.dtype,
@@ -49,24 +73,52 @@ impl Machine<'_> {
         let dtype = dtype.ok_or("a tensor has no type")?;
         let (first, shape, strides) = (self.size(first)?, self.sizes(shape)?, self.sizes(strides)?);
         let offset = self.position;
-        Ok(Node::Tensor(Box::new(Tensor { storage, dtype, first, shape, strides, offset })))
+        Ok(Node::Tensor(Box::new(Tensor {
+            storage,
+            dtype,
+            first,
+            shape,
+            strides,
+            offset,
+        })))
     }
 
     /// `_load_from_bytes(bytes)`: a file within the pickle that holds one storage.
     pub(super) fn loaded_storage(&mut self, content: Id) -> Result<Node, Reason> {
         let content = self.blob(content).ok_or("a storage's file is no bytes")?;
-        let mut legacy = Legacy::new(&content, self.budget, self.nesting + 1).map_err(|fault| fault.nested())?;
+        let mut legacy =
+            Legacy::new(&content, self.budget, self.nesting + 1).map_err(|fault| fault.nested())?;
         let root = legacy.root.node(legacy.id).clone();
-        let Node::Storage(storage) = root else { return Err("a storage's file holds something else".into()) };
-        let Source::Key(key) = &storage.source else { return Err("a storage's file holds something else".into()) };
-        let loaded = legacy.storages.remove(key).ok_or_else(|| format!("storage {key} is missing"))?;
-        Ok(Node::Storage(Arc::new(Storage { dtype: storage.dtype, source: Source::Loaded(loaded) })))
+        let Node::Storage(storage) = root else {
+            return Err("a storage's file holds something else".into());
+        };
+        let Source::Key(key) = &storage.source else {
+            return Err("a storage's file holds something else".into());
+        };
+        let loaded = legacy
+            .storages
+            .remove(key)
+            .ok_or_else(|| format!("storage {key} is missing"))?;
+        Ok(Node::Storage(Arc::new(Storage {
+            dtype: storage.dtype,
+            source: Source::Loaded(loaded),
+        })))
     }
 }
 
 /// The array of a tensor, once its storage is at hand.
-pub(super) fn tensor_array(tensor: &Tensor, storage: &Blob, budget: &mut Budget) -> Result<ArrayData, String> {
-    let (array, repeated) = ArrayData::strided(tensor.dtype, storage, tensor.first, tensor.shape.clone(), tensor.strides.clone())?;
+pub(super) fn tensor_array(
+    tensor: &Tensor,
+    storage: &Blob,
+    budget: &mut Budget,
+) -> Result<ArrayData, String> {
+    let (array, repeated) = ArrayData::strided(
+        tensor.dtype,
+        storage,
+        tensor.first,
+        tensor.shape.clone(),
+        tensor.strides.clone(),
+    )?;
     budget.take_expanded(repeated)?;
     Ok(array)
 }
@@ -85,10 +137,16 @@ pub(crate) fn read_zipped(
 /// The value of a file that torch wrote before version 1.6.
 pub(crate) fn read_legacy(content: &Blob, budget: &mut Budget) -> Result<Value, Fault> {
     let Legacy { root, id, storages } = Legacy::new(content, budget, 0)?;
-    finish(root, id, &mut |key| storages.get(key).cloned().ok_or_else(|| format!("storage {key} is missing")))
+    finish(root, id, &mut |key| {
+        storages
+            .get(key)
+            .cloned()
+            .ok_or_else(|| format!("storage {key} is missing"))
+    })
 }
 
-/// Five pickles (magic number, version, system, root object, storage keys), then of each storage its element count and its elements.
+/// Five pickles (magic number, version, system, root object, storage keys), then of each storage
+/// its element count and its elements.
 struct Legacy<'a> {
     root: Machine<'a>,
     id: Id,
@@ -108,12 +166,19 @@ impl<'a> Legacy<'a> {
         if let Some(order) = machine.lookup(system, "little_endian")
             && !matches!(machine.node(order), Node::Bool(true))
         {
-            return Err(Fault::new(machine.position, "torch wrote it on a big-endian machine, which this reader does not know"));
+            return Err(Fault::new(
+                machine.position,
+                "torch wrote it on a big-endian machine, which this reader does not know",
+            ));
         }
         let id = machine.run()?;
         let keys = machine.run()?;
         let storages = machine.legacy_storages(keys)?;
-        Ok(Self { root: machine, id, storages })
+        Ok(Self {
+            root: machine,
+            id,
+            storages,
+        })
     }
 }
 
@@ -124,7 +189,10 @@ impl Machine<'_> {
             if let Node::Storage(storage) = node
                 && let Source::Key(key) = &storage.source
             {
-                sizes.insert(Arc::clone(key), storage.dtype.map_or(1, |dtype: DType| dtype.size));
+                sizes.insert(
+                    Arc::clone(key),
+                    storage.dtype.map_or(1, |dtype: DType| dtype.size),
+                );
             }
         }
         let mut storages = HashMap::new();
@@ -133,11 +201,21 @@ impl Machine<'_> {
         for key in self.items(keys).map_err(fault)? {
             let offset = self.position;
             let fault = |reason| Fault { offset, reason };
-            let key = self.text(key).ok_or_else(|| fault("a storage key is no text".into()))?;
-            let size = *sizes.get(&key).ok_or_else(|| fault("a storage that no tensor uses".into()))?;
+            let key = self
+                .text(key)
+                .ok_or_else(|| fault("a storage key is no text".into()))?;
+            let size = *sizes
+                .get(&key)
+                .ok_or_else(|| fault("a storage that no tensor uses".into()))?;
             let count = self.take(8).map_err(fault)?;
-            let count = count.iter().rev().fold(0_u64, |sum, &byte| sum << 8 | u64::from(byte));
-            let bytes = usize::try_from(count).ok().and_then(|count| count.checked_mul(size)).unwrap_or(usize::MAX);
+            let count = count
+                .iter()
+                .rev()
+                .fold(0_u64, |sum, &byte| sum << 8 | u64::from(byte));
+            let bytes = usize::try_from(count)
+                .ok()
+                .and_then(|count| count.checked_mul(size))
+                .unwrap_or(usize::MAX);
             storages.insert(key, self.take(bytes).map_err(fault)?);
         }
         Ok(storages)

@@ -12,15 +12,24 @@ use cromosim_spatial::Stamp;
 
 /// Where the samples of this project lie, or none where they are not at hand.
 pub fn cases() -> Option<PathBuf> {
-    let samples = std::env::var_os("CROMOSIM_DATA")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../../shared/data"), PathBuf::from);
+    let samples = std::env::var_os("CROMOSIM_DATA").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../../shared/data"),
+        PathBuf::from,
+    );
     let cases = samples.join("../cases");
     if cases.is_dir() {
         return Some(cases);
     }
-    assert!(std::env::var_os("CROMOSIM_REQUIRE_ALL").is_none_or(|all| all != "1"), "{}: not there", cases.display());
+    assert!(
+        std::env::var_os("CROMOSIM_REQUIRE_ALL").is_none_or(|all| all != "1"),
+        "{}: not there",
+        cases.display()
+    );
     // Past the test harness, which swallows what passing tests print.
-    let _ = std::io::Write::write_all(&mut std::io::stderr(), format!("skipped: no sample recordings in {}\n", cases.display()).as_bytes());
+    let _ = std::io::Write::write_all(
+        &mut std::io::stderr(),
+        format!("skipped: no sample recordings in {}\n", cases.display()).as_bytes(),
+    );
     None
 }
 
@@ -34,8 +43,16 @@ pub fn imu(index: i64) -> Imu {
     let value = index as f64;
     Imu {
         header: Header::new(stamp(index).nanos, "left_wrist_imu"),
-        angular_velocity: Vector3 { x: value, y: 0.1 * value, z: -value },
-        linear_acceleration: Vector3 { x: (0.01 * value).sin(), y: 1.0 / (value + 1.0), z: 9.80665 },
+        angular_velocity: Vector3 {
+            x: value,
+            y: 0.1 * value,
+            z: -value,
+        },
+        linear_acceleration: Vector3 {
+            x: (0.01 * value).sin(),
+            y: 1.0 / (value + 1.0),
+            z: 9.80665,
+        },
         ..Imu::default()
     }
 }
@@ -44,11 +61,28 @@ pub fn imu(index: i64) -> Imu {
 pub fn fill(writer: &mut BagWriter, count: i64) {
     let seed = BTreeMap::from([("seed".to_owned(), "7".to_owned())]);
     writer.write_metadata("cromosim", seed).unwrap();
-    writer.attach("placements.yaml", "application/yaml", stamp(0), b"placements: []\n").unwrap();
+    writer
+        .attach(
+            "placements.yaml",
+            "application/yaml",
+            stamp(0),
+            b"placements: []\n",
+        )
+        .unwrap();
     for index in 0..count {
-        writer.write("/imu/left_wrist/data_raw", stamp(index), &imu(index)).unwrap();
+        writer
+            .write("/imu/left_wrist/data_raw", stamp(index), &imu(index))
+            .unwrap();
         if index % 10 == 0 {
-            writer.write("/note", stamp(index), &Text { data: format!("sample {index}") }).unwrap();
+            writer
+                .write(
+                    "/note",
+                    stamp(index),
+                    &Text {
+                        data: format!("sample {index}"),
+                    },
+                )
+                .unwrap();
         }
     }
 }

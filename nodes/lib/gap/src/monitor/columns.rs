@@ -7,8 +7,13 @@ use super::pairs::{Both, Pairs};
 /// Derivatives of both channels by P parameters, at one pair.
 pub(super) type Columns<const P: usize> = [SMatrix<f64, 3, P>; 2];
 
-/// How much of the whitened squared residual the best parameters explain: b^T A^-1 b with A = J^T W J and b = J^T W r.
-pub(super) fn explained<const P: usize>(pairs: &Pairs, sigmas: [f64; 2], columns: impl Fn(usize) -> Columns<P>) -> f64 {
+/// How much of the whitened squared residual the best parameters explain: b^T A^-1 b with A = J^T W
+/// J and b = J^T W r.
+pub(super) fn explained<const P: usize>(
+    pairs: &Pairs,
+    sigmas: [f64; 2],
+    columns: impl Fn(usize) -> Columns<P>,
+) -> f64 {
     let mut normal = SMatrix::<f64, P, P>::zeros();
     let mut right = SMatrix::<f64, P, 1>::zeros();
     for index in 0..pairs.len() {
@@ -27,7 +32,9 @@ pub(super) fn explained<const P: usize>(pairs: &Pairs, sigmas: [f64; 2], columns
     for k in 0..P {
         normal[(k, k)] += ridge;
     }
-    normal.cholesky().map_or(0.0, |factor| right.dot(&factor.solve(&right)))
+    normal
+        .cholesky()
+        .map_or(0.0, |factor| right.dot(&factor.solve(&right)))
 }
 
 fn only_accel<const P: usize>(columns: SMatrix<f64, 3, P>) -> Columns<P> {
@@ -64,7 +71,16 @@ pub(super) fn lever_arm(rate: &Vector3<f64>, alpha: &Vector3<f64>) -> Columns<3>
 
 /// gyro_g_sensitivity: w + G f, the entries of G row by row.
 pub(super) fn g_sensitivity(force: &Vector3<f64>) -> Columns<9> {
-    only(1, SMatrix::from_fn(|row, column| if column / 3 == row { force[column % 3] } else { 0.0 }))
+    only(
+        1,
+        SMatrix::from_fn(|row, column| {
+            if column / 3 == row {
+                force[column % 3]
+            } else {
+                0.0
+            }
+        }),
+    )
 }
 
 /// time_offset: x(t - tau).

@@ -11,7 +11,8 @@ const SIGMAS: [f64; 2] = [0.03, 0.003];
 /// What a sensor reads at a time, s.
 type Read = Box<dyn Fn(f64) -> (Vector3<f64>, Vector3<f64>)>;
 
-/// A body-worn sensor's motion in sensor axes: specific force, angular velocity and acceleration, and gravity's reaction.
+/// A body-worn sensor's motion in sensor axes: specific force, angular velocity and acceleration,
+/// and gravity's reaction.
 struct Moment {
     force: Vector3<f64>,
     rate: Vector3<f64>,
@@ -20,7 +21,11 @@ struct Moment {
 }
 
 fn rotation(t: f64) -> Rotation3<f64> {
-    Rotation3::from_euler_angles(0.7 * (2.1 * t).sin(), 0.5 * (1.7 * t + 0.4).sin() + 0.2, 0.9 * (2.9 * t + 1.0).sin())
+    Rotation3::from_euler_angles(
+        0.7 * (2.1 * t).sin(),
+        0.5 * (1.7 * t + 0.4).sin() + 0.2,
+        0.9 * (2.9 * t + 1.0).sin(),
+    )
 }
 
 fn rate(t: f64) -> Vector3<f64> {
@@ -29,11 +34,20 @@ fn rate(t: f64) -> Vector3<f64> {
 }
 
 fn moment(t: f64) -> Moment {
-    let acceleration = Vector3::new(3.0 * (6.1 * t).sin(), 2.5 * (7.3 * t + 0.3).cos(), 4.0 * (9.7 * t).sin());
+    let acceleration = Vector3::new(
+        3.0 * (6.1 * t).sin(),
+        2.5 * (7.3 * t + 0.3).cos(),
+        4.0 * (9.7 * t).sin(),
+    );
     let to_sensor = rotation(t).inverse();
     let up = to_sensor * Vector3::new(0.0, 0.0, 9.80665);
     let alpha = (rate(t + 1e-3) - rate(t - 1e-3)) / 2e-3;
-    Moment { force: to_sensor * acceleration + up, rate: rate(t), alpha, up }
+    Moment {
+        force: to_sensor * acceleration + up,
+        rate: rate(t),
+        alpha,
+        up,
+    }
 }
 
 /// A standard normal number by Box and Muller from a hash of its index.
@@ -44,16 +58,27 @@ fn normal(index: u64) -> f64 {
         x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
         ((x ^ (x >> 31)) >> 11) as f64 / (1u64 << 53) as f64
     };
-    (-2.0 * uniform(1 << 40).max(1e-12).ln()).sqrt() * (std::f64::consts::TAU * uniform(1 << 41)).cos()
+    (-2.0 * uniform(1 << 40).max(1e-12).ln()).sqrt()
+        * (std::f64::consts::TAU * uniform(1 << 41)).cos()
 }
 
-fn stream(rate_hz: f64, noise: [f64; 2], seed: u64, read: impl Fn(f64) -> (Vector3<f64>, Vector3<f64>)) -> Vec<ImuReading> {
+fn stream(
+    rate_hz: f64,
+    noise: [f64; 2],
+    seed: u64,
+    read: impl Fn(f64) -> (Vector3<f64>, Vector3<f64>),
+) -> Vec<ImuReading> {
     let reading = |k: u64| {
         let t = 0.0034 + k as f64 / rate_hz;
         let (force, rate) = read(t);
         let clean = [force.x, force.y, force.z, rate.x, rate.y, rate.z];
-        let values = std::array::from_fn(|axis| clean[axis] + noise[axis / 3] * normal(seed * 1_000_000 + k * 6 + axis as u64));
-        ImuReading { stamp: Stamp::from_nanos(1_700_000_000_000_000_000).plus_seconds(t), values }
+        let values = std::array::from_fn(|axis| {
+            clean[axis] + noise[axis / 3] * normal(seed * 1_000_000 + k * 6 + axis as u64)
+        });
+        ImuReading {
+            stamp: Stamp::from_nanos(1_700_000_000_000_000_000).plus_seconds(t),
+            values,
+        }
     };
     (0..(10.0 * rate_hz) as u64).map(reading).collect()
 }
@@ -63,7 +88,10 @@ fn simulated() -> Vec<ImuReading> {
 }
 
 fn options() -> MonitorOptions {
-    MonitorOptions { declared_sigmas: SIGMAS.map(Some), ..MonitorOptions::default() }
+    MonitorOptions {
+        declared_sigmas: SIGMAS.map(Some),
+        ..MonitorOptions::default()
+    }
 }
 
 fn assess_measured(measured: &[ImuReading]) -> Assessment {
@@ -77,7 +105,11 @@ fn named(read: impl Fn(f64) -> (Vector3<f64>, Vector3<f64>)) -> Assessment {
 #[test]
 fn no_gap_is_none() {
     let found = named(|t| (moment(t).force, moment(t).rate));
-    assert_eq!((found.first_cause, found.first_cause_share), (NONE, 0.0), "{found:?}");
+    assert_eq!(
+        (found.first_cause, found.first_cause_share),
+        (NONE, 0.0),
+        "{found:?}"
+    );
     assert!((found.accel_rmse / (3.0_f64.sqrt() * SIGMAS[0]) - 1.0).abs() < 0.1);
     assert!(found.lag_s.unwrap().abs() < 2e-4, "{found:?}");
     assert_eq!(found.compared, 1000);
@@ -86,7 +118,9 @@ fn no_gap_is_none() {
 #[test]
 fn noise_of_the_simulation_is_no_gap() {
     let measured = stream(100.0, SIGMAS, 2, |t| (moment(t).force, moment(t).rate));
-    let noisy = stream(120.0, [0.05, 0.005], 3, |t| (moment(t).force, moment(t).rate));
+    let noisy = stream(120.0, [0.05, 0.005], 3, |t| {
+        (moment(t).force, moment(t).rate)
+    });
     let found = assess(&measured, &noisy, &options()).unwrap();
     assert_eq!(found.first_cause, NONE, "{found:?}");
 }
@@ -97,28 +131,72 @@ fn each_effect_is_named_where_it_is_injected() {
     let scale = Matrix3::from_diagonal(&Vector3::new(1.03, 0.98, 1.01));
     let turn = Rotation3::from_euler_angles(0.1, -0.2, 0.15);
     let axes = Matrix3::new(0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
-    let coupling = Matrix3::new(0.002, -0.003, 0.001, 0.0, 0.004, 0.002, -0.002, 0.001, 0.003);
+    let coupling = Matrix3::new(
+        0.002, -0.003, 0.001, 0.0, 0.004, 0.002, -0.002, 0.001, 0.003,
+    );
     let lever = Vector3::new(0.05, 0.0, -0.06);
-    let of = |change: fn(Moment) -> (Vector3<f64>, Vector3<f64>)| -> Read { Box::new(move |t| change(moment(t))) };
+    let of = |change: fn(Moment) -> (Vector3<f64>, Vector3<f64>)| -> Read {
+        Box::new(move |t| change(moment(t)))
+    };
     let cases: Vec<(&str, Read)> = vec![
-        ("accel_bias", of(|m| (m.force + Vector3::new(0.2, -0.1, 0.15), m.rate))),
-        ("gyro_bias", of(|m| (m.force, m.rate + Vector3::new(0.01, -0.02, 0.015)))),
-        ("accel_scale", Box::new(move |t| (scale * moment(t).force, moment(t).rate))),
-        ("gyro_scale", Box::new(move |t| (moment(t).force, scale * moment(t).rate))),
-        ("accel_misalignment", Box::new(move |t| ((Matrix3::identity() + upper) * moment(t).force, moment(t).rate))),
-        ("gyro_misalignment", Box::new(move |t| (moment(t).force, (Matrix3::identity() + upper) * moment(t).rate))),
-        ("mount_rotation", Box::new(move |t| (turn * moment(t).force, turn * moment(t).rate))),
-        ("axis_convention", Box::new(move |t| (axes * moment(t).force, axes * moment(t).rate))),
+        (
+            "accel_bias",
+            of(|m| (m.force + Vector3::new(0.2, -0.1, 0.15), m.rate)),
+        ),
+        (
+            "gyro_bias",
+            of(|m| (m.force, m.rate + Vector3::new(0.01, -0.02, 0.015))),
+        ),
+        (
+            "accel_scale",
+            Box::new(move |t| (scale * moment(t).force, moment(t).rate)),
+        ),
+        (
+            "gyro_scale",
+            Box::new(move |t| (moment(t).force, scale * moment(t).rate)),
+        ),
+        (
+            "accel_misalignment",
+            Box::new(move |t| {
+                (
+                    (Matrix3::identity() + upper) * moment(t).force,
+                    moment(t).rate,
+                )
+            }),
+        ),
+        (
+            "gyro_misalignment",
+            Box::new(move |t| {
+                (
+                    moment(t).force,
+                    (Matrix3::identity() + upper) * moment(t).rate,
+                )
+            }),
+        ),
+        (
+            "mount_rotation",
+            Box::new(move |t| (turn * moment(t).force, turn * moment(t).rate)),
+        ),
+        (
+            "axis_convention",
+            Box::new(move |t| (axes * moment(t).force, axes * moment(t).rate)),
+        ),
         ("time_offset", of_time(0.021)),
         ("time_offset", of_time(-0.15)),
         (
             "lever_arm",
             Box::new(move |t| {
                 let m = moment(t);
-                (m.force + m.alpha.cross(&lever) + m.rate.cross(&m.rate.cross(&lever)), m.rate)
+                (
+                    m.force + m.alpha.cross(&lever) + m.rate.cross(&m.rate.cross(&lever)),
+                    m.rate,
+                )
             }),
         ),
-        ("gyro_g_sensitivity", Box::new(move |t| (moment(t).force, moment(t).rate + coupling * moment(t).force))),
+        (
+            "gyro_g_sensitivity",
+            Box::new(move |t| (moment(t).force, moment(t).rate + coupling * moment(t).force)),
+        ),
         ("gravity_convention", of(|m| (m.force - m.up, m.rate))),
         ("gravity_convention", of(|m| (m.force - m.up * 2.0, m.rate))),
         ("accel_units", of(|m| (m.force / 9.80665, m.rate))),
@@ -146,7 +224,10 @@ fn of_time(late: f64) -> Read {
 fn the_lag_is_that_of_the_stamps() {
     for late in [0.004, 0.021, -0.15] {
         let found = named(of_time(late));
-        assert!((found.lag_s.unwrap() - late).abs() < 5e-4, "{late}: {found:?}");
+        assert!(
+            (found.lag_s.unwrap() - late).abs() < 5e-4,
+            "{late}: {found:?}"
+        );
     }
 }
 
@@ -154,7 +235,9 @@ fn the_lag_is_that_of_the_stamps() {
 fn clipped_readings_are_saturation() {
     let mut measured = stream(100.0, SIGMAS, 2, |t| (moment(t).force, moment(t).rate));
     for reading in &mut measured {
-        reading.values[..3].iter_mut().for_each(|value| *value = value.clamp(-11.0, 11.0));
+        reading.values[..3]
+            .iter_mut()
+            .for_each(|value| *value = value.clamp(-11.0, 11.0));
     }
     let found = assess_measured(&measured);
     assert_eq!(found.first_cause, "accel_saturation", "{found:?}");
@@ -169,14 +252,23 @@ fn lost_messages_are_counted_and_named_where_nothing_else_is_wrong() {
         number % 20 != 0
     });
     let found = assess_measured(&measured);
-    assert_eq!((found.first_cause, pace(&measured).dropped), ("dropped_samples", 49), "{found:?}");
+    assert_eq!(
+        (found.first_cause, pace(&measured).dropped),
+        ("dropped_samples", 49),
+        "{found:?}"
+    );
     assert!((pace(&measured).rate_hz - 100.0).abs() < 0.1);
 }
 
 #[test]
 fn what_no_effect_explains_is_unknown() {
     // A frequency that nothing in the motion has.
-    let found = named(|t| (moment(t).force + Vector3::new(1.5, 1.0, -1.0) * (60.0 * t).sin(), moment(t).rate));
+    let found = named(|t| {
+        (
+            moment(t).force + Vector3::new(1.5, 1.0, -1.0) * (60.0 * t).sin(),
+            moment(t).rate,
+        )
+    });
     assert_eq!(found.first_cause, UNKNOWN, "{found:?}");
 }
 
@@ -184,7 +276,8 @@ fn what_no_effect_explains_is_unknown() {
 fn streams_without_common_stamps_say_nothing() {
     let measured = stream(100.0, SIGMAS, 2, |t| (moment(t).force, moment(t).rate));
     let mut late = simulated();
-    late.iter_mut().for_each(|reading| reading.stamp = reading.stamp.plus_seconds(60.0));
+    late.iter_mut()
+        .for_each(|reading| reading.stamp = reading.stamp.plus_seconds(60.0));
     assert_eq!(assess(&measured, &late, &options()), None);
     assert_eq!(assess(&measured, &[], &options()), None);
     assert_eq!(assess(&[], &[], &options()), None);
@@ -203,6 +296,11 @@ fn a_hole_in_the_simulation_is_not_interpolated_over() {
 #[test]
 fn a_still_sensor_has_no_lag() {
     let still = |_: f64| (Vector3::new(0.0, 0.3, 9.8), Vector3::zeros());
-    let found = assess(&stream(100.0, SIGMAS, 2, still), &stream(120.0, [0.0; 2], 1, still), &options()).unwrap();
+    let found = assess(
+        &stream(100.0, SIGMAS, 2, still),
+        &stream(120.0, [0.0; 2], 1, still),
+        &options(),
+    )
+    .unwrap();
     assert_eq!((found.first_cause, found.lag_s), (NONE, None));
 }

@@ -32,17 +32,29 @@ pub(super) fn write_causes(page: &mut String, placement: &PlacementDiagnosis) {
 }
 
 fn write_cause(page: &mut String, cause: &Cause, before: &Metrics) {
-    let _ = write!(page, "<tr><td><span class=\"effect\">{}</span>", escape(&cause.effect));
+    let _ = write!(
+        page,
+        "<tr><td><span class=\"effect\">{}</span>",
+        escape(&cause.effect)
+    );
     let what = summary(&cause.effect);
     if !what.is_empty() {
         let _ = write!(page, "<div class=\"what\">{}</div>", escape(what));
     }
     if let Some(spec) = spec(&cause.effect).filter(|spec| !spec.remedy.is_empty()) {
-        let _ = write!(page, "<div class=\"what\"><b>Remedy:</b> {}</div>", escape(spec.remedy));
+        let _ = write!(
+            page,
+            "<div class=\"what\"><b>Remedy:</b> {}</div>",
+            escape(spec.remedy)
+        );
     }
     page.push_str("</td><td class=\"values\">");
     for (name, value) in &cause.parameters {
-        let _ = write!(page, "<div>{}</div>", parameter(&cause.effect, name, value, cause.standard_errors.get(name)));
+        let _ = write!(
+            page,
+            "<div>{}</div>",
+            parameter(&cause.effect, name, value, cause.standard_errors.get(name))
+        );
     }
     let _ = writeln!(
         page,
@@ -56,11 +68,19 @@ fn write_cause(page: &mut String, cause: &Cause, before: &Metrics) {
 }
 
 fn change(before: f64, after: f64) -> String {
-    format!("{}<span class=\"to\">→</span>{}", significant(before, 3), significant(after, 3))
+    format!(
+        "{}<span class=\"to\">→</span>{}",
+        significant(before, 3),
+        significant(after, 3)
+    )
 }
 
 /// A bar as wide as a share.
 pub(super) fn bar(share: f64) -> String {
-    let width = if share.is_finite() { 100.0 * share.clamp(0.0, 1.0) } else { 0.0 };
+    let width = if share.is_finite() {
+        100.0 * share.clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
     format!("<span class=\"bar\"><i style=\"width:{width:.1}%\"></i></span>")
 }

@@ -20,12 +20,23 @@ pub(super) struct Window {
     pub to: f64,
 }
 
-/// Where the whitened residual of the nominal simulation is largest; the beginning where nothing is known.
+/// Where the whitened residual of the nominal simulation is largest; the beginning where nothing is
+/// known.
 pub(super) fn worst_window(evidence: &Evidence) -> Window {
-    let end = evidence.stamps.last().zip(evidence.stamps.first()).map_or(0.0, |(last, first)| *last - *first);
+    let end = evidence
+        .stamps
+        .last()
+        .zip(evidence.stamps.first())
+        .map_or(0.0, |(last, first)| *last - *first);
     let total = |from: f64| -> f64 {
-        let inside = evidence.course.iter().filter(|point| (from..from + WINDOW_S).contains(&point.seconds));
-        inside.map(|point| point.accel_before + point.gyro_before).filter(|value| value.is_finite()).sum()
+        let inside = evidence
+            .course
+            .iter()
+            .filter(|point| (from..from + WINDOW_S).contains(&point.seconds));
+        inside
+            .map(|point| point.accel_before + point.gyro_before)
+            .filter(|value| value.is_finite())
+            .sum()
     };
     let mut best = (0.0, 0.0);
     for point in &evidence.course {
@@ -36,12 +47,17 @@ pub(super) fn worst_window(evidence: &Evidence) -> Window {
             best = (from, value);
         }
     }
-    Window { from: best.0, to: (best.0 + WINDOW_S).min(end.max(0.01)) }
+    Window {
+        from: best.0,
+        to: (best.0 + WINDOW_S).min(end.max(0.01)),
+    }
 }
 
 /// Six panels: accelerometer at the left, gyroscope at the right.
 pub(super) fn curves(evidence: &Evidence, window: Window) -> Vec<Panel> {
-    let Some(&first) = evidence.stamps.first() else { return Vec::new() };
+    let Some(&first) = evidence.stamps.first() else {
+        return Vec::new();
+    };
     let seconds = |stamp: &Stamp| *stamp - first;
     let inside: Vec<usize> = (0..evidence.stamps.len())
         .filter(|&index| {
@@ -60,21 +76,39 @@ pub(super) fn curves(evidence: &Evidence, window: Window) -> Vec<Panel> {
                     points.push((f64::NAN, f64::NAN));
                 }
                 last = Some(time);
-                points.push((time, values.get(index).map_or(f64::NAN, |value| value[axis])));
+                points.push((
+                    time,
+                    values.get(index).map_or(f64::NAN, |value| value[axis]),
+                ));
             }
             points
         };
         let series = vec![
-            Series { class: "measured", points: line(&evidence.measured) },
-            Series { class: "before", points: line(&evidence.before) },
-            Series { class: "after", points: line(&evidence.after) },
+            Series {
+                class: "measured",
+                points: line(&evidence.measured),
+            },
+            Series {
+                class: "before",
+                points: line(&evidence.before),
+            },
+            Series {
+                class: "after",
+                points: line(&evidence.after),
+            },
         ];
         Panel {
             title: axis_name(AXES[axis]),
             width: WIDTH,
             height: if axis % 3 == 2 { 166.0 } else { 154.0 },
             x: Axis::exact(window.from, window.to),
-            y: Axis::linear(series.iter().flat_map(|series| series.points.iter().map(|point| point.1)).collect::<Vec<_>>().into_iter()),
+            y: Axis::linear(
+                series
+                    .iter()
+                    .flat_map(|series| series.points.iter().map(|point| point.1))
+                    .collect::<Vec<_>>()
+                    .into_iter(),
+            ),
             x_label: "time since the first IMU message, s".to_owned(),
             y_label: unit(axis).to_owned(),
             shades: left_out(evidence, first, window),
@@ -82,7 +116,9 @@ pub(super) fn curves(evidence: &Evidence, window: Window) -> Vec<Panel> {
             series,
         }
     };
-    (0..3).flat_map(|axis| [panel(axis), panel(axis + 3)]).collect()
+    (0..3)
+        .flat_map(|axis| [panel(axis), panel(axis + 3)])
+        .collect()
 }
 
 fn unit(axis: usize) -> &'static str {
@@ -90,9 +126,17 @@ fn unit(axis: usize) -> &'static str {
 }
 
 fn median_step(evidence: &Evidence) -> f64 {
-    let mut steps: Vec<f64> = evidence.stamps.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let mut steps: Vec<f64> = evidence
+        .stamps
+        .windows(2)
+        .map(|pair| pair[1] - pair[0])
+        .collect();
     steps.sort_unstable_by(f64::total_cmp);
-    steps.get(steps.len() / 2).copied().unwrap_or(0.01).max(1e-6)
+    steps
+        .get(steps.len() / 2)
+        .copied()
+        .unwrap_or(0.01)
+        .max(1e-6)
 }
 
 /// Stretches that were not compared, from the first reading left out to the last.
@@ -120,12 +164,35 @@ fn left_out(evidence: &Evidence, first: Stamp, window: Window) -> Vec<(&'static 
 
 /// The whitened residual over time, one panel a channel; 1 is noise alone.
 pub(super) fn course(evidence: &Evidence, window: Window) -> Vec<Panel> {
-    let end = evidence.stamps.last().zip(evidence.stamps.first()).map_or(1.0, |(last, first)| *last - *first);
+    let end = evidence
+        .stamps
+        .last()
+        .zip(evidence.stamps.first())
+        .map_or(1.0, |(last, first)| *last - *first);
     let panel = |title: &str, before: fn(&CoursePoint) -> f64, after: fn(&CoursePoint) -> f64| {
-        let line = |of: fn(&CoursePoint) -> f64| evidence.course.iter().map(|point| (point.seconds, of(point))).collect::<Vec<_>>();
-        let series = vec![Series { class: "before", points: line(before) }, Series { class: "after", points: line(after) }];
+        let line = |of: fn(&CoursePoint) -> f64| {
+            evidence
+                .course
+                .iter()
+                .map(|point| (point.seconds, of(point)))
+                .collect::<Vec<_>>()
+        };
+        let series = vec![
+            Series {
+                class: "before",
+                points: line(before),
+            },
+            Series {
+                class: "after",
+                points: line(after),
+            },
+        ];
         // Room around the level of the noise even where nothing goes beyond it.
-        let values = series.iter().flat_map(|series| series.points.iter().map(|point| point.1)).chain([0.5, 3.0]).collect::<Vec<_>>();
+        let values = series
+            .iter()
+            .flat_map(|series| series.points.iter().map(|point| point.1))
+            .chain([0.5, 3.0])
+            .collect::<Vec<_>>();
         Panel {
             title: title.to_owned(),
             width: WIDTH,
@@ -143,8 +210,16 @@ pub(super) fn course(evidence: &Evidence, window: Window) -> Vec<Panel> {
         return Vec::new();
     }
     vec![
-        panel("accelerometer", |point| point.accel_before, |point| point.accel_after),
-        panel("gyroscope", |point| point.gyro_before, |point| point.gyro_after),
+        panel(
+            "accelerometer",
+            |point| point.accel_before,
+            |point| point.accel_after,
+        ),
+        panel(
+            "gyroscope",
+            |point| point.gyro_before,
+            |point| point.gyro_after,
+        ),
     ]
 }
 
@@ -159,12 +234,29 @@ pub(super) fn spectra(evidence: &Evidence, placement: &PlacementDiagnosis) -> Ve
             let axis = worst_axis(evidence, placement, first);
             let line = |values: &[[f64; 6]]| binned(&spectra.frequencies, values, axis);
             let series = vec![
-                Series { class: "measured", points: line(&spectra.measured) },
-                Series { class: "predicted", points: line(&spectra.predicted) },
-                Series { class: "before", points: line(&spectra.residual_before) },
-                Series { class: "after", points: line(&spectra.residual_after) },
+                Series {
+                    class: "measured",
+                    points: line(&spectra.measured),
+                },
+                Series {
+                    class: "predicted",
+                    points: line(&spectra.predicted),
+                },
+                Series {
+                    class: "before",
+                    points: line(&spectra.residual_before),
+                },
+                Series {
+                    class: "after",
+                    points: line(&spectra.residual_after),
+                },
             ];
-            let of = |pick: fn(&(f64, f64)) -> f64| series.iter().flat_map(|series| series.points.iter().map(pick)).collect::<Vec<_>>();
+            let of = |pick: fn(&(f64, f64)) -> f64| {
+                series
+                    .iter()
+                    .flat_map(|series| series.points.iter().map(pick))
+                    .collect::<Vec<_>>()
+            };
             Panel {
                 title: format!("{} (the axis with the largest gap)", axis_name(AXES[axis])),
                 width: WIDTH,
@@ -184,10 +276,19 @@ pub(super) fn spectra(evidence: &Evidence, placement: &PlacementDiagnosis) -> Ve
 /// The axis of a channel with the largest share, or else with the largest residual density.
 fn worst_axis(evidence: &Evidence, placement: &PlacementDiagnosis, first: usize) -> usize {
     let share = |axis: usize| placement.place.axes.get(AXES[axis]).copied().unwrap_or(0.0);
-    let power =
-        |axis: usize| evidence.spectra.residual_before.iter().map(|density| density[axis]).filter(|value| value.is_finite()).sum::<f64>();
+    let power = |axis: usize| {
+        evidence
+            .spectra
+            .residual_before
+            .iter()
+            .map(|density| density[axis])
+            .filter(|value| value.is_finite())
+            .sum::<f64>()
+    };
     let better = |one: usize, other: usize| {
-        let order = share(other).total_cmp(&share(one)).then(power(other).total_cmp(&power(one)));
+        let order = share(other)
+            .total_cmp(&share(one))
+            .then(power(other).total_cmp(&power(one)));
         if order.is_gt() { other } else { one }
     };
     better(better(first, first + 1), first + 2)
@@ -196,12 +297,20 @@ fn worst_axis(evidence: &Evidence, placement: &PlacementDiagnosis, first: usize)
 /// Means over bins of equal width on the logarithmic axis; zero frequency left out.
 fn binned(frequencies: &[f64], values: &[[f64; 6]], axis: usize) -> Vec<(f64, f64)> {
     let mut bins: Vec<(i64, f64, f64, f64)> = Vec::new();
-    for (&frequency, value) in frequencies.iter().zip(values).filter(|(frequency, _)| **frequency > 0.0) {
+    for (&frequency, value) in frequencies
+        .iter()
+        .zip(values)
+        .filter(|(frequency, _)| **frequency > 0.0)
+    {
         let bin = (frequency.log10() * BINS_PER_DECADE).floor() as i64;
         match bins.last_mut() {
-            Some((last, count, hz, sum)) if *last == bin => (*count, *hz, *sum) = (*count + 1.0, *hz + frequency, *sum + value[axis]),
+            Some((last, count, hz, sum)) if *last == bin => {
+                (*count, *hz, *sum) = (*count + 1.0, *hz + frequency, *sum + value[axis])
+            }
             _ => bins.push((bin, 1.0, frequency, value[axis])),
         }
     }
-    bins.into_iter().map(|(_, count, hz, sum)| (hz / count, sum / count)).collect()
+    bins.into_iter()
+        .map(|(_, count, hz, sum)| (hz / count, sum / count))
+        .collect()
 }

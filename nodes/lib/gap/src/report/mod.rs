@@ -1,4 +1,5 @@
-//! A diagnosis as one HTML page: what is wrong, how sure that is, and how it looks; all in one file, with nothing to load.
+//! A diagnosis as one HTML page: what is wrong, how sure that is, and how it looks; all in one
+//! file, with nothing to load.
 
 mod causes;
 mod figures;
@@ -25,7 +26,12 @@ pub(crate) enum State {
 
 impl State {
     pub(crate) fn of(placement: &PlacementDiagnosis) -> Self {
-        if placement.unexplained.significant || placement.causes.iter().any(|cause| cause.effect == "unknown") {
+        if placement.unexplained.significant
+            || placement
+                .causes
+                .iter()
+                .any(|cause| cause.effect == "unknown")
+        {
             Self::Unexplained
         } else if placement.causes.is_empty() {
             Self::NoGap
@@ -51,7 +57,8 @@ impl State {
     }
 }
 
-/// The page. `evidence` is by placement; a placement without any has no pictures. The same input gives the same bytes.
+/// The page. `evidence` is by placement; a placement without any has no pictures. The same input
+/// gives the same bytes.
 pub fn html(diagnosis: &Diagnosis, evidence: &BTreeMap<String, Evidence>, title: &str) -> String {
     let mut placements: Vec<(&String, &PlacementDiagnosis)> = diagnosis.placements.iter().collect();
     // What needs attention first; by name among equals.

@@ -11,12 +11,22 @@ use super::{State, causes, place};
 use crate::{Evidence, Metrics, PlacementDiagnosis};
 
 /// The whole document.
-pub(super) fn page(placements: &[(&String, &PlacementDiagnosis)], evidence: &BTreeMap<String, Evidence>, title: &str) -> String {
+pub(super) fn page(
+    placements: &[(&String, &PlacementDiagnosis)],
+    evidence: &BTreeMap<String, Evidence>,
+    title: &str,
+) -> String {
     let mut page = String::new();
     page.push_str("<p class=\"soft\">Where simulated and real IMUs differ, which effect causes it, and how far the gap shrinks once that effect is added.</p>\n");
     write_summary(&mut page, placements);
     for (number, (name, placement)) in placements.iter().enumerate() {
-        write_placement(&mut page, number, name, placement, evidence.get(name.as_str()));
+        write_placement(
+            &mut page,
+            number,
+            name,
+            placement,
+            evidence.get(name.as_str()),
+        );
     }
     page.push_str(NOTES);
     document(title, "", &page)
@@ -30,7 +40,11 @@ const NOTES: &str = "<section><h3 style=\"margin-top:0\">How to read this</h3><u
 <li><b>±</b>: one standard error. Values within two of them from zero are dimmed.</li></ul></section>\n";
 
 fn change(before: f64, after: f64) -> String {
-    format!("{}<span class=\"to\">→</span>{}", significant(before, 3), significant(after, 3))
+    format!(
+        "{}<span class=\"to\">→</span>{}",
+        significant(before, 3),
+        significant(after, 3)
+    )
 }
 
 fn write_summary(page: &mut String, placements: &[(&String, &PlacementDiagnosis)]) {
@@ -57,7 +71,13 @@ fn write_summary(page: &mut String, placements: &[(&String, &PlacementDiagnosis)
     page.push_str("</tbody></table></div></section>\n");
 }
 
-fn write_placement(page: &mut String, number: usize, name: &str, placement: &PlacementDiagnosis, evidence: Option<&Evidence>) {
+fn write_placement(
+    page: &mut String,
+    number: usize,
+    name: &str,
+    placement: &PlacementDiagnosis,
+    evidence: Option<&Evidence>,
+) {
     let state = State::of(placement);
     let _ = write!(
         page,
@@ -101,11 +121,22 @@ fn legend(page: &mut String, entries: &[(&str, &str)]) {
 }
 
 fn write_curves(page: &mut String, evidence: &Evidence, window: Window) {
-    let _ = writeln!(page, "<h3>Curves of the worst {} seconds</h3>", trimmed(window.to - window.from, 2));
-    let mut entries = vec![("measured", "measured"), ("before", "simulated before"), ("after", "simulated after")];
+    let _ = writeln!(
+        page,
+        "<h3>Curves of the worst {} seconds</h3>",
+        trimmed(window.to - window.from, 2)
+    );
+    let mut entries = vec![
+        ("measured", "measured"),
+        ("before", "simulated before"),
+        ("after", "simulated after"),
+    ];
     let panels = figures::curves(evidence, window);
     if panels.iter().any(|panel| !panel.shades.is_empty()) {
-        entries.push(("left-out", "not compared: no reference, or repeated or clipped values"));
+        entries.push((
+            "left-out",
+            "not compared: no reference, or repeated or clipped values",
+        ));
     }
     legend(page, &entries);
     write_panels(page, &panels);
@@ -117,7 +148,15 @@ fn write_course(page: &mut String, evidence: &Evidence, window: Window) {
         return;
     }
     page.push_str("<h3>Residual over time</h3>\n");
-    legend(page, &[("before", "before"), ("after", "after"), ("level", "1: noise alone"), ("window", "the seconds shown above")]);
+    legend(
+        page,
+        &[
+            ("before", "before"),
+            ("after", "after"),
+            ("level", "1: noise alone"),
+            ("window", "the seconds shown above"),
+        ],
+    );
     write_panels(page, &panels);
 }
 
@@ -139,9 +178,22 @@ fn write_spectra(page: &mut String, evidence: &Evidence, placement: &PlacementDi
 
 fn write_rest(page: &mut String, placement: &PlacementDiagnosis) {
     let rest = &placement.unexplained;
-    let unknown: f64 = placement.causes.iter().filter(|cause| cause.effect == "unknown").map(|cause| cause.gap_share).sum();
-    let verdict = if rest.significant { "and holds structure that no named effect explains" } else { "and looks like noise" };
-    let _ = writeln!(page, "<h3>What is left</h3>\n<p>{} of the gap stays unexplained, {verdict}.</p>", percent(rest.share + unknown));
+    let unknown: f64 = placement
+        .causes
+        .iter()
+        .filter(|cause| cause.effect == "unknown")
+        .map(|cause| cause.gap_share)
+        .sum();
+    let verdict = if rest.significant {
+        "and holds structure that no named effect explains"
+    } else {
+        "and looks like noise"
+    };
+    let _ = writeln!(
+        page,
+        "<h3>What is left</h3>\n<p>{} of the gap stays unexplained, {verdict}.</p>",
+        percent(rest.share + unknown)
+    );
     if rest.significant {
         place::write_place(page, &rest.place);
     }
@@ -154,20 +206,53 @@ fn write_unidentifiable(page: &mut String, placement: &PlacementDiagnosis) {
     page.push_str("<h3>What this motion cannot tell</h3>\n<table><thead><tr><th>Effect</th><th>What would tell</th></tr></thead><tbody>\n");
     for entry in &placement.unidentifiable {
         let (effect, would_tell) = (escape(&entry.effect), escape(&entry.would_tell));
-        let _ = writeln!(page, "<tr><td><span class=\"effect\">{effect}</span></td><td>{would_tell}</td></tr>");
+        let _ = writeln!(
+            page,
+            "<tr><td><span class=\"effect\">{effect}</span></td><td>{would_tell}</td></tr>"
+        );
     }
     page.push_str("</tbody></table>\n");
 }
 
 fn write_metrics(page: &mut String, before: &Metrics, after: &Metrics) {
     let rows: [(&str, &str, f64, f64); 7] = [
-        ("Accelerometer RMSE", "m/s²", before.accel_rmse, after.accel_rmse),
+        (
+            "Accelerometer RMSE",
+            "m/s²",
+            before.accel_rmse,
+            after.accel_rmse,
+        ),
         ("Gyroscope RMSE", "rad/s", before.gyro_rmse, after.gyro_rmse),
-        ("Accelerometer log-spectral distance", "dB", before.accel_log_spectral_distance_db, after.accel_log_spectral_distance_db),
-        ("Gyroscope log-spectral distance", "dB", before.gyro_log_spectral_distance_db, after.gyro_log_spectral_distance_db),
-        ("Accelerometer Wasserstein-1 distance", "m/s²", before.accel_wasserstein, after.accel_wasserstein),
-        ("Gyroscope Wasserstein-1 distance", "rad/s", before.gyro_wasserstein, after.gyro_wasserstein),
-        ("Negative log-likelihood", "nats per sample", before.nll_per_sample, after.nll_per_sample),
+        (
+            "Accelerometer log-spectral distance",
+            "dB",
+            before.accel_log_spectral_distance_db,
+            after.accel_log_spectral_distance_db,
+        ),
+        (
+            "Gyroscope log-spectral distance",
+            "dB",
+            before.gyro_log_spectral_distance_db,
+            after.gyro_log_spectral_distance_db,
+        ),
+        (
+            "Accelerometer Wasserstein-1 distance",
+            "m/s²",
+            before.accel_wasserstein,
+            after.accel_wasserstein,
+        ),
+        (
+            "Gyroscope Wasserstein-1 distance",
+            "rad/s",
+            before.gyro_wasserstein,
+            after.gyro_wasserstein,
+        ),
+        (
+            "Negative log-likelihood",
+            "nats per sample",
+            before.nll_per_sample,
+            after.nll_per_sample,
+        ),
     ];
     page.push_str(
         "<details><summary>All measures of the gap</summary><table><thead><tr><th>Measure</th><th>Unit</th><th class=\"r\">Before</th>\
@@ -175,7 +260,10 @@ fn write_metrics(page: &mut String, before: &Metrics, after: &Metrics) {
     );
     for (name, unit, before, after) in rows {
         let (before, after) = (significant(before, 4), significant(after, 4));
-        let _ = writeln!(page, "<tr><td>{name}</td><td>{unit}</td><td class=\"r\">{before}</td><td class=\"r\">{after}</td></tr>");
+        let _ = writeln!(
+            page,
+            "<tr><td>{name}</td><td>{unit}</td><td class=\"r\">{before}</td><td class=\"r\">{after}</td></tr>"
+        );
     }
     page.push_str("</tbody></table></details>\n");
 }

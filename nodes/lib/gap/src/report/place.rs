@@ -13,13 +13,22 @@ const MOST_INTERVALS: usize = 8;
 
 /// Four groups; those without entries are left out.
 pub(super) fn write_place(page: &mut String, place: &Place) {
-    if place.channels.is_empty() && place.axes.is_empty() && place.bands_hz.is_empty() && place.intervals_s.is_empty() {
-        page.push_str("<p class=\"note\">Nothing to tell: the residual is as small as the noise.</p>\n");
+    if place.channels.is_empty()
+        && place.axes.is_empty()
+        && place.bands_hz.is_empty()
+        && place.intervals_s.is_empty()
+    {
+        page.push_str(
+            "<p class=\"note\">Nothing to tell: the residual is as small as the noise.</p>\n",
+        );
         return;
     }
     page.push_str("<div class=\"where\">\n");
     let named = |shares: &std::collections::BTreeMap<String, f64>| {
-        shares.iter().map(|(name, share)| (escape(&axis_name(name)), *share)).collect::<Vec<_>>()
+        shares
+            .iter()
+            .map(|(name, share)| (escape(&axis_name(name)), *share))
+            .collect::<Vec<_>>()
     };
     write_group(page, "By channel", &named(&place.channels));
     write_group(page, "By axis", &named(&place.axes));
@@ -34,18 +43,37 @@ fn write_group(page: &mut String, title: &str, shares: &[(String, f64)]) {
     }
     let _ = writeln!(page, "<div><h4>{title}</h4>");
     for (name, share) in shares {
-        let _ = writeln!(page, "<div class=\"share\"><span>{name}</span>{}<b>{}</b></div>", bar(*share), percent(*share));
+        let _ = writeln!(
+            page,
+            "<div class=\"share\"><span>{name}</span>{}<b>{}</b></div>",
+            bar(*share),
+            percent(*share)
+        );
     }
     page.push_str("</div>\n");
 }
 
 fn ranges(intervals: &[Interval], unit: &str) -> Vec<(String, f64)> {
-    let places = if intervals.iter().all(|interval| interval.from.fract() == 0.0 && interval.to.fract() == 0.0) { 0 } else { 1 };
+    let places = if intervals
+        .iter()
+        .all(|interval| interval.from.fract() == 0.0 && interval.to.fract() == 0.0)
+    {
+        0
+    } else {
+        1
+    };
     let name = |interval: &Interval| {
-        let to = if interval.to.is_finite() { decimals(interval.to, places) } else { "∞".to_owned() };
+        let to = if interval.to.is_finite() {
+            decimals(interval.to, places)
+        } else {
+            "∞".to_owned()
+        };
         format!("{} to {to} {unit}", decimals(interval.from, places))
     };
-    intervals.iter().map(|interval| (name(interval), interval.share)).collect()
+    intervals
+        .iter()
+        .map(|interval| (name(interval), interval.share))
+        .collect()
 }
 
 /// The intervals with the largest shares, in order of time.

@@ -66,20 +66,31 @@ impl Scene {
     /// The same with an effect.
     #[must_use]
     pub fn with(mut self, kind: EffectKind, values: &[f64]) -> Self {
-        self.effects.insert(Effect::new(kind, values.to_vec()).unwrap());
+        self.effects
+            .insert(Effect::new(kind, values.to_vec()).unwrap());
         self
     }
 
-    /// Another recording of the same device, `later` seconds on. The motion is of the same spectrum: where little but the reference's own error is
-    /// left, that error goes by the motion (some 15 % between two random ones, under the true effects too).
+    /// Another recording of the same device, `later` seconds on. The motion is of the same
+    /// spectrum: where little but the reference's own error is left, that error goes by the motion
+    /// (some 15 % between two random ones, under the true effects too).
     #[must_use]
     pub fn again(&self, later: f64) -> Self {
         let (motion, start) = (self.motion.later(later), self.start.plus_seconds(later));
-        Self { motion, seed: self.seed + 1000, start, ..self.clone() }
+        Self {
+            motion,
+            seed: self.seed + 1000,
+            start,
+            ..self.clone()
+        }
     }
 
     pub fn record(&self) -> PlacementRecord {
-        PlacementRecord { name: "wrist".to_owned(), reference: self.reference(), imu: self.imu() }
+        PlacementRecord {
+            name: "wrist".to_owned(),
+            reference: self.reference(),
+            imu: self.imu(),
+        }
     }
 
     fn value(&self, kind: EffectKind, index: usize) -> Option<f64> {
@@ -92,15 +103,26 @@ impl Scene {
         let (before, count) = (0.4137, ((self.seconds + 0.83) * REFERENCE_HZ) as usize);
         let margin = (MARGIN_S * REFERENCE_HZ) as usize;
         let seconds = |k: usize| (k as f64 - margin as f64) / REFERENCE_HZ - before;
-        let instants: Vec<_> = (0..count + 2 * margin).map(|k| self.motion.at(seconds(k))).collect();
+        let instants: Vec<_> = (0..count + 2 * margin)
+            .map(|k| self.motion.at(seconds(k)))
+            .collect();
         let channel = |of: &dyn Fn(&motion::Instant) -> f64| {
             let series: Vec<f64> = instants.iter().map(of).collect();
-            self.value(EffectKind::ReferenceSmoothing, 0).map_or(series.clone(), |cutoff_hz| zero_phase(&series, cutoff_hz))
+            self.value(EffectKind::ReferenceSmoothing, 0)
+                .map_or(series.clone(), |cutoff_hz| zero_phase(&series, cutoff_hz))
         };
         let position = [0, 1, 2].map(|axis| channel(&|now| now.position[axis]));
         let rotation = [0, 1, 2, 3].map(|part| channel(&|now| now.world_from_segment.coords[part]));
-        let scatter = [0, 1].map(|c| self.value(EffectKind::ReferenceNoise, c).unwrap_or(SCATTER[c]));
-        let tilt = self.effects.get(EffectKind::ReferenceTilt).map_or(Vector3::zeros(), |tilt| Vector3::from_row_slice(tilt.values()));
+        let scatter = [0, 1].map(|c| {
+            self.value(EffectKind::ReferenceNoise, c)
+                .unwrap_or(SCATTER[c])
+        });
+        let tilt = self
+            .effects
+            .get(EffectKind::ReferenceTilt)
+            .map_or(Vector3::zeros(), |tilt| {
+                Vector3::from_row_slice(tilt.values())
+            });
         let tilt = so3::exp(&tilt);
         let scale = self.value(EffectKind::ReferenceScale, 0).unwrap_or(1.0);
         let mut random = ChaCha12Rng::seed_from_u64(self.seed ^ 0x5eed);
@@ -110,29 +132,51 @@ impl Scene {
             if self.lost.iter().any(|lost| lost.contains(&seconds(k))) {
                 continue;
             }
-            let world_from_segment =
-                UnitQuaternion::from_quaternion(Quaternion::new(rotation[3][k], rotation[0][k], rotation[1][k], rotation[2][k]));
+            let world_from_segment = UnitQuaternion::from_quaternion(Quaternion::new(
+                rotation[3][k],
+                rotation[0][k],
+                rotation[1][k],
+                rotation[2][k],
+            ));
             series.stamps.push(self.start.plus_seconds(seconds(k)));
-            series.positions.push(tilt * Vector3::new(position[0][k], position[1][k], position[2][k]) * scale + noise[0] * scatter[0]);
-            series.rotations.push(tilt * world_from_segment * so3::exp(&(noise[1] * scatter[1])));
+            series.positions.push(
+                tilt * Vector3::new(position[0][k], position[1][k], position[2][k]) * scale
+                    + noise[0] * scatter[0],
+            );
+            series
+                .rotations
+                .push(tilt * world_from_segment * so3::exp(&(noise[1] * scatter[1])));
         }
         series
     }
 
-    /// The device's part of the effects on the exact kinematics, then noise, then what is digital, then losses.
+    /// The device's part of the effects on the exact kinematics, then noise, then what is digital,
+    /// then losses.
     fn imu(&self) -> ImuSeries {
         use EffectKind as K;
         let mut device = self.effects.clone();
-        for kind in [K::ReferenceNoise, K::ReferenceSmoothing, K::ReferenceTilt, K::ReferenceScale] {
+        for kind in [
+            K::ReferenceNoise,
+            K::ReferenceSmoothing,
+            K::ReferenceTilt,
+            K::ReferenceScale,
+        ] {
             device.remove(kind);
         }
         let model = SensorModel::new(&device, self.epoch);
-        let stamps: Vec<Stamp> = (0..(self.seconds * IMU_HZ) as usize).map(|k| self.start.plus_seconds(k as f64 / IMU_HZ)).collect();
-        let track = self.motion.track(self.start, -MARGIN_S, self.seconds + MARGIN_S, GRID_HZ);
+        let stamps: Vec<Stamp> = (0..(self.seconds * IMU_HZ) as usize)
+            .map(|k| self.start.plus_seconds(k as f64 / IMU_HZ))
+            .collect();
+        let track = self
+            .motion
+            .track(self.start, -MARGIN_S, self.seconds + MARGIN_S, GRID_HZ);
         let mut readings = model.read(&model.sensor(model.tissue(model.segment(&track))), &stamps);
         model.linear(&mut readings, &stamps);
         let beyond = model.noise_density();
-        let sigma = [SIGMA[0].hypot(beyond.0 * IMU_HZ.sqrt()), SIGMA[1].hypot(beyond.1 * IMU_HZ.sqrt())];
+        let sigma = [
+            SIGMA[0].hypot(beyond.0 * IMU_HZ.sqrt()),
+            SIGMA[1].hypot(beyond.1 * IMU_HZ.sqrt()),
+        ];
         let mut random = ChaCha12Rng::seed_from_u64(self.seed ^ 0xdece);
         for reading in &mut readings {
             reading.force += normal_vector(&mut random) * sigma[0];
@@ -142,7 +186,11 @@ impl Scene {
         let mut dropouts = Dropouts::new(self.effects.get(K::DroppedSamples), self.seed, "wrist");
         let there = |_: &(Stamp, Reading)| !dropouts.as_mut().is_some_and(Dropouts::next_is_lost);
         let (stamps, readings) = stamps.into_iter().zip(readings).filter(there).unzip();
-        ImuSeries { stamps, readings, declared: self.declared }
+        ImuSeries {
+            stamps,
+            readings,
+            declared: self.declared,
+        }
     }
 }
 
@@ -164,7 +212,11 @@ fn zero_phase(series: &[f64], cutoff_hz: f64) -> Vec<f64> {
 fn butterworth(series: &[f64], cutoff_hz: f64) -> Vec<f64> {
     let k = (PI * cutoff_hz / REFERENCE_HZ).tan();
     let norm = 1.0 + SQRT_2 * k + k * k;
-    let (b, a1, a2) = (k * k / norm, 2.0 * (k * k - 1.0) / norm, (1.0 - SQRT_2 * k + k * k) / norm);
+    let (b, a1, a2) = (
+        k * k / norm,
+        2.0 * (k * k - 1.0) / norm,
+        (1.0 - SQRT_2 * k + k * k) / norm,
+    );
     let (mut x, mut y) = ([series[0]; 2], [series[0]; 2]);
     let step = |&now: &f64| {
         let next = b * (now + 2.0 * x[0] + x[1]) - a1 * y[0] - a2 * y[1];

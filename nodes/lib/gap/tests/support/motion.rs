@@ -1,4 +1,5 @@
-//! Motions that are known exactly: position and rotation vector are sums of sinusoids, and all derivatives follow by hand.
+//! Motions that are known exactly: position and rotation vector are sums of sinusoids, and all
+//! derivatives follow by hand.
 
 use std::f64::consts::TAU;
 
@@ -33,7 +34,8 @@ pub struct Instant {
 }
 
 impl Motion {
-    /// Ten terms from 0.2 to 4 Hz each: some 4 m/s2 and 2 rad/s (root mean square of the vectors), and 80 degrees of turn.
+    /// Ten terms from 0.2 to 4 Hz each: some 4 m/s2 and 2 rad/s (root mean square of the vectors),
+    /// and 80 degrees of turn.
     pub fn random(seed: u64) -> Self {
         let mut random = ChaCha12Rng::seed_from_u64(seed);
         let terms = |random: &mut ChaCha12Rng, order: i32, size: f64, most: f64| {
@@ -42,11 +44,18 @@ impl Motion {
                 let hz = 0.2 * 20f64.powf((f64::from(k) + random.random_range(0.1..0.9)) / 10.0);
                 let largest = (size / (TAU * hz).powi(order)).min(most);
                 let amplitude = Vector3::from_fn(|_, _| largest * random.random_range(0.6..1.4));
-                Term { hz, amplitude, phase: Vector3::from_fn(|_, _| random.random_range(0.0..TAU)) }
+                Term {
+                    hz,
+                    amplitude,
+                    phase: Vector3::from_fn(|_, _| random.random_range(0.0..TAU)),
+                }
             };
             (0..10).map(|k| term(k, random)).collect()
         };
-        Self { position: terms(&mut random, 2, 1.2, 0.3), rotation: terms(&mut random, 1, 0.5, 0.4) }
+        Self {
+            position: terms(&mut random, 2, 1.2, 0.3),
+            rotation: terms(&mut random, 1, 0.5, 0.4),
+        }
     }
 
     /// Rest at the origin, level.
@@ -57,9 +66,18 @@ impl Motion {
     /// The same motion some seconds on: other poses, the same spectrum.
     pub fn later(&self, seconds: f64) -> Self {
         let shifted = |terms: &[Term]| {
-            terms.iter().map(|term| Term { phase: term.phase.add_scalar(TAU * term.hz * seconds), ..term.clone() }).collect()
+            terms
+                .iter()
+                .map(|term| Term {
+                    phase: term.phase.add_scalar(TAU * term.hz * seconds),
+                    ..term.clone()
+                })
+                .collect()
         };
-        Self { position: shifted(&self.position), rotation: shifted(&self.rotation) }
+        Self {
+            position: shifted(&self.position),
+            rotation: shifted(&self.rotation),
+        }
     }
 
     pub fn at(&self, t: f64) -> Instant {
@@ -67,14 +85,19 @@ impl Motion {
         let [r, r_dot, r_ddot] = sum(&self.rotation, t);
         // Unit quaternion (c(x), s(x) r) of x = |r|^2: c = cos(|r|/2), s = sin(|r|/2) / |r|.
         let x = r.norm_squared();
-        let (x_dot, x_ddot) = (2.0 * r.dot(&r_dot), 2.0 * (r_dot.norm_squared() + r.dot(&r_ddot)));
+        let (x_dot, x_ddot) = (
+            2.0 * r.dot(&r_dot),
+            2.0 * (r_dot.norm_squared() + r.dot(&r_ddot)),
+        );
         let [c, s, s1, s2] = half_angle(x);
         let (c1, c2) = (-s / 4.0, -s1 / 4.0);
         let quaternion = |w: f64, v: Vector3<f64>| Quaternion::new(w, v.x, v.y, v.z);
         let q = quaternion(c, r * s);
         let q_dot = quaternion(c1 * x_dot, r * (s1 * x_dot) + r_dot * s);
-        let q_ddot =
-            quaternion(c2 * x_dot * x_dot + c1 * x_ddot, r * (s2 * x_dot * x_dot + s1 * x_ddot) + r_dot * (2.0 * s1 * x_dot) + r_ddot * s);
+        let q_ddot = quaternion(
+            c2 * x_dot * x_dot + c1 * x_ddot,
+            r * (s2 * x_dot * x_dot + s1 * x_ddot) + r_dot * (2.0 * s1 * x_dot) + r_ddot * s,
+        );
         Instant {
             position,
             acceleration_in_world,
@@ -87,11 +110,17 @@ impl Motion {
 
     /// The kinematics on a grid that begins `from` seconds after `zero`.
     pub fn track(&self, zero: Stamp, from: f64, to: f64, rate_hz: f64) -> KinematicTrack {
-        let mut track = KinematicTrack { start: zero.plus_seconds(from), rate_hz, ..KinematicTrack::default() };
+        let mut track = KinematicTrack {
+            start: zero.plus_seconds(from),
+            rate_hz,
+            ..KinematicTrack::default()
+        };
         for k in 0..((to - from) * rate_hz) as usize {
             let now = self.at(from + k as f64 / rate_hz);
             track.world_from_segment.push(now.world_from_segment);
-            track.acceleration.push(now.world_from_segment.inverse() * now.acceleration_in_world);
+            track
+                .acceleration
+                .push(now.world_from_segment.inverse() * now.acceleration_in_world);
             track.angular_velocity.push(now.angular_velocity);
             track.angular_acceleration.push(now.angular_acceleration);
         }
@@ -104,7 +133,10 @@ fn sum(terms: &[Term], t: f64) -> [Vector3<f64>; 3] {
     let [mut value, mut first, mut second] = [Vector3::zeros(); 3];
     for term in terms {
         let rate = TAU * term.hz;
-        let (sine, cosine) = (term.phase.map(|phase| (rate * t + phase).sin()), term.phase.map(|phase| (rate * t + phase).cos()));
+        let (sine, cosine) = (
+            term.phase.map(|phase| (rate * t + phase).sin()),
+            term.phase.map(|phase| (rate * t + phase).cos()),
+        );
         value += term.amplitude.component_mul(&sine);
         first += term.amplitude.component_mul(&cosine) * rate;
         second -= term.amplitude.component_mul(&sine) * (rate * rate);
@@ -115,7 +147,12 @@ fn sum(terms: &[Term], t: f64) -> [Vector3<f64>; 3] {
 /// c, s and the first two derivatives of s; near zero by their series.
 fn half_angle(x: f64) -> [f64; 4] {
     if x < 1e-4 {
-        return [1.0 - x / 8.0 + x * x / 384.0, 0.5 - x / 48.0 + x * x / 3840.0, -1.0 / 48.0 + x / 1920.0, 1.0 / 1920.0];
+        return [
+            1.0 - x / 8.0 + x * x / 384.0,
+            0.5 - x / 48.0 + x * x / 3840.0,
+            -1.0 / 48.0 + x / 1920.0,
+            1.0 / 1920.0,
+        ];
     }
     let angle = x.sqrt();
     let (c, s) = ((angle / 2.0).cos(), (angle / 2.0).sin() / angle);

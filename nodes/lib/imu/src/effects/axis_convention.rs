@@ -29,9 +29,25 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
 fn starts(view: &ResidualView) -> Vec<Vec<f64>> {
     let sum: Matrix3<f64> = view.outer_products().sum();
     // trace(M^T C) is greatest: for each order of the columns the signs of C's entries are best.
-    const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
-    let score = |order: &[usize; 3]| order.iter().enumerate().map(|(row, column)| sum[(row, *column)].abs()).sum::<f64>();
-    let order = ORDERS.into_iter().max_by(|a, b| score(a).total_cmp(&score(b))).unwrap_or(ORDERS[0]);
+    const ORDERS: [[usize; 3]; 6] = [
+        [0, 1, 2],
+        [0, 2, 1],
+        [1, 0, 2],
+        [1, 2, 0],
+        [2, 0, 1],
+        [2, 1, 0],
+    ];
+    let score = |order: &[usize; 3]| {
+        order
+            .iter()
+            .enumerate()
+            .map(|(row, column)| sum[(row, *column)].abs())
+            .sum::<f64>()
+    };
+    let order = ORDERS
+        .into_iter()
+        .max_by(|a, b| score(a).total_cmp(&score(b)))
+        .unwrap_or(ORDERS[0]);
     let mut flat = vec![0.0; 9];
     for (row, column) in order.into_iter().enumerate() {
         flat[3 * row + column] = if sum[(row, column)] < 0.0 { -1.0 } else { 1.0 };

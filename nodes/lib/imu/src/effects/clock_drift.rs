@@ -1,4 +1,5 @@
-//! `clock_drift`: the IMU's clock runs at another rate; with `time_offset` it makes stamps of true times.
+//! `clock_drift`: the IMU's clock runs at another rate; with `time_offset` it makes stamps of true
+//! times.
 
 use super::EffectKind;
 use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
@@ -9,7 +10,15 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
     stage: Stage::Timing,
     summary: "The IMU's clock runs fast (positive) or slow: the residual is proportional to the time derivative and grows with time.",
     remedy: "Discipline the clock (PTP, a common oscillator), or stretch the stamps by this rate.",
-    parameters: &[ParameterSpec { name: "ppm", unit: "1e-6", shape: Shape::Scalar, neutral: &[0.0], lower: -1e5, upper: 1e5, step: 0.1 }],
+    parameters: &[ParameterSpec {
+        name: "ppm",
+        unit: "1e-6",
+        shape: Shape::Scalar,
+        neutral: &[0.0],
+        lower: -1e5,
+        upper: 1e5,
+        step: 0.1,
+    }],
     random: false,
     continuous: true,
     starts,

@@ -13,8 +13,24 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
     summary: "Messages are lost: the stamps have gaps of whole intervals, the readings that are there stay right.",
     remedy: "Find the loss (radio, queue sizes, bandwidth), or log on the device.",
     parameters: &[
-        ParameterSpec { name: "fraction", unit: "", shape: Shape::Scalar, neutral: &[0.0], lower: 0.0, upper: 0.99, step: 1e-4 },
-        ParameterSpec { name: "mean_burst", unit: "samples", shape: Shape::Scalar, neutral: &[1.0], lower: 1.0, upper: 1e6, step: 1e-2 },
+        ParameterSpec {
+            name: "fraction",
+            unit: "",
+            shape: Shape::Scalar,
+            neutral: &[0.0],
+            lower: 0.0,
+            upper: 0.99,
+            step: 1e-4,
+        },
+        ParameterSpec {
+            name: "mean_burst",
+            unit: "samples",
+            shape: Shape::Scalar,
+            neutral: &[1.0],
+            lower: 1.0,
+            upper: 1e6,
+            step: 1e-2,
+        },
     ],
     random: true,
     continuous: false,
@@ -23,21 +39,31 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
 
 /// Read off the gaps between stamps.
 fn starts(view: &ResidualView) -> Vec<Vec<f64>> {
-    let intervals: Vec<f64> = view.stamps.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let intervals: Vec<f64> = view
+        .stamps
+        .windows(2)
+        .map(|pair| pair[1] - pair[0])
+        .collect();
     let usual = median(&mut intervals.clone());
     if usual <= 0.0 {
         return vec![SPEC.neutral()];
     }
-    let missing = intervals.iter().map(|interval| (interval / usual).round() - 1.0).filter(|lost| *lost > 0.0);
+    let missing = intervals
+        .iter()
+        .map(|interval| (interval / usual).round() - 1.0)
+        .filter(|lost| *lost > 0.0);
     let (bursts, lost) = missing.fold((0.0, 0.0), |(bursts, sum), lost| (bursts + 1.0, sum + lost));
     if bursts == 0.0 {
         return vec![SPEC.neutral()];
     }
-    vec![vec![(lost / (lost + view.stamps.len() as f64)).min(0.99), lost / bursts]]
+    vec![vec![
+        (lost / (lost + view.stamps.len() as f64)).min(0.99),
+        lost / bursts,
+    ]]
 }
 
-/// Which samples are lost: a chain of two states (Gilbert 1960). A burst goes on with probability 1 - 1/mean_burst, and begins so often that
-/// the fraction comes out.
+/// Which samples are lost: a chain of two states (Gilbert 1960). A burst goes on with probability 1
+/// - 1/mean_burst, and begins so often that the fraction comes out.
 #[derive(Clone, Debug)]
 pub struct Dropouts {
     begins: f64,
@@ -47,18 +73,28 @@ pub struct Dropouts {
 }
 
 impl Dropouts {
-    /// The losses of one placement; none where the effect is none. The same seed and name lose the same samples.
+    /// The losses of one placement; none where the effect is none. The same seed and name lose the
+    /// same samples.
     pub fn new(effect: Option<&Effect>, seed: u64, placement: &str) -> Option<Self> {
         let (fraction, mean_burst) = (effect?.scalar(0), effect?.scalar(1));
         let ends = mean_burst.recip();
         let begins = (ends * fraction / (1.0 - fraction)).min(1.0);
-        (fraction > 0.0).then(|| Self { begins, ends, lost: false, random: noise::stream(seed, placement, noise::DROPOUT_CHANNEL) })
+        (fraction > 0.0).then(|| Self {
+            begins,
+            ends,
+            lost: false,
+            random: noise::stream(seed, placement, noise::DROPOUT_CHANNEL),
+        })
     }
 
     /// Whether the next sample is lost.
     pub fn next_is_lost(&mut self) -> bool {
         let chance = noise::uniform(&mut self.random);
-        self.lost = if self.lost { chance >= self.ends } else { chance < self.begins };
+        self.lost = if self.lost {
+            chance >= self.ends
+        } else {
+            chance < self.begins
+        };
         self.lost
     }
 }

@@ -17,25 +17,45 @@ impl Effect {
     /// An effect with flat values, matrices row by row, in the order of its parameters.
     ///
     /// # Errors
-    /// [`EffectError`] for a wrong number of values, values that are not finite or out of bounds, an `axis_convention` that is no signed permutation.
+    /// [`EffectError`] for a wrong number of values, values that are not finite or out of bounds,
+    /// an `axis_convention` that is no signed permutation.
     pub fn new(kind: EffectKind, values: Vec<f64>) -> Result<Self, EffectError> {
         let (effect, spec) = (kind.name(), kind.spec());
         if values.len() != spec.len() {
-            return Err(EffectError::Length { effect, expected: spec.len(), found: values.len() });
+            return Err(EffectError::Length {
+                effect,
+                expected: spec.len(),
+                found: values.len(),
+            });
         }
         let mut rest = values.as_slice();
         for parameter in spec.parameters {
             let (own, after) = rest.split_at(parameter.shape.len());
             rest = after;
-            if let Some(&value) = own.iter().find(|value| !(parameter.lower..=parameter.upper).contains(*value)) {
+            if let Some(&value) = own
+                .iter()
+                .find(|value| !(parameter.lower..=parameter.upper).contains(*value))
+            {
                 let (field, lower, upper) = (parameter.name, parameter.lower, parameter.upper);
-                return Err(EffectError::OutOfRange { effect, field, value, lower, upper });
+                return Err(EffectError::OutOfRange {
+                    effect,
+                    field,
+                    value,
+                    lower,
+                    upper,
+                });
             }
             if matches!(parameter.shape, Shape::Choice(_)) && own[0].fract() != 0.0 {
-                return Err(EffectError::Malformed { effect, field: parameter.name.to_owned(), expected: "the number of a choice" });
+                return Err(EffectError::Malformed {
+                    effect,
+                    field: parameter.name.to_owned(),
+                    expected: "the number of a choice",
+                });
             }
         }
-        if kind == EffectKind::AxisConvention && !axis_convention::is_signed_permutation(&Matrix3::from_row_slice(&values)) {
+        if kind == EffectKind::AxisConvention
+            && !axis_convention::is_signed_permutation(&Matrix3::from_row_slice(&values))
+        {
             return Err(EffectError::Malformed {
                 effect,
                 field: "matrix".to_owned(),
@@ -47,7 +67,10 @@ impl Effect {
 
     /// The effect with values that change nothing.
     pub fn neutral(kind: EffectKind) -> Self {
-        Self { kind, values: kind.spec().neutral() }
+        Self {
+            kind,
+            values: kind.spec().neutral(),
+        }
     }
 
     /// Which effect.
@@ -88,7 +111,11 @@ impl Effect {
 
     /// The three values from a place on.
     pub(super) fn vector(&self, index: usize) -> Vector3<f64> {
-        Vector3::new(self.scalar(index), self.scalar(index + 1), self.scalar(index + 2))
+        Vector3::new(
+            self.scalar(index),
+            self.scalar(index + 1),
+            self.scalar(index + 2),
+        )
     }
 
     /// The first nine values as a matrix.
@@ -109,7 +136,10 @@ impl EffectSet {
 
     /// The effect of a kind.
     pub fn get(&self, kind: EffectKind) -> Option<&Effect> {
-        self.0.binary_search_by_key(&kind, Effect::kind).ok().map(|index| &self.0[index])
+        self.0
+            .binary_search_by_key(&kind, Effect::kind)
+            .ok()
+            .map(|index| &self.0[index])
     }
 
     /// Whether there is an effect of a kind.
@@ -130,13 +160,22 @@ impl EffectSet {
 
     /// Takes out the effect of a kind.
     pub fn remove(&mut self, kind: EffectKind) -> Option<Effect> {
-        self.0.binary_search_by_key(&kind, Effect::kind).ok().map(|index| self.0.remove(index))
+        self.0
+            .binary_search_by_key(&kind, Effect::kind)
+            .ok()
+            .map(|index| self.0.remove(index))
     }
 
     /// The set without a kind.
     #[must_use]
     pub fn without(&self, kind: EffectKind) -> Self {
-        Self(self.0.iter().filter(|effect| effect.kind != kind).cloned().collect())
+        Self(
+            self.0
+                .iter()
+                .filter(|effect| effect.kind != kind)
+                .cloned()
+                .collect(),
+        )
     }
 
     /// The set with an effect, which replaces that of its kind.

@@ -44,12 +44,20 @@ const NAMES: [&str; 32] = [
 
 /// Values of some size that are allowed.
 fn example(kind: EffectKind) -> Effect {
-    let values = kind.spec().parameters.iter().flat_map(|parameter| match parameter.shape {
-        Shape::Choice(_) => vec![1.0],
-        Shape::Matrix3 if kind == EffectKind::AxisConvention => vec![0.0, 1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0],
-        Shape::Time => vec![1_700_000_000.25],
-        shape => (0..shape.len()).map(|k| (0.11 + 0.07 * k as f64).max(parameter.lower)).collect(),
-    });
+    let values = kind
+        .spec()
+        .parameters
+        .iter()
+        .flat_map(|parameter| match parameter.shape {
+            Shape::Choice(_) => vec![1.0],
+            Shape::Matrix3 if kind == EffectKind::AxisConvention => {
+                vec![0.0, 1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0]
+            }
+            Shape::Time => vec![1_700_000_000.25],
+            shape => (0..shape.len())
+                .map(|k| (0.11 + 0.07 * k as f64).max(parameter.lower))
+                .collect(),
+        });
     Effect::new(kind, values.collect()).unwrap()
 }
 
@@ -59,17 +67,44 @@ fn the_library_is_the_contracts_table() {
     assert!(EffectKind::ALL.is_sorted());
     for kind in EffectKind::ALL {
         let spec = kind.spec();
-        assert_eq!((spec.kind, EffectKind::from_name(spec.name)), (kind, Some(kind)));
-        assert!(spec.summary.ends_with('.') && spec.remedy.ends_with('.') && !spec.is_empty(), "{kind}");
+        assert_eq!(
+            (spec.kind, EffectKind::from_name(spec.name)),
+            (kind, Some(kind))
+        );
+        assert!(
+            spec.summary.ends_with('.') && spec.remedy.ends_with('.') && !spec.is_empty(),
+            "{kind}"
+        );
         for parameter in spec.parameters {
             assert_eq!(parameter.neutral.len(), parameter.shape.len(), "{kind}");
-            assert!(parameter.step > 0.0 && parameter.lower < parameter.upper, "{kind}");
+            assert!(
+                parameter.step > 0.0 && parameter.lower < parameter.upper,
+                "{kind}"
+            );
         }
-        assert_eq!(Effect::new(kind, spec.neutral()).unwrap(), Effect::neutral(kind));
-        assert_eq!(spec.stage == Stage::Reference, kind.name().starts_with("reference_"));
+        assert_eq!(
+            Effect::new(kind, spec.neutral()).unwrap(),
+            Effect::neutral(kind)
+        );
+        assert_eq!(
+            spec.stage == Stage::Reference,
+            kind.name().starts_with("reference_")
+        );
     }
-    let random: BTreeSet<&str> = EffectKind::ALL.iter().filter(|kind| kind.spec().random).map(|kind| kind.name()).collect();
-    assert_eq!(random, BTreeSet::from(["accel_noise", "dropped_samples", "gyro_noise", "reference_noise"]));
+    let random: BTreeSet<&str> = EffectKind::ALL
+        .iter()
+        .filter(|kind| kind.spec().random)
+        .map(|kind| kind.name())
+        .collect();
+    assert_eq!(
+        random,
+        BTreeSet::from([
+            "accel_noise",
+            "dropped_samples",
+            "gyro_noise",
+            "reference_noise"
+        ])
+    );
 }
 
 #[test]
@@ -78,37 +113,88 @@ fn effects_come_back_from_yaml() {
         for effect in [example(kind), Effect::neutral(kind)] {
             let text = serde_norway::to_string(&effect).unwrap();
             assert!(text.starts_with(&format!("effect: {kind}\n")), "{text}");
-            assert_eq!(serde_norway::from_str::<Effect>(&text).unwrap(), effect, "{text}");
+            assert_eq!(
+                serde_norway::from_str::<Effect>(&text).unwrap(),
+                effect,
+                "{text}"
+            );
         }
     }
     let all = EffectSet::try_from(EffectKind::ALL.map(example).to_vec()).unwrap();
-    assert_eq!(serde_norway::from_str::<EffectSet>(&serde_norway::to_string(&all).unwrap()).unwrap(), all);
-    let kinds: Vec<EffectKind> = serde_norway::from_str(&serde_norway::to_string(&EffectKind::ALL.to_vec()).unwrap()).unwrap();
+    assert_eq!(
+        serde_norway::from_str::<EffectSet>(&serde_norway::to_string(&all).unwrap()).unwrap(),
+        all
+    );
+    let kinds: Vec<EffectKind> =
+        serde_norway::from_str(&serde_norway::to_string(&EffectKind::ALL.to_vec()).unwrap())
+            .unwrap();
     assert_eq!(kinds, EffectKind::ALL);
 }
 
 #[test]
 fn parameters_are_found_by_name() {
     let vibration = Effect::new(EffectKind::Vibration, vec![20.0, 1.0, 2.0, 3.0, 0.5]).unwrap();
-    assert_eq!(vibration.parameter("amplitude"), Some([1.0, 2.0, 3.0].as_slice()));
+    assert_eq!(
+        vibration.parameter("amplitude"),
+        Some([1.0, 2.0, 3.0].as_slice())
+    );
     assert_eq!(vibration.parameter("phase"), Some([0.5].as_slice()));
     assert_eq!(vibration.parameter("speed"), None);
-    assert_eq!(vibration.with_values(vec![21.0, 1.0, 2.0, 3.0, 0.5]).unwrap().values()[0], 21.0);
+    assert_eq!(
+        vibration
+            .with_values(vec![21.0, 1.0, 2.0, 3.0, 0.5])
+            .unwrap()
+            .values()[0],
+        21.0
+    );
 }
 
 #[test]
 fn values_that_make_no_sense_are_refused() {
     let new = |kind, values: &[f64]| Effect::new(kind, values.to_vec()).unwrap_err();
-    assert!(matches!(new(EffectKind::AccelBias, &[0.0]), EffectError::Length { expected: 3, found: 1, .. }));
+    assert!(matches!(
+        new(EffectKind::AccelBias, &[0.0]),
+        EffectError::Length {
+            expected: 3,
+            found: 1,
+            ..
+        }
+    ));
     let nan = new(EffectKind::LowPass, &[f64::NAN]).to_string();
-    assert_eq!(nan, "low_pass: cutoff_hz: NaN is out of range; expected 0.1 to 10000");
-    assert!(matches!(new(EffectKind::DroppedSamples, &[1.5, 1.0]), EffectError::OutOfRange { field: "fraction", .. }));
-    assert!(matches!(new(EffectKind::GravityConvention, &[0.5]), EffectError::Malformed { .. }));
-    for matrix in [[1.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], [0.0; 9], [0.5, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]] {
-        assert!(new(EffectKind::AxisConvention, &matrix).to_string().contains("signed permutation"));
+    assert_eq!(
+        nan,
+        "low_pass: cutoff_hz: NaN is out of range; expected 0.1 to 10000"
+    );
+    assert!(matches!(
+        new(EffectKind::DroppedSamples, &[1.5, 1.0]),
+        EffectError::OutOfRange {
+            field: "fraction",
+            ..
+        }
+    ));
+    assert!(matches!(
+        new(EffectKind::GravityConvention, &[0.5]),
+        EffectError::Malformed { .. }
+    ));
+    for matrix in [
+        [1.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        [0.0; 9],
+        [0.5, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+    ] {
+        assert!(
+            new(EffectKind::AxisConvention, &matrix)
+                .to_string()
+                .contains("signed permutation")
+        );
     }
-    let twice = vec![example(EffectKind::LowPass), Effect::neutral(EffectKind::LowPass)];
-    assert_eq!(EffectSet::try_from(twice).unwrap_err().to_string(), "a second `low_pass`; give each effect once");
+    let twice = vec![
+        example(EffectKind::LowPass),
+        Effect::neutral(EffectKind::LowPass),
+    ];
+    assert_eq!(
+        EffectSet::try_from(twice).unwrap_err().to_string(),
+        "a second `low_pass`; give each effect once"
+    );
 }
 
 #[test]
@@ -116,11 +202,20 @@ fn sets_hold_one_of_each_kind_in_order() {
     let mut set = EffectSet::new();
     assert_eq!(set.insert(example(EffectKind::LowPass)), None);
     assert_eq!(set.insert(example(EffectKind::LeverArm)), None);
-    assert_eq!(set.insert(Effect::neutral(EffectKind::LowPass)), Some(example(EffectKind::LowPass)));
-    assert_eq!(set.iter().map(Effect::kind).collect::<Vec<_>>(), [EffectKind::LeverArm, EffectKind::LowPass]);
+    assert_eq!(
+        set.insert(Effect::neutral(EffectKind::LowPass)),
+        Some(example(EffectKind::LowPass))
+    );
+    assert_eq!(
+        set.iter().map(Effect::kind).collect::<Vec<_>>(),
+        [EffectKind::LeverArm, EffectKind::LowPass]
+    );
     assert_eq!(set.without(EffectKind::LowPass).len(), 1);
     assert!(set.contains(EffectKind::LowPass) && !set.contains(EffectKind::Vibration));
-    assert_eq!(set.remove(EffectKind::LeverArm), Some(example(EffectKind::LeverArm)));
+    assert_eq!(
+        set.remove(EffectKind::LeverArm),
+        Some(example(EffectKind::LeverArm))
+    );
     assert_eq!(set.remove(EffectKind::LeverArm), None);
     assert!(!set.is_empty() && set.get(EffectKind::LeverArm).is_none());
 }

@@ -26,7 +26,8 @@ const SCHEMA: &str = "cromosim/effects/1";
 ///       - {effect: lever_arm, offset: [0.05, 0.0, -0.06]}
 ///       - {effect: time_offset, seconds: 0.021}
 /// ```
-/// Parameters stand in SI units, see [`super::EffectSpec::parameters`]; a matrix is a list of three rows.
+/// Parameters stand in SI units, see [`super::EffectSpec::parameters`]; a matrix is a list of three
+/// rows.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct EffectsFile {
     /// By name.
@@ -76,21 +77,43 @@ impl EffectsFile {
     /// Parses a file's text; `file` names it in errors.
     ///
     /// # Errors
-    /// [`ImuError::Yaml`] naming placement, effect and field, [`ImuError::Schema`], [`ImuError::DeviceNumber`].
+    /// [`ImuError::Yaml`] naming placement, effect and field, [`ImuError::Schema`],
+    /// [`ImuError::DeviceNumber`].
     pub fn parse(text: &str, file: &str) -> Result<Self, ImuError> {
-        let raw: RawFile = serde_norway::from_str(text).map_err(|source| ImuError::Yaml { file: file.to_owned(), source })?;
+        let raw: RawFile = serde_norway::from_str(text).map_err(|source| ImuError::Yaml {
+            file: file.to_owned(),
+            source,
+        })?;
         if raw.schema != SCHEMA {
-            return Err(ImuError::Schema { file: file.to_owned(), expected: SCHEMA, found: raw.schema });
+            return Err(ImuError::Schema {
+                file: file.to_owned(),
+                expected: SCHEMA,
+                found: raw.schema,
+            });
         }
         let mut placements = BTreeMap::new();
         for (name, placement) in raw.placements {
             let noise = placement.declared_noise;
-            for (field, value) in [("accel_density", noise.accel_density), ("gyro_density", noise.gyro_density)] {
+            for (field, value) in [
+                ("accel_density", noise.accel_density),
+                ("gyro_density", noise.gyro_density),
+            ] {
                 if !(value >= 0.0 && value.is_finite()) {
-                    return Err(ImuError::DeviceNumber { file: format!("{file}: placement `{name}`"), field, value });
+                    return Err(ImuError::DeviceNumber {
+                        file: format!("{file}: placement `{name}`"),
+                        field,
+                        value,
+                    });
                 }
             }
-            placements.insert(name, PlacementEffects { epoch: placement.epoch.0, declared_noise: noise, effects: placement.effects });
+            placements.insert(
+                name,
+                PlacementEffects {
+                    epoch: placement.epoch.0,
+                    declared_noise: noise,
+                    effects: placement.effects,
+                },
+            );
         }
         Ok(Self { placements })
     }
@@ -100,15 +123,28 @@ impl EffectsFile {
     /// # Errors
     /// As [`EffectsFile::parse`], and [`ImuError::Unreadable`].
     pub fn read(path: &Path) -> Result<Self, ImuError> {
-        let text = std::fs::read_to_string(path).map_err(|source| ImuError::Unreadable { file: path.to_owned(), source })?;
+        let text = std::fs::read_to_string(path).map_err(|source| ImuError::Unreadable {
+            file: path.to_owned(),
+            source,
+        })?;
         Self::parse(&text, &path.display().to_string())
     }
 
     /// The file's text; parsed again it is the same to the last digit (times to the nanosecond).
     pub fn to_yaml(&self) -> String {
-        let mut text = format!("schema: {SCHEMA}\nplacements:{}\n", if self.placements.is_empty() { " {}" } else { "" });
+        let mut text = format!(
+            "schema: {SCHEMA}\nplacements:{}\n",
+            if self.placements.is_empty() {
+                " {}"
+            } else {
+                ""
+            }
+        );
         for (name, placement) in &self.placements {
-            let DeclaredNoise { accel_density, gyro_density } = placement.declared_noise;
+            let DeclaredNoise {
+                accel_density,
+                gyro_density,
+            } = placement.declared_noise;
             let (accel, gyro) = (number(accel_density), number(gyro_density));
             // Writing to a string cannot fail.
             let _ = write!(
@@ -116,7 +152,11 @@ impl EffectsFile {
                 "  {}:\n    epoch: {}\n    declared_noise: {{accel_density: {accel}, gyro_density: {gyro}}}\n    effects:{}\n",
                 key(name),
                 decimal(placement.epoch),
-                if placement.effects.is_empty() { " []" } else { "" }
+                if placement.effects.is_empty() {
+                    " []"
+                } else {
+                    ""
+                }
             );
             for effect in &placement.effects {
                 let _ = writeln!(text, "      - {}", flow(effect));
@@ -129,25 +169,51 @@ impl EffectsFile {
 /// `{effect: lever_arm, offset: [0.05, 0.0, -0.06]}`.
 fn flow(effect: &Effect) -> String {
     let mut text = format!("{{effect: {}", effect.kind().name());
-    let list = |values: &[f64]| format!("[{}]", values.iter().map(|value| number(*value)).collect::<Vec<_>>().join(", "));
+    let list = |values: &[f64]| {
+        format!(
+            "[{}]",
+            values
+                .iter()
+                .map(|value| number(*value))
+                .collect::<Vec<_>>()
+                .join(", ")
+        )
+    };
     for parameter in effect.kind().spec().parameters {
         let values = effect.parameter(parameter.name).unwrap_or_default();
         let value = match parameter.shape {
-            Shape::Scalar => values.first().map(|value| number(*value)).unwrap_or_default(),
-            Shape::Time => values.first().map(|value| format!("{value:.9}")).unwrap_or_default(),
+            Shape::Scalar => values
+                .first()
+                .map(|value| number(*value))
+                .unwrap_or_default(),
+            Shape::Time => values
+                .first()
+                .map(|value| format!("{value:.9}"))
+                .unwrap_or_default(),
             Shape::Vector3 => list(values),
-            Shape::Matrix3 => format!("[{}]", values.chunks(3).map(list).collect::<Vec<_>>().join(", ")),
-            Shape::Choice(words) => values.first().and_then(|value| words.get(*value as usize)).copied().unwrap_or_default().to_owned(),
+            Shape::Matrix3 => format!(
+                "[{}]",
+                values.chunks(3).map(list).collect::<Vec<_>>().join(", ")
+            ),
+            Shape::Choice(words) => values
+                .first()
+                .and_then(|value| words.get(*value as usize))
+                .copied()
+                .unwrap_or_default()
+                .to_owned(),
         };
         let _ = write!(text, ", {}: {value}", parameter.name);
     }
     text + "}"
 }
 
-/// The shortest digits that read back as the same number, with a point and a signed exponent, as YAML 1.1 asks for too.
+/// The shortest digits that read back as the same number, with a point and a signed exponent, as
+/// YAML 1.1 asks for too.
 fn number(value: f64) -> String {
     let text = format!("{value:?}");
-    let Some((mantissa, exponent)) = text.split_once('e') else { return text };
+    let Some((mantissa, exponent)) = text.split_once('e') else {
+        return text;
+    };
     let point = if mantissa.contains('.') { "" } else { ".0" };
     let sign = if exponent.starts_with('-') { "" } else { "+" };
     format!("{mantissa}{point}e{sign}{exponent}")
@@ -157,16 +223,26 @@ fn number(value: f64) -> String {
 fn decimal(stamp: Stamp) -> String {
     let sign = if stamp.nanos < 0 { "-" } else { "" };
     let nanos = stamp.nanos.unsigned_abs();
-    format!("{sign}{}.{:09}", nanos / 1_000_000_000, nanos % 1_000_000_000)
+    format!(
+        "{sign}{}.{:09}",
+        nanos / 1_000_000_000,
+        nanos % 1_000_000_000
+    )
 }
 
 /// A name as a key: in quotes where YAML would read something else than a string.
 fn key(name: &str) -> String {
-    const WORDS: [&str; 10] = ["true", "false", "null", "yes", "no", "on", "off", "y", "n", "nan"];
+    const WORDS: [&str; 10] = [
+        "true", "false", "null", "yes", "no", "on", "off", "y", "n", "nan",
+    ];
     let plain = name.starts_with(|c: char| c.is_ascii_alphabetic())
         && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
         && !WORDS.contains(&name.to_ascii_lowercase().as_str());
-    if plain { name.to_owned() } else { format!("'{}'", name.replace('\'', "''")) }
+    if plain {
+        name.to_owned()
+    } else {
+        format!("'{}'", name.replace('\'', "''"))
+    }
 }
 
 impl<'de> Deserialize<'de> for Seconds {
@@ -182,7 +258,11 @@ impl<'de> Deserialize<'de> for Seconds {
             fn visit_str<E: de::Error>(self, text: &str) -> Result<Seconds, E> {
                 nanoseconds(text)
                     .map(|nanos| Seconds(Stamp::from_nanos(nanos)))
-                    .ok_or_else(|| E::custom(format!("epoch: `{text}` is no number of seconds, such as 1700000000.500000000")))
+                    .ok_or_else(|| {
+                        E::custom(format!(
+                            "epoch: `{text}` is no number of seconds, such as 1700000000.500000000"
+                        ))
+                    })
             }
         }
         // As text: as a number it would be rounded to the quarter of a microsecond.
@@ -203,8 +283,17 @@ fn nanoseconds(text: &str) -> Option<i64> {
         return (seconds.abs() < 9e9).then(|| Stamp::from_seconds(seconds).nanos);
     }
     let nine: i64 = format!("{:0<9.9}", fraction).parse().ok()?;
-    let up = i64::from(fraction.as_bytes().get(9).is_some_and(|digit| *digit >= b'5'));
-    let nanos = whole.parse::<i64>().ok()?.checked_mul(1_000_000_000)?.checked_add(nine + up)?;
+    let up = i64::from(
+        fraction
+            .as_bytes()
+            .get(9)
+            .is_some_and(|digit| *digit >= b'5'),
+    );
+    let nanos = whole
+        .parse::<i64>()
+        .ok()?
+        .checked_mul(1_000_000_000)?
+        .checked_add(nine + up)?;
     Some(if negative { -nanos } else { nanos })
 }
 

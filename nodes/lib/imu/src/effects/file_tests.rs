@@ -15,7 +15,9 @@ placements:
 ";
 
 fn refusal(text: &str) -> String {
-    EffectsFile::parse(text, "effects.yaml").unwrap_err().to_string()
+    EffectsFile::parse(text, "effects.yaml")
+        .unwrap_err()
+        .to_string()
 }
 
 #[test]
@@ -24,30 +26,63 @@ fn files_come_back_to_the_last_digit() {
     assert_eq!(file.to_yaml(), YAML);
     let wrist = &file.placements["wrist"];
     assert_eq!(wrist.epoch.nanos, 1_700_000_000_123_456_789);
-    assert_eq!(wrist.effects.get(EffectKind::GravityConvention).unwrap().values(), [1.0]);
+    assert_eq!(
+        wrist
+            .effects
+            .get(EffectKind::GravityConvention)
+            .unwrap()
+            .values(),
+        [1.0]
+    );
     let mut all = file.clone();
     for kind in EffectKind::ALL {
-        all.placements.get_mut("wrist").unwrap().effects.insert(Effect::neutral(kind));
+        all.placements
+            .get_mut("wrist")
+            .unwrap()
+            .effects
+            .insert(Effect::neutral(kind));
     }
-    all.placements.insert("no".to_owned(), PlacementEffects { epoch: Stamp::from_nanos(-5), effects: EffectSet::new(), ..wrist.clone() });
+    all.placements.insert(
+        "no".to_owned(),
+        PlacementEffects {
+            epoch: Stamp::from_nanos(-5),
+            effects: EffectSet::new(),
+            ..wrist.clone()
+        },
+    );
     assert_eq!(EffectsFile::parse(&all.to_yaml(), "again").unwrap(), all);
-    assert_eq!(EffectsFile::parse(&EffectsFile::default().to_yaml(), "none").unwrap(), EffectsFile::default());
+    assert_eq!(
+        EffectsFile::parse(&EffectsFile::default().to_yaml(), "none").unwrap(),
+        EffectsFile::default()
+    );
 }
 
 #[test]
 fn a_matrix_may_be_flat_and_the_order_of_effects_is_free() {
-    let flat = YAML.replace("[[0.001, 0.0, 0.0], [0.0, 0.0, 1.0e-9], [0.0, 0.0, 0.0]]", "[0.001, 0, 0, 0, 0, 1e-9, 0, 0, 0]");
+    let flat = YAML.replace(
+        "[[0.001, 0.0, 0.0], [0.0, 0.0, 1.0e-9], [0.0, 0.0, 0.0]]",
+        "[0.001, 0, 0, 0, 0, 1e-9, 0, 0, 0]",
+    );
     assert_eq!(EffectsFile::parse(&flat, "f").unwrap().to_yaml(), YAML);
     let mut lines: Vec<&str> = YAML.lines().collect();
     lines.swap(6, 9);
-    assert_eq!(EffectsFile::parse(&lines.join("\n"), "f").unwrap().to_yaml(), YAML);
+    assert_eq!(
+        EffectsFile::parse(&lines.join("\n"), "f")
+            .unwrap()
+            .to_yaml(),
+        YAML
+    );
 }
 
 #[test]
 fn epochs_are_read_to_the_nanosecond() {
-    for (text, nanos) in
-        [("0.5", 500_000_000), ("-0.5", -500_000_000), ("7", 7_000_000_000), ("1.0000000015", 1_000_000_002), ("1.5e0", 1_500_000_000)]
-    {
+    for (text, nanos) in [
+        ("0.5", 500_000_000),
+        ("-0.5", -500_000_000),
+        ("7", 7_000_000_000),
+        ("1.0000000015", 1_000_000_002),
+        ("1.5e0", 1_500_000_000),
+    ] {
         assert_eq!(nanoseconds(text), Some(nanos), "{text}");
     }
     for text in ["", "x", "1.x", ".nan", "1e300"] {
@@ -58,13 +93,41 @@ fn epochs_are_read_to_the_nanosecond() {
 #[test]
 fn refusals_name_file_placement_effect_and_field() {
     for (from, to, expected) in [
-        ("offset: [0.05, 0.0, -0.06]", "offset: [0.05, 0.0]", "lever_arm: offset: expected a list of three numbers"),
-        ("offset: [0.05, 0.0, -0.06]", "offset: [0.05, 0.0, .nan]", "lever_arm: offset: NaN is out of range"),
-        ("offset: [0.05, 0.0, -0.06]", "ofset: [0.05, 0.0, -0.06]", "lever_arm: unknown field `ofset`"),
-        (", offset: [0.05, 0.0, -0.06]", "", "lever_arm: offset: expected once"),
-        ("effect: lever_arm", "effect: lever", "unknown effect `lever`"),
-        ("effect: lever_arm, offset: [0.05, 0.0, -0.06]", "effect: unknown", "`unknown`"),
-        ("mode: removed", "mode: gone", "gravity_convention: mode: expected one of kept, removed, negated"),
+        (
+            "offset: [0.05, 0.0, -0.06]",
+            "offset: [0.05, 0.0]",
+            "lever_arm: offset: expected a list of three numbers",
+        ),
+        (
+            "offset: [0.05, 0.0, -0.06]",
+            "offset: [0.05, 0.0, .nan]",
+            "lever_arm: offset: NaN is out of range",
+        ),
+        (
+            "offset: [0.05, 0.0, -0.06]",
+            "ofset: [0.05, 0.0, -0.06]",
+            "lever_arm: unknown field `ofset`",
+        ),
+        (
+            ", offset: [0.05, 0.0, -0.06]",
+            "",
+            "lever_arm: offset: expected once",
+        ),
+        (
+            "effect: lever_arm",
+            "effect: lever",
+            "unknown effect `lever`",
+        ),
+        (
+            "effect: lever_arm, offset: [0.05, 0.0, -0.06]",
+            "effect: unknown",
+            "`unknown`",
+        ),
+        (
+            "mode: removed",
+            "mode: gone",
+            "gravity_convention: mode: expected one of kept, removed, negated",
+        ),
         (
             "effect: mount_slip, at: 1700000030.250000000, rotvec: [0.1, 0.0, 0.2]",
             "effect: lever_arm, offset: [0, 0, 0]",
@@ -73,10 +136,15 @@ fn refusals_name_file_placement_effect_and_field() {
     ] {
         let message = refusal(&YAML.replacen(from, to, 1));
         println!("{message}");
-        assert!(message.starts_with("effects.yaml: placements.wrist") && message.contains(expected), "{message}");
+        assert!(
+            message.starts_with("effects.yaml: placements.wrist") && message.contains(expected),
+            "{message}"
+        );
         assert_eq!(message.lines().count(), 1);
     }
-    assert!(refusal(&YAML.replace("0.0014", "-1")).contains("placement `wrist`: accel_density: -1"));
+    assert!(
+        refusal(&YAML.replace("0.0014", "-1")).contains("placement `wrist`: accel_density: -1")
+    );
     assert!(refusal(&YAML.replace("1700000000.123456789", "soon")).contains("epoch: `soon`"));
     assert!(refusal(&YAML.replace("effects/1", "effects/2")).contains("cromosim/effects/2"));
     assert!(refusal(&YAML.replace("epoch", "epok")).contains("epok"));

@@ -31,6 +31,10 @@ fn starts(_: &ResidualView) -> Vec<Vec<f64>> {
 
 /// `alpha x l + w x (w x l)`, m/s2, all in segment axes.
 #[inline]
-pub(super) fn acceleration(offset: &Vector3<f64>, rate: &Vector3<f64>, angular_acceleration: &Vector3<f64>) -> Vector3<f64> {
+pub(super) fn acceleration(
+    offset: &Vector3<f64>,
+    rate: &Vector3<f64>,
+    angular_acceleration: &Vector3<f64>,
+) -> Vector3<f64> {
     angular_acceleration.cross(offset) + rate.cross(&rate.cross(offset))
 }

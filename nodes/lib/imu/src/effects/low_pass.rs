@@ -27,7 +27,9 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
 pub(super) const DAMPING_RATIO: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 fn starts(_: &ResidualView) -> Vec<Vec<f64>> {
-    [4.0, 8.0, 14.0, 25.0, 40.0].map(|cutoff_hz| vec![cutoff_hz]).to_vec()
+    [4.0, 8.0, 14.0, 25.0, 40.0]
+        .map(|cutoff_hz| vec![cutoff_hz])
+        .to_vec()
 }
 
 /// Gain and phase (rad, negative is late) at a frequency.

@@ -1,6 +1,8 @@
-//! Effects: what lies between an ideal IMU on the reference frame and a real one, one file an effect.
+//! Effects: what lies between an ideal IMU on the reference frame and a real one, one file an
+//! effect.
 //!
-//! With R, a, w the orientation, acceleration and angular velocity of the reference frame at the true time t, and the epoch t0:
+//! With R, a, w the orientation, acceleration and angular velocity of the reference frame at the
+//! true time t, and the epoch t0:
 //! ```text
 //! 1  f = R^T (a + alpha x l + w x (w x l) - g)                      lever_arm; reference_tilt, reference_scale, gravity_convention
 //! 2  f <- H f                                                       soft_tissue

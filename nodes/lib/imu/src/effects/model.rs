@@ -9,8 +9,8 @@ use super::clock_drift::Clock;
 use super::filter::SecondOrder;
 use super::vibration::Line;
 use super::{
-    Effect, EffectKind, EffectSet, Reading, gravity_convention, lever_arm, low_pass, misalignment, mount_rotation, mount_slip,
-    quantization, reference_tilt, sampling, saturation,
+    Effect, EffectKind, EffectSet, Reading, gravity_convention, lever_arm, low_pass, misalignment,
+    mount_rotation, mount_slip, quantization, reference_tilt, sampling, saturation,
 };
 use crate::GRAVITY_IN_WORLD;
 
@@ -27,7 +27,8 @@ pub struct GridTrace {
     pub rate: Vec<Vector3<f64>>,
 }
 
-/// The deterministic part of an [`EffectSet`], ready to run; the stages in the order of the measurement model, see [`crate::effects`].
+/// The deterministic part of an [`EffectSet`], ready to run; the stages in the order of the
+/// measurement model, see [`crate::effects`].
 ///
 /// ```text
 /// segment -> tissue -> sensor -> read -> linear -> (white noise) -> digital
@@ -67,8 +68,17 @@ pub(super) struct Channel {
 }
 
 impl Channel {
-    fn new(effects: &EffectSet, [bias, scale, misaligned, noise, drift, limit, lsb, factor]: [EffectKind; 8]) -> Self {
-        let scalar = |kind: EffectKind| effects.get(kind).map_or(kind.spec().parameters[0].neutral[0], |effect| effect.scalar(0));
+    fn new(
+        effects: &EffectSet,
+        [bias, scale, misaligned, noise, drift, limit, lsb, factor]: [EffectKind; 8],
+    ) -> Self {
+        let scalar = |kind: EffectKind| {
+            effects
+                .get(kind)
+                .map_or(kind.spec().parameters[0].neutral[0], |effect| {
+                    effect.scalar(0)
+                })
+        };
         let vector = |kind| effects.get(kind).map(|effect| effect.vector(0));
         let gains = vector(scale).map(|scale| Matrix3::from_diagonal(&scale));
         let cross = vector(misaligned).map(|upper| misalignment::matrix(&upper));
@@ -77,7 +87,15 @@ impl Channel {
             (gains, cross) => gains.or(cross),
         };
         let [density, limit, lsb, factor] = [noise, limit, lsb, factor].map(scalar);
-        Self { matrix, bias: vector(bias).unwrap_or_default(), drift: vector(drift).unwrap_or_default(), density, limit, lsb, factor }
+        Self {
+            matrix,
+            bias: vector(bias).unwrap_or_default(),
+            drift: vector(drift).unwrap_or_default(),
+            density,
+            limit,
+            lsb,
+            factor,
+        }
     }
 
     /// 7.
@@ -89,7 +107,9 @@ impl Channel {
     /// 8, after the noise.
     #[inline]
     pub(super) fn digital(&self, value: &Vector3<f64>) -> Vector3<f64> {
-        value.map(|value| quantization::round(saturation::clip(value, self.limit), self.lsb) * self.factor)
+        value.map(|value| {
+            quantization::round(saturation::clip(value, self.limit), self.lsb) * self.factor
+        })
     }
 }
 
@@ -98,7 +118,8 @@ impl SensorModel {
     pub fn new(effects: &EffectSet, epoch: Stamp) -> Self {
         use EffectKind as Kind;
         let vector = |kind, index| effects.get(kind).map(|effect| effect.vector(index));
-        let mount = vector(Kind::MountRotation, 0).map(|rotvec| mount_rotation::sensor_from_segment(&rotvec));
+        let mount = vector(Kind::MountRotation, 0)
+            .map(|rotvec| mount_rotation::sensor_from_segment(&rotvec));
         let axes = effects.get(Kind::AxisConvention).map(Effect::matrix);
         let sensor_from_segment = match (axes, mount) {
             (Some(axes), Some(mount)) => Some(axes * mount),
@@ -106,25 +127,42 @@ impl SensorModel {
         };
         let slipped = |slip: &Effect| {
             // M (R_mount R_slip)^T = M R_slip^T R_mount^T
-            let turned = mount_rotation::sensor_from_segment(&slip.vector(1)) * mount.unwrap_or_else(Matrix3::identity);
-            (mount_slip::since(epoch, slip.scalar(0)), axes.unwrap_or_else(Matrix3::identity) * turned)
+            let turned = mount_rotation::sensor_from_segment(&slip.vector(1))
+                * mount.unwrap_or_else(Matrix3::identity);
+            (
+                mount_slip::since(epoch, slip.scalar(0)),
+                axes.unwrap_or_else(Matrix3::identity) * turned,
+            )
         };
-        let mode = effects.get(Kind::GravityConvention).map_or(0.0, |effect| effect.scalar(0));
-        let gravity = vector(Kind::ReferenceTilt, 0).map_or(GRAVITY_IN_WORLD, |rotvec| reference_tilt::gravity(&rotvec));
+        let mode = effects
+            .get(Kind::GravityConvention)
+            .map_or(0.0, |effect| effect.scalar(0));
+        let gravity = vector(Kind::ReferenceTilt, 0)
+            .map_or(GRAVITY_IN_WORLD, |rotvec| reference_tilt::gravity(&rotvec));
         Self {
             epoch,
             gravity: gravity * gravity_convention::gravity_factor(mode),
-            inverse_scale: effects.get(Kind::ReferenceScale).map_or(1.0, |effect| effect.scalar(0).recip()),
+            inverse_scale: effects
+                .get(Kind::ReferenceScale)
+                .map_or(1.0, |effect| effect.scalar(0).recip()),
             lever_arm: vector(Kind::LeverArm, 0),
-            tissue: effects.get(Kind::SoftTissue).and_then(|effect| filter(effect, effect.scalar(1), true)),
+            tissue: effects
+                .get(Kind::SoftTissue)
+                .and_then(|effect| filter(effect, effect.scalar(1), true)),
             sensor_from_segment,
             slip: effects.get(Kind::MountSlip).map(slipped),
             coupling: effects.get(Kind::GyroGSensitivity).map(Effect::matrix),
-            low_pass: effects.get(Kind::LowPass).and_then(|effect| filter(effect, low_pass::DAMPING_RATIO, false)),
+            low_pass: effects
+                .get(Kind::LowPass)
+                .and_then(|effect| filter(effect, low_pass::DAMPING_RATIO, false)),
             vibration: effects.get(Kind::Vibration).map(Line::of),
             clock: Clock {
-                offset: effects.get(Kind::TimeOffset).map_or(0.0, |effect| effect.scalar(0)),
-                ppm: effects.get(Kind::ClockDrift).map_or(0.0, |effect| effect.scalar(0)),
+                offset: effects
+                    .get(Kind::TimeOffset)
+                    .map_or(0.0, |effect| effect.scalar(0)),
+                ppm: effects
+                    .get(Kind::ClockDrift)
+                    .map_or(0.0, |effect| effect.scalar(0)),
             },
             force: Channel::new(
                 effects,
@@ -155,21 +193,32 @@ impl SensorModel {
         }
     }
 
-    /// Specific force of the segment at the lever arm, with tilt and scale of the reference undone (1); segment axes:
-    /// `f = a / s + alpha x l + w x (w x l) - c R^T T g`, c = 1, 0 (removed) or -1 (negated).
+    /// Specific force of the segment at the lever arm, with tilt and scale of the reference undone
+    /// (1); segment axes: `f = a / s + alpha x l + w x (w x l) - c R^T T g`, c = 1, 0 (removed) or
+    /// -1 (negated).
     pub fn segment(&self, track: &KinematicTrack) -> GridTrace {
         let motion = track.acceleration.iter().zip(&track.world_from_segment);
         let mut force: Vec<Vector3<f64>> = motion
             .map(|(acceleration, world_from_segment)| {
-                acceleration * self.inverse_scale - world_from_segment.inverse_transform_vector(&self.gravity)
+                acceleration * self.inverse_scale
+                    - world_from_segment.inverse_transform_vector(&self.gravity)
             })
             .collect();
         if let Some(offset) = &self.lever_arm {
-            for ((force, rate), angular_acceleration) in force.iter_mut().zip(&track.angular_velocity).zip(&track.angular_acceleration) {
+            for ((force, rate), angular_acceleration) in force
+                .iter_mut()
+                .zip(&track.angular_velocity)
+                .zip(&track.angular_acceleration)
+            {
                 *force += lever_arm::acceleration(offset, rate, angular_acceleration);
             }
         }
-        GridTrace { start: track.start, rate_hz: track.rate_hz, force, rate: track.angular_velocity.clone() }
+        GridTrace {
+            start: track.start,
+            rate_hz: track.rate_hz,
+            force,
+            rate: track.angular_velocity.clone(),
+        }
     }
 
     /// Soft tissue under the sensor (2): on the specific force alone.
@@ -182,12 +231,19 @@ impl SensorModel {
 
     /// Mount and axes (3), coupling (5) and low-pass (6), without the vibration; sensor axes.
     ///
-    /// Where the mount slips, the axes stay the segment's and [`SensorModel::read`] turns and couples each reading: all of these are linear
-    /// and constant but for the slip, so their order does not matter but for what the low-pass remembers across it.
+    /// Where the mount slips, the axes stay the segment's and [`SensorModel::read`] turns and
+    /// couples each reading: all of these are linear and constant but for the slip, so their order
+    /// does not matter but for what the low-pass remembers across it.
     pub fn sensor(&self, mut trace: GridTrace) -> GridTrace {
         if self.slip.is_none() && (self.sensor_from_segment.is_some() || self.coupling.is_some()) {
             for (force, rate) in trace.force.iter_mut().zip(&mut trace.rate) {
-                let turned = self.turned(self.sensor_from_segment.as_ref(), &Reading { force: *force, rate: *rate });
+                let turned = self.turned(
+                    self.sensor_from_segment.as_ref(),
+                    &Reading {
+                        force: *force,
+                        rate: *rate,
+                    },
+                );
                 (*force, *rate) = (turned.force, turned.rate);
             }
         }
@@ -200,8 +256,15 @@ impl SensorModel {
 
     /// 3 and 5.
     #[inline]
-    pub(super) fn turned(&self, sensor_from_segment: Option<&Matrix3<f64>>, reading: &Reading) -> Reading {
-        let Reading { mut force, mut rate } = *reading;
+    pub(super) fn turned(
+        &self,
+        sensor_from_segment: Option<&Matrix3<f64>>,
+        reading: &Reading,
+    ) -> Reading {
+        let Reading {
+            mut force,
+            mut rate,
+        } = *reading;
         if let Some(turn) = sensor_from_segment {
             (force, rate) = (turn * force, turn * rate);
         }
@@ -211,24 +274,31 @@ impl SensorModel {
         Reading { force, rate }
     }
 
-    /// Readings at the true times of the stamps (9), with the vibration (4) in closed form; `trace` is that of [`SensorModel::sensor`].
-    /// Before and after the grid its ends are held.
+    /// Readings at the true times of the stamps (9), with the vibration (4) in closed form; `trace`
+    /// is that of [`SensorModel::sensor`]. Before and after the grid its ends are held.
     pub fn read(&self, trace: &GridTrace, stamps: &[Stamp]) -> Vec<Reading> {
         let start = trace.start - self.epoch;
         let vibration = self.vibration.map(|line| match &self.low_pass {
             Some(filter) => line.filtered(low_pass::response(filter.natural_hz, line.hz)),
             None => line,
         });
-        let slip = self.slip.map(|(at, after)| Slip::new(self, trace, start, at, after));
+        let slip = self
+            .slip
+            .map(|(at, after)| Slip::new(self, trace, start, at, after));
         let read = |stamp: &Stamp| {
             let seconds = self.clock.true_seconds(*stamp - self.epoch);
             let position = (seconds - start) * trace.rate_hz;
-            let mut reading = match sampling::Place::at(position, trace.force.len().min(trace.rate.len())) {
-                Some(place) => Reading { force: place.of(&trace.force), rate: place.of(&trace.rate) },
-                None => {
-                    Reading { force: sampling::interpolate(&trace.force, position), rate: sampling::interpolate(&trace.rate, position) }
-                }
-            };
+            let mut reading =
+                match sampling::Place::at(position, trace.force.len().min(trace.rate.len())) {
+                    Some(place) => Reading {
+                        force: place.of(&trace.force),
+                        rate: place.of(&trace.rate),
+                    },
+                    None => Reading {
+                        force: sampling::interpolate(&trace.force, position),
+                        rate: sampling::interpolate(&trace.rate, position),
+                    },
+                };
             if let Some(slip) = &slip {
                 reading = slip.turn(self, &reading, seconds);
             }
@@ -280,11 +350,15 @@ impl SensorModel {
 fn filter(effect: &Effect, damping_ratio: f64, base: bool) -> Option<SecondOrder> {
     let natural_hz = effect.scalar(0);
     let neutral = effect.kind().spec().parameters[0].neutral[0];
-    (natural_hz < neutral).then_some(SecondOrder { natural_hz, damping_ratio, base })
+    (natural_hz < neutral).then_some(SecondOrder {
+        natural_hz,
+        damping_ratio,
+        base,
+    })
 }
 
-/// A slip while sampling. The low-pass y of `u_1` before and `u_2` after the slip is that of `u_2` plus the decay of `y_1 - y_2`, both of
-/// which are the low-passed segment's in other axes.
+/// A slip while sampling. The low-pass y of `u_1` before and `u_2` after the slip is that of `u_2`
+/// plus the decay of `y_1 - y_2`, both of which are the low-passed segment's in other axes.
 struct Slip {
     at: f64,
     before: Matrix3<f64>,
@@ -294,14 +368,32 @@ struct Slip {
 }
 
 impl Slip {
-    fn new(model: &SensorModel, trace: &GridTrace, start: f64, at: f64, after: Matrix3<f64>) -> Self {
-        let position = ((at - start) * trace.rate_hz).clamp(0.0, trace.force.len().saturating_sub(1) as f64);
+    fn new(
+        model: &SensorModel,
+        trace: &GridTrace,
+        start: f64,
+        at: f64,
+        after: Matrix3<f64>,
+    ) -> Self {
+        let position =
+            ((at - start) * trace.rate_hz).clamp(0.0, trace.force.len().saturating_sub(1) as f64);
         let of = |sample: fn(&[Vector3<f64>], f64) -> Vector3<f64>, factor: f64| Reading {
             force: sample(&trace.force, position) * factor,
             rate: sample(&trace.rate, position) * factor,
         };
-        let memory = model.low_pass.map(|filter| (filter, of(sampling::interpolate, 1.0), of(sampling::derivative, trace.rate_hz)));
-        Self { at, before: model.sensor_from_segment.unwrap_or_else(Matrix3::identity), after, memory }
+        let memory = model.low_pass.map(|filter| {
+            (
+                filter,
+                of(sampling::interpolate, 1.0),
+                of(sampling::derivative, trace.rate_hz),
+            )
+        });
+        Self {
+            at,
+            before: model.sensor_from_segment.unwrap_or_else(Matrix3::identity),
+            after,
+            memory,
+        }
     }
 
     fn turn(&self, model: &SensorModel, reading: &Reading, seconds: f64) -> Reading {
@@ -317,7 +409,10 @@ impl Slip {
                     force: filter.homogeneous(since, &value.force, &derivative.force),
                     rate: filter.homogeneous(since, &value.rate, &derivative.rate),
                 };
-                let (old, new) = (model.turned(Some(&self.before), &decay), model.turned(Some(&self.after), &decay));
+                let (old, new) = (
+                    model.turned(Some(&self.before), &decay),
+                    model.turned(Some(&self.after), &decay),
+                );
                 turned.force += old.force - new.force;
                 turned.rate += old.rate - new.rate;
             }

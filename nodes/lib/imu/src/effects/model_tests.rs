@@ -11,18 +11,31 @@ use super::{Effect, EffectKind, EffectKind as Kind, EffectSet, Reading, SensorMo
 pub(super) const START: Stamp = Stamp::from_nanos(1_700_000_000_123_456_789);
 const G: f64 = 9.80665;
 
-/// A tumbling motion on a grid of 200 Hz: `w = (sin 2t, 0.5 cos 3t, 0.8)` and an acceleration of some m/s2, both in segment axes.
+/// A tumbling motion on a grid of 200 Hz: `w = (sin 2t, 0.5 cos 3t, 0.8)` and an acceleration of
+/// some m/s2, both in segment axes.
 pub(super) fn track(seconds: f64) -> KinematicTrack {
     let count = (seconds * 200.0) as usize + 1;
-    let mut track = KinematicTrack { start: START, rate_hz: 200.0, ..KinematicTrack::default() };
+    let mut track = KinematicTrack {
+        start: START,
+        rate_hz: 200.0,
+        ..KinematicTrack::default()
+    };
     let mut rotation = so3::exp(&Vector3::new(0.3, -0.2, 0.5));
     for k in 0..count {
         let t = k as f64 / 200.0;
         let rate = |t: f64| Vector3::new((2.0 * t).sin(), 0.5 * (3.0 * t).cos(), 0.8);
         track.world_from_segment.push(rotation);
         track.angular_velocity.push(rate(t));
-        track.angular_acceleration.push(Vector3::new(2.0 * (2.0 * t).cos(), -1.5 * (3.0 * t).sin(), 0.0));
-        track.acceleration.push(Vector3::new(3.0 * (5.0 * t).sin(), 2.0 * (4.0 * t).cos(), (7.0 * t).sin()));
+        track.angular_acceleration.push(Vector3::new(
+            2.0 * (2.0 * t).cos(),
+            -1.5 * (3.0 * t).sin(),
+            0.0,
+        ));
+        track.acceleration.push(Vector3::new(
+            3.0 * (5.0 * t).sin(),
+            2.0 * (4.0 * t).cos(),
+            (7.0 * t).sin(),
+        ));
         rotation *= so3::exp(&(rate(t + 0.0025) / 200.0));
     }
     track
@@ -34,7 +47,10 @@ fn on_grid(track: &KinematicTrack) -> Vec<Stamp> {
 }
 
 pub(super) fn set(effects: &[(Kind, &[f64])]) -> EffectSet {
-    let effects: Vec<Effect> = effects.iter().map(|(kind, values)| Effect::new(*kind, values.to_vec()).unwrap()).collect();
+    let effects: Vec<Effect> = effects
+        .iter()
+        .map(|(kind, values)| Effect::new(*kind, values.to_vec()).unwrap())
+        .collect();
     EffectSet::try_from(effects).unwrap()
 }
 
@@ -45,8 +61,13 @@ fn run(effects: &[(Kind, &[f64])], track: &KinematicTrack, stamps: &[Stamp]) -> 
 fn close(found: &[Reading], expected: impl Fn(usize) -> Reading, tolerance: f64) {
     for (k, found) in found.iter().enumerate() {
         let expected = expected(k);
-        let error = (found.force - expected.force).norm().max((found.rate - expected.rate).norm());
-        assert!(error < tolerance, "reading {k}: {found:?} against {expected:?}");
+        let error = (found.force - expected.force)
+            .norm()
+            .max((found.rate - expected.rate).norm());
+        assert!(
+            error < tolerance,
+            "reading {k}: {found:?} against {expected:?}"
+        );
     }
 }
 
@@ -54,7 +75,10 @@ fn close(found: &[Reading], expected: impl Fn(usize) -> Reading, tolerance: f64)
 fn ideal(track: &KinematicTrack, k: usize, arm: &Vector3<f64>) -> Reading {
     let (w, alpha) = (track.angular_velocity[k], track.angular_acceleration[k]);
     let up = track.world_from_segment[k].inverse() * Vector3::new(0.0, 0.0, G);
-    Reading { force: track.acceleration[k] + up + alpha.cross(arm) + w.cross(&w.cross(arm)), rate: w }
+    Reading {
+        force: track.acceleration[k] + up + alpha.cross(arm) + w.cross(&w.cross(arm)),
+        rate: w,
+    }
 }
 
 #[test]
@@ -79,28 +103,87 @@ fn effects_on_the_grid_act_as_by_hand() {
     let ideal = |k: usize| ideal(&track, k, &Vector3::zeros());
     let arm = Vector3::new(0.05, -0.1, 0.2);
     close(&run(&[], &track, &stamps), ideal, 1e-9);
-    close(&run(&[(Kind::LeverArm, arm.as_slice())], &track, &stamps), |k| self::ideal(&track, k, &arm), 1e-9);
+    close(
+        &run(&[(Kind::LeverArm, arm.as_slice())], &track, &stamps),
+        |k| self::ideal(&track, k, &arm),
+        1e-9,
+    );
     // segment_from_sensor turns the sensor's x onto the segment's y.
-    let mounted = run(&[(Kind::MountRotation, &[0.0, 0.0, FRAC_PI_2])], &track, &stamps);
+    let mounted = run(
+        &[(Kind::MountRotation, &[0.0, 0.0, FRAC_PI_2])],
+        &track,
+        &stamps,
+    );
     let turned = |v: Vector3<f64>| Vector3::new(v.y, -v.x, v.z);
-    close(&mounted, |k| Reading { force: turned(ideal(k).force), rate: turned(ideal(k).rate) }, 1e-9);
-    let swapped = run(&[(Kind::AxisConvention, &[0.0, 0.0, -1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0])], &track, &stamps);
+    close(
+        &mounted,
+        |k| Reading {
+            force: turned(ideal(k).force),
+            rate: turned(ideal(k).rate),
+        },
+        1e-9,
+    );
+    let swapped = run(
+        &[(
+            Kind::AxisConvention,
+            &[0.0, 0.0, -1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0],
+        )],
+        &track,
+        &stamps,
+    );
     let axes = |v: Vector3<f64>| Vector3::new(-v.z, v.x, v.y);
-    close(&swapped, |k| Reading { force: axes(ideal(k).force), rate: axes(ideal(k).rate) }, 1e-9);
+    close(
+        &swapped,
+        |k| Reading {
+            force: axes(ideal(k).force),
+            rate: axes(ideal(k).rate),
+        },
+        1e-9,
+    );
     let up = |k: usize| track.world_from_segment[k].inverse() * Vector3::new(0.0, 0.0, G);
     for (mode, factor) in [(0.0, 1.0), (1.0, 0.0), (2.0, -1.0)] {
         let read = run(&[(Kind::GravityConvention, &[mode])], &track, &stamps);
-        close(&read, |k| Reading { force: track.acceleration[k] + up(k) * factor, rate: track.angular_velocity[k] }, 1e-9);
+        close(
+            &read,
+            |k| Reading {
+                force: track.acceleration[k] + up(k) * factor,
+                rate: track.angular_velocity[k],
+            },
+            1e-9,
+        );
     }
     // The reported world leans by T: what is up in it is T up.
     let tilt = Vector3::new(0.02, -0.03, 0.0);
-    let leaning = |k: usize| track.world_from_segment[k].inverse() * (so3::exp(&tilt) * Vector3::new(0.0, 0.0, G));
-    let tilted = run(&[(Kind::ReferenceTilt, tilt.as_slice()), (Kind::ReferenceScale, &[2.0])], &track, &stamps);
-    close(&tilted, |k| Reading { force: track.acceleration[k] / 2.0 + leaning(k), rate: track.angular_velocity[k] }, 1e-9);
+    let leaning = |k: usize| {
+        track.world_from_segment[k].inverse() * (so3::exp(&tilt) * Vector3::new(0.0, 0.0, G))
+    };
+    let tilted = run(
+        &[
+            (Kind::ReferenceTilt, tilt.as_slice()),
+            (Kind::ReferenceScale, &[2.0]),
+        ],
+        &track,
+        &stamps,
+    );
+    close(
+        &tilted,
+        |k| Reading {
+            force: track.acceleration[k] / 2.0 + leaning(k),
+            rate: track.angular_velocity[k],
+        },
+        1e-9,
+    );
     let flat: Vec<f64> = (1..10).map(|k| 1e-3 * f64::from(k)).collect();
     let coupled = run(&[(Kind::GyroGSensitivity, &flat)], &track, &stamps);
     let g = Matrix3::from_row_slice(&flat);
-    close(&coupled, |k| Reading { force: ideal(k).force, rate: ideal(k).rate + g * ideal(k).force }, 1e-9);
+    close(
+        &coupled,
+        |k| Reading {
+            force: ideal(k).force,
+            rate: ideal(k).rate + g * ideal(k).force,
+        },
+        1e-9,
+    );
 }
 
 #[test]
@@ -124,7 +207,10 @@ fn each_reading_is_scaled_shifted_and_made_digital_as_by_hand() {
         let (f, w, t) = (ideal(k).force, ideal(k).rate, stamps[k] - START);
         let x = 1.1 * (f.x + 0.01 * f.y + 0.02 * f.z) + 0.1 + 0.01 * t;
         let force = Vector3::new(x, 0.9 * (f.y + 0.03 * f.z) + 0.2, f.z + 0.3 - 0.02 * t);
-        Reading { force, rate: Vector3::new(2.0 * w.x, w.y - 0.2, w.z) }
+        Reading {
+            force,
+            rate: Vector3::new(2.0 * w.x, w.y - 0.2, w.z),
+        }
     };
     close(&read, by_hand, 1e-9);
     let digital = run(
@@ -138,8 +224,19 @@ fn each_reading_is_scaled_shifted_and_made_digital_as_by_hand() {
         &stamps,
     );
     let clip = |v: f64| (v.clamp(-8.1, 8.1) / 0.5).round() * 0.5;
-    close(&digital, |k| Reading { force: ideal(k).force.map(clip), rate: ideal(k).rate.map(|v| (v / 0.1).round() * 100.0) }, 1e-9);
-    let density = SensorModel::new(&set(&[(Kind::AccelNoise, &[0.02]), (Kind::GyroNoise, &[0.003])]), START).noise_density();
+    close(
+        &digital,
+        |k| Reading {
+            force: ideal(k).force.map(clip),
+            rate: ideal(k).rate.map(|v| (v / 0.1).round() * 100.0),
+        },
+        1e-9,
+    );
+    let density = SensorModel::new(
+        &set(&[(Kind::AccelNoise, &[0.02]), (Kind::GyroNoise, &[0.003])]),
+        START,
+    )
+    .noise_density();
     assert_eq!(density, (0.02, 0.003));
 }
 
@@ -148,13 +245,28 @@ fn stamps_are_those_of_the_devices_clock() {
     let track = track(20.0);
     let clock: [(Kind, &[f64]); 2] = [(Kind::TimeOffset, &[0.031]), (Kind::ClockDrift, &[400.0])];
     // True times on the grid, stamped by the clock: t0 + (t - t0) 1.0004 + 0.031.
-    let stamps: Vec<Stamp> = on_grid(&track).iter().map(|t| START.plus_seconds((*t - START) * 1.0004 + 0.031)).collect();
-    close(&run(&clock, &track, &stamps), |k| ideal(&track, k, &Vector3::zeros()), 1e-7);
+    let stamps: Vec<Stamp> = on_grid(&track)
+        .iter()
+        .map(|t| START.plus_seconds((*t - START) * 1.0004 + 0.031))
+        .collect();
+    close(
+        &run(&clock, &track, &stamps),
+        |k| ideal(&track, k, &Vector3::zeros()),
+        1e-7,
+    );
     // Drift of the bias goes by true time.
-    let drifting: [(Kind, &[f64]); 3] = [clock[0], clock[1], (Kind::GyroBiasDrift, &[1.0, 0.0, 0.0])];
+    let drifting: [(Kind, &[f64]); 3] =
+        [clock[0], clock[1], (Kind::GyroBiasDrift, &[1.0, 0.0, 0.0])];
     let read = run(&drifting, &track, &stamps);
     let t = |k: usize| Vector3::new(k as f64 / 200.0, 0.0, 0.0);
-    close(&read, |k| Reading { rate: track.angular_velocity[k] + t(k), ..ideal(&track, k, &Vector3::zeros()) }, 1e-7);
+    close(
+        &read,
+        |k| Reading {
+            rate: track.angular_velocity[k] + t(k),
+            ..ideal(&track, k, &Vector3::zeros())
+        },
+        1e-7,
+    );
 }
 
 #[test]
@@ -165,41 +277,79 @@ fn a_slip_is_sharp_and_turns_the_mount_further() {
     let at = START.nanos as f64 * 1e-9 + 2.00271;
     let seconds = super::mount_slip::since(START, at);
     assert!((seconds - 2.00271).abs() < 3e-7);
-    let slipped = run(&[(Kind::MountRotation, mount.as_slice()), (Kind::MountSlip, &[at, slip.x, slip.y, slip.z])], &track, &stamps);
+    let slipped = run(
+        &[
+            (Kind::MountRotation, mount.as_slice()),
+            (Kind::MountSlip, &[at, slip.x, slip.y, slip.z]),
+        ],
+        &track,
+        &stamps,
+    );
     let before = run(&[(Kind::MountRotation, mount.as_slice())], &track, &stamps);
     let total = so3::log(&(so3::exp(&mount) * so3::exp(&slip)));
     let after = run(&[(Kind::MountRotation, total.as_slice())], &track, &stamps);
-    close(&slipped, |k| if stamps[k] - START < seconds { before[k] } else { after[k] }, 1e-9);
+    close(
+        &slipped,
+        |k| {
+            if stamps[k] - START < seconds {
+                before[k]
+            } else {
+                after[k]
+            }
+        },
+        1e-9,
+    );
 }
 
 #[test]
 fn the_low_pass_remembers_across_a_slip() {
     // Against the plain way: turn on a fine grid, then filter.
     let mut fine = track(4.0);
-    let ideal: Vec<Reading> = (0..fine.len()).map(|k| ideal(&fine, k, &Vector3::zeros())).collect();
+    let ideal: Vec<Reading> = (0..fine.len())
+        .map(|k| ideal(&fine, k, &Vector3::zeros()))
+        .collect();
     fine.start = START;
     let slip = Vector3::new(0.5, -0.9, 0.3);
     let g = [0.01, 0.0, 0.02, 0.0, -0.01, 0.0, 0.0, 0.03, 0.0];
     let at_index = 401;
     let at = START.nanos as f64 * 1e-9 + 2.0025;
-    let low_passed: [(Kind, &[f64]); 3] =
-        [(Kind::MountSlip, &[at, slip.x, slip.y, slip.z]), (Kind::LowPass, &[5.0]), (Kind::GyroGSensitivity, &g)];
+    let low_passed: [(Kind, &[f64]); 3] = [
+        (Kind::MountSlip, &[at, slip.x, slip.y, slip.z]),
+        (Kind::LowPass, &[5.0]),
+        (Kind::GyroGSensitivity, &g),
+    ];
     let read = run(&low_passed, &fine, &on_grid(&fine));
     let turned: Vec<Reading> = ideal
         .iter()
         .enumerate()
         .map(|(k, reading)| {
             let back = so3::exp(&slip).inverse();
-            let (force, rate) = if k < at_index { (reading.force, reading.rate) } else { (back * reading.force, back * reading.rate) };
-            Reading { force, rate: rate + Matrix3::from_row_slice(&g) * force }
+            let (force, rate) = if k < at_index {
+                (reading.force, reading.rate)
+            } else {
+                (back * reading.force, back * reading.rate)
+            };
+            Reading {
+                force,
+                rate: rate + Matrix3::from_row_slice(&g) * force,
+            }
         })
         .collect();
-    // Held straight between samples, the switch is a ramp over one interval around 2.0025 s: right to a part of the grid's interval.
-    let mut filter =
-        super::filter::Streamed::new(super::filter::SecondOrder { natural_hz: 5.0, damping_ratio: low_pass::DAMPING_RATIO, base: false });
+    // Held straight between samples, the switch is a ramp over one interval around 2.0025 s: right
+    // to a part of the grid's interval.
+    let mut filter = super::filter::Streamed::new(super::filter::SecondOrder {
+        natural_hz: 5.0,
+        damping_ratio: low_pass::DAMPING_RATIO,
+        base: false,
+    });
     let mut rates = filter.clone();
-    let plain: Vec<Reading> =
-        turned.iter().map(|reading| Reading { force: filter.push(reading.force, 0.005), rate: rates.push(reading.rate, 0.005) }).collect();
+    let plain: Vec<Reading> = turned
+        .iter()
+        .map(|reading| Reading {
+            force: filter.push(reading.force, 0.005),
+            rate: rates.push(reading.rate, 0.005),
+        })
+        .collect();
     close(&read, |k| plain[k], 0.02);
 }
 
@@ -219,8 +369,12 @@ fn vibration_passes_the_filter_and_reaches_the_gyroscope() {
     let by_hand = |gain: f64, delay: f64| {
         let stamps = &stamps;
         move |k: usize| {
-            let force = amplitude * (TAU * 31.7 * (stamps[k] - START) + 0.7 + delay).sin() * gain + gravity;
-            Reading { force, rate: Matrix3::from_row_slice(&g) * force }
+            let force =
+                amplitude * (TAU * 31.7 * (stamps[k] - START) + 0.7 + delay).sin() * gain + gravity;
+            Reading {
+                force,
+                rate: Matrix3::from_row_slice(&g) * force,
+            }
         }
     };
     close(&run(&plain, &still, &stamps), by_hand(1.0, 0.0), 1e-9);
@@ -228,7 +382,11 @@ fn vibration_passes_the_filter_and_reaches_the_gyroscope() {
     // 1 / (1 - r^2 + sqrt(2) i r) at r = 31.7 / 20.
     let r: f64 = 31.7 / 20.0;
     let (real, imaginary) = (1.0 - r * r, 2f64.sqrt() * r);
-    close(&run(&filtered, &still, &stamps), by_hand((1.0 + r.powi(4)).sqrt().recip(), -imaginary.atan2(real)), 1e-9);
+    close(
+        &run(&filtered, &still, &stamps),
+        by_hand((1.0 + r.powi(4)).sqrt().recip(), -imaginary.atan2(real)),
+        1e-9,
+    );
 }
 
 /// Pairs of effects that do not commute, with the result of the right order by hand at one time.
@@ -242,43 +400,122 @@ fn the_order_is_that_of_the_measurement_model() {
     // 3: axes after the mount.
     let rotvec = Vector3::new(0.7, 0.0, 0.0);
     let mount = so3::exp(&rotvec).inverse();
-    let read = run(&[(Kind::MountRotation, rotvec.as_slice()), (Kind::AxisConvention, &swap)], &track, &stamps);
-    close(&read, |k| Reading { force: m * (mount * ideal(k).force), rate: m * (mount * ideal(k).rate) }, 1e-9);
+    let read = run(
+        &[
+            (Kind::MountRotation, rotvec.as_slice()),
+            (Kind::AxisConvention, &swap),
+        ],
+        &track,
+        &stamps,
+    );
+    close(
+        &read,
+        |k| Reading {
+            force: m * (mount * ideal(k).force),
+            rate: m * (mount * ideal(k).rate),
+        },
+        1e-9,
+    );
     // 3 before 5: the coupling feels force in the chip's axes.
     let mut g = [0.0; 9];
     g[1] = 0.1;
-    let read = run(&[(Kind::AxisConvention, &swap), (Kind::GyroGSensitivity, &g)], &track, &stamps);
+    let read = run(
+        &[(Kind::AxisConvention, &swap), (Kind::GyroGSensitivity, &g)],
+        &track,
+        &stamps,
+    );
     close(
         &read,
-        |k| Reading { force: m * ideal(k).force, rate: m * ideal(k).rate + Matrix3::from_row_slice(&g) * m * ideal(k).force },
+        |k| Reading {
+            force: m * ideal(k).force,
+            rate: m * ideal(k).rate + Matrix3::from_row_slice(&g) * m * ideal(k).force,
+        },
         1e-9,
     );
-    // 5 before 7: the gyroscope does not feel the accelerometer's own bias, but its scale acts on what it feels.
-    let read =
-        run(&[(Kind::AccelBias, &[1.0, 1.0, 1.0]), (Kind::GyroScale, &[2.0, 1.0, 1.0]), (Kind::GyroGSensitivity, &g)], &track, &stamps);
-    let scaled = |k: usize| Vector3::new(2.0, 1.0, 1.0).component_mul(&(ideal(k).rate + Matrix3::from_row_slice(&g) * ideal(k).force));
-    close(&read, |k| Reading { force: ideal(k).force + Vector3::repeat(1.0), rate: scaled(k) }, 1e-9);
+    // 5 before 7: the gyroscope does not feel the accelerometer's own bias, but its scale acts on
+    // what it feels.
+    let read = run(
+        &[
+            (Kind::AccelBias, &[1.0, 1.0, 1.0]),
+            (Kind::GyroScale, &[2.0, 1.0, 1.0]),
+            (Kind::GyroGSensitivity, &g),
+        ],
+        &track,
+        &stamps,
+    );
+    let scaled = |k: usize| {
+        Vector3::new(2.0, 1.0, 1.0)
+            .component_mul(&(ideal(k).rate + Matrix3::from_row_slice(&g) * ideal(k).force))
+    };
+    close(
+        &read,
+        |k| Reading {
+            force: ideal(k).force + Vector3::repeat(1.0),
+            rate: scaled(k),
+        },
+        1e-9,
+    );
     // 7 before 8: bias, then the limit, then steps, then units.
     let read = run(
-        &[(Kind::AccelBias, &[5.0; 3]), (Kind::AccelSaturation, &[7.3]), (Kind::AccelQuantization, &[1.0]), (Kind::AccelUnits, &[0.1])],
+        &[
+            (Kind::AccelBias, &[5.0; 3]),
+            (Kind::AccelSaturation, &[7.3]),
+            (Kind::AccelQuantization, &[1.0]),
+            (Kind::AccelUnits, &[0.1]),
+        ],
         &track,
         &stamps,
     );
     let digital = |v: f64| (v + 5.0).clamp(-7.3, 7.3).round() * 0.1;
-    close(&read, |k| Reading { force: ideal(k).force.map(digital), rate: ideal(k).rate }, 1e-9);
+    close(
+        &read,
+        |k| Reading {
+            force: ideal(k).force.map(digital),
+            rate: ideal(k).rate,
+        },
+        1e-9,
+    );
     // 2 before 3 and on the force alone: tissue and mount commute, so the gyroscope is what tells.
     let tissue = run(&[(Kind::SoftTissue, &[2.0, 0.3])], &track, &stamps);
     assert!((0..stamps.len()).all(|k| (tissue[k].rate - ideal(k).rate).norm() < 1e-9));
     assert!((100..500).any(|k| (tissue[k].force - ideal(k).force).norm() > 0.3));
     // 1 before 2: the lever arm's force goes through the tissue.
     let arm = [0.3, 0.0, 0.0];
-    let both = run(&[(Kind::LeverArm, &arm), (Kind::SoftTissue, &[2.0, 0.3])], &track, &stamps);
-    let mut added: Vec<Vector3<f64>> =
-        (0..stamps.len()).map(|k| self::ideal(&track, k, &Vector3::from(arm)).force - ideal(k).force).collect();
-    super::filter::SecondOrder { natural_hz: 2.0, damping_ratio: 0.3, base: true }.apply(&mut added, 200.0);
-    close(&both, |k| Reading { force: tissue[k].force + added[k], rate: tissue[k].rate }, 1e-9);
+    let both = run(
+        &[(Kind::LeverArm, &arm), (Kind::SoftTissue, &[2.0, 0.3])],
+        &track,
+        &stamps,
+    );
+    let mut added: Vec<Vector3<f64>> = (0..stamps.len())
+        .map(|k| self::ideal(&track, k, &Vector3::from(arm)).force - ideal(k).force)
+        .collect();
+    super::filter::SecondOrder {
+        natural_hz: 2.0,
+        damping_ratio: 0.3,
+        base: true,
+    }
+    .apply(&mut added, 200.0);
+    close(
+        &both,
+        |k| Reading {
+            force: tissue[k].force + added[k],
+            rate: tissue[k].rate,
+        },
+        1e-9,
+    );
     // 5 before 6: what the gyroscope feels is low-passed once, with the rest.
     let low = run(&[(Kind::LowPass, &[3.0])], &track, &stamps);
-    let coupled = run(&[(Kind::LowPass, &[3.0]), (Kind::GyroGSensitivity, &g)], &track, &stamps);
-    close(&coupled, |k| Reading { force: low[k].force, rate: low[k].rate + Matrix3::from_row_slice(&g) * low[k].force }, 1e-9);
+    let coupled = run(
+        &[(Kind::LowPass, &[3.0]), (Kind::GyroGSensitivity, &g)],
+        &track,
+        &stamps,
+    );
+    close(
+        &coupled,
+        |k| Reading {
+            force: low[k].force,
+            rate: low[k].rate + Matrix3::from_row_slice(&g) * low[k].force,
+        },
+        1e-9,
+    );
 }

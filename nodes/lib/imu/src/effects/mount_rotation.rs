@@ -34,10 +34,13 @@ fn starts(view: &ResidualView) -> Vec<Vec<f64>> {
     vec![vec![0.0; 3], best.as_slice().to_vec()]
 }
 
-/// R that makes `sum |m - R^T s|^2` least, from `C = sum m s^T` (Kabsch 1976): `trace(R C)` is greatest.
+/// R that makes `sum |m - R^T s|^2` least, from `C = sum m s^T` (Kabsch 1976): `trace(R C)` is
+/// greatest.
 pub(super) fn best_rotation(sum: &Matrix3<f64>) -> UnitQuaternion<f64> {
     let svd = sum.transpose().svd(true, true);
-    let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else { return UnitQuaternion::identity() };
+    let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else {
+        return UnitQuaternion::identity();
+    };
     let sign = (u * v_t).determinant().signum();
     let rotation = u * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, sign)) * v_t;
     so3::rotation_from_matrix(&rotation, 1e-6).unwrap_or_else(|_| UnitQuaternion::identity())
@@ -45,5 +48,8 @@ pub(super) fn best_rotation(sum: &Matrix3<f64>) -> UnitQuaternion<f64> {
 
 /// `R_mount^T`, which turns segment axes into sensor axes; R_mount is segment_from_sensor.
 pub(super) fn sensor_from_segment(rotvec: &Vector3<f64>) -> Matrix3<f64> {
-    so3::exp(rotvec).to_rotation_matrix().into_inner().transpose()
+    so3::exp(rotvec)
+        .to_rotation_matrix()
+        .into_inner()
+        .transpose()
 }

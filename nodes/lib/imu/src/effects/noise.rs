@@ -43,11 +43,15 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
     starts: |view| starts(view, Channel::Gyro),
 };
 
-/// Variance of the third differences, by their median so that smooth model errors and outliers count little, less the declared.
+/// Variance of the third differences, by their median so that smooth model errors and outliers
+/// count little, less the declared.
 fn starts(view: &ResidualView, channel: Channel) -> Vec<Vec<f64>> {
     let residual: Vec<_> = view.residual(channel).collect();
     let third = |w: &[nalgebra::Vector3<f64>]| w[3] - w[2] * 3.0 + w[1] * 3.0 - w[0];
-    let mut differences: Vec<f64> = residual.windows(4).flat_map(|w| <[f64; 3]>::from(third(w).abs())).collect();
+    let mut differences: Vec<f64> = residual
+        .windows(4)
+        .flat_map(|w| <[f64; 3]>::from(third(w).abs()))
+        .collect();
     // 1 + 9 + 9 + 1 = 20 variances; the median of |x| is 0.6745 sigma.
     let sigma = median(&mut differences) / 0.674_489_750_196_081_7 / 20f64.sqrt();
     let beyond = (sigma.powi(2) - view.sigma(channel).powi(2)).max(0.0);

@@ -9,7 +9,15 @@ pub(super) static ACCEL: EffectSpec = EffectSpec {
     stage: Stage::Digital,
     summary: "The accelerometer rounds to steps: all readings lie on a lattice, and the residual is as wide as a step.",
     remedy: "Choose a smaller range or a device with more bits.",
-    parameters: &[ParameterSpec { name: "lsb", unit: "m/s2", shape: Shape::Scalar, neutral: &[0.0], lower: 0.0, upper: 1e6, step: 1e-6 }],
+    parameters: &[ParameterSpec {
+        name: "lsb",
+        unit: "m/s2",
+        shape: Shape::Scalar,
+        neutral: &[0.0],
+        lower: 0.0,
+        upper: 1e6,
+        step: 1e-6,
+    }],
     random: false,
     continuous: false,
     starts: |view| starts(view, Channel::Accel),
@@ -21,24 +29,41 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
     stage: Stage::Digital,
     summary: "The gyroscope rounds to steps: all readings lie on a lattice, and the residual is as wide as a step.",
     remedy: "Choose a smaller range or a device with more bits.",
-    parameters: &[ParameterSpec { name: "lsb", unit: "rad/s", shape: Shape::Scalar, neutral: &[0.0], lower: 0.0, upper: 1e6, step: 1e-7 }],
+    parameters: &[ParameterSpec {
+        name: "lsb",
+        unit: "rad/s",
+        shape: Shape::Scalar,
+        neutral: &[0.0],
+        lower: 0.0,
+        upper: 1e6,
+        step: 1e-7,
+    }],
     random: false,
     continuous: false,
     starts: |view| starts(view, Channel::Gyro),
 };
 
 fn starts(view: &ResidualView, channel: Channel) -> Vec<Vec<f64>> {
-    let mut values: Vec<f64> = view.pairs(channel).flat_map(|(m, _)| <[f64; 3]>::from(m)).collect();
+    let mut values: Vec<f64> = view
+        .pairs(channel)
+        .flat_map(|(m, _)| <[f64; 3]>::from(m))
+        .collect();
     vec![vec![lattice_spacing(&mut values).unwrap_or(0.0)]]
 }
 
-/// Spacing of the lattice through zero that all values lie on, where there is one: the greatest common divisor of the sorted values'
-/// differences, found by Euclid's steps down to 1e-7 of the largest value. Reorders the values.
+/// Spacing of the lattice through zero that all values lie on, where there is one: the greatest
+/// common divisor of the sorted values' differences, found by Euclid's steps down to 1e-7 of the
+/// largest value. Reorders the values.
 pub fn lattice_spacing(values: &mut [f64]) -> Option<f64> {
     values.sort_unstable_by(f64::total_cmp);
     let largest = values.first()?.abs().max(values.last()?.abs());
     let least = largest * 1e-7;
-    let differences = || values.windows(2).map(|pair| pair[1] - pair[0]).filter(|difference| *difference > 1e-3 * least);
+    let differences = || {
+        values
+            .windows(2)
+            .map(|pair| pair[1] - pair[0])
+            .filter(|difference| *difference > 1e-3 * least)
+    };
     let mut spacing = differences().fold(f64::INFINITY, f64::min);
     for difference in differences() {
         let mut rest = (difference - (difference / spacing).round() * spacing).abs();
@@ -59,11 +84,18 @@ pub fn lattice_spacing(values: &mut [f64]) -> Option<f64> {
     // The whole range fixes the spacing better than one difference.
     let steps = (largest / spacing).round();
     let spacing = largest / steps.max(1.0);
-    values.iter().all(|value| (value / spacing - (value / spacing).round()).abs() < 1e-3).then_some(spacing)
+    values
+        .iter()
+        .all(|value| (value / spacing - (value / spacing).round()).abs() < 1e-3)
+        .then_some(spacing)
 }
 
 /// Rounds to the nearest multiple of lsb.
 #[inline]
 pub(super) fn round(value: f64, lsb: f64) -> f64 {
-    if lsb > 0.0 { (value / lsb).round() * lsb } else { value }
+    if lsb > 0.0 {
+        (value / lsb).round() * lsb
+    } else {
+        value
+    }
 }

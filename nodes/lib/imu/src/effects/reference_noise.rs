@@ -1,4 +1,5 @@
-//! `reference_noise`: scatter of the reported pose; it belongs to the recording and no simulation takes it away.
+//! `reference_noise`: scatter of the reported pose; it belongs to the recording and no simulation
+//! takes it away.
 
 use std::f64::consts::PI;
 
@@ -12,8 +13,24 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
     summary: "The reference pose scatters from sample to sample; differentiated, the scatter leaves broadband residual in both channels.",
     remedy: "Improve the motion capture: more cameras in view, larger marker spacing, or smooth the reference before use.",
     parameters: &[
-        ParameterSpec { name: "position", unit: "m", shape: Shape::Scalar, neutral: &[0.0], lower: 0.0, upper: 1.0, step: 1e-5 },
-        ParameterSpec { name: "rotation", unit: "rad", shape: Shape::Scalar, neutral: &[0.0], lower: 0.0, upper: PI, step: 1e-5 },
+        ParameterSpec {
+            name: "position",
+            unit: "m",
+            shape: Shape::Scalar,
+            neutral: &[0.0],
+            lower: 0.0,
+            upper: 1.0,
+            step: 1e-5,
+        },
+        ParameterSpec {
+            name: "rotation",
+            unit: "rad",
+            shape: Shape::Scalar,
+            neutral: &[0.0],
+            lower: 0.0,
+            upper: PI,
+            step: 1e-5,
+        },
     ],
     random: true,
     continuous: true,

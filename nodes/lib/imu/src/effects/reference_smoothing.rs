@@ -1,4 +1,5 @@
-//! `reference_smoothing`: a reference that was low-passed without phase; what is lost there no simulation brings back.
+//! `reference_smoothing`: a reference that was low-passed without phase; what is lost there no
+//! simulation brings back.
 
 use super::EffectKind;
 use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage};

@@ -12,7 +12,8 @@ pub(super) struct Place {
 }
 
 impl Place {
-    /// The place at `position` entries from the first; held at the ends. `None` where the grid has fewer than six entries.
+    /// The place at `position` entries from the first; held at the ends. `None` where the grid has
+    /// fewer than six entries.
     #[inline]
     pub(super) fn at(position: f64, length: usize) -> Option<Self> {
         let first_of = |position: f64| (position as usize).saturating_sub(2).min(length - NODES);
@@ -40,7 +41,10 @@ impl Place {
     #[inline]
     pub(super) fn of(&self, series: &[Vector3<f64>]) -> Vector3<f64> {
         let mut sum = Vector3::zeros();
-        for (value, weight) in series[self.first..self.first + NODES].iter().zip(&self.weights) {
+        for (value, weight) in series[self.first..self.first + NODES]
+            .iter()
+            .zip(&self.weights)
+        {
             sum += value * *weight;
         }
         sum
@@ -54,12 +58,16 @@ pub(super) fn interpolate(series: &[Vector3<f64>], position: f64) -> Vector3<f64
         Some(place) => place.of(series),
         None => {
             let last = series.len().saturating_sub(1);
-            series.get((position.max(0.0).round() as usize).min(last)).copied().unwrap_or_default()
+            series
+                .get((position.max(0.0).round() as usize).min(last))
+                .copied()
+                .unwrap_or_default()
         }
     }
 }
 
-/// Derivative per entry at a place, from the interpolation's values half an entry to both sides and a whole one: error O(h^4).
+/// Derivative per entry at a place, from the interpolation's values half an entry to both sides and
+/// a whole one: error O(h^4).
 pub(super) fn derivative(series: &[Vector3<f64>], position: f64) -> Vector3<f64> {
     let at = |away: f64| interpolate(series, position + away);
     ((at(0.5) - at(-0.5)) * 8.0 - (at(1.0) - at(-1.0))) / 6.0
@@ -74,12 +82,22 @@ mod tests {
         let polynomial = |t: f64| Vector3::new(1.0 - t + 0.3 * t.powi(5), t * t, -0.2 * t.powi(3));
         let series: Vec<_> = (0..12).map(|k| polynomial(0.3 * f64::from(k))).collect();
         for position in [0.0, 0.4, 1.7, 5.0, 5.25, 8.99, 10.2, 11.0] {
-            assert!((interpolate(&series, position) - polynomial(0.3 * position)).norm() < 1e-11 * 200.0, "{position}");
+            assert!(
+                (interpolate(&series, position) - polynomial(0.3 * position)).norm()
+                    < 1e-11 * 200.0,
+                "{position}"
+            );
         }
-        assert_eq!((interpolate(&series, -3.0), interpolate(&series, 40.0)), (series[0], series[11]));
+        assert_eq!(
+            (interpolate(&series, -3.0), interpolate(&series, 40.0)),
+            (series[0], series[11])
+        );
         let slope = derivative(&series, 5.3) / 0.3;
         let t: f64 = 0.3 * 5.3;
-        assert!((slope - Vector3::new(-1.0 + 1.5 * t.powi(4), 2.0 * t, -0.6 * t * t)).norm() < 1e-2, "{slope}");
+        assert!(
+            (slope - Vector3::new(-1.0 + 1.5 * t.powi(4), 2.0 * t, -0.6 * t * t)).norm() < 1e-2,
+            "{slope}"
+        );
         assert_eq!(interpolate(&[], 0.0), Vector3::zeros());
         assert_eq!(interpolate(&series[..2], 0.8), series[1]);
     }

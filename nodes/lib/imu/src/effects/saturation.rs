@@ -46,15 +46,25 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
 /// Readings at the limit that make it one.
 const LEAST_REPEATS: usize = 3;
 
-/// The largest magnitude on any axis, where it repeats and the simulation mostly reads as much or more there.
+/// The largest magnitude on any axis, where it repeats and the simulation mostly reads as much or
+/// more there.
 fn starts(view: &ResidualView, channel: Channel) -> Vec<Vec<f64>> {
-    let values = || view.pairs(channel).flat_map(|(m, s)| (0..3).map(move |axis| (m[axis], s[axis])));
+    let values = || {
+        view.pairs(channel)
+            .flat_map(|(m, s)| (0..3).map(move |axis| (m[axis], s[axis])))
+    };
     let limit = values().map(|(m, _)| m.abs()).fold(0.0, f64::max);
     let at_limit = || values().filter(|(m, _)| m.abs() >= limit * (1.0 - 1e-9));
     let repeats = at_limit().count();
-    let beyond = at_limit().filter(|(m, s)| s * m.signum() >= 0.9 * limit).count();
+    let beyond = at_limit()
+        .filter(|(m, s)| s * m.signum() >= 0.9 * limit)
+        .count();
     let found = limit > 0.0 && repeats >= LEAST_REPEATS && 2 * beyond >= repeats;
-    vec![vec![if found { limit } else { ACCEL.parameters[0].neutral[0] }]]
+    vec![vec![if found {
+        limit
+    } else {
+        ACCEL.parameters[0].neutral[0]
+    }]]
 }
 
 /// Clips one value at +-limit.

@@ -26,7 +26,9 @@ fn kind(name: &str) -> Result<EffectKind, EffectError> {
     if name == "unknown" {
         return Err(EffectError::NotSimulated);
     }
-    EffectKind::from_name(name).ok_or_else(|| EffectError::UnknownEffect { effect: name.to_owned() })
+    EffectKind::from_name(name).ok_or_else(|| EffectError::UnknownEffect {
+        effect: name.to_owned(),
+    })
 }
 
 /// One parameter's values for writing.
@@ -50,7 +52,13 @@ impl Serialize for Effect {
         let mut map = serializer.serialize_map(Some(1 + parameters.len()))?;
         map.serialize_entry("effect", self.kind().name())?;
         for parameter in parameters {
-            map.serialize_entry(parameter.name, &Written(parameter, self.parameter(parameter.name).unwrap_or_default()))?;
+            map.serialize_entry(
+                parameter.name,
+                &Written(
+                    parameter,
+                    self.parameter(parameter.name).unwrap_or_default(),
+                ),
+            )?;
         }
         map.end()
     }
@@ -136,11 +144,17 @@ impl Raw {
             (Shape::Scalar | Shape::Time, _) => Err("a number"),
             (Shape::Vector3, Self::List(items)) if items.len() == 3 && listed(3) => Ok(numbers),
             (Shape::Vector3, _) => Err("a list of three numbers"),
-            (Shape::Matrix3, Self::List(items)) if listed(9) && (items.len() == 9 || items.iter().all(|row| row.is_row())) => Ok(numbers),
-            (Shape::Matrix3, _) => Err("three rows of three numbers"),
-            (Shape::Choice(words), Self::Text(word)) => {
-                words.iter().position(|known| known == word).map(|index| vec![index as f64]).ok_or("another word")
+            (Shape::Matrix3, Self::List(items))
+                if listed(9) && (items.len() == 9 || items.iter().all(|row| row.is_row())) =>
+            {
+                Ok(numbers)
             }
+            (Shape::Matrix3, _) => Err("three rows of three numbers"),
+            (Shape::Choice(words), Self::Text(word)) => words
+                .iter()
+                .position(|known| known == word)
+                .map(|index| vec![index as f64])
+                .ok_or("another word"),
             (Shape::Choice(_), _) => Err("a word"),
         }
     }
@@ -177,20 +191,44 @@ impl<'de> Visitor<'de> for EffectVisitor {
 fn parse(name: &str, fields: &[(String, Raw)]) -> Result<Effect, EffectError> {
     let kind = kind(name)?;
     let (effect, spec) = (kind.name(), kind.spec());
-    let known = |field: &str| spec.parameters.iter().any(|parameter| parameter.name == field);
+    let known = |field: &str| {
+        spec.parameters
+            .iter()
+            .any(|parameter| parameter.name == field)
+    };
     if let Some((field, _)) = fields.iter().find(|(field, _)| !known(field)) {
-        let expected = spec.parameters.iter().map(|parameter| parameter.name).collect::<Vec<_>>().join(", ");
-        return Err(EffectError::UnknownField { effect, field: field.clone(), expected });
+        let expected = spec
+            .parameters
+            .iter()
+            .map(|parameter| parameter.name)
+            .collect::<Vec<_>>()
+            .join(", ");
+        return Err(EffectError::UnknownField {
+            effect,
+            field: field.clone(),
+            expected,
+        });
     }
     let mut values = Vec::with_capacity(spec.len());
     for parameter in spec.parameters {
         let mut given = fields.iter().filter(|(field, _)| field == parameter.name);
         let (Some((field, raw)), None) = (given.next(), given.next()) else {
-            return Err(EffectError::NotOnce { effect, field: parameter.name });
+            return Err(EffectError::NotOnce {
+                effect,
+                field: parameter.name,
+            });
         };
         let malformed = |expected| match parameter.shape {
-            Shape::Choice(words) => EffectError::NoChoice { effect, field: parameter.name, words: words.join(", ") },
-            _ => EffectError::Malformed { effect, field: field.clone(), expected },
+            Shape::Choice(words) => EffectError::NoChoice {
+                effect,
+                field: parameter.name,
+                words: words.join(", "),
+            },
+            _ => EffectError::Malformed {
+                effect,
+                field: field.clone(),
+                expected,
+            },
         };
         values.extend(raw.values(parameter.shape).map_err(malformed)?);
     }

@@ -5,7 +5,8 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{EffectKind, Reading};
 
-/// Where in the measurement an effect acts; effects of a stage leave the results of the stages before it as they are.
+/// Where in the measurement an effect acts; effects of a stage leave the results of the stages
+/// before it as they are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Stage {
     /// In the reference, not in the device.
@@ -100,7 +101,10 @@ pub struct EffectSpec {
 impl EffectSpec {
     /// Numbers of all parameters.
     pub fn len(&self) -> usize {
-        self.parameters.iter().map(|parameter| parameter.shape.len()).sum()
+        self.parameters
+            .iter()
+            .map(|parameter| parameter.shape.len())
+            .sum()
     }
 
     /// Never: every effect has a parameter.
@@ -110,7 +114,10 @@ impl EffectSpec {
 
     /// The values that change nothing.
     pub fn neutral(&self) -> Vec<f64> {
-        self.parameters.iter().flat_map(|parameter| parameter.neutral.iter().copied()).collect()
+        self.parameters
+            .iter()
+            .flat_map(|parameter| parameter.neutral.iter().copied())
+            .collect()
     }
 }
 
@@ -142,15 +149,25 @@ pub(super) enum Channel {
 
 impl ResidualView<'_> {
     pub(super) fn len(&self) -> usize {
-        self.stamps.len().min(self.measured.len()).min(self.simulated.len())
+        self.stamps
+            .len()
+            .min(self.measured.len())
+            .min(self.simulated.len())
     }
 
     /// Pairs of measured and simulated vectors.
-    pub(super) fn pairs(&self, channel: Channel) -> impl Iterator<Item = (Vector3<f64>, Vector3<f64>)> + '_ {
-        self.measured.iter().zip(self.simulated).take(self.len()).map(move |(m, s)| match channel {
-            Channel::Accel => (m.force, s.force),
-            Channel::Gyro => (m.rate, s.rate),
-        })
+    pub(super) fn pairs(
+        &self,
+        channel: Channel,
+    ) -> impl Iterator<Item = (Vector3<f64>, Vector3<f64>)> + '_ {
+        self.measured
+            .iter()
+            .zip(self.simulated)
+            .take(self.len())
+            .map(move |(m, s)| match channel {
+                Channel::Accel => (m.force, s.force),
+                Channel::Gyro => (m.rate, s.rate),
+            })
     }
 
     /// Measured less simulated.
@@ -170,15 +187,24 @@ impl ResidualView<'_> {
         self.residual(channel).sum::<Vector3<f64>>() / count
     }
 
-    /// `m s^T` of both channels at one reading, each in units of its scatter, so that neither drowns the other.
+    /// `m s^T` of both channels at one reading, each in units of its scatter, so that neither
+    /// drowns the other.
     pub(super) fn outer_products(&self) -> impl Iterator<Item = Matrix3<f64>> + '_ {
         let weight = |channel| {
             let power: f64 = self.pairs(channel).map(|(_, s)| s.norm_squared()).sum();
-            if power > 0.0 { self.len() as f64 / power } else { 0.0 }
+            if power > 0.0 {
+                self.len() as f64 / power
+            } else {
+                0.0
+            }
         };
         let (accel, gyro) = (weight(Channel::Accel), weight(Channel::Gyro));
-        let forces = self.pairs(Channel::Accel).map(move |(m, s)| m * s.transpose() * accel);
-        forces.zip(self.pairs(Channel::Gyro)).map(move |(sum, (m, s))| sum + m * s.transpose() * gyro)
+        let forces = self
+            .pairs(Channel::Accel)
+            .map(move |(m, s)| m * s.transpose() * accel);
+        forces
+            .zip(self.pairs(Channel::Gyro))
+            .map(move |(sum, (m, s))| sum + m * s.transpose() * gyro)
     }
 }
 

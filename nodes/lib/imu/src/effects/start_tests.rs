@@ -26,14 +26,25 @@ fn case(effects: &[(Kind, &[f64])]) -> Case {
     let mut measured = model.read(&model.sensor(model.tissue(model.segment(&track))), &stamps);
     model.linear(&mut measured, &stamps);
     let beyond = model.noise_density();
-    let mut noise = NoiseSource::white((NOISE.0.hypot(beyond.0), NOISE.1.hypot(beyond.1)), 0.0, RATE_HZ, 7, "wrist").unwrap();
+    let mut noise = NoiseSource::white(
+        (NOISE.0.hypot(beyond.0), NOISE.1.hypot(beyond.1)),
+        0.0,
+        RATE_HZ,
+        7,
+        "wrist",
+    )
+    .unwrap();
     for reading in &mut measured {
         let drawn = noise.draw();
         reading.force += drawn.force;
         reading.rate += drawn.rate;
     }
     model.digital(&mut measured);
-    Case { stamps, measured, simulated }
+    Case {
+        stamps,
+        measured,
+        simulated,
+    }
 }
 
 impl Case {
@@ -52,16 +63,28 @@ impl Case {
 
     /// Whether some start is as near to the truth as said, value by value.
     fn finds(&self, kind: Kind, truth: &[f64], tolerance: f64) {
-        let near = |start: &Vec<f64>| start.iter().zip(truth).all(|(a, b)| (a - b).abs() <= tolerance);
+        let near = |start: &Vec<f64>| {
+            start
+                .iter()
+                .zip(truth)
+                .all(|(a, b)| (a - b).abs() <= tolerance)
+        };
         let starts = self.starts(kind);
-        assert!(starts.iter().any(near), "{kind}: {starts:?} against {truth:?}");
+        assert!(
+            starts.iter().any(near),
+            "{kind}: {starts:?} against {truth:?}"
+        );
     }
 }
 
 #[test]
 fn all_starts_are_valid() {
     let nominal = case(&[]);
-    let nothing = Case { stamps: Vec::new(), measured: Vec::new(), simulated: Vec::new() };
+    let nothing = Case {
+        stamps: Vec::new(),
+        measured: Vec::new(),
+        simulated: Vec::new(),
+    };
     for kind in Kind::ALL {
         for case in [&nominal, &nothing] {
             let starts = case.starts(kind);
@@ -76,10 +99,23 @@ fn all_starts_are_valid() {
 #[test]
 fn what_is_read_off_is_not_found_where_it_is_not() {
     let nominal = case(&[]);
-    let neutral =
-        [Kind::AccelSaturation, Kind::GyroSaturation, Kind::AccelQuantization, Kind::GyroQuantization, Kind::AccelUnits, Kind::GyroUnits];
-    for kind in neutral.into_iter().chain([Kind::AxisConvention, Kind::DroppedSamples]) {
-        assert_eq!(nominal.starts(kind)[0], Effect::neutral(kind).values(), "{kind}");
+    let neutral = [
+        Kind::AccelSaturation,
+        Kind::GyroSaturation,
+        Kind::AccelQuantization,
+        Kind::GyroQuantization,
+        Kind::AccelUnits,
+        Kind::GyroUnits,
+    ];
+    for kind in neutral
+        .into_iter()
+        .chain([Kind::AxisConvention, Kind::DroppedSamples])
+    {
+        assert_eq!(
+            nominal.starts(kind)[0],
+            Effect::neutral(kind).values(),
+            "{kind}"
+        );
     }
     nominal.finds(Kind::AccelNoise, &[0.0], 0.0006);
     nominal.finds(Kind::TimeOffset, &[0.0], 0.0);
@@ -88,7 +124,11 @@ fn what_is_read_off_is_not_found_where_it_is_not() {
 #[test]
 fn constants_and_noise_are_estimated() {
     case(&[(Kind::AccelBias, &[0.3, -0.2, 0.1])]).finds(Kind::AccelBias, &[0.3, -0.2, 0.1], 0.002);
-    case(&[(Kind::GyroBias, &[0.03, -0.02, 0.01])]).finds(Kind::GyroBias, &[0.03, -0.02, 0.01], 0.0005);
+    case(&[(Kind::GyroBias, &[0.03, -0.02, 0.01])]).finds(
+        Kind::GyroBias,
+        &[0.03, -0.02, 0.01],
+        0.0005,
+    );
     case(&[(Kind::AccelNoise, &[0.01])]).finds(Kind::AccelNoise, &[0.01], 0.0005);
     case(&[(Kind::GyroNoise, &[0.001])]).finds(Kind::GyroNoise, &[0.001], 0.00005);
 }
@@ -103,7 +143,10 @@ fn turns_are_estimated() {
     let slip = case(&[(Kind::MountSlip, &[at, 0.2, 0.0, -0.3])]);
     let start = &slip.starts(Kind::MountSlip)[0];
     assert!((start[0] - at).abs() < 0.3, "{}", start[0] - at);
-    assert!((Vector3::new(start[1], start[2], start[3]) - Vector3::new(0.2, 0.0, -0.3)).norm() < 0.02, "{start:?}");
+    assert!(
+        (Vector3::new(start[1], start[2], start[3]) - Vector3::new(0.2, 0.0, -0.3)).norm() < 0.02,
+        "{start:?}"
+    );
     assert!((so3::exp(&Vector3::new(0.2, 0.0, -0.3)).angle() - 0.36).abs() < 0.01);
 }
 
@@ -113,19 +156,32 @@ fn clocks_and_losses_are_estimated() {
     let mut lossy = case(&[]);
     let effect = Effect::new(Kind::DroppedSamples, vec![0.1, 3.0]).unwrap();
     let mut dropouts = Dropouts::new(Some(&effect), 1, "wrist").unwrap();
-    let kept: Vec<bool> = lossy.stamps.iter().map(|_| !dropouts.next_is_lost()).collect();
+    let kept: Vec<bool> = lossy
+        .stamps
+        .iter()
+        .map(|_| !dropouts.next_is_lost())
+        .collect();
     let mut each = kept.iter();
     lossy.stamps.retain(|_| *each.next().unwrap());
-    let [fraction, mean_burst] = lossy.starts(Kind::DroppedSamples)[0][..] else { panic!("two values") };
+    let [fraction, mean_burst] = lossy.starts(Kind::DroppedSamples)[0][..] else {
+        panic!("two values")
+    };
     let truth = kept.iter().filter(|kept| !**kept).count() as f64 / kept.len() as f64;
-    assert!((fraction - truth).abs() < 0.002 && (fraction - 0.1).abs() < 0.03, "{fraction} against {truth}");
+    assert!(
+        (fraction - truth).abs() < 0.002 && (fraction - 0.1).abs() < 0.03,
+        "{fraction} against {truth}"
+    );
     assert!((mean_burst - 3.0).abs() < 0.6, "{mean_burst}");
 }
 
 #[test]
 fn what_digits_show_is_read_off() {
     for units in [1.0, 1.0 / 9.80665, 1000.0] {
-        let digital = case(&[(Kind::AccelQuantization, &[0.0383]), (Kind::AccelSaturation, &[9.5]), (Kind::AccelUnits, &[units])]);
+        let digital = case(&[
+            (Kind::AccelQuantization, &[0.0383]),
+            (Kind::AccelSaturation, &[9.5]),
+            (Kind::AccelUnits, &[units]),
+        ]);
         digital.finds(Kind::AccelQuantization, &[0.0383 * units], 1e-9 * units);
         digital.finds(Kind::AccelUnits, &[units], 1e-12);
     }
@@ -135,20 +191,31 @@ fn what_digits_show_is_read_off() {
     case(&[(Kind::GyroQuantization, &[0.00106])]).finds(Kind::GyroQuantization, &[0.00106], 1e-9);
     let degrees = 180.0 / std::f64::consts::PI;
     for factor in [degrees, 1000.0 * degrees, degrees / 6.0, 1e-3] {
-        case(&[(Kind::GyroUnits, &[factor]), (Kind::GyroScale, &[1.02; 3])]).finds(Kind::GyroUnits, &[factor], 1e-9);
+        case(&[(Kind::GyroUnits, &[factor]), (Kind::GyroScale, &[1.02; 3])]).finds(
+            Kind::GyroUnits,
+            &[factor],
+            1e-9,
+        );
     }
 }
 
 #[test]
 fn a_vibration_is_found_with_its_phase() {
     let line = [31.417, 0.05, -0.1, 0.08, 1.2];
-    let start = case(&[(Kind::Vibration, &line)]).starts(Kind::Vibration).remove(0);
+    let start = case(&[(Kind::Vibration, &line)])
+        .starts(Kind::Vibration)
+        .remove(0);
     assert!((start[0] - line[0]).abs() < 1e-3, "{start:?}");
     // Amplitude and phase are as good as their common sign.
     let sign = (start[1] * line[1]).signum();
     for axis in 1..4 {
         assert!((start[axis] * sign - line[axis]).abs() < 0.003, "{start:?}");
     }
-    let phase = start[4] + if sign < 0.0 { std::f64::consts::PI } else { 0.0 };
+    let phase = start[4]
+        + if sign < 0.0 {
+            std::f64::consts::PI
+        } else {
+            0.0
+        };
     assert!((phase - line[4]).sin().abs() < 0.1, "{start:?}");
 }

@@ -8,10 +8,12 @@ use super::filter::Streamed;
 use super::{EffectKind, Reading, SensorModel, lever_arm};
 use crate::{Device, ImuError, ImuSample, KinematicSample, NoiseSource};
 
-/// A device's effects and white noise on samples as they come; the stages of [`SensorModel`], sample by sample.
+/// A device's effects and white noise on samples as they come; the stages of [`SensorModel`],
+/// sample by sample.
 ///
-/// The epoch is the first sample's stamp. Filters take the input as straight between the samples, so they need no look-ahead; where the
-/// samples carry no angular acceleration, the difference from the sample before stands for it.
+/// The epoch is the first sample's stamp. Filters take the input as straight between the samples,
+/// so they need no look-ahead; where the samples carry no angular acceleration, the difference from
+/// the sample before stands for it.
 #[derive(Clone, Debug)]
 pub struct StreamingEffects {
     device: Device,
@@ -27,21 +29,42 @@ pub struct StreamingEffects {
 }
 
 impl StreamingEffects {
-    /// The effects of one placement's device, for samples at a rate. Seed and name make the noise and the losses.
+    /// The effects of one placement's device, for samples at a rate. Seed and name make the noise
+    /// and the losses.
     ///
     /// # Errors
     /// [`ImuError::Trajectory`] for a rate that is not positive.
-    pub fn new(device: &Device, rate_hz: f64, seed: u64, placement: &str) -> Result<Self, ImuError> {
+    pub fn new(
+        device: &Device,
+        rate_hz: f64,
+        seed: u64,
+        placement: &str,
+    ) -> Result<Self, ImuError> {
         let model = SensorModel::new(device.effects(), Stamp::default());
         let beyond = model.noise_density();
-        let densities = (device.accel_density().hypot(beyond.0), device.gyro_density().hypot(beyond.1));
+        let densities = (
+            device.accel_density().hypot(beyond.0),
+            device.gyro_density().hypot(beyond.1),
+        );
         Ok(Self {
             device: device.clone(),
             rate_hz,
-            noise: Some(NoiseSource::white(densities, device.orientation_stddev(), rate_hz, seed, placement)?),
-            dropouts: Dropouts::new(device.effects().get(EffectKind::DroppedSamples), seed, placement),
+            noise: Some(NoiseSource::white(
+                densities,
+                device.orientation_stddev(),
+                rate_hz,
+                seed,
+                placement,
+            )?),
+            dropouts: Dropouts::new(
+                device.effects().get(EffectKind::DroppedSamples),
+                seed,
+                placement,
+            ),
             tissue: model.tissue.map(Streamed::new),
-            low_pass: model.low_pass.map(|filter| [filter, filter].map(Streamed::new)),
+            low_pass: model
+                .low_pass
+                .map(|filter| [filter, filter].map(Streamed::new)),
             model: None,
             previous: None,
         })
@@ -50,10 +73,15 @@ impl StreamingEffects {
     /// Without the random part: no noise, no losses.
     #[must_use]
     pub fn without_noise(self) -> Self {
-        Self { noise: None, dropouts: None, ..self }
+        Self {
+            noise: None,
+            dropouts: None,
+            ..self
+        }
     }
 
-    /// Begins anew with the next sample, which is the new epoch: for sources that jump back in time. Noise and losses go on.
+    /// Begins anew with the next sample, which is the new epoch: for sources that jump back in
+    /// time. Noise and losses go on.
     pub fn reset(&mut self) {
         self.model = None;
         self.forget();
@@ -62,11 +90,14 @@ impl StreamingEffects {
     /// Filters begin anew.
     fn forget(&mut self) {
         self.previous = None;
-        self.tissue.iter_mut().chain(self.low_pass.iter_mut().flatten()).for_each(Streamed::reset);
+        self.tissue
+            .iter_mut()
+            .chain(self.low_pass.iter_mut().flatten())
+            .for_each(Streamed::reset);
     }
 
-    /// The device's reading of a sample, by the device's own clock; none where it is lost. One call a sample, in order of time; after a
-    /// pause of more than ten intervals the filters begin anew.
+    /// The device's reading of a sample, by the device's own clock; none where it is lost. One call
+    /// a sample, in order of time; after a pause of more than ten intervals the filters begin anew.
     pub fn step(&mut self, sample: &KinematicSample) -> Option<ImuSample> {
         let model = match self.model.take() {
             Some(model) => model,
@@ -88,21 +119,37 @@ impl StreamingEffects {
         if let Some(filter) = &mut self.tissue {
             segment.force = filter.push(segment.force, interval);
         }
-        let sensor_from_segment = model.slip.filter(|(at, _)| seconds >= *at).map(|(_, after)| after).or(model.sensor_from_segment);
+        let sensor_from_segment = model
+            .slip
+            .filter(|(at, _)| seconds >= *at)
+            .map(|(_, after)| after)
+            .or(model.sensor_from_segment);
         let mut reading = model.turned(sensor_from_segment.as_ref(), &segment);
         if let Some(line) = &model.vibration {
             let force = line.at(seconds);
             reading.force += force;
-            reading.rate += model.coupling.map_or_else(Vector3::zeros, |coupling| coupling * force);
+            reading.rate += model
+                .coupling
+                .map_or_else(Vector3::zeros, |coupling| coupling * force);
         }
         if let Some([force, rate]) = &mut self.low_pass {
-            reading = Reading { force: force.push(reading.force, interval), rate: rate.push(reading.rate, interval) };
+            reading = Reading {
+                force: force.push(reading.force, interval),
+                rate: rate.push(reading.rate, interval),
+            };
         }
-        let mut world_from_sensor = sample.world_from_sensor.rotation * orientation(sensor_from_segment.as_ref());
-        reading = Reading { force: model.force.linear(&reading.force, seconds), rate: model.rate.linear(&reading.rate, seconds) };
+        let mut world_from_sensor =
+            sample.world_from_sensor.rotation * orientation(sensor_from_segment.as_ref());
+        reading = Reading {
+            force: model.force.linear(&reading.force, seconds),
+            rate: model.rate.linear(&reading.rate, seconds),
+        };
         if let Some(noise) = &mut self.noise {
             let Reading { force, rate } = noise.draw();
-            reading = Reading { force: reading.force + force, rate: reading.rate + rate };
+            reading = Reading {
+                force: reading.force + force,
+                rate: reading.rate + rate,
+            };
             world_from_sensor *= noise.draw_turn();
         }
         ImuSample {
@@ -119,9 +166,14 @@ impl StreamingEffects {
         let rate = segment_from_world * sample.angular_velocity;
         let mut force = segment_from_world * (sample.acceleration - model.gravity);
         if let Some(offset) = &model.lever_arm {
-            let difference = |(stamp, before): (Stamp, Vector3<f64>)| (rate - before) / (sample.stamp - stamp);
-            let given = sample.angular_acceleration.map(|alpha| segment_from_world * alpha);
-            let angular_acceleration = given.or_else(|| self.previous.map(difference)).unwrap_or_default();
+            let difference =
+                |(stamp, before): (Stamp, Vector3<f64>)| (rate - before) / (sample.stamp - stamp);
+            let given = sample
+                .angular_acceleration
+                .map(|alpha| segment_from_world * alpha);
+            let angular_acceleration = given
+                .or_else(|| self.previous.map(difference))
+                .unwrap_or_default();
             force += lever_arm::acceleration(offset, &rate, &angular_acceleration);
         }
         self.previous = Some((sample.stamp, rate));
@@ -129,10 +181,13 @@ impl StreamingEffects {
     }
 }
 
-/// segment_from_sensor as a rotation; a mirrored axis convention, which is none, leaves the orientation as it is.
+/// segment_from_sensor as a rotation; a mirrored axis convention, which is none, leaves the
+/// orientation as it is.
 fn orientation(sensor_from_segment: Option<&Matrix3<f64>>) -> UnitQuaternion<f64> {
     match sensor_from_segment {
-        Some(turn) if turn.determinant() > 0.0 => UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn.transpose())),
+        Some(turn) if turn.determinant() > 0.0 => UnitQuaternion::from_rotation_matrix(
+            &Rotation3::from_matrix_unchecked(turn.transpose()),
+        ),
         _ => UnitQuaternion::identity(),
     }
 }

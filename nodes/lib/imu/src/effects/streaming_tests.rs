@@ -8,7 +8,9 @@ use crate::{Scheme, SensorTrajectory, simulate_kinematics};
 const RATE_HZ: f64 = 400.0;
 
 fn device(effects: &str) -> Device {
-    let text = format!("schema: cromosim/device/1\ndeclared_noise: {{accel_density: 0.002, gyro_density: 0.0003}}\neffects:\n{effects}");
+    let text = format!(
+        "schema: cromosim/device/1\ndeclared_noise: {{accel_density: 0.002, gyro_density: 0.0003}}\neffects:\n{effects}"
+    );
     Device::parse(&text, "d.yaml").unwrap()
 }
 
@@ -18,8 +20,13 @@ fn samples(trajectory: &SensorTrajectory) -> Vec<KinematicSample> {
 }
 
 fn readings(device: &Device, samples: &[KinematicSample]) -> Vec<ImuSample> {
-    let mut effects = StreamingEffects::new(device, RATE_HZ, 3, "wrist").unwrap().without_noise();
-    samples.iter().filter_map(|sample| effects.step(sample)).collect()
+    let mut effects = StreamingEffects::new(device, RATE_HZ, 3, "wrist")
+        .unwrap()
+        .without_noise();
+    samples
+        .iter()
+        .filter_map(|sample| effects.step(sample))
+        .collect()
 }
 
 const MANY: &str = "- {effect: lever_arm, offset: [0.05, 0.0, -0.06]}
@@ -41,13 +48,21 @@ fn live_readings_are_those_of_the_model() {
     let motion = samples(&trajectory(wrist, 240.0, 3.0));
     let device = device(MANY);
     let live = readings(&device, &motion);
-    let mut track = cromosim_spatial::KinematicTrack { start: START, rate_hz: RATE_HZ, ..Default::default() };
+    let mut track = cromosim_spatial::KinematicTrack {
+        start: START,
+        rate_hz: RATE_HZ,
+        ..Default::default()
+    };
     for sample in &motion {
         let back = sample.world_from_sensor.rotation.inverse();
-        track.world_from_segment.push(sample.world_from_sensor.rotation);
+        track
+            .world_from_segment
+            .push(sample.world_from_sensor.rotation);
         track.acceleration.push(back * sample.acceleration);
         track.angular_velocity.push(back * sample.angular_velocity);
-        track.angular_acceleration.push(back * sample.angular_acceleration.unwrap());
+        track
+            .angular_acceleration
+            .push(back * sample.angular_acceleration.unwrap());
     }
     let stamps: Vec<Stamp> = live.iter().map(|sample| sample.stamp).collect();
     let offline = SensorModel::new(device.effects(), START).run(&track, &stamps);
@@ -68,8 +83,14 @@ fn live_readings_are_those_of_the_model() {
 fn a_device_without_effects_changes_nothing() {
     let motion = samples(&trajectory(wrist, 240.0, 3.0));
     let plain: Vec<ImuSample> = motion.iter().map(KinematicSample::imu).collect();
-    for (found, expected) in readings(&Device::white(0.1, 0.1), &motion).iter().zip(&plain) {
-        assert!((found.specific_force - expected.specific_force).norm() < 1e-12 && found.stamp == expected.stamp);
+    for (found, expected) in readings(&Device::white(0.1, 0.1), &motion)
+        .iter()
+        .zip(&plain)
+    {
+        assert!(
+            (found.specific_force - expected.specific_force).norm() < 1e-12
+                && found.stamp == expected.stamp
+        );
         assert!((found.angular_velocity - expected.angular_velocity).norm() < 1e-12);
     }
 }
@@ -77,9 +98,19 @@ fn a_device_without_effects_changes_nothing() {
 #[test]
 fn without_an_angular_acceleration_differences_stand_for_it() {
     let motion = samples(&trajectory(wrist, 240.0, 3.0));
-    let bare: Vec<KinematicSample> = motion.iter().map(|sample| KinematicSample { angular_acceleration: None, ..*sample }).collect();
+    let bare: Vec<KinematicSample> = motion
+        .iter()
+        .map(|sample| KinematicSample {
+            angular_acceleration: None,
+            ..*sample
+        })
+        .collect();
     let device = device("- {effect: lever_arm, offset: [0.05, 0.0, -0.06]}");
-    for (found, expected) in readings(&device, &bare).iter().zip(readings(&device, &motion)).skip(1) {
+    for (found, expected) in readings(&device, &bare)
+        .iter()
+        .zip(readings(&device, &motion))
+        .skip(1)
+    {
         assert!((found.specific_force - expected.specific_force).norm() < 0.4);
     }
 }
@@ -90,13 +121,20 @@ fn samples_are_lost_in_bursts_that_seed_and_name_make() {
     let device = device("- {effect: dropped_samples, fraction: 0.2, mean_burst: 4}");
     let run = |seed, name: &str| {
         let mut effects = StreamingEffects::new(&device, RATE_HZ, seed, name).unwrap();
-        let all = motion.iter().cycle().take(40_000).map(|sample| effects.step(sample).is_some());
+        let all = motion
+            .iter()
+            .cycle()
+            .take(40_000)
+            .map(|sample| effects.step(sample).is_some());
         all.collect::<Vec<bool>>()
     };
     let kept = run(1, "wrist");
     let lost = kept.iter().filter(|kept| !**kept).count() as f64;
     let bursts = kept.windows(2).filter(|pair| pair[0] && !pair[1]).count() as f64;
-    assert!((lost / 40_000.0 - 0.2).abs() < 0.02 && (lost / bursts - 4.0).abs() < 0.4, "{lost} in {bursts}");
+    assert!(
+        (lost / 40_000.0 - 0.2).abs() < 0.02 && (lost / bursts - 4.0).abs() < 0.4,
+        "{lost} in {bursts}"
+    );
     assert_eq!(kept, run(1, "wrist"));
     assert!(kept != run(2, "wrist") && kept != run(1, "ankle"));
 }
@@ -105,7 +143,9 @@ fn samples_are_lost_in_bursts_that_seed_and_name_make() {
 fn a_new_beginning_is_a_new_epoch() {
     let motion = samples(&trajectory(wrist, 240.0, 3.0));
     let device = device("- {effect: gyro_bias_drift, rate: [0.1, 0.0, 0.0]}");
-    let mut effects = StreamingEffects::new(&device, RATE_HZ, 3, "wrist").unwrap().without_noise();
+    let mut effects = StreamingEffects::new(&device, RATE_HZ, 3, "wrist")
+        .unwrap()
+        .without_noise();
     let drift = |effects: &mut StreamingEffects, k: usize| {
         (effects.step(&motion[k]).unwrap().angular_velocity - motion[k].imu().angular_velocity).x
     };
@@ -123,10 +163,30 @@ fn noise_comes_before_the_limit_and_the_steps() {
     );
     let mut effects = StreamingEffects::new(&device, RATE_HZ, 3, "wrist").unwrap();
     let quiet = readings(&device, &motion);
-    let noisy: Vec<ImuSample> = motion.iter().filter_map(|sample| effects.step(sample)).collect();
-    assert!(noisy.iter().flat_map(|sample| sample.specific_force.iter()).all(|v| v.abs() <= 20.0 && (v / 0.25).fract() == 0.0));
+    let noisy: Vec<ImuSample> = motion
+        .iter()
+        .filter_map(|sample| effects.step(sample))
+        .collect();
+    assert!(
+        noisy
+            .iter()
+            .flat_map(|sample| sample.specific_force.iter())
+            .all(|v| v.abs() <= 20.0 && (v / 0.25).fract() == 0.0)
+    );
     // 0.1 sqrt(400) = 2 m/s2, less where the limit cuts it.
-    let inside = noisy.iter().zip(&quiet).filter(|(_, quiet)| quiet.specific_force.z.abs() < 10.0);
-    let (n, sum) = inside.fold((0.0, 0.0), |(n, sum), (a, b)| (n + 1.0, sum + (a.specific_force.z - b.specific_force.z).powi(2)));
-    assert!(((sum / n).sqrt() - 2.0f64).abs() < 0.2, "{}", (sum / n).sqrt());
+    let inside = noisy
+        .iter()
+        .zip(&quiet)
+        .filter(|(_, quiet)| quiet.specific_force.z.abs() < 10.0);
+    let (n, sum) = inside.fold((0.0, 0.0), |(n, sum), (a, b)| {
+        (
+            n + 1.0,
+            sum + (a.specific_force.z - b.specific_force.z).powi(2),
+        )
+    });
+    assert!(
+        ((sum / n).sqrt() - 2.0f64).abs() < 0.2,
+        "{}",
+        (sum / n).sqrt()
+    );
 }

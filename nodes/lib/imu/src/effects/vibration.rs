@@ -15,9 +15,33 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
     summary: "Something vibrates at the sensor (a motor, a fan): the specific force's residual has a sharp line of one frequency.",
     remedy: "Find and damp the source, or mount the sensor on rubber.",
     parameters: &[
-        ParameterSpec { name: "hz", unit: "Hz", shape: Shape::Scalar, neutral: &[10.0], lower: 0.01, upper: 1e5, step: 1e-5 },
-        ParameterSpec { name: "amplitude", unit: "m/s2", shape: Shape::Vector3, neutral: &[0.0; 3], lower: -1e3, upper: 1e3, step: 1e-4 },
-        ParameterSpec { name: "phase", unit: "rad", shape: Shape::Scalar, neutral: &[0.0], lower: -TAU, upper: TAU, step: 1e-4 },
+        ParameterSpec {
+            name: "hz",
+            unit: "Hz",
+            shape: Shape::Scalar,
+            neutral: &[10.0],
+            lower: 0.01,
+            upper: 1e5,
+            step: 1e-5,
+        },
+        ParameterSpec {
+            name: "amplitude",
+            unit: "m/s2",
+            shape: Shape::Vector3,
+            neutral: &[0.0; 3],
+            lower: -1e3,
+            upper: 1e3,
+            step: 1e-4,
+        },
+        ParameterSpec {
+            name: "phase",
+            unit: "rad",
+            shape: Shape::Scalar,
+            neutral: &[0.0],
+            lower: -TAU,
+            upper: TAU,
+            step: 1e-4,
+        },
     ],
     random: false,
     continuous: true,
@@ -34,7 +58,11 @@ pub(super) struct Line {
 
 impl Line {
     pub(super) fn of(effect: &Effect) -> Self {
-        Self { hz: effect.scalar(0), amplitude: effect.vector(1), phase: effect.scalar(4) }
+        Self {
+            hz: effect.scalar(0),
+            amplitude: effect.vector(1),
+            phase: effect.scalar(4),
+        }
     }
 
     /// Specific force at seconds since the epoch, in sensor axes.
@@ -45,33 +73,52 @@ impl Line {
 
     /// What a filter of this gain and phase leaves of it.
     pub(super) fn filtered(self, (gain, phase): (f64, f64)) -> Self {
-        Self { amplitude: self.amplitude * gain, phase: self.phase + phase, ..self }
+        Self {
+            amplitude: self.amplitude * gain,
+            phase: self.phase + phase,
+            ..self
+        }
     }
 }
 
 /// Least frequency that is looked at, Hz: below it the residual of motion lives.
 const LEAST_HZ: f64 = 2.0;
 
-/// The residual's line that stands out most over its surroundings, with amplitudes and phase by least squares in absolute time.
+/// The residual's line that stands out most over its surroundings, with amplitudes and phase by
+/// least squares in absolute time.
 fn starts(view: &ResidualView) -> Vec<Vec<f64>> {
     let neutral = vec![SPEC.neutral()];
     let residual: Vec<Vector3<f64>> = view.residual(Channel::Accel).collect();
     if residual.len() < 64 || view.rate_hz.is_nan() || view.rate_hz <= 0.0 {
         return neutral;
     }
-    let seconds: Vec<f64> = view.stamps.iter().map(|stamp| *stamp - view.epoch).collect();
+    let seconds: Vec<f64> = view
+        .stamps
+        .iter()
+        .map(|stamp| *stamp - view.epoch)
+        .collect();
     let mean = view.mean_residual(Channel::Accel);
-    let Some((coarse, width)) = coarse_line(&seconds, &residual, &mean, view.rate_hz) else { return neutral };
+    let Some((coarse, width)) = coarse_line(&seconds, &residual, &mean, view.rate_hz) else {
+        return neutral;
+    };
     let power = |hz: f64| fit(&seconds, &residual, &mean, hz).norm_squared();
     let hz = refined(power, coarse, width);
     let coefficients = fit(&seconds, &residual, &mean, hz);
     let svd = coefficients.svd(true, true);
-    let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else { return neutral };
+    let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else {
+        return neutral;
+    };
     let (strongest, sigma) = svd.singular_values.argmax();
     // S = A cos(phase), C = A sin(phase), as A sin(x + phase) = S sin x + C cos x.
     let amplitude = u.column(strongest) * sigma;
     let phase = v_t[(strongest, 1)].atan2(v_t[(strongest, 0)]);
-    vec![vec![hz, amplitude[0], amplitude[1], amplitude[2], phase.clamp(-PI, PI)]]
+    vec![vec![
+        hz,
+        amplitude[0],
+        amplitude[1],
+        amplitude[2],
+        phase.clamp(-PI, PI),
+    ]]
 }
 
 /// Coefficients of sine and cosine for each axis, by least squares.
@@ -86,7 +133,10 @@ fn fit(seconds: &[f64], residual: &[Vector3<f64>], mean: &Vector3<f64>, hz: f64)
         with_cosine += residual * cosine;
     }
     let determinant = ss * cc - sc * sc;
-    Matrix3x2::from_columns(&[(with_sine * cc - with_cosine * sc) / determinant, (with_cosine * ss - with_sine * sc) / determinant])
+    Matrix3x2::from_columns(&[
+        (with_sine * cc - with_cosine * sc) / determinant,
+        (with_cosine * ss - with_sine * sc) / determinant,
+    ])
 }
 
 /// The greatest value near a coarse peak, by golden sections.
@@ -112,8 +162,14 @@ fn refined(power: impl Fn(f64) -> f64, peak: f64, width: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// Frequency of the bin that stands out most over the median of its surroundings, and the bins' spacing, from a zero-padded spectrum of all axes.
-fn coarse_line(seconds: &[f64], residual: &[Vector3<f64>], mean: &Vector3<f64>, rate_hz: f64) -> Option<(f64, f64)> {
+/// Frequency of the bin that stands out most over the median of its surroundings, and the bins'
+/// spacing, from a zero-padded spectrum of all axes.
+fn coarse_line(
+    seconds: &[f64],
+    residual: &[Vector3<f64>],
+    mean: &Vector3<f64>,
+    rate_hz: f64,
+) -> Option<(f64, f64)> {
     let first = *seconds.first()?;
     let count = ((seconds.last()? - first) * rate_hz).round() as usize + 1;
     let size = (2 * count).next_power_of_two();
@@ -131,7 +187,10 @@ fn coarse_line(seconds: &[f64], residual: &[Vector3<f64>], mean: &Vector3<f64>, 
             signal[index.min(size - 1)].re = (residual[axis] - mean[axis]) * window;
         }
         transform.forward(&mut signal);
-        power.iter_mut().zip(&signal).for_each(|(power, value)| *power += value.norm_sqr());
+        power
+            .iter_mut()
+            .zip(&signal)
+            .for_each(|(power, value)| *power += value.norm_sqr());
     }
     let spacing = rate_hz / size as f64;
     let around = ((1.0 / spacing) as usize).max(20);
@@ -141,7 +200,8 @@ fn coarse_line(seconds: &[f64], residual: &[Vector3<f64>], mean: &Vector3<f64>, 
         if power[k] < power[k - 1] || power[k] < power[k + 1] {
             continue;
         }
-        let mut neighbours = power[k.saturating_sub(around).max(lowest)..(k + around).min(power.len())].to_vec();
+        let mut neighbours =
+            power[k.saturating_sub(around).max(lowest)..(k + around).min(power.len())].to_vec();
         let score = power[k] / median(&mut neighbours).max(f64::MIN_POSITIVE);
         if score > best.0 {
             best = (score, k);

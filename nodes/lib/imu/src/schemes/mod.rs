@@ -20,14 +20,16 @@ mod triangle;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Scheme {
-    /// Richardson's extrapolation of central differences over five frames; errors O(h^4). Amplifies jitter the most.
+    /// Richardson's extrapolation of central differences over five frames; errors O(h^4). Amplifies
+    /// jitter the most.
     Richardson,
-    /// The paper's baseline: the turning of the skin's normal alone, blind to rotation about it; central differences, O(h^2).
+    /// The paper's baseline: the turning of the skin's normal alone, blind to rotation about it;
+    /// central differences, O(h^2).
     NormalTracking,
     /// The triangle's full frame by central differences of its rotation matrix; O(h^2).
     Triangle,
-    /// Smoothing quintic splines of position and quaternion, the smoothing chosen from the frames, at any output rate; O(h^4) for
-    /// acceleration, O(h^5) for angular velocity.
+    /// Smoothing quintic splines of position and quaternion, the smoothing chosen from the frames,
+    /// at any output rate; O(h^4) for acceleration, O(h^5) for angular velocity.
     #[default]
     Spline,
     /// Plain second difference of the position and the turn between the neighbours; O(h^2).
@@ -36,7 +38,13 @@ pub enum Scheme {
 
 impl Scheme {
     /// All schemes.
-    pub const ALL: [Self; 5] = [Self::Richardson, Self::NormalTracking, Self::Triangle, Self::Spline, Self::SecondDifference];
+    pub const ALL: [Self; 5] = [
+        Self::Richardson,
+        Self::NormalTracking,
+        Self::Triangle,
+        Self::Spline,
+        Self::SecondDifference,
+    ];
 
     /// The name on the command line and in files.
     pub fn name(self) -> &'static str {
@@ -49,7 +57,8 @@ impl Scheme {
         }
     }
 
-    /// Frames that an estimate needs after (and before) its own; `None` for the spline, which has no stencil.
+    /// Frames that an estimate needs after (and before) its own; `None` for the spline, which has
+    /// no stencil.
     pub(crate) fn reach(self) -> Option<usize> {
         match self {
             Self::Richardson => Some(2),
@@ -58,8 +67,9 @@ impl Scheme {
         }
     }
 
-    /// Acceleration and angular velocity (world axes) at frame `k` of `frames` by the scheme's stencil; at the ends the
-    /// stencil is one-sided and has one frame more. For schemes with a reach.
+    /// Acceleration and angular velocity (world axes) at frame `k` of `frames` by the scheme's
+    /// stencil; at the ends the stencil is one-sided and has one frame more. For schemes with a
+    /// reach.
     pub(crate) fn at_frame(self, frames: &[SensorFrame], k: usize) -> (Vector3<f64>, Vector3<f64>) {
         let stencil = Stencil::new(frames, k, self.reach().unwrap_or(1));
         let angular_velocity = match self {
@@ -82,7 +92,12 @@ impl FromStr for Scheme {
     type Err = ImuError;
 
     fn from_str(name: &str) -> Result<Self, ImuError> {
-        Self::ALL.into_iter().find(|scheme| scheme.name() == name).ok_or_else(|| ImuError::UnknownScheme { name: name.to_owned() })
+        Self::ALL
+            .into_iter()
+            .find(|scheme| scheme.name() == name)
+            .ok_or_else(|| ImuError::UnknownScheme {
+                name: name.to_owned(),
+            })
     }
 }
 
@@ -111,17 +126,28 @@ impl<'a> Stencil<'a> {
         for (seconds, frame) in seconds.iter_mut().zip(frames) {
             *seconds = frame.stamp - centre.stamp;
         }
-        Self { frames, centre, weights: derivative_weights(&seconds[..width], 0.0) }
+        Self {
+            frames,
+            centre,
+            weights: derivative_weights(&seconds[..width], 0.0),
+        }
     }
 
     /// `sum_j w_j x_j` with the weights of a derivative of the given order.
     fn sum(&self, order: usize, of: impl Fn(&SensorFrame) -> Vector3<f64>) -> Vector3<f64> {
-        self.frames.iter().zip(self.weights[order]).map(|(frame, weight)| of(frame) * weight).sum()
+        self.frames
+            .iter()
+            .zip(self.weights[order])
+            .map(|(frame, weight)| of(frame) * weight)
+            .sum()
     }
 
-    /// Second derivative of the position. Differences from the centre, so that rounding does not grow with the distance from the origin.
+    /// Second derivative of the position. Differences from the centre, so that rounding does not
+    /// grow with the distance from the origin.
     fn acceleration(&self) -> Vector3<f64> {
         let centre = self.centre.world_from_sensor.translation.vector;
-        self.sum(2, |frame| frame.world_from_sensor.translation.vector - centre)
+        self.sum(2, |frame| {
+            frame.world_from_sensor.translation.vector - centre
+        })
     }
 }

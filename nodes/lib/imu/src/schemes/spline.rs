@@ -8,8 +8,13 @@ use crate::{ImuError, KinematicSample, SampleVariance, SensorFrame};
 
 /// The spline of a series of frames, smoothed as the frames themselves ask for.
 pub(crate) fn fit(times: &PoseTimes, frames: &[SensorFrame]) -> Result<PoseSpline, ImuError> {
-    let world_from_sensor: Vec<Isometry3<f64>> = frames.iter().map(|frame| frame.world_from_sensor).collect();
-    Ok(PoseSpline::fit_on(times, &world_from_sensor, PoseSmoothing::default())?)
+    let world_from_sensor: Vec<Isometry3<f64>> =
+        frames.iter().map(|frame| frame.world_from_sensor).collect();
+    Ok(PoseSpline::fit_on(
+        times,
+        &world_from_sensor,
+        PoseSmoothing::default(),
+    )?)
 }
 
 /// The motion at a stamp.
@@ -25,8 +30,9 @@ pub(crate) fn sample(spline: &PoseSpline, stamp: Stamp) -> KinematicSample {
     }
 }
 
-/// What errors of a spline's frames leave in its samples, its smoothing taken as given. That the smoothing is chosen from the same frames adds
-/// to it: 12 % of the acceleration's variance and 28 % of the angular velocity's on the tests' jittered second at 100 Hz.
+/// What errors of a spline's frames leave in its samples, its smoothing taken as given. That the
+/// smoothing is chosen from the same frames adds to it: 12 % of the acceleration's variance and 28
+/// % of the angular velocity's on the tests' jittered second at 100 Hz.
 pub(crate) struct SplineVariance<'a> {
     frames: &'a [SensorFrame],
     position: Influence,
@@ -35,13 +41,24 @@ pub(crate) struct SplineVariance<'a> {
 
 impl<'a> SplineVariance<'a> {
     /// For a spline through or near `frames`; `None` where no errors are known of.
-    pub(crate) fn new(times: &PoseTimes, spline: &PoseSpline, frames: &'a [SensorFrame]) -> Result<Option<Self>, ImuError> {
+    pub(crate) fn new(
+        times: &PoseTimes,
+        spline: &PoseSpline,
+        frames: &'a [SensorFrame],
+    ) -> Result<Option<Self>, ImuError> {
         if !any_error(frames) {
             return Ok(None);
         }
         let influence = |weight| Influence::new(times.system(), weight);
-        let (position, rotation) = (influence(spline.position().weight())?, influence(spline.rotation().weight())?);
-        Ok(Some(Self { frames, position, rotation }))
+        let (position, rotation) = (
+            influence(spline.position().weight())?,
+            influence(spline.rotation().weight())?,
+        );
+        Ok(Some(Self {
+            frames,
+            position,
+            rotation,
+        }))
     }
 
     /// At a stamp within the frames.

@@ -19,7 +19,11 @@ impl Examples {
     /// None yet, of so many steps and channels.
     #[must_use]
     pub fn new(steps: usize, channels: usize) -> Self {
-        Self { steps, channels, ..Self::default() }
+        Self {
+            steps,
+            channels,
+            ..Self::default()
+        }
     }
 
     /// Windows.
@@ -50,15 +54,29 @@ impl Examples {
     /// Windows of each class.
     #[must_use]
     pub fn counts(&self, classes: usize) -> Vec<usize> {
-        (0..classes).map(|class| self.labels.iter().filter(|label| usize::from(**label) == class).count()).collect()
+        (0..classes)
+            .map(|class| {
+                self.labels
+                    .iter()
+                    .filter(|label| usize::from(**label) == class)
+                    .count()
+            })
+            .collect()
     }
 
-    /// Weights with which all classes that are there count alike: windows / (classes there x windows of the class); 0 for others.
+    /// Weights with which all classes that are there count alike: windows / (classes there x
+    /// windows of the class); 0 for others.
     #[must_use]
     pub fn balance(&self, classes: usize) -> Vec<f32> {
         let counts = self.counts(classes);
         let there = counts.iter().filter(|count| **count > 0).count();
-        let weight = |count: &usize| if *count == 0 { 0.0 } else { self.len() as f32 / (there * count) as f32 };
+        let weight = |count: &usize| {
+            if *count == 0 {
+                0.0
+            } else {
+                self.len() as f32 / (there * count) as f32
+            }
+        };
         counts.iter().map(weight).collect()
     }
 
@@ -68,26 +86,50 @@ impl Examples {
     /// [`LearnedError::Input`], [`LearnedError::Batch`] naming the window.
     pub fn check(&self, channels: usize, classes: usize) -> Result<(), LearnedError> {
         crate::network::check_input(&self.values, self.len(), self.steps, channels)?;
-        let bad = |number: usize, reason: String| LearnedError::Batch { number: number as u64, reason };
-        if let Some(index) = self.labels.iter().position(|label| usize::from(*label) >= classes) {
-            return Err(bad(index, format!("a window of class {}, there are {classes}", self.labels[index])));
+        let bad = |number: usize, reason: String| LearnedError::Batch {
+            number: number as u64,
+            reason,
+        };
+        if let Some(index) = self
+            .labels
+            .iter()
+            .position(|label| usize::from(*label) >= classes)
+        {
+            return Err(bad(
+                index,
+                format!(
+                    "a window of class {}, there are {classes}",
+                    self.labels[index]
+                ),
+            ));
         }
         if let Some(index) = self.values.iter().position(|value| !value.is_finite()) {
-            return Err(bad(index / (self.steps * channels).max(1), format!("{} in a window", self.values[index])));
+            return Err(bad(
+                index / (self.steps * channels).max(1),
+                format!("{} in a window", self.values[index]),
+            ));
         }
         Ok(())
     }
 }
 
-/// Weighted sum of -ln softmax(logits)_label over rows, and its gradient times `scale` over the logits; logits: (rows, classes), weights: one a
-/// row. As PyTorch's CrossEntropyLoss with scale = 1 / sum of weights.
+/// Weighted sum of -ln softmax(logits)_label over rows, and its gradient times `scale` over the
+/// logits; logits: (rows, classes), weights: one a row. As PyTorch's CrossEntropyLoss with scale =
+/// 1 / sum of weights.
 pub fn cross_entropy(logits: &mut [f32], labels: &[u8], weights: &[f32], scale: f64) -> f64 {
     let classes = logits.len() / labels.len().max(1);
     let mut sum = 0.0;
-    for ((row, label), weight) in logits.chunks_exact_mut(classes.max(1)).zip(labels).zip(weights) {
+    for ((row, label), weight) in logits
+        .chunks_exact_mut(classes.max(1))
+        .zip(labels)
+        .zip(weights)
+    {
         // Less the largest, so that nothing overflows.
         let largest = row.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-        let powers: Vec<f64> = row.iter().map(|logit| f64::from(logit - largest).exp()).collect();
+        let powers: Vec<f64> = row
+            .iter()
+            .map(|logit| f64::from(logit - largest).exp())
+            .collect();
         let total: f64 = powers.iter().sum();
         let own = usize::from(*label);
         sum += f64::from(*weight) * (total.ln() - f64::from(row[own] - largest));
@@ -123,7 +165,10 @@ mod tests {
         check_gradient("logits", &logits, &gradient, loss);
         // Logits beyond f32's exponentials.
         let mut large = [200.0, -200.0, 0.0, 300.0];
-        assert!((cross_entropy(&mut large, &[0], &[1.0], 1.0) - 100.0).abs() < 1e-6 && large.iter().all(|value| value.is_finite()));
+        assert!(
+            (cross_entropy(&mut large, &[0], &[1.0], 1.0) - 100.0).abs() < 1e-6
+                && large.iter().all(|value| value.is_finite())
+        );
     }
 
     #[test]
@@ -132,9 +177,24 @@ mod tests {
         for label in [0, 0, 0, 2] {
             examples.push(&[0.5], label);
         }
-        assert_eq!((examples.counts(3), examples.balance(3)), (vec![3, 0, 1], vec![4.0 / 6.0, 0.0, 2.0]));
-        assert!(examples.check(1, 2).unwrap_err().to_string().contains("class 2"));
+        assert_eq!(
+            (examples.counts(3), examples.balance(3)),
+            (vec![3, 0, 1], vec![4.0 / 6.0, 0.0, 2.0])
+        );
+        assert!(
+            examples
+                .check(1, 2)
+                .unwrap_err()
+                .to_string()
+                .contains("class 2")
+        );
         examples.values[3] = f32::NAN;
-        assert!(examples.check(1, 3).unwrap_err().to_string().contains("batch 3: NaN"));
+        assert!(
+            examples
+                .check(1, 3)
+                .unwrap_err()
+                .to_string()
+                .contains("batch 3: NaN")
+        );
     }
 }

@@ -47,32 +47,58 @@ impl Classifier {
         &self.parameters
     }
 
-    /// One number a class: (windows, steps, inputs) -> (windows, classes); the largest is the class that it says.
+    /// One number a class: (windows, steps, inputs) -> (windows, classes); the largest is the class
+    /// that it says.
     ///
     /// # Errors
     /// Where the input's length does not fit, or windows are too short.
-    pub fn logits(&self, windows: &[f32], count: usize, steps: usize) -> Result<Vec<f32>, LearnedError> {
+    pub fn logits(
+        &self,
+        windows: &[f32],
+        count: usize,
+        steps: usize,
+    ) -> Result<Vec<f32>, LearnedError> {
         check_input(windows, count, steps, self.shape.inputs)?;
         self.check_steps(steps)?;
         let layers = Layers::new(&self.shape, &self.parameters);
         let parts = windows.chunks(BATCH * steps * self.shape.inputs);
-        Ok(parts.flat_map(|part| layers.forward(part, steps, None).0).collect())
+        Ok(parts
+            .flat_map(|part| layers.forward(part, steps, None).0)
+            .collect())
     }
 
     /// The class with the largest number, for each window; the first of equals.
     ///
     /// # Errors
     /// As [`Classifier::logits`].
-    pub fn classes(&self, windows: &[f32], count: usize, steps: usize) -> Result<Vec<u8>, LearnedError> {
+    pub fn classes(
+        &self,
+        windows: &[f32],
+        count: usize,
+        steps: usize,
+    ) -> Result<Vec<u8>, LearnedError> {
         let logits = self.logits(windows, count, steps)?;
-        let largest = |row: &[f32]| (1..row.len()).fold(0, |best, class| if row[class] > row[best] { class } else { best }) as u8;
-        Ok(logits.chunks_exact(self.shape.classes).map(largest).collect())
+        let largest = |row: &[f32]| {
+            (1..row.len()).fold(
+                0,
+                |best, class| if row[class] > row[best] { class } else { best },
+            ) as u8
+        };
+        Ok(logits
+            .chunks_exact(self.shape.classes)
+            .map(largest)
+            .collect())
     }
 
     pub(super) fn check_steps(&self, steps: usize) -> Result<(), LearnedError> {
         let least = self.shape.least_steps();
         if steps < least {
-            return Err(LearnedError::Shape { field: "steps of a window", found: steps, least, most: usize::MAX });
+            return Err(LearnedError::Shape {
+                field: "steps of a window",
+                found: steps,
+                least,
+                most: usize::MAX,
+            });
         }
         Ok(())
     }
@@ -81,8 +107,17 @@ impl Classifier {
     ///
     /// # Errors
     /// Where they cannot be made; the message names `path`, under which they are meant to lie.
-    pub fn to_bytes(&self, notes: &BTreeMap<String, String>, path: &Path) -> Result<Vec<u8>, LearnedError> {
-        weights_to_bytes((&self.shape, self.shape.tensors()), &self.parameters, notes, path)
+    pub fn to_bytes(
+        &self,
+        notes: &BTreeMap<String, String>,
+        path: &Path,
+    ) -> Result<Vec<u8>, LearnedError> {
+        weights_to_bytes(
+            (&self.shape, self.shape.tensors()),
+            &self.parameters,
+            notes,
+            path,
+        )
     }
 
     /// Writes a safetensors file, whole or not at all.
@@ -93,12 +128,16 @@ impl Classifier {
         tensors::write_whole(path, &self.to_bytes(notes, path)?)
     }
 
-    /// Reads what [`Classifier::write`] wrote, or PyTorch under the same names; `path` stands in messages. What is allocated is bounded by the
-    /// bytes' length.
+    /// Reads what [`Classifier::write`] wrote, or PyTorch under the same names; `path` stands in
+    /// messages. What is allocated is bounded by the bytes' length.
     ///
     /// # Errors
-    /// Where the bytes are not such a file, or its tensors are not those of the shape in its metadata.
-    pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<(Self, BTreeMap<String, String>), LearnedError> {
+    /// Where the bytes are not such a file, or its tensors are not those of the shape in its
+    /// metadata.
+    pub fn from_bytes(
+        bytes: &[u8],
+        path: &Path,
+    ) -> Result<(Self, BTreeMap<String, String>), LearnedError> {
         let sound = |shape: &ClassifierShape| shape.check().map(|()| shape.tensors());
         let (shape, parameters, notes) = read_weights(bytes, path, sound)?;
         Ok((Self { shape, parameters }, notes))
@@ -151,37 +190,99 @@ impl<'a> Layers<'a> {
         }
     }
 
-    /// windows: (batch, steps, inputs) -> (batch, classes), and with dropout what the way back needs.
+    /// windows: (batch, steps, inputs) -> (batch, classes), and with dropout what the way back
+    /// needs.
     ///
-    /// (steps, batch, inputs) is (steps, batch x inputs, 1) in memory: a convolution over batch x inputs sequences of one number does each
-    /// channel by itself, and its output (steps, batch x inputs, maps) is the LSTM's input (steps, batch, inputs x maps).
-    pub fn forward(&self, windows: &[f32], steps: usize, dropout: Option<Dropout<'_>>) -> (Vec<f32>, Tape) {
+    /// (steps, batch, inputs) is (steps, batch x inputs, 1) in memory: a convolution over batch x
+    /// inputs sequences of one number does each channel by itself, and its output (steps, batch x
+    /// inputs, maps) is the LSTM's input (steps, batch, inputs x maps).
+    pub fn forward(
+        &self,
+        windows: &[f32],
+        steps: usize,
+        dropout: Option<Dropout<'_>>,
+    ) -> (Vec<f32>, Tape) {
         let ClassifierShape { inputs, hidden, .. } = *self.shape;
         let batch = windows.len() / (steps * inputs);
         let by_steps = swap_leading_axes(windows, batch, steps, inputs);
-        let mut tape = Tape { steps_out: steps + 1 - self.shape.least_steps(), ..Tape::default() };
+        let mut tape = Tape {
+            steps_out: steps + 1 - self.shape.least_steps(),
+            ..Tape::default()
+        };
         let keep = dropout.is_some();
-        let convolved = self.convolutions.forward(by_steps, batch * inputs, keep.then_some(&mut tape.convolved));
-        let recurrent = self.recurrent.forward(convolved, batch, keep.then_some(&mut tape.recurrent));
+        let convolved = self.convolutions.forward(
+            by_steps,
+            batch * inputs,
+            keep.then_some(&mut tape.convolved),
+        );
+        let recurrent =
+            self.recurrent
+                .forward(convolved, batch, keep.then_some(&mut tape.recurrent));
         tape.last = recurrent[(tape.steps_out - 1) * batch * hidden..].to_vec();
-        if let Some(Dropout { probability, random }) = dropout {
+        if let Some(Dropout {
+            probability,
+            random,
+        }) = dropout
+        {
             let scale = 1.0 / (1.0 - probability);
-            tape.kept = tape.last.iter().map(|_| if random.random::<f32>() < probability { 0.0 } else { scale }).collect();
-            tape.last.iter_mut().zip(&tape.kept).for_each(|(value, kept)| *value *= kept);
+            tape.kept = tape
+                .last
+                .iter()
+                .map(|_| {
+                    if random.random::<f32>() < probability {
+                        0.0
+                    } else {
+                        scale
+                    }
+                })
+                .collect();
+            tape.last
+                .iter_mut()
+                .zip(&tape.kept)
+                .for_each(|(value, kept)| *value *= kept);
         }
         (self.linear.forward(&tape.last), tape)
     }
 
-    /// Adds the gradients of all parameters to `gradients`; output_gradient: (batch, classes). Returns the input's, (steps, batch, inputs).
-    pub fn backward(&self, parameters: &[f32], tape: &Tape, output_gradient: &[f32], gradients: &mut [f32]) -> Vec<f32> {
+    /// Adds the gradients of all parameters to `gradients`; output_gradient: (batch, classes).
+    /// Returns the input's, (steps, batch, inputs).
+    pub fn backward(
+        &self,
+        parameters: &[f32],
+        tape: &Tape,
+        output_gradient: &[f32],
+        gradients: &mut [f32],
+    ) -> Vec<f32> {
         let batch = output_gradient.len() / self.shape.classes;
-        let mut of_last = linear_backward(&self.linear, &self.places, parameters, (&tape.last, output_gradient), gradients);
-        of_last.iter_mut().zip(&tape.kept).for_each(|(gradient, kept)| *gradient *= kept);
+        let mut of_last = linear_backward(
+            &self.linear,
+            &self.places,
+            parameters,
+            (&tape.last, output_gradient),
+            gradients,
+        );
+        of_last
+            .iter_mut()
+            .zip(&tape.kept)
+            .for_each(|(gradient, kept)| *gradient *= kept);
         let mut of_recurrent = vec![0.0; (tape.steps_out - 1) * of_last.len()];
         of_recurrent.extend(of_last);
-        let of_convolved = self.recurrent.backward(&self.places, parameters, &tape.recurrent, of_recurrent, gradients);
+        let of_convolved = self.recurrent.backward(
+            &self.places,
+            parameters,
+            &tape.recurrent,
+            of_recurrent,
+            gradients,
+        );
         let convolved = (tape.convolved.as_slice(), tape.recurrent.input());
-        self.convolutions.backward(&self.places, parameters, convolved, of_convolved, batch * self.shape.inputs, gradients)
+        self.convolutions.backward(
+            &self.places,
+            parameters,
+            convolved,
+            of_convolved,
+            batch * self.shape.inputs,
+            gradients,
+        )
     }
 }
 

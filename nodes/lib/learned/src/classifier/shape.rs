@@ -29,7 +29,15 @@ impl ClassifierShape {
     /// The sizes of the article: 64 maps, four convolutions of 5 taps, two layers of 128 units.
     #[must_use]
     pub fn published(inputs: usize, classes: usize) -> Self {
-        Self { inputs, maps: 64, kernel: 5, convolutions: 4, hidden: 128, layers: 2, classes }
+        Self {
+            inputs,
+            maps: 64,
+            kernel: 5,
+            convolutions: 4,
+            hidden: 128,
+            layers: 2,
+            classes,
+        }
     }
 
     /// All numbers within their ranges, and no more parameters than [`crate::MOST_PARAMETERS`].
@@ -55,7 +63,8 @@ impl ClassifierShape {
         self.convolutions * (self.kernel - 1) + 1
     }
 
-    /// Every tensor by PyTorch's names of the modules `conv` (Conv1d over one channel), `lstm` and `linear`, in the order in which they lie.
+    /// Every tensor by PyTorch's names of the modules `conv` (Conv1d over one channel), `lstm` and
+    /// `linear`, in the order in which they lie.
     #[must_use]
     pub fn tensors(&self) -> Vec<Tensor> {
         let mut list = TensorList::default();
@@ -94,7 +103,19 @@ mod tests {
     fn refuses_what_cannot_be() {
         let message = |shape: ClassifierShape| shape.check().unwrap_err().to_string();
         let shape = ClassifierShape::published(12, 5);
-        assert_eq!(message(ClassifierShape { classes: 1, ..shape.clone() }), "network shape: classes is 1, it may be 2 to 65536");
-        assert!(message(ClassifierShape { hidden: 16_384, ..shape }).contains("parameters, at most 268435456"));
+        assert_eq!(
+            message(ClassifierShape {
+                classes: 1,
+                ..shape.clone()
+            }),
+            "network shape: classes is 1, it may be 2 to 65536"
+        );
+        assert!(
+            message(ClassifierShape {
+                hidden: 16_384,
+                ..shape
+            })
+            .contains("parameters, at most 268435456")
+        );
     }
 }

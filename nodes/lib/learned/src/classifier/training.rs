@@ -32,18 +32,28 @@ pub struct ClassifierOptions {
 
 impl ClassifierOptions {
     fn check(&self, pools: usize) -> Result<(), LearnedError> {
-        let wrong = |field: &'static str, reason: String| Err(LearnedError::Options { field, reason });
+        let wrong =
+            |field: &'static str, reason: String| Err(LearnedError::Options { field, reason });
         if self.steps == 0 {
             return wrong("steps", "0; it has to be at least 1".to_owned());
         }
         if self.batch < pools.max(1) {
-            return wrong("batch", format!("{}; every one of {pools} pools needs a window", self.batch));
+            return wrong(
+                "batch",
+                format!("{}; every one of {pools} pools needs a window", self.batch),
+            );
         }
         if !(self.learning_rate.is_finite() && self.learning_rate > 0.0) {
-            return wrong("learning_rate", format!("{}; it has to be above 0", self.learning_rate));
+            return wrong(
+                "learning_rate",
+                format!("{}; it has to be above 0", self.learning_rate),
+            );
         }
         if !(0.0..1.0).contains(&self.dropout) {
-            return wrong("dropout", format!("{}; it may be 0 to below 1", self.dropout));
+            return wrong(
+                "dropout",
+                format!("{}; it may be 0 to below 1", self.dropout),
+            );
         }
         if let Schedule::Cosine { floor } = self.schedule
             && !(0.0..=1.0).contains(&floor)
@@ -65,7 +75,10 @@ struct Deck {
 
 impl Deck {
     fn new(count: usize) -> Self {
-        Self { order: (0..count as u32).collect(), next: count }
+        Self {
+            order: (0..count as u32).collect(),
+            next: count,
+        }
     }
 
     fn draw(&mut self, random: &mut ChaCha8Rng) -> usize {
@@ -81,8 +94,9 @@ impl Deck {
     }
 }
 
-/// Trains a classifier on pools of windows; every batch takes as many of each, the first pools one more where they do not divide it. Within a
-/// pool all classes count alike ([`Examples::balance`]); the loss is the weighted mean of the cross-entropy. None where it was interrupted.
+/// Trains a classifier on pools of windows; every batch takes as many of each, the first pools one
+/// more where they do not divide it. Within a pool all classes count alike ([`Examples::balance`]);
+/// the loss is the weighted mean of the cross-entropy. None where it was interrupted.
 ///
 /// On the calling thread alone; the same seed gives the same bits.
 ///
@@ -102,10 +116,17 @@ pub fn train_classifier(
     for pool in pools {
         pool.check(shape.inputs, shape.classes)?;
         if pool.is_empty() || pool.steps != steps {
-            return Err(LearnedError::TooFew { what: "windows of a pool".to_owned(), found: pool.len(), needed: 1 });
+            return Err(LearnedError::TooFew {
+                what: "windows of a pool".to_owned(),
+                found: pool.len(),
+                needed: 1,
+            });
         }
     }
-    let balances: Vec<Vec<f32>> = pools.iter().map(|pool| pool.balance(shape.classes)).collect();
+    let balances: Vec<Vec<f32>> = pools
+        .iter()
+        .map(|pool| pool.balance(shape.classes))
+        .collect();
     let mut decks: Vec<Deck> = pools.iter().map(|pool| Deck::new(pool.len())).collect();
     let (mut order, mut dropped) = (random(seed, 1), random(seed, 2));
     let mut adam = Adam::new(classifier.parameters.len());
@@ -125,13 +146,28 @@ pub fn train_classifier(
             labels.push(pools[pool].labels[index]);
             weights.push(balances[pool][usize::from(pools[pool].labels[index])]);
         }
-        let dropout = Dropout { probability: options.dropout, random: &mut dropped };
-        let loss = gradients_of(&classifier, (&windows, &labels, &weights), steps, dropout, &mut gradients);
+        let dropout = Dropout {
+            probability: options.dropout,
+            random: &mut dropped,
+        };
+        let loss = gradients_of(
+            &classifier,
+            (&windows, &labels, &weights),
+            steps,
+            dropout,
+            &mut gradients,
+        );
         let gradient_norm = clip(&mut gradients, options.clip);
         if !loss.is_finite() || !gradient_norm.is_finite() {
-            return Err(LearnedError::Diverged { step, loss, gradient_norm });
+            return Err(LearnedError::Diverged {
+                step,
+                loss,
+                gradient_norm,
+            });
         }
-        let rate = options.schedule.rate(options.learning_rate, step, options.steps);
+        let rate = options
+            .schedule
+            .rate(options.learning_rate, step, options.steps);
         adam.step(&mut classifier.parameters, &gradients, rate, step + 1);
     }
     Ok(Some(classifier))

@@ -59,8 +59,21 @@ impl Convolution {
     #[must_use]
     pub fn new(weight: &[f32], bias: &[f32], kernel: usize, padding: Padding) -> Self {
         let inputs = weight.len() / (bias.len() * kernel);
-        let tap = |tap| PackedMatrix::new(View::strided(&weight[tap..], inputs, bias.len(), kernel, inputs * kernel));
-        Self { inputs, padding, taps: (0..kernel).map(tap).collect(), bias: bias.to_vec() }
+        let tap = |tap| {
+            PackedMatrix::new(View::strided(
+                &weight[tap..],
+                inputs,
+                bias.len(),
+                kernel,
+                inputs * kernel,
+            ))
+        };
+        Self {
+            inputs,
+            padding,
+            taps: (0..kernel).map(tap).collect(),
+            bias: bias.to_vec(),
+        }
     }
 
     /// The matrices of the taps, (inputs, outputs) each, the earliest first, and the bias.
@@ -68,7 +81,8 @@ impl Convolution {
         (&self.taps, &self.bias)
     }
 
-    /// For a tap: the first step that it reaches, the first that it reads, and how many there are; nothing where all it reads is padding.
+    /// For a tap: the first step that it reaches, the first that it reads, and how many there are;
+    /// nothing where all it reads is padding.
     fn reach(&self, tap: usize, steps: usize) -> Option<(usize, usize, usize)> {
         let (before, _) = self.padding.steps(self.taps.len());
         let (to, from) = (before.saturating_sub(tap), tap.saturating_sub(before));
@@ -85,14 +99,25 @@ impl Convolution {
         let mut output = vec![0.0; self.padding.steps_out(self.taps.len(), steps) * wide_out];
         fill_rows(&mut output, &self.bias);
         for (tap, matrix) in self.taps.iter().enumerate() {
-            let Some((to, from, count)) = self.reach(tap, steps) else { continue };
-            let input = View::new(&input[from * wide_in..][..count * wide_in], count * batch, self.inputs);
-            add_product(&mut output[to * wide_out..][..count * wide_out], input, matrix);
+            let Some((to, from, count)) = self.reach(tap, steps) else {
+                continue;
+            };
+            let input = View::new(
+                &input[from * wide_in..][..count * wide_in],
+                count * batch,
+                self.inputs,
+            );
+            add_product(
+                &mut output[to * wide_out..][..count * wide_out],
+                input,
+                matrix,
+            );
         }
         output
     }
 
-    /// Adds the gradients of weight and bias, returns that of the input; weight: as given to [`Convolution::new`].
+    /// Adds the gradients of weight and bias, returns that of the input; weight: as given to
+    /// [`Convolution::new`].
     #[must_use]
     pub fn backward(
         &self,
@@ -113,10 +138,26 @@ impl Convolution {
         let mut input_gradient = vec![0.0; input.len()];
         let mut of_tap = vec![0.0; inputs * outputs];
         for tap in 0..kernel {
-            let Some((to, from, count)) = self.reach(tap, steps) else { continue };
-            let gradient = View::new(&output_gradient[to * wide_out..][..count * wide_out], count * batch, outputs);
-            let back = PackedMatrix::new(View::strided(&weight[tap..], outputs, inputs, inputs * kernel, kernel));
-            add_product(&mut input_gradient[from * wide_in..][..count * wide_in], gradient, &back);
+            let Some((to, from, count)) = self.reach(tap, steps) else {
+                continue;
+            };
+            let gradient = View::new(
+                &output_gradient[to * wide_out..][..count * wide_out],
+                count * batch,
+                outputs,
+            );
+            let back = PackedMatrix::new(View::strided(
+                &weight[tap..],
+                outputs,
+                inputs,
+                inputs * kernel,
+                kernel,
+            ));
+            add_product(
+                &mut input_gradient[from * wide_in..][..count * wide_in],
+                gradient,
+                &back,
+            );
             of_tap.fill(0.0);
             let seen = View::new(&padded[tap * wide_in..][..rows * inputs], rows, inputs);
             add_product(&mut of_tap, seen.transposed(), &packed_gradient);
@@ -132,12 +173,18 @@ impl Convolution {
 
 /// x becomes max(x, 0); NaN stays.
 pub fn relu(values: &mut [f32]) {
-    values.iter_mut().filter(|value| **value < 0.0).for_each(|value| *value = 0.0);
+    values
+        .iter_mut()
+        .filter(|value| **value < 0.0)
+        .for_each(|value| *value = 0.0);
 }
 
 /// The gradient behind [`relu`] becomes the one before it: 0 where the output is 0.
 pub fn relu_backward(output: &[f32], gradient: &mut [f32]) {
-    gradient.iter_mut().zip(output).for_each(|(gradient, output)| *gradient = if *output == 0.0 { 0.0 } else { *gradient });
+    gradient
+        .iter_mut()
+        .zip(output)
+        .for_each(|(gradient, output)| *gradient = if *output == 0.0 { 0.0 } else { *gradient });
 }
 
 #[cfg(test)]
@@ -150,20 +197,27 @@ mod tests {
     const OUTPUTS: usize = 5;
 
     /// The definition, in f64.
-    fn by_definition(input: &[f32], weight: &[f32], bias: &[f32], kernel: usize, padding: Padding) -> Vec<f64> {
+    fn by_definition(
+        input: &[f32],
+        weight: &[f32],
+        bias: &[f32],
+        kernel: usize,
+        padding: Padding,
+    ) -> Vec<f64> {
         let steps = input.len() / (BATCH * INPUTS);
         let before = padding.steps(kernel).0 as isize;
         let mut output = Vec::new();
-        for (step, sequence, channel) in (0..padding.steps_out(kernel, steps))
-            .flat_map(|step| (0..BATCH * OUTPUTS).map(move |index| (step, index / OUTPUTS, index % OUTPUTS)))
-        {
+        for (step, sequence, channel) in (0..padding.steps_out(kernel, steps)).flat_map(|step| {
+            (0..BATCH * OUTPUTS).map(move |index| (step, index / OUTPUTS, index % OUTPUTS))
+        }) {
             let mut sum = f64::from(bias[channel]);
             for tap in 0..kernel {
                 let from = step as isize + tap as isize - before;
                 if (0..steps as isize).contains(&from) {
                     for index in 0..INPUTS {
                         let value = input[(from as usize * BATCH + sequence) * INPUTS + index];
-                        sum += f64::from(value) * f64::from(weight[(channel * INPUTS + index) * kernel + tap]);
+                        sum += f64::from(value)
+                            * f64::from(weight[(channel * INPUTS + index) * kernel + tap]);
                     }
                 }
             }
@@ -176,29 +230,63 @@ mod tests {
     fn agrees_with_the_definition() {
         for (steps, kernel) in [(9, 5), (9, 4), (2, 5), (1, 1), (6, 3)] {
             for padding in [Padding::Same, Padding::Causal, Padding::None] {
-                let (input, weight, bias) = (values(steps * BATCH * INPUTS, 1), values(OUTPUTS * INPUTS * kernel, 2), values(OUTPUTS, 3));
-                let found = Convolution::new(&weight, &bias, kernel, padding).forward(&input, BATCH);
+                let (input, weight, bias) = (
+                    values(steps * BATCH * INPUTS, 1),
+                    values(OUTPUTS * INPUTS * kernel, 2),
+                    values(OUTPUTS, 3),
+                );
+                let found =
+                    Convolution::new(&weight, &bias, kernel, padding).forward(&input, BATCH);
                 let expected = by_definition(&input, &weight, &bias, kernel, padding);
-                assert_eq!(found.len(), expected.len(), "{padding:?}, {steps} steps, kernel {kernel}");
-                assert!(found.iter().zip(&expected).all(|(found, expected)| (f64::from(*found) - expected).abs() < 1e-5));
+                assert_eq!(
+                    found.len(),
+                    expected.len(),
+                    "{padding:?}, {steps} steps, kernel {kernel}"
+                );
+                assert!(
+                    found
+                        .iter()
+                        .zip(&expected)
+                        .all(|(found, expected)| (f64::from(*found) - expected).abs() < 1e-5)
+                );
             }
         }
     }
 
     #[test]
     fn gradients_agree_with_differences() {
-        for (padding, kernel) in [(Padding::Same, 5), (Padding::Same, 2), (Padding::Causal, 3), (Padding::None, 3)] {
+        for (padding, kernel) in [
+            (Padding::Same, 5),
+            (Padding::Same, 2),
+            (Padding::Causal, 3),
+            (Padding::None, 3),
+        ] {
             let steps = 6;
-            let (input, weight, bias) = (values(steps * BATCH * INPUTS, 1), values(OUTPUTS * INPUTS * kernel, 2), values(OUTPUTS, 3));
+            let (input, weight, bias) = (
+                values(steps * BATCH * INPUTS, 1),
+                values(OUTPUTS * INPUTS * kernel, 2),
+                values(OUTPUTS, 3),
+            );
             let along = values(padding.steps_out(kernel, steps) * BATCH * OUTPUTS, 4);
             let loss = |input: &[f32], weight: &[f32], bias: &[f32]| {
-                weighted_sum(&Convolution::new(weight, bias, kernel, padding).forward(input, BATCH), &along)
+                weighted_sum(
+                    &Convolution::new(weight, bias, kernel, padding).forward(input, BATCH),
+                    &along,
+                )
             };
             let (mut of_weight, mut of_bias) = (vec![0.0; weight.len()], vec![0.0; bias.len()]);
-            let gradients = ConvolutionGradients { weight: &mut of_weight, bias: &mut of_bias };
-            let of_input = Convolution::new(&weight, &bias, kernel, padding).backward(&weight, &input, &along, BATCH, gradients);
-            check_gradient("input", &input, &of_input, |input| loss(input, &weight, &bias));
-            check_gradient("weight", &weight, &of_weight, |weight| loss(&input, weight, &bias));
+            let gradients = ConvolutionGradients {
+                weight: &mut of_weight,
+                bias: &mut of_bias,
+            };
+            let of_input = Convolution::new(&weight, &bias, kernel, padding)
+                .backward(&weight, &input, &along, BATCH, gradients);
+            check_gradient("input", &input, &of_input, |input| {
+                loss(input, &weight, &bias)
+            });
+            check_gradient("weight", &weight, &of_weight, |weight| {
+                loss(&input, weight, &bias)
+            });
             check_gradient("bias", &bias, &of_bias, |bias| loss(&input, &weight, bias));
         }
     }

@@ -24,13 +24,21 @@ impl Linear {
     #[must_use]
     pub fn new(weight: &[f32], bias: &[f32]) -> Self {
         let inputs = weight.len() / bias.len();
-        Self { inputs, by_input: PackedMatrix::new(View::new(weight, bias.len(), inputs).transposed()), bias: bias.to_vec() }
+        Self {
+            inputs,
+            by_input: PackedMatrix::new(View::new(weight, bias.len(), inputs).transposed()),
+            bias: bias.to_vec(),
+        }
     }
 
     /// y = x W^T + b; input: (rows, inputs), output: (rows, outputs).
     pub fn forward_into(&self, input: &[f32], output: &mut [f32]) {
         fill_rows(output, &self.bias);
-        add_product(output, View::new(input, input.len() / self.inputs, self.inputs), &self.by_input);
+        add_product(
+            output,
+            View::new(input, input.len() / self.inputs, self.inputs),
+            &self.by_input,
+        );
     }
 
     /// As [`Linear::forward_into`], into memory of its own.
@@ -41,15 +49,30 @@ impl Linear {
         output
     }
 
-    /// Adds dW = dY^T X and db = the sum of dY's rows, returns dX = dY W; weight: as given to [`Linear::new`].
+    /// Adds dW = dY^T X and db = the sum of dY's rows, returns dX = dY W; weight: as given to
+    /// [`Linear::new`].
     #[must_use]
-    pub fn backward(&self, weight: &[f32], input: &[f32], output_gradient: &[f32], gradients: LinearGradients<'_>) -> Vec<f32> {
+    pub fn backward(
+        &self,
+        weight: &[f32],
+        input: &[f32],
+        output_gradient: &[f32],
+        gradients: LinearGradients<'_>,
+    ) -> Vec<f32> {
         let (inputs, outputs, rows) = (self.inputs, self.bias.len(), input.len() / self.inputs);
         let output_gradient_rows = View::new(output_gradient, rows, outputs);
-        add_product(gradients.weight, output_gradient_rows.transposed(), &PackedMatrix::new(View::new(input, rows, inputs)));
+        add_product(
+            gradients.weight,
+            output_gradient_rows.transposed(),
+            &PackedMatrix::new(View::new(input, rows, inputs)),
+        );
         add_rows(gradients.bias, output_gradient);
         let mut input_gradient = vec![0.0; input.len()];
-        add_product(&mut input_gradient, output_gradient_rows, &PackedMatrix::new(View::new(weight, outputs, inputs)));
+        add_product(
+            &mut input_gradient,
+            output_gradient_rows,
+            &PackedMatrix::new(View::new(weight, outputs, inputs)),
+        );
         input_gradient
     }
 }
@@ -62,14 +85,27 @@ mod tests {
     #[test]
     fn gradients_agree_with_differences() {
         let (rows, inputs, outputs) = (7, 5, 3);
-        let (input, weight, bias, along) =
-            (values(rows * inputs, 1), values(outputs * inputs, 2), values(outputs, 3), values(rows * outputs, 4));
-        let loss = |input: &[f32], weight: &[f32], bias: &[f32]| weighted_sum(&Linear::new(weight, bias).forward(input), &along);
+        let (input, weight, bias, along) = (
+            values(rows * inputs, 1),
+            values(outputs * inputs, 2),
+            values(outputs, 3),
+            values(rows * outputs, 4),
+        );
+        let loss = |input: &[f32], weight: &[f32], bias: &[f32]| {
+            weighted_sum(&Linear::new(weight, bias).forward(input), &along)
+        };
         let (mut of_weight, mut of_bias) = (vec![0.0; weight.len()], vec![0.0; bias.len()]);
-        let gradients = LinearGradients { weight: &mut of_weight, bias: &mut of_bias };
+        let gradients = LinearGradients {
+            weight: &mut of_weight,
+            bias: &mut of_bias,
+        };
         let of_input = Linear::new(&weight, &bias).backward(&weight, &input, &along, gradients);
-        check_gradient("input", &input, &of_input, |input| loss(input, &weight, &bias));
-        check_gradient("weight", &weight, &of_weight, |weight| loss(&input, weight, &bias));
+        check_gradient("input", &input, &of_input, |input| {
+            loss(input, &weight, &bias)
+        });
+        check_gradient("weight", &weight, &of_weight, |weight| {
+            loss(&input, weight, &bias)
+        });
         check_gradient("bias", &bias, &of_bias, |bias| loss(&input, &weight, bias));
     }
 }

@@ -1,9 +1,11 @@
-//! Long short-term memory over a batch (Hochreiter and Schmidhuber 1997, with the forget gate of Gers et al. 2000), gates in PyTorch's order:
+//! Long short-term memory over a batch (Hochreiter and Schmidhuber 1997, with the forget gate of
+//! Gers et al. 2000), gates in PyTorch's order:
 //!
-//! i, f, o = sigmoid(z), g = tanh(z), z = W_ih x_t + b_ih + W_hh h_(t-1) + b_hh; c_t = f c_(t-1) + i g; h_t = o tanh(c_t).
+//! i, f, o = sigmoid(z), g = tanh(z), z = W_ih x_t + b_ih + W_hh h_(t-1) + b_hh; c_t = f c_(t-1) +
+//! i g; h_t = o tanh(c_t).
 //!
-//! One product takes the inputs of all steps, one small product each step the hidden state; the way back walks the steps once for the
-//! gates' gradients and takes three large products at its end.
+//! One product takes the inputs of all steps, one small product each step the hidden state; the way
+//! back walks the steps once for the gates' gradients and takes three large products at its end.
 
 use super::product::{PackedMatrix, View, add_product, add_rows, fill_rows};
 use pulp::{Arch, Simd, WithSimd};
@@ -32,7 +34,8 @@ pub struct LstmWeights<'a> {
     pub recurrent_bias: &'a [f32],
 }
 
-/// Gradients in the shapes of [`LstmWeights`]; what comes is added. Both biases have the same gradient.
+/// Gradients in the shapes of [`LstmWeights`]; what comes is added. Both biases have the same
+/// gradient.
 #[derive(Debug)]
 pub struct LstmGradients<'a> {
     /// (4 H, inputs)
@@ -100,7 +103,12 @@ impl Lstm {
             order,
             by_input: PackedMatrix::new(View::new(weights.input, gates, inputs).transposed()),
             by_hidden: PackedMatrix::new(View::new(weights.recurrent, gates, hidden).transposed()),
-            bias: weights.input_bias.iter().zip(weights.recurrent_bias).map(|(input, recurrent)| input + recurrent).collect(),
+            bias: weights
+                .input_bias
+                .iter()
+                .zip(weights.recurrent_bias)
+                .map(|(input, recurrent)| input + recurrent)
+                .collect(),
         }
     }
 
@@ -112,17 +120,28 @@ impl Lstm {
 
     fn steps_in_order(&self, steps: usize) -> impl DoubleEndedIterator<Item = usize> + use<> {
         let order = self.order;
-        (0..steps).map(move |index| if order == Order::Forward { index } else { steps - 1 - index })
+        (0..steps).map(move |index| {
+            if order == Order::Forward {
+                index
+            } else {
+                steps - 1 - index
+            }
+        })
     }
 
     /// input: (steps, batch, inputs); hidden state and cells begin at zero.
     #[must_use]
     pub fn forward(&self, input: &[f32], batch: usize) -> LstmTape {
         let rows = input.len() / self.inputs;
-        let (steps, wide, wide_gates) = (rows / batch, batch * self.hidden, 4 * batch * self.hidden);
+        let (steps, wide, wide_gates) =
+            (rows / batch, batch * self.hidden, 4 * batch * self.hidden);
         let mut gates = vec![0.0; steps * wide_gates];
         fill_rows(&mut gates, &self.bias);
-        add_product(&mut gates, View::new(input, rows, self.inputs), &self.by_input);
+        add_product(
+            &mut gates,
+            View::new(input, rows, self.inputs),
+            &self.by_input,
+        );
         let (mut cells, mut tanh_cells) = (vec![0.0; steps * wide], vec![0.0; steps * wide]);
         let mut hidden = vec![0.0; (steps + 1) * wide];
         let mut before: Option<usize> = None;
@@ -136,26 +155,60 @@ impl Lstm {
                 Order::Reverse => (&later[..wide], &mut earlier[step * wide..]),
             };
             let gates = &mut gates[step * wide_gates..][..wide_gates];
-            add_product(gates, View::new(previous, batch, self.hidden), &self.by_hidden);
+            add_product(
+                gates,
+                View::new(previous, batch, self.hidden),
+                &self.by_hidden,
+            );
             let range = step * wide..(step + 1) * wide;
             let (cells, tanh_cells) = (&mut cells[range.clone()], &mut tanh_cells[range]);
-            Arch::new().dispatch(CellsForward { units: self.hidden, gates, cells, tanh_cells, hidden: next });
+            Arch::new().dispatch(CellsForward {
+                units: self.hidden,
+                gates,
+                cells,
+                tanh_cells,
+                hidden: next,
+            });
             before = Some(step);
         }
-        LstmTape { order: self.order, wide, gates, cells, tanh_cells, hidden }
+        LstmTape {
+            order: self.order,
+            wide,
+            gates,
+            cells,
+            tanh_cells,
+            hidden,
+        }
     }
 
-    /// One step from and to a state that the caller keeps; input: (batch, inputs). Allocates nothing.
+    /// One step from and to a state that the caller keeps; input: (batch, inputs). Allocates
+    /// nothing.
     pub fn step(&self, input: &[f32], state: &mut LstmState) {
         let batch = input.len() / self.inputs;
-        let LstmState { gates, cells, tanh_cells, hidden } = state;
+        let LstmState {
+            gates,
+            cells,
+            tanh_cells,
+            hidden,
+        } = state;
         fill_rows(gates, &self.bias);
         add_product(gates, View::new(input, batch, self.inputs), &self.by_input);
-        add_product(gates, View::new(hidden, batch, self.hidden), &self.by_hidden);
-        Arch::new().dispatch(CellsForward { units: self.hidden, gates, cells, tanh_cells, hidden });
+        add_product(
+            gates,
+            View::new(hidden, batch, self.hidden),
+            &self.by_hidden,
+        );
+        Arch::new().dispatch(CellsForward {
+            units: self.hidden,
+            gates,
+            cells,
+            tanh_cells,
+            hidden,
+        });
     }
 
-    /// Adds the weights' gradients, returns the input's. weights and input: as given before; output_gradient: (steps, batch, H).
+    /// Adds the weights' gradients, returns the input's. weights and input: as given before;
+    /// output_gradient: (steps, batch, H).
     #[must_use]
     pub fn backward(
         &self,
@@ -169,30 +222,54 @@ impl Lstm {
         let rows = input.len() / self.inputs;
         let of_gates = self.gate_gradients(weights.recurrent, tape, output_gradient);
         let of_gates_rows = View::new(&of_gates, rows, gates);
-        add_product(gradients.input, of_gates_rows.transposed(), &PackedMatrix::new(View::new(input, rows, self.inputs)));
+        add_product(
+            gradients.input,
+            of_gates_rows.transposed(),
+            &PackedMatrix::new(View::new(input, rows, self.inputs)),
+        );
         let previous = PackedMatrix::new(View::new(tape.previous_hidden(), rows, self.hidden));
         add_product(gradients.recurrent, of_gates_rows.transposed(), &previous);
         add_rows(gradients.bias, &of_gates);
         let mut of_input = vec![0.0; input.len()];
-        add_product(&mut of_input, of_gates_rows, &PackedMatrix::new(View::new(weights.input, gates, self.inputs)));
+        add_product(
+            &mut of_input,
+            of_gates_rows,
+            &PackedMatrix::new(View::new(weights.input, gates, self.inputs)),
+        );
         of_input
     }
 
     /// Gradients before the gates' functions, (steps, batch, 4 H).
-    fn gate_gradients(&self, recurrent: &[f32], tape: &LstmTape, output_gradient: &[f32]) -> Vec<f32> {
+    fn gate_gradients(
+        &self,
+        recurrent: &[f32],
+        tape: &LstmTape,
+        output_gradient: &[f32],
+    ) -> Vec<f32> {
         let (wide, wide_gates) = (tape.wide, 4 * tape.wide);
         let (batch, steps) = (wide / self.hidden, output_gradient.len() / wide);
         let back = PackedMatrix::new(View::new(recurrent, 4 * self.hidden, self.hidden));
         let mut of_gates = vec![0.0; tape.gates.len()];
-        let (mut of_hidden, mut of_cells, nothing) = (vec![0.0; wide], vec![0.0; wide], vec![0.0; wide]);
+        let (mut of_hidden, mut of_cells, nothing) =
+            (vec![0.0; wide], vec![0.0; wide], vec![0.0; wide]);
         let mut order = self.steps_in_order(steps).rev().peekable();
         let mut behind: Option<usize> = None;
         while let Some(step) = order.next() {
             of_hidden.copy_from_slice(&output_gradient[step * wide..][..wide]);
             if let Some(behind) = behind {
-                add_product(&mut of_hidden, View::new(&of_gates[behind * wide_gates..][..wide_gates], batch, 4 * self.hidden), &back);
+                add_product(
+                    &mut of_hidden,
+                    View::new(
+                        &of_gates[behind * wide_gates..][..wide_gates],
+                        batch,
+                        4 * self.hidden,
+                    ),
+                    &back,
+                );
             }
-            let previous_cells = order.peek().map_or(nothing.as_slice(), |previous| &tape.cells[previous * wide..][..wide]);
+            let previous_cells = order.peek().map_or(nothing.as_slice(), |previous| {
+                &tape.cells[previous * wide..][..wide]
+            });
             Arch::new().dispatch(CellsBackward {
                 units: self.hidden,
                 gates: &tape.gates[step * wide_gates..][..wide_gates],
@@ -222,7 +299,12 @@ impl LstmState {
     #[must_use]
     pub fn new(batch: usize, hidden: usize) -> Self {
         let zeros = vec![0.0; batch * hidden];
-        Self { gates: vec![0.0; 4 * batch * hidden], cells: zeros.clone(), tanh_cells: zeros.clone(), hidden: zeros }
+        Self {
+            gates: vec![0.0; 4 * batch * hidden],
+            cells: zeros.clone(),
+            tanh_cells: zeros.clone(),
+            hidden: zeros,
+        }
     }
 
     /// h, (batch, H).
@@ -269,25 +351,49 @@ impl WithSimd for CellsForward<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let units = self.units;
-        let states =
-            self.cells.chunks_exact_mut(units).zip(self.tanh_cells.chunks_exact_mut(units)).zip(self.hidden.chunks_exact_mut(units));
-        for (gates, ((cells, tanh_cells), hidden)) in self.gates.chunks_exact_mut(4 * units).zip(states) {
+        let states = self
+            .cells
+            .chunks_exact_mut(units)
+            .zip(self.tanh_cells.chunks_exact_mut(units))
+            .zip(self.hidden.chunks_exact_mut(units));
+        for (gates, ((cells, tanh_cells), hidden)) in
+            self.gates.chunks_exact_mut(4 * units).zip(states)
+        {
             let (i, rest) = gates.split_at_mut(units);
             let (f, rest) = rest.split_at_mut(units);
             let (g, o) = rest.split_at_mut(units);
-            let [(i, i_end), (f, f_end), (g, g_end), (o, o_end)] = [i, f, g, o].map(S::as_mut_simd_f32s);
-            let [(cells, cells_end), (tanh_cells, tanh_end), (hidden, hidden_end)] = [cells, tanh_cells, hidden].map(S::as_mut_simd_f32s);
+            let [(i, i_end), (f, f_end), (g, g_end), (o, o_end)] =
+                [i, f, g, o].map(S::as_mut_simd_f32s);
+            let [
+                (cells, cells_end),
+                (tanh_cells, tanh_end),
+                (hidden, hidden_end),
+            ] = [cells, tanh_cells, hidden].map(S::as_mut_simd_f32s);
             cells_forward(simd, [i, f, g, o], [cells, tanh_cells, hidden]);
-            cells_forward(pulp::Scalar, [i_end, f_end, g_end, o_end], [cells_end, tanh_end, hidden_end]);
+            cells_forward(
+                pulp::Scalar,
+                [i_end, f_end, g_end, o_end],
+                [cells_end, tanh_end, hidden_end],
+            );
         }
     }
 }
 
 #[inline(always)]
-fn cells_forward<S: Simd>(simd: S, [i, f, g, o]: [&mut [S::f32s]; 4], [cells, tanh_cells, hidden]: [&mut [S::f32s]; 3]) {
+fn cells_forward<S: Simd>(
+    simd: S,
+    [i, f, g, o]: [&mut [S::f32s]; 4],
+    [cells, tanh_cells, hidden]: [&mut [S::f32s]; 3],
+) {
     let gates = i.iter_mut().zip(f).zip(g.iter_mut().zip(o));
-    for (((i, f), (g, o)), ((cell, tanh_cell), hidden)) in gates.zip(cells.iter_mut().zip(tanh_cells).zip(hidden)) {
-        (*i, *f, *o) = (sigmoid_lanes(simd, *i), sigmoid_lanes(simd, *f), sigmoid_lanes(simd, *o));
+    for (((i, f), (g, o)), ((cell, tanh_cell), hidden)) in
+        gates.zip(cells.iter_mut().zip(tanh_cells).zip(hidden))
+    {
+        (*i, *f, *o) = (
+            sigmoid_lanes(simd, *i),
+            sigmoid_lanes(simd, *f),
+            sigmoid_lanes(simd, *o),
+        );
         *g = tanh_lanes(simd, *g);
         *cell = simd.mul_add_f32s(*f, *cell, simd.mul_f32s(*i, *g));
         *tanh_cell = tanh_lanes(simd, *cell);
@@ -295,7 +401,8 @@ fn cells_forward<S: Simd>(simd: S, [i, f, g, o]: [&mut [S::f32s]; 4], [cells, ta
     }
 }
 
-/// of_cells: gradient that the step behind sends to the cells -> what this step sends to the one before.
+/// of_cells: gradient that the step behind sends to the cells -> what this step sends to the one
+/// before.
 struct CellsBackward<'a> {
     units: usize,
     gates: &'a [f32],
@@ -312,9 +419,16 @@ impl WithSimd for CellsBackward<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let units = self.units;
-        for (row, (of_gates, of_cells)) in self.of_gates.chunks_exact_mut(4 * units).zip(self.of_cells.chunks_exact_mut(units)).enumerate()
+        for (row, (of_gates, of_cells)) in self
+            .of_gates
+            .chunks_exact_mut(4 * units)
+            .zip(self.of_cells.chunks_exact_mut(units))
+            .enumerate()
         {
-            let (gates, place) = (&self.gates[4 * row * units..][..4 * units], row * units..(row + 1) * units);
+            let (gates, place) = (
+                &self.gates[4 * row * units..][..4 * units],
+                row * units..(row + 1) * units,
+            );
             let gate = |index: usize| &gates[index * units..][..units];
             let known = [
                 gate(0),
@@ -329,14 +443,25 @@ impl WithSimd for CellsBackward<'_> {
             let (i, rest) = of_gates.split_at_mut(units);
             let (f, rest) = rest.split_at_mut(units);
             let (g, o) = rest.split_at_mut(units);
-            let [(i, i_end), (f, f_end), (g, g_end), (o, o_end), (cells, cells_end)] = [i, f, g, o, of_cells].map(S::as_mut_simd_f32s);
+            let [
+                (i, i_end),
+                (f, f_end),
+                (g, g_end),
+                (o, o_end),
+                (cells, cells_end),
+            ] = [i, f, g, o, of_cells].map(S::as_mut_simd_f32s);
             cells_backward(simd, known.map(|(lanes, _)| lanes), [i, f, g, o, cells]);
-            cells_backward(pulp::Scalar, known.map(|(_, end)| end), [i_end, f_end, g_end, o_end, cells_end]);
+            cells_backward(
+                pulp::Scalar,
+                known.map(|(_, end)| end),
+                [i_end, f_end, g_end, o_end, cells_end],
+            );
         }
     }
 }
 
-/// known: i, f, g, o, c of the step before, tanh(c), gradient of h; found: gradients of z of i, f, g, o, and of c.
+/// known: i, f, g, o, c of the step before, tanh(c), gradient of h; found: gradients of z of i, f,
+/// g, o, and of c.
 #[inline(always)]
 fn cells_backward<S: Simd>(simd: S, known: [&[S::f32s]; 7], found: [&mut [S::f32s]; 5]) {
     let one = simd.splat_f32s(1.0);

@@ -1,8 +1,9 @@
 //! Products of matrices.
 //!
-//! The right factor is packed once into panels of [`PANEL`] columns and kept, as the weights of a recurrent layer are used at every step.
-//! Each element of the product is a sum over blocks of [`BLOCK`] terms, in order; within a block the terms are added one by one, fused.
-//! That order holds for every vector width and every cut of the rows.
+//! The right factor is packed once into panels of [`PANEL`] columns and kept, as the weights of a
+//! recurrent layer are used at every step. Each element of the product is a sum over blocks of
+//! [`BLOCK`] terms, in order; within a block the terms are added one by one, fused. That order
+//! holds for every vector width and every cut of the rows.
 
 use pulp::{Arch, Simd, WithSimd};
 
@@ -10,7 +11,8 @@ use pulp::{Arch, Simd, WithSimd};
 const PANEL: usize = 32;
 /// Terms that are summed in registers before they are added to the product.
 const BLOCK: usize = 128;
-/// Rows that share each load of a panel: with two registers a row, twelve sums hide the latency of a multiply-add.
+/// Rows that share each load of a panel: with two registers a row, twelve sums hide the latency of
+/// a multiply-add.
 const ROWS: usize = 6;
 
 /// A matrix as a view of a slice: element (i, j) is `values[i * row_stride + j * column_stride]`.
@@ -27,26 +29,62 @@ impl<'a> View<'a> {
     /// Row after row, without gaps. Panics where the slice's length is not rows x columns.
     #[must_use]
     pub fn new(values: &'a [f32], rows: usize, columns: usize) -> Self {
-        assert_eq!(values.len(), rows * columns, "a matrix of {rows} x {columns}");
-        Self { values, rows, columns, row_stride: columns, column_stride: 1 }
+        assert_eq!(
+            values.len(),
+            rows * columns,
+            "a matrix of {rows} x {columns}"
+        );
+        Self {
+            values,
+            rows,
+            columns,
+            row_stride: columns,
+            column_stride: 1,
+        }
     }
 
     /// With strides of its own. Panics where the last element lies beyond the slice.
     #[must_use]
-    pub fn strided(values: &'a [f32], rows: usize, columns: usize, row_stride: usize, column_stride: usize) -> Self {
-        let beyond = if rows * columns == 0 { 0 } else { (rows - 1) * row_stride + (columns - 1) * column_stride + 1 };
-        assert!(beyond <= values.len(), "a matrix of {rows} x {columns} with strides {row_stride} and {column_stride}");
-        Self { values, rows, columns, row_stride, column_stride }
+    pub fn strided(
+        values: &'a [f32],
+        rows: usize,
+        columns: usize,
+        row_stride: usize,
+        column_stride: usize,
+    ) -> Self {
+        let beyond = if rows * columns == 0 {
+            0
+        } else {
+            (rows - 1) * row_stride + (columns - 1) * column_stride + 1
+        };
+        assert!(
+            beyond <= values.len(),
+            "a matrix of {rows} x {columns} with strides {row_stride} and {column_stride}"
+        );
+        Self {
+            values,
+            rows,
+            columns,
+            row_stride,
+            column_stride,
+        }
     }
 
     /// Rows for columns.
     #[must_use]
     pub fn transposed(self) -> Self {
-        Self { rows: self.columns, columns: self.rows, row_stride: self.column_stride, column_stride: self.row_stride, ..self }
+        Self {
+            rows: self.columns,
+            columns: self.rows,
+            row_stride: self.column_stride,
+            column_stride: self.row_stride,
+            ..self
+        }
     }
 }
 
-/// The right factor of products, in panels: (panels, rows, [`PANEL`]), the last panel filled up with zeros.
+/// The right factor of products, in panels: (panels, rows, [`PANEL`]), the last panel filled up
+/// with zeros.
 #[derive(Debug, Clone, Default)]
 pub struct PackedMatrix {
     rows: usize,
@@ -69,7 +107,11 @@ impl PackedMatrix {
         let count = matrix.columns.div_ceil(PANEL) * matrix.rows * PANEL;
         self.panels.clear();
         self.panels.resize(count, 0.0);
-        for (index, panel) in self.panels.chunks_exact_mut((matrix.rows * PANEL).max(1)).enumerate() {
+        for (index, panel) in self
+            .panels
+            .chunks_exact_mut((matrix.rows * PANEL).max(1))
+            .enumerate()
+        {
             let first = index * PANEL;
             let width = PANEL.min(matrix.columns - first);
             for (row, into) in panel.chunks_exact_mut(PANEL).enumerate() {
@@ -77,7 +119,10 @@ impl PackedMatrix {
                 if matrix.column_stride == 1 {
                     into[..width].copy_from_slice(&from[..width]);
                 } else {
-                    into[..width].iter_mut().zip(from.iter().step_by(matrix.column_stride)).for_each(|(into, from)| *into = *from);
+                    into[..width]
+                        .iter_mut()
+                        .zip(from.iter().step_by(matrix.column_stride))
+                        .for_each(|(into, from)| *into = *from);
                 }
             }
         }
@@ -90,12 +135,17 @@ impl PackedMatrix {
     }
 }
 
-/// sum += left right; left: (rows, terms), right: (terms, columns), sum: (rows, columns), without gaps.
+/// sum += left right; left: (rows, terms), right: (terms, columns), sum: (rows, columns), without
+/// gaps.
 ///
 /// Panics where the shapes do not fit.
 pub fn add_product(sum: &mut [f32], left: View<'_>, right: &PackedMatrix) {
     assert_eq!(left.columns, right.rows, "terms of left and right");
-    assert_eq!(sum.len(), left.rows * right.columns, "elements of the product");
+    assert_eq!(
+        sum.len(),
+        left.rows * right.columns,
+        "elements of the product"
+    );
     if !sum.is_empty() && left.columns > 0 {
         Arch::new().dispatch(Product { sum, left, right });
     }
@@ -126,7 +176,8 @@ impl WithSimd for Product<'_> {
             let terms = BLOCK.min(left.columns - first_term);
             for (index, sum) in sum.chunks_mut(ROWS * right.columns).enumerate() {
                 let rows = sum.len() / right.columns;
-                let left = &left.values[index * ROWS * left.row_stride + first_term * left.column_stride..];
+                let left = &left.values
+                    [index * ROWS * left.row_stride + first_term * left.column_stride..];
                 pack_rows(&mut packed, left, self.left, rows, terms);
                 let left = &packed[..terms * rows];
                 match rows {
@@ -151,14 +202,27 @@ fn pack_rows(packed: &mut [f32], left: &[f32], strides: View<'_>, rows: usize, t
         }
     } else {
         for row in 0..rows {
-            let from = left[row * strides.row_stride..].iter().step_by(strides.column_stride);
-            packed[row..].iter_mut().step_by(rows).zip(from).take(terms).for_each(|(into, from)| *into = *from);
+            let from = left[row * strides.row_stride..]
+                .iter()
+                .step_by(strides.column_stride);
+            packed[row..]
+                .iter_mut()
+                .step_by(rows)
+                .zip(from)
+                .take(terms)
+                .for_each(|(into, from)| *into = *from);
         }
     }
 }
 
 #[inline(always)]
-fn row_block<S: Simd, const N: usize>(simd: S, sum: &mut [f32], left: &[f32], right: &PackedMatrix, first_term: usize) {
+fn row_block<S: Simd, const N: usize>(
+    simd: S,
+    sum: &mut [f32],
+    left: &[f32],
+    right: &PackedMatrix,
+    first_term: usize,
+) {
     let terms = left.len() / N;
     for (index, panel) in right.panels.chunks_exact(right.rows * PANEL).enumerate() {
         let panel = &panel[first_term * PANEL..][..terms * PANEL];
@@ -166,7 +230,17 @@ fn row_block<S: Simd, const N: usize>(simd: S, sum: &mut [f32], left: &[f32], ri
             let column = index * PANEL + start;
             if column < right.columns {
                 let width = (2 * S::F32_LANES).min(right.columns - column);
-                tile::<S, N>(simd, sum, left, panel, Place { column, width, stride: right.columns });
+                tile::<S, N>(
+                    simd,
+                    sum,
+                    left,
+                    panel,
+                    Place {
+                        column,
+                        width,
+                        stride: right.columns,
+                    },
+                );
             }
         }
     }
@@ -174,7 +248,13 @@ fn row_block<S: Simd, const N: usize>(simd: S, sum: &mut [f32], left: &[f32], ri
 
 /// N rows by two registers: the sums stay in registers over all terms of the block.
 #[inline(always)]
-fn tile<S: Simd, const N: usize>(simd: S, sum: &mut [f32], left: &[f32], panel: &[f32], place: Place) {
+fn tile<S: Simd, const N: usize>(
+    simd: S,
+    sum: &mut [f32],
+    left: &[f32],
+    panel: &[f32],
+    place: Place,
+) {
     let register = place.column % PANEL / S::F32_LANES;
     let (left, _) = left.as_chunks::<N>();
     let (panel, _) = S::as_simd_f32s(panel);
@@ -194,14 +274,17 @@ fn tile<S: Simd, const N: usize>(simd: S, sum: &mut [f32], left: &[f32], panel: 
             *second = simd.add_f32s(*second, sums[1]);
         } else {
             let added: &[f32] = pulp::bytemuck::cast_slice(&sums);
-            row.iter_mut().zip(added).for_each(|(sum, added)| *sum += added);
+            row.iter_mut()
+                .zip(added)
+                .for_each(|(sum, added)| *sum += added);
         }
     }
 }
 
 /// Every row becomes `row`.
 pub fn fill_rows(rows: &mut [f32], row: &[f32]) {
-    rows.chunks_exact_mut(row.len()).for_each(|into| into.copy_from_slice(row));
+    rows.chunks_exact_mut(row.len())
+        .for_each(|into| into.copy_from_slice(row));
 }
 
 /// sum += all rows, in blocks of [`BLOCK`] as products sum.
@@ -210,9 +293,14 @@ pub fn add_rows(sum: &mut [f32], rows: &[f32]) {
     for block in rows.chunks(BLOCK * sum.len()) {
         partial.fill(0.0);
         for row in block.chunks_exact(sum.len()) {
-            partial.iter_mut().zip(row).for_each(|(partial, value)| *partial += value);
+            partial
+                .iter_mut()
+                .zip(row)
+                .for_each(|(partial, value)| *partial += value);
         }
-        sum.iter_mut().zip(&partial).for_each(|(sum, partial)| *sum += partial);
+        sum.iter_mut()
+            .zip(&partial)
+            .for_each(|(sum, partial)| *sum += partial);
     }
 }
 
@@ -221,22 +309,46 @@ mod tests {
     use super::*;
     use crate::kernels::testing::values;
 
-    fn product_in_f64(left: &[f32], right: &[f32], (rows, terms, columns): (usize, usize, usize)) -> Vec<f64> {
+    fn product_in_f64(
+        left: &[f32],
+        right: &[f32],
+        (rows, terms, columns): (usize, usize, usize),
+    ) -> Vec<f64> {
         let element = |row: usize, column: usize| {
-            (0..terms).map(|term| f64::from(left[row * terms + term]) * f64::from(right[term * columns + column])).sum()
+            (0..terms)
+                .map(|term| {
+                    f64::from(left[row * terms + term]) * f64::from(right[term * columns + column])
+                })
+                .sum()
         };
-        (0..rows).flat_map(|row| (0..columns).map(move |column| element(row, column))).collect()
+        (0..rows)
+            .flat_map(|row| (0..columns).map(move |column| element(row, column)))
+            .collect()
     }
 
     #[test]
     fn agrees_with_f64_at_all_edges() {
-        for shape @ (rows, terms, columns) in [(1, 1, 1), (6, 128, 32), (7, 129, 33), (17, 64, 256), (5, 300, 3), (13, 27, 40), (64, 5, 16)]
-        {
+        for shape @ (rows, terms, columns) in [
+            (1, 1, 1),
+            (6, 128, 32),
+            (7, 129, 33),
+            (17, 64, 256),
+            (5, 300, 3),
+            (13, 27, 40),
+            (64, 5, 16),
+        ] {
             let (left, right) = (values(rows * terms, 1), values(terms * columns, 2));
             let mut sum = vec![1.0; rows * columns];
-            add_product(&mut sum, View::new(&left, rows, terms), &PackedMatrix::new(View::new(&right, terms, columns)));
+            add_product(
+                &mut sum,
+                View::new(&left, rows, terms),
+                &PackedMatrix::new(View::new(&right, terms, columns)),
+            );
             for (found, expected) in sum.iter().zip(product_in_f64(&left, &right, shape)) {
-                assert!((f64::from(*found) - 1.0 - expected).abs() < 2e-6 * terms as f64, "{shape:?}: {found} {expected}");
+                assert!(
+                    (f64::from(*found) - 1.0 - expected).abs() < 2e-6 * terms as f64,
+                    "{shape:?}: {found} {expected}"
+                );
             }
         }
     }
@@ -245,13 +357,24 @@ mod tests {
     fn transposed_views_give_the_same_bits() {
         let (rows, terms, columns) = (19, 150, 37);
         let (left, right) = (values(rows * terms, 3), values(terms * columns, 4));
-        let turned = |values: &[f32], rows, columns| crate::kernels::swap_leading_axes(values, rows, columns, 1);
-        let (left_turned, right_turned) = (turned(&left, rows, terms), turned(&right, terms, columns));
+        let turned = |values: &[f32], rows, columns| {
+            crate::kernels::swap_leading_axes(values, rows, columns, 1)
+        };
+        let (left_turned, right_turned) =
+            (turned(&left, rows, terms), turned(&right, terms, columns));
         let mut straight = vec![0.0; rows * columns];
-        add_product(&mut straight, View::new(&left, rows, terms), &PackedMatrix::new(View::new(&right, terms, columns)));
+        add_product(
+            &mut straight,
+            View::new(&left, rows, terms),
+            &PackedMatrix::new(View::new(&right, terms, columns)),
+        );
         let mut crosswise = vec![0.0; rows * columns];
         let right = PackedMatrix::new(View::new(&right_turned, columns, terms).transposed());
-        add_product(&mut crosswise, View::new(&left_turned, terms, rows).transposed(), &right);
+        add_product(
+            &mut crosswise,
+            View::new(&left_turned, terms, rows).transposed(),
+            &right,
+        );
         assert_eq!(straight, crosswise);
     }
 
@@ -263,7 +386,12 @@ mod tests {
         let mut widest = vec![0.0; rows * columns];
         add_product(&mut widest, View::new(&left, rows, terms), &right);
         let mut scalar = vec![0.0; rows * columns];
-        Product { sum: &mut scalar, left: View::new(&left, rows, terms), right: &right }.with_simd(pulp::Scalar);
+        Product {
+            sum: &mut scalar,
+            left: View::new(&left, rows, terms),
+            right: &right,
+        }
+        .with_simd(pulp::Scalar);
         assert_eq!(widest, scalar);
         let mut cut = vec![0.0; rows * columns];
         for (sum, left) in cut.chunks_mut(4 * columns).zip(left.chunks(4 * terms)) {

@@ -17,8 +17,9 @@ pub struct Batch {
     pub steps: usize,
 }
 
-/// Batches by their number: the same number gives the same batch, so that a training that was interrupted goes on as if it were not.
-/// Whatever is random in them follows from a seed and the number.
+/// Batches by their number: the same number gives the same batch, so that a training that was
+/// interrupted goes on as if it were not. Whatever is random in them follows from a seed and the
+/// number.
 pub trait Batches: Sync {
     /// The batch of this number, from 0 on.
     ///
@@ -34,7 +35,8 @@ impl Batch {
         self.weights.iter().map(|weight| f64::from(*weight)).sum()
     }
 
-    /// Lengths fit the network, inputs are finite, and so are weights and the targets that count; number: for the message.
+    /// Lengths fit the network, inputs are finite, and so are weights and the targets that count;
+    /// number: for the message.
     ///
     /// # Errors
     /// Where they are not.
@@ -55,14 +57,26 @@ impl Batch {
             }
         }
         if let Some(index) = self.inputs.iter().position(|value| !value.is_finite()) {
-            return wrong(format!("input {index} is {}; weigh gaps with 0 and fill them", self.inputs[index]));
+            return wrong(format!(
+                "input {index} is {}; weigh gaps with 0 and fill them",
+                self.inputs[index]
+            ));
         }
-        for (row, (weight, targets)) in self.weights.iter().zip(self.targets.chunks_exact(shape.outputs)).enumerate() {
+        for (row, (weight, targets)) in self
+            .weights
+            .iter()
+            .zip(self.targets.chunks_exact(shape.outputs))
+            .enumerate()
+        {
             if !(weight.is_finite() && *weight >= 0.0) {
-                return wrong(format!("weight {row} is {weight}; weights are finite and not negative"));
+                return wrong(format!(
+                    "weight {row} is {weight}; weights are finite and not negative"
+                ));
             }
             if *weight > 0.0 && !targets.iter().all(|target| target.is_finite()) {
-                return wrong(format!("row {row} counts, but its targets are {targets:?}; weigh it with 0"));
+                return wrong(format!(
+                    "row {row} counts, but its targets are {targets:?}; weigh it with 0"
+                ));
             }
         }
         if self.weights.iter().all(|weight| *weight == 0.0) {

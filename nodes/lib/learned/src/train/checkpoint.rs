@@ -40,9 +40,18 @@ impl Training {
     /// # Errors
     /// Where it cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), LearnedError> {
-        let best = self.best.as_ref().map(|best| BestHeader { step: best.step, loss_bits: best.loss.to_bits() });
+        let best = self.best.as_ref().map(|best| BestHeader {
+            step: best.step,
+            loss_bits: best.loss.to_bits(),
+        });
         let (shape, options) = (self.network.shape().clone(), self.options.clone());
-        let header = Header { shape, options, step: self.step, stale: self.stale, best };
+        let header = Header {
+            shape,
+            options,
+            step: self.step,
+            stale: self.stale,
+            best,
+        };
         let values = [
             Some(self.network.parameters()),
             Some(&self.adam.first),
@@ -51,16 +60,28 @@ impl Training {
         ];
         let named = NAMES.into_iter().zip(values).filter_map(|(name, values)| {
             let values = values?;
-            Some(Named { name: name.to_owned(), shape: vec![values.len()], values })
+            Some(Named {
+                name: name.to_owned(),
+                shape: vec![values.len()],
+                values,
+            })
         });
-        tensors::write_whole(path, &tensors::to_bytes(named.collect(), KEY, &header, path)?)
+        tensors::write_whole(
+            path,
+            &tensors::to_bytes(named.collect(), KEY, &header, path)?,
+        )
     }
 
     /// Reads a checkpoint, to go on from it.
     ///
     /// # Errors
-    /// Where the file cannot be read or is no sound checkpoint, or where it was written with another shape or other options.
-    pub fn resume(path: &Path, shape: &NetworkShape, options: &TrainOptions) -> Result<Self, LearnedError> {
+    /// Where the file cannot be read or is no sound checkpoint, or where it was written with
+    /// another shape or other options.
+    pub fn resume(
+        path: &Path,
+        shape: &NetworkShape,
+        options: &TrainOptions,
+    ) -> Result<Self, LearnedError> {
         let bytes = tensors::read_bounded(path, 4)?;
         let file = TensorFile::parse(&bytes, path)?;
         let header: Header = file.header(KEY)?;
@@ -76,13 +97,20 @@ impl Training {
             None => None,
             Some(best) => {
                 let network = Network::from_parameters(shape.clone(), values(3)?);
-                Some(Best { network, step: best.step, loss: f64::from_bits(best.loss_bits) })
+                Some(Best {
+                    network,
+                    step: best.step,
+                    loss: f64::from_bits(best.loss_bits),
+                })
             }
         };
         Ok(Self {
             options: options.clone(),
             network: Network::from_parameters(shape.clone(), values(0)?),
-            adam: Adam { first: values(1)?, second: values(2)? },
+            adam: Adam {
+                first: values(1)?,
+                second: values(2)?,
+            },
             step: header.step,
             best,
             stale: header.stale,
@@ -93,24 +121,45 @@ impl Training {
     ///
     /// # Errors
     /// As [`Training::resume`] and [`Training::new`].
-    pub fn resume_or_new(path: &Path, shape: NetworkShape, options: TrainOptions) -> Result<Self, LearnedError> {
-        if fs::exists(path).unwrap_or(true) { Self::resume(path, &shape, &options) } else { Self::new(shape, options) }
+    pub fn resume_or_new(
+        path: &Path,
+        shape: NetworkShape,
+        options: TrainOptions,
+    ) -> Result<Self, LearnedError> {
+        if fs::exists(path).unwrap_or(true) {
+            Self::resume(path, &shape, &options)
+        } else {
+            Self::new(shape, options)
+        }
     }
 }
 
 /// Refuses where file and wish differ, by the name of the first field that does.
-fn same<T: Serialize + DeserializeOwned + PartialEq>(path: &Path, what: &'static str, in_file: &T, wished: &T) -> Result<(), LearnedError> {
+fn same<T: Serialize + DeserializeOwned + PartialEq>(
+    path: &Path,
+    what: &'static str,
+    in_file: &T,
+    wished: &T,
+) -> Result<(), LearnedError> {
     // Through text as the file's was, since a number may come back from text with another last bit.
-    let through_text = serde_json::to_string(wished).and_then(|text| serde_json::from_str::<T>(&text));
+    let through_text =
+        serde_json::to_string(wished).and_then(|text| serde_json::from_str::<T>(&text));
     if through_text.as_ref().is_ok_and(|wished| wished == in_file) {
         return Ok(());
     }
     let value = |value: &T| serde_json::to_value(value).unwrap_or_default();
     let (in_file, wished) = (value(in_file), value(wished));
     let nothing = serde_json::Map::new();
-    let (in_file, wished) = (in_file.as_object().unwrap_or(&nothing), wished.as_object().unwrap_or(&nothing));
-    let differing = in_file.iter().find(|(field, value)| wished.get(*field) != Some(value));
-    let text = |value: Option<&serde_json::Value>| value.map_or_else(|| "nothing".to_owned(), ToString::to_string);
+    let (in_file, wished) = (
+        in_file.as_object().unwrap_or(&nothing),
+        wished.as_object().unwrap_or(&nothing),
+    );
+    let differing = in_file
+        .iter()
+        .find(|(field, value)| wished.get(*field) != Some(value));
+    let text = |value: Option<&serde_json::Value>| {
+        value.map_or_else(|| "nothing".to_owned(), ToString::to_string)
+    };
     let field = differing.map_or("", |(field, _)| field);
     Err(LearnedError::OtherTraining {
         path: path.into(),

@@ -1,4 +1,5 @@
-//! Training: batches by number, a masked loss, Adam, validation, early stopping, checkpoints from which it goes on to the same bits.
+//! Training: batches by number, a masked loss, Adam, validation, early stopping, checkpoints from
+//! which it goes on to the same bits.
 
 pub(crate) mod adam;
 mod batch;

@@ -11,7 +11,8 @@ use crate::{LearnedError, NetworkShape};
 pub enum Schedule {
     /// The same all the time.
     Constant,
-    /// Half a cosine from the learning rate down to `floor` times it, over all steps (Loshchilov and Hutter 2017, without restarts).
+    /// Half a cosine from the learning rate down to `floor` times it, over all steps (Loshchilov
+    /// and Hutter 2017, without restarts).
     Cosine {
         /// What is left at the end, 0 to 1.
         floor: f64,
@@ -26,13 +27,15 @@ impl Schedule {
             Self::Constant => learning_rate,
             Self::Cosine { floor } => {
                 let share = step.min(steps) as f64 / steps as f64;
-                learning_rate * (floor + (1.0 - floor) * 0.5 * (1.0 + (std::f64::consts::PI * share).cos()))
+                learning_rate
+                    * (floor + (1.0 - floor) * 0.5 * (1.0 + (std::f64::consts::PI * share).cos()))
             }
         }
     }
 }
 
-/// How a training runs; all of it stands in a checkpoint, and a training goes on only with the same.
+/// How a training runs; all of it stands in a checkpoint, and a training goes on only with the
+/// same.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrainOptions {
@@ -62,18 +65,34 @@ impl TrainOptions {
     /// # Errors
     /// Where they are not; the message names the field.
     pub fn check(&self, shape: &NetworkShape) -> Result<(), LearnedError> {
-        let wrong = |field: &'static str, reason: String| Err(LearnedError::Options { field, reason });
+        let wrong =
+            |field: &'static str, reason: String| Err(LearnedError::Options { field, reason });
         let positive = |value: f64| value.is_finite() && value > 0.0;
         if self.losses.len() != 1 && self.losses.len() != shape.outputs {
-            return wrong("losses", format!("{} of them; one for all outputs or {} are needed", self.losses.len(), shape.outputs));
+            return wrong(
+                "losses",
+                format!(
+                    "{} of them; one for all outputs or {} are needed",
+                    self.losses.len(),
+                    shape.outputs
+                ),
+            );
         }
-        if let Some(Loss::Huber { delta }) =
-            self.losses.iter().find(|loss| matches!(loss, Loss::Huber { delta } if !positive(f64::from(*delta))))
+        if let Some(Loss::Huber { delta }) = self
+            .losses
+            .iter()
+            .find(|loss| matches!(loss, Loss::Huber { delta } if !positive(f64::from(*delta))))
         {
-            return wrong("losses", format!("huber delta is {delta}; it has to be above 0"));
+            return wrong(
+                "losses",
+                format!("huber delta is {delta}; it has to be above 0"),
+            );
         }
         if !positive(self.learning_rate) {
-            return wrong("learning_rate", format!("{}; it has to be above 0", self.learning_rate));
+            return wrong(
+                "learning_rate",
+                format!("{}; it has to be above 0", self.learning_rate),
+            );
         }
         if let Schedule::Cosine { floor } = self.schedule
             && !(0.0..=1.0).contains(&floor)
@@ -83,8 +102,11 @@ impl TrainOptions {
         if let Some(clip) = self.clip.filter(|clip| !positive(*clip)) {
             return wrong("clip", format!("{clip}; it has to be above 0"));
         }
-        for (field, value) in [("steps", self.steps), ("validate_every", self.validate_every), ("checkpoint_every", self.checkpoint_every)]
-        {
+        for (field, value) in [
+            ("steps", self.steps),
+            ("validate_every", self.validate_every),
+            ("checkpoint_every", self.checkpoint_every),
+        ] {
             if value == 0 {
                 return wrong(field, "0; it has to be at least 1".to_owned());
             }

@@ -98,7 +98,14 @@ impl Training {
     pub fn from_network(network: Network, options: TrainOptions) -> Result<Self, LearnedError> {
         options.check(network.shape())?;
         let adam = Adam::new(network.parameters().len());
-        Ok(Self { options, network, adam, step: 0, best: None, stale: 0 })
+        Ok(Self {
+            options,
+            network,
+            adam,
+            step: 0,
+            best: None,
+            stale: 0,
+        })
     }
 
     /// Steps taken.
@@ -128,9 +135,14 @@ impl Training {
     /// Takes steps until they are done, until it stops early, or until it is interrupted.
     ///
     /// # Errors
-    /// Where a batch is not sound, where loss or gradient is no number any more (the checkpoint stays as it was), where the engine fails,
-    /// or where a checkpoint cannot be written.
-    pub fn run(&mut self, engine: &mut dyn Engine, data: Data<'_>, hooks: &mut Hooks<'_>) -> Result<Stop, LearnedError> {
+    /// Where a batch is not sound, where loss or gradient is no number any more (the checkpoint
+    /// stays as it was), where the engine fails, or where a checkpoint cannot be written.
+    pub fn run(
+        &mut self,
+        engine: &mut dyn Engine,
+        data: Data<'_>,
+        hooks: &mut Hooks<'_>,
+    ) -> Result<Stop, LearnedError> {
         let mut gradients = vec![0.0; self.network.parameters().len()];
         loop {
             if let Some(stop) = self.reason_to_stop(hooks) {
@@ -139,7 +151,8 @@ impl Training {
             }
             let mut progress = self.take_step(engine, data.training, &mut gradients)?;
             if let Some((batches, count)) = data.validation
-                && (self.step.is_multiple_of(self.options.validate_every) || self.step == self.options.steps)
+                && (self.step.is_multiple_of(self.options.validate_every)
+                    || self.step == self.options.steps)
             {
                 progress.validation_loss = Some(self.validate(engine, batches, count)?);
             }
@@ -154,10 +167,17 @@ impl Training {
     fn reason_to_stop(&self, hooks: &Hooks<'_>) -> Option<Stop> {
         if self.step >= self.options.steps {
             Some(Stop::Done)
-        } else if self.options.patience.is_some_and(|patience| self.stale >= patience) {
+        } else if self
+            .options
+            .patience
+            .is_some_and(|patience| self.stale >= patience)
+        {
             Some(Stop::Early)
         } else {
-            hooks.interrupt.load(Ordering::Relaxed).then_some(Stop::Interrupted)
+            hooks
+                .interrupt
+                .load(Ordering::Relaxed)
+                .then_some(Stop::Interrupted)
         }
     }
 
@@ -165,22 +185,49 @@ impl Training {
         hooks.checkpoint.map_or(Ok(()), |path| self.write(path))
     }
 
-    fn take_step(&mut self, engine: &mut dyn Engine, batches: &dyn Batches, gradients: &mut [f32]) -> Result<Progress, LearnedError> {
+    fn take_step(
+        &mut self,
+        engine: &mut dyn Engine,
+        batches: &dyn Batches,
+        gradients: &mut [f32],
+    ) -> Result<Progress, LearnedError> {
         let batch = batches.batch(self.step)?;
         batch.check(self.network.shape(), self.step)?;
         let loss = engine.gradients(&self.network, &batch, &self.options.losses, gradients)?;
         let gradient_norm = clip(gradients, self.options.clip);
         if !loss.is_finite() || !gradient_norm.is_finite() {
-            return Err(LearnedError::Diverged { step: self.step, loss, gradient_norm });
+            return Err(LearnedError::Diverged {
+                step: self.step,
+                loss,
+                gradient_norm,
+            });
         }
         let learning_rate = self.options.rate(self.step);
         self.step += 1;
-        self.adam.step(self.network.parameters_mut(), gradients, learning_rate, self.step);
+        self.adam.step(
+            self.network.parameters_mut(),
+            gradients,
+            learning_rate,
+            self.step,
+        );
         let steps = self.options.steps;
-        Ok(Progress { step: self.step, steps, loss, gradient_norm, learning_rate, validation_loss: None, best_loss: None })
+        Ok(Progress {
+            step: self.step,
+            steps,
+            loss,
+            gradient_norm,
+            learning_rate,
+            validation_loss: None,
+            best_loss: None,
+        })
     }
 
-    fn validate(&mut self, engine: &mut dyn Engine, batches: &dyn Batches, count: u64) -> Result<f64, LearnedError> {
+    fn validate(
+        &mut self,
+        engine: &mut dyn Engine,
+        batches: &dyn Batches,
+        count: u64,
+    ) -> Result<f64, LearnedError> {
         let (mut sum, mut weight) = (0.0, 0.0);
         for number in 0..count {
             let batch = batches.batch(number)?;
@@ -190,10 +237,18 @@ impl Training {
         }
         let loss = sum / (weight * self.network.shape().outputs as f64);
         if !loss.is_finite() {
-            return Err(LearnedError::Diverged { step: self.step, loss, gradient_norm: f64::NAN });
+            return Err(LearnedError::Diverged {
+                step: self.step,
+                loss,
+                gradient_norm: f64::NAN,
+            });
         }
         if self.best.as_ref().is_none_or(|best| loss < best.loss) {
-            self.best = Some(Best { network: self.network.clone(), step: self.step, loss });
+            self.best = Some(Best {
+                network: self.network.clone(),
+                step: self.step,
+                loss,
+            });
             self.stale = 0;
         } else {
             self.stale += 1;

@@ -19,7 +19,11 @@ pub(crate) struct Token<'a> {
 
 impl<'a> Cursor<'a> {
     pub fn new(text: &'a str, name: &'a str) -> Self {
-        Self { rest: text, line: 1, name }
+        Self {
+            rest: text,
+            line: 1,
+            name,
+        }
     }
 
     /// Bytes that are still to be read: bounds every allocation.
@@ -36,16 +40,27 @@ impl<'a> Cursor<'a> {
         let end = if first == '{' || first == '}' {
             1
         } else {
-            characters.find(|(_, character)| character.is_whitespace() || "{}".contains(*character)).map_or(self.rest.len(), |(at, _)| at)
+            characters
+                .find(|(_, character)| character.is_whitespace() || "{}".contains(*character))
+                .map_or(self.rest.len(), |(at, _)| at)
         };
-        Some(Token { text: self.take(end), line })
+        Some(Token {
+            text: self.take(end),
+            line,
+        })
     }
 
     /// The rest of the current line up to a brace, without spaces around it.
     pub fn rest_of_line(&mut self) -> Token<'a> {
         let line = self.line;
-        let end = self.rest.find(['\n', '\r', '{', '}']).unwrap_or(self.rest.len());
-        Token { text: self.take(end).trim(), line }
+        let end = self
+            .rest
+            .find(['\n', '\r', '{', '}'])
+            .unwrap_or(self.rest.len());
+        Token {
+            text: self.take(end).trim(),
+            line,
+        }
     }
 
     /// The next line that is not blank, without spaces around it. `None` at the end.
@@ -53,7 +68,14 @@ impl<'a> Cursor<'a> {
         self.skip(|character| character.is_whitespace());
         let line = self.line;
         let end = self.rest.find(['\n', '\r']).unwrap_or(self.rest.len());
-        if self.rest.is_empty() { None } else { Some(Token { text: self.take(end).trim_end(), line }) }
+        if self.rest.is_empty() {
+            None
+        } else {
+            Some(Token {
+                text: self.take(end).trim_end(),
+                line,
+            })
+        }
     }
 
     /// The line that the last thing read ends on.
@@ -78,12 +100,26 @@ impl<'a> Cursor<'a> {
     }
 
     /// `word` as a finite number below [`MAX_VALUE`] in size.
-    pub fn parse_number(&self, word: Token<'_>, what: &str, column: usize) -> Result<f64, MotionError> {
-        let number: f64 = word.text.parse().map_err(|_| self.unexpected(what, Some(word)))?;
+    pub fn parse_number(
+        &self,
+        word: Token<'_>,
+        what: &str,
+        column: usize,
+    ) -> Result<f64, MotionError> {
+        let number: f64 = word
+            .text
+            .parse()
+            .map_err(|_| self.unexpected(what, Some(word)))?;
         if number.abs() < MAX_VALUE {
             return Ok(number);
         }
-        Err(MotionError::Value { name: self.name.to_owned(), line: word.line, column, found: shortened(word.text), limit: MAX_VALUE })
+        Err(MotionError::Value {
+            name: self.name.to_owned(),
+            line: word.line,
+            column,
+            found: shortened(word.text),
+            limit: MAX_VALUE,
+        })
     }
 
     /// The error for `found` (the end of the file where `None`) in the place of `expected`.
@@ -92,7 +128,10 @@ impl<'a> Cursor<'a> {
             name: self.name.to_owned(),
             line: found.map_or(self.line, |token| token.line),
             expected: expected.to_owned(),
-            found: found.map_or_else(|| "the end of the file".to_owned(), |token| format!("\"{}\"", shortened(token.text))),
+            found: found.map_or_else(
+                || "the end of the file".to_owned(),
+                |token| format!("\"{}\"", shortened(token.text)),
+            ),
         }
     }
 
@@ -101,7 +140,10 @@ impl<'a> Cursor<'a> {
     }
 
     fn skip(&mut self, unwanted: impl Fn(char) -> bool) {
-        let end = self.rest.find(|character| !unwanted(character)).unwrap_or(self.rest.len());
+        let end = self
+            .rest
+            .find(|character| !unwanted(character))
+            .unwrap_or(self.rest.len());
         self.take(end);
     }
 
@@ -116,5 +158,9 @@ impl<'a> Cursor<'a> {
 /// A text cut to what fits on a line of an error, control characters made visible.
 pub(crate) fn shortened(text: &str) -> String {
     let visible: String = text.chars().take(40).flat_map(char::escape_debug).collect();
-    if text.chars().nth(40).is_some() { format!("{visible}…") } else { visible }
+    if text.chars().nth(40).is_some() {
+        format!("{visible}…")
+    } else {
+        visible
+    }
 }

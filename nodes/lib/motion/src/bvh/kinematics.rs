@@ -14,8 +14,8 @@ pub struct SkeletonPose {
 }
 
 impl BvhClip {
-    /// The joints' frames of one frame, in the file's axes and units: `world_from_joint = world_from_parent * parent_from_joint`. `index` is
-    /// clamped to the last frame.
+    /// The joints' frames of one frame, in the file's axes and units: `world_from_joint =
+    /// world_from_parent * parent_from_joint`. `index` is clamped to the last frame.
     pub fn world_from_joints(&self, index: usize) -> Vec<Isometry3<f64>> {
         let mut values = self.frame(index.min(self.frame_count() - 1)).iter();
         let mut world_from_joint: Vec<Isometry3<f64>> = Vec::with_capacity(self.joints.len());
@@ -29,7 +29,9 @@ impl BvhClip {
                 }
             }
             let parent_from_joint = Isometry3::from_parts(Translation3::from(position), rotation);
-            world_from_joint.push(joint.parent.map_or(parent_from_joint, |parent| world_from_joint[parent] * parent_from_joint));
+            world_from_joint.push(joint.parent.map_or(parent_from_joint, |parent| {
+                world_from_joint[parent] * parent_from_joint
+            }));
         }
         world_from_joint
     }
@@ -38,9 +40,16 @@ impl BvhClip {
     pub fn zero_pose(&self) -> SkeletonPose {
         let mut positions: Vec<Vector3<f64>> = Vec::with_capacity(self.joints.len());
         for joint in &self.joints {
-            positions.push(joint.parent.map_or_else(Vector3::zeros, |parent| positions[parent] + joint.rest_in_parent));
+            positions.push(joint.parent.map_or_else(Vector3::zeros, |parent| {
+                positions[parent] + joint.rest_in_parent
+            }));
         }
-        self.with_tips(positions.into_iter().map(|position| Isometry3::from(Translation3::from(position))).collect())
+        self.with_tips(
+            positions
+                .into_iter()
+                .map(|position| Isometry3::from(Translation3::from(position)))
+                .collect(),
+        )
     }
 
     /// The skeleton in one of the frames.
@@ -52,21 +61,36 @@ impl BvhClip {
     pub fn with_rotations(&self, rotations: &[UnitQuaternion<f64>]) -> SkeletonPose {
         let mut frames: Vec<Isometry3<f64>> = Vec::with_capacity(self.joints.len());
         for (joint, &rotation) in self.joints.iter().zip(rotations) {
-            let position = joint
-                .parent
-                .map_or_else(Vector3::zeros, |parent| frames[parent].rotation * joint.rest_in_parent + frames[parent].translation.vector);
-            frames.push(Isometry3::from_parts(Translation3::from(position), rotation));
+            let position = joint.parent.map_or_else(Vector3::zeros, |parent| {
+                frames[parent].rotation * joint.rest_in_parent + frames[parent].translation.vector
+            });
+            frames.push(Isometry3::from_parts(
+                Translation3::from(position),
+                rotation,
+            ));
         }
         self.with_tips(frames)
     }
 
     fn with_tips(&self, world_from_joint: Vec<Isometry3<f64>>) -> SkeletonPose {
         let tips = self.joints.iter().zip(&world_from_joint);
-        let tips = tips.map(|(joint, frame)| joint.tip.map(|tip| frame.rotation * tip + frame.translation.vector)).collect();
-        SkeletonPose { world_from_joint, tips }
+        let tips = tips
+            .map(|(joint, frame)| {
+                joint
+                    .tip
+                    .map(|tip| frame.rotation * tip + frame.translation.vector)
+            })
+            .collect();
+        SkeletonPose {
+            world_from_joint,
+            tips,
+        }
     }
 }
 
 fn about(axis: usize, angle: f64) -> UnitQuaternion<f64> {
-    UnitQuaternion::from_axis_angle(&[Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()][axis], angle)
+    UnitQuaternion::from_axis_angle(
+        &[Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()][axis],
+        angle,
+    )
 }

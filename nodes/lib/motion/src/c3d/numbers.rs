@@ -40,14 +40,19 @@ impl<'a> Bytes<'a> {
 
     pub fn unsigned(&self, offset: usize) -> Option<u16> {
         let bytes: [u8; 2] = self.slice(offset, 2)?.try_into().ok()?;
-        Some(if self.processor == Processor::Mips { u16::from_be_bytes(bytes) } else { u16::from_le_bytes(bytes) })
+        Some(if self.processor == Processor::Mips {
+            u16::from_be_bytes(bytes)
+        } else {
+            u16::from_le_bytes(bytes)
+        })
     }
 
     pub fn integer(&self, offset: usize) -> Option<i16> {
         self.unsigned(offset).map(u16::cast_signed)
     }
 
-    /// A VAX F float has its halves exchanged and stands for a quarter of the IEEE float with the same bits; 0 where its exponent is 0.
+    /// A VAX F float has its halves exchanged and stands for a quarter of the IEEE float with the
+    /// same bits; 0 where its exponent is 0.
     pub fn float(&self, offset: usize) -> Option<f32> {
         let bytes: [u8; 4] = self.slice(offset, 4)?.try_into().ok()?;
         Some(match self.processor {

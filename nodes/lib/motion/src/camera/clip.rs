@@ -5,8 +5,8 @@ use nalgebra::Vector2;
 
 use super::{Camera, CameraError, DepthMap, PersonKeypoints};
 
-/// One person's shot: per frame a pose in camera axes (x right, y down, z forward), as VIBE and its kind give it, the keypoints, and the
-/// camera. All lists have the frames' length.
+/// One person's shot: per frame a pose in camera axes (x right, y down, z forward), as VIBE and its
+/// kind give it, the keypoints, and the camera. All lists have the frames' length.
 #[derive(Clone, Debug)]
 pub struct CameraClip {
     /// Names the clip in errors.
@@ -15,11 +15,13 @@ pub struct CameraClip {
     pub rate_hz: f64,
     /// The body's gender; neutral where the estimator does not say.
     pub gender: Gender,
-    /// camera_from_pelvis and the local rotations. The root position is not used: an in-place pose has none.
+    /// camera_from_pelvis and the local rotations. The root position is not used: an in-place pose
+    /// has none.
     pub poses: Vec<BodyPose>,
     /// How sure each pose is, 0 (none in this frame) to 1.
     pub pose_confidence: Vec<f64>,
-    /// Shape coefficients of each frame, of the body that the trajectory is made for; no list at all for the mean shape.
+    /// Shape coefficients of each frame, of the body that the trajectory is made for; no list at
+    /// all for the mean shape.
     pub betas: Vec<Vec<f64>>,
     /// The followed person; `None` where they were not found.
     pub keypoints: Vec<Option<PersonKeypoints>>,
@@ -55,10 +57,22 @@ impl CameraClip {
             ("pose_confidence", self.pose_confidence.len()),
             ("keypoints", self.keypoints.len()),
             ("cameras", self.cameras.len()),
-            ("betas", if self.betas.is_empty() { expected } else { self.betas.len() }),
+            (
+                "betas",
+                if self.betas.is_empty() {
+                    expected
+                } else {
+                    self.betas.len()
+                },
+            ),
         ];
         if let Some((what, found)) = lists.into_iter().find(|(_, found)| *found != expected) {
-            return Err(CameraError::Length { name: self.name.clone(), what, expected, found });
+            return Err(CameraError::Length {
+                name: self.name.clone(),
+                what,
+                expected,
+                found,
+            });
         }
         self.positive("rate_hz", self.rate_hz)?;
         self.positive("keypoint_image_px", self.keypoint_image_px.min())?;
@@ -71,9 +85,15 @@ impl CameraClip {
             let Some(camera) = camera else { continue };
             self.positive(&format!("cameras[{frame}].focal_px"), camera.focal_px.min())?;
             self.positive(&format!("cameras[{frame}].image_px"), camera.image_px.min())?;
-            let numbers = camera.principal_point_px.iter().chain(camera.world_from_camera.translation.vector.iter());
+            let numbers = camera
+                .principal_point_px
+                .iter()
+                .chain(camera.world_from_camera.translation.vector.iter());
             let rotation = camera.world_from_camera.rotation.coords;
-            if let Some(number) = numbers.chain(rotation.iter()).find(|number| !number.is_finite()) {
+            if let Some(number) = numbers
+                .chain(rotation.iter())
+                .find(|number| !number.is_finite())
+            {
                 return Err(self.value(format!("cameras[{frame}]"), *number, "finite numbers"));
             }
         }
@@ -86,21 +106,42 @@ impl CameraClip {
     }
 
     fn positive(&self, what: &str, value: f64) -> Result<(), CameraError> {
-        if value > 0.0 && value.is_finite() { Ok(()) } else { Err(self.value(what.to_owned(), value, "a finite number above 0")) }
+        if value > 0.0 && value.is_finite() {
+            Ok(())
+        } else {
+            Err(self.value(what.to_owned(), value, "a finite number above 0"))
+        }
     }
 
     pub(super) fn value(&self, what: String, value: f64, expected: &'static str) -> CameraError {
-        CameraError::Value { name: self.name.clone(), what, value, expected }
+        CameraError::Value {
+            name: self.name.clone(),
+            what,
+            value,
+            expected,
+        }
     }
 }
 
-/// Shape coefficients over the clip: the mean of the frames' weighted by their confidence. Shorter lists count as filled up with 0; all
-/// weights 0 give the plain mean.
+/// Shape coefficients over the clip: the mean of the frames' weighted by their confidence. Shorter
+/// lists count as filled up with 0; all weights 0 give the plain mean.
 pub fn average_betas(betas: &[Vec<f64>], confidence: &[f64]) -> Vec<f64> {
     let count = betas.iter().map(Vec::len).max().unwrap_or(0);
     let known: f64 = confidence.iter().take(betas.len()).sum();
-    let weight = |frame: usize| if known > 0.0 { confidence.get(frame).copied().unwrap_or(0.0) / known } else { 1.0 / betas.len() as f64 };
+    let weight = |frame: usize| {
+        if known > 0.0 {
+            confidence.get(frame).copied().unwrap_or(0.0) / known
+        } else {
+            1.0 / betas.len() as f64
+        }
+    };
     (0..count)
-        .map(|index| betas.iter().enumerate().map(|(frame, betas)| weight(frame) * betas.get(index).copied().unwrap_or(0.0)).sum())
+        .map(|index| {
+            betas
+                .iter()
+                .enumerate()
+                .map(|(frame, betas)| weight(frame) * betas.get(index).copied().unwrap_or(0.0))
+                .sum()
+        })
         .collect()
 }

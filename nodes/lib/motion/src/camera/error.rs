@@ -37,7 +37,9 @@ pub enum CameraError {
         source: serde_json::Error,
     },
     /// A person's keypoints are not those of BODY_25.
-    #[error("{name}: people[{person}].pose_keypoints_2d: {problem}; run OpenPose with --model_pose BODY_25")]
+    #[error(
+        "{name}: people[{person}].pose_keypoints_2d: {problem}; run OpenPose with --model_pose BODY_25"
+    )]
     Keypoints {
         /// The file.
         name: String,

@@ -19,7 +19,11 @@ const NOISE: FilterNoise = FilterNoise {
 
 impl FilterNoise {
     fn with_jerk(self, density: f64) -> Self {
-        Self { horizontal_jerk: density, vertical_jerk: density, ..self }
+        Self {
+            horizontal_jerk: density,
+            vertical_jerk: density,
+            ..self
+        }
     }
 }
 
@@ -29,9 +33,17 @@ fn normal(random: &mut ChaCha8Rng) -> f64 {
 }
 
 /// Motion of the very model: white jerk, measured with noise.
-fn simulated(jerk_density: f64, pixel_std: f64, depth_std: f64, count: usize) -> (Vec<Vector3<f64>>, Vec<Option<Measurement>>) {
+fn simulated(
+    jerk_density: f64,
+    pixel_std: f64,
+    depth_std: f64,
+    count: usize,
+) -> (Vec<Vector3<f64>>, Vec<Option<Measurement>>) {
     let mut random = ChaCha8Rng::seed_from_u64(5);
-    let factor = process_noise(DT, &NOISE.with_jerk(jerk_density)).cholesky().unwrap().l();
+    let factor = process_noise(DT, &NOISE.with_jerk(jerk_density))
+        .cholesky()
+        .unwrap()
+        .l();
     let mut state = State::zeros();
     let (mut truth, mut measurements) = (Vec::new(), Vec::new());
     for frame in 0..count {
@@ -39,14 +51,23 @@ fn simulated(jerk_density: f64, pixel_std: f64, depth_std: f64, count: usize) ->
         // A pull back to the origin keeps people in the room.
         state = transition(DT, &NOISE) * state + noise;
         for axis in 0..3 {
-            state[6 + axis] -= DT * (2.0 * state[6 + axis] + 4.0 * state[3 + axis] + 2.0 * state[axis]);
+            state[6 + axis] -=
+                DT * (2.0 * state[6 + axis] + 4.0 * state[3 + axis] + 2.0 * state[axis]);
         }
         let position: Vector3<f64> = state.fixed_rows::<3>(0).into_owned();
         truth.push(position);
-        let error = Vector3::new(pixel_std * normal(&mut random), pixel_std * normal(&mut random), depth_std * normal(&mut random));
+        let error = Vector3::new(
+            pixel_std * normal(&mut random),
+            pixel_std * normal(&mut random),
+            depth_std * normal(&mut random),
+        );
         let measurement = Measurement {
             position: position + error,
-            covariance_of_pixel: Matrix3::from_diagonal(&Vector3::new(0.02_f64.powi(2), 0.02_f64.powi(2), 0.0)),
+            covariance_of_pixel: Matrix3::from_diagonal(&Vector3::new(
+                0.02_f64.powi(2),
+                0.02_f64.powi(2),
+                0.0,
+            )),
             covariance_of_depth: Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, 0.02_f64.powi(2))),
         };
         measurements.push((frame % 17 != 3).then_some(measurement));
@@ -73,12 +94,30 @@ fn the_noise_is_learnt_and_the_covariance_is_honest() {
         states.iter().zip(&truth).map(of).sum::<f64>() / states.len() as f64 / 3.0
     };
     let (filtered, smoothed) = (run.filtered(), run.smoothed(DT));
-    println!("squared error by its covariance: filtered {:.3}, smoothed {:.3}", consistency(&filtered), consistency(&smoothed));
-    assert!((0.8..1.25).contains(&consistency(&filtered)) && (0.8..1.25).contains(&consistency(&smoothed)));
+    println!(
+        "squared error by its covariance: filtered {:.3}, smoothed {:.3}",
+        consistency(&filtered),
+        consistency(&smoothed)
+    );
+    assert!(
+        (0.8..1.25).contains(&consistency(&filtered))
+            && (0.8..1.25).contains(&consistency(&smoothed))
+    );
     let rms = |states: &[RootState]| {
-        (states.iter().zip(&truth).map(|(state, truth)| (state.position - truth).norm_squared()).sum::<f64>() / truth.len() as f64).sqrt()
+        (states
+            .iter()
+            .zip(&truth)
+            .map(|(state, truth)| (state.position - truth).norm_squared())
+            .sum::<f64>()
+            / truth.len() as f64)
+            .sqrt()
     };
-    assert!(rms(&smoothed) < 0.75 * rms(&filtered), "{} {}", rms(&smoothed), rms(&filtered));
+    assert!(
+        rms(&smoothed) < 0.75 * rms(&filtered),
+        "{} {}",
+        rms(&smoothed),
+        rms(&filtered)
+    );
 }
 
 #[test]
@@ -92,12 +131,25 @@ fn outliers_are_gated_and_gaps_bridged_with_growing_doubt() {
     for missing in &mut measurements[300..320] {
         *missing = None;
     }
-    let run = kalman_filter(&measurements, DT, &learn_noise(&measurements, DT, &Vector3::x()), Gate::Mahalanobis);
-    let outliers: Vec<usize> = (0..600).filter(|&frame| measurements[frame].is_some() && !run.accepted[frame]).collect();
-    let planted: Vec<usize> = (50..600).step_by(40).filter(|&frame| measurements[frame].is_some()).collect();
+    let run = kalman_filter(
+        &measurements,
+        DT,
+        &learn_noise(&measurements, DT, &Vector3::x()),
+        Gate::Mahalanobis,
+    );
+    let outliers: Vec<usize> = (0..600)
+        .filter(|&frame| measurements[frame].is_some() && !run.accepted[frame])
+        .collect();
+    let planted: Vec<usize> = (50..600)
+        .step_by(40)
+        .filter(|&frame| measurements[frame].is_some())
+        .collect();
     println!("gated {outliers:?}");
     assert!(planted.iter().all(|frame| outliers.contains(frame)));
-    assert!(outliers.len() <= planted.len() + 6, "few good ones are lost");
+    assert!(
+        outliers.len() <= planted.len() + 6,
+        "few good ones are lost"
+    );
     let smoothed = run.smoothed(DT);
     let doubt = |frame: usize| smoothed[frame].position_covariance.trace().sqrt();
     assert!(doubt(310) > 3.0 * doubt(290) && doubt(310) > doubt(302));
@@ -109,26 +161,50 @@ fn nothing_measured_is_nothing_known() {
     let run = kalman_filter(&[None, None], DT, &NOISE, Gate::Mahalanobis);
     assert_eq!(run.accepted, [false, false]);
     assert!(run.smoothed(DT)[1].position_covariance.trace() > 100.0);
-    assert!(kalman_filter(&[], DT, &NOISE, Gate::Mahalanobis).smoothed(DT).is_empty());
+    assert!(
+        kalman_filter(&[], DT, &NOISE, Gate::Mahalanobis)
+            .smoothed(DT)
+            .is_empty()
+    );
 }
 
 #[test]
 fn a_bounce_is_found_in_noise_as_large_as_itself() {
     let mut random = ChaCha8Rng::seed_from_u64(9);
-    let bounce = |frame: usize| Vector3::new(0.022 * (std::f64::consts::TAU * 1.83 * frame as f64 * DT).sin(), 0.0, 0.0);
-    let truth: Vec<Vector3<f64>> = (0..300).map(|frame| Vector3::new(1.0, 1.1 * frame as f64 * DT, 4.0) + bounce(frame)).collect();
+    let bounce = |frame: usize| {
+        Vector3::new(
+            0.022 * (std::f64::consts::TAU * 1.83 * frame as f64 * DT).sin(),
+            0.0,
+            0.0,
+        )
+    };
+    let truth: Vec<Vector3<f64>> = (0..300)
+        .map(|frame| Vector3::new(1.0, 1.1 * frame as f64 * DT, 4.0) + bounce(frame))
+        .collect();
     let covariance = Matrix3::from_diagonal(&Vector3::new(4e-4, 4e-4, 4e-4));
     let measured = |truth: &Vector3<f64>, random: &mut ChaCha8Rng| {
         let position = truth + Vector3::from_fn(|_, _| 0.02 * normal(random));
-        Some(Measurement { position, covariance_of_pixel: covariance, covariance_of_depth: Matrix3::zeros() })
+        Some(Measurement {
+            position,
+            covariance_of_pixel: covariance,
+            covariance_of_depth: Matrix3::zeros(),
+        })
     };
-    let measurements: Vec<_> = truth.iter().map(|truth| measured(truth, &mut random)).collect();
+    let measurements: Vec<_> = truth
+        .iter()
+        .map(|truth| measured(truth, &mut random))
+        .collect();
     let noise = learn_noise(&measurements, DT, &Vector3::x());
     println!("{noise:?}");
-    assert!((noise.bounce_hz - 1.83).abs() < 0.05 && (0.005..0.05).contains(&noise.bounce_std), "{noise:?}");
+    assert!(
+        (noise.bounce_hz - 1.83).abs() < 0.05 && (0.005..0.05).contains(&noise.bounce_std),
+        "{noise:?}"
+    );
     let states = kalman_filter(&measurements, DT, &noise, Gate::Mahalanobis).smoothed(DT);
     let turn = std::f64::consts::TAU * 1.83;
-    let rms = |of: &dyn Fn(usize) -> f64| ((0..300).map(|frame| of(frame).powi(2)).sum::<f64>() / 300.0).sqrt();
+    let rms = |of: &dyn Fn(usize) -> f64| {
+        ((0..300).map(|frame| of(frame).powi(2)).sum::<f64>() / 300.0).sqrt()
+    };
     let error = rms(&|frame| states[frame].acceleration.x + turn * turn * bounce(frame).x);
     let whole = rms(&|frame| turn * turn * bounce(frame).x);
     println!("vertical acceleration {whole:.2} m/s2, found within {error:.2} m/s2");

@@ -1,4 +1,5 @@
-//! The files of a shot: which belongs to which frame, and opening them. What stands in them is read by the parsers.
+//! The files of a shot: which belongs to which frame, and opening them. What stands in them is read
+//! by the parsers.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -8,8 +9,8 @@ use std::path::{Path, PathBuf};
 use nalgebra::Vector2;
 
 use super::{
-    Camera, CameraAxes, CameraError, DepthEncoding, DepthMap, DepthProvider, MAX_DEPTH_PIXELS, PersonKeypoints, parse_camera, parse_depth,
-    parse_openpose, parse_plain_depth, track_person,
+    Camera, CameraAxes, CameraError, DepthEncoding, DepthMap, DepthProvider, MAX_DEPTH_PIXELS,
+    PersonKeypoints, parse_camera, parse_depth, parse_openpose, parse_plain_depth, track_person,
 };
 
 /// Larger files are no frame.
@@ -28,9 +29,11 @@ pub struct FolderLayout {
     pub keypoint_image_px: Vector2<f64>,
     /// Width and height of the image that the intrinsics are for, px.
     pub intrinsics_image_px: Vector2<f64>,
-    /// Number of the first frame in the files' names: 0 as OpenPose and Robust CVD count, 1 where a tool counts from 1.
+    /// Number of the first frame in the files' names: 0 as OpenPose and Robust CVD count, 1 where a
+    /// tool counts from 1.
     pub first_number: usize,
-    /// Width and height of depth maps without a header (plain float32); `None` for maps that say it themselves.
+    /// Width and height of depth maps without a header (plain float32); `None` for maps that say it
+    /// themselves.
     pub plain_depth_px: Option<[usize; 2]>,
 }
 
@@ -66,16 +69,22 @@ pub struct FolderDepth {
 }
 
 impl CameraFolder {
-    /// Reads keypoints and cameras and lists the depth maps. A file's frame is the last number of its name less
-    /// [`FolderLayout::first_number`]. `frames` is the number of frames; files beyond it are left alone.
+    /// Reads keypoints and cameras and lists the depth maps. A file's frame is the last number of
+    /// its name less [`FolderLayout::first_number`]. `frames` is the number of frames; files beyond
+    /// it are left alone.
     ///
     /// # Errors
     /// [`CameraError::Read`], [`CameraError::NoFrames`], and those of the parsers.
     pub fn read(&self, frames: usize, least_confidence: f64) -> Result<FolderFrames, CameraError> {
         let frames = frames.min(MAX_FRAMES);
-        let keypoint_files = self.numbered(&self.keypoints, &["_keypoints.json"], "*_keypoints.json")?;
+        let keypoint_files =
+            self.numbered(&self.keypoints, &["_keypoints.json"], "*_keypoints.json")?;
         let camera_files = self.numbered(&self.cameras, &[".npz"], "frame_NNNNNN.npz")?;
-        let depth_files = self.numbered(&self.depth, &[".raw", ".npy", ".png"], "frame_NNNNNN.raw, .npy or .png")?;
+        let depth_files = self.numbered(
+            &self.depth,
+            &[".raw", ".npy", ".png"],
+            "frame_NNNNNN.raw, .npy or .png",
+        )?;
         let mut people = Vec::with_capacity(frames);
         let mut cameras = Vec::with_capacity(frames);
         for frame in 0..frames {
@@ -86,44 +95,91 @@ impl CameraFolder {
             cameras.push(match camera_files.get(&frame) {
                 Some(path) => {
                     let name = path.display().to_string();
-                    Some(parse_camera(&read(path)?, self.layout.intrinsics_image_px, self.layout.axes, &name)?)
+                    Some(parse_camera(
+                        &read(path)?,
+                        self.layout.intrinsics_image_px,
+                        self.layout.axes,
+                        &name,
+                    )?)
                 }
                 None => None,
             });
         }
         let chosen = track_person(&people, least_confidence);
-        let keypoints = people.iter().zip(chosen).map(|(people, person)| people.get(person?).copied()).collect();
-        Ok(FolderFrames { keypoints, cameras, depth: FolderDepth { files: depth_files, layout: self.layout } })
+        let keypoints = people
+            .iter()
+            .zip(chosen)
+            .map(|(people, person)| people.get(person?).copied())
+            .collect();
+        Ok(FolderFrames {
+            keypoints,
+            cameras,
+            depth: FolderDepth {
+                files: depth_files,
+                layout: self.layout,
+            },
+        })
     }
 
-    /// Files with one of the endings by frame; where a frame has several, the one with the first ending.
-    fn numbered(&self, folder: &Path, endings: &[&str], expected: &'static str) -> Result<BTreeMap<usize, PathBuf>, CameraError> {
-        let unreadable = |source| CameraError::Read { path: folder.to_owned(), source };
+    /// Files with one of the endings by frame; where a frame has several, the one with the first
+    /// ending.
+    fn numbered(
+        &self,
+        folder: &Path,
+        endings: &[&str],
+        expected: &'static str,
+    ) -> Result<BTreeMap<usize, PathBuf>, CameraError> {
+        let unreadable = |source| CameraError::Read {
+            path: folder.to_owned(),
+            source,
+        };
         let mut found = Vec::new();
         for entry in std::fs::read_dir(folder).map_err(unreadable)? {
             let path = entry.map_err(unreadable)?.path();
-            let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-            let stem = endings.iter().enumerate().find_map(|(rank, ending)| Some((rank, name.strip_suffix(ending)?)));
-            let frame = stem.and_then(|(rank, stem)| Some((last_number(stem)?.checked_sub(self.layout.first_number)?, rank)));
+            let name = path
+                .file_name()
+                .map(|name| name.to_string_lossy().into_owned())
+                .unwrap_or_default();
+            let stem = endings
+                .iter()
+                .enumerate()
+                .find_map(|(rank, ending)| Some((rank, name.strip_suffix(ending)?)));
+            let frame = stem.and_then(|(rank, stem)| {
+                Some((
+                    last_number(stem)?.checked_sub(self.layout.first_number)?,
+                    rank,
+                ))
+            });
             if let Some((frame, rank)) = frame {
                 found.push((frame, rank, path));
             }
         }
         if found.is_empty() {
-            return Err(CameraError::NoFrames { path: folder.to_owned(), expected });
+            return Err(CameraError::NoFrames {
+                path: folder.to_owned(),
+                expected,
+            });
         }
         // The first of a frame is inserted last.
         found.sort();
-        Ok(found.into_iter().rev().map(|(frame, _, path)| (frame, path)).collect())
+        Ok(found
+            .into_iter()
+            .rev()
+            .map(|(frame, _, path)| (frame, path))
+            .collect())
     }
 }
 
 impl DepthProvider for FolderDepth {
     fn depth(&mut self, frame: usize) -> Result<Option<DepthMap>, CameraError> {
-        let Some(path) = self.files.get(&frame) else { return Ok(None) };
+        let Some(path) = self.files.get(&frame) else {
+            return Ok(None);
+        };
         let (bytes, name) = (read(path)?, path.display().to_string());
         match self.layout.plain_depth_px {
-            Some([width, height]) => parse_plain_depth(&bytes, width, height, self.layout.encoding, &name),
+            Some([width, height]) => {
+                parse_plain_depth(&bytes, width, height, self.layout.encoding, &name)
+            }
             None => parse_depth(&bytes, self.layout.encoding, &name),
         }
         .map(Some)
@@ -132,17 +188,31 @@ impl DepthProvider for FolderDepth {
 
 fn last_number(stem: &str) -> Option<usize> {
     let end = stem.rfind(|c: char| c.is_ascii_digit())? + 1;
-    let start =
-        stem[..end].rfind(|c: char| !c.is_ascii_digit()).map_or(0, |place| place + stem[place..].chars().next().map_or(1, char::len_utf8));
+    let start = stem[..end]
+        .rfind(|c: char| !c.is_ascii_digit())
+        .map_or(0, |place| {
+            place + stem[place..].chars().next().map_or(1, char::len_utf8)
+        });
     stem[start..end].parse().ok()
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, CameraError> {
-    let unreadable = |source| CameraError::Read { path: path.to_owned(), source };
+    let unreadable = |source| CameraError::Read {
+        path: path.to_owned(),
+        source,
+    };
     let mut bytes = Vec::new();
-    File::open(path).map_err(unreadable)?.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+    File::open(path)
+        .map_err(unreadable)?
+        .take(MAX_BYTES + 1)
+        .read_to_end(&mut bytes)
+        .map_err(unreadable)?;
     if bytes.len() as u64 > MAX_BYTES {
-        return Err(CameraError::TooLarge { name: path.display().to_string(), bytes: bytes.len() as u64, limit: MAX_BYTES });
+        return Err(CameraError::TooLarge {
+            name: path.display().to_string(),
+            bytes: bytes.len() as u64,
+            limit: MAX_BYTES,
+        });
     }
     Ok(bytes)
 }
@@ -156,6 +226,9 @@ mod tests {
         assert_eq!(last_number("frame_000012"), Some(12));
         assert_eq!(last_number("GH01_000000000007"), Some(7));
         assert_eq!(last_number("clip2é05x"), Some(5));
-        assert_eq!((last_number("frame"), last_number("99999999999999999999999")), (None, None));
+        assert_eq!(
+            (last_number("frame"), last_number("99999999999999999999999")),
+            (None, None)
+        );
     }
 }

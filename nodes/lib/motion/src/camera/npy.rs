@@ -33,7 +33,8 @@ impl<'a> NpyHeader<'a> {
         Ok(Self { element, shape, c_order, start: start + length })
     }
 
-    /// The elements in C order, NaN included; what is wrong with them otherwise. They take no more memory than four times the file.
+    /// The elements in C order, NaN included; what is wrong with them otherwise. They take no more
+    /// memory than four times the file.
     pub fn floats(&self, bytes: &[u8]) -> Result<Vec<f64>, String> {
         let content = bytes.get(self.start..).unwrap_or_default();
         let size = match self.element {

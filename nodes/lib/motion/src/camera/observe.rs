@@ -1,11 +1,16 @@
-//! What one frame says about the root: from keypoints, depth and pose to a position with its covariance.
+//! What one frame says about the root: from keypoints, depth and pose to a position with its
+//! covariance.
 
 use cromosim_body::ShapedBody;
 use nalgebra::{Vector2, Vector3};
 
-use super::{Camera, CameraClip, DepthMap, Measurement, PelvisSkin, TrajectoryOptions, pelvis_pixel, position_by_keypoints, surface_depth};
+use super::{
+    Camera, CameraClip, DepthMap, Measurement, PelvisSkin, TrajectoryOptions, pelvis_pixel,
+    position_by_keypoints, surface_depth,
+};
 
-/// How exactly the skin's distance before the joint is known, m: clothing, and limbs that the pose has elsewhere.
+/// How exactly the skin's distance before the joint is known, m: clothing, and limbs that the pose
+/// has elsewhere.
 const SKIN_STD_M: f64 = 0.02;
 
 /// One frame, before the scale is known.
@@ -25,7 +30,8 @@ pub struct RootObservation {
     pub behind_skin_m: f64,
     /// From the middle of the hips to the pelvis joint, camera axes, m.
     pub pelvis_from_mid_hip: Vector3<f64>,
-    /// Distance of the middle of the hips along the optical axis by keypoints and body size alone, m; see [`position_by_keypoints`].
+    /// Distance of the middle of the hips along the optical axis by keypoints and body size alone,
+    /// m; see [`position_by_keypoints`].
     pub distance_by_keypoints_m: Option<f64>,
 }
 
@@ -48,16 +54,32 @@ pub fn observe(
     options: &TrajectoryOptions,
 ) -> Option<RootObservation> {
     let person = clip.keypoints.get(frame)?.as_ref()?;
-    let camera = clip.cameras.get(frame)?.as_ref()?.resized(clip.keypoint_image_px);
-    let pose = clip.poses.get(frame).filter(|_| clip.pose_confidence.get(frame).is_some_and(|confidence| *confidence > 0.0))?;
+    let camera = clip
+        .cameras
+        .get(frame)?
+        .as_ref()?
+        .resized(clip.keypoint_image_px);
+    let pose = clip.poses.get(frame).filter(|_| {
+        clip.pose_confidence
+            .get(frame)
+            .is_some_and(|confidence| *confidence > 0.0)
+    })?;
     let pelvis = pelvis_pixel(person, options.least_confidence)?;
     let surface = surface_depth(map, &camera, pelvis.pixel, pelvis.torso_px)?;
     let hips = body.skin.hips(pose, &camera.ray(pelvis.pixel));
-    let by_keypoints = position_by_keypoints(person, pose, body.shaped, body.size, &camera, options.least_confidence);
+    let by_keypoints = position_by_keypoints(
+        person,
+        pose,
+        body.shaped,
+        body.size,
+        &camera,
+        options.least_confidence,
+    );
     Some(RootObservation {
         frame,
         pixel: pelvis.pixel,
-        pixel_std: options.keypoint_std_px * clip.keypoint_image_px.y / 1080.0 * pelvis.spread / pelvis.confidence,
+        pixel_std: options.keypoint_std_px * clip.keypoint_image_px.y / 1080.0 * pelvis.spread
+            / pelvis.confidence,
         confidence: pelvis.confidence,
         skin_depth: surface.depth,
         behind_skin_m: hips.behind_skin_m * body.size,
@@ -66,10 +88,16 @@ pub fn observe(
     })
 }
 
-/// The root in the reconstruction's world, metres:
-/// `X_w = R_wc (s d K^-1 (u, v, 1) + b r + R_cp (pelvis - mid hip)) + s t_wc`, with r the ray's direction and b how far the hips lie behind
-/// the skin. Pixel and depth errors travel through the back-projection: see [`Camera::back_projection_covariance`].
-pub fn measure(observation: &RootObservation, camera: &Camera, scale: f64, depth_std: f64) -> Measurement {
+/// The root in the reconstruction's world, metres: `X_w = R_wc (s d K^-1 (u, v, 1) + b r + R_cp
+/// (pelvis - mid hip)) + s t_wc`, with r the ray's direction and b how far the hips lie behind the
+/// skin. Pixel and depth errors travel through the back-projection: see
+/// [`Camera::back_projection_covariance`].
+pub fn measure(
+    observation: &RootObservation,
+    camera: &Camera,
+    scale: f64,
+    depth_std: f64,
+) -> Measurement {
     let camera = camera.scaled(scale);
     let depth = scale * observation.skin_depth;
     let in_camera = camera.back_project(observation.pixel, depth)
@@ -81,7 +109,8 @@ pub fn measure(observation: &RootObservation, camera: &Camera, scale: f64, depth
         .back_projection_covariance(observation.pixel, depth, observation.pixel_std, depth_std_m)
         .map(|covariance| rotation * covariance * rotation.transpose());
     Measurement {
-        position: camera.world_from_camera.rotation * in_camera + camera.world_from_camera.translation.vector,
+        position: camera.world_from_camera.rotation * in_camera
+            + camera.world_from_camera.translation.vector,
         covariance_of_pixel,
         covariance_of_depth,
     }

@@ -11,47 +11,106 @@ use super::{Camera, CameraAxes, CameraError};
 
 /// Names that the arrays go by, in files of different hands.
 const INTRINSICS: [&str; 4] = ["intrinsics", "intrinsic", "K", "cam_K"];
-const CAMERA_TO_WORLD: [&str; 6] = ["extrinsics", "camera_to_world", "cam_c2w", "c2w", "pose", "world_from_camera"];
+const CAMERA_TO_WORLD: [&str; 6] = [
+    "extrinsics",
+    "camera_to_world",
+    "cam_c2w",
+    "c2w",
+    "pose",
+    "world_from_camera",
+];
 const LARGEST_PIXEL: f64 = 1e6;
 /// A camera is a few dozen numbers.
-const LIMITS: Limits = Limits { decoded_bytes: 1 << 20, opcodes: 10_000, depth: 10 };
+const LIMITS: Limits = Limits {
+    decoded_bytes: 1 << 20,
+    opcodes: 10_000,
+    depth: 10,
+};
 
-/// The camera of an npz: intrinsics as (fx, fy), (fx, fy, cx, cy) or a 3 x 3 matrix, under `intrinsics`, `intrinsic`, `K` or `cam_K`; and
-/// world_from_camera as a 4 x 4 or 3 x 4 matrix under `extrinsics`, `camera_to_world`, `cam_c2w`, `c2w`, `pose` or `world_from_camera`.
-/// The principal point is the image's middle where absent. `image_px` is the size of the image that the intrinsics are for.
+/// The camera of an npz: intrinsics as (fx, fy), (fx, fy, cx, cy) or a 3 x 3 matrix, under
+/// `intrinsics`, `intrinsic`, `K` or `cam_K`; and world_from_camera as a 4 x 4 or 3 x 4 matrix
+/// under `extrinsics`, `camera_to_world`, `cam_c2w`, `c2w`, `pose` or `world_from_camera`. The
+/// principal point is the image's middle where absent. `image_px` is the size of the image that the
+/// intrinsics are for.
 ///
 /// # Errors
 /// [`CameraError::Parameters`], [`CameraError::Arrays`] for a damaged archive or array.
-pub fn parse_camera(bytes: &[u8], image_px: Vector2<f64>, axes: CameraAxes, name: &str) -> Result<Camera, CameraError> {
+pub fn parse_camera(
+    bytes: &[u8],
+    image_px: Vector2<f64>,
+    axes: CameraAxes,
+    name: &str,
+) -> Result<Camera, CameraError> {
     let mut npz = NpzReader::with_limits(Cursor::new(bytes), Path::new(name), LIMITS)?;
     let keys = npz.keys();
-    let problem = |key: &str, problem: String| CameraError::Parameters { name: name.to_owned(), key: key.to_owned(), problem };
-    let find = |names: &[&'static str]| names.iter().copied().find(|name| keys.iter().any(|key| key == name));
-    let missing = |names: &[&str]| problem(names[0], format!("absent, as is any of {}", names[1..].join(", ")));
+    let problem = |key: &str, problem: String| CameraError::Parameters {
+        name: name.to_owned(),
+        key: key.to_owned(),
+        problem,
+    };
+    let find = |names: &[&'static str]| {
+        names
+            .iter()
+            .copied()
+            .find(|name| keys.iter().any(|key| key == name))
+    };
+    let missing = |names: &[&str]| {
+        problem(
+            names[0],
+            format!("absent, as is any of {}", names[1..].join(", ")),
+        )
+    };
     let key = find(&INTRINSICS).ok_or_else(|| missing(&INTRINSICS))?;
     let (focal_px, principal_point_px) = match &array(&mut npz, key)?[..] {
         [fx, fy] => (Vector2::new(*fx, *fy), image_px / 2.0),
         [fx, fy, cx, cy] => (Vector2::new(*fx, *fy), Vector2::new(*cx, *cy)),
         [fx, _, cx, _, fy, cy, _, _, _] => (Vector2::new(*fx, *fy), Vector2::new(*cx, *cy)),
-        other => return Err(problem(key, format!("expected (fx, fy), (fx, fy, cx, cy) or 3 x 3, found {} numbers", other.len()))),
+        other => {
+            return Err(problem(
+                key,
+                format!(
+                    "expected (fx, fy), (fx, fy, cx, cy) or 3 x 3, found {} numbers",
+                    other.len()
+                ),
+            ));
+        }
     };
-    if !(focal_px.min() > 0.0 && focal_px.max() < LARGEST_PIXEL && principal_point_px.amax() < LARGEST_PIXEL) {
-        let found = format!("focal lengths {} and {}, expected pixels above 0", focal_px.x, focal_px.y);
+    if !(focal_px.min() > 0.0
+        && focal_px.max() < LARGEST_PIXEL
+        && principal_point_px.amax() < LARGEST_PIXEL)
+    {
+        let found = format!(
+            "focal lengths {} and {}, expected pixels above 0",
+            focal_px.x, focal_px.y
+        );
         return Err(problem(key, found));
     }
     let key = find(&CAMERA_TO_WORLD).ok_or_else(|| missing(&CAMERA_TO_WORLD))?;
     let values = array(&mut npz, key)?;
     if values.len() != 16 && values.len() != 12 {
-        return Err(problem(key, format!("expected a 4 x 4 or 3 x 4 matrix, found {} numbers", values.len())));
+        return Err(problem(
+            key,
+            format!(
+                "expected a 4 x 4 or 3 x 4 matrix, found {} numbers",
+                values.len()
+            ),
+        ));
     }
     let rotation = Matrix3::from_fn(|row, column| values[4 * row + column]);
     let position = Vector3::from_fn(|row, _| values[4 * row + 3]);
-    let rotation = so3::rotation_from_matrix(&rotation, 1e-2).map_err(|error| problem(key, error.to_string()))?;
+    let rotation = so3::rotation_from_matrix(&rotation, 1e-2)
+        .map_err(|error| problem(key, error.to_string()))?;
     let world_from_camera = axes.to_open_cv(Isometry3::from_parts(position.into(), rotation));
-    Ok(Camera { focal_px, principal_point_px, image_px, world_from_camera })
+    Ok(Camera {
+        focal_px,
+        principal_point_px,
+        image_px,
+        world_from_camera,
+    })
 }
 
-/// The numbers of a small array of any of the shapes that cameras come in: a vector, a matrix, or a stack of one matrix.
+/// The numbers of a small array of any of the shapes that cameras come in: a vector, a matrix, or a
+/// stack of one matrix.
 fn array(npz: &mut NpzReader<Cursor<&[u8]>>, key: &str) -> Result<Vec<f64>, CameraError> {
     let entry = npz.at(key)?;
     let shape: &[Option<usize>] = match entry.shape()?.len() {
@@ -80,22 +139,59 @@ mod tests {
     #[test]
     fn cameras_are_read_in_the_forms_that_occur() {
         let size = Vector2::new(384.0, 216.0);
-        let pose = [1.0, 0.0, 0.0, 0.5, 0.0, -1.0, 0.0, 1.5, 0.0, 0.0, -1.0, 2.5, 0.0, 0.0, 0.0, 1.0];
-        let first =
-            parse_camera(&npz(&[("intrinsics", &[2], &[300.0, 310.0]), ("extrinsics", &[4, 4], &pose)]), size, CameraAxes::OpenCv, "a.npz")
-                .unwrap();
-        assert_eq!((first.focal_px, first.principal_point_px), (Vector2::new(300.0, 310.0), Vector2::new(192.0, 108.0)));
-        assert_eq!(first.world_from_camera.translation.vector, Vector3::new(0.5, 1.5, 2.5));
+        let pose = [
+            1.0, 0.0, 0.0, 0.5, 0.0, -1.0, 0.0, 1.5, 0.0, 0.0, -1.0, 2.5, 0.0, 0.0, 0.0, 1.0,
+        ];
+        let first = parse_camera(
+            &npz(&[
+                ("intrinsics", &[2], &[300.0, 310.0]),
+                ("extrinsics", &[4, 4], &pose),
+            ]),
+            size,
+            CameraAxes::OpenCv,
+            "a.npz",
+        )
+        .unwrap();
+        assert_eq!(
+            (first.focal_px, first.principal_point_px),
+            (Vector2::new(300.0, 310.0), Vector2::new(192.0, 108.0))
+        );
+        assert_eq!(
+            first.world_from_camera.translation.vector,
+            Vector3::new(0.5, 1.5, 2.5)
+        );
         let k = [300.0, 0.0, 190.0, 0.0, 310.0, 100.0, 0.0, 0.0, 1.0];
-        let second = parse_camera(&npz(&[("K", &[3, 3], &k), ("c2w", &[3, 4], &pose[..12])]), size, CameraAxes::OpenGl, "a.npz").unwrap();
+        let second = parse_camera(
+            &npz(&[("K", &[3, 3], &k), ("c2w", &[3, 4], &pose[..12])]),
+            size,
+            CameraAxes::OpenGl,
+            "a.npz",
+        )
+        .unwrap();
         assert_eq!(second.principal_point_px, Vector2::new(190.0, 100.0));
-        assert!((second.world_from_camera.rotation.angle()) < 1e-9, "OpenGL's half turn undoes the matrix's");
+        assert!(
+            (second.world_from_camera.rotation.angle()) < 1e-9,
+            "OpenGL's half turn undoes the matrix's"
+        );
 
-        let message = |bytes: &[u8]| parse_camera(bytes, size, CameraAxes::OpenCv, "a.npz").unwrap_err().to_string();
-        assert!(message(&npz(&[("K", &[2], &[300.0, 310.0])])).contains("a.npz: key extrinsics: absent"));
+        let message = |bytes: &[u8]| {
+            parse_camera(bytes, size, CameraAxes::OpenCv, "a.npz")
+                .unwrap_err()
+                .to_string()
+        };
+        assert!(
+            message(&npz(&[("K", &[2], &[300.0, 310.0])]))
+                .contains("a.npz: key extrinsics: absent")
+        );
         assert!(message(&npz(&[("K", &[3], &[1.0, 2.0, 3.0])])).contains("found 3 numbers"));
         assert!(message(&npz(&[("K", &[2], &[0.0, 3.0])])).contains("focal"));
-        assert!(message(&npz(&[("K", &[2], &[300.0, 310.0]), ("c2w", &[4, 4], &[0.0; 16])])).contains("c2w"));
+        assert!(
+            message(&npz(&[
+                ("K", &[2], &[300.0, 310.0]),
+                ("c2w", &[4, 4], &[0.0; 16])
+            ]))
+            .contains("c2w")
+        );
         assert!(message(b"PK\x03\x04 nothing").contains("a.npz"));
     }
 }

@@ -17,7 +17,10 @@ impl CameraAxes {
     pub fn to_open_cv(self, world_from_camera: Isometry3<f64>) -> Isometry3<f64> {
         match self {
             Self::OpenCv => world_from_camera,
-            Self::OpenGl => world_from_camera * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI),
+            Self::OpenGl => {
+                world_from_camera
+                    * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
+            }
         }
     }
 }
@@ -37,8 +40,17 @@ pub struct Camera {
 
 impl Camera {
     /// A camera with its principal point in the middle of the image.
-    pub fn centred(focal_px: Vector2<f64>, image_px: Vector2<f64>, world_from_camera: Isometry3<f64>) -> Self {
-        Self { focal_px, principal_point_px: image_px / 2.0, image_px, world_from_camera }
+    pub fn centred(
+        focal_px: Vector2<f64>,
+        image_px: Vector2<f64>,
+        world_from_camera: Isometry3<f64>,
+    ) -> Self {
+        Self {
+            focal_px,
+            principal_point_px: image_px / 2.0,
+            image_px,
+            world_from_camera,
+        }
     }
 
     /// The same camera for its image at another size.
@@ -56,13 +68,24 @@ impl Camera {
     /// Lengths of the reconstruction times `scale`: the camera's position in metres.
     #[must_use]
     pub fn scaled(&self, scale: f64) -> Self {
-        let Isometry3 { rotation, translation } = self.world_from_camera;
-        Self { world_from_camera: Isometry3::from_parts(Translation3::from(translation.vector * scale), rotation), ..*self }
+        let Isometry3 {
+            rotation,
+            translation,
+        } = self.world_from_camera;
+        Self {
+            world_from_camera: Isometry3::from_parts(
+                Translation3::from(translation.vector * scale),
+                rotation,
+            ),
+            ..*self
+        }
     }
 
     /// K^-1 (u, v, 1): the ray of a pixel in camera axes, with z = 1.
     pub fn ray(&self, pixel: Vector2<f64>) -> Vector3<f64> {
-        (pixel - self.principal_point_px).component_div(&self.focal_px).push(1.0)
+        (pixel - self.principal_point_px)
+            .component_div(&self.focal_px)
+            .push(1.0)
     }
 
     /// X_c = d K^-1 (u, v, 1): the point at `depth` along the optical axis, in camera axes.
@@ -72,15 +95,27 @@ impl Camera {
 
     /// Pixel of a point in camera axes; `None` behind the camera.
     pub fn project(&self, in_camera: &Vector3<f64>) -> Option<Vector2<f64>> {
-        (in_camera.z > 0.0).then(|| in_camera.xy().component_mul(&self.focal_px) / in_camera.z + self.principal_point_px)
+        (in_camera.z > 0.0).then(|| {
+            in_camera.xy().component_mul(&self.focal_px) / in_camera.z + self.principal_point_px
+        })
     }
 
-    /// Covariance of a back-projected point in camera axes, m2: J diag(s_u^2, s_v^2, s_d^2) J^T with the columns of J = dX_c/d(u, v, d)
-    /// being (d/f_x, 0, 0), (0, d/f_y, 0) and the ray. Also returns the part of pixels and the part of depth, which sum to it.
-    pub fn back_projection_covariance(&self, pixel: Vector2<f64>, depth: f64, pixel_std: f64, depth_std: f64) -> [Matrix3<f64>; 2] {
+    /// Covariance of a back-projected point in camera axes, m2: J diag(s_u^2, s_v^2, s_d^2) J^T
+    /// with the columns of J = dX_c/d(u, v, d) being (d/f_x, 0, 0), (0, d/f_y, 0) and the ray. Also
+    /// returns the part of pixels and the part of depth, which sum to it.
+    pub fn back_projection_covariance(
+        &self,
+        pixel: Vector2<f64>,
+        depth: f64,
+        pixel_std: f64,
+        depth_std: f64,
+    ) -> [Matrix3<f64>; 2] {
         let across = Vector2::repeat(depth * pixel_std).component_div(&self.focal_px);
         let along = self.ray(pixel) * depth_std;
-        [Matrix3::from_diagonal(&across.component_mul(&across).push(0.0)), along * along.transpose()]
+        [
+            Matrix3::from_diagonal(&across.component_mul(&across).push(0.0)),
+            along * along.transpose(),
+        ]
     }
 }
 
@@ -91,7 +126,11 @@ mod tests {
 
     #[test]
     fn projection_undoes_back_projection_at_every_image_size() {
-        let camera = Camera::centred(Vector2::new(1500.0, 1480.0), Vector2::new(1920.0, 1080.0), Isometry3::identity());
+        let camera = Camera::centred(
+            Vector2::new(1500.0, 1480.0),
+            Vector2::new(1920.0, 1080.0),
+            Isometry3::identity(),
+        );
         let pixel = Vector2::new(1203.0, 222.0);
         let point = camera.back_project(pixel, 3.7);
         assert!((camera.project(&point).unwrap() - pixel).norm() < 1e-9);
@@ -102,16 +141,28 @@ mod tests {
 
     #[test]
     fn the_covariance_is_that_of_finite_differences() {
-        let camera = Camera::centred(Vector2::new(1500.0, 1480.0), Vector2::new(1920.0, 1080.0), Isometry3::identity());
+        let camera = Camera::centred(
+            Vector2::new(1500.0, 1480.0),
+            Vector2::new(1920.0, 1080.0),
+            Isometry3::identity(),
+        );
         let (pixel, depth, pixel_std, depth_std) = (Vector2::new(1203.0, 222.0), 3.7, 7.0, 0.2);
         let step = 1e-4;
         let column = |du: f64, dv: f64, dd: f64| {
             let moved = camera.back_project(pixel + Vector2::new(du, dv) * step, depth + dd * step);
             (moved - camera.back_project(pixel, depth)) / step
         };
-        let columns = [column(1.0, 0.0, 0.0) * pixel_std, column(0.0, 1.0, 0.0) * pixel_std, column(0.0, 0.0, 1.0) * depth_std];
-        let expected: Matrix3<f64> = columns.iter().map(|column| column * column.transpose()).sum();
-        let [of_pixels, of_depth] = camera.back_projection_covariance(pixel, depth, pixel_std, depth_std);
+        let columns = [
+            column(1.0, 0.0, 0.0) * pixel_std,
+            column(0.0, 1.0, 0.0) * pixel_std,
+            column(0.0, 0.0, 1.0) * depth_std,
+        ];
+        let expected: Matrix3<f64> = columns
+            .iter()
+            .map(|column| column * column.transpose())
+            .sum();
+        let [of_pixels, of_depth] =
+            camera.back_projection_covariance(pixel, depth, pixel_std, depth_std);
         assert!((of_pixels + of_depth - expected).norm() < 1e-6);
     }
 

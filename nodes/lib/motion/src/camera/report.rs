@@ -25,8 +25,8 @@ pub struct TrajectoryReport {
     pub scale: Option<ScaleEstimate>,
     /// The filter's noise as learnt; `None` without a trajectory.
     pub noise: Option<FilterNoise>,
-    /// Standard deviation per axis of the positions, median of the frames, m: with the part that does not average out (scale errors of the
-    /// depth maps). 0 without a trajectory.
+    /// Standard deviation per axis of the positions, median of the frames, m: with the part that
+    /// does not average out (scale errors of the depth maps). 0 without a trajectory.
     pub position_std_m: f64,
     /// Of the velocities, m/s. 0 without a trajectory.
     pub velocity_std: f64,
@@ -41,7 +41,11 @@ pub struct TrajectoryReport {
 impl fmt::Display for TrajectoryReport {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (Some(scale), Some(noise)) = (self.scale, self.noise) else {
-            return write!(formatter, "{} frames in place, {} poses bridged", self.frames, self.poses_bridged);
+            return write!(
+                formatter,
+                "{} frames in place, {} poses bridged",
+                self.frames, self.poses_bridged
+            );
         };
         write!(
             formatter,

@@ -10,7 +10,8 @@ use super::{Camera, DepthMap, PersonKeypoints};
 pub enum ScaleSource {
     /// Metres per unit, known: 1 for metric depth.
     Given(f64),
-    /// The person's standing height, m: the estimated pose at this size says how far away the person is.
+    /// The person's standing height, m: the estimated pose at this size says how far away the
+    /// person is.
     BodyHeight(f64),
     /// The length of something that stands still or moves along, seen in one frame or several.
     Object(Vec<ObjectLength>),
@@ -64,14 +65,18 @@ pub fn standing_height(shaped: &ShapedBody) -> f64 {
     heights().fold(f64::MIN, f64::max) - heights().fold(f64::MAX, f64::min)
 }
 
-/// Where a body of known size and pose is by its keypoints alone: the middle of the hips in camera axes, m.
+/// Where a body of known size and pose is by its keypoints alone: the middle of the hips in camera
+/// axes, m.
 ///
-/// With points p_j of the body about the middle of its hips (camera axes, m) and rays r_j = K^-1 (u_j, v_j, 1), the position t minimises
-/// `sum_j w_j |(p_j + t)_xy / (p_j + t)_z - (r_j)_xy|^2` (Gauss-Newton), w_j the inverse variance of keypoint and joint with Huber's
-/// weights against limbs that the pose has elsewhere. The residual stands in the image on purpose: joint angles that are wrong by s on
-/// average shorten the projection of a body on the true one by s^2, and its own length by s^2 as well, so that the distance keeps its mean
-/// to that order; residuals in metres would place the body s^2 too near. With pose errors as large as VIBE's the distance came out 1 % too
-/// far in shots that tests made. `size` multiplies the body. `None` with fewer than 6 points.
+/// With points p_j of the body about the middle of its hips (camera axes, m) and rays r_j = K^-1
+/// (u_j, v_j, 1), the position t minimises `sum_j w_j |(p_j + t)_xy / (p_j + t)_z - (r_j)_xy|^2`
+/// (Gauss-Newton), w_j the inverse variance of keypoint and joint with Huber's weights against
+/// limbs that the pose has elsewhere. The residual stands in the image on purpose: joint angles
+/// that are wrong by s on average shorten the projection of a body on the true one by s^2, and its
+/// own length by s^2 as well, so that the distance keeps its mean to that order; residuals in
+/// metres would place the body s^2 too near. With pose errors as large as VIBE's the distance came
+/// out 1 % too far in shots that tests made. `size` multiplies the body. `None` with fewer than 6
+/// points.
 pub fn position_by_keypoints(
     person: &PersonKeypoints,
     pose: &BodyPose,
@@ -80,7 +85,10 @@ pub fn position_by_keypoints(
     camera: &Camera,
     least_confidence: f64,
 ) -> Option<Vector3<f64>> {
-    let segments = shaped.world_from_segments(&BodyPose { root_position: Vector3::zeros(), ..pose.clone() });
+    let segments = shaped.world_from_segments(&BodyPose {
+        root_position: Vector3::zeros(),
+        ..pose.clone()
+    });
     let place = |joint: Joint| segments[joint.index()].translation.vector;
     let mid_hip = (place(Joint::LeftHip) + place(Joint::RightHip)) / 2.0;
     let points: Vec<SeenPoint> = JOINTS
@@ -106,7 +114,8 @@ pub fn position_by_keypoints(
     Some(position)
 }
 
-/// A keypoint's error is some 2 cm by its confidence, a joint's 7 degrees times its distance from the hips (VIBE's 83 mm on 3DPW).
+/// A keypoint's error is some 2 cm by its confidence, a joint's 7 degrees times its distance from
+/// the hips (VIBE's 83 mm on 3DPW).
 fn weight(confidence: f64, lever_m: f64) -> f64 {
     ((0.02 / confidence).powi(2) + (0.12 * lever_m).powi(2)).recip()
 }
@@ -123,10 +132,16 @@ const ROUNDS: usize = 6;
 /// A person farther away is none that keypoints are found on.
 const FARTHEST_M: f64 = 1e4;
 
-/// The linear solution with residuals in metres: `X - a_j Z = a_j z_j - x_j`, `Y - b_j Z = b_j z_j - y_j` for rays (a_j, b_j, 1).
+/// The linear solution with residuals in metres: `X - a_j Z = a_j z_j - x_j`, `Y - b_j Z = b_j z_j
+/// - y_j` for rays (a_j, b_j, 1).
 fn start(points: &[SeenPoint]) -> Option<Vector3<f64>> {
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
-    for SeenPoint { ray, in_body, weight } in points {
+    for SeenPoint {
+        ray,
+        in_body,
+        weight,
+    } in points
+    {
         for axis in 0..2 {
             let mut row = Vector3::ith(axis, 1.0);
             row.z = -ray[axis];
@@ -139,14 +154,23 @@ fn start(points: &[SeenPoint]) -> Option<Vector3<f64>> {
 
 /// One Gauss-Newton step on the residuals in the image.
 fn improvement(points: &[SeenPoint], position: &Vector3<f64>) -> Option<Vector3<f64>> {
-    let placed = |point: &SeenPoint| Some(point.in_body + position).filter(|placed| placed.z > 1e-3);
-    let residual = |point: &SeenPoint| Some(point.ray.xy() - placed(point).map(|placed| placed.xy() / placed.z)?);
-    let mut sizes: Vec<f64> = points.iter().filter_map(residual).map(|residual| residual.norm()).collect();
+    let placed =
+        |point: &SeenPoint| Some(point.in_body + position).filter(|placed| placed.z > 1e-3);
+    let residual = |point: &SeenPoint| {
+        Some(point.ray.xy() - placed(point).map(|placed| placed.xy() / placed.z)?)
+    };
+    let mut sizes: Vec<f64> = points
+        .iter()
+        .filter_map(residual)
+        .map(|residual| residual.norm())
+        .collect();
     sizes.sort_by(f64::total_cmp);
     let limit = 2.0 * sizes.get(sizes.len() / 2)? + 1e-12;
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
     for point in points {
-        let (Some(placed), Some(residual)) = (placed(point), residual(point)) else { continue };
+        let (Some(placed), Some(residual)) = (placed(point), residual(point)) else {
+            continue;
+        };
         let weight = point.weight * (limit / residual.norm().max(limit));
         for axis in 0..2 {
             let mut row = Vector3::ith(axis, 1.0 / placed.z);
@@ -158,24 +182,41 @@ fn improvement(points: &[SeenPoint], position: &Vector3<f64>) -> Option<Vector3<
     Some(normal.cholesky()?.solve(&right))
 }
 
-/// Metres per unit from one frame's distance by keypoints and its depth map: the skin lies `behind_skin_m` (along the axis) before the
-/// middle of the hips, so that `s = (Z - behind_skin) / d`.
+/// Metres per unit from one frame's distance by keypoints and its depth map: the skin lies
+/// `behind_skin_m` (along the axis) before the middle of the hips, so that `s = (Z - behind_skin) /
+/// d`.
 pub fn scale_of_frame(distance_m: f64, behind_skin_m: f64, depth: f64) -> Option<f64> {
     Some((distance_m - behind_skin_m) / depth).filter(|scale| scale.is_finite() && *scale > 0.0)
 }
 
-/// Huber's mean (two and a half robust standard deviations around the median) of the frames' inverse scales, weighted, and inverted: the
-/// errors of depth maps multiply the depth, which stands above in 1/s = d / (Z - behind_skin). Its error: frames next to each other err
-/// alike, so that the scatter of the means of `block` frames counts, by the square root of the number of blocks; blocks are taken to be 3 %
-/// off beforehand, with the weight of four, as two or three of them agree by chance.
+/// Huber's mean (two and a half robust standard deviations around the median) of the frames'
+/// inverse scales, weighted, and inverted: the errors of depth maps multiply the depth, which
+/// stands above in 1/s = d / (Z - behind_skin). Its error: frames next to each other err alike, so
+/// that the scatter of the means of `block` frames counts, by the square root of the number of
+/// blocks; blocks are taken to be 3 % off beforehand, with the weight of four, as two or three of
+/// them agree by chance.
 pub fn combined_scale(scales: &[(f64, f64)], block: usize) -> Option<ScaleEstimate> {
-    let inverse: Vec<(f64, f64)> = scales.iter().map(|(scale, weight)| (scale.recip(), *weight)).collect();
+    let inverse: Vec<(f64, f64)> = scales
+        .iter()
+        .map(|(scale, weight)| (scale.recip(), *weight))
+        .collect();
     let mean = huber_mean(&inverse)?;
-    let blocks: Vec<f64> = inverse.chunks(block.max(1)).filter_map(huber_mean).collect();
-    let scatter: f64 = blocks.iter().map(|value| (value / mean - 1.0).powi(2)).sum();
-    let variance = (scatter + PRIOR_BLOCKS * PRIOR_SCATTER * PRIOR_SCATTER) / (blocks.len() as f64 - 1.0 + PRIOR_BLOCKS);
+    let blocks: Vec<f64> = inverse
+        .chunks(block.max(1))
+        .filter_map(huber_mean)
+        .collect();
+    let scatter: f64 = blocks
+        .iter()
+        .map(|value| (value / mean - 1.0).powi(2))
+        .sum();
+    let variance = (scatter + PRIOR_BLOCKS * PRIOR_SCATTER * PRIOR_SCATTER)
+        / (blocks.len() as f64 - 1.0 + PRIOR_BLOCKS);
     let relative_std = (variance / blocks.len() as f64).sqrt();
-    Some(ScaleEstimate { metres_per_unit: mean.recip(), relative_std, observations: scales.len() })
+    Some(ScaleEstimate {
+        metres_per_unit: mean.recip(),
+        relative_std,
+        observations: scales.len(),
+    })
 }
 
 const PRIOR_BLOCKS: f64 = 4.0;
@@ -183,14 +224,21 @@ const PRIOR_SCATTER: f64 = 0.03;
 
 fn huber_mean(values: &[(f64, f64)]) -> Option<f64> {
     let centre = weighted_median(values)?;
-    let deviations: Vec<(f64, f64)> = values.iter().map(|(value, weight)| ((value - centre).abs(), *weight)).collect();
+    let deviations: Vec<(f64, f64)> = values
+        .iter()
+        .map(|(value, weight)| ((value - centre).abs(), *weight))
+        .collect();
     let limit = 2.5 * 1.4826 * weighted_median(&deviations)?;
     let mut mean = centre;
     for _ in 0..5 {
         let (mut sum, mut weights) = (0.0, 0.0);
         for (value, weight) in values {
             let away = (value - mean).abs();
-            let weight = if away > limit { weight * limit / away } else { *weight };
+            let weight = if away > limit {
+                weight * limit / away
+            } else {
+                *weight
+            };
             sum += weight * value;
             weights += weight;
         }
@@ -215,16 +263,20 @@ fn weighted_median(values: &[(f64, f64)]) -> Option<f64> {
         .map(|(value, _)| *value)
 }
 
-/// Metres per unit from one known length: `s = L / |d_1 K^-1 (u_1, v_1, 1) - d_2 K^-1 (u_2, v_2, 1)|`, each depth the median of the 5 x 5
-/// pixels around its end. `None` where the map knows nothing there.
+/// Metres per unit from one known length: `s = L / |d_1 K^-1 (u_1, v_1, 1) - d_2 K^-1 (u_2, v_2,
+/// 1)|`, each depth the median of the 5 x 5 pixels around its end. `None` where the map knows
+/// nothing there.
 pub fn scale_of_object(object: &ObjectLength, map: &DepthMap, camera: &Camera) -> Option<f64> {
-    let end = |pixel: Vector2<f64>| Some(camera.back_project(pixel, median_around(map, camera, pixel)?));
+    let end =
+        |pixel: Vector2<f64>| Some(camera.back_project(pixel, median_around(map, camera, pixel)?));
     let length = (end(object.from)? - end(object.to)?).norm();
     Some(object.length_m / length).filter(|scale| scale.is_finite() && *scale > 0.0)
 }
 
 fn median_around(map: &DepthMap, camera: &Camera, pixel: Vector2<f64>) -> Option<f64> {
-    let centre = pixel.component_div(&camera.image_px).component_mul(&Vector2::new(map.width() as f64, map.height() as f64));
+    let centre = pixel
+        .component_div(&camera.image_px)
+        .component_mul(&Vector2::new(map.width() as f64, map.height() as f64));
     let index = |value: f64, step: i64| usize::try_from(value.floor() as i64 + step).ok();
     let mut depths = Vec::new();
     for (row, column) in (-2..=2).flat_map(|row| (-2..=2).map(move |column| (row, column))) {
@@ -246,19 +298,30 @@ mod tests {
     use super::*;
 
     fn camera() -> Camera {
-        Camera::centred(Vector2::new(1500.0, 1500.0), Vector2::new(1920.0, 1080.0), Isometry3::identity())
+        Camera::centred(
+            Vector2::new(1500.0, 1500.0),
+            Vector2::new(1920.0, 1080.0),
+            Isometry3::identity(),
+        )
     }
 
     #[test]
     fn distance_and_height_follow_each_other() {
         let shaped = ShapedBody::new(BodyModel::embedded(), &[]).unwrap();
         let mut pose = BodyPose::rest(Vector3::new(0.4, 0.1, 4.5));
-        pose.local_rotations[0] = UnitQuaternion::from_scaled_axis(Vector3::new(std::f64::consts::PI, 0.3, 0.2));
+        pose.local_rotations[0] =
+            UnitQuaternion::from_scaled_axis(Vector3::new(std::f64::consts::PI, 0.3, 0.2));
         let segments = shaped.world_from_segments(&pose);
         let mut person = [Keypoint::default(); BODY_25_COUNT];
         for (index, joint) in JOINTS {
-            let pixel = camera().project(&segments[joint.index()].translation.vector).unwrap();
-            person[index] = Keypoint { u: pixel.x, v: pixel.y, confidence: 0.9 };
+            let pixel = camera()
+                .project(&segments[joint.index()].translation.vector)
+                .unwrap();
+            person[index] = Keypoint {
+                u: pixel.x,
+                v: pixel.y,
+                confidence: 0.9,
+            };
         }
         let place = |joint: Joint| segments[joint.index()].translation.vector;
         let mid_hip = (place(Joint::LeftHip) + place(Joint::RightHip)) / 2.0;
@@ -269,16 +332,28 @@ mod tests {
         assert!((taller - mid_hip * 1.1).norm() < 1e-9);
         person[4].u += 200.0;
         let robust = position_by_keypoints(&person, &pose, &shaped, 1.0, &camera(), 0.3).unwrap();
-        println!("one wrist 200 px away moves the body by {:.3} m", (robust - mid_hip).norm());
+        println!(
+            "one wrist 200 px away moves the body by {:.3} m",
+            (robust - mid_hip).norm()
+        );
         assert!((robust - mid_hip).norm() < 0.15);
-        assert!((standing_height(&shaped) - 1.70).abs() < 0.02, "{}", standing_height(&shaped));
+        assert!(
+            (standing_height(&shaped) - 1.70).abs() < 0.02,
+            "{}",
+            standing_height(&shaped)
+        );
     }
 
     #[test]
     fn a_known_length_gives_the_scale() {
         // A plane at 2 units; 300 px are 0.4 units, and were 0.6 m.
         let map = DepthMap::new(384, 216, vec![2.0; 384 * 216]).unwrap();
-        let object = ObjectLength { frame: 0, from: Vector2::new(800.0, 500.0), to: Vector2::new(1100.0, 500.0), length_m: 0.6 };
+        let object = ObjectLength {
+            frame: 0,
+            from: Vector2::new(800.0, 500.0),
+            to: Vector2::new(1100.0, 500.0),
+            length_m: 0.6,
+        };
         assert!((scale_of_object(&object, &map, &camera()).unwrap() - 1.5).abs() < 1e-9);
         let unknown = DepthMap::new(2, 2, vec![0.0; 4]).unwrap();
         assert_eq!(scale_of_object(&object, &unknown, &camera()), None);
@@ -286,9 +361,23 @@ mod tests {
 
     #[test]
     fn frames_combine_robustly() {
-        let scales: Vec<(f64, f64)> = (0..100).map(|k| (if k % 10 == 0 { 9.0 } else { 1.5 + 0.01 * f64::from(k % 3) }, 1.0)).collect();
+        let scales: Vec<(f64, f64)> = (0..100)
+            .map(|k| {
+                (
+                    if k % 10 == 0 {
+                        9.0
+                    } else {
+                        1.5 + 0.01 * f64::from(k % 3)
+                    },
+                    1.0,
+                )
+            })
+            .collect();
         let combined = combined_scale(&scales, 10).unwrap();
-        assert!((combined.metres_per_unit - 1.51).abs() < 0.005 && combined.relative_std < 0.01, "{combined:?}");
+        assert!(
+            (combined.metres_per_unit - 1.51).abs() < 0.005 && combined.relative_std < 0.01,
+            "{combined:?}"
+        );
         assert_eq!(combined_scale(&[], 10), None);
     }
 }

@@ -16,27 +16,54 @@ pub(super) struct InSource {
 
 impl InSource {
     fn poses(&self) -> Vec<BodyPose> {
-        let root = |frame: usize| self.smoothed.as_ref().map_or_else(Vector3::zeros, |states| states[frame].position);
-        self.placed.poses.iter().enumerate().map(|(frame, pose)| BodyPose { root_position: root(frame), ..pose.clone() }).collect()
+        let root = |frame: usize| {
+            self.smoothed
+                .as_ref()
+                .map_or_else(Vector3::zeros, |states| states[frame].position)
+        };
+        self.placed
+            .poses
+            .iter()
+            .enumerate()
+            .map(|(frame, pose)| BodyPose {
+                root_position: root(frame),
+                ..pose.clone()
+            })
+            .collect()
     }
 }
 
 impl InSource {
     /// See [`floor_normal`]; feet that move in place tell nothing, and the hints decide.
-    fn floor_normal(&self, shaped: &ShapedBody, soles: &Soles, poses: &[BodyPose], rate_hz: f64, depth_scale_std: f64) -> Vector3<f64> {
+    fn floor_normal(
+        &self,
+        shaped: &ShapedBody,
+        soles: &Soles,
+        poses: &[BodyPose],
+        rate_hz: f64,
+        depth_scale_std: f64,
+    ) -> Vector3<f64> {
         let camera = mean_up(&self.placed.cameras);
         let trunk = |pose: &BodyPose| {
             let segments = shaped.world_from_segments(pose);
-            let along = segments[Joint::Neck.index()].translation.vector - segments[Joint::Pelvis.index()].translation.vector;
+            let along = segments[Joint::Neck.index()].translation.vector
+                - segments[Joint::Pelvis.index()].translation.vector;
             along.try_normalize(1e-9).unwrap_or_else(Vector3::zeros)
         };
         let trunk = poses.iter().map(trunk).sum::<Vector3<f64>>() / poses.len().max(1) as f64;
         let foot = |(pose, own): (&BodyPose, &Camera)| {
             let lowest = soles.lowest(pose, &camera)?;
-            Some((lowest, (lowest - own.world_from_camera.translation.vector * self.metres) * depth_scale_std))
+            Some((
+                lowest,
+                (lowest - own.world_from_camera.translation.vector * self.metres) * depth_scale_std,
+            ))
         };
         let feet: Vec<_> = match self.smoothed {
-            Some(_) => poses.iter().zip(&self.placed.cameras).filter_map(foot).collect(),
+            Some(_) => poses
+                .iter()
+                .zip(&self.placed.cameras)
+                .filter_map(foot)
+                .collect(),
             None => Vec::new(),
         };
         floor_normal(&feet, &UpHints { camera, trunk }, rate_hz)
@@ -45,7 +72,10 @@ impl InSource {
 
 /// Up as the cameras are held on average.
 pub(super) fn mean_up(cameras: &[Camera]) -> Vector3<f64> {
-    cameras.iter().map(|camera| camera.world_from_camera.rotation * -Vector3::y()).sum()
+    cameras
+        .iter()
+        .map(|camera| camera.world_from_camera.rotation * -Vector3::y())
+        .sum()
 }
 
 /// Everything upright.
@@ -66,26 +96,62 @@ pub(super) fn stand_up(
 ) -> Result<Upright, CameraError> {
     let soles = Soles::new(shaped)?;
     let poses = source.poses();
-    let no_frames = || CameraError::Gravity { name: clip.name.clone(), problem: "the clip has no frames".to_owned() };
-    let first_camera = source.placed.cameras.first().ok_or_else(no_frames)?.world_from_camera.rotation;
+    let no_frames = || CameraError::Gravity {
+        name: clip.name.clone(),
+        problem: "the clip has no frames".to_owned(),
+    };
+    let first_camera = source
+        .placed
+        .cameras
+        .first()
+        .ok_or_else(no_frames)?
+        .world_from_camera
+        .rotation;
     let up = match options.gravity {
         Gravity::Given(up) => up.normalize(),
         Gravity::FirstCamera => first_camera * -Vector3::y(),
-        Gravity::Floor => source.floor_normal(shaped, &soles, &poses, clip.rate_hz, options.depth_scale_std),
+        Gravity::Floor => source.floor_normal(
+            shaped,
+            &soles,
+            &poses,
+            clip.rate_hz,
+            options.depth_scale_std,
+        ),
     };
     let turn = upright(&up, &(first_camera * Vector3::z()));
     let mut poses: Vec<BodyPose> = poses.into_iter().map(|pose| turned(pose, &turn)).collect();
-    let mut lowest: Vec<Vector3<f64>> = poses.iter().filter_map(|pose| soles.lowest(pose, &Vector3::z())).collect();
+    let mut lowest: Vec<Vector3<f64>> = poses
+        .iter()
+        .filter_map(|pose| soles.lowest(pose, &Vector3::z()))
+        .collect();
     let start = poses.first().ok_or_else(no_frames)?.root_position;
     let shift = -Vector3::new(start.x, start.y, floor_height(&lowest));
-    poses.iter_mut().for_each(|pose| pose.root_position += shift);
+    poses
+        .iter_mut()
+        .for_each(|pose| pose.root_position += shift);
     lowest.iter_mut().for_each(|point| *point += shift);
-    let floor_rms_m = (lowest.iter().map(|point| point.z * point.z).sum::<f64>() / lowest.len().max(1) as f64).sqrt();
+    let floor_rms_m = (lowest.iter().map(|point| point.z * point.z).sum::<f64>()
+        / lowest.len().max(1) as f64)
+        .sqrt();
     let world_from_source = Isometry3::from_parts(shift.into(), turn);
     let smoothed = source.smoothed.as_deref().unwrap_or_default();
     let states = smoothed.iter().zip(&source.placed.cameras);
-    let states = states.map(|(state, camera)| in_world(state, camera, source.metres, &world_from_source, options.depth_scale_std));
-    Ok(Upright { poses, states: states.collect(), world_from_source, up_in_source: up, floor_rms_m })
+    let states = states.map(|(state, camera)| {
+        in_world(
+            state,
+            camera,
+            source.metres,
+            &world_from_source,
+            options.depth_scale_std,
+        )
+    });
+    Ok(Upright {
+        poses,
+        states: states.collect(),
+        world_from_source,
+        up_in_source: up,
+        floor_rms_m,
+    })
 }
 
 fn turned(mut pose: BodyPose, turn: &UnitQuaternion<f64>) -> BodyPose {
@@ -95,8 +161,15 @@ fn turned(mut pose: BodyPose, turn: &UnitQuaternion<f64>) -> BodyPose {
 }
 
 /// A state in the world, the slow error of the depth maps' scale added along the view.
-fn in_world(state: &RootState, camera: &Camera, metres: f64, world_from_source: &Isometry3<f64>, depth_scale_std: f64) -> RootState {
-    let view = (state.position - camera.world_from_camera.translation.vector * metres) * depth_scale_std;
+fn in_world(
+    state: &RootState,
+    camera: &Camera,
+    metres: f64,
+    world_from_source: &Isometry3<f64>,
+    depth_scale_std: f64,
+) -> RootState {
+    let view =
+        (state.position - camera.world_from_camera.translation.vector * metres) * depth_scale_std;
     let rotation = world_from_source.rotation.to_rotation_matrix();
     let turned = |covariance: &Matrix3<f64>| rotation * covariance * rotation.transpose();
     RootState {

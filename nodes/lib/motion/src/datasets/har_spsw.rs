@@ -1,9 +1,10 @@
-//! Smartphone and smartwatch (Matey-Sanz, Casteleyn, Granell 2023, Data in Brief 109809), as npz: one person a file, and for each execution `YY`
-//! and device `D` (`sp` the phone, `sw` the watch) the arrays `YY_D__acc` (N, 3) m/s2, `YY_D__gyr` (N, 3) rad/s, `YY_D__t_ms` (N) and
-//! `YY_D__label` (N).
+//! Smartphone and smartwatch (Matey-Sanz, Casteleyn, Granell 2023, Data in Brief 109809), as npz:
+//! one person a file, and for each execution `YY` and device `D` (`sp` the phone, `sw` the watch)
+//! the arrays `YY_D__acc` (N, 3) m/s2, `YY_D__gyr` (N, 3) rad/s, `YY_D__t_ms` (N) and `YY_D__label`
+//! (N).
 //!
-//! Executions follow each other in time, so that they are one recording with gaps. Phones repeat stamps: of readings with the same stamp the
-//! first is kept.
+//! Executions follow each other in time, so that they are one recording with gaps. Phones repeat
+//! stamps: of readings with the same stamp the first is kept.
 
 use std::collections::BTreeSet;
 use std::io::{Read, Seek};
@@ -19,14 +20,24 @@ use crate::rigid::RigidError;
 /// Both devices' nominal rate, Hz.
 pub const HAR_SPSW_RATE_HZ: f64 = 102.0;
 /// One person takes a hundredth of it.
-const LIMITS: Limits = Limits { decoded_bytes: 64 << 20, opcodes: 10_000, depth: 10 };
+const LIMITS: Limits = Limits {
+    decoded_bytes: 64 << 20,
+    opcodes: 10_000,
+    depth: 10,
+};
 /// Devices and where they are worn. The side is not said.
 const DEVICES: [(&str, &str); 2] = [("sp", "pocket"), ("sw", "wrist")];
 
 /// `YY` of a key `YY_sp__acc` or `YY_sw__acc`.
 fn execution(key: &str) -> Option<&str> {
-    let (name, _) =
-        DEVICES.iter().find_map(|(device, _)| Some((key.strip_suffix("__acc")?.strip_suffix(device)?.strip_suffix('_')?, device)))?;
+    let (name, _) = DEVICES.iter().find_map(|(device, _)| {
+        Some((
+            key.strip_suffix("__acc")?
+                .strip_suffix(device)?
+                .strip_suffix('_')?,
+            device,
+        ))
+    })?;
     (!name.is_empty() && name.bytes().all(|byte| byte.is_ascii_digit())).then_some(name)
 }
 
@@ -35,20 +46,33 @@ pub(super) fn is_har_spsw(keys: &[String]) -> bool {
     keys.iter().any(|key| execution(key).is_some())
 }
 
-/// Reads a person: the phone in a trouser pocket (`pocket`) and the watch (`wrist`). What was done is what the phone's labels say, the watch's
-/// where an execution has no phone; spans end with their execution.
+/// Reads a person: the phone in a trouser pocket (`pocket`) and the watch (`wrist`). What was done
+/// is what the phone's labels say, the watch's where an execution has no phone; spans end with
+/// their execution.
 ///
 /// # Errors
 /// [`RigidError::Arrays`], [`RigidError::Content`]; both name the array.
-pub fn parse_har_spsw<R: Read + Seek>(reader: R, name: &str) -> Result<DatasetRecording, RigidError> {
+pub fn parse_har_spsw<R: Read + Seek>(
+    reader: R,
+    name: &str,
+) -> Result<DatasetRecording, RigidError> {
     let mut npz = NpzReader::with_limits(reader, Path::new(name), LIMITS)?;
     let keys: BTreeSet<String> = npz.keys().into_iter().collect();
     let mut executions: Vec<&str> = keys.iter().filter_map(|key| execution(key)).collect();
     // Numbers of different lengths would not sort as text.
     executions.sort_by_key(|name| (name.len(), *name));
     executions.dedup();
-    let mut recording = DatasetRecording { name: name.to_owned(), rate_hz: HAR_SPSW_RATE_HZ, ..DatasetRecording::default() };
-    recording.imus = DEVICES.map(|(_, placement)| PlacedImu { placement: placement.to_owned(), ..PlacedImu::default() }).to_vec();
+    let mut recording = DatasetRecording {
+        name: name.to_owned(),
+        rate_hz: HAR_SPSW_RATE_HZ,
+        ..DatasetRecording::default()
+    };
+    recording.imus = DEVICES
+        .map(|(_, placement)| PlacedImu {
+            placement: placement.to_owned(),
+            ..PlacedImu::default()
+        })
+        .to_vec();
     for number in executions {
         let mut spans = None;
         for ((device, _), imu) in DEVICES.iter().zip(&mut recording.imus) {
@@ -62,7 +86,9 @@ pub fn parse_har_spsw<R: Read + Seek>(reader: R, name: &str) -> Result<DatasetRe
     }
     recording.imus.retain(|imu| !imu.series.stamps.is_empty());
     if recording.imus.is_empty() {
-        return Err(RigidError::Empty { name: name.to_owned() });
+        return Err(RigidError::Empty {
+            name: name.to_owned(),
+        });
     }
     Ok(recording)
 }
@@ -76,33 +102,62 @@ fn read_device<R: Read + Seek>(
 ) -> Result<Vec<ActivitySpan>, RigidError> {
     let key = |array: &str| format!("{prefix}{array}");
     let vectors = |npz: &mut NpzReader<R>, array: &str| -> Result<Vec<Vector3<f64>>, RigidError> {
-        let values = npz.at(&key(array))?.floats(&[None, Some(3)], "(N, 3)")?.values;
-        Ok(values.as_chunks::<3>().0.iter().map(|value| Vector3::from(*value)).collect())
+        let values = npz
+            .at(&key(array))?
+            .floats(&[None, Some(3)], "(N, 3)")?
+            .values;
+        Ok(values
+            .as_chunks::<3>()
+            .0
+            .iter()
+            .map(|value| Vector3::from(*value))
+            .collect())
     };
     let (forces, rates) = (vectors(npz, "acc")?, vectors(npz, "gyr")?);
     let times = npz.at(&key("t_ms"))?.integers(&[None], "(N)")?.values;
     let labels = npz.at(&key("label"))?.texts()?;
-    for (array, found) in [("gyr", rates.len()), ("t_ms", times.len()), ("label", labels.len())] {
+    for (array, found) in [
+        ("gyr", rates.len()),
+        ("t_ms", times.len()),
+        ("label", labels.len()),
+    ] {
         if found != forces.len() {
             let problem = format!("{found} rows, but {prefix}acc has {}", forces.len());
-            return Err(RigidError::Content { name: name.to_owned(), place: key(array), problem });
+            return Err(RigidError::Content {
+                name: name.to_owned(),
+                place: key(array),
+                problem,
+            });
         }
     }
     let mut spans: Vec<ActivitySpan> = Vec::new();
     for (row, (milliseconds, label)) in times.iter().zip(labels).enumerate() {
         let Some(nanos) = milliseconds.checked_mul(1_000_000) else {
             let problem = format!("row {row} is {milliseconds}, expected milliseconds since 1970");
-            return Err(RigidError::Content { name: name.to_owned(), place: key("t_ms"), problem });
+            return Err(RigidError::Content {
+                name: name.to_owned(),
+                place: key("t_ms"),
+                problem,
+            });
         };
         let stamp = Stamp::from_nanos(nanos);
-        if imu.series.stamps.last().is_some_and(|previous| *previous >= stamp) {
+        if imu
+            .series
+            .stamps
+            .last()
+            .is_some_and(|previous| *previous >= stamp)
+        {
             imu.rows_left_out += 1;
             continue;
         }
         imu.series.push(stamp, forces[row], rates[row]);
         match spans.last_mut().filter(|span| span.activity == label) {
             Some(span) => span.end = stamp,
-            None => spans.push(ActivitySpan { start: stamp, end: stamp, activity: label }),
+            None => spans.push(ActivitySpan {
+                start: stamp,
+                end: stamp,
+                activity: label,
+            }),
         }
     }
     Ok(spans)

@@ -1,5 +1,6 @@
-//! An IMU on a segment that carries markers, as npz: `fs_imu`, `fs_mocap` (Hz), `acc` (N, 3) m/s2, `gyr` (N, 3) rad/s, and at least three
-//! `marker_NAME` (M, 3) m, z up; NaN where a marker is hidden. So the project converted gaitmap's example of a shoe.
+//! An IMU on a segment that carries markers, as npz: `fs_imu`, `fs_mocap` (Hz), `acc` (N, 3) m/s2,
+//! `gyr` (N, 3) rad/s, and at least three `marker_NAME` (M, 3) m, z up; NaN where a marker is
+//! hidden. So the project converted gaitmap's example of a shoe.
 
 use std::io::{Read, Seek};
 use std::path::Path;
@@ -14,7 +15,11 @@ use crate::rigid::{PoseTrajectory, RigidError};
 
 /// Twenty minutes at 200 Hz take a tenth of this.
 pub(super) const MAX_BYTES: u64 = 64 << 20;
-const LIMITS: Limits = Limits { decoded_bytes: MAX_BYTES, opcodes: 10_000, depth: 10 };
+const LIMITS: Limits = Limits {
+    decoded_bytes: MAX_BYTES,
+    opcodes: 10_000,
+    depth: 10,
+};
 const MARKER: &str = "marker_";
 /// A pose needs so many markers.
 const LEAST: usize = 3;
@@ -26,81 +31,165 @@ const ROUNDS: usize = 3;
 /// Whether these are such a file's keys.
 pub(super) fn is_marked_imu(keys: &[String]) -> bool {
     let has = |key: &str| keys.iter().any(|known| known == key);
-    ["fs_imu", "fs_mocap", "acc", "gyr"].into_iter().all(has) && keys.iter().filter(|key| key.starts_with(MARKER)).count() >= LEAST
+    ["fs_imu", "fs_mocap", "acc", "gyr"].into_iter().all(has)
+        && keys.iter().filter(|key| key.starts_with(MARKER)).count() >= LEAST
 }
 
-/// Reads the IMU and the segment's pose: the rotation and position that lay the markers' mean shape nearest to them (Kabsch 1976); its axes are
-/// the world's at the first frame in which every marker was seen, its origin the markers' centre. Stamps count from 0 on both clocks.
+/// Reads the IMU and the segment's pose: the rotation and position that lay the markers' mean shape
+/// nearest to them (Kabsch 1976); its axes are the world's at the first frame in which every marker
+/// was seen, its origin the markers' centre. Stamps count from 0 on both clocks.
 ///
 /// # Errors
 /// [`RigidError::Arrays`], [`RigidError::Content`]; both name the array.
-pub fn parse_marked_imu<R: Read + Seek>(reader: R, name: &str) -> Result<DatasetRecording, RigidError> {
-    let content = |place: &str, problem: String| RigidError::Content { name: name.to_owned(), place: place.to_owned(), problem };
+pub fn parse_marked_imu<R: Read + Seek>(
+    reader: R,
+    name: &str,
+) -> Result<DatasetRecording, RigidError> {
+    let content = |place: &str, problem: String| RigidError::Content {
+        name: name.to_owned(),
+        place: place.to_owned(),
+        problem,
+    };
     let mut file = Container::new(reader, Path::new(name), LIMITS)?;
     let mut rate = |key: &str| match file.at(key)?.float()? {
         rate_hz if (1.0..1e5).contains(&rate_hz) => Ok(rate_hz),
-        found => Err(content(key, format!("expected a rate in Hz, found {found}"))),
+        found => Err(content(
+            key,
+            format!("expected a rate in Hz, found {found}"),
+        )),
     };
     let [imu_hz, mocap_hz] = [rate("fs_imu")?, rate("fs_mocap")?];
     let mut rows = |key: &str| -> Result<Vec<Vector3<f64>>, RigidError> {
-        let values = file.at(key)?.floats_with_nan(&[None, Some(3)], "(N, 3)")?.values;
-        Ok(values.as_chunks::<3>().0.iter().map(|value| Vector3::from(*value)).collect())
+        let values = file
+            .at(key)?
+            .floats_with_nan(&[None, Some(3)], "(N, 3)")?
+            .values;
+        Ok(values
+            .as_chunks::<3>()
+            .0
+            .iter()
+            .map(|value| Vector3::from(*value))
+            .collect())
     };
     let (acc, gyr) = (rows("acc")?, rows("gyr")?);
     if acc.len() != gyr.len() {
-        return Err(content("gyr", format!("{} rows, but acc has {}", gyr.len(), acc.len())));
+        return Err(content(
+            "gyr",
+            format!("{} rows, but acc has {}", gyr.len(), acc.len()),
+        ));
     }
-    let mut imu = PlacedImu { placement: "segment".to_owned(), ..PlacedImu::default() };
+    let mut imu = PlacedImu {
+        placement: "segment".to_owned(),
+        ..PlacedImu::default()
+    };
     for (index, (acc, gyr)) in acc.iter().zip(&gyr).enumerate() {
         if acc.iter().chain(gyr).all(|value| value.is_finite()) {
-            imu.series.push(Stamp::from_seconds(index as f64 / imu_hz), *acc, *gyr);
+            imu.series
+                .push(Stamp::from_seconds(index as f64 / imu_hz), *acc, *gyr);
         } else {
             imu.rows_left_out += 1;
         }
     }
-    let mut keys: Vec<String> = file.keys().into_iter().filter(|key| key.starts_with(MARKER)).collect();
+    let mut keys: Vec<String> = file
+        .keys()
+        .into_iter()
+        .filter(|key| key.starts_with(MARKER))
+        .collect();
     keys.sort();
     if !(LEAST..=MOST).contains(&keys.len()) {
-        return Err(content("marker_NAME", format!("{} markers, expected {LEAST} to {MOST}", keys.len())));
+        return Err(content(
+            "marker_NAME",
+            format!("{} markers, expected {LEAST} to {MOST}", keys.len()),
+        ));
     }
     let mut markers = Vec::with_capacity(keys.len());
     for key in &keys {
-        let values = file.at(key)?.floats_with_nan(&[None, Some(3)], "(N, 3)")?.values;
-        let seen = |value: &[f64; 3]| value.iter().all(|value| value.is_finite()).then(|| Vector3::from(*value));
-        markers.push(values.as_chunks::<3>().0.iter().map(seen).collect::<Vec<_>>());
+        let values = file
+            .at(key)?
+            .floats_with_nan(&[None, Some(3)], "(N, 3)")?
+            .values;
+        let seen = |value: &[f64; 3]| {
+            value
+                .iter()
+                .all(|value| value.is_finite())
+                .then(|| Vector3::from(*value))
+        };
+        markers.push(
+            values
+                .as_chunks::<3>()
+                .0
+                .iter()
+                .map(seen)
+                .collect::<Vec<_>>(),
+        );
     }
-    if let Some(index) = markers.iter().position(|marker| marker.len() != markers[0].len()) {
-        return Err(content(&keys[index], format!("{} frames, but {} has {}", markers[index].len(), keys[0], markers[0].len())));
+    if let Some(index) = markers
+        .iter()
+        .position(|marker| marker.len() != markers[0].len())
+    {
+        return Err(content(
+            &keys[index],
+            format!(
+                "{} frames, but {} has {}",
+                markers[index].len(),
+                keys[0],
+                markers[0].len()
+            ),
+        ));
     }
-    let poses = poses(&markers, mocap_hz).ok_or_else(|| content(&keys[0], "no frame shows every marker".to_owned()))?;
+    let poses = poses(&markers, mocap_hz)
+        .ok_or_else(|| content(&keys[0], "no frame shows every marker".to_owned()))?;
     let (imus, references) = (vec![imu], vec![("segment".to_owned(), poses)]);
-    Ok(DatasetRecording { name: name.to_owned(), rate_hz: imu_hz, imus, references, activities: Vec::new() })
+    Ok(DatasetRecording {
+        name: name.to_owned(),
+        rate_hz: imu_hz,
+        imus,
+        references,
+        activities: Vec::new(),
+    })
 }
 
-/// The segment's poses in the frames that show enough of it; `None` where its shape is never seen whole.
+/// The segment's poses in the frames that show enough of it; `None` where its shape is never seen
+/// whole.
 fn poses(markers: &[Vec<Option<Vector3<f64>>>], rate_hz: f64) -> Option<PoseTrajectory> {
     let frames = markers[0].len();
     let at = |frame: usize| markers.iter().map(move |marker| marker[frame]);
     let whole = |frame: usize| at(frame).collect::<Option<Vec<Vector3<f64>>>>();
     let centred = |points: Vec<Vector3<f64>>| {
         let centre = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
-        points.into_iter().map(|point| point - centre).collect::<Vec<_>>()
+        points
+            .into_iter()
+            .map(|point| point - centre)
+            .collect::<Vec<_>>()
     };
     let mut shape = centred((0..frames).find_map(whole)?);
     let fit = |shape: &[Vector3<f64>], frame: usize| {
-        let pairs: Vec<_> = shape.iter().zip(at(frame)).filter_map(|(own, seen)| Some((*own, seen?))).collect();
-        if pairs.len() >= LEAST { rigid(&pairs) } else { None }
+        let pairs: Vec<_> = shape
+            .iter()
+            .zip(at(frame))
+            .filter_map(|(own, seen)| Some((*own, seen?)))
+            .collect();
+        if pairs.len() >= LEAST {
+            rigid(&pairs)
+        } else {
+            None
+        }
     };
     for _ in 0..ROUNDS {
         let mut sums = vec![Vector3::zeros(); shape.len()];
         for points in (0..frames).filter_map(|frame| Some((whole(frame)?, fit(&shape, frame)?))) {
             let (seen, (turn, shift)) = points;
-            sums.iter_mut().zip(seen).for_each(|(sum, point)| *sum += turn.inverse() * (point - shift));
+            sums.iter_mut()
+                .zip(seen)
+                .for_each(|(sum, point)| *sum += turn.inverse() * (point - shift));
         }
         let count = (0..frames).filter(|frame| whole(*frame).is_some()).count();
         shape = centred(sums.into_iter().map(|sum| sum / count as f64).collect());
     }
-    let mut trajectory = PoseTrajectory { frame: "world".to_owned(), ..PoseTrajectory::default() };
+    let mut trajectory = PoseTrajectory {
+        frame: "world".to_owned(),
+        ..PoseTrajectory::default()
+    };
     for frame in 0..frames {
         if let Some((turn, shift)) = fit(&shape, frame) {
             trajectory.push(Stamp::from_seconds(frame as f64 / rate_hz), shift, turn);

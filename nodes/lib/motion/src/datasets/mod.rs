@@ -1,8 +1,9 @@
-//! Importers of the data sets that people have: TotalCapture, PAMAP2, RealWorld (HAR), BROAD, smartphone and smartwatch, IMUs on segments with
-//! markers, and the structure of DIP-IMU. Each gives the
-//! IMUs by placement, and references where there are.
+//! Importers of the data sets that people have: TotalCapture, PAMAP2, RealWorld (HAR), BROAD,
+//! smartphone and smartwatch, IMUs on segments with markers, and the structure of DIP-IMU. Each
+//! gives the IMUs by placement, and references where there are.
 //!
-//! [`open_dataset`] tells a file by its content and looks for what belongs to it. Parsers work over bytes and open nothing. What a data set does not say (gyroscopes in DIP-IMU) is not made up.
+//! [`open_dataset`] tells a file by its content and looks for what belongs to it. Parsers work over
+//! bytes and open nothing. What a data set does not say (gyroscopes in DIP-IMU) is not made up.
 
 mod broad;
 mod dip;
@@ -24,4 +25,7 @@ pub use pamap2::{PAMAP2_RATE_HZ, pamap2_activity, parse_pamap2};
 pub use realworld::parse_realworld;
 pub use recording::{ActivitySpan, DatasetRecording, PlacedImu};
 pub use skeleton_npz::{LabelledClip, parse_skeleton_npz};
-pub use totalcapture::{TOTALCAPTURE_RATE_HZ, parse_totalcapture_calibration, parse_totalcapture_reference, parse_totalcapture_sensors};
+pub use totalcapture::{
+    TOTALCAPTURE_RATE_HZ, parse_totalcapture_calibration, parse_totalcapture_reference,
+    parse_totalcapture_sensors,
+};

@@ -1,5 +1,6 @@
-//! RealWorld (HAR; Sztyler and Stuckenschmidt 2016): zips of `acc_ACTIVITY_POSITION.csv` and `Gyroscope_ACTIVITY_POSITION.csv`, with
-//! columns `id,attr_time,attr_x,attr_y,attr_z`, milliseconds since 1970.
+//! RealWorld (HAR; Sztyler and Stuckenschmidt 2016): zips of `acc_ACTIVITY_POSITION.csv` and
+//! `Gyroscope_ACTIVITY_POSITION.csv`, with columns `id,attr_time,attr_x,attr_y,attr_z`,
+//! milliseconds since 1970.
 
 use std::io::{Read, Seek};
 
@@ -42,26 +43,47 @@ struct Table {
     rows_left_out: usize,
 }
 
-/// Reads one activity of one person from its two zips, accelerometer and gyroscope. Both sensors have stamps of their own: the gyroscope is
-/// interpolated linearly to the accelerometer's stamps, and readings without gyroscope within 0.1 s around are left out.
+/// Reads one activity of one person from its two zips, accelerometer and gyroscope. Both sensors
+/// have stamps of their own: the gyroscope is interpolated linearly to the accelerometer's stamps,
+/// and readings without gyroscope within 0.1 s around are left out.
 ///
 /// # Errors
 /// [`RigidError::Content`] for a damaged zip or one without positions, and those of the tables.
-pub fn parse_realworld<R: Read + Seek>(accelerometer: R, gyroscope: R, names: [&str; 2]) -> Result<DatasetRecording, RigidError> {
+pub fn parse_realworld<R: Read + Seek>(
+    accelerometer: R,
+    gyroscope: R,
+    names: [&str; 2],
+) -> Result<DatasetRecording, RigidError> {
     let accelerations = tables(accelerometer, names[0])?;
     let turns = tables(gyroscope, names[1])?;
-    let mut recording = DatasetRecording { name: names[0].to_owned(), rate_hz: RATE_HZ, ..DatasetRecording::default() };
+    let mut recording = DatasetRecording {
+        name: names[0].to_owned(),
+        rate_hz: RATE_HZ,
+        ..DatasetRecording::default()
+    };
     for table in accelerations {
-        let Some(turn) = turns.iter().find(|turn| turn.position == table.position) else { continue };
-        let mut imu = PlacedImu { placement: table.position.to_owned(), segment: table.segment, ..PlacedImu::default() };
+        let Some(turn) = turns.iter().find(|turn| turn.position == table.position) else {
+            continue;
+        };
+        let mut imu = PlacedImu {
+            placement: table.position.to_owned(),
+            segment: table.segment,
+            ..PlacedImu::default()
+        };
         imu.rows_left_out = table.rows_left_out + turn.rows_left_out;
         let mut after = 0;
         for (stamp, specific_force) in &table.readings {
-            while turn.readings.get(after).is_some_and(|(other, _)| other < stamp) {
+            while turn
+                .readings
+                .get(after)
+                .is_some_and(|(other, _)| other < stamp)
+            {
                 after += 1;
             }
             match interpolated(&turn.readings, after, *stamp) {
-                Some(angular_velocity) => imu.series.push(*stamp, *specific_force, angular_velocity),
+                Some(angular_velocity) => {
+                    imu.series.push(*stamp, *specific_force, angular_velocity)
+                }
                 None => imu.rows_left_out += 1,
             }
         }
@@ -74,15 +96,22 @@ pub fn parse_realworld<R: Read + Seek>(accelerometer: R, gyroscope: R, names: [&
         }
     }
     if recording.imus.is_empty() {
-        let problem = "no position has both an accelerometer and a gyroscope over the same time".to_owned();
-        return Err(RigidError::Content { name: names[0].to_owned(), place: "zip".to_owned(), problem });
+        let problem =
+            "no position has both an accelerometer and a gyroscope over the same time".to_owned();
+        return Err(RigidError::Content {
+            name: names[0].to_owned(),
+            place: "zip".to_owned(),
+            problem,
+        });
     }
     Ok(recording)
 }
 
 /// Whether a zip holds tables of the data set.
 pub(super) fn is_realworld(reader: impl Read + Seek) -> bool {
-    let Ok(archive) = ZipArchive::new(reader) else { return false };
+    let Ok(archive) = ZipArchive::new(reader) else {
+        return false;
+    };
     archive.file_names().filter_map(Result::ok).any(|member| {
         let file = member.rsplit('/').next().unwrap_or_default().to_lowercase();
         file.ends_with(".csv") && (file.starts_with("acc_") || file.starts_with("gyroscope_"))
@@ -96,36 +125,72 @@ fn interpolated(readings: &[Reading], after: usize, stamp: Stamp) -> Option<Vect
         return Some(*later);
     }
     let (from, earlier) = readings.get(after.checked_sub(1)?)?;
-    let gap = to.nanos.checked_sub(from.nanos).filter(|gap| *gap <= LONGEST_GAP_NS)?;
+    let gap = to
+        .nanos
+        .checked_sub(from.nanos)
+        .filter(|gap| *gap <= LONGEST_GAP_NS)?;
     Some(earlier.lerp(later, (stamp.nanos - from.nanos) as f64 / gap as f64))
 }
 
 fn tables<R: Read + Seek>(reader: R, name: &str) -> Result<Vec<Table>, RigidError> {
-    let problem = |place: &str, problem: String| RigidError::Content { name: name.to_owned(), place: place.to_owned(), problem };
+    let problem = |place: &str, problem: String| RigidError::Content {
+        name: name.to_owned(),
+        place: place.to_owned(),
+        problem,
+    };
     let mut archive = ZipArchive::new(reader).map_err(|error| problem("zip", error.to_string()))?;
-    let members: Vec<String> =
-        archive.file_names().filter_map(Result::ok).filter(|member| member.ends_with(".csv")).map(std::borrow::Cow::into_owned).collect();
+    let members: Vec<String> = archive
+        .file_names()
+        .filter_map(Result::ok)
+        .filter(|member| member.ends_with(".csv"))
+        .map(std::borrow::Cow::into_owned)
+        .collect();
     if members.len() > MAX_TABLES {
-        return Err(problem("zip", format!("{} tables, expected up to {MAX_TABLES}", members.len())));
+        return Err(problem(
+            "zip",
+            format!("{} tables, expected up to {MAX_TABLES}", members.len()),
+        ));
     }
     let mut tables = Vec::new();
     for member in members {
         let stem = member.trim_end_matches(".csv").to_lowercase();
-        let Some((position, segment)) = POSITIONS.iter().find(|(position, _)| stem.ends_with(position)) else { continue };
+        let Some((position, segment)) = POSITIONS
+            .iter()
+            .find(|(position, _)| stem.ends_with(position))
+        else {
+            continue;
+        };
         // One table a position: what else matches is a copy.
-        if tables.iter().any(|table: &Table| table.position == *position) {
+        if tables
+            .iter()
+            .any(|table: &Table| table.position == *position)
+        {
             continue;
         }
-        let entry = archive.by_name(&member).map_err(|error| problem(&member, error.to_string()))?;
+        let entry = archive
+            .by_name(&member)
+            .map_err(|error| problem(&member, error.to_string()))?;
         let mut bytes = Vec::new();
-        entry.take(MAX_TABLE_BYTES + 1).read_to_end(&mut bytes).map_err(|error| problem(&member, error.to_string()))?;
+        entry
+            .take(MAX_TABLE_BYTES + 1)
+            .read_to_end(&mut bytes)
+            .map_err(|error| problem(&member, error.to_string()))?;
         if bytes.len() as u64 > MAX_TABLE_BYTES {
-            return Err(problem(&member, format!("more than {MAX_TABLE_BYTES} bytes")));
+            return Err(problem(
+                &member,
+                format!("more than {MAX_TABLE_BYTES} bytes"),
+            ));
         }
         let file = stem.rsplit('/').next().unwrap_or_default();
         let activity = file.split('_').nth(1).unwrap_or_default().to_owned();
         let (readings, rows_left_out) = readings(&bytes, &format!("{name}/{member}"))?;
-        tables.push(Table { position, segment: *segment, activity, readings, rows_left_out });
+        tables.push(Table {
+            position,
+            segment: *segment,
+            activity,
+            readings,
+            rows_left_out,
+        });
     }
     tables.sort_by_key(|table| table.position);
     Ok(tables)
@@ -150,7 +215,10 @@ fn readings(bytes: &[u8], name: &str) -> Result<(Vec<Reading>, usize), RigidErro
         row.expect_columns(|count| count == 5, "5 (id, time, x, y, z)")?;
         let stamp = row.stamp(1, 3)?;
         // Phones repeat stamps now and then.
-        if readings.last().is_some_and(|(previous, _)| *previous >= stamp) {
+        if readings
+            .last()
+            .is_some_and(|(previous, _)| *previous >= stamp)
+        {
             left_out += 1;
             continue;
         }

@@ -13,7 +13,8 @@ use crate::rigid::{ImuSeries, PoseTrajectory};
 pub struct PlacedImu {
     /// The data set's own name: `L_LowArm`, `hand`, `forearm`.
     pub placement: String,
-    /// SMPL's segment that the placement moves with; `None` off the body, and where the data set does not say the side.
+    /// SMPL's segment that the placement moves with; `None` off the body, and where the data set
+    /// does not say the side.
     pub segment: Option<Joint>,
     /// Its readings.
     pub series: ImuSeries,
@@ -61,14 +62,21 @@ impl DatasetRecording {
     /// From its first reading or pose to its last; `None` where there is none.
     pub fn span(&self) -> Option<(Stamp, Stamp)> {
         let imus = self.imus.iter().map(|imu| &imu.series.stamps);
-        let stamps = || imus.clone().chain(self.references.iter().map(|(_, poses)| &poses.stamps));
+        let stamps = || {
+            imus.clone()
+                .chain(self.references.iter().map(|(_, poses)| &poses.stamps))
+        };
         let first = stamps().filter_map(|stamps| stamps.first()).min()?;
         Some((*first, *stamps().filter_map(|stamps| stamps.last()).max()?))
     }
 
-    /// What lies between two times, ends included; the count of rows left out stays that of the file.
+    /// What lies between two times, ends included; the count of rows left out stays that of the
+    /// file.
     pub fn between(&mut self, from: Stamp, to: Stamp) {
-        let inside = |stamps: &[Stamp]| stamps.partition_point(|stamp| *stamp < from)..stamps.partition_point(|stamp| *stamp <= to);
+        let inside = |stamps: &[Stamp]| {
+            stamps.partition_point(|stamp| *stamp < from)
+                ..stamps.partition_point(|stamp| *stamp <= to)
+        };
         for imu in &mut self.imus {
             let range = inside(&imu.series.stamps);
             cut(&mut imu.series.stamps, &range);
@@ -83,7 +91,8 @@ impl DatasetRecording {
             cut(&mut poses.positions, &range);
             cut(&mut poses.rotations, &range);
         }
-        self.activities.retain(|span| span.end >= from && span.start <= to);
+        self.activities
+            .retain(|span| span.end >= from && span.start <= to);
         for span in &mut self.activities {
             (span.start, span.end) = (span.start.max(from), span.end.min(to));
         }
@@ -91,9 +100,17 @@ impl DatasetRecording {
 
     /// Adds a row's activity: the last span goes on, or a new one begins.
     pub(super) fn mark(&mut self, stamp: Stamp, activity: &str) {
-        match self.activities.last_mut().filter(|span| span.activity == activity) {
+        match self
+            .activities
+            .last_mut()
+            .filter(|span| span.activity == activity)
+        {
             Some(span) => span.end = stamp,
-            None => self.activities.push(ActivitySpan { start: stamp, end: stamp, activity: activity.to_owned() }),
+            None => self.activities.push(ActivitySpan {
+                start: stamp,
+                end: stamp,
+                activity: activity.to_owned(),
+            }),
         }
     }
 }

@@ -1,8 +1,10 @@
-//! Skeleton clips as npz with a label for every frame: `fps`, `joints`, `parents`, `offsets` (J, 3) m, `local_quat_wxyz` (N, J, 4) and `pos`
-//! (N, J, 3) m, as the project's own conversion of CMU clips has them; `label` (N) and `label_names` where it is labelled, `suspect` (N) where
-//! joints flip.
+//! Skeleton clips as npz with a label for every frame: `fps`, `joints`, `parents`, `offsets` (J, 3)
+//! m, `local_quat_wxyz` (N, J, 4) and `pos` (N, J, 3) m, as the project's own conversion of CMU
+//! clips has them; `label` (N) and `label_names` where it is labelled, `suspect` (N) where joints
+//! flip.
 //!
-//! Offsets and local rotations are a BVH file's (y up), positions have z up; so the clip comes out as that BVH file had it, in metres.
+//! Offsets and local rotations are a BVH file's (y up), positions have z up; so the clip comes out
+//! as that BVH file had it, in metres.
 
 use std::io::{Read, Seek};
 use std::path::Path;
@@ -15,7 +17,11 @@ use crate::rigid::RigidError;
 use crate::rigid::table::unit_quaternion;
 
 /// An hour at 120 Hz with 21 joints.
-const LIMITS: Limits = Limits { decoded_bytes: 256 << 20, opcodes: 10_000, depth: 10 };
+const LIMITS: Limits = Limits {
+    decoded_bytes: 256 << 20,
+    opcodes: 10_000,
+    depth: 10,
+};
 
 /// A skeleton's motion with what its frames show.
 #[derive(Clone, Debug)]
@@ -24,9 +30,11 @@ pub struct LabelledClip {
     pub clip: BvhClip,
     /// Whose motion it is; empty where the file does not say.
     pub subject: String,
-    /// One per frame: the label's name, or none where the frame shows nothing of them. Empty where the file has no labels.
+    /// One per frame: the label's name, or none where the frame shows nothing of them. Empty where
+    /// the file has no labels.
     pub labels: Vec<Option<String>>,
-    /// One per frame: whether a joint flips there or moves like none. Empty where the file does not say.
+    /// One per frame: whether a joint flips there or moves like none. Empty where the file does not
+    /// say.
     pub suspect: Vec<bool>,
     /// Why a clip is unlike everyday motion; empty where it is not.
     pub atypical: String,
@@ -36,31 +44,71 @@ pub struct LabelledClip {
 ///
 /// # Errors
 /// [`RigidError::Arrays`], [`RigidError::Content`]; both name the array.
-pub fn parse_skeleton_npz<R: Read + Seek>(reader: R, name: &str) -> Result<LabelledClip, RigidError> {
-    let content = |place: &str, problem: String| RigidError::Content { name: name.to_owned(), place: place.to_owned(), problem };
+pub fn parse_skeleton_npz<R: Read + Seek>(
+    reader: R,
+    name: &str,
+) -> Result<LabelledClip, RigidError> {
+    let content = |place: &str, problem: String| RigidError::Content {
+        name: name.to_owned(),
+        place: place.to_owned(),
+        problem,
+    };
     let mut npz = NpzReader::with_limits(reader, Path::new(name), LIMITS)?;
     let rate_hz = npz.at("fps")?.float()?;
     if !(1.0..1e4).contains(&rate_hz) {
-        return Err(content("fps", format!("expected frames per second, found {rate_hz}")));
+        return Err(content(
+            "fps",
+            format!("expected frames per second, found {rate_hz}"),
+        ));
     }
     let names = npz.at("joints")?.texts()?;
     let count = names.len();
     if !(1..=MAX_JOINTS).contains(&count) {
-        return Err(content("joints", format!("{count} joints, expected 1 to {MAX_JOINTS}")));
+        return Err(content(
+            "joints",
+            format!("{count} joints, expected 1 to {MAX_JOINTS}"),
+        ));
     }
     let parents = npz.at("parents")?.integers(&[Some(count)], "(J)")?.values;
-    let offsets = npz.at("offsets")?.floats(&[Some(count), Some(3)], "(J, 3)")?.values;
-    let rotations = npz.at("local_quat_wxyz")?.floats(&[None, Some(count), Some(4)], "(N, J, 4)")?.values;
-    let positions = npz.at("pos")?.floats(&[None, Some(count), Some(3)], "(N, J, 3)")?.values;
+    let offsets = npz
+        .at("offsets")?
+        .floats(&[Some(count), Some(3)], "(J, 3)")?
+        .values;
+    let rotations = npz
+        .at("local_quat_wxyz")?
+        .floats(&[None, Some(count), Some(4)], "(N, J, 4)")?
+        .values;
+    let positions = npz
+        .at("pos")?
+        .floats(&[None, Some(count), Some(3)], "(N, J, 3)")?
+        .values;
     let frames = rotations.len() / (4 * count);
     if frames == 0 || positions.len() != frames * count * 3 {
-        return Err(content("pos", format!("{} frames, local_quat_wxyz has {frames}", positions.len() / (3 * count))));
+        return Err(content(
+            "pos",
+            format!(
+                "{} frames, local_quat_wxyz has {frames}",
+                positions.len() / (3 * count)
+            ),
+        ));
     }
     let mut joints = Vec::with_capacity(count);
     for (index, (joint, parent)) in names.iter().zip(&parents).enumerate() {
-        let parent = if *parent < 0 { None } else { usize::try_from(*parent).ok().filter(|parent| *parent < index) };
+        let parent = if *parent < 0 {
+            None
+        } else {
+            usize::try_from(*parent)
+                .ok()
+                .filter(|parent| *parent < index)
+        };
         if parent.is_none() && index > 0 {
-            return Err(content("parents", format!("joint {index} has parent {}, expected one of the joints before it", parents[index])));
+            return Err(content(
+                "parents",
+                format!(
+                    "joint {index} has parent {}, expected one of the joints before it",
+                    parents[index]
+                ),
+            ));
         }
         joints.push(joint_of(joint, parent, &offsets[3 * index..3 * index + 3]));
     }
@@ -70,16 +118,37 @@ pub fn parse_skeleton_npz<R: Read + Seek>(reader: R, name: &str) -> Result<Label
         // Rx(-90 degrees): z up to y up.
         values.extend([root[0], root[2], -root[1]]);
         for (joint, [w, x, y, z]) in quaternions.as_chunks::<4>().0.iter().enumerate() {
-            let wrong = |length| content("local_quat_wxyz", format!("frame {frame}, joint {joint} has length {length}, expected 1"));
-            values.extend(zxy_degrees(&unit_quaternion(Quaternion::new(*w, *x, *y, *z)).map_err(wrong)?));
+            let wrong = |length| {
+                content(
+                    "local_quat_wxyz",
+                    format!("frame {frame}, joint {joint} has length {length}, expected 1"),
+                )
+            };
+            values.extend(zxy_degrees(
+                &unit_quaternion(Quaternion::new(*w, *x, *y, *z)).map_err(wrong)?,
+            ));
         }
     }
-    let clip = BvhClip { name: name.to_owned(), joints, frame_time_s: rate_hz.recip(), values, channel_count: 3 * (count + 1) };
+    let clip = BvhClip {
+        name: name.to_owned(),
+        joints,
+        frame_time_s: rate_hz.recip(),
+        values,
+        channel_count: 3 * (count + 1),
+    };
     let subject = npz.text("subject")?.unwrap_or_default();
     let atypical = npz.text("atypical")?.unwrap_or_default();
-    let suspect = npz.integers("suspect", &[Some(frames)], "(N)")?.map_or_else(Vec::new, |flags| flags.values);
+    let suspect = npz
+        .integers("suspect", &[Some(frames)], "(N)")?
+        .map_or_else(Vec::new, |flags| flags.values);
     let suspect = suspect.iter().map(|flag| *flag != 0).collect();
-    Ok(LabelledClip { clip, subject, labels: labels(&mut npz, frames, &content)?, suspect, atypical })
+    Ok(LabelledClip {
+        clip,
+        subject,
+        labels: labels(&mut npz, frames, &content)?,
+        suspect,
+        atypical,
+    })
 }
 
 fn labels<R: Read + Seek>(
@@ -87,22 +156,35 @@ fn labels<R: Read + Seek>(
     frames: usize,
     content: &dyn Fn(&str, String) -> RigidError,
 ) -> Result<Vec<Option<String>>, RigidError> {
-    let Some(labels) = npz.integers("label", &[Some(frames)], "(N)")? else { return Ok(Vec::new()) };
+    let Some(labels) = npz.integers("label", &[Some(frames)], "(N)")? else {
+        return Ok(Vec::new());
+    };
     let names = npz.at("label_names")?.texts()?;
     let name = |(frame, label): (usize, &i64)| match usize::try_from(*label) {
         Err(_) => Ok(None),
         Ok(index) => match names.get(index) {
             Some(name) => Ok(Some(name.clone())),
-            None => Err(content("label", format!("frame {frame} has label {label}, but there are {} label_names", names.len()))),
+            None => Err(content(
+                "label",
+                format!(
+                    "frame {frame} has label {label}, but there are {} label_names",
+                    names.len()
+                ),
+            )),
         },
     };
     labels.values.iter().enumerate().map(name).collect()
 }
 
 fn joint_of(name: &str, parent: Option<usize>, offset: &[f64]) -> BvhJoint {
-    // Z, X, Y: the middle angle is the one that a standing human's joints rarely bring to 90 degrees.
+    // Z, X, Y: the middle angle is the one that a standing human's joints rarely bring to 90
+    // degrees.
     let turns = [2, 0, 1].map(Channel::Rotation);
-    let moves = if parent.is_none() { [0, 1, 2].map(Channel::Position).to_vec() } else { Vec::new() };
+    let moves = if parent.is_none() {
+        [0, 1, 2].map(Channel::Position).to_vec()
+    } else {
+        Vec::new()
+    };
     BvhJoint {
         name: name.to_owned(),
         parent,
@@ -117,7 +199,10 @@ fn zxy_degrees(rotation: &UnitQuaternion<f64>) -> [f64; 3] {
     let matrix = rotation.to_rotation_matrix();
     let x = matrix[(2, 1)].clamp(-1.0, 1.0).asin();
     let (z, y) = if matrix[(2, 1)].abs() < 1.0 - 1e-9 {
-        ((-matrix[(0, 1)]).atan2(matrix[(1, 1)]), (-matrix[(2, 0)]).atan2(matrix[(2, 2)]))
+        (
+            (-matrix[(0, 1)]).atan2(matrix[(1, 1)]),
+            (-matrix[(2, 0)]).atan2(matrix[(2, 2)]),
+        )
     } else {
         // Both turn about the same axis: one does it all.
         (matrix[(1, 0)].atan2(matrix[(0, 0)]), 0.0)
@@ -147,7 +232,11 @@ mod tests {
                 .zip(axes)
                 .map(|(angle, axis)| UnitQuaternion::from_scaled_axis(axis * angle.to_radians()))
                 .fold(UnitQuaternion::identity(), |product, turn| product * turn);
-            assert!(again.angle_to(&rotation) < 1e-4, "{a} {b} {c}: {}", again.angle_to(&rotation));
+            assert!(
+                again.angle_to(&rotation) < 1e-4,
+                "{a} {b} {c}: {}",
+                again.angle_to(&rotation)
+            );
         }
     }
 }

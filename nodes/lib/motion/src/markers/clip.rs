@@ -27,35 +27,54 @@ pub struct MarkerClip {
 impl MarkerClip {
     /// The subjects that the labels name before a colon, sorted.
     pub fn subjects(&self) -> Vec<String> {
-        let subjects: BTreeSet<&str> = self.labels.iter().filter_map(|label| split(label).0).collect();
+        let subjects: BTreeSet<&str> = self
+            .labels
+            .iter()
+            .filter_map(|label| split(label).0)
+            .collect();
         subjects.into_iter().map(str::to_owned).collect()
     }
 
-    /// The labels without the subject's name; those of other subjects are `None`. `wanted` chooses a subject, and need not where there is
-    /// one only.
+    /// The labels without the subject's name; those of other subjects are `None`. `wanted` chooses
+    /// a subject, and need not where there is one only.
     ///
     /// # Errors
     /// [`MotionError::Subject`], which lists the subjects.
     pub fn labels_of(&self, wanted: Option<&str>) -> Result<Vec<Option<&str>>, MotionError> {
         let subjects = self.subjects();
         let chosen = match wanted {
-            Some(wanted) => subjects.iter().find(|subject| subject.eq_ignore_ascii_case(wanted)),
+            Some(wanted) => subjects
+                .iter()
+                .find(|subject| subject.eq_ignore_ascii_case(wanted)),
             None => subjects.first().filter(|_| subjects.len() == 1),
         };
         // Where nobody is named, there is nobody to choose.
         if chosen.is_none() && (wanted.is_some() || subjects.len() > 1) {
-            return Err(MotionError::Subject { name: self.name.clone(), given: wanted.unwrap_or("none").to_owned(), known: subjects });
+            return Err(MotionError::Subject {
+                name: self.name.clone(),
+                given: wanted.unwrap_or("none").to_owned(),
+                known: subjects,
+            });
         }
         let own = |label| match (split(label), chosen) {
             ((Some(subject), bare), Some(chosen)) => (subject == chosen).then_some(bare),
             ((_, bare), _) => Some(bare),
         };
-        Ok(self.labels.iter().map(|label| own(label.as_str())).collect())
+        Ok(self
+            .labels
+            .iter()
+            .map(|label| own(label.as_str()))
+            .collect())
     }
 
     /// Share of points that were not seen, in [0, 1].
     pub fn missing_share(&self) -> f64 {
-        let missing = self.frames.iter().flatten().filter(|point| point.is_none()).count();
+        let missing = self
+            .frames
+            .iter()
+            .flatten()
+            .filter(|point| point.is_none())
+            .count();
         missing as f64 / self.frames.iter().map(Vec::len).sum::<usize>().max(1) as f64
     }
 }
@@ -87,5 +106,10 @@ pub(crate) fn checked_rate(name: &str, rate_hz: f64) -> Result<f64, MotionError>
         return Ok(rate_hz);
     }
     let expected = format!("{} to {} Hz", RATES_HZ.start(), RATES_HZ.end());
-    Err(MotionError::Setting { name: name.to_owned(), setting: "rate_hz", value: rate_hz, expected })
+    Err(MotionError::Setting {
+        name: name.to_owned(),
+        setting: "rate_hz",
+        value: rate_hz,
+        expected,
+    })
 }

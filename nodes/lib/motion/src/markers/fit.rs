@@ -33,7 +33,8 @@ pub struct MarkerOptions {
     pub up_axis: UpAxis,
     /// Metres per unit of the file; as the file says where absent.
     pub unit_scale_m: Option<f64>,
-    /// Fits where each marker is stuck, about a centimetre around the set's place; else the set is taken at its word.
+    /// Fits where each marker is stuck, about a centimetre around the set's place; else the set is
+    /// taken at its word.
     pub fit_placement: bool,
     /// The largest number of shape coefficients that are fitted.
     pub betas: usize,
@@ -41,21 +42,31 @@ pub struct MarkerOptions {
 
 impl Default for MarkerOptions {
     fn default() -> Self {
-        Self { subject: None, up_axis: UpAxis::Detect, unit_scale_m: None, fit_placement: true, betas: 10 }
+        Self {
+            subject: None,
+            up_axis: UpAxis::Detect,
+            unit_scale_m: None,
+            fit_placement: true,
+            betas: 10,
+        }
     }
 }
 
-/// Finds the body that moved under the markers, after MoSh (Loper et al. 2014): shape, and where the markers are stuck, from twelve frames
-/// that are unlike each other; then, with these held, a pose for every frame.
+/// Finds the body that moved under the markers, after MoSh (Loper et al. 2014): shape, and where
+/// the markers are stuck, from twelve frames that are unlike each other; then, with these held, a
+/// pose for every frame.
 ///
-/// A frame's cost is `sum rho(|m_i - y_i|) / (3 mm)^2 + w |pose - mean|^2 / sigma^2 + |pose - expected|^2 / sigma_t^2` with Huber's rho, linear
-/// beyond 3 mm, the marker `m_i` on the skin by linear blend skinning with pose corrections, the prior's weight w falling from 4 to 0.25
-/// where a frame starts from nothing, and what the frames around it promise; elbows and knees that bend the wrong way cost more. Markers that
-/// are not seen count nothing; frames with fewer than six are interpolated. The world has z up, the recording's origin and floor. The
-/// motion's `confidence` follows from the joints' median standard deviation and from how many markers were seen.
+/// A frame's cost is `sum rho(|m_i - y_i|) / (3 mm)^2 + w |pose - mean|^2 / sigma^2 + |pose -
+/// expected|^2 / sigma_t^2` with Huber's rho, linear beyond 3 mm, the marker `m_i` on the skin by
+/// linear blend skinning with pose corrections, the prior's weight w falling from 4 to 0.25 where a
+/// frame starts from nothing, and what the frames around it promise; elbows and knees that bend the
+/// wrong way cost more. Markers that are not seen count nothing; frames with fewer than six are
+/// interpolated. The world has z up, the recording's origin and floor. The motion's `confidence`
+/// follows from the joints' median standard deviation and from how many markers were seen.
 ///
 /// # Errors
-/// [`MotionError`] where labels, subject, unit or up axis do not fit; the message says which option helps.
+/// [`MotionError`] where labels, subject, unit or up axis do not fit; the message says which option
+/// helps.
 pub fn fit_markers(
     clip: &MarkerClip,
     body: &Arc<BodyModel>,
@@ -64,8 +75,21 @@ pub fn fit_markers(
 ) -> Result<(SmplMotion, MarkerReport), MotionError> {
     let bound = bind(clip, body, set, options)?;
     let skin = Skin::new(body, &bound.sites, options.betas.min(body.beta_count()))?;
-    let stuck_at: Vec<Vector3<f64>> = bound.markers.iter().map(|marker| Vector3::new(0.0, 0.0, marker.height_m)).collect();
-    let (prior, trunk) = (PosePrior::standing(), trunk_markers(&bound.sites.iter().map(|site| site.joint).collect::<Vec<Joint>>()));
+    let stuck_at: Vec<Vector3<f64>> = bound
+        .markers
+        .iter()
+        .map(|marker| Vector3::new(0.0, 0.0, marker.height_m))
+        .collect();
+    let (prior, trunk) = (
+        PosePrior::standing(),
+        trunk_markers(
+            &bound
+                .sites
+                .iter()
+                .map(|site| site.joint)
+                .collect::<Vec<Joint>>(),
+        ),
+    );
     let chosen = choose(&bound.frames, KEYFRAMES);
     let mean = skin.shaped(&[], &stuck_at)?;
     let keyframe = |&index: &usize| {
@@ -73,20 +97,49 @@ pub fn fit_markers(
         let pose = cold_start(&mean, &observed, &trunk, &prior, &[])?;
         Some(Keyframe { observed, pose })
     };
-    let mut keyframes: Vec<Keyframe> = chosen.par_iter().map(keyframe).collect::<Vec<_>>().into_iter().flatten().collect();
+    let mut keyframes: Vec<Keyframe> = chosen
+        .par_iter()
+        .map(keyframe)
+        .collect::<Vec<_>>()
+        .into_iter()
+        .flatten()
+        .collect();
     if keyframes.is_empty() {
-        return Err(MotionError::NoMarkers { name: clip.name.clone() });
+        return Err(MotionError::NoMarkers {
+            name: clip.name.clone(),
+        });
     }
-    let person = fit_person(&skin, &stuck_at, &prior, &mut keyframes, options.fit_placement)?;
+    let person = fit_person(
+        &skin,
+        &stuck_at,
+        &prior,
+        &mut keyframes,
+        options.fit_placement,
+    )?;
     let shaped = skin.shaped(&person.betas, &person.placements)?;
     let known: Vec<_> = keyframes.iter().map(|frame| frame.pose.clone()).collect();
-    let tracker = Tracker { skin: &shaped, prior: &prior, trunk: &trunk, rate_hz: clip.rate_hz, known: &known };
+    let tracker = Tracker {
+        skin: &shaped,
+        prior: &prior,
+        trunk: &trunk,
+        rate_hz: clip.rate_hz,
+        known: &known,
+    };
     let frames = continuous(tracker.track(&bound.frames));
     crate::retarget::check_finite(&clip.name, &frames)?;
     let (markers, rms_m) = marker_fits(&bound, &shaped, &person, &stuck_at, &frames);
-    let missing = bound.frames.iter().flatten().filter(|point| point.is_none()).count();
+    let missing = bound
+        .frames
+        .iter()
+        .flatten()
+        .filter(|point| point.is_none())
+        .count();
     let sigmas = joint_sigmas(&shaped, &prior, &keyframes, rms_m / f64::sqrt(3.0));
-    let confidence = bound.frames.iter().map(|frame| confidence(&sigmas, frame, set.markers().len())).collect();
+    let confidence = bound
+        .frames
+        .iter()
+        .map(|frame| confidence(&sigmas, frame, set.markers().len()))
+        .collect();
     let report = MarkerReport {
         marker_set: set.name().to_owned(),
         subjects: clip.subjects(),
@@ -116,11 +169,16 @@ pub fn fit_markers(
     Ok((motion, report))
 }
 
-/// Of a frame, by the joints' median standard deviation along an axis; it grows as the root of the set's markers over those seen.
+/// Of a frame, by the joints' median standard deviation along an axis; it grows as the root of the
+/// set's markers over those seen.
 fn confidence(joint_sigmas_m: &[f64], frame: &[Option<Vector3<f64>>], markers: usize) -> f64 {
     let mut sigmas = joint_sigmas_m.to_vec();
     sigmas.sort_unstable_by(f64::total_cmp);
-    let median_m = sigmas.get(sigmas.len() / 2).copied().unwrap_or(f64::INFINITY) / f64::sqrt(3.0);
+    let median_m = sigmas
+        .get(sigmas.len() / 2)
+        .copied()
+        .unwrap_or(f64::INFINITY)
+        / f64::sqrt(3.0);
     confidence_of_std(median_m * (markers as f64 / frame.iter().flatten().count() as f64).sqrt())
 }
 
@@ -150,24 +208,52 @@ fn marker_fits(
     };
     let mut fits: Vec<MarkerFit> = sums.iter().enumerate().map(fit).collect();
     fits.sort_by(|left, right| right.rms_m.total_cmp(&left.rms_m));
-    (fits, rms(sums.iter().fold((0.0, 0), |all, sum| (all.0 + sum.0, all.1 + sum.1))))
+    (
+        fits,
+        rms(sums
+            .iter()
+            .fold((0.0, 0), |all, sum| (all.0 + sum.0, all.1 + sum.1))),
+    )
 }
 
 /// Where a set's markers are on a body in a pose of its own shape: what [`fit_markers`] would see.
 ///
 /// # Errors
 /// [`MotionError`] where a place of the set is not on the body.
-pub fn place_markers(motion: &SmplMotion, body: &Arc<BodyModel>, set: &MarkerSet) -> Result<MarkerClip, MotionError> {
-    let sites: Vec<Site> = set.markers().iter().map(|marker| marker.site_on(body, set.name())).collect::<Result<_, _>>()?;
+pub fn place_markers(
+    motion: &SmplMotion,
+    body: &Arc<BodyModel>,
+    set: &MarkerSet,
+) -> Result<MarkerClip, MotionError> {
+    let sites: Vec<Site> = set
+        .markers()
+        .iter()
+        .map(|marker| marker.site_on(body, set.name()))
+        .collect::<Result<_, _>>()?;
     let skin = Skin::new(body, &sites, 0)?;
-    let stuck_at: Vec<Vector3<f64>> = set.markers().iter().map(|marker| Vector3::new(0.0, 0.0, marker.height_m)).collect();
+    let stuck_at: Vec<Vector3<f64>> = set
+        .markers()
+        .iter()
+        .map(|marker| Vector3::new(0.0, 0.0, marker.height_m))
+        .collect();
     let shaped = skin.shaped(&motion.betas, &stuck_at)?;
-    let frame = |pose| shaped.posed(pose).markers.into_iter().map(|marker| Some(marker.into())).collect();
+    let frame = |pose| {
+        shaped
+            .posed(pose)
+            .markers
+            .into_iter()
+            .map(|marker| Some(marker.into()))
+            .collect()
+    };
     Ok(MarkerClip {
         name: motion.name.clone(),
         rate_hz: motion.rate_hz,
         unit_scale_m: 1.0,
-        labels: set.markers().iter().map(|marker| marker.label.clone()).collect(),
+        labels: set
+            .markers()
+            .iter()
+            .map(|marker| marker.label.clone())
+            .collect(),
         frames: motion.frames.iter().map(frame).collect(),
     })
 }
@@ -178,8 +264,18 @@ mod tests {
 
     #[test]
     fn confidence_is_that_of_the_joints_and_falls_with_markers_lost() {
-        let seen = |count: usize| -> Vec<Option<Vector3<f64>>> { (0..40).map(|marker| (marker < count).then(Vector3::zeros)).collect() };
-        let of = |count: usize| cromosim_spatial::std_of_confidence(confidence(&[0.001, 0.003, 0.002, 0.009, 0.001], &seen(count), 40));
+        let seen = |count: usize| -> Vec<Option<Vector3<f64>>> {
+            (0..40)
+                .map(|marker| (marker < count).then(Vector3::zeros))
+                .collect()
+        };
+        let of = |count: usize| {
+            cromosim_spatial::std_of_confidence(confidence(
+                &[0.001, 0.003, 0.002, 0.009, 0.001],
+                &seen(count),
+                40,
+            ))
+        };
         let median_m = 0.002 / f64::sqrt(3.0);
         assert!((of(40) - median_m).abs() < 1e-9 && (of(10) - 2.0 * median_m).abs() < 1e-9);
         assert_eq!(confidence(&[0.002], &seen(0), 40), 0.0);

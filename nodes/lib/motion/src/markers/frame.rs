@@ -1,4 +1,5 @@
-//! One frame: the pose that explains its markers, by damped Gauss-Newton steps (Levenberg 1944, Marquardt 1963).
+//! One frame: the pose that explains its markers, by damped Gauss-Newton steps (Levenberg 1944,
+//! Marquardt 1963).
 
 use cromosim_body::{BodyPose, JOINT_COUNT};
 use nalgebra::{DMatrix, DVector, Matrix3, UnitQuaternion, Vector3};
@@ -42,7 +43,10 @@ pub(super) struct Normal {
 
 impl Normal {
     pub fn zeros() -> Self {
-        Self { hessian: DMatrix::zeros(POSE, POSE), gradient: DVector::zeros(POSE) }
+        Self {
+            hessian: DMatrix::zeros(POSE, POSE),
+            gradient: DVector::zeros(POSE),
+        }
     }
 
     /// A residual with derivative blocks at parameter offsets; offsets descend but for the first.
@@ -66,32 +70,51 @@ impl Normal {
     }
 
     /// A turn away from `mean` with a precision about each axis.
-    fn add_turn(&mut self, joint: usize, mean: &UnitQuaternion<f64>, own: &UnitQuaternion<f64>, precisions: Vector3<f64>) {
+    fn add_turn(
+        &mut self,
+        joint: usize,
+        mean: &UnitQuaternion<f64>,
+        own: &UnitQuaternion<f64>,
+        precisions: Vector3<f64>,
+    ) {
         let away = (mean.inverse() * own).scaled_axis();
         let jacobian = right_jacobian_inverse(away);
         let weighted = jacobian.transpose() * Matrix3::from_diagonal(&precisions);
         let mut part = self.gradient.fixed_rows_mut::<3>(3 + 3 * joint);
         part += weighted * away;
-        let mut part = self.hessian.fixed_view_mut::<3, 3>(3 + 3 * joint, 3 + 3 * joint);
+        let mut part = self
+            .hessian
+            .fixed_view_mut::<3, 3>(3 + 3 * joint, 3 + 3 * joint);
         part += weighted * jacobian;
     }
 }
 
-/// Cost of an error of `size_m` and the weight of its square in the next step, both per [`MARKER_SIGMA_M`]^2.
+/// Cost of an error of `size_m` and the weight of its square in the next step, both per
+/// [`MARKER_SIGMA_M`]^2.
 pub(super) fn huber(size_m: f64, limit_m: f64) -> (f64, f64) {
     let scale = MARKER_SIGMA_M.powi(-2);
     if size_m <= limit_m {
         (0.5 * size_m * size_m * scale, scale)
     } else {
-        (limit_m * (size_m - 0.5 * limit_m) * scale, limit_m / size_m * scale)
+        (
+            limit_m * (size_m - 0.5 * limit_m) * scale,
+            limit_m / size_m * scale,
+        )
     }
 }
 
 /// The derivative blocks of a marker by root position and turns.
-pub(super) fn pose_blocks(skin: &ShapedSkin<'_>, marker: usize, posed: &Posed, blocks: &mut Vec<(usize, Matrix3<f64>)>) {
+pub(super) fn pose_blocks(
+    skin: &ShapedSkin<'_>,
+    marker: usize,
+    posed: &Posed,
+    blocks: &mut Vec<(usize, Matrix3<f64>)>,
+) {
     blocks.clear();
     blocks.push((0, Matrix3::identity()));
-    skin.turn_blocks(marker, posed, |joint, block| blocks.push((3 + 3 * joint, block)));
+    skin.turn_blocks(marker, posed, |joint, block| {
+        blocks.push((3 + 3 * joint, block))
+    });
 }
 
 /// Markers, prior and expectation.
@@ -111,37 +134,66 @@ pub(super) fn normal_equations(
         normal.add(&blocks, residual, huber(residual.norm(), terms.huber_m).1);
     }
     for (joint, own) in pose.local_rotations.iter().enumerate() {
-        normal.add_turn(joint, &terms.prior.means[joint], own, terms.prior.precisions[joint] * terms.prior_weight);
+        normal.add_turn(
+            joint,
+            &terms.prior.means[joint],
+            own,
+            terms.prior.precisions[joint] * terms.prior_weight,
+        );
         if let Some(expected) = terms.expected {
-            normal.add_turn(joint, &expected.pose.local_rotations[joint], own, expected.turn_precisions[joint]);
+            normal.add_turn(
+                joint,
+                &expected.pose.local_rotations[joint],
+                own,
+                expected.turn_precisions[joint],
+            );
         }
     }
     for hinge in &HINGES {
         let (over, row, precision) = hinge.overstretch(&pose.local_rotations[hinge.joint]);
         let mut part = normal.gradient.fixed_rows_mut::<3>(3 + 3 * hinge.joint);
         part += row * (precision * over);
-        let mut part = normal.hessian.fixed_view_mut::<3, 3>(3 + 3 * hinge.joint, 3 + 3 * hinge.joint);
+        let mut part = normal
+            .hessian
+            .fixed_view_mut::<3, 3>(3 + 3 * hinge.joint, 3 + 3 * hinge.joint);
         part += row * row.transpose() * precision;
     }
     if let Some(expected) = terms.expected {
         let weight = expected.position_sigma_m.powi(-2);
-        normal.add(&[(0, Matrix3::identity())], pose.root_position - expected.pose.root_position, weight);
+        normal.add(
+            &[(0, Matrix3::identity())],
+            pose.root_position - expected.pose.root_position,
+            weight,
+        );
     }
     normal
 }
 
 /// What [`normal_equations`] is the derivative of.
-pub(super) fn cost(observed: &[Option<Vector3<f64>>], terms: &Terms<'_>, pose: &BodyPose, posed: &Posed) -> f64 {
-    let of_marker =
-        |(seen, marker): (&Option<Vector3<f64>>, &Vector3<f64>)| seen.map_or(0.0, |seen| huber((marker - seen).norm(), terms.huber_m).0);
+pub(super) fn cost(
+    observed: &[Option<Vector3<f64>>],
+    terms: &Terms<'_>,
+    pose: &BodyPose,
+    posed: &Posed,
+) -> f64 {
+    let of_marker = |(seen, marker): (&Option<Vector3<f64>>, &Vector3<f64>)| {
+        seen.map_or(0.0, |seen| huber((marker - seen).norm(), terms.huber_m).0)
+    };
     let markers: f64 = observed.iter().zip(&posed.markers).map(of_marker).sum();
     let mut turns = 0.0;
     for (joint, own) in pose.local_rotations.iter().enumerate() {
         let away = (terms.prior.means[joint].inverse() * own).scaled_axis();
-        turns += 0.5 * terms.prior_weight * away.component_mul(&away).dot(&terms.prior.precisions[joint]);
+        turns += 0.5
+            * terms.prior_weight
+            * away
+                .component_mul(&away)
+                .dot(&terms.prior.precisions[joint]);
         if let Some(expected) = terms.expected {
             let away = (expected.pose.local_rotations[joint].inverse() * own).scaled_axis();
-            turns += 0.5 * away.component_mul(&away).dot(&expected.turn_precisions[joint]);
+            turns += 0.5
+                * away
+                    .component_mul(&away)
+                    .dot(&expected.turn_precisions[joint]);
         }
     }
     for hinge in &HINGES {
@@ -149,7 +201,8 @@ pub(super) fn cost(observed: &[Option<Vector3<f64>>], terms: &Terms<'_>, pose: &
         turns += 0.5 * precision * over * over;
     }
     let root = terms.expected.map_or(0.0, |expected| {
-        0.5 * (pose.root_position - expected.pose.root_position).norm_squared() / expected.position_sigma_m.powi(2)
+        0.5 * (pose.root_position - expected.pose.root_position).norm_squared()
+            / expected.position_sigma_m.powi(2)
     });
     markers + turns + root
 }
@@ -161,7 +214,9 @@ pub(super) fn stepped(pose: &BodyPose, step: &DVector<f64>) -> BodyPose {
         root_position: pose.root_position + part(0),
         local_rotations: std::array::from_fn(|joint| {
             UnitQuaternion::new_normalize(
-                (pose.local_rotations[joint] * UnitQuaternion::from_scaled_axis(part(3 + 3 * joint))).into_inner(),
+                (pose.local_rotations[joint]
+                    * UnitQuaternion::from_scaled_axis(part(3 + 3 * joint)))
+                .into_inner(),
             )
         }),
     }
@@ -191,7 +246,9 @@ pub(super) fn solve(
         let normal = normal_equations(skin, observed, terms, &pose, &posed);
         let mut improved = false;
         for _ in 0..=REFUSALS {
-            let step = damped(&normal.hessian, damping).cholesky().map(|cholesky| -cholesky.solve(&normal.gradient));
+            let step = damped(&normal.hessian, damping)
+                .cholesky()
+                .map(|cholesky| -cholesky.solve(&normal.gradient));
             if let Some(step) = step {
                 if step.amax() < SMALL_STEP {
                     return (pose, least);

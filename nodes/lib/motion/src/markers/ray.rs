@@ -3,13 +3,20 @@
 use cromosim_body::BodyModel;
 use nalgebra::Vector3;
 
-/// The first triangle of the mean shape in T-pose that the ray meets, and the barycentrics of the point (Möller and Trumbore 1997).
-pub(super) fn site_by_ray(body: &BodyModel, start: Vector3<f64>, direction: Vector3<f64>) -> Option<(u32, [f64; 3])> {
+/// The first triangle of the mean shape in T-pose that the ray meets, and the barycentrics of the
+/// point (Möller and Trumbore 1997).
+pub(super) fn site_by_ray(
+    body: &BodyModel,
+    start: Vector3<f64>,
+    direction: Vector3<f64>,
+) -> Option<(u32, [f64; 3])> {
     let direction = direction.try_normalize(0.0)?;
     let mut nearest: Option<(f64, u32, [f64; 3])> = None;
     for (index, corners) in body.faces().iter().enumerate() {
         let [a, b, c] = corners.map(|vertex| body.template()[vertex as usize]);
-        let Some((distance, barycentrics)) = hit(start, direction, [a, b, c]) else { continue };
+        let Some((distance, barycentrics)) = hit(start, direction, [a, b, c]) else {
+            continue;
+        };
         if nearest.is_none_or(|(least, ..)| distance < least) {
             nearest = Some((distance, index as u32, barycentrics));
         }
@@ -18,7 +25,11 @@ pub(super) fn site_by_ray(body: &BodyModel, start: Vector3<f64>, direction: Vect
 }
 
 /// Distance and barycentrics where the ray goes out through the triangle.
-fn hit(start: Vector3<f64>, direction: Vector3<f64>, [a, b, c]: [Vector3<f64>; 3]) -> Option<(f64, [f64; 3])> {
+fn hit(
+    start: Vector3<f64>,
+    direction: Vector3<f64>,
+    [a, b, c]: [Vector3<f64>; 3],
+) -> Option<(f64, [f64; 3])> {
     let (ab, ac) = (b - a, c - a);
     let p = direction.cross(&ac);
     let determinant = ab.dot(&p);

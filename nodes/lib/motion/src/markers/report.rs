@@ -42,7 +42,8 @@ pub struct MarkerReport {
     pub keyframes: Vec<usize>,
     /// Shape coefficients.
     pub betas: Vec<f64>,
-    /// Standard deviation of each joint's position from the markers' errors alone (shape and placements taken as known), m.
+    /// Standard deviation of each joint's position from the markers' errors alone (shape and
+    /// placements taken as known), m.
     pub joint_sigma_m: Vec<(Joint, f64)>,
 }
 
@@ -61,7 +62,12 @@ impl fmt::Display for MarkerReport {
             1000.0 * self.rms_m
         )?;
         match self.markers.first() {
-            Some(worst) => write!(formatter, ", worst {} {:.1} mm", worst.label, 1000.0 * worst.rms_m),
+            Some(worst) => write!(
+                formatter,
+                ", worst {} {:.1} mm",
+                worst.label,
+                1000.0 * worst.rms_m
+            ),
             None => Ok(()),
         }
     }

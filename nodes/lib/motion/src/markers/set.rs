@@ -9,7 +9,10 @@ use serde::Deserialize;
 use super::ray::site_by_ray;
 use crate::MotionError;
 
-const EMBEDDED: [(&str, &str); 1] = [("plug_in_gait", include_str!("../../marker_sets/plug_in_gait.yaml"))];
+const EMBEDDED: [(&str, &str); 1] = [(
+    "plug_in_gait",
+    include_str!("../../marker_sets/plug_in_gait.yaml"),
+)];
 /// The largest number of markers in a set.
 const MAX_MARKERS: usize = 500;
 
@@ -47,8 +50,9 @@ pub enum MarkerPlace {
     Vertex(u32),
     /// A point of a triangle; only for the body it was found on.
     Barycentric(u32, [f64; 3]),
-    /// Where a ray leaves the skin of the mean shape in T-pose: from the point `along` of the way between two joints (0 the first, 1 the
-    /// second) in `direction` (left, up, forward). The same place on every body.
+    /// Where a ray leaves the skin of the mean shape in T-pose: from the point `along` of the way
+    /// between two joints (0 the first, 1 the second) in `direction` (left, up, forward). The same
+    /// place on every body.
     Ray {
         /// The joint that the way begins at.
         from: Joint,
@@ -76,9 +80,11 @@ pub struct SetMarker {
 
 /// A marker set: labels and places.
 ///
-/// As YAML: `name`, `description`, `height_mm` (centres over the skin; usual markers 9.5) and `markers`: label to one of `{site: NAME}`,
-/// `{vertex: N}`, `{triangle: N, barycentrics: [a, b, c]}`, `{from: JOINT, to: JOINT, along: SHARE, direction: [left, up, forward]}` (see
-/// [`MarkerPlace::Ray`]; `to` and `along` may be left out), each with `height_mm` and `aliases` of its own where wanted.
+/// As YAML: `name`, `description`, `height_mm` (centres over the skin; usual markers 9.5) and
+/// `markers`: label to one of `{site: NAME}`, `{vertex: N}`, `{triangle: N, barycentrics: [a, b,
+/// c]}`, `{from: JOINT, to: JOINT, along: SHARE, direction: [left, up, forward]}` (see
+/// [`MarkerPlace::Ray`]; `to` and `along` may be left out), each with `height_mm` and `aliases` of
+/// its own where wanted.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MarkerSet {
     name: String,
@@ -92,7 +98,10 @@ impl MarkerSet {
     /// # Errors
     /// None in practice: a test reads them all.
     pub fn embedded() -> Result<Vec<Self>, MotionError> {
-        EMBEDDED.iter().map(|(name, yaml)| Self::from_yaml(yaml, &format!("embedded marker set {name}"))).collect()
+        EMBEDDED
+            .iter()
+            .map(|(name, yaml)| Self::from_yaml(yaml, &format!("embedded marker set {name}")))
+            .collect()
     }
 
     /// From YAML; `origin` names the file in errors.
@@ -101,14 +110,20 @@ impl MarkerSet {
     /// [`MotionError::MarkerSetSyntax`] and [`MotionError::MapContent`].
     pub fn from_yaml(yaml: &str, origin: &str) -> Result<Self, MotionError> {
         let raw: RawSet =
-            serde_norway::from_str(yaml).map_err(|source| MotionError::MarkerSetSyntax { origin: origin.to_owned(), source })?;
+            serde_norway::from_str(yaml).map_err(|source| MotionError::MarkerSetSyntax {
+                origin: origin.to_owned(),
+                source,
+            })?;
         let content = |key: &str, problem: &str| MotionError::MapContent {
             origin: origin.to_owned(),
             key: key.to_owned(),
             problem: problem.to_owned(),
         };
         if raw.markers.is_empty() || raw.markers.len() > MAX_MARKERS {
-            return Err(content("markers", &format!("{} of them, expected 1 to {MAX_MARKERS}", raw.markers.len())));
+            return Err(content(
+                "markers",
+                &format!("{} of them, expected 1 to {MAX_MARKERS}", raw.markers.len()),
+            ));
         }
         let mut markers = Vec::with_capacity(raw.markers.len());
         for (label, raw_marker) in raw.markers {
@@ -119,9 +134,18 @@ impl MarkerSet {
             }
             let aliases = raw_marker.aliases.clone();
             let place = place(raw_marker).map_err(|problem| content(&key, &problem))?;
-            markers.push(SetMarker { label, aliases, place, height_m: height_mm * 1e-3 });
+            markers.push(SetMarker {
+                label,
+                aliases,
+                place,
+                height_m: height_mm * 1e-3,
+            });
         }
-        Ok(Self { name: raw.name, description: raw.description, markers })
+        Ok(Self {
+            name: raw.name,
+            description: raw.description,
+            markers,
+        })
     }
 
     /// The set's name.
@@ -141,28 +165,51 @@ impl MarkerSet {
 }
 
 fn place(raw: RawMarker) -> Result<MarkerPlace, String> {
-    let given = [raw.site.is_some(), raw.vertex.is_some(), raw.triangle.is_some(), raw.from.is_some()];
+    let given = [
+        raw.site.is_some(),
+        raw.vertex.is_some(),
+        raw.triangle.is_some(),
+        raw.from.is_some(),
+    ];
     if given.iter().filter(|given| **given).count() != 1 {
         return Err("expected one of site, vertex, triangle and from".to_owned());
     }
     if raw.triangle.is_some() != raw.barycentrics.is_some() {
         return Err("triangle and barycentrics belong together".to_owned());
     }
-    if raw.from.is_some() != raw.direction.is_some() || (raw.from.is_none() && (raw.to.is_some() || raw.along.is_some())) {
+    if raw.from.is_some() != raw.direction.is_some()
+        || (raw.from.is_none() && (raw.to.is_some() || raw.along.is_some()))
+    {
         return Err("from and direction belong together, to and along with them".to_owned());
     }
-    match (raw.site, raw.vertex, raw.triangle.zip(raw.barycentrics), raw.from.zip(raw.direction)) {
+    match (
+        raw.site,
+        raw.vertex,
+        raw.triangle.zip(raw.barycentrics),
+        raw.from.zip(raw.direction),
+    ) {
         (Some(site), ..) => Ok(MarkerPlace::Site(site)),
         (_, Some(vertex), ..) => Ok(MarkerPlace::Vertex(vertex)),
-        (_, _, Some((triangle, barycentrics)), _) => Ok(MarkerPlace::Barycentric(triangle, barycentrics)),
+        (_, _, Some((triangle, barycentrics)), _) => {
+            Ok(MarkerPlace::Barycentric(triangle, barycentrics))
+        }
         (_, _, _, Some((from, direction))) => {
-            let joint = |name: &str| Joint::from_name(name).ok_or_else(|| format!("SMPL has no joint {name}"));
+            let joint = |name: &str| {
+                Joint::from_name(name).ok_or_else(|| format!("SMPL has no joint {name}"))
+            };
             let to = joint(raw.to.as_deref().unwrap_or(&from))?;
             let (along, direction) = (raw.along.unwrap_or(0.0), Vector3::from(direction));
             if !(along.abs() <= 10.0 && direction.norm() > 1e-6 && direction.norm() < 1e6) {
-                return Err("expected along from -10 to 10 and a direction that is not 0".to_owned());
+                return Err(
+                    "expected along from -10 to 10 and a direction that is not 0".to_owned(),
+                );
             }
-            Ok(MarkerPlace::Ray { from: joint(&from)?, to, along, direction })
+            Ok(MarkerPlace::Ray {
+                from: joint(&from)?,
+                to,
+                along,
+                direction,
+            })
         }
         _ => Err("expected one of site, vertex, triangle and from".to_owned()),
     }
@@ -172,8 +219,8 @@ impl SetMarker {
     /// The point of the skin on `body`.
     ///
     /// # Errors
-    /// [`MotionError::Body`] for a site, vertex or triangle that the body does not have, [`MotionError::MapContent`] for a ray that meets no
-    /// skin.
+    /// [`MotionError::Body`] for a site, vertex or triangle that the body does not have,
+    /// [`MotionError::MapContent`] for a ray that meets no skin.
     pub fn site_on(&self, body: &BodyModel, set: &str) -> Result<Site, MotionError> {
         let missed = |problem: &str| MotionError::MapContent {
             origin: format!("marker set {set}"),
@@ -182,20 +229,38 @@ impl SetMarker {
         };
         match &self.place {
             MarkerPlace::Site(name) => Ok(body.site(name)?),
-            MarkerPlace::Barycentric(triangle, barycentrics) => Ok(body.site_at(*triangle, *barycentrics)?),
-            MarkerPlace::Vertex(vertex) => {
-                let corner = |triangle: &[u32; 3]| triangle.iter().position(|corner| corner == vertex);
-                let found = body.faces().iter().enumerate().find_map(|(triangle, corners)| Some((triangle, corner(corners)?)));
-                let Some((triangle, corner)) = found else {
-                    return Err(missed(&format!("no triangle has vertex {vertex} on body {}", body.id())));
-                };
-                Ok(body.site_at(triangle as u32, std::array::from_fn(|index| f64::from(u8::from(index == corner))))?)
+            MarkerPlace::Barycentric(triangle, barycentrics) => {
+                Ok(body.site_at(*triangle, *barycentrics)?)
             }
-            MarkerPlace::Ray { from, to, along, direction } => {
+            MarkerPlace::Vertex(vertex) => {
+                let corner =
+                    |triangle: &[u32; 3]| triangle.iter().position(|corner| corner == vertex);
+                let found = body
+                    .faces()
+                    .iter()
+                    .enumerate()
+                    .find_map(|(triangle, corners)| Some((triangle, corner(corners)?)));
+                let Some((triangle, corner)) = found else {
+                    return Err(missed(&format!(
+                        "no triangle has vertex {vertex} on body {}",
+                        body.id()
+                    )));
+                };
+                Ok(body.site_at(
+                    triangle as u32,
+                    std::array::from_fn(|index| f64::from(u8::from(index == corner))),
+                )?)
+            }
+            MarkerPlace::Ray {
+                from,
+                to,
+                along,
+                direction,
+            } => {
                 let (joints, _) = body.joint_shape_directions();
                 let start = joints[from.index()].lerp(&joints[to.index()], *along);
-                let (triangle, barycentrics) =
-                    site_by_ray(body, start, *direction).ok_or_else(|| missed("the ray meets no skin; check from, to and direction"))?;
+                let (triangle, barycentrics) = site_by_ray(body, start, *direction)
+                    .ok_or_else(|| missed("the ray meets no skin; check from, to and direction"))?;
                 Ok(body.site_at(triangle, barycentrics)?)
             }
         }

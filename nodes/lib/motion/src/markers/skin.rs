@@ -1,12 +1,15 @@
-//! The skin under the markers: where they are in a pose, and how they move with pose, shape and placement.
+//! The skin under the markers: where they are in a pose, and how they move with pose, shape and
+//! placement.
 //!
-//! A marker stands at `m = sum_i b_i v_i + F l`: v_i are its triangle's corners (SMPL with pose corrections), b_i its barycentrics, F the
-//! triangle's frame [tangent, binormal, normal] and l the placement, (0, 0, height) as stuck on.
+//! A marker stands at `m = sum_i b_i v_i + F l`: v_i are its triangle's corners (SMPL with pose
+//! corrections), b_i its barycentrics, F the triangle's frame [tangent, binormal, normal] and l the
+//! placement, (0, 0, height) as stuck on.
 //!
-//! Derivatives are those of linear blend skinning. Turning joint j by the small world vector d moves the marker by `d x Y_j`, with
-//! `Y_j = sum over segments s below j of (q_s - w_s o_j + w_s F l)`, where w_s is the marker's weight on s, o_j the joint and
-//! `q_s = sum_i b_i w_is (G_s v_i)`. Left out are the pose corrections' own derivatives, and that F turns with its corners rather than
-//! with the mean of their segments; the positions leave nothing out.
+//! Derivatives are those of linear blend skinning. Turning joint j by the small world vector d
+//! moves the marker by `d x Y_j`, with `Y_j = sum over segments s below j of (q_s - w_s o_j + w_s F
+//! l)`, where w_s is the marker's weight on s, o_j the joint and `q_s = sum_i b_i w_is (G_s v_i)`.
+//! Left out are the pose corrections' own derivatives, and that F turns with its corners rather
+//! than with the mean of their segments; the positions leave nothing out.
 
 use std::sync::Arc;
 
@@ -60,7 +63,11 @@ pub(super) struct Posed {
 
 impl Skin {
     /// `beta_count` shape coefficients will be fitted.
-    pub fn new(body: &Arc<BodyModel>, sites: &[Site], beta_count: usize) -> Result<Self, MotionError> {
+    pub fn new(
+        body: &Arc<BodyModel>,
+        sites: &[Site],
+        beta_count: usize,
+    ) -> Result<Self, MotionError> {
         let mut vertices = Vec::with_capacity(3 * sites.len());
         for site in sites {
             vertices.extend(body.triangle(site)?);
@@ -74,13 +81,33 @@ impl Skin {
                 directions.push(corner(&one, vertex) - corner(&mean, vertex));
             }
         }
-        // A body of one shape does not tell its weights: there a marker moves with its site's joint alone.
-        let rigid = || sites.iter().flat_map(|site| std::iter::repeat_n(vec![(site.joint.index(), 1.0)], 3)).collect();
-        let weights = if body.beta_count() > 0 { skin_weights(body, &vertices)? } else { rigid() };
-        let patches = sites.iter().zip(weights.as_chunks::<3>().0).map(|(site, weights)| Patch::new(site.barycentrics, weights)).collect();
+        // A body of one shape does not tell its weights: there a marker moves with its site's joint
+        // alone.
+        let rigid = || {
+            sites
+                .iter()
+                .flat_map(|site| std::iter::repeat_n(vec![(site.joint.index(), 1.0)], 3))
+                .collect()
+        };
+        let weights = if body.beta_count() > 0 {
+            skin_weights(body, &vertices)?
+        } else {
+            rigid()
+        };
+        let patches = sites
+            .iter()
+            .zip(weights.as_chunks::<3>().0)
+            .map(|(site, weights)| Patch::new(site.barycentrics, weights))
+            .collect();
         let (_, mut joint_directions) = body.joint_shape_directions();
         joint_directions.truncate(beta_count);
-        Ok(Self { body: body.clone(), patches, vertices, corner_directions, joint_directions })
+        Ok(Self {
+            body: body.clone(),
+            patches,
+            vertices,
+            corner_directions,
+            joint_directions,
+        })
     }
 
     /// How many shape coefficients are fitted.
@@ -88,10 +115,24 @@ impl Skin {
         self.joint_directions.len()
     }
 
-    pub fn shaped(&self, betas: &[f64], placements: &[Vector3<f64>]) -> Result<ShapedSkin<'_>, MotionError> {
+    pub fn shaped(
+        &self,
+        betas: &[f64],
+        placements: &[Vector3<f64>],
+    ) -> Result<ShapedSkin<'_>, MotionError> {
         let shaped = ShapedBody::new(self.body.clone(), betas)?;
-        let corners = self.vertices.iter().map(|&vertex| shaped.rest_vertices()[vertex as usize]).collect();
-        Ok(ShapedSkin { skin: self, subset: shaped.subset(&self.vertices)?, shaped, corners, placements: placements.to_vec() })
+        let corners = self
+            .vertices
+            .iter()
+            .map(|&vertex| shaped.rest_vertices()[vertex as usize])
+            .collect();
+        Ok(ShapedSkin {
+            skin: self,
+            subset: shaped.subset(&self.vertices)?,
+            shaped,
+            corners,
+            placements: placements.to_vec(),
+        })
     }
 }
 
@@ -106,17 +147,38 @@ impl Patch {
             }
         }
         // SMPL numbers parents before children.
-        let joints: Vec<usize> = (0..JOINT_COUNT).rev().filter(|&joint| moves[joint]).collect();
+        let joints: Vec<usize> = (0..JOINT_COUNT)
+            .rev()
+            .filter(|&joint| moves[joint])
+            .collect();
         let slot = |&joint: &usize| {
-            let parent = Joint::ALL[joint].parent().and_then(|parent| joints.iter().position(|&other| other == parent.index()));
+            let parent = Joint::ALL[joint]
+                .parent()
+                .and_then(|parent| joints.iter().position(|&other| other == parent.index()));
             let of_corner = |(corner, weights): (usize, &Vec<(usize, f64)>)| {
-                let weight: f64 = weights.iter().filter(|(other, _)| *other == joint).map(|(_, weight)| weight).sum();
+                let weight: f64 = weights
+                    .iter()
+                    .filter(|(other, _)| *other == joint)
+                    .map(|(_, weight)| weight)
+                    .sum();
                 (corner, weight * barycentrics[corner])
             };
-            let shares = weights.iter().enumerate().map(of_corner).filter(|(_, share)| *share != 0.0).collect();
-            Slot { joint, parent, shares }
+            let shares = weights
+                .iter()
+                .enumerate()
+                .map(of_corner)
+                .filter(|(_, share)| *share != 0.0)
+                .collect();
+            Slot {
+                joint,
+                parent,
+                shares,
+            }
         };
-        Self { barycentrics, slots: joints.iter().map(slot).collect() }
+        Self {
+            barycentrics,
+            slots: joints.iter().map(slot).collect(),
+        }
     }
 }
 
@@ -124,18 +186,35 @@ impl ShapedSkin<'_> {
     pub fn posed(&self, pose: &BodyPose) -> Posed {
         let mut corners = Vec::with_capacity(self.corners.len());
         let segments = self.subset.positions_and_segments_into(pose, &mut corners);
-        let frames: Vec<Matrix3<f64>> = corners.as_chunks::<3>().0.iter().map(triangle_frame).collect();
+        let frames: Vec<Matrix3<f64>> = corners
+            .as_chunks::<3>()
+            .0
+            .iter()
+            .map(triangle_frame)
+            .collect();
         let place = |marker: usize| {
             let [a, b, c] = self.skin.patches[marker].barycentrics;
-            corners[3 * marker] * a + corners[3 * marker + 1] * b + corners[3 * marker + 2] * c + frames[marker] * self.placements[marker]
+            corners[3 * marker] * a
+                + corners[3 * marker + 1] * b
+                + corners[3 * marker + 2] * c
+                + frames[marker] * self.placements[marker]
         };
         let markers = (0..frames.len()).map(place).collect();
-        Posed { markers, frames, segments }
+        Posed {
+            markers,
+            frames,
+            segments,
+        }
     }
 
-    /// Hands every joint that moves `marker` to `use_block`, with the derivative of the marker by a small turn of the joint in its own
-    /// axes, (3, 3) m/rad.
-    pub fn turn_blocks(&self, marker: usize, posed: &Posed, mut use_block: impl FnMut(usize, Matrix3<f64>)) {
+    /// Hands every joint that moves `marker` to `use_block`, with the derivative of the marker by a
+    /// small turn of the joint in its own axes, (3, 3) m/rad.
+    pub fn turn_blocks(
+        &self,
+        marker: usize,
+        posed: &Posed,
+        mut use_block: impl FnMut(usize, Matrix3<f64>),
+    ) {
         let patch = &self.skin.patches[marker];
         let arm = posed.frames[marker] * self.placements[marker];
         let mut moments = [(Vector3::zeros(), 0.0); JOINT_COUNT];
@@ -143,7 +222,8 @@ impl ShapedSkin<'_> {
             let segment = &posed.segments[slot.joint];
             let joint = segment.translation.vector;
             for &(corner, share) in &slot.shares {
-                let in_segment = self.corners[3 * marker + corner] - self.shaped.joints_in_model()[slot.joint];
+                let in_segment =
+                    self.corners[3 * marker + corner] - self.shaped.joints_in_model()[slot.joint];
                 moments[index].0 += (segment.rotation * in_segment + joint + arm) * share;
                 moments[index].1 += share;
             }
@@ -165,7 +245,8 @@ impl ShapedSkin<'_> {
             for joint in Joint::ALL {
                 if let Some(parent) = joint.parent() {
                     let bone = directions[joint.index()] - directions[parent.index()];
-                    motion[joint.index()] = motion[parent.index()] + posed.segments[parent.index()].rotation * bone;
+                    motion[joint.index()] =
+                        motion[parent.index()] + posed.segments[parent.index()].rotation * bone;
                 }
             }
             motion
@@ -173,13 +254,23 @@ impl ShapedSkin<'_> {
         self.skin.joint_directions.iter().map(moved).collect()
     }
 
-    /// The derivative of `marker` by shape coefficient `beta`, m; `joint_motion` is [`Self::joint_shape_motion`]'s row of that coefficient.
-    pub fn shape_column(&self, marker: usize, beta: usize, posed: &Posed, joint_motion: &[Vector3<f64>; JOINT_COUNT]) -> Vector3<f64> {
+    /// The derivative of `marker` by shape coefficient `beta`, m; `joint_motion` is
+    /// [`Self::joint_shape_motion`]'s row of that coefficient.
+    pub fn shape_column(
+        &self,
+        marker: usize,
+        beta: usize,
+        posed: &Posed,
+        joint_motion: &[Vector3<f64>; JOINT_COUNT],
+    ) -> Vector3<f64> {
         let mut column = Vector3::zeros();
         for slot in &self.skin.patches[marker].slots {
             for &(corner, share) in &slot.shares {
-                let direction = self.skin.corner_directions[3 * marker + corner][beta] - self.skin.joint_directions[beta][slot.joint];
-                column += (posed.segments[slot.joint].rotation * direction + joint_motion[slot.joint]) * share;
+                let direction = self.skin.corner_directions[3 * marker + corner][beta]
+                    - self.skin.joint_directions[beta][slot.joint];
+                column += (posed.segments[slot.joint].rotation * direction
+                    + joint_motion[slot.joint])
+                    * share;
             }
         }
         column
@@ -188,8 +279,13 @@ impl ShapedSkin<'_> {
 
 /// [tangent, binormal, normal] of a triangle, counter-clockwise seen from outside.
 fn triangle_frame(corners: &[Vector3<f64>; 3]) -> Matrix3<f64> {
-    let tangent = (corners[1] - corners[0]).try_normalize(1e-12).unwrap_or_else(Vector3::x);
-    let normal = tangent.cross(&(corners[2] - corners[0])).try_normalize(1e-12).unwrap_or_else(Vector3::zeros);
+    let tangent = (corners[1] - corners[0])
+        .try_normalize(1e-12)
+        .unwrap_or_else(Vector3::x);
+    let normal = tangent
+        .cross(&(corners[2] - corners[0]))
+        .try_normalize(1e-12)
+        .unwrap_or_else(Vector3::zeros);
     Matrix3::from_columns(&[tangent, normal.cross(&tangent), normal])
 }
 
@@ -199,10 +295,15 @@ fn unit(beta: usize) -> Vec<f64> {
     betas
 }
 
-/// Skin weights of vertices, read off the body's motion: between two shapes in the same pose the pose corrections are the same, so that,
-/// with one joint turned by R, `v(beta) - v(0) - d = W (R - I) (d - D)`: d and D are how shape moves the vertex and the joint at rest, and W
-/// sums the weights of the joint and all beyond it. Half turns about three axes and up to ten shapes give W by least squares.
-fn skin_weights(body: &Arc<BodyModel>, vertices: &[u32]) -> Result<Vec<Vec<(usize, f64)>>, MotionError> {
+/// Skin weights of vertices, read off the body's motion: between two shapes in the same pose the
+/// pose corrections are the same, so that, with one joint turned by R, `v(beta) - v(0) - d = W (R -
+/// I) (d - D)`: d and D are how shape moves the vertex and the joint at rest, and W sums the
+/// weights of the joint and all beyond it. Half turns about three axes and up to ten shapes give W
+/// by least squares.
+fn skin_weights(
+    body: &Arc<BodyModel>,
+    vertices: &[u32],
+) -> Result<Vec<Vec<(usize, f64)>>, MotionError> {
     let mean = ShapedBody::new(body.clone(), &[])?;
     let still = mean.subset(vertices)?;
     let (_, directions) = body.joint_shape_directions();
@@ -212,13 +313,15 @@ fn skin_weights(body: &Arc<BodyModel>, vertices: &[u32]) -> Result<Vec<Vec<(usiz
         let moved = shape.subset(vertices)?;
         for joint in 0..JOINT_COUNT {
             for axis in 0..3 {
-                let turn = UnitQuaternion::from_scaled_axis(Vector3::ith(axis, std::f64::consts::PI));
+                let turn =
+                    UnitQuaternion::from_scaled_axis(Vector3::ith(axis, std::f64::consts::PI));
                 let mut pose = BodyPose::rest(Vector3::zeros());
                 pose.local_rotations[joint] = turn;
                 let (with, without) = (moved.positions(&pose), still.positions(&pose));
                 // Poses hold the pelvis in place, shapes move it.
                 for (index, &vertex) in vertices.iter().enumerate() {
-                    let rest = shape.rest_vertices()[vertex as usize] - mean.rest_vertices()[vertex as usize];
+                    let rest = shape.rest_vertices()[vertex as usize]
+                        - mean.rest_vertices()[vertex as usize];
                     let pelvis = joint_directions[0];
                     let measured = with[index] - without[index] - (rest - pelvis);
                     let lever = rest - joint_directions[joint];
@@ -230,10 +333,24 @@ fn skin_weights(body: &Arc<BodyModel>, vertices: &[u32]) -> Result<Vec<Vec<(usiz
         }
     }
     let weights = |products: &[(f64, f64); JOINT_COUNT]| {
-        let sums = products.map(|(measured, square)| if square > 0.0 { measured / square } else { 0.0 });
-        let own = |joint: Joint| (joint.index(), sums[joint.index()] - joint.children().map(|child| sums[child.index()]).sum::<f64>());
+        let sums =
+            products.map(|(measured, square)| if square > 0.0 { measured / square } else { 0.0 });
+        let own = |joint: Joint| {
+            (
+                joint.index(),
+                sums[joint.index()]
+                    - joint
+                        .children()
+                        .map(|child| sums[child.index()])
+                        .sum::<f64>(),
+            )
+        };
         // What rounding leaves is a thousand times smaller.
-        Joint::ALL.map(own).into_iter().filter(|(_, weight)| weight.abs() > 1e-7).collect()
+        Joint::ALL
+            .map(own)
+            .into_iter()
+            .filter(|(_, weight)| weight.abs() > 1e-7)
+            .collect()
     };
     Ok(products.iter().map(weights).collect())
 }
@@ -247,14 +364,23 @@ mod tests {
         let mut pose = BodyPose::rest(Vector3::new(0.3, -0.2, 1.1));
         for (joint, rotation) in pose.local_rotations.iter_mut().enumerate() {
             let wave = |phase: f64| (1.7 * joint as f64 + phase).sin() * 0.4;
-            *rotation = UnitQuaternion::from_scaled_axis(Vector3::new(wave(0.0), wave(1.0), wave(2.0)));
+            *rotation =
+                UnitQuaternion::from_scaled_axis(Vector3::new(wave(0.0), wave(1.0), wave(2.0)));
         }
         pose
     }
 
     fn skin() -> Skin {
         let body = BodyModel::embedded();
-        let names = ["left_watch", "left_shoulder", "right_asis", "c7", "left_knee", "right_heel", "head_top"];
+        let names = [
+            "left_watch",
+            "left_shoulder",
+            "right_asis",
+            "c7",
+            "left_knee",
+            "right_heel",
+            "head_top",
+        ];
         let sites: Vec<Site> = names.iter().map(|name| body.site(name).unwrap()).collect();
         Skin::new(&body, &sites, 10).unwrap()
     }
@@ -264,14 +390,22 @@ mod tests {
         let skin = skin();
         let weights = skin_weights(&skin.body, &skin.vertices).unwrap();
         for weights in &weights {
-            assert!((weights.iter().map(|(_, weight)| weight).sum::<f64>() - 1.0).abs() < 1e-6, "{weights:?}");
+            assert!(
+                (weights.iter().map(|(_, weight)| weight).sum::<f64>() - 1.0).abs() < 1e-6,
+                "{weights:?}"
+            );
             assert!(weights.iter().all(|(_, weight)| *weight > 0.0));
         }
-        let watch = weights[0].iter().find(|(joint, _)| *joint == Joint::LeftElbow.index()).unwrap().1;
+        let watch = weights[0]
+            .iter()
+            .find(|(joint, _)| *joint == Joint::LeftElbow.index())
+            .unwrap()
+            .1;
         assert!(watch > 0.8, "{watch}");
     }
 
-    /// Turns without pose corrections' derivatives: within what these are; shape and placement: exact but for the triangle's frame.
+    /// Turns without pose corrections' derivatives: within what these are; shape and placement:
+    /// exact but for the triangle's frame.
     #[test]
     fn derivatives_agree_with_differences() {
         let skin = skin();
@@ -285,14 +419,19 @@ mod tests {
             shaped.turn_blocks(marker, &posed, |joint, block| {
                 for axis in 0..3 {
                     let mut turned = pose.clone();
-                    turned.local_rotations[joint] *= UnitQuaternion::from_scaled_axis(Vector3::ith(axis, step));
-                    let difference = (shaped.posed(&turned).markers[marker] - posed.markers[marker]) / step;
+                    turned.local_rotations[joint] *=
+                        UnitQuaternion::from_scaled_axis(Vector3::ith(axis, step));
+                    let difference =
+                        (shaped.posed(&turned).markers[marker] - posed.markers[marker]) / step;
                     error += (difference - block.column(axis)).norm_squared();
                     size += difference.norm_squared();
                 }
             });
         }
-        println!("turns: {:.4} of the derivative left out", f64::sqrt(error / size));
+        println!(
+            "turns: {:.4} of the derivative left out",
+            f64::sqrt(error / size)
+        );
         assert!(error < 0.03 * 0.03 * size, "{error} {size}");
         let motion = shaped.joint_shape_motion(&posed);
         for beta in 0..10 {
@@ -302,7 +441,10 @@ mod tests {
             for marker in 0..skin.patches.len() {
                 let difference = (moved.markers[marker] - posed.markers[marker]) / step;
                 let column = shaped.shape_column(marker, beta, &posed, &motion[beta]);
-                assert!((difference - column).norm() < 1.5e-3, "{marker} {beta} {difference} {column}");
+                assert!(
+                    (difference - column).norm() < 1.5e-3,
+                    "{marker} {beta} {difference} {column}"
+                );
             }
         }
     }

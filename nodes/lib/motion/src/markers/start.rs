@@ -1,4 +1,5 @@
-//! A frame without a frame before it: the trunk's markers give the root, falling weights of the prior the rest.
+//! A frame without a frame before it: the trunk's markers give the root, falling weights of the
+//! prior the rest.
 
 use cromosim_body::{BodyPose, Joint};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
@@ -8,26 +9,61 @@ use super::prior::PosePrior;
 use super::skin::ShapedSkin;
 
 /// Weight of the prior, where errors begin to count linearly (m), steps.
-const STAGES: [(f64, f64, usize); 5] = [(4.0, 0.5, 10), (1.0, 0.1, 8), (0.25, 0.03, 8), (0.25, 0.01, 6), (0.25, 0.003, 6)];
+const STAGES: [(f64, f64, usize); 5] = [
+    (4.0, 0.5, 10),
+    (1.0, 0.1, 8),
+    (0.25, 0.03, 8),
+    (0.25, 0.01, 6),
+    (0.25, 0.003, 6),
+];
 
 /// Which markers move with the trunk.
 pub(super) fn trunk_markers(joints: &[Joint]) -> Vec<bool> {
     use Joint::{LeftCollar, LeftHip, Neck, Pelvis, RightCollar, RightHip, Spine1, Spine2, Spine3};
-    joints.iter().map(|joint| [Pelvis, Spine1, Spine2, Spine3, Neck, LeftCollar, RightCollar, LeftHip, RightHip].contains(joint)).collect()
+    joints
+        .iter()
+        .map(|joint| {
+            [
+                Pelvis,
+                Spine1,
+                Spine2,
+                Spine3,
+                Neck,
+                LeftCollar,
+                RightCollar,
+                LeftHip,
+                RightHip,
+            ]
+            .contains(joint)
+        })
+        .collect()
 }
 
-/// `pose` moved and turned as a whole so that its trunk's markers lie nearest to those seen; all markers serve where fewer than three
-/// of the trunk's are seen. `None` where there are fewer than three in all.
-pub(super) fn placed(skin: &ShapedSkin<'_>, observed: &[Option<Vector3<f64>>], trunk: &[bool], pose: &BodyPose) -> Option<BodyPose> {
+/// `pose` moved and turned as a whole so that its trunk's markers lie nearest to those seen; all
+/// markers serve where fewer than three of the trunk's are seen. `None` where there are fewer than
+/// three in all.
+pub(super) fn placed(
+    skin: &ShapedSkin<'_>,
+    observed: &[Option<Vector3<f64>>],
+    trunk: &[bool],
+    pose: &BodyPose,
+) -> Option<BodyPose> {
     let mut pose = pose.clone();
     (pose.root_position, pose.local_rotations[0]) = (Vector3::zeros(), UnitQuaternion::identity());
     let model = skin.posed(&pose).markers;
     let pairs = |only_trunk: bool| -> Vec<(Vector3<f64>, Vector3<f64>)> {
         let chosen = |index: &usize| !only_trunk || trunk[*index];
-        (0..model.len()).filter(chosen).filter_map(|index| Some((model[index], observed[index]?))).collect()
+        (0..model.len())
+            .filter(chosen)
+            .filter_map(|index| Some((model[index], observed[index]?)))
+            .collect()
     };
     let of_trunk = pairs(true);
-    let pairs = if of_trunk.len() >= 3 { of_trunk } else { pairs(false) };
+    let pairs = if of_trunk.len() >= 3 {
+        of_trunk
+    } else {
+        pairs(false)
+    };
     if pairs.len() < 3 {
         return None;
     }
@@ -37,11 +73,16 @@ pub(super) fn placed(skin: &ShapedSkin<'_>, observed: &[Option<Vector3<f64>>], t
 }
 
 /// The rotation R and shift t that minimise the squares of `R a + t - b` (Kabsch 1976).
-pub(crate) fn rigid(pairs: &[(Vector3<f64>, Vector3<f64>)]) -> Option<(UnitQuaternion<f64>, Vector3<f64>)> {
+pub(crate) fn rigid(
+    pairs: &[(Vector3<f64>, Vector3<f64>)],
+) -> Option<(UnitQuaternion<f64>, Vector3<f64>)> {
     let count = pairs.len() as f64;
     let middle_a = pairs.iter().map(|pair| pair.0).sum::<Vector3<f64>>() / count;
     let middle_b = pairs.iter().map(|pair| pair.1).sum::<Vector3<f64>>() / count;
-    let product: Matrix3<f64> = pairs.iter().map(|(a, b)| (b - middle_b) * (a - middle_a).transpose()).sum();
+    let product: Matrix3<f64> = pairs
+        .iter()
+        .map(|(a, b)| (b - middle_b) * (a - middle_a).transpose())
+        .sum();
     let svd = product.try_svd(true, true, 1e-12, 200)?;
     let (u, v_t) = (svd.u?, svd.v_t?);
     let sign = (u * v_t).determinant().signum();
@@ -50,8 +91,8 @@ pub(crate) fn rigid(pairs: &[(Vector3<f64>, Vector3<f64>)]) -> Option<(UnitQuate
     Some((turn, middle_b - turn * middle_a))
 }
 
-/// The pose of a frame from nothing but its markers; `others` are poses seen elsewhere in the recording, tried where the prior's mean
-/// leads nowhere. `None` with fewer than three markers.
+/// The pose of a frame from nothing but its markers; `others` are poses seen elsewhere in the
+/// recording, tried where the prior's mean leads nowhere. `None` with fewer than three markers.
 pub(super) fn cold_start(
     skin: &ShapedSkin<'_>,
     observed: &[Option<Vector3<f64>>],
@@ -62,7 +103,18 @@ pub(super) fn cold_start(
     let from = |pose: &BodyPose| {
         let mut found = (placed(skin, observed, trunk, pose)?, f64::MAX);
         for (prior_weight, huber_m, steps) in STAGES {
-            found = solve(skin, observed, &Terms { prior, prior_weight, huber_m, expected: None }, found.0, steps);
+            found = solve(
+                skin,
+                observed,
+                &Terms {
+                    prior,
+                    prior_weight,
+                    huber_m,
+                    expected: None,
+                },
+                found.0,
+                steps,
+            );
         }
         Some(found)
     };
@@ -84,6 +136,9 @@ const GOOD_M: f64 = 0.02;
 /// Largest distance of a marker seen from where the body has it, m.
 fn error(skin: &ShapedSkin<'_>, observed: &[Option<Vector3<f64>>], pose: &BodyPose) -> f64 {
     let markers = skin.posed(pose).markers;
-    let distances = observed.iter().zip(&markers).filter_map(|(seen, marker)| Some((marker - (*seen)?).norm()));
+    let distances = observed
+        .iter()
+        .zip(&markers)
+        .filter_map(|(seen, marker)| Some((marker - (*seen)?).norm()));
     distances.fold(0.0, f64::max)
 }

@@ -1,5 +1,6 @@
-//! AMASS: `poses` (N, 156) and `mocap_framerate` of the first release, `mocap_frame_rate` and parts of the pose since stage II (SMPL-X too),
-//! and MoSh++'s own pickles (`fullpose`, `stageii_debug_details`). Axis times angle, world z up. Fingers, jaw and eyes are passed over.
+//! AMASS: `poses` (N, 156) and `mocap_framerate` of the first release, `mocap_frame_rate` and parts
+//! of the pose since stage II (SMPL-X too), and MoSh++'s own pickles (`fullpose`,
+//! `stageii_debug_details`). Axis times angle, world z up. Fingers, jaw and eyes are passed over.
 
 use std::io::{Read, Seek};
 
@@ -9,21 +10,28 @@ use nalgebra::Vector3;
 
 use super::track::{PoseAxes, PoseTrack, Rotations};
 use super::values::{
-    Budget, RATES_HZ, RATES_TEXT, SHARED_JOINTS, betas, body_angles, frame_count, gender, numbers, of_axis_angles, of_root_and_body,
-    vectors, wrong,
+    Budget, RATES_HZ, RATES_TEXT, SHARED_JOINTS, betas, body_angles, frame_count, gender, numbers,
+    of_axis_angles, of_root_and_body, vectors, wrong,
 };
 use crate::MotionError;
 
-/// Where MoSh++'s pickles hold its settings as OmegaConf's objects, which are passed over: gender and kind of body stand in them alone.
-pub(super) const SKIPPED: &[&[&str]] = &[&["stageii_debug_details", "cfg"], &["stagei_debug_details"]];
+/// Where MoSh++'s pickles hold its settings as OmegaConf's objects, which are passed over: gender
+/// and kind of body stand in them alone.
+pub(super) const SKIPPED: &[&[&str]] =
+    &[&["stageii_debug_details", "cfg"], &["stagei_debug_details"]];
 /// Values in a row of `poses`: SMPL, its 22 shared joints alone, SMPL-H, SMPL-X.
 const WIDTHS: [usize; 4] = [72, 66, 156, 165];
 
-pub(super) fn tracks<R: Read + Seek>(container: &mut Container<R>, budget: &mut Budget) -> Result<Vec<PoseTrack>, MotionError> {
+pub(super) fn tracks<R: Read + Seek>(
+    container: &mut Container<R>,
+    budget: &mut Budget,
+) -> Result<Vec<PoseTrack>, MotionError> {
     let (rotations, width) = poses(container, budget)?;
     let count = rotations.len();
     let trans = vectors(&container.at("trans")?, count)?;
-    let kind = container.get("surface_model_type")?.and_then(|entry| entry.text().ok());
+    let kind = container
+        .get("surface_model_type")?
+        .and_then(|entry| entry.text().ok());
     let shape_space = match kind.map(|kind| kind.to_ascii_lowercase()).as_deref() {
         // As our own writer marks the embedded body's.
         Some("cromosim") => ShapeSpace::Cromosim,
@@ -34,10 +42,17 @@ pub(super) fn tracks<R: Read + Seek>(container: &mut Container<R>, budget: &mut 
     let details = container.get("stageii_debug_details")?;
     let of_details = |key: &str| details.as_ref().and_then(|details| details.get(key));
     let rate = match container.get("mocap_framerate")? {
-        None => container.get("mocap_frame_rate")?.or_else(|| of_details("mocap_frame_rate")),
+        None => container
+            .get("mocap_frame_rate")?
+            .or_else(|| of_details("mocap_frame_rate")),
         rate => rate,
     };
-    let gender = gender(container.get("gender")?.or_else(|| of_details("gender")).as_ref());
+    let gender = gender(
+        container
+            .get("gender")?
+            .or_else(|| of_details("gender"))
+            .as_ref(),
+    );
     Ok(vec![PoseTrack {
         person: "0".to_owned(),
         gender,
@@ -58,31 +73,56 @@ fn rate_of(entry: &Entry) -> Result<f64, MotionError> {
     if RATES_HZ.contains(&rate_hz) {
         Ok(rate_hz)
     } else {
-        Err(wrong(entry, format!("the rate is {rate_hz} Hz, expected {RATES_TEXT}; set rate_hz")))
+        Err(wrong(
+            entry,
+            format!("the rate is {rate_hz} Hz, expected {RATES_TEXT}; set rate_hz"),
+        ))
     }
 }
 
 /// The rotations, and how many values a row of the pose has.
-fn poses<R: Read + Seek>(container: &mut Container<R>, budget: &mut Budget) -> Result<(Vec<Rotations>, usize), MotionError> {
+fn poses<R: Read + Seek>(
+    container: &mut Container<R>,
+    budget: &mut Budget,
+) -> Result<(Vec<Rotations>, usize), MotionError> {
     for key in ["poses", "fullpose"] {
-        let Some(entry) = container.get(key)? else { continue };
+        let Some(entry) = container.get(key)? else {
+            continue;
+        };
         let shape = entry.shape()?;
         let (count, width) = match shape[..] {
             [count, width] if WIDTHS.contains(&width) => (count, width),
             _ => {
                 let found = shape.iter().map(|&size| size as u64).collect();
-                let expected = "(N, 72) of SMPL, (N, 156) of SMPL-H or (N, 165) of SMPL-X".to_owned();
-                return Err(ArraysError::Shape { path: entry.path().to_owned(), key: key.to_owned(), found, expected }.into());
+                let expected =
+                    "(N, 72) of SMPL, (N, 156) of SMPL-H or (N, 165) of SMPL-X".to_owned();
+                return Err(ArraysError::Shape {
+                    path: entry.path().to_owned(),
+                    key: key.to_owned(),
+                    found,
+                    expected,
+                }
+                .into());
             }
         };
         budget.take(key, count)?;
         let rows = numbers(&entry, &[None, None], "(N, 156)")?;
-        return Ok((of_axis_angles(&rows.values, width, if width == 72 { 24 } else { SHARED_JOINTS }), width));
+        return Ok((
+            of_axis_angles(
+                &rows.values,
+                width,
+                if width == 72 { 24 } else { SHARED_JOINTS },
+            ),
+            width,
+        ));
     }
     let root = container.at("root_orient")?;
     let count = frame_count(&root);
     budget.take("root_orient", count)?;
     let root = numbers(&root, &[Some(count), Some(3)], "(N, 3)")?;
     let body = body_angles(&container.at("pose_body")?, count)?;
-    Ok((of_root_and_body(&root.values, &body.values), 3 * SHARED_JOINTS))
+    Ok((
+        of_root_and_body(&root.values, &body.values),
+        3 * SHARED_JOINTS,
+    ))
 }

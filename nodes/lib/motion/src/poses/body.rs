@@ -21,7 +21,8 @@ use crate::{MotionError, MotionOptions, SmplMotion};
 /// How clearly the mean upward direction must point along an axis: cos 53 degrees.
 const CLEARLY_UP: f64 = 0.6;
 
-/// One person's poses in the axes of a camera (x right, y down, z forward), for a global trajectory.
+/// One person's poses in the axes of a camera (x right, y down, z forward), for a global
+/// trajectory.
 #[derive(Clone, Debug)]
 pub struct CameraPoses {
     /// Names the file.
@@ -38,7 +39,8 @@ pub struct CameraPoses {
     pub poses: Vec<BodyPose>,
     /// How sure each pose is, in [0, 1]: 0 where the track has a gap.
     pub pose_confidence: Vec<f64>,
-    /// Shape coefficients of each frame where they are those of the body; no list at all for the mean shape.
+    /// Shape coefficients of each frame where they are those of the body; no list at all for the
+    /// mean shape.
     pub betas: Vec<Vec<f64>>,
 }
 
@@ -62,7 +64,13 @@ struct Frames {
 impl OnBody<'_> {
     pub fn motion(&self, track: PoseTrack) -> Result<SmplMotion, MotionError> {
         let (rate_hz, rate_origin) = self.rate(&track)?;
-        let shape = Shape::choose(self.path, &track, self.body, self.source_body, self.options.shape)?;
+        let shape = Shape::choose(
+            self.path,
+            &track,
+            self.body,
+            self.source_body,
+            self.options.shape,
+        )?;
         let shaped = ShapedBody::new(self.body.clone(), &shape.betas)?;
         let (world_from_file, up_axis) = self.world_from_file(&track)?;
         let pelvis_in_model = match &shape.source_joints {
@@ -70,24 +78,40 @@ impl OnBody<'_> {
             None if track.shape_space != self.body.shape_space() => usual_pelvis(track.shape_space),
             None => shaped.joints_in_model()[0],
         };
-        let metres = shape.source_joints.as_ref().map_or(1.0, |source| leg_length(shaped.joints_in_model()) / leg_length(source));
+        let metres = shape.source_joints.as_ref().map_or(1.0, |source| {
+            leg_length(shaped.joints_in_model()) / leg_length(source)
+        });
         let pose = |frame: usize| {
             let mut local_rotations = track.rotations[frame];
             local_rotations[0] = world_from_file * local_rotations[0];
             let root_position = match &track.trans {
                 Some(trans) => {
-                    let turn = track.pelvis_turns.as_ref().map_or_else(UnitQuaternion::identity, |turns| turns[frame]);
+                    let turn = track
+                        .pelvis_turns
+                        .as_ref()
+                        .map_or_else(UnitQuaternion::identity, |turns| turns[frame]);
                     world_from_file * (turn * pelvis_in_model + trans[frame]) * metres
                 }
                 None => Vector3::zeros(),
             };
-            BodyPose { root_position, local_rotations }
+            BodyPose {
+                root_position,
+                local_rotations,
+            }
         };
-        let Frames { poses, confidence, played } = self.frames(&track, rate_hz, pose)?;
+        let Frames {
+            poses,
+            confidence,
+            played,
+        } = self.frames(&track, rate_hz, pose)?;
         let mut frames = continuous(poses);
         // MoCap knows its floor; a video's is a guess, and another body's feet are elsewhere.
         let knows_floor = !self.format.is_video() && shape.origin == ShapeOrigin::File;
-        let floor_shift_m = if knows_floor { 0.0 } else { floor::stand_on_floor(&shaped, &mut frames, rate_hz) };
+        let floor_shift_m = if knows_floor {
+            0.0
+        } else {
+            floor::stand_on_floor(&shaped, &mut frames, rate_hz)
+        };
         let report = PoseReport {
             format: self.format,
             person: track.person.clone(),
@@ -108,7 +132,11 @@ impl OnBody<'_> {
         Ok(SmplMotion {
             name: self.path.display().to_string(),
             rate_hz,
-            gender: self.body.gender().or(track.gender).unwrap_or(Gender::Neutral),
+            gender: self
+                .body
+                .gender()
+                .or(track.gender)
+                .unwrap_or(Gender::Neutral),
             betas: shape.betas,
             shape_space: self.body.shape_space(),
             frames,
@@ -125,11 +153,30 @@ impl OnBody<'_> {
             return Ok(None);
         }
         let (rate_hz, _) = self.rate(track)?;
-        let pose = |frame: usize| BodyPose { root_position: Vector3::zeros(), local_rotations: track.rotations[frame] };
-        let Frames { poses, confidence, played } = self.frames(track, rate_hz, pose)?;
-        let own = track.shape_space == self.body.shape_space() && track.shape_space != ShapeSpace::Cromosim;
-        let own = own && self.body.check_betas(track.shape_space, track.gender, &track.mean_betas()).is_ok();
-        let betas_at = |frame: usize| track.betas_of(frame).iter().take(self.body.beta_count()).copied().collect();
+        let pose = |frame: usize| BodyPose {
+            root_position: Vector3::zeros(),
+            local_rotations: track.rotations[frame],
+        };
+        let Frames {
+            poses,
+            confidence,
+            played,
+        } = self.frames(track, rate_hz, pose)?;
+        let own = track.shape_space == self.body.shape_space()
+            && track.shape_space != ShapeSpace::Cromosim;
+        let own = own
+            && self
+                .body
+                .check_betas(track.shape_space, track.gender, &track.mean_betas())
+                .is_ok();
+        let betas_at = |frame: usize| {
+            track
+                .betas_of(frame)
+                .iter()
+                .take(self.body.beta_count())
+                .copied()
+                .collect()
+        };
         let places = played.places(track.frame_ids.as_deref());
         Ok(Some(CameraPoses {
             name: self.path.display().to_string(),
@@ -139,7 +186,14 @@ impl OnBody<'_> {
             first_frame: first_frame(track, &played),
             poses: continuous(poses),
             pose_confidence: confidence,
-            betas: if own { places.into_iter().map(|(frame, _)| betas_at(frame)).collect() } else { Vec::new() },
+            betas: if own {
+                places
+                    .into_iter()
+                    .map(|(frame, _)| betas_at(frame))
+                    .collect()
+            } else {
+                Vec::new()
+            },
         }))
     }
 
@@ -148,46 +202,85 @@ impl OnBody<'_> {
         if let Some(rate_hz) = self.options.rate_hz {
             let expected = RATES_TEXT.to_owned();
             let name = self.path.display().to_string();
-            let wrong = MotionError::Setting { name, setting: "rate_hz", value: rate_hz, expected };
-            return if RATES_HZ.contains(&rate_hz) { Ok((rate_hz, RateOrigin::Option)) } else { Err(wrong) };
+            let wrong = MotionError::Setting {
+                name,
+                setting: "rate_hz",
+                value: rate_hz,
+                expected,
+            };
+            return if RATES_HZ.contains(&rate_hz) {
+                Ok((rate_hz, RateOrigin::Option))
+            } else {
+                Err(wrong)
+            };
         }
         match track.rate_hz {
             Some(rate_hz) => Ok((rate_hz, RateOrigin::File)),
             None if self.format.is_video() => Ok((VIDEO_RATE_HZ, RateOrigin::Assumed)),
-            None => Err(problem(self.path, "mocap_framerate", "missing, and mocap_frame_rate too; set rate_hz")),
+            None => Err(problem(
+                self.path,
+                "mocap_framerate",
+                "missing, and mocap_frame_rate too; set rate_hz",
+            )),
         }
     }
 
     /// The part of the track that is played, at a constant rate.
-    fn frames(&self, track: &PoseTrack, rate_hz: f64, pose: impl Fn(usize) -> BodyPose) -> Result<Frames, MotionError> {
+    fn frames(
+        &self,
+        track: &PoseTrack,
+        rate_hz: f64,
+        pose: impl Fn(usize) -> BodyPose,
+    ) -> Result<Frames, MotionError> {
         let ids = track.frame_ids.as_deref();
         let played = Played::of(ids, track.rotations.len(), rate_hz);
         if played.length > MAX_POSES {
             return Err(too_long(self.path));
         }
-        let (mut poses, mut confidence) = (Vec::with_capacity(played.length), Vec::with_capacity(played.length));
+        let (mut poses, mut confidence) = (
+            Vec::with_capacity(played.length),
+            Vec::with_capacity(played.length),
+        );
         for (frame, fraction) in played.places(ids) {
             if fraction == 0.0 {
                 poses.push(pose(frame));
-                confidence.push(track.confidence.as_ref().map_or(1.0, |values| values[frame]));
+                confidence.push(
+                    track
+                        .confidence
+                        .as_ref()
+                        .map_or(1.0, |values| values[frame]),
+                );
             } else {
                 poses.push(between(&pose(frame), &pose(frame + 1), fraction));
                 confidence.push(0.0);
             }
         }
-        Ok(Frames { poses, confidence, played })
+        Ok(Frames {
+            poses,
+            confidence,
+            played,
+        })
     }
 
-    /// The rotation from the file's axes into a world with z up, and the name of the file's up axis.
-    fn world_from_file(&self, track: &PoseTrack) -> Result<(UnitQuaternion<f64>, String), MotionError> {
+    /// The rotation from the file's axes into a world with z up, and the name of the file's up
+    /// axis.
+    fn world_from_file(
+        &self,
+        track: &PoseTrack,
+    ) -> Result<(UnitQuaternion<f64>, String), MotionError> {
         let up = match (self.options.up_axis.direction(), track.axes) {
             (Some(up), _) | (None, PoseAxes::Up(up)) => up,
-            (None, PoseAxes::Camera) => return Ok((world_from_level_camera(), "camera".to_owned())),
+            (None, PoseAxes::Camera) => {
+                return Ok((world_from_level_camera(), "camera".to_owned()));
+            }
             (None, PoseAxes::Detect) => {
                 let mean = track.mean_upward();
                 let up = nearest_axis(mean);
                 if up.dot(&mean) < CLEARLY_UP {
-                    return Err(MotionError::UpAxis { name: self.path.display().to_string(), mean: mean.into() });
+                    return Err(MotionError::UpAxis {
+                        name: self.path.display().to_string(),
+                        mean: mean.into(),
+                    });
                 }
                 up
             }
@@ -198,18 +291,28 @@ impl OnBody<'_> {
 
 /// Number of the first frame that is played.
 fn first_frame(track: &PoseTrack, played: &Played) -> i64 {
-    track.frame_ids.as_ref().map_or(0, |ids| ids[played.frames.start])
+    track
+        .frame_ids
+        .as_ref()
+        .map_or(0, |ids| ids[played.frames.start])
 }
 
 fn between(from: &BodyPose, to: &BodyPose, fraction: f64) -> BodyPose {
     BodyPose {
         root_position: from.root_position.lerp(&to.root_position, fraction),
-        local_rotations: std::array::from_fn(|joint| slerp(&from.local_rotations[joint], &to.local_rotations[joint], fraction)),
+        local_rotations: std::array::from_fn(|joint| {
+            slerp(
+                &from.local_rotations[joint],
+                &to.local_rotations[joint],
+                fraction,
+            )
+        }),
     }
 }
 
-/// Where the mean body's pelvis joint stands in its model frame, m, to a centimetre: for files whose body is not at hand. Errors of it, a few
-/// centimetres by the betas, move a whole motion; only where a camera turns (TRAM) do they turn with it.
+/// Where the mean body's pelvis joint stands in its model frame, m, to a centimetre: for files
+/// whose body is not at hand. Errors of it, a few centimetres by the betas, move a whole motion;
+/// only where a camera turns (TRAM) do they turn with it.
 fn usual_pelvis(space: ShapeSpace) -> Vector3<f64> {
     match space {
         ShapeSpace::Cromosim => Vector3::new(0.0, -0.22, 0.0),

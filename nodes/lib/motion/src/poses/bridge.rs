@@ -19,26 +19,48 @@ pub(super) struct Played {
 impl Played {
     /// Of `count` frames numbered by `ids`, which rise.
     pub fn of(ids: Option<&[i64]>, count: usize, rate_hz: f64) -> Self {
-        let Some(ids) = ids else { return Self { frames: 0..count, length: count } };
-        let longest = (LONGEST_GAP_S * rate_hz).round().clamp(1.0, LONGEST_GAP_FRAMES) as i64 + 1;
-        let mut best = Self { frames: 0..0, length: 0 };
-        let mut current = Self { frames: 0..1, length: 1 };
+        let Some(ids) = ids else {
+            return Self {
+                frames: 0..count,
+                length: count,
+            };
+        };
+        let longest = (LONGEST_GAP_S * rate_hz)
+            .round()
+            .clamp(1.0, LONGEST_GAP_FRAMES) as i64
+            + 1;
+        let mut best = Self {
+            frames: 0..0,
+            length: 0,
+        };
+        let mut current = Self {
+            frames: 0..1,
+            length: 1,
+        };
         for (index, pair) in ids.windows(2).enumerate() {
             let step = pair[1].saturating_sub(pair[0]);
             if step > longest {
                 if current.frames.len() > best.frames.len() {
                     best = current;
                 }
-                current = Self { frames: index + 1..index + 2, length: 1 };
+                current = Self {
+                    frames: index + 1..index + 2,
+                    length: 1,
+                };
             } else {
                 current.frames.end = index + 2;
                 current.length += usize::try_from(step).unwrap_or(1);
             }
         }
-        if current.frames.len() > best.frames.len() { current } else { best }
+        if current.frames.len() > best.frames.len() {
+            current
+        } else {
+            best
+        }
     }
 
-    /// Of each frame of the motion the track's frame at or before it, and how far it is from there to the next one, in [0, 1).
+    /// Of each frame of the motion the track's frame at or before it, and how far it is from there
+    /// to the next one, in [0, 1).
     pub fn places(&self, ids: Option<&[i64]>) -> Vec<(usize, f64)> {
         let mut places = Vec::with_capacity(self.length);
         for index in self.frames.clone() {
@@ -59,14 +81,35 @@ mod tests {
     #[test]
     fn short_gaps_are_bridged_and_long_ones_split() {
         let whole = Played::of(None, 5, 30.0);
-        assert_eq!((whole.clone(), whole.places(None)[4]), (Played { frames: 0..5, length: 5 }, (4, 0.0)));
+        assert_eq!(
+            (whole.clone(), whole.places(None)[4]),
+            (
+                Played {
+                    frames: 0..5,
+                    length: 5
+                },
+                (4, 0.0)
+            )
+        );
         let ids = [3, 4, 8, 100, 101];
         let played = Played::of(Some(&ids), 5, 30.0);
-        assert_eq!(played, Played { frames: 0..3, length: 6 });
-        assert_eq!(played.places(Some(&ids)), [(0, 0.0), (1, 0.0), (1, 0.25), (1, 0.5), (1, 0.75), (2, 0.0)]);
+        assert_eq!(
+            played,
+            Played {
+                frames: 0..3,
+                length: 6
+            }
+        );
+        assert_eq!(
+            played.places(Some(&ids)),
+            [(0, 0.0), (1, 0.0), (1, 0.25), (1, 0.5), (1, 0.75), (2, 0.0)]
+        );
         assert_eq!(Played::of(Some(&[0, 31]), 2, 30.0).length, 32);
         assert_eq!(Played::of(Some(&[0, 32]), 2, 30.0).length, 1);
-        assert_eq!(Played::of(Some(&[i64::MIN, 0, 1, i64::MAX]), 4, 30.0).frames, 1..3);
+        assert_eq!(
+            Played::of(Some(&[i64::MIN, 0, 1, i64::MAX]), 4, 30.0).frames,
+            1..3
+        );
         assert_eq!(Played::of(Some(&[0, 241, 500]), 3, 1e4).length, 242);
     }
 }

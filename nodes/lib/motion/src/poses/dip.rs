@@ -1,5 +1,5 @@
-//! DIP-IMU (Huang et al. 2018): `gt` (N, 72), the reference poses in place at 60 Hz. What its sensors measured is read by
-//! [`DipRecording`](crate::datasets::DipRecording).
+//! DIP-IMU (Huang et al. 2018): `gt` (N, 72), the reference poses in place at 60 Hz. What its
+//! sensors measured is read by [`DipRecording`](crate::datasets::DipRecording).
 
 use std::io::{Read, Seek};
 
@@ -11,7 +11,10 @@ use super::values::{Budget, frame_count, numbers, of_axis_angles};
 use crate::MotionError;
 use crate::datasets::DIP_RATE_HZ;
 
-pub(super) fn track<R: Read + Seek>(container: &mut Container<R>, budget: &mut Budget) -> Result<PoseTrack, MotionError> {
+pub(super) fn track<R: Read + Seek>(
+    container: &mut Container<R>,
+    budget: &mut Budget,
+) -> Result<PoseTrack, MotionError> {
     let pose = container.at("gt")?;
     budget.take(pose.key(), frame_count(&pose))?;
     let rows = numbers(&pose, &[None, Some(72)], "(N, 72)")?;
@@ -19,7 +22,10 @@ pub(super) fn track<R: Read + Seek>(container: &mut Container<R>, budget: &mut B
         person: "0".to_owned(),
         gender: None,
         shape_space: ShapeSpace::Smpl,
-        betas: Array { shape: vec![1, 0], values: Vec::new() },
+        betas: Array {
+            shape: vec![1, 0],
+            values: Vec::new(),
+        },
         frame_ids: None,
         rotations: of_axis_angles(&rows.values, 72, 24),
         trans: None,

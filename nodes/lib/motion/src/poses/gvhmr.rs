@@ -1,5 +1,6 @@
-//! GVHMR: `smpl_params_global` with `global_orient` (N, 3), `body_pose` (N, 63), `transl` (N, 3) and `betas` of SMPL-X, in a world with y up;
-//! `smpl_params_incam` is the same in the camera's axes.
+//! GVHMR: `smpl_params_global` with `global_orient` (N, 3), `body_pose` (N, 63), `transl` (N, 3)
+//! and `betas` of SMPL-X, in a world with y up; `smpl_params_incam` is the same in the camera's
+//! axes.
 
 use cromosim_arrays::Entry;
 use cromosim_body::ShapeSpace;
@@ -10,8 +11,16 @@ use super::track::{PoseAxes, PoseTrack};
 use super::values::{Budget, betas, body_angles, frame_count, numbers, of_root_and_body, vectors};
 use crate::MotionError;
 
-pub(super) fn track(root: &Entry, view: PoseView, budget: &mut Budget) -> Result<PoseTrack, MotionError> {
-    let parameters = root.at(if view == PoseView::Camera { "smpl_params_incam" } else { "smpl_params_global" })?;
+pub(super) fn track(
+    root: &Entry,
+    view: PoseView,
+    budget: &mut Budget,
+) -> Result<PoseTrack, MotionError> {
+    let parameters = root.at(if view == PoseView::Camera {
+        "smpl_params_incam"
+    } else {
+        "smpl_params_global"
+    })?;
     let orient = parameters.at("global_orient")?;
     let count = frame_count(&orient);
     budget.take(orient.key(), count)?;
@@ -19,7 +28,10 @@ pub(super) fn track(root: &Entry, view: PoseView, budget: &mut Budget) -> Result
     let body = body_angles(&parameters.at("body_pose")?, count)?;
     let (trans, axes) = match view {
         PoseView::Camera => (None, PoseAxes::Camera),
-        PoseView::World => (Some(vectors(&parameters.at("transl")?, count)?), PoseAxes::Up(Vector3::y())),
+        PoseView::World => (
+            Some(vectors(&parameters.at("transl")?, count)?),
+            PoseAxes::Up(Vector3::y()),
+        ),
     };
     Ok(PoseTrack {
         person: "0".to_owned(),

@@ -1,9 +1,10 @@
 //! Files of SMPL parameters: AMASS, and what estimators from video write.
 //!
-//! A file is recognised by its keys ([`PoseFormat`]), whatever packs it (npz, pickle, joblib, torch, npy). Each format has a file here that
-//! turns it into [`PoseTrack`]s, one a person: SMPL's 24 rotations per frame and `trans`, in the file's own axes. A track becomes a
-//! [`SmplMotion`](crate::SmplMotion) on a body in a world with z up ([`PoseFile::into_motion`]), or stays in camera axes
-//! ([`PoseFile::into_camera_poses`]).
+//! A file is recognised by its keys ([`PoseFormat`]), whatever packs it (npz, pickle, joblib,
+//! torch, npy). Each format has a file here that turns it into [`PoseTrack`]s, one a person: SMPL's
+//! 24 rotations per frame and `trans`, in the file's own axes. A track becomes a
+//! [`SmplMotion`](crate::SmplMotion) on a body in a world with z up ([`PoseFile::into_motion`]), or
+//! stays in camera axes ([`PoseFile::into_camera_poses`]).
 //!
 //! | format | keys | axes | person |
 //! |---|---|---|---|
@@ -56,7 +57,8 @@ pub const VIDEO_RATE_HZ: f64 = 30.0;
 /// Who wrote a file of SMPL parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PoseFormat {
-    /// AMASS (Mahmood et al. 2019), the releases for SMPL, SMPL-H and SMPL-X, and MoSh++'s stage II.
+    /// AMASS (Mahmood et al. 2019), the releases for SMPL, SMPL-H and SMPL-X, and MoSh++'s stage
+    /// II.
     Amass,
     /// VIBE (Kocabas et al. 2020).
     Vibe,

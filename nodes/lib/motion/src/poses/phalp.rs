@@ -1,6 +1,7 @@
-//! PHALP, the tracker of 4D-Humans: a dictionary of frames, each with the people's numbers `tid`, their `smpl` (`global_orient` (1, 3, 3),
-//! `body_pose` (23, 3, 3), `betas` (10)) in the camera's axes, and `time`, the frame's number. People whom it has lost for a while are
-//! guessed (`tracked_time` above 0): such frames have confidence 0.
+//! PHALP, the tracker of 4D-Humans: a dictionary of frames, each with the people's numbers `tid`,
+//! their `smpl` (`global_orient` (1, 3, 3), `body_pose` (23, 3, 3), `betas` (10)) in the camera's
+//! axes, and `time`, the frame's number. People whom it has lost for a while are guessed
+//! (`tracked_time` above 0): such frames have confidence 0.
 
 use std::collections::BTreeMap;
 
@@ -14,30 +15,48 @@ use crate::MotionError;
 pub(super) fn tracks(root: &Entry, budget: &mut Budget) -> Result<Vec<PoseTrack>, MotionError> {
     let mut frames = Vec::new();
     for (index, (_, frame)) in root.pairs()?.into_iter().enumerate() {
-        let time = frame.get("time").map_or(Ok(index as i64), |time| time.integer())?;
+        let time = frame
+            .get("time")
+            .map_or(Ok(index as i64), |time| time.integer())?;
         frames.push((time, frame));
     }
     frames.sort_by_key(|(time, _)| *time);
     let mut people: BTreeMap<i64, PoseTrack> = BTreeMap::new();
     for (time, frame) in &frames {
         let numbers = frame.at("tid")?;
-        let ids = numbers.integers(&[None], "(P), one number a person")?.values;
+        let ids = numbers
+            .integers(&[None], "(P), one number a person")?
+            .values;
         let bodies = frame.at("smpl")?;
         let items = bodies.items()?;
         if items.len() != ids.len() {
-            return Err(wrong(&bodies, format!("{} bodies for the {} people of tid", items.len(), ids.len())));
+            return Err(wrong(
+                &bodies,
+                format!("{} bodies for the {} people of tid", items.len(), ids.len()),
+            ));
         }
         let lost = match frame.get("tracked_time") {
-            Some(lost) => lost.integers(&[None], "(P), frames since the person was seen")?.values,
+            Some(lost) => {
+                lost.integers(&[None], "(P), frames since the person was seen")?
+                    .values
+            }
             None => Vec::new(),
         };
         for (place, (id, body)) in ids.iter().zip(&items).enumerate() {
             budget.take(body.key(), 1)?;
             let track = people.entry(*id).or_insert_with(|| empty(*id));
             if track.frame_ids.as_ref().and_then(|times| times.last()) == Some(time) {
-                return Err(wrong(&numbers, format!("person {id} stands twice in the frame of time {time}")));
+                return Err(wrong(
+                    &numbers,
+                    format!("person {id} stands twice in the frame of time {time}"),
+                ));
             }
-            add(track, *time, body, lost.get(place).is_none_or(|&frames| frames <= 0))?;
+            add(
+                track,
+                *time,
+                body,
+                lost.get(place).is_none_or(|&frames| frames <= 0),
+            )?;
         }
     }
     Ok(people.into_values().collect())
@@ -48,7 +67,10 @@ fn empty(id: i64) -> PoseTrack {
         person: id.to_string(),
         gender: None,
         shape_space: ShapeSpace::Smpl,
-        betas: Array { shape: vec![0, 0], values: Vec::new() },
+        betas: Array {
+            shape: vec![0, 0],
+            values: Vec::new(),
+        },
         frame_ids: Some(Vec::new()),
         rotations: Vec::new(),
         trans: None,
@@ -74,7 +96,13 @@ fn add(track: &mut PoseTrack, time: i64, body: &Entry, seen: bool) -> Result<(),
     if track.betas.shape[0] == 0 {
         track.betas.shape = vec![0, count];
     } else if track.betas.shape[1] != count {
-        return Err(wrong(body, format!("{count} betas, but {} in the person's frames before", track.betas.shape[1])));
+        return Err(wrong(
+            body,
+            format!(
+                "{count} betas, but {} in the person's frames before",
+                track.betas.shape[1]
+            ),
+        ));
     }
     track.betas.shape[0] += 1;
     track.betas.values.extend(row.values);
@@ -82,9 +110,15 @@ fn add(track: &mut PoseTrack, time: i64, body: &Entry, seen: bool) -> Result<(),
 }
 
 /// `count` matrices: (count, 3, 3), or (3, 3) of one.
-fn matrices(entry: &Entry, count: usize) -> Result<Vec<nalgebra::UnitQuaternion<f64>>, MotionError> {
-    let expected: &[Option<usize>] =
-        if count == 1 && entry.shape()?.len() == 2 { &[Some(3), Some(3)] } else { &[Some(count), Some(3), Some(3)] };
+fn matrices(
+    entry: &Entry,
+    count: usize,
+) -> Result<Vec<nalgebra::UnitQuaternion<f64>>, MotionError> {
+    let expected: &[Option<usize>] = if count == 1 && entry.shape()?.len() == 2 {
+        &[Some(3), Some(3)]
+    } else {
+        &[Some(count), Some(3), Some(3)]
+    };
     let array = super::values::numbers(entry, expected, &format!("({count}, 3, 3)"))?;
     of_matrices(entry, &array.values)
 }

@@ -35,7 +35,8 @@ pub struct PoseTrack {
     pub rotations: Vec<Rotations>,
     /// SMPL's `trans`, m, N; absent where the file knows no place that can be trusted.
     pub trans: Option<Vec<Vector3<f64>>>,
-    /// What turned `trans` after SMPL was evaluated, where frames differ in it: the pelvis stands at turn J_0 + trans.
+    /// What turned `trans` after SMPL was evaluated, where frames differ in it: the pelvis stands
+    /// at turn J_0 + trans.
     pub(crate) pelvis_turns: Option<Vec<UnitQuaternion<f64>>>,
     /// The axes of the above.
     pub axes: PoseAxes,
@@ -48,26 +49,42 @@ pub struct PoseTrack {
 impl PoseTrack {
     /// Shape coefficients over the track: the mean of its rows.
     pub fn mean_betas(&self) -> Vec<f64> {
-        let [rows, count] = self.betas.shape[..] else { return Vec::new() };
-        let column = |beta: usize| (0..rows).filter_map(|row| self.betas.values.get(row * count + beta)).sum::<f64>();
+        let [rows, count] = self.betas.shape[..] else {
+            return Vec::new();
+        };
+        let column = |beta: usize| {
+            (0..rows)
+                .filter_map(|row| self.betas.values.get(row * count + beta))
+                .sum::<f64>()
+        };
         (0..count).map(|beta| column(beta) / rows as f64).collect()
     }
 
     /// Shape coefficients of one frame.
     pub(crate) fn betas_of(&self, frame: usize) -> &[f64] {
-        let [rows, count] = self.betas.shape[..] else { return &[] };
+        let [rows, count] = self.betas.shape[..] else {
+            return &[];
+        };
         let row = if rows == 1 { 0 } else { frame };
-        self.betas.values.get(row * count..(row + 1) * count).unwrap_or_default()
+        self.betas
+            .values
+            .get(row * count..(row + 1) * count)
+            .unwrap_or_default()
     }
 
     /// Mean over the frames of where the pelvis' y axis, the upward one at rest, points.
     pub(crate) fn mean_upward(&self) -> Vector3<f64> {
-        let sum: Vector3<f64> = self.rotations.iter().map(|rotations| rotations[0] * Vector3::y()).sum();
+        let sum: Vector3<f64> = self
+            .rotations
+            .iter()
+            .map(|rotations| rotations[0] * Vector3::y())
+            .sum();
         sum / self.rotations.len().max(1) as f64
     }
 }
 
-/// world_from_camera of a camera that is held level and looks along the world's x axis: x right, y down, z forward become -y, -z, x.
+/// world_from_camera of a camera that is held level and looks along the world's x axis: x right, y
+/// down, z forward become -y, -z, x.
 pub(crate) fn world_from_level_camera() -> UnitQuaternion<f64> {
     let columns = Matrix3::from_columns(&[-Vector3::y(), -Vector3::z(), Vector3::x()]);
     UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(columns))

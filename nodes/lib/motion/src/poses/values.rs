@@ -30,30 +30,47 @@ pub(super) struct Budget {
 
 impl Budget {
     pub fn new(path: &Path) -> Self {
-        Self { path: path.to_owned(), frames: MAX_POSES }
+        Self {
+            path: path.to_owned(),
+            frames: MAX_POSES,
+        }
     }
 
     /// Takes `count` frames off: before memory is taken for them, and at least one.
     pub fn take(&mut self, key: &str, count: usize) -> Result<(), MotionError> {
         if count == 0 {
-            return Err(problem(&self.path, key, "it has no frames, expected one or more"));
+            return Err(problem(
+                &self.path,
+                key,
+                "it has no frames, expected one or more",
+            ));
         }
         let left = self.frames.checked_sub(count);
-        self.frames =
-            left.ok_or_else(|| problem(&self.path, key, format!("more than {MAX_POSES} frames of all people; cut the file into parts")))?;
+        self.frames = left.ok_or_else(|| {
+            problem(
+                &self.path,
+                key,
+                format!("more than {MAX_POSES} frames of all people; cut the file into parts"),
+            )
+        })?;
         Ok(())
     }
 }
 
 pub(super) fn problem(path: &Path, key: &str, problem: impl Into<String>) -> MotionError {
-    MotionError::Key { path: path.to_owned(), key: key.to_owned(), problem: problem.into() }
+    MotionError::Key {
+        path: path.to_owned(),
+        key: key.to_owned(),
+        problem: problem.into(),
+    }
 }
 
 pub(super) fn wrong(entry: &Entry, text: impl Into<String>) -> MotionError {
     problem(entry.path(), entry.key(), text)
 }
 
-/// How many frames an array has, without decoding it; what is no array has one, and decoding it says what is wrong.
+/// How many frames an array has, without decoding it; what is no array has one, and decoding it
+/// says what is wrong.
 pub(super) fn frame_count(entry: &Entry) -> usize {
     match entry.value() {
         Value::Array(array) => array.shape().first().copied().unwrap_or(1),
@@ -63,26 +80,46 @@ pub(super) fn frame_count(entry: &Entry) -> usize {
 }
 
 /// Finite numbers of sane size.
-pub(super) fn numbers(entry: &Entry, expected: &[Option<usize>], expectation: &str) -> Result<Array<f64>, MotionError> {
+pub(super) fn numbers(
+    entry: &Entry,
+    expected: &[Option<usize>],
+    expectation: &str,
+) -> Result<Array<f64>, MotionError> {
     let array = entry.floats(expected, expectation)?;
-    let Some(element) = array.values.iter().position(|value| value.abs() > LARGEST) else { return Ok(array) };
+    let Some(element) = array.values.iter().position(|value| value.abs() > LARGEST) else {
+        return Ok(array);
+    };
     let value = array.values[element];
-    Err(wrong(entry, format!("element {element} (C order) is {value:e}, expected at most {LARGEST:e} in size")))
+    Err(wrong(
+        entry,
+        format!("element {element} (C order) is {value:e}, expected at most {LARGEST:e} in size"),
+    ))
 }
 
 /// (N, 3), also where it is written as (N, 1, 3).
 pub(super) fn vectors(entry: &Entry, count: usize) -> Result<Vec<Vector3<f64>>, MotionError> {
     let expectation = format!("({count}, 3)");
-    let expected: &[Option<usize>] = if entry.shape()?.len() == 3 { &[Some(count), Some(1), Some(3)] } else { &[Some(count), Some(3)] };
+    let expected: &[Option<usize>] = if entry.shape()?.len() == 3 {
+        &[Some(count), Some(1), Some(3)]
+    } else {
+        &[Some(count), Some(3)]
+    };
     let array = numbers(entry, expected, &expectation)?;
-    Ok(array.values.chunks_exact(3).map(Vector3::from_column_slice).collect())
+    Ok(array
+        .values
+        .chunks_exact(3)
+        .map(Vector3::from_column_slice)
+        .collect())
 }
 
-/// Of rows that are a joint's axis times angle each (rad), the rotations of the first `joints`; identity for the rest of SMPL's.
+/// Of rows that are a joint's axis times angle each (rad), the rotations of the first `joints`;
+/// identity for the rest of SMPL's.
 pub(super) fn of_axis_angles(rows: &[f64], width: usize, joints: usize) -> Vec<Rotations> {
     let of_row = |row: &[f64]| -> Rotations {
         std::array::from_fn(|joint| match row.get(3 * joint..3 * joint + 3) {
-            Some(angles) if joint < joints => UnitQuaternion::from_scaled_axis(Vector3::from_column_slice(angles)),
+            Some(angles) if joint < joints => {
+                UnitQuaternion::from_scaled_axis(Vector3::from_column_slice(angles))
+            }
             _ => UnitQuaternion::identity(),
         })
     };
@@ -91,18 +128,29 @@ pub(super) fn of_axis_angles(rows: &[f64], width: usize, joints: usize) -> Vec<R
 
 /// Of root (N, 3) and body (N, 63) or (N, 21, 3) in axis times angle.
 pub(super) fn of_root_and_body(root: &[f64], body: &[f64]) -> Vec<Rotations> {
-    let rows: Vec<f64> = root.chunks_exact(3).zip(body.chunks_exact(63)).flat_map(|(root, body)| [root, body].concat()).collect();
+    let rows: Vec<f64> = root
+        .chunks_exact(3)
+        .zip(body.chunks_exact(63))
+        .flat_map(|(root, body)| [root, body].concat())
+        .collect();
     of_axis_angles(&rows, 3 * SHARED_JOINTS, SHARED_JOINTS)
 }
 
 /// The body's poses of 21 joints: (N, 63) or (N, 21, 3).
 pub(super) fn body_angles(entry: &Entry, count: usize) -> Result<Array<f64>, MotionError> {
-    let expected: &[Option<usize>] = if entry.shape()?.len() == 3 { &[Some(count), Some(21), Some(3)] } else { &[Some(count), Some(63)] };
+    let expected: &[Option<usize>] = if entry.shape()?.len() == 3 {
+        &[Some(count), Some(21), Some(3)]
+    } else {
+        &[Some(count), Some(63)]
+    };
     numbers(entry, expected, &format!("({count}, 63)"))
 }
 
 /// Rotation matrices one after the other, row by row; `first` counts them in the entry.
-pub(super) fn of_matrices(entry: &Entry, values: &[f64]) -> Result<Vec<UnitQuaternion<f64>>, MotionError> {
+pub(super) fn of_matrices(
+    entry: &Entry,
+    values: &[f64],
+) -> Result<Vec<UnitQuaternion<f64>>, MotionError> {
     let one = |(index, row): (usize, &[f64])| {
         let matrix = Matrix3::from_row_slice(row);
         let deviation = (matrix.transpose() * matrix - Matrix3::identity()).amax();
@@ -112,7 +160,8 @@ pub(super) fn of_matrices(entry: &Entry, values: &[f64]) -> Result<Vec<UnitQuate
             );
             return Err(wrong(entry, text));
         }
-        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix));
+        let rotation =
+            UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix));
         Ok(UnitQuaternion::new_normalize(rotation.into_inner()))
     };
     values.chunks_exact(9).enumerate().map(one).collect()
@@ -120,12 +169,20 @@ pub(super) fn of_matrices(entry: &Entry, values: &[f64]) -> Result<Vec<UnitQuate
 
 /// 24 rotations a frame from their list.
 pub(super) fn in_frames(rotations: &[UnitQuaternion<f64>]) -> Vec<Rotations> {
-    rotations.chunks_exact(JOINT_COUNT).map(|frame| std::array::from_fn(|joint| frame[joint])).collect()
+    rotations
+        .chunks_exact(JOINT_COUNT)
+        .map(|frame| std::array::from_fn(|joint| frame[joint]))
+        .collect()
 }
 
 /// Shape coefficients (B), (1, B) or (N, B); (1, 0) where there are none.
 pub(super) fn betas(entry: Option<&Entry>, count: usize) -> Result<Array<f64>, MotionError> {
-    let Some(entry) = entry else { return Ok(Array { shape: vec![1, 0], values: Vec::new() }) };
+    let Some(entry) = entry else {
+        return Ok(Array {
+            shape: vec![1, 0],
+            values: Vec::new(),
+        });
+    };
     let expectation = format!("(B), (1, B) or ({count}, B) with B up to {MAX_BETAS}");
     let shape = entry.shape()?;
     let unsuitable = || ArraysError::Shape {
@@ -143,7 +200,10 @@ pub(super) fn betas(entry: Option<&Entry>, count: usize) -> Result<Array<f64>, M
         return Err(unsuitable().into());
     }
     let array = numbers(entry, &vec![None; shape.len()], &expectation)?;
-    Ok(Array { shape: vec![rows, columns], values: array.values })
+    Ok(Array {
+        shape: vec![rows, columns],
+        values: array.values,
+    })
 }
 
 /// `male`, `b'female'`, `neutral`; `None` for any other word.
@@ -153,11 +213,22 @@ pub(super) fn gender(entry: Option<&Entry>) -> Option<Gender> {
 }
 
 /// Numbers of frames: rising, one a pose.
-pub(super) fn frame_ids(entry: Option<&Entry>, count: usize) -> Result<Option<Vec<i64>>, MotionError> {
+pub(super) fn frame_ids(
+    entry: Option<&Entry>,
+    count: usize,
+) -> Result<Option<Vec<i64>>, MotionError> {
     let Some(entry) = entry else { return Ok(None) };
-    let ids = entry.integers(&[Some(count)], &format!("({count}), one number a frame"))?.values;
+    let ids = entry
+        .integers(&[Some(count)], &format!("({count}), one number a frame"))?
+        .values;
     if let Some(place) = ids.windows(2).position(|pair| pair[0] >= pair[1]) {
-        return Err(wrong(entry, format!("element {} does not exceed the one before, expected rising frame numbers", place + 1)));
+        return Err(wrong(
+            entry,
+            format!(
+                "element {} does not exceed the one before, expected rising frame numbers",
+                place + 1
+            ),
+        ));
     }
     Ok(Some(ids))
 }

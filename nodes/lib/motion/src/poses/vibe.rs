@@ -1,5 +1,5 @@
-//! VIBE: a dictionary of people, each with `pose` (N, 72) in a camera's axes, `betas` (N, 10) and `frame_ids`. Its camera is that of a crop:
-//! it tells no place, so the motion stays in place.
+//! VIBE: a dictionary of people, each with `pose` (N, 72) in a camera's axes, `betas` (N, 10) and
+//! `frame_ids`. Its camera is that of a crop: it tells no place, so the motion stays in place.
 
 use cromosim_arrays::Entry;
 use cromosim_body::ShapeSpace;
@@ -13,7 +13,11 @@ pub(super) fn track(person: &Entry, budget: &mut Budget) -> Result<PoseTrack, Mo
 }
 
 /// A person whose pose stands under `key`, without a place.
-pub(super) fn in_camera(person: &Entry, budget: &mut Budget, key: &str) -> Result<PoseTrack, MotionError> {
+pub(super) fn in_camera(
+    person: &Entry,
+    budget: &mut Budget,
+    key: &str,
+) -> Result<PoseTrack, MotionError> {
     let pose = person.at(key)?;
     let count = frame_count(&pose);
     budget.take(pose.key(), count)?;

@@ -1,5 +1,5 @@
-//! WHAM: a dictionary of people, each with `pose_world` (N, 72) and `trans_world` (N, 3) in a world with y up, `pose` in the camera's axes,
-//! `betas` (N, 10) and `frame_ids`.
+//! WHAM: a dictionary of people, each with `pose_world` (N, 72) and `trans_world` (N, 3) in a world
+//! with y up, `pose` in the camera's axes, `betas` (N, 10) and `frame_ids`.
 
 use cromosim_arrays::Entry;
 use nalgebra::Vector3;
@@ -10,11 +10,19 @@ use super::values::{Budget, vectors};
 use super::vibe::in_camera;
 use crate::MotionError;
 
-pub(super) fn track(person: &Entry, view: PoseView, budget: &mut Budget) -> Result<PoseTrack, MotionError> {
+pub(super) fn track(
+    person: &Entry,
+    view: PoseView,
+    budget: &mut Budget,
+) -> Result<PoseTrack, MotionError> {
     if view == PoseView::Camera {
         return in_camera(person, budget, "pose");
     }
     let track = in_camera(person, budget, "pose_world")?;
     let trans = vectors(&person.at("trans_world")?, track.rotations.len())?;
-    Ok(PoseTrack { trans: Some(trans), axes: PoseAxes::Up(Vector3::y()), ..track })
+    Ok(PoseTrack {
+        trans: Some(trans),
+        axes: PoseAxes::Up(Vector3::y()),
+        ..track
+    })
 }

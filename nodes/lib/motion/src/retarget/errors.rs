@@ -24,12 +24,18 @@ struct Line {
 }
 
 /// Compares `frames` with the clip's frames from `first` on.
-pub(super) fn bone_directions(source: &Source<'_>, shaped: &ShapedBody, frames: &[BodyPose], first: usize) -> BoneDirections {
+pub(super) fn bone_directions(
+    source: &Source<'_>,
+    shaped: &ShapedBody,
+    frames: &[BodyPose],
+    first: usize,
+) -> BoneDirections {
     let lines = lines(source);
     let mut angles: Vec<Vec<f64>> = vec![Vec::with_capacity(frames.len()); lines.len()];
     for (index, pose) in frames.iter().enumerate() {
         let segments = shaped.world_from_segments(pose);
-        let joints: [Vector3<f64>; JOINT_COUNT] = segments.map(|segment| segment.translation.vector);
+        let joints: [Vector3<f64>; JOINT_COUNT] =
+            segments.map(|segment| segment.translation.vector);
         let skeleton = source.clip.pose_of_frame(first + index);
         let point = |point: Point| match point {
             Point::Joint(joint) => skeleton.world_from_joint[joint].translation.vector,
@@ -38,28 +44,44 @@ pub(super) fn bone_directions(source: &Source<'_>, shaped: &ShapedBody, frames: 
         for (line, angles) in lines.iter().zip(&mut angles) {
             let ours = |[a, b]: [Joint; 2]| (joints[a.index()] + joints[b.index()]) / 2.0;
             let theirs = |[a, b]: [Point; 2]| (point(a) + point(b)) / 2.0;
-            let direction = source.world_from_file * (theirs(line.theirs.1) - theirs(line.theirs.0));
-            angles.push(angle_between(ours(line.ours.1) - ours(line.ours.0), direction).to_degrees());
+            let direction =
+                source.world_from_file * (theirs(line.theirs.1) - theirs(line.theirs.0));
+            angles
+                .push(angle_between(ours(line.ours.1) - ours(line.ours.0), direction).to_degrees());
         }
     }
     let mut all: Vec<f64> = angles.iter().flatten().copied().collect();
-    let mut bones: Vec<_> = lines.iter().zip(&mut angles).map(|(line, angles)| (line.name.to_owned(), quantile(angles, 0.5))).collect();
+    let mut bones: Vec<_> = lines
+        .iter()
+        .zip(&mut angles)
+        .map(|(line, angles)| (line.name.to_owned(), quantile(angles, 0.5)))
+        .collect();
     bones.sort_by(|left, right| right.1.total_cmp(&left.1));
     let median_deg = quantile(&mut all, 0.5);
-    BoneDirections { median_deg, max_deg: all.last().copied().unwrap_or(0.0), bones }
+    BoneDirections {
+        median_deg,
+        max_deg: all.last().copied().unwrap_or(0.0),
+        bones,
+    }
 }
 
 /// The lines that both skeletons have.
 fn lines(source: &Source<'_>) -> Vec<Line> {
     use Joint::{
-        Head, LeftAnkle, LeftElbow, LeftFoot, LeftHand, LeftHip, LeftKnee, LeftShoulder, LeftWrist, Neck, RightAnkle, RightElbow,
-        RightFoot, RightHand, RightHip, RightKnee, RightShoulder, RightWrist,
+        Head, LeftAnkle, LeftElbow, LeftFoot, LeftHand, LeftHip, LeftKnee, LeftShoulder, LeftWrist,
+        Neck, RightAnkle, RightElbow, RightFoot, RightHand, RightHip, RightKnee, RightShoulder,
+        RightWrist,
     };
     let map = &source.map;
     let joint = |joint: Joint| map.joints[joint.index()].map(Point::Joint);
     let bones = [
         ("left upper arm", LeftShoulder, LeftElbow, joint(LeftElbow)),
-        ("right upper arm", RightShoulder, RightElbow, joint(RightElbow)),
+        (
+            "right upper arm",
+            RightShoulder,
+            RightElbow,
+            joint(RightElbow),
+        ),
         ("left forearm", LeftElbow, LeftWrist, joint(LeftWrist)),
         ("right forearm", RightElbow, RightWrist, joint(RightWrist)),
         ("left hand", LeftWrist, LeftHand, map.hands.left),
@@ -72,15 +94,28 @@ fn lines(source: &Source<'_>) -> Vec<Line> {
         ("right foot", RightAnkle, RightFoot, map.toes.right),
         ("neck", Neck, Head, joint(Head)),
         ("across the hips", RightHip, LeftHip, joint(LeftHip)),
-        ("across the shoulders", RightShoulder, LeftShoulder, joint(LeftShoulder)),
+        (
+            "across the shoulders",
+            RightShoulder,
+            LeftShoulder,
+            joint(LeftShoulder),
+        ),
     ];
     let bone = |(name, from, to, end): (&'static str, Joint, Joint, Option<Point>)| {
         let (start, end) = (joint(from)?, end?);
-        Some(Line { name, ours: ([from; 2], [to; 2]), theirs: ([start; 2], [end; 2]) })
+        Some(Line {
+            name,
+            ours: ([from; 2], [to; 2]),
+            theirs: ([start; 2], [end; 2]),
+        })
     };
     let mut lines: Vec<Line> = bones.into_iter().filter_map(bone).collect();
     if let (Some(left), Some(right), Some(neck)) = (joint(LeftHip), joint(RightHip), joint(Neck)) {
-        lines.push(Line { name: "trunk", ours: ([LeftHip, RightHip], [Neck; 2]), theirs: ([left, right], [neck; 2]) });
+        lines.push(Line {
+            name: "trunk",
+            ours: ([LeftHip, RightHip], [Neck; 2]),
+            theirs: ([left, right], [neck; 2]),
+        });
     }
     lines
 }

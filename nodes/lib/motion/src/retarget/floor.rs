@@ -15,25 +15,42 @@ pub(crate) struct Sole {
 }
 
 impl Sole {
-    /// The soles of a shaped body, left and right: the outermost low vertices before and behind the toe joint, fixed to toes and foot.
+    /// The soles of a shaped body, left and right: the outermost low vertices before and behind the
+    /// toe joint, fixed to toes and foot.
     pub fn both(shaped: &ShapedBody) -> [Self; 2] {
         let of = |ankle: Joint, foot: Joint, side: f64| {
             let joints = shaped.joints_in_model();
-            let own = shaped.rest_vertices().iter().filter(|vertex| vertex.x * side > 0.0);
+            let own = shaped
+                .rest_vertices()
+                .iter()
+                .filter(|vertex| vertex.x * side > 0.0);
             let lowest = own.clone().map(|vertex| vertex.y).fold(f64::MAX, f64::min);
-            let low: Vec<&Vector3<f64>> = own.filter(|vertex| vertex.y < lowest + SOLE_THICKNESS_M).collect();
+            let low: Vec<&Vector3<f64>> = own
+                .filter(|vertex| vertex.y < lowest + SOLE_THICKNESS_M)
+                .collect();
             let toe_z = joints[foot.index()].z;
             let mut points = Vec::new();
             for (segment, toes) in [(ankle, false), (foot, true)] {
                 let part = || low.iter().filter(|vertex| (vertex.z > toe_z) == toes);
-                for axis in [Vector3::x(), -Vector3::x(), Vector3::z(), -Vector3::z(), -Vector3::y()] {
+                for axis in [
+                    Vector3::x(),
+                    -Vector3::x(),
+                    Vector3::z(),
+                    -Vector3::z(),
+                    -Vector3::y(),
+                ] {
                     let outermost = part().max_by(|a, b| a.dot(&axis).total_cmp(&b.dot(&axis)));
-                    points.extend(outermost.map(|vertex| (segment, **vertex - joints[segment.index()])));
+                    points.extend(
+                        outermost.map(|vertex| (segment, **vertex - joints[segment.index()])),
+                    );
                 }
             }
             Self { ankle, points }
         };
-        [of(Joint::LeftAnkle, Joint::LeftFoot, 1.0), of(Joint::RightAnkle, Joint::RightFoot, -1.0)]
+        [
+            of(Joint::LeftAnkle, Joint::LeftFoot, 1.0),
+            of(Joint::RightAnkle, Joint::RightFoot, -1.0),
+        ]
     }
 
     /// Height of the lowest point of the sole in a pose, m.
@@ -50,9 +67,10 @@ impl Sole {
 /// How far soles on the same floor are apart, m: noise of the recording and the roll of the foot.
 const SAME_FLOOR_M: f64 = 0.03;
 
-/// Raises all frames so that standing soles are at z = 0, and says by how much, m. The floor is the lowest level on which soles stand (who
-/// climbs stairs stands on several): the median of the heights near their lowest tenth. Where hardly a foot stands still, the floor is
-/// where the lowest twentieth of all soles ends.
+/// Raises all frames so that standing soles are at z = 0, and says by how much, m. The floor is the
+/// lowest level on which soles stand (who climbs stairs stands on several): the median of the
+/// heights near their lowest tenth. Where hardly a foot stands still, the floor is where the lowest
+/// twentieth of all soles ends.
 pub(crate) fn stand_on_floor(shaped: &ShapedBody, frames: &mut [BodyPose], rate_hz: f64) -> f64 {
     let soles = Sole::both(shaped);
     let ankles: Vec<[Vector3<f64>; 2]> = frames
@@ -68,7 +86,9 @@ pub(crate) fn stand_on_floor(shaped: &ShapedBody, frames: &mut [BodyPose], rate_
         lowest.push(heights[0].min(heights[1]));
         let next = (index + 1).min(frames.len() - 1);
         for side in 0..2 {
-            if frames.len() > 1 && (ankles[next][side] - ankles[index][side]).norm() * rate_hz < STANDING_SPEED {
+            if frames.len() > 1
+                && (ankles[next][side] - ankles[index][side]).norm() * rate_hz < STANDING_SPEED
+            {
                 standing.push(heights[side]);
             }
         }
@@ -89,5 +109,8 @@ pub(crate) fn stand_on_floor(shaped: &ShapedBody, frames: &mut [BodyPose], rate_
 /// The value below which `fraction` of the values lie; 0 without values.
 pub(super) fn quantile(values: &mut [f64], fraction: f64) -> f64 {
     values.sort_by(f64::total_cmp);
-    values.get(((values.len().saturating_sub(1)) as f64 * fraction).round() as usize).copied().unwrap_or(0.0)
+    values
+        .get(((values.len().saturating_sub(1)) as f64 * fraction).round() as usize)
+        .copied()
+        .unwrap_or(0.0)
 }

@@ -1,6 +1,7 @@
 //! What can go wrong with a file of a rigid body.
 
-/// An error of [`crate::rigid`] and [`crate::datasets`]: one line that names the file, the place and what to do.
+/// An error of [`crate::rigid`] and [`crate::datasets`]: one line that names the file, the place
+/// and what to do.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RigidError {
@@ -73,7 +74,9 @@ pub enum RigidError {
         previous_ns: i64,
     },
     /// A quaternion is no rotation.
-    #[error("{name}, line {line}: the quaternion has length {length}, expected 1 within 0.01; check the order of its columns")]
+    #[error(
+        "{name}, line {line}: the quaternion has length {length}, expected 1 within 0.01; check the order of its columns"
+    )]
     Quaternion {
         /// The file.
         name: String,

@@ -18,7 +18,12 @@ pub struct PoseTrajectory {
 
 impl PoseTrajectory {
     /// Adds a pose at the end.
-    pub(crate) fn push(&mut self, stamp: Stamp, position: Vector3<f64>, rotation: UnitQuaternion<f64>) {
+    pub(crate) fn push(
+        &mut self,
+        stamp: Stamp,
+        position: Vector3<f64>,
+        rotation: UnitQuaternion<f64>,
+    ) {
         self.stamps.push(stamp);
         self.positions.push(position);
         self.rotations.push(rotation);
@@ -38,7 +43,12 @@ pub struct ImuSeries {
 
 impl ImuSeries {
     /// Adds a reading at the end.
-    pub(crate) fn push(&mut self, stamp: Stamp, specific_force: Vector3<f64>, angular_velocity: Vector3<f64>) {
+    pub(crate) fn push(
+        &mut self,
+        stamp: Stamp,
+        specific_force: Vector3<f64>,
+        angular_velocity: Vector3<f64>,
+    ) {
         self.stamps.push(stamp);
         self.specific_force.push(specific_force);
         self.angular_velocity.push(angular_velocity);

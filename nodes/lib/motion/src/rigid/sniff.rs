@@ -18,8 +18,9 @@ pub enum RigidFormat {
 /// How much of the content is looked at.
 const LOOKED_AT: usize = 64 << 10;
 
-/// The format by the header, or by number and kind of the first row's columns: 8 between blanks are TUM's; 7, 8 or 17 between commas, the
-/// first of them a whole number, are EuRoC's. `None` for anything else.
+/// The format by the header, or by number and kind of the first row's columns: 8 between blanks are
+/// TUM's; 7, 8 or 17 between commas, the first of them a whole number, are EuRoC's. `None` for
+/// anything else.
 pub fn sniff_rigid(bytes: &[u8]) -> Option<RigidFormat> {
     let start = String::from_utf8_lossy(&bytes[..bytes.len().min(LOOKED_AT)]);
     let start = start.trim_start_matches('\u{feff}');
@@ -33,31 +34,66 @@ pub fn sniff_rigid(bytes: &[u8]) -> Option<RigidFormat> {
         return Some(RigidFormat::EurocGroundTruth);
     }
     let separators = first.contains([',', ';', '\t']);
-    let cells: Vec<String> =
-        lower.split([',', ';', '\t']).map(|cell| cell.split(['[', '(']).next().unwrap_or_default().trim().to_owned()).collect();
+    let cells: Vec<String> = lower
+        .split([',', ';', '\t'])
+        .map(|cell| {
+            cell.split(['[', '('])
+                .next()
+                .unwrap_or_default()
+                .trim()
+                .to_owned()
+        })
+        .collect();
     let ends = |ending: &str| cells.iter().any(|cell| cell.ends_with(ending));
     let has = |names: &[&str]| {
-        let is = |cell: &str, name: &str| cell.replace(['.', '/'], "_").strip_suffix("_x").is_some_and(|cell| cell.ends_with(name));
-        cells.iter().any(|cell| names.iter().any(|name| is(cell, name)))
+        let is = |cell: &str, name: &str| {
+            cell.replace(['.', '/'], "_")
+                .strip_suffix("_x")
+                .is_some_and(|cell| cell.ends_with(name))
+        };
+        cells
+            .iter()
+            .any(|cell| names.iter().any(|name| is(cell, name)))
     };
     // Single letters name columns of many tables: they do not tell what a file is.
     let longer = |name: &&&str| name.len() > 1;
-    let names = |names: &'static [&'static str]| names.iter().filter(longer).copied().collect::<Vec<_>>();
-    let placed = cells.iter().any(|cell| matches!(cell.as_str(), "x" | "px" | "tx")) || has(&["position", "pos"]);
-    if separators && !placed && has(&names(&super::imu_csv::RATES)) && has(&names(&super::imu_csv::FORCES)) {
+    let names =
+        |names: &'static [&'static str]| names.iter().filter(longer).copied().collect::<Vec<_>>();
+    let placed = cells
+        .iter()
+        .any(|cell| matches!(cell.as_str(), "x" | "px" | "tx"))
+        || has(&["position", "pos"]);
+    if separators
+        && !placed
+        && has(&names(&super::imu_csv::RATES))
+        && has(&names(&super::imu_csv::FORCES))
+    {
         return Some(RigidFormat::ImuCsv);
     }
-    let quaternion = ends("qw") || ends("q_w") || ends("orientation.w") || ends("orientation_w") || ends("quat_w") || ends("quaternion_w");
+    let quaternion = ends("qw")
+        || ends("q_w")
+        || ends("orientation.w")
+        || ends("orientation_w")
+        || ends("quat_w")
+        || ends("quaternion_w");
     if separators && quaternion && first.chars().any(char::is_alphabetic) {
         return Some(RigidFormat::PoseCsv);
     }
-    let row = start.lines().map(str::trim).find(|line| !line.is_empty() && !line.starts_with('#'))?;
+    let row = start
+        .lines()
+        .map(str::trim)
+        .find(|line| !line.is_empty() && !line.starts_with('#'))?;
     let numbers = |cells: &[&str]| cells.iter().all(|cell| cell.parse::<f64>().is_ok());
-    let (blanks, commas): (Vec<&str>, Vec<&str>) = (row.split_ascii_whitespace().collect(), row.split(',').map(str::trim).collect());
+    let (blanks, commas): (Vec<&str>, Vec<&str>) = (
+        row.split_ascii_whitespace().collect(),
+        row.split(',').map(str::trim).collect(),
+    );
     if blanks.len() == 8 && numbers(&blanks) {
         return Some(RigidFormat::Tum);
     }
-    let whole = commas.first().is_some_and(|cell| cell.parse::<i64>().is_ok());
+    let whole = commas
+        .first()
+        .is_some_and(|cell| cell.parse::<i64>().is_ok());
     match commas.len() {
         7 if whole && numbers(&commas) => Some(RigidFormat::EurocImu),
         8 | 17 if whole && numbers(&commas) => Some(RigidFormat::EurocGroundTruth),

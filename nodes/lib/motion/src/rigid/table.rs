@@ -13,7 +13,10 @@ const LENGTH_TOLERANCE: f64 = 1e-2;
 
 /// The text of a file, without a byte order mark.
 pub(crate) fn text<'a>(bytes: &'a [u8], name: &str) -> Result<&'a str, RigidError> {
-    let text = std::str::from_utf8(bytes).map_err(|error| RigidError::NotText { name: name.to_owned(), offset: error.valid_up_to() })?;
+    let text = std::str::from_utf8(bytes).map_err(|error| RigidError::NotText {
+        name: name.to_owned(),
+        offset: error.valid_up_to(),
+    })?;
     Ok(text.strip_prefix('\u{feff}').unwrap_or(text))
 }
 
@@ -26,10 +29,21 @@ pub(crate) struct Row<'a> {
 }
 
 /// Lines with data: neither empty nor beginning with `#`.
-pub(crate) fn rows<'a>(text: &'a str, name: &'a str, split: fn(&'a str) -> Vec<&'a str>) -> impl Iterator<Item = Row<'a>> {
-    let lines = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));
+pub(crate) fn rows<'a>(
+    text: &'a str,
+    name: &'a str,
+    split: fn(&'a str) -> Vec<&'a str>,
+) -> impl Iterator<Item = Row<'a>> {
+    let lines = text
+        .lines()
+        .enumerate()
+        .map(|(index, line)| (index + 1, line.trim()));
     let data = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
-    data.map(move |(line, content)| Row { name, line, cells: split(content) })
+    data.map(move |(line, content)| Row {
+        name,
+        line,
+        cells: split(content),
+    })
 }
 
 pub(crate) fn by_blanks(line: &str) -> Vec<&str> {
@@ -41,64 +55,107 @@ pub(crate) fn by_commas(line: &str) -> Vec<&str> {
 }
 
 impl Row<'_> {
-    pub fn expect_columns(&self, fits: impl Fn(usize) -> bool, expected: &str) -> Result<(), RigidError> {
+    pub fn expect_columns(
+        &self,
+        fits: impl Fn(usize) -> bool,
+        expected: &str,
+    ) -> Result<(), RigidError> {
         if fits(self.cells.len()) {
             return Ok(());
         }
         let (name, line, found) = (self.name.to_owned(), self.line, self.cells.len());
-        Err(RigidError::Columns { name, line, expected: expected.to_owned(), found })
+        Err(RigidError::Columns {
+            name,
+            line,
+            expected: expected.to_owned(),
+            found,
+        })
     }
 
     /// The number in a column (0-based).
     pub fn number(&self, column: usize) -> Result<f64, RigidError> {
         let cell = self.cell(column)?;
-        let number = cell.parse().ok().filter(|number: &f64| number.abs() < LARGEST);
+        let number = cell
+            .parse()
+            .ok()
+            .filter(|number: &f64| number.abs() < LARGEST);
         number.ok_or_else(|| self.error(column, "a finite number"))
     }
 
     /// As [`Self::number`], where NaN marks a missing value.
     pub fn number_or_nan(&self, column: usize) -> Result<Option<f64>, RigidError> {
-        if self.cell(column)?.eq_ignore_ascii_case("nan") { Ok(None) } else { self.number(column).map(Some) }
+        if self.cell(column)?.eq_ignore_ascii_case("nan") {
+            Ok(None)
+        } else {
+            self.number(column).map(Some)
+        }
     }
 
     /// Three numbers from a column on.
     pub fn vector(&self, column: usize) -> Result<Vector3<f64>, RigidError> {
-        Ok(Vector3::new(self.number(column)?, self.number(column + 1)?, self.number(column + 2)?))
+        Ok(Vector3::new(
+            self.number(column)?,
+            self.number(column + 1)?,
+            self.number(column + 2)?,
+        ))
     }
 
     /// x, y, z, w from their columns.
     pub fn rotation(&self, [x, y, z, w]: [usize; 4]) -> Result<UnitQuaternion<f64>, RigidError> {
-        let quaternion = Quaternion::new(self.number(w)?, self.number(x)?, self.number(y)?, self.number(z)?);
-        unit_quaternion(quaternion).map_err(|length| RigidError::Quaternion { name: self.name.to_owned(), line: self.line, length })
+        let quaternion = Quaternion::new(
+            self.number(w)?,
+            self.number(x)?,
+            self.number(y)?,
+            self.number(z)?,
+        );
+        unit_quaternion(quaternion).map_err(|length| RigidError::Quaternion {
+            name: self.name.to_owned(),
+            line: self.line,
+            length,
+        })
     }
 
     /// The stamp in a column whose unit is `10^-digits` s.
     pub fn stamp(&self, column: usize, digits: i32) -> Result<Stamp, RigidError> {
         let nanos = nanos(self.cell(column)?, digits);
-        nanos.map(Stamp::from_nanos).ok_or_else(|| self.error(column, "a time"))
+        nanos
+            .map(Stamp::from_nanos)
+            .ok_or_else(|| self.error(column, "a time"))
     }
 
     pub fn cell(&self, column: usize) -> Result<&str, RigidError> {
-        self.cells.get(column).copied().ok_or_else(|| RigidError::Columns {
-            name: self.name.to_owned(),
-            line: self.line,
-            expected: format!("at least {}", column + 1),
-            found: self.cells.len(),
-        })
+        self.cells
+            .get(column)
+            .copied()
+            .ok_or_else(|| RigidError::Columns {
+                name: self.name.to_owned(),
+                line: self.line,
+                expected: format!("at least {}", column + 1),
+                found: self.cells.len(),
+            })
     }
 
     pub fn error(&self, column: usize, expected: &str) -> RigidError {
         let found = self.cells.get(column).copied().unwrap_or_default();
         let found = format!("\"{}\"", found.chars().take(40).collect::<String>());
-        RigidError::Value { name: self.name.to_owned(), line: self.line, column: column + 1, expected: expected.to_owned(), found }
+        RigidError::Value {
+            name: self.name.to_owned(),
+            line: self.line,
+            column: column + 1,
+            expected: expected.to_owned(),
+            found,
+        }
     }
 
     /// Time goes on.
     pub fn check_order(&self, stamp: Stamp, previous: Option<&Stamp>) -> Result<(), RigidError> {
         match previous {
-            Some(previous) if stamp <= *previous => {
-                Err(RigidError::Order { name: self.name.to_owned(), line: self.line, stamp_ns: stamp.nanos, previous_ns: previous.nanos })
-            }
+            Some(previous) if stamp <= *previous => Err(RigidError::Order {
+                name: self.name.to_owned(),
+                line: self.line,
+                stamp_ns: stamp.nanos,
+                previous_ns: previous.nanos,
+            }),
             _ => Ok(()),
         }
     }
@@ -114,12 +171,18 @@ pub(crate) fn unit_quaternion(quaternion: Quaternion<f64>) -> Result<UnitQuatern
     }
 }
 
-/// Nanoseconds of a decimal number whose unit is `10^-digits` s, without passing through floats: `1403636579.763555527` with 0 digits.
-/// What is finer than a nanosecond is rounded to the nearest, halves away from zero. `None` where it is no number or beyond the range of
-/// stamps (292 years).
+/// Nanoseconds of a decimal number whose unit is `10^-digits` s, without passing through floats:
+/// `1403636579.763555527` with 0 digits. What is finer than a nanosecond is rounded to the nearest,
+/// halves away from zero. `None` where it is no number or beyond the range of stamps (292 years).
 pub(crate) fn nanos(text: &str, digits: i32) -> Option<i64> {
     let (mantissa, exponent) = match text.split_once(['e', 'E']) {
-        Some((mantissa, exponent)) => (mantissa, exponent.parse::<i32>().ok().filter(|exponent| exponent.abs() < 100)?),
+        Some((mantissa, exponent)) => (
+            mantissa,
+            exponent
+                .parse::<i32>()
+                .ok()
+                .filter(|exponent| exponent.abs() < 100)?,
+        ),
         None => (text, 0),
     };
     let (negative, mantissa) = match mantissa.strip_prefix('-') {
@@ -128,7 +191,11 @@ pub(crate) fn nanos(text: &str, digits: i32) -> Option<i64> {
     };
     let (whole, fraction) = mantissa.split_once('.').unwrap_or((mantissa, ""));
     let all_digits = |part: &str| part.bytes().all(|byte| byte.is_ascii_digit());
-    if (whole.is_empty() && fraction.is_empty()) || !all_digits(whole) || !all_digits(fraction) || whole.len() + fraction.len() > 200 {
+    if (whole.is_empty() && fraction.is_empty())
+        || !all_digits(whole)
+        || !all_digits(fraction)
+        || whole.len() + fraction.len() > 200
+    {
         return None;
     }
     // The number of digits, from the front, that make whole nanoseconds.
@@ -174,11 +241,33 @@ mod tests {
         ] {
             assert_eq!(nanos(text, digits), Some(expected), "{text}");
         }
-        for text in ["", ".", "-", "1e", "nan", "1 2", "1e999", "99999999999", "1_0", "--1"] {
+        for text in [
+            "",
+            ".",
+            "-",
+            "1e",
+            "nan",
+            "1 2",
+            "1e999",
+            "99999999999",
+            "1_0",
+            "--1",
+        ] {
             assert_eq!(nanos(text, 0), None, "{text}");
         }
-        for value in [0, 1, -1, 999_999_999, -1_000_000_001, i64::MAX / 2, 1_403_636_579_763_555_527] {
-            assert_eq!(nanos(&seconds_text(Stamp::from_nanos(value)), 0), Some(value));
+        for value in [
+            0,
+            1,
+            -1,
+            999_999_999,
+            -1_000_000_001,
+            i64::MAX / 2,
+            1_403_636_579_763_555_527,
+        ] {
+            assert_eq!(
+                nanos(&seconds_text(Stamp::from_nanos(value)), 0),
+                Some(value)
+            );
         }
     }
 }

@@ -1,7 +1,8 @@
 //! Where the feet are: footprints, and the way from one to the next.
 //!
-//! A step lifts the heel while the ball stays (the toes stay flat), swings, comes down on the heel, and rolls flat about it. Pivots change
-//! where the foot is flat and at rest, so that all accelerations stay continuous.
+//! A step lifts the heel while the ball stays (the toes stay flat), swings, comes down on the heel,
+//! and rolls flat about it. Pivots change where the foot is flat and at rest, so that all
+//! accelerations stay continuous.
 
 use nalgebra::{Vector2, Vector3};
 
@@ -93,36 +94,65 @@ impl Step {
         let middle = Knot::passing(PITCH_MIDDLE * self.vigour, RATE_MIDDLE * self.vigour);
         let middle_s = self.off_s() + half_s;
         if time < self.off_s() {
-            quintic(Knot::still(0.0), self.at_off(), HEEL_RISE_S, time - self.heel_rise_s())
+            quintic(
+                Knot::still(0.0),
+                self.at_off(),
+                HEEL_RISE_S,
+                time - self.heel_rise_s(),
+            )
         } else if time < middle_s {
             quintic(self.at_off(), middle, half_s, time - self.off_s())
         } else if time < self.strike_s {
             quintic(middle, self.at_strike(), half_s, time - middle_s)
         } else {
-            quintic(self.at_strike(), Knot::still(0.0), ROLL_DOWN_S, time - self.strike_s)
+            quintic(
+                self.at_strike(),
+                Knot::still(0.0),
+                ROLL_DOWN_S,
+                time - self.strike_s,
+            )
         }
     }
 
     fn toes(&self, time: f64) -> f64 {
-        if time < self.off_s() { self.pitch(time) } else { quintic(self.at_off(), Knot::still(0.0), 0.8 * SWING_S, time - self.off_s()) }
+        if time < self.off_s() {
+            self.pitch(time)
+        } else {
+            quintic(
+                self.at_off(),
+                Knot::still(0.0),
+                0.8 * SWING_S,
+                time - self.off_s(),
+            )
+        }
     }
 
-    /// The ankle's way through the air: quintics between the ends that the pivots prescribe, and an arch.
+    /// The ankle's way through the air: quintics between the ends that the pivots prescribe, and an
+    /// arch.
     fn swing(&self, size: &FootSize, time: f64) -> Vector3<f64> {
         let start = pivoted(&self.from, size, size.ankle_from_ball, self.at_off());
         let end = pivoted(&self.to, size, size.ankle_from_heel, self.at_strike());
         let u = (time - self.off_s()) / SWING_S;
-        let way = Vector3::from_fn(|axis, _| quintic(start[axis], end[axis], SWING_S, time - self.off_s()));
+        let way = Vector3::from_fn(|axis, _| {
+            quintic(start[axis], end[axis], SWING_S, time - self.off_s())
+        });
         // Highest at 3/8 of the way: the toes leave the floor before they move on.
         way + Vector3::z() * (self.lift * 199.0 * u.powi(3) * (1.0 - u).powi(5))
     }
 }
 
 /// The ankle's coordinates (and their rates) while the foot pitches about a pivot of its flat pose.
-fn pivoted(print: &Footprint, size: &FootSize, ankle_from_pivot: Vector2<f64>, pitch: Knot) -> [Knot; 3] {
+fn pivoted(
+    print: &Footprint,
+    size: &FootSize,
+    ankle_from_pivot: Vector2<f64>,
+    pitch: Knot,
+) -> [Knot; 3] {
     let (sine, cosine) = pitch.position.sin_cos();
-    let turned =
-        Vector2::new(ankle_from_pivot.x * cosine - ankle_from_pivot.y * sine, ankle_from_pivot.x * sine + ankle_from_pivot.y * cosine);
+    let turned = Vector2::new(
+        ankle_from_pivot.x * cosine - ankle_from_pivot.y * sine,
+        ankle_from_pivot.x * sine + ankle_from_pivot.y * cosine,
+    );
     let across = Vector2::new(-turned.y, turned.x);
     let velocity = across * pitch.velocity;
     let acceleration = across * pitch.acceleration - turned * pitch.velocity.powi(2);
@@ -133,14 +163,28 @@ fn pivoted(print: &Footprint, size: &FootSize, ankle_from_pivot: Vector2<f64>, p
         velocity: share * velocity.x,
         acceleration: share * acceleration.x,
     };
-    let up = Knot { position: size.ankle_height + way.y, velocity: velocity.y, acceleration: acceleration.y };
-    [level(print.ankle.x, heading_cosine), level(print.ankle.y, heading_sine), up]
+    let up = Knot {
+        position: size.ankle_height + way.y,
+        velocity: velocity.y,
+        acceleration: acceleration.y,
+    };
+    [
+        level(print.ankle.x, heading_cosine),
+        level(print.ankle.y, heading_sine),
+        up,
+    ]
 }
 
 impl Foot {
-    /// The foot at a time: on its first print before the first step, on the last one after the last.
+    /// The foot at a time: on its first print before the first step, on the last one after the
+    /// last.
     pub fn at(&self, time: f64) -> FootState {
-        let Some(step) = self.steps.iter().rev().find(|step| time >= step.heel_rise_s()) else {
+        let Some(step) = self
+            .steps
+            .iter()
+            .rev()
+            .find(|step| time >= step.heel_rise_s())
+        else {
             return self.flat(&self.first);
         };
         let pitch = step.pitch(time);
@@ -149,18 +193,36 @@ impl Foot {
             Vector3::from_fn(|axis, _| knots[axis].position)
         };
         let (ankle, heading) = if time < step.off_s() {
-            (pivot(&step.from, self.size.ankle_from_ball), step.from.heading)
+            (
+                pivot(&step.from, self.size.ankle_from_ball),
+                step.from.heading,
+            )
         } else if time < step.strike_s {
-            let turn = quintic(Knot::still(step.from.heading), Knot::still(step.to.heading), SWING_S, time - step.off_s());
+            let turn = quintic(
+                Knot::still(step.from.heading),
+                Knot::still(step.to.heading),
+                SWING_S,
+                time - step.off_s(),
+            );
             (step.swing(&self.size, time), turn)
         } else {
             (pivot(&step.to, self.size.ankle_from_heel), step.to.heading)
         };
-        FootState { ankle, heading, pitch, toes: step.toes(time) }
+        FootState {
+            ankle,
+            heading,
+            pitch,
+            toes: step.toes(time),
+        }
     }
 
     fn flat(&self, print: &Footprint) -> FootState {
         let ankle = Vector3::new(print.ankle.x, print.ankle.y, self.size.ankle_height);
-        FootState { ankle, heading: print.heading, pitch: 0.0, toes: 0.0 }
+        FootState {
+            ankle,
+            heading: print.heading,
+            pitch: 0.0,
+            toes: 0.0,
+        }
     }
 }

@@ -13,7 +13,8 @@ use crate::motion::slerp;
 
 type Joints = [Vector3<f64>; JOINT_COUNT];
 
-/// Height of the pelvis joint over the floor when standing, m, and how far it sinks in the middle of a walking step's double support.
+/// Height of the pelvis joint over the floor when standing, m, and how far it sinks in the middle
+/// of a walking step's double support.
 const STANDING_HEIGHT: f64 = 0.980;
 const WALKING_SINK: f64 = 0.010;
 const STEP_SINK: f64 = 0.046;
@@ -50,9 +51,20 @@ pub(super) fn pose(plan: &Plan, joints: &Joints, time: f64) -> BodyPose {
     trunk(&gait, time, plan, &mut local, pelvis);
     arms(plan, &gait, time, &mut local);
     for (foot, side) in plan.feet.iter().zip(Side::BOTH) {
-        leg(&side, &foot.at(time), joints, root_position, pelvis, gait.heading, &mut local);
+        leg(
+            &side,
+            &foot.at(time),
+            joints,
+            root_position,
+            pelvis,
+            gait.heading,
+            &mut local,
+        );
     }
-    BodyPose { root_position, local_rotations: local }
+    BodyPose {
+        root_position,
+        local_rotations: local,
+    }
 }
 
 impl Gait {
@@ -67,7 +79,9 @@ impl Gait {
         };
         let (mut support, mut sink) = (0.0, 0.0);
         for (side, step) in plan.steps() {
-            support -= side * step.vigour.sqrt() * plateau(time, step.off_s() - 0.02, step.strike_s + 0.02, 0.26);
+            support -= side
+                * step.vigour.sqrt()
+                * plateau(time, step.off_s() - 0.02, step.strike_s + 0.02, 0.26);
             if step.vigour > 0.5 {
                 sink += step.vigour * bump((time - step.strike_s - 0.03) / 0.38);
             }
@@ -86,14 +100,22 @@ impl Gait {
 
 /// The mean heading of the feet, smoothed, rad.
 fn heading(plan: &Plan, time: f64) -> f64 {
-    mean_around::<16, _>(time, 0.6, |time| (plan.feet[0].at(time).heading + plan.feet[1].at(time).heading) / 2.0)
+    mean_around::<16, _>(time, 0.6, |time| {
+        (plan.feet[0].at(time).heading + plan.feet[1].at(time).heading) / 2.0
+    })
 }
 
 fn pelvis_frame(gait: &Gait) -> UnitQuaternion<f64> {
-    heading_frame(gait.heading) * turned(-4.0 * gait.stride, 2.0 + 1.5 * gait.walking, 3.5 * gait.support)
+    heading_frame(gait.heading)
+        * turned(
+            -4.0 * gait.stride,
+            2.0 + 1.5 * gait.walking,
+            3.5 * gait.support,
+        )
 }
 
-/// Over the middle of the feet, smoothed over one step: at an even speed in the steady walk. As high as posture and legs allow.
+/// Over the middle of the feet, smoothed over one step: at an even speed in the steady walk. As
+/// high as posture and legs allow.
 fn root_position(plan: &Plan, joints: &Joints, time: f64) -> Vector3<f64> {
     let mut position = level_root_position(plan, &Gait::at(plan, time), time);
     position.z = mean_around::<6, _>(time, 0.1, |time| root_height(plan, joints, time));
@@ -101,14 +123,21 @@ fn root_position(plan: &Plan, joints: &Joints, time: f64) -> Vector3<f64> {
 }
 
 fn level_root_position(plan: &Plan, gait: &Gait, time: f64) -> Vector3<f64> {
-    let middle = mean_around::<16, _>(time, STEP_S, |time| (plan.feet[0].at(time).ankle + plan.feet[1].at(time).ankle) / 2.0);
+    let middle = mean_around::<16, _>(time, STEP_S, |time| {
+        (plan.feet[0].at(time).ankle + plan.feet[1].at(time).ankle) / 2.0
+    });
     let forward = 0.012 + 0.042 * gait.walking + 0.02 * gait.reach;
     let left = 0.022 * gait.support + 0.004 * (0.9 * time).sin() * (1.0 - gait.walking);
     let (sine, cosine) = gait.heading.sin_cos();
-    Vector3::new(middle.x + cosine * forward - sine * left, middle.y + sine * forward + cosine * left, 0.0)
+    Vector3::new(
+        middle.x + cosine * forward - sine * left,
+        middle.y + sine * forward + cosine * left,
+        0.0,
+    )
 }
 
-/// The smooth minimum of the posture's height and of the heights up to which each leg reaches its ankle.
+/// The smooth minimum of the posture's height and of the heights up to which each leg reaches its
+/// ankle.
 fn root_height(plan: &Plan, joints: &Joints, time: f64) -> f64 {
     let gait = Gait::at(plan, time);
     let softness = 0.005 + 0.011 * gait.walking;
@@ -121,14 +150,23 @@ fn root_height(plan: &Plan, joints: &Joints, time: f64) -> f64 {
         let to_ankle = foot.at(time).ankle - level - hip;
         let bone = |from: Joint, to: Joint| (joints[to.index()] - joints[from.index()]).norm();
         let length = (bone(side.hip, side.knee) + bone(side.knee, side.ankle)) * LONGEST_LEG;
-        let reachable = to_ankle.z + (length * length - to_ankle.xy().norm_squared()).max(0.0).sqrt();
+        let reachable = to_ankle.z
+            + (length * length - to_ankle.xy().norm_squared())
+                .max(0.0)
+                .sqrt();
         sum += ((wanted - reachable) / softness).exp();
     }
     wanted - softness * sum.ln()
 }
 
 /// Spine, neck and head: the chest turns against the pelvis and stays level, the head looks ahead.
-fn trunk(gait: &Gait, time: f64, plan: &Plan, local: &mut [UnitQuaternion<f64>; JOINT_COUNT], pelvis: UnitQuaternion<f64>) {
+fn trunk(
+    gait: &Gait,
+    time: f64,
+    plan: &Plan,
+    local: &mut [UnitQuaternion<f64>; JOINT_COUNT],
+    pelvis: UnitQuaternion<f64>,
+) {
     let breath = 0.5 * (TAU * 0.27 * time).sin();
     let yaw = 9.0 * gait.stride + 11.0 * gait.reach;
     let lean = 1.0 + 8.0 * gait.reach + breath;
@@ -138,26 +176,38 @@ fn trunk(gait: &Gait, time: f64, plan: &Plan, local: &mut [UnitQuaternion<f64>; 
     }
     let chest = pelvis * part * part * part;
     // The eyes lead into a turn, and follow the hand when it reaches.
-    let head = heading_frame(heading(plan, time + 0.25)) * turned(-4.0 * gait.reach, 4.0 + 5.0 * gait.reach - 0.6 * breath, 0.0);
+    let head = heading_frame(heading(plan, time + 0.25))
+        * turned(
+            -4.0 * gait.reach,
+            4.0 + 5.0 * gait.reach - 0.6 * breath,
+            0.0,
+        );
     let neck = slerp(&chest, &head, 0.5);
     local[Joint::Neck.index()] = chest.inverse() * neck;
     local[Joint::Head.index()] = neck.inverse() * head;
 }
 
-/// Arms hang, swing against the legs with bent elbows, and the right one reaches forward to shoulder height.
+/// Arms hang, swing against the legs with bent elbows, and the right one reaches forward to
+/// shoulder height.
 fn arms(plan: &Plan, gait: &Gait, time: f64, local: &mut [UnitQuaternion<f64>; JOINT_COUNT]) {
     let delayed = Gait::at(plan, time - 0.03);
     for side in Side::BOTH {
         let swing = -side.sign * delayed.stride;
         let forward = 4.0 + 21.0 * swing + 3.0 * swing * swing * gait.walking;
         let bend = 17.0 + 6.0 * gait.walking + 9.0 * swing;
-        let hanging = about(Vector3::x(), -forward) * about(Vector3::z(), -side.sign * 73.0) * about(Vector3::x(), 12.0);
+        let hanging = about(Vector3::x(), -forward)
+            * about(Vector3::z(), -side.sign * 73.0)
+            * about(Vector3::x(), 12.0);
         let reach = if side.sign < 0.0 { gait.reach } else { 0.0 };
-        let reaching = about(Vector3::x(), -6.0) * about(Vector3::y(), -side.sign * 72.0) * about(Vector3::x(), -20.0);
+        let reaching = about(Vector3::x(), -6.0)
+            * about(Vector3::y(), -side.sign * 72.0)
+            * about(Vector3::x(), -20.0);
         local[side.shoulder.index()] = slerp(&hanging, &reaching, reach);
-        local[side.collar.index()] = about(Vector3::z(), -side.sign * (6.0 - 9.0 * reach)) * about(Vector3::y(), -side.sign * 10.0 * reach);
+        local[side.collar.index()] = about(Vector3::z(), -side.sign * (6.0 - 9.0 * reach))
+            * about(Vector3::y(), -side.sign * 10.0 * reach);
         let elbow = bend + 4.0 * reach + 150.0 * reach * reach * (1.0 - reach) * (1.0 - reach);
-        local[side.elbow.index()] = about(Vector3::y(), -side.sign * elbow) * about(Vector3::x(), 8.0 + 4.0 * swing);
+        local[side.elbow.index()] =
+            about(Vector3::y(), -side.sign * elbow) * about(Vector3::x(), 8.0 + 4.0 * swing);
         local[side.wrist.index()] = about(Vector3::z(), -side.sign * (4.0 * swing - 12.0 * reach));
     }
 }
@@ -172,11 +222,15 @@ fn leg(
     local: &mut [UnitQuaternion<f64>; JOINT_COUNT],
 ) {
     let bone = |from: Joint, to: Joint| joints[to.index()] - joints[from.index()];
-    let bones = LegBones { thigh: bone(side.hip, side.knee), shin: bone(side.knee, side.ankle) };
+    let bones = LegBones {
+        thigh: bone(side.hip, side.knee),
+        shin: bone(side.knee, side.ankle),
+    };
     let hip = root_position + pelvis * bone(Joint::Pelvis, side.hip);
     let hinge = heading_frame(0.6 * heading + 0.4 * foot.heading) * Vector3::x();
     let [thigh, shin] = bones.reach(foot.ankle - hip, hinge);
-    let sole = heading_frame(foot.heading) * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -foot.pitch);
+    let sole = heading_frame(foot.heading)
+        * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -foot.pitch);
     local[side.hip.index()] = pelvis.inverse() * thigh;
     local[side.knee.index()] = thigh.inverse() * shin;
     local[side.ankle.index()] = shin.inverse() * sole;
@@ -227,7 +281,8 @@ impl Side {
 /// world_from_segment of an upright segment with a heading (rad, from x): x left, y up, z forward.
 fn heading_frame(heading: f64) -> UnitQuaternion<f64> {
     let upright = Matrix3::from_columns(&[Vector3::y(), Vector3::z(), Vector3::x()]);
-    let world_from_upright = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(upright));
+    let world_from_upright =
+        UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(upright));
     UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading) * world_from_upright
 }
 

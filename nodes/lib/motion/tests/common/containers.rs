@@ -21,11 +21,21 @@ pub enum Py {
 impl Py {
     /// Rows of `width` numbers each.
     pub fn rows(values: &[f64], width: usize) -> Self {
-        Self::List(values.chunks(width).map(|row| Self::List(row.iter().map(|&value| Self::Float(value)).collect())).collect())
+        Self::List(
+            values
+                .chunks(width)
+                .map(|row| Self::List(row.iter().map(|&value| Self::Float(value)).collect()))
+                .collect(),
+        )
     }
 
     pub fn named(pairs: &[(&'static str, Py)]) -> Self {
-        Self::Dict(pairs.iter().map(|(key, value)| (Self::Text(key), value.clone())).collect())
+        Self::Dict(
+            pairs
+                .iter()
+                .map(|(key, value)| (Self::Text(key), value.clone()))
+                .collect(),
+        )
     }
 
     /// A pickle of protocol 2.
@@ -78,6 +88,7 @@ pub fn npz(arrays: &Arrays) -> Vec<u8> {
 
 /// What the reader makes of a file's bytes.
 pub fn parsed(bytes: Vec<u8>) -> Result<PoseFile, MotionError> {
-    let mut container = Container::new(Cursor::new(bytes), Path::new("clip.bin"), Limits::default())?;
+    let mut container =
+        Container::new(Cursor::new(bytes), Path::new("clip.bin"), Limits::default())?;
     PoseFile::parse(&mut container, PoseView::World, || Ok(None))
 }

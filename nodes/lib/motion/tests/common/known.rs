@@ -11,14 +11,23 @@ pub fn about(axis: Vector3<f64>, degrees: f64) -> UnitQuaternion<f64> {
 }
 
 pub fn side(joint: Joint) -> f64 {
-    if joint.name().starts_with("left") { 1.0 } else { -1.0 }
+    if joint.name().starts_with("left") {
+        1.0
+    } else {
+        -1.0
+    }
 }
 
-/// A rest pose: arms lowered, elbows turned forward, legs splayed, ankles turned back (all degrees).
+/// A rest pose: arms lowered, elbows turned forward, legs splayed, ankles turned back (all
+/// degrees).
 pub fn rest(arms_down: f64, elbows: f64, splay: f64, ankles: f64) -> Rotations {
     let mut rotations = [UnitQuaternion::identity(); JOINT_COUNT];
     for joint in Joint::ALL {
-        rotations[joint.index()] = match joint.name().trim_start_matches("left_").trim_start_matches("right_") {
+        rotations[joint.index()] = match joint
+            .name()
+            .trim_start_matches("left_")
+            .trim_start_matches("right_")
+        {
             "shoulder" => about(Vector3::z(), -side(joint) * arms_down),
             "elbow" => about(Vector3::y(), -side(joint) * elbows),
             "hip" => about(Vector3::z(), side(joint) * splay),
@@ -29,8 +38,9 @@ pub fn rest(arms_down: f64, elbows: f64, splay: f64, ankles: f64) -> Rotations {
     rotations
 }
 
-/// The embedded walk with every joint that `keeps_toes` allows moved and twisted further: smooth turns about changing axes, up to 20
-/// degrees and 1.3 Hz. The spine's joints move together, as skeletons with a shorter spine can tell.
+/// The embedded walk with every joint that `keeps_toes` allows moved and twisted further: smooth
+/// turns about changing axes, up to 20 degrees and 1.3 Hz. The spine's joints move together, as
+/// skeletons with a shorter spine can tell.
 pub fn known_motion(keeps_toes: bool) -> SmplMotion {
     let mut motion = embedded_walk();
     let rate_hz = motion.rate_hz;
@@ -47,10 +57,17 @@ pub fn known_motion(keeps_toes: bool) -> SmplMotion {
             let (number, size) = if joint.name().starts_with("spine") {
                 (3.0, 0.06)
             } else {
-                (joint.index() as f64, if joint == Joint::Pelvis { 0.1 } else { 0.2 })
+                (
+                    joint.index() as f64,
+                    if joint == Joint::Pelvis { 0.1 } else { 0.2 },
+                )
             };
-            let wave = |axis: f64| ((1.5 + 0.3 * number + 1.1 * axis).min(8.0) * time + number + 2.0 * axis).sin();
-            let extra = UnitQuaternion::from_scaled_axis(Vector3::new(wave(0.0), wave(1.0), wave(2.0)) * size);
+            let wave = |axis: f64| {
+                ((1.5 + 0.3 * number + 1.1 * axis).min(8.0) * time + number + 2.0 * axis).sin()
+            };
+            let extra = UnitQuaternion::from_scaled_axis(
+                Vector3::new(wave(0.0), wave(1.0), wave(2.0)) * size,
+            );
             pose.local_rotations[joint.index()] *= extra;
         }
     }
@@ -70,7 +87,11 @@ pub fn joint_shift() -> [Vector3<f64>; JOINT_COUNT] {
         } else {
             -1.0
         };
-        Vector3::new(mirror * (3.0 * number).sin(), (5.0 * number).sin(), (7.0 * number).sin()) * 0.002
+        Vector3::new(
+            mirror * (3.0 * number).sin(),
+            (5.0 * number).sin(),
+            (7.0 * number).sin(),
+        ) * 0.002
     })
 }
 

@@ -11,11 +11,13 @@ use super::value::{from_yaml, to_yaml};
 use crate::error::{RosError, RosResult};
 
 impl Parameters {
-    /// Declares a parameter for every field of a configuration, with the field's value as default; fields of inner structs have dotted
-    /// names. The parameters are read-only, for a configuration is read once; [`Parameters::amend`] changes that.
+    /// Declares a parameter for every field of a configuration, with the field's value as default;
+    /// fields of inner structs have dotted names. The parameters are read-only, for a configuration
+    /// is read once; [`Parameters::amend`] changes that.
     ///
-    /// An empty map stands open: any parameter below its name is taken and checked by [`Parameters::config`]. `None` and empty lists
-    /// say nothing of their type: any value is taken, and checked there too.
+    /// An empty map stands open: any parameter below its name is taken and checked by
+    /// [`Parameters::config`]. `None` and empty lists say nothing of their type: any value is
+    /// taken, and checked there too.
     ///
     /// # Errors
     /// Where a field is not a scalar, a list of scalars, a struct or a map.
@@ -23,15 +25,22 @@ impl Parameters {
         let wrong = |problem: String| RosError::Config { problem };
         let root = serde_norway::to_value(defaults).map_err(|error| wrong(error.to_string()))?;
         let mut leaves = Vec::new();
-        flatten(&mut Vec::new(), &root, &mut |path, value| leaves.push((path.join("."), value)));
+        flatten(&mut Vec::new(), &root, &mut |path, value| {
+            leaves.push((path.join("."), value))
+        });
         for (name, value) in leaves {
             if matches!(value, Value::Mapping(_)) {
                 self.open_config(&name);
                 continue;
             }
-            let default = from_yaml(value).map_err(|problem| wrong(format!("field '{name}': {problem}")))?;
+            let default =
+                from_yaml(value).map_err(|problem| wrong(format!("field '{name}': {problem}")))?;
             let untyped = value.is_null() || value.as_sequence().is_some_and(Vec::is_empty);
-            self.declare(Parameter { untyped, in_config: true, ..Parameter::of_value(&name, default).read_only() })?;
+            self.declare(Parameter {
+                untyped,
+                in_config: true,
+                ..Parameter::of_value(&name, default).read_only()
+            })?;
         }
         Ok(())
     }
@@ -48,7 +57,9 @@ impl Parameters {
         for name in self.open_configs() {
             insert_map(&mut root, &name);
         }
-        serde_norway::from_value(Value::Mapping(root)).map_err(|error| RosError::Config { problem: one_line(&error.to_string()) })
+        serde_norway::from_value(Value::Mapping(root)).map_err(|error| RosError::Config {
+            problem: one_line(&error.to_string()),
+        })
     }
 }
 
@@ -57,16 +68,25 @@ fn insert(root: &mut Mapping, name: &str, value: &ParameterValue) -> Result<(), 
         root.insert(name.into(), to_yaml(value));
         return Ok(());
     };
-    match root.entry(first.into()).or_insert_with(|| Value::Mapping(Mapping::new())) {
+    match root
+        .entry(first.into())
+        .or_insert_with(|| Value::Mapping(Mapping::new()))
+    {
         Value::Mapping(inner) => insert(inner, rest, value),
-        _ => Err(format!("'{first}' is a value and has '{rest}' below it too")),
+        _ => Err(format!(
+            "'{first}' is a value and has '{rest}' below it too"
+        )),
     }
 }
 
 /// An open map that nothing was put into must still be there, empty.
 fn insert_map(root: &mut Mapping, name: &str) {
-    let (first, rest) = name.split_once('.').map_or((name, None), |(first, rest)| (first, Some(rest)));
-    let inner = root.entry(first.into()).or_insert_with(|| Value::Mapping(Mapping::new()));
+    let (first, rest) = name
+        .split_once('.')
+        .map_or((name, None), |(first, rest)| (first, Some(rest)));
+    let inner = root
+        .entry(first.into())
+        .or_insert_with(|| Value::Mapping(Mapping::new()));
     if let (Value::Mapping(inner), Some(rest)) = (inner, rest) {
         insert_map(inner, rest);
     }
@@ -116,7 +136,14 @@ mod tests {
 
     fn defaults() -> Config {
         let placements = BTreeMap::new();
-        Config { rate_hz: 100.0, scheme: Scheme::Spline, device: None, names: vec![], noise: Noise { seed: 1 }, placements }
+        Config {
+            rate_hz: 100.0,
+            scheme: Scheme::Spline,
+            device: None,
+            names: vec![],
+            noise: Noise { seed: 1 },
+            placements,
+        }
     }
 
     fn config(given: &[&str]) -> RosResult<Config> {
@@ -141,7 +168,10 @@ mod tests {
             "use_sim_time:=true",
         ])
         .unwrap();
-        assert_eq!((config.rate_hz, config.scheme, config.noise.seed), (50.0, Scheme::Differences, 7));
+        assert_eq!(
+            (config.rate_hz, config.scheme, config.noise.seed),
+            (50.0, Scheme::Differences, 7)
+        );
         assert_eq!(config.device.as_deref(), Some("phone"));
         assert_eq!(config.names, ["a", "b"]);
         assert_eq!(config.placements["left_wrist"].site, "left_watch");
@@ -150,8 +180,14 @@ mod tests {
     #[test]
     fn wrong_values_are_refused() {
         for (given, expected) in [
-            ("rate_hz:=fast", "-p rate_hz:=fast: parameter 'rate_hz': expected a number, found 'fast'"),
-            ("rate_khz:=1", "unknown parameter 'rate_khz', did you mean 'rate_hz'?"),
+            (
+                "rate_hz:=fast",
+                "-p rate_hz:=fast: parameter 'rate_hz': expected a number, found 'fast'",
+            ),
+            (
+                "rate_khz:=1",
+                "unknown parameter 'rate_khz', did you mean 'rate_hz'?",
+            ),
             ("scheme:=guess", "unknown variant `guess`"),
             ("placements.w.sight:=x", "sight"),
             ("noise.seed:=-1", "-1"),

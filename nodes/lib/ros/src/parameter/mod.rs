@@ -1,4 +1,5 @@
-//! ROS 2 parameters: declared with a type, bounds and a description; given by file or command line; open to the standard services.
+//! ROS 2 parameters: declared with a type, bounds and a description; given by file or command line;
+//! open to the standard services.
 
 mod config;
 mod file;

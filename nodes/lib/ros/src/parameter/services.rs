@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use ros2_client::parameters::raw;
 use ros2_client::rcl_interfaces::{
-    DescribeParametersRequest, DescribeParametersResponse, GetParameterTypesRequest, GetParameterTypesResponse, GetParametersRequest,
-    GetParametersResponse, ListParametersRequest, ListParametersResponse, ListParametersResult, SetParametersAtomicallyResponse,
+    DescribeParametersRequest, DescribeParametersResponse, GetParameterTypesRequest,
+    GetParameterTypesResponse, GetParametersRequest, GetParametersResponse, ListParametersRequest,
+    ListParametersResponse, ListParametersResult, SetParametersAtomicallyResponse,
     SetParametersRequest, SetParametersResponse,
 };
 use ros2_client::{ParameterValue, builtin_interfaces};
@@ -27,13 +28,27 @@ struct Setter {
 
 impl Setter {
     fn set(&self, changes: &[raw::Parameter]) -> raw::SetParametersResult {
-        let changes: Vec<_> = changes.iter().map(|change| (change.name.clone(), ParameterValue::from(change.value.clone()))).collect();
+        let changes: Vec<_> = changes
+            .iter()
+            .map(|change| {
+                (
+                    change.name.clone(),
+                    ParameterValue::from(change.value.clone()),
+                )
+            })
+            .collect();
         match self.parameters.set_all(&changes, "parameter service") {
             Ok(changed) => {
                 self.publish(changed);
-                raw::SetParametersResult { successful: true, reason: String::new() }
+                raw::SetParametersResult {
+                    successful: true,
+                    reason: String::new(),
+                }
             }
-            Err(error) => raw::SetParametersResult { successful: false, reason: error.to_string() },
+            Err(error) => raw::SetParametersResult {
+                successful: false,
+                reason: error.to_string(),
+            },
         }
     }
 
@@ -42,7 +57,13 @@ impl Setter {
             stamp: builtin_interfaces::Time::from_nanos(self.core.clock.now().nanos),
             node: self.core.name.to_string(),
             new_parameters: Vec::new(),
-            changed_parameters: changed.into_iter().map(|(name, value)| raw::Parameter { name, value: value.into() }).collect(),
+            changed_parameters: changed
+                .into_iter()
+                .map(|(name, value)| raw::Parameter {
+                    name,
+                    value: value.into(),
+                })
+                .collect(),
             deleted_parameters: Vec::new(),
         };
         let sent = RawMessage::encode(&event).map(|raw| self.events.publish(raw));
@@ -53,51 +74,114 @@ impl Setter {
 }
 
 /// Offers the services below the node's name.
-pub(crate) fn serve_parameters(core: &Arc<Core>, parameters: &Parameters) -> RosResult<Vec<ServiceServer>> {
-    let events = RawPublisher::new(core, "/parameter_events".into(), "rcl_interfaces/msg/ParameterEvent", Qos::reliable().depth(1000))?;
-    let setter = Arc::new(Setter { parameters: parameters.clone(), core: Arc::clone(core), events });
+pub(crate) fn serve_parameters(
+    core: &Arc<Core>,
+    parameters: &Parameters,
+) -> RosResult<Vec<ServiceServer>> {
+    let events = RawPublisher::new(
+        core,
+        "/parameter_events".into(),
+        "rcl_interfaces/msg/ParameterEvent",
+        Qos::reliable().depth(1000),
+    )?;
+    let setter = Arc::new(Setter {
+        parameters: parameters.clone(),
+        core: Arc::clone(core),
+        events,
+    });
     let name = |service: &str| format!("{}/{service}", core.name);
     let [get, types, list, describe] = std::array::from_fn(|_| parameters.clone());
     let (one_by_one, together) = (Arc::clone(&setter), setter);
     let unset = |value: Option<ParameterValue>| value.unwrap_or(ParameterValue::NotSet);
     Ok(vec![
-        serve(core, name("get_parameters"), "rcl_interfaces/srv/GetParameters", move |request: GetParametersRequest| {
-            GetParametersResponse { values: request.names.iter().map(|name| unset(get.value(name)).into()).collect() }
-        })?,
-        serve(core, name("get_parameter_types"), "rcl_interfaces/srv/GetParameterTypes", move |request: GetParameterTypesRequest| {
-            let kind = |name: &String| unset(types.value(name)).to_parameter_type() as u8;
-            GetParameterTypesResponse { values: request.names.iter().map(kind).collect() }
-        })?,
-        serve(core, name("set_parameters"), "rcl_interfaces/srv/SetParameters", move |request: SetParametersRequest| {
-            SetParametersResponse { results: request.parameter.iter().map(|one| one_by_one.set(std::slice::from_ref(one))).collect() }
-        })?,
+        serve(
+            core,
+            name("get_parameters"),
+            "rcl_interfaces/srv/GetParameters",
+            move |request: GetParametersRequest| GetParametersResponse {
+                values: request
+                    .names
+                    .iter()
+                    .map(|name| unset(get.value(name)).into())
+                    .collect(),
+            },
+        )?,
+        serve(
+            core,
+            name("get_parameter_types"),
+            "rcl_interfaces/srv/GetParameterTypes",
+            move |request: GetParameterTypesRequest| {
+                let kind = |name: &String| unset(types.value(name)).to_parameter_type() as u8;
+                GetParameterTypesResponse {
+                    values: request.names.iter().map(kind).collect(),
+                }
+            },
+        )?,
+        serve(
+            core,
+            name("set_parameters"),
+            "rcl_interfaces/srv/SetParameters",
+            move |request: SetParametersRequest| SetParametersResponse {
+                results: request
+                    .parameter
+                    .iter()
+                    .map(|one| one_by_one.set(std::slice::from_ref(one)))
+                    .collect(),
+            },
+        )?,
         serve(
             core,
             name("set_parameters_atomically"),
             "rcl_interfaces/srv/SetParametersAtomically",
-            move |request: SetParametersRequest| SetParametersAtomicallyResponse { result: together.set(&request.parameter) },
+            move |request: SetParametersRequest| SetParametersAtomicallyResponse {
+                result: together.set(&request.parameter),
+            },
         )?,
-        serve(core, name("list_parameters"), "rcl_interfaces/srv/ListParameters", move |request: ListParametersRequest| {
-            ListParametersResponse { result: list_names(list.names(), &request.prefixes, request.depth) }
-        })?,
-        serve(core, name("describe_parameters"), "rcl_interfaces/srv/DescribeParameters", move |request: DescribeParametersRequest| {
-            DescribeParametersResponse { values: request.names.iter().map(|name| descriptor(name, describe.describe(name))).collect() }
-        })?,
+        serve(
+            core,
+            name("list_parameters"),
+            "rcl_interfaces/srv/ListParameters",
+            move |request: ListParametersRequest| ListParametersResponse {
+                result: list_names(list.names(), &request.prefixes, request.depth),
+            },
+        )?,
+        serve(
+            core,
+            name("describe_parameters"),
+            "rcl_interfaces/srv/DescribeParameters",
+            move |request: DescribeParametersRequest| DescribeParametersResponse {
+                values: request
+                    .names
+                    .iter()
+                    .map(|name| descriptor(name, describe.describe(name)))
+                    .collect(),
+            },
+        )?,
     ])
 }
 
-/// As rclcpp lists: with no prefix, the names of at most `depth` parts (0: all); else the prefixes themselves and what stands at most
-/// `depth` parts below them.
+/// As rclcpp lists: with no prefix, the names of at most `depth` parts (0: all); else the prefixes
+/// themselves and what stands at most `depth` parts below them.
 fn list_names(names: Vec<String>, prefixes: &[String], depth: u64) -> ListParametersResult {
     let parts = |name: &str| name.split('.').count() as u64;
     let shallow = |name: &str| depth == 0 || parts(name) <= depth;
-    let below = |name: &str, prefix: &str| name.strip_prefix(prefix).and_then(|rest| rest.strip_prefix('.')).is_some_and(shallow);
+    let below = |name: &str, prefix: &str| {
+        name.strip_prefix(prefix)
+            .and_then(|rest| rest.strip_prefix('.'))
+            .is_some_and(shallow)
+    };
     let wanted = |name: &String| match prefixes {
         [] => shallow(name),
-        prefixes => prefixes.iter().any(|prefix| name == prefix || below(name, prefix)),
+        prefixes => prefixes
+            .iter()
+            .any(|prefix| name == prefix || below(name, prefix)),
     };
     let names: Vec<String> = names.into_iter().filter(wanted).collect();
-    let mut prefixes: Vec<String> = names.iter().filter_map(|name| name.rsplit_once('.')).map(|(prefix, _)| prefix.to_owned()).collect();
+    let mut prefixes: Vec<String> = names
+        .iter()
+        .filter_map(|name| name.rsplit_once('.'))
+        .map(|(prefix, _)| prefix.to_owned())
+        .collect();
     prefixes.sort();
     prefixes.dedup();
     ListParametersResult { names, prefixes }
@@ -105,11 +189,24 @@ fn list_names(names: Vec<String>, prefixes: &[String], depth: u64) -> ListParame
 
 fn descriptor(name: &str, parameter: Option<Parameter>) -> raw::ParameterDescriptor {
     let known = parameter.is_some();
-    let parameter = parameter.unwrap_or_else(|| Parameter::of_value(name, ParameterValue::NotSet).about("not a parameter of this node"));
-    let whole = matches!(parameter.value, ParameterValue::Integer(_) | ParameterValue::IntegerArray(_));
+    let parameter = parameter.unwrap_or_else(|| {
+        Parameter::of_value(name, ParameterValue::NotSet).about("not a parameter of this node")
+    });
+    let whole = matches!(
+        parameter.value,
+        ParameterValue::Integer(_) | ParameterValue::IntegerArray(_)
+    );
     let (integers, numbers): (Vec<_>, Vec<_>) = parameter.range.into_iter().partition(|_| whole);
-    let integer_range = |(least, most): (f64, f64)| raw::IntegerRange { from_value: least as i64, to_value: most as i64, step: 1 };
-    let number_range = |(least, most)| raw::FloatingPointRange { from_value: least, to_value: most, step: 0.0 };
+    let integer_range = |(least, most): (f64, f64)| raw::IntegerRange {
+        from_value: least as i64,
+        to_value: most as i64,
+        step: 1,
+    };
+    let number_range = |(least, most)| raw::FloatingPointRange {
+        from_value: least,
+        to_value: most,
+        step: 0.0,
+    };
     raw::ParameterDescriptor {
         name: name.to_owned(),
         r#type: parameter.value.to_parameter_type() as u8,
@@ -130,7 +227,8 @@ mod tests {
     fn names_are_listed_by_prefix_and_depth() {
         let names = || ["a", "n.b", "n.c.d", "nn.e"].map(String::from).to_vec();
         let list = |prefixes: &[&str], depth| {
-            let prefixes: Vec<String> = prefixes.iter().map(|prefix| (*prefix).to_owned()).collect();
+            let prefixes: Vec<String> =
+                prefixes.iter().map(|prefix| (*prefix).to_owned()).collect();
             list_names(names(), &prefixes, depth).names
         };
         assert_eq!(list(&[], 0), names());

@@ -35,7 +35,15 @@ impl Parameter {
 
     pub(crate) fn of_value(name: &str, value: ParameterValue) -> Self {
         let description = String::new();
-        Self { name: name.to_owned(), value, description, read_only: false, range: None, untyped: false, in_config: false }
+        Self {
+            name: name.to_owned(),
+            value,
+            description,
+            read_only: false,
+            range: None,
+            untyped: false,
+            in_config: false,
+        }
     }
 
     /// With a description for `ros2 param describe`.
@@ -59,7 +67,8 @@ impl Parameter {
         self
     }
 
-    /// Can change at run time: the node asks for the value again and again, or registers [`Parameters::on_set`].
+    /// Can change at run time: the node asks for the value again and again, or registers
+    /// [`Parameters::on_set`].
     #[must_use]
     pub fn writable(mut self) -> Self {
         self.read_only = false;
@@ -70,12 +79,25 @@ impl Parameter {
         let found = to_text(&given);
         let refuse = |expected: String| {
             let (place, name) = (place.to_owned(), self.name.clone());
-            RosError::ParameterValue { place, name, expected, found }
+            RosError::ParameterValue {
+                place,
+                name,
+                expected,
+                found,
+            }
         };
-        let value = if self.untyped { Some(given) } else { coerce(given, &self.value) };
+        let value = if self.untyped {
+            Some(given)
+        } else {
+            coerce(given, &self.value)
+        };
         match (value, self.range) {
             (None, _) => Err(refuse(type_name(&self.value).to_owned())),
-            (Some(value), Some((least, most))) if numbers(&value).iter().any(|number| !(least..=most).contains(number)) => {
+            (Some(value), Some((least, most)))
+                if numbers(&value)
+                    .iter()
+                    .any(|number| !(least..=most).contains(number)) =>
+            {
                 Err(refuse(format!("{least} to {most}")))
             }
             (Some(value), _) => Ok(value),
@@ -105,8 +127,14 @@ struct Store {
 impl Store {
     /// Whether an undeclared name is taken, and if so, whether it belongs to the configuration.
     fn is_open(&self, name: &str) -> Option<bool> {
-        let below = |prefix: &str| name.strip_prefix(prefix).is_some_and(|rest| rest.len() > 1 && rest.starts_with('.'));
-        self.open.iter().find(|(prefix, _)| below(prefix)).map(|(_, in_config)| *in_config)
+        let below = |prefix: &str| {
+            name.strip_prefix(prefix)
+                .is_some_and(|rest| rest.len() > 1 && rest.starts_with('.'))
+        };
+        self.open
+            .iter()
+            .find(|(prefix, _)| below(prefix))
+            .map(|(_, in_config)| *in_config)
     }
 }
 
@@ -114,8 +142,11 @@ impl Parameters {
     /// `use_sim_time` alone.
     pub fn new() -> Self {
         let parameters = Self::default();
-        let sim_time = Parameter::new(USE_SIM_TIME, false).about("Follow /clock instead of the system clock.");
-        lock(&parameters.inner).declared.insert(USE_SIM_TIME.to_owned(), sim_time);
+        let sim_time =
+            Parameter::new(USE_SIM_TIME, false).about("Follow /clock instead of the system clock.");
+        lock(&parameters.inner)
+            .declared
+            .insert(USE_SIM_TIME.to_owned(), sim_time);
         parameters
     }
 
@@ -125,16 +156,21 @@ impl Parameters {
     /// Where the default is outside its own bounds.
     pub fn declare(&self, parameter: Parameter) -> RosResult<()> {
         parameter.check(parameter.value.clone(), "default")?;
-        lock(&self.inner).declared.insert(parameter.name.clone(), parameter);
+        lock(&self.inner)
+            .declared
+            .insert(parameter.name.clone(), parameter);
         Ok(())
     }
 
-    /// Changes what is known about a declared parameter: `amend("rate_hz", |p| p.about("...").range(1.0, 1000.0))`.
+    /// Changes what is known about a declared parameter: `amend("rate_hz", |p|
+    /// p.about("...").range(1.0, 1000.0))`.
     ///
     /// # Errors
     /// Where the parameter is unknown, or its value is outside the new bounds.
     pub fn amend(&self, name: &str, change: impl FnOnce(Parameter) -> Parameter) -> RosResult<()> {
-        let parameter = self.describe(name).ok_or_else(|| self.unknown("amend", name))?;
+        let parameter = self
+            .describe(name)
+            .ok_or_else(|| self.unknown("amend", name))?;
         self.declare(change(parameter))
     }
 
@@ -148,13 +184,20 @@ impl Parameters {
     }
 
     pub(crate) fn open_configs(&self) -> Vec<String> {
-        lock(&self.inner).open.iter().filter(|(_, in_config)| *in_config).map(|(prefix, _)| prefix.clone()).collect()
+        lock(&self.inner)
+            .open
+            .iter()
+            .filter(|(_, in_config)| *in_config)
+            .map(|(prefix, _)| prefix.clone())
+            .collect()
     }
 
-    /// Takes over what parameter files and `-p` say for this node, in the order of the command line: the last one counts.
+    /// Takes over what parameter files and `-p` say for this node, in the order of the command
+    /// line: the last one counts.
     ///
     /// # Errors
-    /// Names file and line, or the argument, of a value that does not fit or a parameter that the node does not have.
+    /// Names file and line, or the argument, of a value that does not fit or a parameter that the
+    /// node does not have.
     pub fn apply(&self, args: &RosArgs, node: &NodeName) -> RosResult<()> {
         for given in args.overrides().iter().filter(|given| given.is_for(node)) {
             if given.name.starts_with(QOS_OVERRIDES) {
@@ -174,7 +217,10 @@ impl Parameters {
 
     /// The value of a parameter, whatever its type; none where it is not declared.
     pub fn value(&self, name: &str) -> Option<ParameterValue> {
-        lock(&self.inner).declared.get(name).map(|parameter| parameter.value.clone())
+        lock(&self.inner)
+            .declared
+            .get(name)
+            .map(|parameter| parameter.value.clone())
     }
 
     /// All names, sorted.
@@ -182,8 +228,12 @@ impl Parameters {
         lock(&self.inner).declared.keys().cloned().collect()
     }
 
-    /// Calls `callback` before a parameter changes at run time; its error refuses the change and is the reason given to the caller.
-    pub fn on_set(&self, callback: impl FnMut(&str, &ParameterValue) -> Result<(), String> + Send + 'static) {
+    /// Calls `callback` before a parameter changes at run time; its error refuses the change and is
+    /// the reason given to the caller.
+    pub fn on_set(
+        &self,
+        callback: impl FnMut(&str, &ParameterValue) -> Result<(), String> + Send + 'static,
+    ) {
         lock(&self.inner).on_set.push(Box::new(callback));
     }
 
@@ -195,33 +245,56 @@ impl Parameters {
     /// Changes a parameter at run time, as the parameter services do.
     ///
     /// # Errors
-    /// Where the parameter is unknown or read-only, the value does not fit, or a callback refuses it.
+    /// Where the parameter is unknown or read-only, the value does not fit, or a callback refuses
+    /// it.
     pub fn set(&self, name: &str, value: impl ParameterScalar) -> RosResult<()> {
-        self.set_all(&[(name.to_owned(), value.into_value())], "set").map(drop)
+        self.set_all(&[(name.to_owned(), value.into_value())], "set")
+            .map(drop)
     }
 
     /// Changes all or none; the values as they are now.
-    pub(crate) fn set_all(&self, changes: &[(String, ParameterValue)], place: &str) -> RosResult<Vec<(String, ParameterValue)>> {
+    pub(crate) fn set_all(
+        &self,
+        changes: &[(String, ParameterValue)],
+        place: &str,
+    ) -> RosResult<Vec<(String, ParameterValue)>> {
         let mut checked = Vec::new();
         for (name, value) in changes {
-            if self.describe(name).is_some_and(|parameter| parameter.read_only) {
-                return Err(RosError::ReadOnly { place: place.to_owned(), name: name.clone() });
+            if self
+                .describe(name)
+                .is_some_and(|parameter| parameter.read_only)
+            {
+                return Err(RosError::ReadOnly {
+                    place: place.to_owned(),
+                    name: name.clone(),
+                });
             }
             checked.push((name.clone(), self.checked(name, value.clone(), place)?));
         }
         // Taken out: a callback may ask for parameters.
         let mut callbacks = std::mem::take(&mut lock(&self.inner).on_set);
         let refused = checked.iter().find_map(|(name, value)| {
-            let expected = callbacks.iter_mut().find_map(|callback| callback(name, value).err())?;
-            Some(RosError::ParameterValue { place: place.to_owned(), name: name.clone(), expected, found: to_text(value) })
+            let expected = callbacks
+                .iter_mut()
+                .find_map(|callback| callback(name, value).err())?;
+            Some(RosError::ParameterValue {
+                place: place.to_owned(),
+                name: name.clone(),
+                expected,
+                found: to_text(value),
+            })
         });
         let mut store = lock(&self.inner);
         callbacks.append(&mut store.on_set);
         store.on_set = callbacks;
         drop(store);
         refused.map_or(Ok(()), Err)?;
-        checked.iter().for_each(|(name, value)| self.store(name, value.clone()));
-        lock(&self.inner).bells.retain(|bell| bell.upgrade().inspect(|bell| bell.ring()).is_some());
+        checked
+            .iter()
+            .for_each(|(name, value)| self.store(name, value.clone()));
+        lock(&self.inner)
+            .bells
+            .retain(|bell| bell.upgrade().inspect(|bell| bell.ring()).is_some());
         Ok(checked)
     }
 
@@ -231,13 +304,21 @@ impl Parameters {
 
     pub(crate) fn config_values(&self) -> Vec<(String, ParameterValue)> {
         let store = lock(&self.inner);
-        store.declared.values().filter(|parameter| parameter.in_config).map(|p| (p.name.clone(), p.value.clone())).collect()
+        store
+            .declared
+            .values()
+            .filter(|parameter| parameter.in_config)
+            .map(|p| (p.name.clone(), p.value.clone()))
+            .collect()
     }
 
     fn checked(&self, name: &str, value: ParameterValue, place: &str) -> RosResult<ParameterValue> {
         let (parameter, open) = {
             let store = lock(&self.inner);
-            (store.declared.get(name).cloned(), store.is_open(name).is_some())
+            (
+                store.declared.get(name).cloned(),
+                store.is_open(name).is_some(),
+            )
         };
         match parameter {
             Some(parameter) => parameter.check(value, place),
@@ -249,17 +330,37 @@ impl Parameters {
     fn store(&self, name: &str, value: ParameterValue) {
         let mut store = lock(&self.inner);
         let in_config = store.is_open(name).unwrap_or(false);
-        let fresh = || Parameter { untyped: true, in_config, read_only: in_config, ..Parameter::of_value(name, ParameterValue::NotSet) };
-        store.declared.entry(name.to_owned()).or_insert_with(fresh).value = value;
+        let fresh = || Parameter {
+            untyped: true,
+            in_config,
+            read_only: in_config,
+            ..Parameter::of_value(name, ParameterValue::NotSet)
+        };
+        store
+            .declared
+            .entry(name.to_owned())
+            .or_insert_with(fresh)
+            .value = value;
     }
 
     fn unknown(&self, place: &str, name: &str) -> RosError {
         let names = self.names();
         // A part of a name ('rate' for 'rate_hz') is as good as a slip of the finger.
-        let part = |known: &str| name.len() > 2 && (known.starts_with(name) || name.starts_with(known));
-        let close = |known: &str| part(known) || strsim::levenshtein(name, known) <= (name.len() / 3).max(2);
-        let nearest = names.iter().filter(|known| close(known)).min_by_key(|known| strsim::levenshtein(name, known)).cloned();
-        RosError::UnknownParameter { place: place.to_owned(), name: name.to_owned(), nearest }
+        let part =
+            |known: &str| name.len() > 2 && (known.starts_with(name) || name.starts_with(known));
+        let close = |known: &str| {
+            part(known) || strsim::levenshtein(name, known) <= (name.len() / 3).max(2)
+        };
+        let nearest = names
+            .iter()
+            .filter(|known| close(known))
+            .min_by_key(|known| strsim::levenshtein(name, known))
+            .cloned();
+        RosError::UnknownParameter {
+            place: place.to_owned(),
+            name: name.to_owned(),
+            nearest,
+        }
     }
 
     fn keep_qos(&self, name: &str, value: ParameterValue, place: &str) -> RosResult<()> {
@@ -271,13 +372,21 @@ impl Parameters {
             found: to_text(&value),
         };
         let parts: Vec<&str> = name.rsplitn(3, '.').collect();
-        let [policy, "publisher" | "subscription", topic] = parts[..] else { return Err(refuse()) };
-        if !topic.strip_prefix(QOS_OVERRIDES).is_some_and(|topic| topic.starts_with('/')) {
+        let [policy, "publisher" | "subscription", topic] = parts[..] else {
+            return Err(refuse());
+        };
+        if !topic
+            .strip_prefix(QOS_OVERRIDES)
+            .is_some_and(|topic| topic.starts_with('/'))
+        {
             return Err(refuse());
         }
-        // Tried on a default now, so that a wrong value is refused at the start and not when the topic comes up.
+        // Tried on a default now, so that a wrong value is refused at the start and not when the
+        // topic comes up.
         Qos::default().override_policy(policy, &plain_text(&value), place, name)?;
-        lock(&self.inner).qos.insert(name.to_owned(), (value, place.to_owned()));
+        lock(&self.inner)
+            .qos
+            .insert(name.to_owned(), (value, place.to_owned()));
         Ok(())
     }
 
@@ -294,10 +403,22 @@ impl Parameters {
             History::KeepLast(depth) => ("keep_last", i64::from(depth)),
             History::KeepAll => ("keep_all", 0),
         };
-        let reliability = if qos.reliability == Reliability::Reliable { "reliable" } else { "best_effort" };
-        let durability = if qos.durability == Durability::Volatile { "volatile" } else { "transient_local" };
+        let reliability = if qos.reliability == Reliability::Reliable {
+            "reliable"
+        } else {
+            "best_effort"
+        };
+        let durability = if qos.durability == Durability::Volatile {
+            "volatile"
+        } else {
+            "transient_local"
+        };
         self.declare(Parameter::new(&name("depth"), depth).read_only())?;
-        for (policy, text) in [("history", history), ("reliability", reliability), ("durability", durability)] {
+        for (policy, text) in [
+            ("history", history),
+            ("reliability", reliability),
+            ("durability", durability),
+        ] {
             self.declare(Parameter::new(&name(policy), text.to_owned()).read_only())?;
         }
         Ok(qos)

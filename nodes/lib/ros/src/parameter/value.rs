@@ -77,17 +77,24 @@ pub(crate) fn from_yaml(value: &Value) -> Result<ParameterValue, String> {
         Value::Bool(value) => Ok(ParameterValue::Boolean(*value)),
         Value::Number(number) => match number.as_i64() {
             Some(integer) => Ok(ParameterValue::Integer(integer)),
-            None if number.is_f64() => Ok(ParameterValue::Double(number.as_f64().unwrap_or(f64::NAN))),
+            None if number.is_f64() => {
+                Ok(ParameterValue::Double(number.as_f64().unwrap_or(f64::NAN)))
+            }
             None => Err(format!("{number} does not fit into 64 bits")),
         },
         Value::String(text) => Ok(ParameterValue::String(text.clone())),
         Value::Sequence(items) => list_from_yaml(items),
-        Value::Mapping(_) | Value::Tagged(_) => Err("expected a scalar or a list of scalars".into()),
+        Value::Mapping(_) | Value::Tagged(_) => {
+            Err("expected a scalar or a list of scalars".into())
+        }
     }
 }
 
 fn list_from_yaml(items: &[Value]) -> Result<ParameterValue, String> {
-    fn all<T>(values: &[ParameterValue], pick: impl Fn(&ParameterValue) -> Option<T>) -> Option<Vec<T>> {
+    fn all<T>(
+        values: &[ParameterValue],
+        pick: impl Fn(&ParameterValue) -> Option<T>,
+    ) -> Option<Vec<T>> {
         values.iter().map(pick).collect()
     }
     let values = items.iter().map(from_yaml).collect::<Result<Vec<_>, _>>()?;
@@ -129,20 +136,35 @@ pub(crate) fn to_yaml(value: &ParameterValue) -> Value {
     }
 }
 
-/// `given` as a value of the type that `wanted` has: integers become numbers, an empty list fits every list. None where it does not fit.
+/// `given` as a value of the type that `wanted` has: integers become numbers, an empty list fits
+/// every list. None where it does not fit.
 pub(crate) fn coerce(given: ParameterValue, wanted: &ParameterValue) -> Option<ParameterValue> {
     use ParameterValue as V;
     match (given, wanted) {
         (V::Integer(value), V::Double(_)) => Some(V::Double(value as f64)),
-        (V::IntegerArray(items), V::DoubleArray(_)) => Some(V::DoubleArray(items.into_iter().map(|item| item as f64).collect())),
-        (V::IntegerArray(items), V::ByteArray(_)) => {
-            items.into_iter().map(|item| u8::try_from(item).ok()).collect::<Option<_>>().map(V::ByteArray)
+        (V::IntegerArray(items), V::DoubleArray(_)) => Some(V::DoubleArray(
+            items.into_iter().map(|item| item as f64).collect(),
+        )),
+        (V::IntegerArray(items), V::ByteArray(_)) => items
+            .into_iter()
+            .map(|item| u8::try_from(item).ok())
+            .collect::<Option<_>>()
+            .map(V::ByteArray),
+        (V::StringArray(items), V::BooleanArray(_)) if items.is_empty() => {
+            Some(V::BooleanArray(Vec::new()))
         }
-        (V::StringArray(items), V::BooleanArray(_)) if items.is_empty() => Some(V::BooleanArray(Vec::new())),
-        (V::StringArray(items), V::IntegerArray(_)) if items.is_empty() => Some(V::IntegerArray(Vec::new())),
-        (V::StringArray(items), V::DoubleArray(_)) if items.is_empty() => Some(V::DoubleArray(Vec::new())),
-        (V::StringArray(items), V::ByteArray(_)) if items.is_empty() => Some(V::ByteArray(Vec::new())),
-        (given, wanted) => (std::mem::discriminant(&given) == std::mem::discriminant(wanted)).then_some(given),
+        (V::StringArray(items), V::IntegerArray(_)) if items.is_empty() => {
+            Some(V::IntegerArray(Vec::new()))
+        }
+        (V::StringArray(items), V::DoubleArray(_)) if items.is_empty() => {
+            Some(V::DoubleArray(Vec::new()))
+        }
+        (V::StringArray(items), V::ByteArray(_)) if items.is_empty() => {
+            Some(V::ByteArray(Vec::new()))
+        }
+        (given, wanted) => {
+            (std::mem::discriminant(&given) == std::mem::discriminant(wanted)).then_some(given)
+        }
     }
 }
 
@@ -171,9 +193,18 @@ mod tests {
         assert_eq!(parsed("true").unwrap(), ParameterValue::Boolean(true));
         assert_eq!(parsed("100").unwrap(), ParameterValue::Integer(100));
         assert_eq!(parsed("1e-3").unwrap(), ParameterValue::Double(0.001));
-        assert_eq!(parsed("'100'").unwrap(), ParameterValue::String("100".into()));
-        assert_eq!(parsed("[1, 2.5]").unwrap(), ParameterValue::DoubleArray(vec![1.0, 2.5]));
-        assert_eq!(parsed("[a, b]").unwrap(), ParameterValue::StringArray(vec!["a".into(), "b".into()]));
+        assert_eq!(
+            parsed("'100'").unwrap(),
+            ParameterValue::String("100".into())
+        );
+        assert_eq!(
+            parsed("[1, 2.5]").unwrap(),
+            ParameterValue::DoubleArray(vec![1.0, 2.5])
+        );
+        assert_eq!(
+            parsed("[a, b]").unwrap(),
+            ParameterValue::StringArray(vec!["a".into(), "b".into()])
+        );
         for wrong in ["[1, a]", "[[1]]", "{a: 1}"] {
             assert!(parsed(wrong).is_err(), "{wrong}");
         }
@@ -181,9 +212,18 @@ mod tests {
 
     #[test]
     fn integers_pass_for_numbers_and_not_the_other_way() {
-        assert_eq!(coerce(ParameterValue::Integer(2), &ParameterValue::Double(0.0)), Some(ParameterValue::Double(2.0)));
-        assert_eq!(coerce(ParameterValue::Double(2.0), &ParameterValue::Integer(0)), None);
+        assert_eq!(
+            coerce(ParameterValue::Integer(2), &ParameterValue::Double(0.0)),
+            Some(ParameterValue::Double(2.0))
+        );
+        assert_eq!(
+            coerce(ParameterValue::Double(2.0), &ParameterValue::Integer(0)),
+            None
+        );
         let empty = ParameterValue::StringArray(Vec::new());
-        assert_eq!(coerce(empty, &ParameterValue::DoubleArray(vec![1.0])), Some(ParameterValue::DoubleArray(Vec::new())));
+        assert_eq!(
+            coerce(empty, &ParameterValue::DoubleArray(vec![1.0])),
+            Some(ParameterValue::DoubleArray(Vec::new()))
+        );
     }
 }
