@@ -43,7 +43,7 @@ placements:
     declared_noise: {accel_density: 0.0014, gyro_density: 0.00012}
     effects:
       - {effect: mount_rotation, rotvec: [0.1, -0.05, 0.02]}
-      - {effect: mount_slip, time: 5.0, rotvec: [0.0, 0.1, 0.0]}
+      - {effect: mount_slip, at: 5.0, rotvec: [0.0, 0.1, 0.0]}
       - {effect: soft_tissue, natural_hz: 7.0, damping_ratio: 0.4}
       - {effect: vibration, hz: 31.0, amplitude: [0.2, 0.1, 0.0], phase: 0.3}
       - {effect: clock_drift, ppm: 80.0}
@@ -54,19 +54,20 @@ YAML
 run simulate --out walk.mcap --csv csv
 run simulate --no-noise --scheme richardson --out walk_ideal.mcap
 run simulate --placements placements.yaml --seed 7 --out walk_worn.mcap
-run simulate "$poses/a_ok.bvh" --out bvh.mcap
+run convert walk.mcap walk.bvh
+run simulate walk.bvh --out bvh.mcap
 run simulate "$poses/poses/amass.npz" --out amass.mcap
 run simulate "$poses/poses/chain_wham.pkl" --person all --out people.mcap
 run simulate --reference walk.mcap --effects effects.yaml --out again.mcap
 run simulate --reference walk.mcap --scheme spline --rate 60 --no-noise --out again_spline.mcap
-run convert "$poses/a_ok.bvh" watch.tum --site left_watch
+run convert "walk.bvh" watch.tum --site left_watch
 run simulate --rigid watch.tum --rate 100 --device consumer_mems --out rigid.mcap
 run simulate --rigid watch.tum --rate 100 --learned motion_capture --out rigid_learned.mcap
 run simulate --learned motion_capture_60 --out walk_learned.mcap
 run map --simulated walk.mcap --measured walk_worn.mcap --out map.yaml
 run simulate --mapping map.yaml --learned streaming --out walk_mapped.mcap
 run convert bvh.mcap bvh.npz
-run convert "$poses/a_ok.bvh" markers.trc
+run convert "walk.bvh" markers.trc
 run convert again.mcap again.csv --topic /imu/left_wrist/data_raw
 run compare walk.mcap walk_worn.mcap
 cp log.txt compare.txt
@@ -84,7 +85,6 @@ data:
   - {subject: a, licence: own, motions: ["*.bvh"], sites: [left_watch, right_instep], repeats: 2}
   - {subject: b, licence: own, motions: [walk.bvh], sites: [left_watch]}
 YAML
-run convert walk.mcap walk.bvh
 run train training.yaml --data . --out model
 
 if [ -d "$cases" ]; then
