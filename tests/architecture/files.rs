@@ -251,7 +251,4 @@ fn files_are_read_in_a_sitting() {
 const STILL_LONG_FILES: &[&str] = &[
     "nodes/lib/motion/tests/datasets.rs",
     "nodes/lib/motion/tests/poses.rs",
-    "tests/convert.rs",
-    "tests/diagnosis.rs",
-    "tests/nodes.rs",
 ];
