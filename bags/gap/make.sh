@@ -1,0 +1,13 @@
+#!/usr/bin/env bash
+# Makes the two recordings beside it anew (the same bytes each time on one machine): two sensors on
+# the embedded walk, the wrist's with the errors in made_from/the_watch.yaml.
+#   CROMOSIM=target/debug/cromosim bags/gap/make.sh      default: the cromosim on PATH
+set -euo pipefail
+cromosim=$(command -v "${CROMOSIM:-cromosim}")
+cromosim=$(realpath "$cromosim")
+cd "$(dirname "$0")"
+
+# Walking: what is diagnosed.
+"$cromosim" simulate --placements made_from/placements.yaml --duration 6 --seed 1 --out session --force
+# Stopping, reaching out and turning: what the diagnosis is checked on.
+"$cromosim" simulate --placements made_from/placements.yaml --start 6 --seed 2 --out check --force
