@@ -2,7 +2,7 @@
 
 ros2 launch gap.launch.py names:=left_wrist,head [placements:=FILE.yaml] [motion:=FILE.bvh]
 The drivers of the real IMUs publish /imu/NAME/data_raw, a source of motion publishes /smpl/pose (or motion:=FILE.bvh is looped); /diagnostics
-says how far real and virtual ones lie apart, and the first cause. The program `cromosim` has to be on PATH (cargo install --path .).
+says how far apart real and virtual ones are, and the first cause. The program `cromosim` has to be on PATH (cargo install --path .).
 """
 
 from launch import LaunchDescription
@@ -35,7 +35,7 @@ def nodes(context):
 
 def generate_launch_description():
     return LaunchDescription([
-        DeclareLaunchArgument("names", description="Placements to watch, with commas between"),
+        DeclareLaunchArgument("names", description="Placements to watch, separated by commas"),
         DeclareLaunchArgument("placements", default_value="", description="Sensor placements (YAML); empty: the demo's"),
         DeclareLaunchArgument("motion", default_value="", description="A BVH file to loop; empty: /smpl/pose comes from elsewhere"),
         OpaqueFunction(function=nodes),

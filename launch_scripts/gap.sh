@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # Watches the gap between real and virtual IMUs: the drivers of the real ones publish /imu/NAME/data_raw, a source of motion publishes
-# /smpl/pose, and this starts what is between them. /diagnostics then says how far they lie apart, and the first cause. Runs until Ctrl-C.
+# /smpl/pose, and this starts the nodes in between. /diagnostics then says how far apart they are, and the first cause. Runs until Ctrl-C.
 #   gap.sh NAME...                                  placements of the demo: left_wrist, right_ankle, pelvis, sternum, head
 #   PLACEMENTS=FILE.yaml gap.sh NAME...             placements of your own
-#   MOTION=FILE.bvh gap.sh NAME...                  play a motion file in a loop rather than wait for /smpl/pose
+#   MOTION=FILE.bvh gap.sh NAME...                  play a motion file in a loop instead of waiting for /smpl/pose
 set -euo pipefail
 [ $# -gt 0 ] || { echo "usage: gap.sh NAME..." >&2; exit 2; }
 source "$(dirname "$0")/nodes.sh"

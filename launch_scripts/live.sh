@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The live case: the nodes run until Ctrl-C, a Rerun viewer shows what they publish, and nothing is recorded unless asked for.
+# The live case: the nodes run until Ctrl-C, a Rerun viewer shows what they publish, and nothing is recorded unless you ask for it.
 #   live.sh [MOTION.bvh]            play a file (or the embedded walk) in a loop
 #   BAG=out live.sh [MOTION.bvh]    record as well
 # Start a viewer first: rerun --bind 127.0.0.1

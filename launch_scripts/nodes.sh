@@ -1,9 +1,9 @@
-# Sourced by the scripts that run several nodes: `start NODE ARGUMENTS...`, then `until_one_ends`. Whatever ends the script ends the nodes.
+# Sourced by the scripts that run several nodes: `start NODE ARGUMENTS...`, then `until_one_ends`. When the script ends, for whatever reason, the nodes end.
 cromosim=${CROMOSIM:-cromosim}
 config=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)/config
 
 pids=()
-# TERM: bash starts background processes with INT ignored.
+# TERM, because bash starts background processes with INT ignored.
 stop() {
     trap - EXIT INT TERM
     kill -TERM "${pids[@]}" 2>/dev/null || true
@@ -19,7 +19,7 @@ trap 'exit 130' INT TERM
 
 start() { "$cromosim" node "$@" & pids+=($!); }
 
-# Whichever node ends first ends all, with its exit code.
+# The first node that ends, ends them all; its exit code is the script's.
 until_one_ends() {
     local status=0
     wait -n || status=$?
