@@ -219,6 +219,8 @@ fn top_level_holds_what_the_design_names() {
         "ARCHITECTURE.md",
         "LICENSE",
         "CHANGELOG.md",
+        "CONTRIBUTING.md",
+        "CITATION.cff",
         "rustfmt.toml",
         "clippy.toml",
         "target",
