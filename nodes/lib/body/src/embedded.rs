@@ -1,21 +1,23 @@
 //! The body that is part of the program; made for it by `scripts/build.py`.
 
+use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
 use cromosim_arrays::{Container, Limits};
+use serde::Deserialize;
 
-use crate::model::Gender;
+use crate::gender::Gender;
 use crate::posedirs::{Constants, generated_pose_blocks};
 use crate::read::read_without_posedirs;
-use crate::site::embedded_sites;
+use crate::site::NamedSite;
 use crate::{BodyError, BodyModel, JOINT_COUNT, ShapeSpace};
 
 static ARRAYS: &[u8] = include_bytes!("../assets/body-without-posedirs.npz");
 static POSEDIRS: &str = include_str!("../assets/posedirs.json");
-/// triangle, barycentrics, joint and point of each named site.
-pub(crate) static SITES: &str = include_str!("../assets/sites.json");
+/// Triangle, barycentrics, joint and point of each named site.
+static SITES: &str = include_str!("../assets/sites.json");
 
 impl BodyModel {
     /// The body of this project: an adult of 1.70 m and 70 kg in SMPL's structure with 6954
@@ -52,4 +54,24 @@ fn load() -> Result<BodyModel, BodyError> {
     let mut body = BodyModel::from_raw(raw)?;
     body.sites = embedded_sites(&body)?;
     Ok(body)
+}
+
+/// One entry of `assets/sites.json`.
+#[derive(Deserialize)]
+struct SiteRecord {
+    triangle: u32,
+    bary: [f64; 3],
+}
+
+/// The sites of `assets/sites.json` on the body they were made for.
+pub(crate) fn embedded_sites(body: &BodyModel) -> Result<Vec<NamedSite>, BodyError> {
+    let records: BTreeMap<String, SiteRecord> =
+        serde_json::from_str(SITES).expect("the embedded sites are sound");
+    let site = |(name, record): (String, SiteRecord)| {
+        Ok(NamedSite {
+            name,
+            site: body.site_at(record.triangle, record.bary)?,
+        })
+    };
+    records.into_iter().map(site).collect()
 }

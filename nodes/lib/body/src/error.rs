@@ -1,4 +1,4 @@
-//! What can go wrong with a body.
+//! Errors of this crate.
 
 use std::io;
 use std::path::PathBuf;
@@ -12,20 +12,20 @@ pub enum BodyError {
     /// A file of arrays that cannot be read, or an array in it that does not suit.
     #[error(transparent)]
     Arrays(ArraysError),
-    /// The file holds another kind of body.
+    /// The file holds a body with a number of joints that neither SMPL, SMPL-H nor SMPL-X has.
     #[error("{}: key kintree_table: {joints} joints; bodies have 24 (SMPL), 52 (SMPL-H) or 55 (SMPL-X)", path.display())]
     BodyType {
         /// The body file.
         path: PathBuf,
-        /// How many joints it has.
+        /// Joints of its kintree_table.
         joints: usize,
     },
-    /// An array is missing.
+    /// The file lacks an array that every body needs.
     #[error("{}: key {key} is missing; an SMPL file holds v_template, shapedirs, posedirs, J_regressor, weights, kintree_table and f", path.display())]
     MissingKey {
         /// The body file.
         path: PathBuf,
-        /// The array.
+        /// SMPL's key of the array.
         key: String,
     },
     /// A triangle names a vertex that is not there.
@@ -33,9 +33,9 @@ pub enum BodyError {
     TriangleVertex {
         /// The body file.
         path: PathBuf,
-        /// The triangle.
+        /// Index of the triangle, from 0.
         triangle: usize,
-        /// What it names.
+        /// The vertex index that it holds.
         vertex: i64,
         /// Number of vertices.
         vertex_count: usize,
@@ -45,7 +45,7 @@ pub enum BodyError {
     Skeleton {
         /// The body file.
         path: PathBuf,
-        /// The joint.
+        /// Index of the joint, from 0.
         joint: usize,
         /// Its parent in the file.
         found: i64,
@@ -57,11 +57,11 @@ pub enum BodyError {
     WeightSum {
         /// The body file.
         path: PathBuf,
-        /// The array.
+        /// `weights` or `J_regressor`.
         key: String,
         /// The vertex (weights) or joint (J_regressor).
         row: usize,
-        /// The sum.
+        /// What the row sums to.
         sum: f64,
     },
     /// Shape coefficients of one kind of body are given to another.
@@ -71,17 +71,17 @@ pub enum BodyError {
     ForeignBetas {
         /// The body's id.
         body: String,
-        /// Whose shapes the body has.
+        /// Shape space (and gender) of the body, in words.
         body_of: String,
-        /// Whose shapes the betas tell.
+        /// Shape space (and gender) of the betas, in words.
         betas_of: String,
     },
-    /// Shape coefficients that do not say whose they are.
+    /// Shape coefficients without a known shape space.
     #[error(
         "betas of shape space '{given}'; say whose they are: smpl (SMPL and SMPL-H), smplx or cromosim (the embedded body)"
     )]
     UnknownShapeSpace {
-        /// What was given, maybe nothing.
+        /// The word that was given, maybe empty.
         given: String,
     },
     /// More shape coefficients than the body has.
@@ -91,15 +91,15 @@ pub enum BodyError {
     TooManyBetas {
         /// The body's id.
         body: String,
-        /// How many were given.
+        /// Coefficients given.
         given: usize,
-        /// How many there are.
+        /// Coefficients that the body has.
         available: usize,
     },
     /// A shape coefficient is NaN or infinite.
     #[error("beta {index} is {value}; betas are finite numbers of standard deviations")]
     BetaNotFinite {
-        /// Which one.
+        /// Index of the coefficient, from 0.
         index: usize,
         /// NaN or an infinity.
         value: f64,
@@ -109,7 +109,7 @@ pub enum BodyError {
     UnknownVertex {
         /// The body's id.
         body: String,
-        /// The vertex.
+        /// Index of the vertex, from 0.
         vertex: u32,
         /// Number of vertices.
         vertex_count: usize,
@@ -119,17 +119,27 @@ pub enum BodyError {
     UnknownSite {
         /// The body's id.
         body: String,
-        /// The name.
+        /// The name that was asked for.
         name: String,
-        /// The known name with the least edits.
+        /// The known name with the fewest edits.
         nearest: String,
+    },
+    /// A named site that has no place on a body from a file.
+    #[error(
+        "site {site} has no place on body {body}: no point of its skin is nearest; its vertices are too far apart"
+    )]
+    SiteTransfer {
+        /// The body's id.
+        body: String,
+        /// The site's name.
+        site: String,
     },
     /// A triangle that the body does not have.
     #[error("triangle {triangle} asked for, but body {body} has {triangle_count} (0-based)")]
     UnknownTriangle {
         /// The body's id.
         body: String,
-        /// The triangle.
+        /// Index of the triangle, from 0.
         triangle: u32,
         /// Number of triangles.
         triangle_count: usize,
@@ -139,29 +149,29 @@ pub enum BodyError {
         "barycentrics {barycentrics:?} are no point of a triangle; expected three numbers in [0, 1] that sum to 1"
     )]
     Barycentrics {
-        /// What was given.
+        /// The weights as given.
         barycentrics: [f64; 3],
     },
-    /// A point from which no nearest surface follows.
+    /// A point with a coordinate that is NaN or infinite.
     #[error(
         "point {point:?} is not finite; expected metres in the model frame (x left, y up, z forward)"
     )]
     PointNotFinite {
-        /// What was given.
+        /// The point as given, m.
         point: [f64; 3],
     },
     /// A name that no joint has.
     #[error("joint {name} is unknown; joints are named as in SMPL: pelvis, left_hip, … right_hand")]
     UnknownJoint {
-        /// The name.
+        /// The name as given.
         name: String,
     },
     /// A file cannot be written.
     #[error("{}: cannot write: {source}", path.display())]
     Write {
-        /// The file.
+        /// The file that was to be written.
         path: PathBuf,
-        /// The reason.
+        /// What the operating system says.
         source: io::Error,
     },
 }

@@ -8,10 +8,13 @@ use crate::BodyError;
 /// Number of SMPL's joints, and so of its segments.
 pub const JOINT_COUNT: usize = 24;
 
+/// Joints that SMPL, SMPL-H and SMPL-X share; the others are fingers, jaw and eyes, or SMPL's hands.
+pub(crate) const SHARED_JOINTS: usize = 22;
+
 /// A joint of SMPL, and the segment whose frame stands there. The discriminant is SMPL's index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
-#[allow(missing_docs)] // the names say it all
+#[allow(missing_docs)] // the names are the anatomical ones of SMPL
 pub enum Joint {
     Pelvis,
     LeftHip,

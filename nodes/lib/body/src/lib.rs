@@ -27,29 +27,39 @@
 //! # }
 //! ```
 
+mod betas;
 mod embedded;
 mod error;
+mod file;
+mod gender;
 mod joint;
-mod kind;
 mod model;
 mod pose;
+mod pose_blocks;
 mod posedirs;
+mod raw;
 mod read;
+mod reduce;
+mod rows;
 mod shape;
 mod shape_fit;
+mod shape_space;
 mod site;
+mod site_lookup;
 mod skin;
+mod skin_tables;
 mod subset;
 mod transfer;
 mod write;
 
 pub use error::BodyError;
+pub use gender::Gender;
 pub use joint::{JOINT_COUNT, Joint};
-pub use kind::ShapeSpace;
-pub use model::{BodyModel, Gender};
+pub use model::BodyModel;
 pub use pose::BodyPose;
 pub use shape::ShapedBody;
 pub use shape_fit::ShapeFit;
+pub use shape_space::ShapeSpace;
 pub use site::Site;
 pub use subset::VertexSubset;
 pub use write::write_obj;

@@ -1,66 +1,16 @@
 //! A body's arrays, checked once: every index and every size is right from here on.
 
-use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
 
+use crate::gender::Gender;
+use crate::pose_blocks::PoseBlock;
+use crate::raw::RawModel;
+use crate::rows::Rows;
 use crate::site::NamedSite;
-use crate::skin::SkinTables;
+use crate::skin_tables::SkinTables;
 use crate::{BodyError, JOINT_COUNT, ShapeSpace};
-
-/// The group of people a body model was made from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Gender {
-    /// Women and men together.
-    #[default]
-    Neutral,
-    /// Women.
-    Female,
-    /// Men.
-    Male,
-}
-
-impl Gender {
-    /// SMPL's word: `neutral`, `female`, `male`.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Neutral => "neutral",
-            Self::Female => "female",
-            Self::Male => "male",
-        }
-    }
-
-    /// From SMPL's word or its first letter, in any case.
-    pub fn from_name(name: &str) -> Option<Self> {
-        match name.to_ascii_lowercase().as_str() {
-            "neutral" | "n" => Some(Self::Neutral),
-            "female" | "f" => Some(Self::Female),
-            "male" | "m" => Some(Self::Male),
-            _ => None,
-        }
-    }
-}
-
-impl fmt::Display for Gender {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(self.name())
-    }
-}
-
-/// What one joint's rotation adds to one vertex: `coefficients[9 * axis + 3 * row + column]` times
-/// (R - I)[row, column].
-///
-/// f32: corrections are centimetres, so that rounding stays under a nanometre.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct PoseBlock {
-    /// The joint, 1 to 23.
-    pub joint: u8,
-    /// Metres.
-    pub coefficients: [f32; 27],
-}
 
 /// A body before it has a shape: SMPL (Loper et al. 2015) with V vertices, 24 joints and B shape
 /// coefficients.
@@ -83,58 +33,6 @@ pub struct BodyModel {
     pub(crate) faces: Vec<[u32; 3]>,
     pub(crate) sites: Vec<NamedSite>,
     pub(crate) skin_tables: SkinTables,
-}
-
-/// Rows of different lengths in one allocation.
-#[derive(Debug, Clone)]
-pub(crate) struct Rows<T> {
-    ends: Vec<u32>,
-    items: Vec<T>,
-}
-
-impl<T> Rows<T> {
-    pub fn new(rows: impl IntoIterator<Item = impl IntoIterator<Item = T>>) -> Self {
-        let (mut ends, mut items) = (Vec::new(), Vec::new());
-        for row in rows {
-            items.extend(row);
-            ends.push(items.len() as u32);
-        }
-        Self { ends, items }
-    }
-
-    pub fn row(&self, index: usize) -> &[T] {
-        let start = if index == 0 {
-            0
-        } else {
-            self.ends[index - 1] as usize
-        };
-        &self.items[start..self.ends[index] as usize]
-    }
-
-    pub fn rows(&self) -> impl Iterator<Item = &[T]> {
-        (0..self.ends.len()).map(|index| self.row(index))
-    }
-}
-
-/// The dense arrays of a body file, shapes checked by the reader and values not yet.
-pub(crate) struct RawModel {
-    /// Names the file in errors.
-    pub path: PathBuf,
-    pub id: String,
-    pub space: ShapeSpace,
-    pub gender: Option<Gender>,
-    /// (V, 3).
-    pub template: Vec<f64>,
-    /// (V, 3, B).
-    pub shape_directions: Vec<f64>,
-    pub beta_count: usize,
-    pub pose_blocks: Rows<PoseBlock>,
-    /// (24, V).
-    pub regressor: Vec<f64>,
-    /// (V, 24).
-    pub weights: Vec<f64>,
-    /// (F, 3).
-    pub faces: Vec<i64>,
 }
 
 impl BodyModel {

@@ -10,8 +10,9 @@
 use nalgebra::{SMatrix, Vector3};
 use serde::Deserialize;
 
-use crate::kind::vertex_pose_blocks;
-use crate::model::{PoseBlock, RawModel, Rows};
+use crate::pose_blocks::{PoseBlock, vertex_pose_blocks};
+use crate::raw::RawModel;
+use crate::rows::Rows;
 use crate::{JOINT_COUNT, Joint};
 
 /// One vertex' directions (3, 207), row-major.

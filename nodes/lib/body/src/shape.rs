@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use crate::skin::RestTiles;
+use crate::skin_tables::RestTiles;
 use crate::{BodyError, BodyModel, BodyPose, JOINT_COUNT, Joint};
 
 /// A body of one person.
@@ -14,7 +14,7 @@ pub struct ShapedBody {
     betas: Vec<f64>,
     rest_vertices: Vec<Vector3<f64>>,
     joints_in_model: [Vector3<f64>; JOINT_COUNT],
-    /// As the skin kernel wants it: see `skin.rs`.
+    /// As the skin kernel wants it: see `skin_tables.rs`.
     pub(crate) rest_tiles: RestTiles,
 }
 

@@ -1,6 +1,6 @@
 //! The whole mesh in f32, fast enough to watch it live.
 //!
-//! Vertices are brought into tiles of [`LANES`] that hang on the same joints, and every operation
+//! Vertices are brought into tiles of [`LANES`] vertices that hang on the same joints, and every operation
 //! runs over the lanes of a tile, so that the compiler makes vector instructions of it. posedirs
 //! are a sparse matrix: per tile and axis, the rows that are not zero. A batch walks the tiles once
 //! for several poses, so that the coefficients come from memory once for all of them. No
@@ -9,54 +9,14 @@
 use nalgebra::Vector3;
 use pulp::NullaryFnOnce;
 
-use crate::model::{PoseBlock, Rows};
+use crate::skin_tables::{FEATURES, LANES, Lanes, RestTiles, SkinTables};
 use crate::{BodyPose, JOINT_COUNT, ShapedBody};
 
-/// Vertices per tile: eight f32 fill an AVX register.
-const LANES: usize = 8;
-/// Elements of R - I, with joint 0 and up to what a `u8` may count: no index needs a check.
-const FEATURES: usize = 256;
 /// Poses per walk over the tiles: what keeps their matrices (2 KB each) in the first-level cache
 /// beside a tile.
 const POSES_PER_WALK: usize = 8;
 /// Poses that share each load of a coefficient.
 const POSES_PER_LOAD: usize = 4;
-/// Marks lanes that fill up the last tile.
-const NO_VERTEX: u32 = u32::MAX;
-
-/// One number of each vertex of a tile.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[repr(align(32))]
-struct Lanes([f32; LANES]);
-
-impl Lanes {
-    const ZERO: Self = Self([0.0; LANES]);
-
-    #[inline(always)]
-    fn add_scaled(&mut self, values: &Self, factor: f32) {
-        for (sum, value) in self.0.iter_mut().zip(&values.0) {
-            *sum += value * factor;
-        }
-    }
-}
-
-/// posedirs and weights in the order of the kernel.
-#[derive(Debug)]
-pub(crate) struct SkinTables {
-    vertex_count: usize,
-    /// Which vertex each lane is.
-    order: Vec<[u32; LANES]>,
-    /// Per tile and axis, what the features that move it add.
-    pose_rows: Rows<Lanes>,
-    /// Which features these are: 9 (joint - 1) + 3 row + column.
-    pose_features: Rows<u8>,
-    /// Per tile, the joints that move it and how much.
-    weights: Rows<(u8, Lanes)>,
-}
-
-/// Rest vertices in the order of the kernel: x, y, z of each tile.
-#[derive(Debug, Clone)]
-pub(crate) struct RestTiles(Vec<[Lanes; 3]>);
 
 /// What one pose does to every tile.
 struct PoseMatrices {
@@ -65,113 +25,6 @@ struct PoseMatrices {
     /// [rotation | translation] from the rest mesh to the world less the root, (3, 4).
     root_from_rest: [[[f32; 4]; 3]; JOINT_COUNT],
     root: [f32; 3],
-}
-
-impl SkinTables {
-    pub fn new(
-        pose_blocks: &Rows<PoseBlock>,
-        skin_weights: &Rows<(u8, f64)>,
-        vertex_count: usize,
-    ) -> Self {
-        let mut sorted: Vec<u32> = (0..vertex_count as u32).collect();
-        sorted.sort_by_cached_key(|&vertex| {
-            let corrected_by: u32 = pose_blocks
-                .row(vertex as usize)
-                .iter()
-                .map(|block| 1 << block.joint)
-                .sum();
-            let moved_by: u32 = skin_weights
-                .row(vertex as usize)
-                .iter()
-                .map(|&(joint, _)| 1 << joint)
-                .sum();
-            (corrected_by, moved_by)
-        });
-        let tile = |vertices: &[u32]| {
-            std::array::from_fn(|lane| vertices.get(lane).copied().unwrap_or(NO_VERTEX))
-        };
-        let order: Vec<[u32; LANES]> = sorted.chunks(LANES).map(tile).collect();
-        let rows: Vec<_> = order
-            .iter()
-            .flat_map(|vertices| pose_rows(vertices, pose_blocks))
-            .collect();
-        Self {
-            vertex_count,
-            pose_rows: Rows::new(
-                rows.iter()
-                    .map(|of_axis| of_axis.iter().map(|(_, lanes)| *lanes)),
-            ),
-            pose_features: Rows::new(
-                rows.iter()
-                    .map(|of_axis| of_axis.iter().map(|(feature, _)| *feature)),
-            ),
-            weights: Rows::new(order.iter().map(|vertices| weights(vertices, skin_weights))),
-            order,
-        }
-    }
-
-    pub fn tiled(&self, rest_vertices: &[Vector3<f64>]) -> RestTiles {
-        let value = |axis: usize, vertex: u32| {
-            if vertex == NO_VERTEX {
-                0.0
-            } else {
-                rest_vertices[vertex as usize][axis] as f32
-            }
-        };
-        RestTiles(
-            self.order
-                .iter()
-                .map(|vertices| {
-                    std::array::from_fn(|axis| Lanes(vertices.map(|vertex| value(axis, vertex))))
-                })
-                .collect(),
-        )
-    }
-}
-
-/// Per axis, the features with a coefficient that is not zero on any lane.
-fn pose_rows(vertices: &[u32; LANES], pose_blocks: &Rows<PoseBlock>) -> [Vec<(u8, Lanes)>; 3] {
-    let mut dense = vec![[Lanes::ZERO; 3]; FEATURES];
-    for (lane, &vertex) in vertices
-        .iter()
-        .enumerate()
-        .filter(|(_, vertex)| **vertex != NO_VERTEX)
-    {
-        for block in pose_blocks.row(vertex as usize) {
-            for (i, &coefficient) in block.coefficients.iter().enumerate() {
-                dense[9 * (block.joint as usize - 1) + i % 9][i / 9].0[lane] = coefficient;
-            }
-        }
-    }
-    std::array::from_fn(|axis| {
-        let rows = dense
-            .iter()
-            .map(|axes| axes[axis])
-            .enumerate()
-            .filter(|(_, lanes)| *lanes != Lanes::ZERO);
-        rows.map(|(feature, lanes)| (feature as u8, lanes))
-            .collect()
-    })
-}
-
-fn weights(vertices: &[u32; LANES], skin_weights: &Rows<(u8, f64)>) -> Vec<(u8, Lanes)> {
-    let mut dense = [Lanes::ZERO; JOINT_COUNT];
-    for (lane, &vertex) in vertices
-        .iter()
-        .enumerate()
-        .filter(|(_, vertex)| **vertex != NO_VERTEX)
-    {
-        skin_weights
-            .row(vertex as usize)
-            .iter()
-            .for_each(|&(joint, weight)| dense[joint as usize].0[lane] = weight as f32);
-    }
-    dense
-        .into_iter()
-        .enumerate()
-        .filter(|(_, lanes)| *lanes != Lanes::ZERO)
-        .map(|(joint, lanes)| (joint as u8, lanes))
-        .collect()
 }
 
 impl ShapedBody {

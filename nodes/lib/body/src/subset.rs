@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use crate::model::PoseBlock;
+use crate::pose_blocks::PoseBlock;
 use crate::shape::forward_kinematics;
 use crate::{BodyError, BodyPose, JOINT_COUNT, ShapedBody};
 

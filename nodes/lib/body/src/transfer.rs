@@ -1,39 +1,48 @@
-//! Named sites on bodies from files.
+//! Named sites carried from one body to another.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use crate::site::{NamedSite, nearest, point_at};
+use crate::site::{NamedSite, point_at};
+use crate::site_lookup::nearest;
 use crate::{BodyError, BodyModel, JOINT_COUNT, Joint};
 
-/// The embedded body's sites on another body. With the embedded body's triangles they are the same;
-/// else each is placed by landmarks that do not depend on how a skeleton divides the spine (hips,
-/// shoulders, limbs' joints, the head's extent) and put onto the nearest skin: centimetres off, not
-/// more exact than a person's hand.
-pub(crate) fn transferred_sites(body: &BodyModel) -> Result<Vec<NamedSite>, BodyError> {
-    let embedded = BodyModel::embedded();
-    if body.faces == embedded.faces {
-        return Ok(embedded.sites.clone());
-    }
-    let (from, to) = (Landmarks::of(&embedded), Landmarks::of(body));
-    let owners = body.triangle_owners();
+/// The sites of `from` on a body `to` with other triangles: each is placed by landmarks that do not
+/// depend on how a skeleton divides the spine (hips, shoulders, limbs' joints, the head's extent) and
+/// put onto the nearest skin: centimetres off, no more exact than a person's hand.
+///
+/// # Errors
+/// [`BodyError::SiteTransfer`] where no point of the skin is nearest.
+pub(crate) fn transferred_sites(
+    from: &BodyModel,
+    to: &BodyModel,
+) -> Result<Vec<NamedSite>, BodyError> {
+    let (from_landmarks, to_landmarks) = (Landmarks::from_body(from), Landmarks::from_body(to));
+    let owners = to.triangle_owners();
     let transferred = |named: &NamedSite| {
         let joint = named.site.joint;
         let point = point_at(
-            &embedded.faces[named.site.triangle as usize],
+            &from.faces[named.site.triangle as usize],
             &named.site.barycentrics,
-            &embedded.template,
+            &from.template,
         );
-        let wanted = carried(&from, &to, joint, point);
-        let site = nearest(body, &body.template, wanted, |triangle| {
-            touches(Region::of(joint), Region::of(owners[triangle]))
+        let wanted = carried(&from_landmarks, &to_landmarks, joint, point);
+        let region = Region::from_joint(joint);
+        let site = nearest(to, &to.template, wanted, |triangle| {
+            touches(region, Region::from_joint(owners[triangle]))
         })
-        .or_else(|| nearest(body, &body.template, wanted, |_| true));
+        .or_else(|| nearest(to, &to.template, wanted, |_| true))
+        // Of coordinates near the largest that floats hold, nothing finite follows.
+        .filter(|site| site.barycentrics.iter().all(|weight| weight.is_finite()));
         site.map(|site| NamedSite {
             name: named.name.clone(),
             site,
         })
+        .ok_or_else(|| BodyError::SiteTransfer {
+            body: to.id.clone(),
+            site: named.name.clone(),
+        })
     };
-    Ok(embedded.sites.iter().filter_map(transferred).collect())
+    from.sites.iter().map(transferred).collect()
 }
 
 /// Parts of the body; sides are kept apart, so that no site of one thigh lands on the other.
@@ -48,7 +57,7 @@ enum Region {
 }
 
 impl Region {
-    fn of(joint: Joint) -> Self {
+    fn from_joint(joint: Joint) -> Self {
         match joint {
             Joint::Pelvis
             | Joint::Spine1
@@ -77,7 +86,7 @@ fn touches(region: Region, other: Region) -> bool {
     region == other || region == Region::Trunk || other == Region::Trunk
 }
 
-/// What people have at the same place.
+/// Points by which a place on one body is found on another; model frame, mean shape, m.
 struct Landmarks {
     joints: [Vector3<f64>; JOINT_COUNT],
     hips: Vector3<f64>,
@@ -87,7 +96,7 @@ struct Landmarks {
 }
 
 impl Landmarks {
-    fn of(body: &BodyModel) -> Self {
+    fn from_body(body: &BodyModel) -> Self {
         let (joints, _) = body.joint_shape_directions();
         let middle = |a: Joint, b: Joint| (joints[a.index()] + joints[b.index()]) / 2.0;
         let (hips, shoulders) = (
@@ -145,7 +154,7 @@ fn carried(from: &Landmarks, to: &Landmarks, joint: Joint, point: Vector3<f64>) 
         to.joint(bone[0])
             + turn * ((point - from.joint(bone[0])) * ratio(to_bone.norm(), from_bone.norm()))
     };
-    match Region::of(joint) {
+    match Region::from_joint(joint) {
         Region::Trunk => {
             let (from_spine, to_spine) = (from.shoulders - from.hips, to.shoulders - to.hips);
             let height = ratio(point.y - from.hips.y, from_spine.y);

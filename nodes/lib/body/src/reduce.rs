@@ -1,116 +1,13 @@
 //! The kinds of bodies that files hold, and how each becomes a body of SMPL's 24 joints.
 
-use std::fmt;
 use std::path::Path;
 
-use crate::model::{Gender, PoseBlock, RawModel, Rows};
-use crate::{BodyError, BodyModel, JOINT_COUNT, Joint};
+use crate::joint::SHARED_JOINTS;
+use crate::raw::RawModel;
+use crate::{BodyError, JOINT_COUNT, Joint, ShapeSpace};
 
-/// Joints that SMPL, SMPL-H and SMPL-X share; the others are fingers, jaw and eyes, or SMPL's
-/// hands.
-const SHARED_JOINTS: usize = 22;
 const LEFT_WRIST: usize = Joint::LeftWrist as usize;
 const RIGHT_WRIST: usize = Joint::RightWrist as usize;
-
-/// Whose shapes the betas of a body tell.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum ShapeSpace {
-    /// The embedded body's: stature, mass and so on.
-    Cromosim,
-    /// SMPL's and SMPL-H's.
-    Smpl,
-    /// SMPL-X'.
-    SmplX,
-}
-
-impl ShapeSpace {
-    const ALL: [Self; 3] = [Self::Cromosim, Self::Smpl, Self::SmplX];
-
-    /// The word in messages and files (AMASS' `surface_model_type`): `cromosim`, `smpl`, `smplx`.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Cromosim => "cromosim",
-            Self::Smpl => "smpl",
-            Self::SmplX => "smplx",
-        }
-    }
-
-    /// The space of a word.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|space| space.name() == name)
-    }
-}
-
-impl fmt::Display for ShapeSpace {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(match self {
-            Self::Cromosim => "the embedded body",
-            Self::Smpl => "SMPL",
-            Self::SmplX => "SMPL-X",
-        })
-    }
-}
-
-impl BodyModel {
-    /// Whether betas of `space` and `gender` mean on this body what they were made for; no betas,
-    /// or zeros, always do.
-    ///
-    /// SMPL's betas are coefficients of directions that its file holds: on another mesh the same
-    /// numbers are another person. Where the people's bone lengths are known,
-    /// [`Self::fit_bone_lengths`] finds this body's own betas instead.
-    ///
-    /// # Errors
-    /// [`BodyError::ForeignBetas`] for those of another kind of body, or of another gender's file
-    /// where both are known.
-    pub fn check_betas(
-        &self,
-        space: ShapeSpace,
-        gender: Option<Gender>,
-        betas: &[f64],
-    ) -> Result<(), BodyError> {
-        let both = self.gender.zip(gender);
-        let genders_differ =
-            space != ShapeSpace::Cromosim && both.is_some_and(|(own, given)| own != given);
-        if betas.iter().all(|&beta| beta == 0.0) || (space == self.space && !genders_differ) {
-            return Ok(());
-        }
-        let named = |space: ShapeSpace, gender: Option<Gender>| match gender
-            .filter(|_| genders_differ && space != ShapeSpace::Cromosim)
-        {
-            Some(gender) => format!("{space} {gender}"),
-            None => space.to_string(),
-        };
-        let (body_of, betas_of) = (named(self.space, self.gender), named(space, gender));
-        Err(BodyError::ForeignBetas {
-            body: self.id.clone(),
-            body_of,
-            betas_of,
-        })
-    }
-}
-
-impl BodyModel {
-    /// As [`Self::check_betas`], of the words that a message carries. Betas other than 0 need the
-    /// word: nobody can tell from the numbers.
-    ///
-    /// # Errors
-    /// [`BodyError::ForeignBetas`], and [`BodyError::UnknownShapeSpace`] for betas other than 0
-    /// whose space is missing or unknown.
-    pub fn check_named_betas(
-        &self,
-        shape_space: &str,
-        gender: &str,
-        betas: &[f64],
-    ) -> Result<(), BodyError> {
-        match ShapeSpace::from_name(shape_space) {
-            Some(space) => self.check_betas(space, Gender::from_name(gender), betas),
-            None if betas.iter().all(|&beta| beta == 0.0) => Ok(()),
-            None => Err(BodyError::UnknownShapeSpace {
-                given: shape_space.to_owned(),
-            }),
-        }
-    }
-}
 
 /// The kind of body a file holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -121,7 +18,7 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
-    pub fn of_joint_count(joints: usize, path: &Path) -> Result<Self, BodyError> {
+    pub fn from_joint_count(joints: usize, path: &Path) -> Result<Self, BodyError> {
         match joints {
             24 => Ok(Self::Smpl),
             52 => Ok(Self::SmplH),
@@ -252,34 +149,4 @@ fn hand_root(path: &Path, parents: &[i64], wrist: usize) -> Result<usize, BodyEr
         expected: wrist as i64,
     };
     fingers.nth(1).ok_or_else(missing)
-}
-
-/// Of posedirs (V, 3, 9 (J - 1)), each vertex' blocks (3, 9) of SMPL's joints that are not zero.
-pub(crate) fn pose_blocks(directions: &[f64], joint_count: usize) -> Rows<PoseBlock> {
-    let features = 9 * (joint_count - 1);
-    Rows::new(
-        directions
-            .chunks_exact(3 * features)
-            .map(|directions| vertex_pose_blocks(directions, joint_count)),
-    )
-}
-
-/// As [`pose_blocks`], of one vertex.
-pub(crate) fn vertex_pose_blocks(directions: &[f64], joint_count: usize) -> Vec<PoseBlock> {
-    let features = 9 * (joint_count - 1);
-    let joints = if joint_count == JOINT_COUNT {
-        JOINT_COUNT
-    } else {
-        SHARED_JOINTS
-    };
-    let block = |joint: usize| PoseBlock {
-        joint: joint as u8,
-        coefficients: std::array::from_fn(|i| {
-            directions[(i / 9) * features + 9 * (joint - 1) + i % 9] as f32
-        }),
-    };
-    (1..joints)
-        .map(block)
-        .filter(|block| block.coefficients.iter().any(|&c| c != 0.0))
-        .collect()
 }
