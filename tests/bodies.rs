@@ -11,7 +11,7 @@ use std::process::Command;
 use common::{CROMOSIM, cromosim_in, root, succeed, text};
 use cromosim_bag::{BagOptions, BagReader, BagWriter, Selection};
 use cromosim_body::{BodyModel, Joint, ShapedBody};
-use cromosim_imu::{MountedSites, PlacementSet};
+use cromosim_imu::{MountedSensors, PlacementSet};
 use cromosim_motion::embedded_walk;
 use cromosim_msgs::tf2_msgs::TFMessage;
 use cromosim_ros::testing::{environment, in_private_network};
@@ -375,7 +375,7 @@ fn the_demo_tells_every_node_of_its_body() {
         .vector
         .norm();
         let placements = PlacementSet::demo();
-        let sites = MountedSites::new(&body, placements.placements()).unwrap();
+        let sites = MountedSensors::new(&body, placements.placements()).unwrap();
         let stamps = [Stamp::from_nanos(0), Stamp::from_nanos(10_000_000)];
         let watch = sites
             .trajectories(&stamps, &[standing.clone(), standing.clone()])

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, bail};
 use clap::Args;
 use cromosim_body::ShapedBody;
-use cromosim_imu::{Device, MountedSites, PlacementSet};
+use cromosim_imu::{Device, MountedSensors, PlacementSet};
 
 use crate::progress::Interrupt;
 use crate::{body, progress, summary};
@@ -286,7 +286,7 @@ impl Arguments {
         };
         if let Some(path) = &self.placements {
             let placements = PlacementSet::read(path)?;
-            MountedSites::new(&ShapedBody::new(model, &[])?, placements.placements())?;
+            MountedSensors::new(&ShapedBody::new(model, &[])?, placements.placements())?;
             for placement in placements.placements() {
                 Device::resolve(placement.device(), path.parent().unwrap_or(Path::new(".")))?;
             }

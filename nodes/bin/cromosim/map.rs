@@ -105,8 +105,8 @@ fn readings(path: &Path) -> anyhow::Result<BTreeMap<String, Vec<Reading>>> {
             .read::<Imu>(&format!("/imu/{name}/data_raw"))?
             .into_iter();
         let readings = messages.map(|(_, imu)| Reading {
-            force: imu.linear_acceleration.into(),
-            rate: imu.angular_velocity.into(),
+            specific_force: imu.linear_acceleration.into(),
+            angular_velocity: imu.angular_velocity.into(),
         });
         Ok((name, readings.collect()))
     };

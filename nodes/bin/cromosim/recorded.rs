@@ -6,7 +6,7 @@ use anyhow::{Context, anyhow, bail};
 use cromosim_bag::BagReader;
 use cromosim_body::{BodyModel, BodyPose, ShapedBody};
 use cromosim_gap::{ImuSeries, PlacementRecord, PoseSeries};
-use cromosim_imu::{MountedSites, PlacementSet, Reading, SensorFrame, SensorTrajectory};
+use cromosim_imu::{MountedSensors, PlacementSet, Reading, SensorFrame, SensorTrajectory};
 use cromosim_msgs::RosMessage;
 use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_msgs::geometry_msgs::PoseStamped;
@@ -174,7 +174,7 @@ fn from_states(
         .check_named_betas(&last.shape_space, &last.gender, &last.betas)
         .with_context(|| format!("{path}, /smpl/state"))?;
     let shaped = ShapedBody::new(model, &last.betas)?;
-    let sites = MountedSites::new(&shaped, placements.placements())?;
+    let sites = MountedSensors::new(&shaped, placements.placements())?;
     let stamps: Vec<Stamp> = states
         .iter()
         .map(|(_, state)| Stamp::from_nanos(state.header.stamp.nanos()))
@@ -255,8 +255,8 @@ impl Recorded {
     /// What a diagnosis takes.
     pub fn record(&self) -> PlacementRecord {
         let reading = |message: &Imu| Reading {
-            force: message.linear_acceleration.into(),
-            rate: message.angular_velocity.into(),
+            specific_force: message.linear_acceleration.into(),
+            angular_velocity: message.angular_velocity.into(),
         };
         let stamps = self
             .measured

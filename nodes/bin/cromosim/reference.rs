@@ -401,8 +401,8 @@ fn resimulate(placement: &Recorded, how: &How, arguments: &Arguments) -> anyhow:
         let mut noise = NoiseSource::white(densities, 0.0, rate_hz, seed, name)?;
         for reading in &mut readings {
             let drawn = noise.draw();
-            reading.force += drawn.force;
-            reading.rate += drawn.rate;
+            reading.specific_force += drawn.specific_force;
+            reading.angular_velocity += drawn.angular_velocity;
         }
         // A recording's own stamps have its losses in them.
         if placement.measured.is_empty() {
@@ -426,8 +426,8 @@ fn resimulate(placement: &Recorded, how: &How, arguments: &Arguments) -> anyhow:
         let sample = ImuSample {
             stamp: *stamp,
             world_from_sensor,
-            specific_force: reading.force,
-            angular_velocity: reading.rate,
+            specific_force: reading.specific_force,
+            angular_velocity: reading.angular_velocity,
         };
         let lost = dropouts.as_mut().is_some_and(Dropouts::next_is_lost);
         (!lost).then(|| imu_message(&sample, &frame_id, &covariances, false))
@@ -501,16 +501,20 @@ fn differentiated(
                 &motion[k.saturating_sub(1)],
                 &motion[(k + 1).min(motion.len() - 1)],
             );
-            (after.angular_velocity - before.angular_velocity)
+            (after.angular_velocity_in_world - before.angular_velocity_in_world)
                 / (after.stamp - before.stamp).max(1e-9)
         };
         track.world_from_segment.push(world_from_segment);
-        track.acceleration.push(in_segment(&sample.acceleration));
         track
-            .angular_velocity
-            .push(in_segment(&sample.angular_velocity));
-        track.angular_acceleration.push(in_segment(
-            &sample.angular_acceleration.unwrap_or_else(difference),
+            .acceleration_in_segment
+            .push(in_segment(&sample.acceleration_in_world));
+        track
+            .angular_velocity_in_segment
+            .push(in_segment(&sample.angular_velocity_in_world));
+        track.angular_acceleration_in_segment.push(in_segment(
+            &sample
+                .angular_acceleration_in_world
+                .unwrap_or_else(difference),
         ));
     }
     Ok(track)

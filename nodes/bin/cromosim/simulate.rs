@@ -11,8 +11,8 @@ use clap::Args;
 use cromosim_bag::{BagOptions, BagWriter, Compression};
 use cromosim_body::{BodyModel, ShapedBody};
 use cromosim_imu::{
-    Covariances, Device, MAX_RATE_HZ, MountedSite, MountedSites, PlacementSet, PoseStd, Reading,
-    Scheme, SensorTrajectory, StreamingEffects, simulate_kinematics_on,
+    Covariances, Device, MAX_RATE_HZ, MountedSensor, MountedSensors, PlacementSet, PoseStd,
+    Reading, Scheme, SensorTrajectory, StreamingEffects, simulate_kinematics_on,
 };
 use cromosim_learned::{LearnedSimulator, MappingFile, Patch, SiteMotion};
 use cromosim_motion::{MotionOptions, SmplMotion, embedded_walk, read_motion_for, read_people};
@@ -286,7 +286,7 @@ impl Setup {
     fn simulate(&self, person: &Played, bar: &ProgressBar) -> anyhow::Result<Vec<Simulated>> {
         let Played { motion, stamps, .. } = person;
         let shaped = ShapedBody::new(self.model.clone(), &motion.betas)?;
-        let sites = MountedSites::new(&shaped, self.placements.placements())?;
+        let sites = MountedSensors::new(&shaped, self.placements.placements())?;
         if motion.frames.len() < 2 {
             bail!(
                 "{}: {} frame is no motion; at least 2 are needed",
@@ -310,7 +310,7 @@ impl Setup {
             self.interrupt.check()?;
             let simulated = self.simulate_placement(
                 person,
-                (&shaped, &sites.sites()[index]),
+                (&shaped, &sites.sensors()[index]),
                 index,
                 trajectory,
                 &times,
@@ -324,7 +324,7 @@ impl Setup {
     fn simulate_placement(
         &self,
         person: &Played,
-        (shaped, mounted): (&ShapedBody, &MountedSite),
+        (shaped, mounted): (&ShapedBody, &MountedSensor),
         index: usize,
         trajectory: &SensorTrajectory,
         times: &PoseTimes,
@@ -367,10 +367,11 @@ impl Setup {
             };
             if let Some(mapping) = mapping {
                 let mapped = mapping.apply(&Reading {
-                    force: sample.specific_force,
-                    rate: sample.angular_velocity,
+                    specific_force: sample.specific_force,
+                    angular_velocity: sample.angular_velocity,
                 });
-                (sample.specific_force, sample.angular_velocity) = (mapped.force, mapped.rate);
+                (sample.specific_force, sample.angular_velocity) =
+                    (mapped.specific_force, mapped.angular_velocity);
             }
             let covariances = covariances.with_motion(&kinematic.variance, &sample);
             raw.push(imu_message(

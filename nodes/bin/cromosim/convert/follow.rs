@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use anyhow::{anyhow, bail};
 use cromosim_body::{BodyModel, Joint, ShapedBody};
-use cromosim_imu::{MountedSite, Placement};
+use cromosim_imu::{MountedSensor, Placement};
 use cromosim_motion::SmplMotion;
 use cromosim_motion::rigid::PoseTrajectory;
 use cromosim_spatial::Stamp;
@@ -44,14 +44,14 @@ pub fn site(
     let shaped = ShapedBody::new(model.clone(), &motion.betas)?;
     let placement = Placement::at_site("site", name, motion.rate_hz)
         .map_err(|(field, problem)| anyhow!("--site {name}: {field}: {problem}"))?;
-    let mounted =
-        MountedSite::new(&shaped, &placement).map_err(|error| anyhow!("--site {name}: {error}"))?;
+    let mounted = MountedSensor::new(&shaped, &placement)
+        .map_err(|error| anyhow!("--site {name}: {error}"))?;
     Ok(trajectory(
         motion,
         motion
             .frames
             .iter()
-            .map(|pose| mounted.frame(pose).world_from_sensor),
+            .map(|pose| mounted.pose(pose).world_from_sensor),
     ))
 }
 

@@ -23,8 +23,8 @@ pub fn analytic(pairs: &[&Pair]) -> [f64; 2] {
         let kinematics = &pair.motion.kinematics;
         let left = pair.rms(|sample| {
             (
-                kinematics[sample].acceleration,
-                kinematics[sample].angular_velocity,
+                kinematics[sample].acceleration_in_world,
+                kinematics[sample].angular_velocity_in_world,
             )
         });
         let left = left.unwrap_or_default();
@@ -61,14 +61,14 @@ pub fn scores(simulator: &LearnedSimulator, pairs: &[Pair]) -> anyhow::Result<St
         let count = pair.targets.iter().flatten().count() as f64;
         let of_analytic = pair.rms(|sample| {
             (
-                analytic[sample].acceleration,
-                analytic[sample].angular_velocity,
+                analytic[sample].acceleration_in_world,
+                analytic[sample].angular_velocity_in_world,
             )
         });
         let of_learned = pair.rms(|sample| {
             (
-                learned[sample].acceleration,
-                learned[sample].angular_velocity,
+                learned[sample].acceleration_in_world,
+                learned[sample].angular_velocity_in_world,
             )
         });
         if let (Some(before), Some(after)) = (of_analytic, of_learned) {

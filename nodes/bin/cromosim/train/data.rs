@@ -289,8 +289,8 @@ pub fn recorded(
                 let both = series.specific_force.iter().zip(&series.angular_velocity);
                 let readings = both
                     .map(|(force, rate)| Reading {
-                        force: *force,
-                        rate: *rate,
+                        specific_force: *force,
+                        angular_velocity: *rate,
                     })
                     .collect();
                 add(

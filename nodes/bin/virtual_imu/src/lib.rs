@@ -21,7 +21,7 @@ use cromosim_msgs::tf2_msgs::TFMessage;
 use cromosim_ros::{Durability, Node, Publisher, Qos, RosError, prepare};
 
 pub use config::Config;
-pub use node::{Reading, Refusal, Step, VirtualImuNode, imu_message};
+pub use node::{ImuMessages, Refusal, Step, VirtualImuNode, imu_message};
 
 const ABOUT: &str = "virtual_imu: what IMUs on the body would measure, one sensor_msgs/Imu publisher for each placement";
 
@@ -98,10 +98,10 @@ impl Publishers {
         // What most stacks listen to goes first, and what nobody listens to stays here: each
         // message costs the later ones some 30 us.
         for reading in &step.readings {
-            publish_if_heard(&self.raw[reading.placement], &reading.raw);
+            publish_if_heard(&self.raw[reading.placement], &reading.data_raw);
         }
         for reading in &step.readings {
-            publish_if_heard(&self.full[reading.placement], &reading.full);
+            publish_if_heard(&self.full[reading.placement], &reading.data);
         }
         if !step.frames.transforms.is_empty() {
             report(self.frames.publish(&step.frames));

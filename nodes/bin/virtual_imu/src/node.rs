@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use cromosim_body::{BodyError, BodyModel, BodyPose, Joint, ShapedBody};
 use cromosim_imu::{
-    Covariances, Device, Follow, ImuError, ImuSample, MountedSites, Placement, PlacementSet,
+    Covariances, Device, Follow, ImuError, ImuSample, MountedSensors, Placement, PlacementSet,
     PoseStd, StreamOptions, StreamingEffects, StreamingImu,
 };
 use cromosim_learned::{
@@ -29,20 +29,20 @@ const RATE_STATES: usize = 13;
 
 /// One sample of one placement, in both forms of REP-145.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Reading {
+pub struct ImuMessages {
     /// Number of the placement.
     pub placement: usize,
     /// For `imu/NAME/data_raw`: without orientation.
-    pub raw: Imu,
+    pub data_raw: Imu,
     /// For `imu/NAME/data`: with orientation.
-    pub full: Imu,
+    pub data: Imu,
 }
 
 /// What one state leads to.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Step {
     /// The samples that it released.
-    pub readings: Vec<Reading>,
+    pub readings: Vec<ImuMessages>,
     /// For `/tf`: the frames of sensors that follow the skin.
     pub frames: TFMessage,
     /// For `reference/NAME`, in the order of the placements.
@@ -78,7 +78,7 @@ pub enum Refusal {
 }
 
 /// One placement's way from frames to messages.
-struct Channel {
+struct PlacementStream {
     stream: Option<StreamingImu>,
     /// The device's errors, where they are wanted.
     effects: Option<StreamingEffects>,
@@ -93,10 +93,10 @@ pub struct VirtualImuNode {
     model: Arc<BodyModel>,
     placements: Vec<Placement>,
     devices: Vec<Device>,
-    channels: Vec<Channel>,
+    channels: Vec<PlacementStream>,
     betas: Vec<f64>,
     shaped: ShapedBody,
-    sites: MountedSites,
+    sensors: MountedSensors,
     /// States that wait until their rate is known.
     early: Vec<(Stamp, BodyPose, PoseStd)>,
     last: Option<Stamp>,
@@ -137,7 +137,7 @@ impl VirtualImuNode {
             .map(resolve)
             .collect::<Result<Vec<_>, _>>()?;
         let shaped = ShapedBody::new(model.clone(), &[])?;
-        let sites = MountedSites::new(&shaped, &placements)?;
+        let sensors = MountedSensors::new(&shaped, &placements)?;
         let learned = if config.learned.is_empty() {
             None
         } else {
@@ -172,7 +172,7 @@ impl VirtualImuNode {
             channels: Vec::new(),
             betas: Vec::new(),
             shaped,
-            sites,
+            sensors,
             early: Vec::new(),
             last: None,
             counts: Counts::default(),
@@ -186,7 +186,7 @@ impl VirtualImuNode {
         Ok(node)
     }
 
-    fn fresh_channels(&self) -> Result<Vec<Channel>, Refusal> {
+    fn fresh_channels(&self) -> Result<Vec<PlacementStream>, Refusal> {
         let channel = |(placement, device): (&Placement, &Device)| {
             let rate_hz = placement.rate_hz();
             let seed = self.config.seed as u64;
@@ -200,7 +200,7 @@ impl VirtualImuNode {
             let covariances = Covariances::of(device, rate_hz);
             let frame_id = self.config.frame(&format!("{}_imu", placement.name()));
             let mapping = self.mapping.placements.get(placement.name()).cloned();
-            Ok(Channel {
+            Ok(PlacementStream {
                 stream: None,
                 effects,
                 covariances,
@@ -229,7 +229,7 @@ impl VirtualImuNode {
             .transpose()
     }
 
-    /// The placements, in the order of [`Reading::placement`].
+    /// The placements, in the order of [`ImuMessages::placement`].
     pub fn placements(&self) -> &[Placement] {
         &self.placements
     }
@@ -254,8 +254,9 @@ impl VirtualImuNode {
             Ok(step) => {
                 self.counts.states += 1;
                 self.counts.readings += step.readings.len() as u64;
-                let without =
-                    |reading: &&Reading| reading.raw.linear_acceleration_covariance[0] < 0.0;
+                let without = |reading: &&ImuMessages| {
+                    reading.data_raw.linear_acceleration_covariance[0] < 0.0
+                };
                 self.counts.without_estimate += step.readings.iter().filter(without).count() as u64;
             }
             Err(refusal) => {
@@ -281,7 +282,7 @@ impl VirtualImuNode {
         self.watch_time(stamp);
         if state.betas != self.betas {
             self.shaped = ShapedBody::new(self.model.clone(), &state.betas)?;
-            self.sites = MountedSites::new(&self.shaped, &self.placements)?;
+            self.sensors = MountedSensors::new(&self.shaped, &self.placements)?;
             self.betas.clone_from(&state.betas);
             self.live = self.fresh_networks()?;
         }
@@ -335,10 +336,10 @@ impl VirtualImuNode {
     fn push(
         &mut self,
         (stamp, body, pose_std): (Stamp, &BodyPose, PoseStd),
-        readings: &mut Vec<Reading>,
+        readings: &mut Vec<ImuMessages>,
     ) -> Result<(), Refusal> {
         let mut released = Vec::with_capacity(self.channels.len());
-        let frames = self.sites.frames(body);
+        let frames = self.sensors.poses(body);
         for (channel, frame) in self.channels.iter_mut().zip(&frames) {
             let stream = channel.stream.as_mut();
             released.push(stream.map_or_else(
@@ -360,23 +361,24 @@ impl VirtualImuNode {
                 let Some(mut sample) = sample else { continue };
                 if let Some(mapping) = &channel.mapping {
                     let mapped = mapping.apply(&cromosim_imu::Reading {
-                        force: sample.specific_force,
-                        rate: sample.angular_velocity,
+                        specific_force: sample.specific_force,
+                        angular_velocity: sample.angular_velocity,
                     });
-                    (sample.specific_force, sample.angular_velocity) = (mapped.force, mapped.rate);
+                    (sample.specific_force, sample.angular_velocity) =
+                        (mapped.specific_force, mapped.angular_velocity);
                 }
                 let covariances = channel.covariances.with_motion(&motion.variance, &sample);
-                let raw = imu_message(
+                let data_raw = imu_message(
                     &sample,
                     &channel.frame_id,
                     &covariances.without_orientation(),
                     false,
                 );
-                let full = imu_message(&sample, &channel.frame_id, &covariances, true);
-                readings.push(Reading {
+                let data = imu_message(&sample, &channel.frame_id, &covariances, true);
+                readings.push(ImuMessages {
                     placement,
-                    raw,
-                    full,
+                    data_raw,
+                    data,
                 });
             }
         }
@@ -406,8 +408,8 @@ impl VirtualImuNode {
         for ((placement, site), frame) in self
             .placements
             .iter()
-            .zip(self.sites.sites())
-            .zip(self.sites.frames(body))
+            .zip(self.sensors.sensors())
+            .zip(self.sensors.poses(body))
         {
             if follows_skin(placement) {
                 let segment_from_sensor =
@@ -434,7 +436,7 @@ impl VirtualImuNode {
         let rigid = self
             .placements
             .iter()
-            .zip(self.sites.sites())
+            .zip(self.sensors.sensors())
             .filter(|(placement, _)| placement.follow() == Follow::Segment);
         TFMessage {
             transforms: rigid

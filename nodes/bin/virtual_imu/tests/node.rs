@@ -9,7 +9,7 @@ use cromosim_imu::PlacementSet;
 use cromosim_motion::{SmplMotion, embedded_walk};
 use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_msgs::std_msgs::Header;
-use cromosim_virtual_imu::{Config, Reading, VirtualImuNode};
+use cromosim_virtual_imu::{Config, ImuMessages, VirtualImuNode};
 use nalgebra::{UnitQuaternion, Vector3};
 
 const START: i64 = 1_700_000_000_000_000_000;
@@ -45,7 +45,7 @@ fn state(motion: &SmplMotion, frame: usize, nanos: i64) -> SmplState {
 }
 
 /// The readings of the walk's frames, whose stamps begin at `start`.
-fn walk(node: &mut VirtualImuNode, motion: &SmplMotion, start: i64) -> Vec<Reading> {
+fn walk(node: &mut VirtualImuNode, motion: &SmplMotion, start: i64) -> Vec<ImuMessages> {
     let step = |frame| {
         node.step(&state(motion, frame, start + frame as i64 * 10_000_000))
             .unwrap()
@@ -60,19 +60,19 @@ fn a_body_at_rest_reads_gravity_upwards_and_no_rate() {
     let first = standing.frames[0].clone();
     standing.frames.fill(first);
     for reading in walk(&mut node(quiet()), &standing, START) {
-        let world_from_sensor: UnitQuaternion<f64> = reading.full.orientation.try_into().unwrap();
-        let force = world_from_sensor * Vector3::from(reading.full.linear_acceleration);
+        let world_from_sensor: UnitQuaternion<f64> = reading.data.orientation.try_into().unwrap();
+        let force = world_from_sensor * Vector3::from(reading.data.linear_acceleration);
         assert!(
             (force - Vector3::new(0.0, 0.0, 9.80665)).norm() < 1e-4,
             "{force}"
         );
-        assert!(Vector3::from(reading.full.angular_velocity).norm() < 1e-5);
+        assert!(Vector3::from(reading.data.angular_velocity).norm() < 1e-5);
         assert_eq!(
-            reading.raw.linear_acceleration,
-            reading.full.linear_acceleration
+            reading.data_raw.linear_acceleration,
+            reading.data.linear_acceleration
         );
-        assert_eq!(reading.raw.orientation_covariance[0], -1.0);
-        assert!(reading.raw.header.frame_id.ends_with("_imu"));
+        assert_eq!(reading.data_raw.orientation_covariance[0], -1.0);
+        assert!(reading.data_raw.header.frame_id.ends_with("_imu"));
     }
 }
 
@@ -84,7 +84,7 @@ fn every_sample_comes_out_once_with_the_stated_delay() {
     for frame in 0..motion.frames.len() {
         let now = START + frame as i64 * 10_000_000;
         for reading in node.step(&state(&motion, frame, now)).unwrap().readings {
-            let stamp = reading.full.header.stamp.nanos();
+            let stamp = reading.data.header.stamp.nanos();
             // The first states wait until their rate is known.
             if frame > 20 {
                 let delay = node.delays_seconds()[reading.placement].unwrap();
@@ -119,11 +119,11 @@ fn a_source_that_starts_over_starts_the_schemes_over() {
     assert!(
         again
             .iter()
-            .all(|reading| reading.full.header.stamp.nanos() < START)
+            .all(|reading| reading.data.header.stamp.nanos() < START)
     );
     let largest = again
         .iter()
-        .map(|reading| Vector3::from(reading.full.linear_acceleration).norm())
+        .map(|reading| Vector3::from(reading.data.linear_acceleration).norm())
         .fold(0.0, f64::max);
     assert!(
         largest < 60.0,
@@ -174,7 +174,7 @@ fn nonsense_is_refused_and_the_node_goes_on() {
 
 /// The readings of the walk's first second with this confidence, without those that rest on its
 /// ends.
-fn with_confidence(config: Config, confidence: f64) -> Vec<Reading> {
+fn with_confidence(config: Config, confidence: f64) -> Vec<ImuMessages> {
     let motion = embedded_walk().slice(0.0, Some(1.0)).unwrap();
     let placements = cromosim_virtual_imu::placements(&config).unwrap();
     let mut node =
@@ -205,18 +205,19 @@ fn confidence_grows_the_covariances() {
     assert_eq!(certain.len(), doubtful.len());
     for (certain, doubtful) in certain.iter().zip(&doubtful).skip(100) {
         assert_eq!(
-            certain.raw.linear_acceleration, doubtful.raw.linear_acceleration,
+            certain.data_raw.linear_acceleration, doubtful.data_raw.linear_acceleration,
             "the reading stays as it is"
         );
-        let grown = |pick: fn(&Reading) -> [f64; 9]| (pick(doubtful)[0] - pick(certain)[0]).sqrt();
+        let grown =
+            |pick: fn(&ImuMessages) -> [f64; 9]| (pick(doubtful)[0] - pick(certain)[0]).sqrt();
         let (force, rate) = (
-            grown(|r| r.raw.linear_acceleration_covariance),
-            grown(|r| r.raw.angular_velocity_covariance),
+            grown(|r| r.data_raw.linear_acceleration_covariance),
+            grown(|r| r.data_raw.angular_velocity_covariance),
         );
         assert!((24.0..25.0).contains(&force), "{force} m/s2");
         assert!((0.14..0.15).contains(&rate), "{rate} rad/s");
-        assert!((grown(|r| r.full.orientation_covariance) - 0.002).abs() < 1e-6);
-        assert_eq!(doubtful.raw.orientation_covariance[0], -1.0);
+        assert!((grown(|r| r.data.orientation_covariance) - 0.002).abs() < 1e-6);
+        assert_eq!(doubtful.data_raw.orientation_covariance[0], -1.0);
     }
     let holding = with_confidence(
         Config {
@@ -225,7 +226,7 @@ fn confidence_grows_the_covariances() {
         },
         0.5,
     );
-    let force = holding[200].raw.linear_acceleration_covariance[0].sqrt();
+    let force = holding[200].data_raw.linear_acceleration_covariance[0].sqrt();
     assert!(
         (0.5..5.0).contains(&force),
         "0.1 m that hold for half a second are sqrt(3) 0.1 / 0.25 m/s2, and 0.2 rad of gravity: {force}"
@@ -249,11 +250,11 @@ fn at_confidence_0_there_is_no_estimate() {
         };
         for reading in node.step(&state).unwrap().readings {
             let covariances = [
-                reading.raw.linear_acceleration_covariance,
-                reading.raw.angular_velocity_covariance,
-                reading.full.orientation_covariance,
+                reading.data_raw.linear_acceleration_covariance,
+                reading.data_raw.angular_velocity_covariance,
+                reading.data.orientation_covariance,
             ];
-            let at = (reading.raw.header.stamp.nanos() - START) / 10_000_000;
+            let at = (reading.data_raw.header.stamp.nanos() - START) / 10_000_000;
             if (105..125).contains(&at) {
                 assert!(
                     covariances.iter().all(|covariance| covariance[0] == -1.0),
@@ -266,7 +267,7 @@ fn at_confidence_0_there_is_no_estimate() {
                     "frame {at}"
                 );
             }
-            lost.extend((reading.raw.linear_acceleration_covariance[0] < 0.0).then_some(at));
+            lost.extend((reading.data_raw.linear_acceleration_covariance[0] < 0.0).then_some(at));
         }
     }
     let report = node.diagnostics(Header::new(START, "").stamp, "/virtual_imu");
@@ -310,7 +311,7 @@ fn two_people_have_errors_of_their_own() {
     };
     let (one, other) = (run("person_1"), run("person_2"));
     assert_eq!(
-        one[0].raw.header.frame_id,
+        one[0].data_raw.header.frame_id,
         format!(
             "person_1/{}_imu",
             node(quiet()).placements()[one[0].placement].name()
@@ -319,7 +320,8 @@ fn two_people_have_errors_of_their_own() {
     assert!(
         one.iter()
             .zip(&other)
-            .all(|(one, other)| one.raw.linear_acceleration != other.raw.linear_acceleration)
+            .all(|(one, other)| one.data_raw.linear_acceleration
+                != other.data_raw.linear_acceleration)
     );
 }
 
@@ -364,14 +366,14 @@ fn a_devices_effects_act_live() {
     );
     assert_eq!(ideal.len(), changed.len());
     for (ideal, changed) in ideal.iter().zip(&changed) {
-        let since = ideal.raw.header.stamp.nanos() - START;
+        let since = ideal.data_raw.header.stamp.nanos() - START;
         assert_eq!(
-            changed.raw.header.stamp.nanos() - START,
+            changed.data_raw.header.stamp.nanos() - START,
             since + since / 1000 + 250_000_000
         );
         let (ideal, changed) = (
-            Vector3::from(ideal.raw.angular_velocity),
-            Vector3::from(changed.raw.angular_velocity),
+            Vector3::from(ideal.data_raw.angular_velocity),
+            Vector3::from(changed.data_raw.angular_velocity),
         );
         assert!(
             (changed - Vector3::new(ideal.y, -ideal.x, ideal.z) * 1000.0).norm() < 1e-6,
@@ -468,14 +470,18 @@ fn networks_correct_what_the_scheme_says_before_the_device() {
         // 0.1 of 5 m/s2 and 0.5 of 2 rad/s, whatever way the sensor is turned.
         assert!(
             (difference(
-                after.raw.linear_acceleration,
-                before.raw.linear_acceleration
+                after.data_raw.linear_acceleration,
+                before.data_raw.linear_acceleration
             ) - 0.5)
                 .abs()
                 < 1e-5
         );
         assert!(
-            (difference(after.raw.angular_velocity, before.raw.angular_velocity) - 1.0).abs()
+            (difference(
+                after.data_raw.angular_velocity,
+                before.data_raw.angular_velocity
+            ) - 1.0)
+                .abs()
                 < 1e-5
         );
     }

@@ -262,8 +262,8 @@ impl<'a> Answer<'a> {
                 let mut noisy = *reading;
                 for axis in 0..3 {
                     let [a, b] = cromosim_imu::normal_pair(&mut random);
-                    noisy.force[axis] += sigma[0] * a;
-                    noisy.rate[axis] += sigma[1] * b;
+                    noisy.specific_force[axis] += sigma[0] * a;
+                    noisy.angular_velocity[axis] += sigma[1] * b;
                 }
                 noisy
             })

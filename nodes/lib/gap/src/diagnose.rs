@@ -128,8 +128,8 @@ pub fn diagnose(
     }
     let units = allowed_units(&gross, options);
     for reading in &mut problem.measured {
-        reading.force /= units[0];
-        reading.rate /= units[1];
+        reading.specific_force /= units[0];
+        reading.angular_velocity /= units[1];
     }
     problem.declared = declared_in_si(&problem, units);
     debug(|| {
@@ -354,7 +354,7 @@ fn first_context<'a>(
     let sigma = white_noise(problem, found_noise(problem, &residual), digital, without);
     let mut basis = NoiseBasis::new(problem.estimate.clone(), sigma);
     basis.rate_squared = track
-        .angular_velocity
+        .angular_velocity_in_segment
         .iter()
         .map(|w| w.norm_squared())
         .sum::<f64>()
@@ -362,7 +362,7 @@ fn first_context<'a>(
     basis.force_squared = first
         .readings
         .iter()
-        .map(|r| r.force.norm_squared())
+        .map(|r| r.specific_force.norm_squared())
         .sum::<f64>()
         / first.readings.len() as f64;
     if without.contains(&EffectKind::ReferenceNoise) {

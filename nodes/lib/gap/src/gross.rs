@@ -145,7 +145,7 @@ fn lag(problem: &Problem, track: &KinematicTrack) -> f64 {
     let measured: Vec<f64> = problem
         .raster(|k, axis| {
             if axis == 3 {
-                problem.measured[k].rate.norm()
+                problem.measured[k].angular_velocity.norm()
             } else {
                 0.0
             }
@@ -154,7 +154,7 @@ fn lag(problem: &Problem, track: &KinematicTrack) -> f64 {
     let seconds = (track.len() - 1) as f64 / track.rate_hz;
     let reference: Vec<f64> = (0..(seconds * rate_hz) as usize)
         .map(|k| {
-            track.angular_velocity
+            track.angular_velocity_in_segment
                 [((k as f64 / rate_hz * track.rate_hz) as usize).min(track.len() - 1)]
             .norm()
         })
@@ -240,8 +240,8 @@ fn gyro_axes(rows: &[(&Reading, usize)], track: &KinematicTrack) -> (Option<Matr
     let mean = |of: &dyn Fn(&(&Reading, usize)) -> Vector3<f64>| {
         rows.iter().map(of).sum::<Vector3<f64>>() / count
     };
-    let measured = |row: &(&Reading, usize)| row.0.rate;
-    let predicted = |row: &(&Reading, usize)| track.angular_velocity[row.1];
+    let measured = |row: &(&Reading, usize)| row.0.angular_velocity;
+    let predicted = |row: &(&Reading, usize)| track.angular_velocity_in_segment[row.1];
     let (mean_m, mean_p) = (mean(&measured), mean(&predicted));
     let (mut cross, mut own) = (Matrix3::zeros(), Matrix3::zeros());
     for row in rows {
@@ -304,13 +304,13 @@ fn accel_units(
 ) -> (f64, i32) {
     let (mut aa, mut ag, mut gg, mut ya, mut yg) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for (reading, entry) in rows {
-        let a = turn * track.acceleration[*entry];
+        let a = turn * track.acceleration_in_segment[*entry];
         let g = turn * (track.world_from_segment[*entry].inverse() * -GRAVITY_IN_WORLD);
         aa += a.dot(&a);
         ag += a.dot(&g);
         gg += g.dot(&g);
-        ya += reading.force.dot(&a);
-        yg += reading.force.dot(&g);
+        ya += reading.specific_force.dot(&a);
+        yg += reading.specific_force.dot(&g);
     }
     let determinant = aa * gg - ag * ag;
     if gg <= 0.0 || determinant <= 1e-9 * gg * gg {
@@ -392,9 +392,9 @@ pub(crate) fn digital(measured: &[Reading], channel: usize) -> Digital {
         .iter()
         .flat_map(|reading| {
             if channel == 0 {
-                reading.force
+                reading.specific_force
             } else {
-                reading.rate
+                reading.angular_velocity
             }
             .iter()
             .copied()

@@ -115,16 +115,16 @@ fn families(findings: &Findings, channel: usize) -> Vec<(&'static str, Vec<Colum
     let readings = &findings.state.fit.prediction.readings;
     let own = |reading: &Reading| {
         if channel == 0 {
-            reading.force
+            reading.specific_force
         } else {
-            reading.rate
+            reading.angular_velocity
         }
     };
     let other = |reading: &Reading| {
         if channel == 0 {
-            reading.rate
+            reading.angular_velocity
         } else {
-            reading.force
+            reading.specific_force
         }
     };
     let axes = 3 * channel..3 * channel + 3;

@@ -245,9 +245,9 @@ impl Problem {
 /// One of the six values of a reading, in the order of [`crate::AXES`].
 pub(crate) fn axis_of(reading: &Reading, axis: usize) -> f64 {
     if axis < 3 {
-        reading.force[axis]
+        reading.specific_force[axis]
     } else {
-        reading.rate[axis - 3]
+        reading.angular_velocity[axis - 3]
     }
 }
 

@@ -67,9 +67,9 @@ pub(crate) fn mask_clipped(problem: &mut Problem, channel: usize, digital: &Digi
     for (k, reading) in problem.measured.iter().enumerate() {
         for axis in 0..3 {
             let value = if channel == 0 {
-                reading.force[axis]
+                reading.specific_force[axis]
             } else {
-                reading.rate[axis]
+                reading.angular_velocity[axis]
             };
             if value.abs() >= limit * (1.0 - 1e-9) {
                 problem.usable[k][3 * channel + axis] = false;

@@ -80,8 +80,8 @@ fn simulated_gap(record: &PlacementRecord, effects: &EffectSet, epoch: Stamp) ->
             .sqrt()
     };
     [
-        rms(&|m, s| (m.force - s.force).norm_squared()),
-        rms(&|m, s| (m.rate - s.rate).norm_squared()),
+        rms(&|m, s| (m.specific_force - s.specific_force).norm_squared()),
+        rms(&|m, s| (m.angular_velocity - s.angular_velocity).norm_squared()),
     ]
 }
 

@@ -297,7 +297,7 @@ fn readings_that_are_no_numbers_are_refused_or_left_out() {
         .imu
         .readings
         .iter_mut()
-        .for_each(|reading| reading.force.x = f64::NAN);
+        .for_each(|reading| reading.specific_force.x = f64::NAN);
     assert!(matches!(refusal(&record), GapError::NotFinite { .. }));
     let mut record = Scene::new(17).record();
     record
@@ -305,7 +305,7 @@ fn readings_that_are_no_numbers_are_refused_or_left_out() {
         .readings
         .iter_mut()
         .step_by(700)
-        .for_each(|reading| reading.rate.y = f64::INFINITY);
+        .for_each(|reading| reading.angular_velocity.y = f64::INFINITY);
     let diagnosis = answer(&record).diagnosis;
     let other: Vec<&str> = names(&diagnosis)
         .into_iter()
@@ -325,7 +325,7 @@ fn a_stuck_sensor_is_refused() {
         .imu
         .readings
         .iter_mut()
-        .for_each(|reading| reading.rate = Vector3::new(0.01, -0.02, 0.0));
+        .for_each(|reading| reading.angular_velocity = Vector3::new(0.01, -0.02, 0.0));
     let error = refusal(&record);
     assert!(
         matches!(error, GapError::Stuck { .. })

@@ -18,14 +18,16 @@ fn track() -> KinematicTrack {
             .world_from_segment
             .push(so3::exp(&Vector3::new((2.0 * t).sin(), 0.3, 0.5 * t.cos())));
         track
-            .acceleration
+            .acceleration_in_segment
             .push(Vector3::new((9.0 * t).sin(), t.cos(), (3.0 * t).sin()) * 5.0);
         track
-            .angular_velocity
+            .angular_velocity_in_segment
             .push(Vector3::new((5.0 * t).cos(), t.sin(), 0.1));
-        track
-            .angular_acceleration
-            .push(Vector3::new(-5.0 * (5.0 * t).sin(), t.cos(), 0.0));
+        track.angular_acceleration_in_segment.push(Vector3::new(
+            -5.0 * (5.0 * t).sin(),
+            t.cos(),
+            0.0,
+        ));
     }
     track
 }

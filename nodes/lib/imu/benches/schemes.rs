@@ -6,7 +6,7 @@ use std::hint::black_box;
 use criterion::{Criterion, criterion_group, criterion_main};
 use cromosim_body::{BodyModel, BodyPose, JOINT_COUNT, ShapedBody};
 use cromosim_imu::{
-    MountedSites, PlacementSet, Scheme, SensorTrajectory, StreamOptions, StreamingImu,
+    MountedSensors, PlacementSet, Scheme, SensorTrajectory, StreamOptions, StreamingImu,
     simulate_kinematics_on,
 };
 use cromosim_spatial::{PoseTimes, Stamp, so3, uniform_stamps};
@@ -36,7 +36,7 @@ fn trajectories(
 ) -> (
     Vec<Stamp>,
     Vec<BodyPose>,
-    MountedSites,
+    MountedSensors,
     Vec<SensorTrajectory>,
 ) {
     let body = ShapedBody::new(BodyModel::embedded(), &[]).expect("the embedded body is sound");
@@ -47,7 +47,7 @@ fn trajectories(
     )
     .expect("a positive rate");
     let poses = motion(&stamps);
-    let sites = MountedSites::new(&body, placements.placements())
+    let sites = MountedSensors::new(&body, placements.placements())
         .expect("shipped placements fit the embedded body");
     let trajectories = sites
         .trajectories(&stamps, &poses)

@@ -1,6 +1,6 @@
 //! From a placement on a body to an inertial measurement unit.
 //!
-//! A [`Placement`] says where a sensor sits; a [`MountedSite`] gives its frame for any
+//! A [`Placement`] says where a sensor sits; a [`MountedSensor`] gives its frame for any
 //! [`cromosim_body::BodyPose`]; a [`Scheme`] differentiates the frames, offline by [`simulate`] or
 //! live by [`StreamingImu`]; a [`Device`] adds noise and further [`effects`]; [`SampleVariance`] is
 //! what errors of the poses ([`PoseStd`]) leave in a sample.
@@ -16,14 +16,14 @@
 //!
 //! ```
 //! use cromosim_body::{BodyModel, BodyPose, ShapedBody};
-//! use cromosim_imu::{Device, MountedSite, PlacementSet, Scheme, StreamingEffects, simulate, simulate_kinematics};
+//! use cromosim_imu::{Device, MountedSensor, PlacementSet, Scheme, StreamingEffects, simulate, simulate_kinematics};
 //! use cromosim_spatial::{Stamp, uniform_stamps};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let body = ShapedBody::new(BodyModel::embedded(), &[])?;
 //! let placements = PlacementSet::demo();
 //! let left_wrist = placements.get("left_wrist").ok_or("no such placement")?;
-//! let mounted = MountedSite::new(&body, left_wrist)?;
+//! let mounted = MountedSensor::new(&body, left_wrist)?;
 //!
 //! let stamps = uniform_stamps(Stamp::from_seconds(0.0), Stamp::from_seconds(1.0), 120.0)?;
 //! let poses = vec![BodyPose::rest(nalgebra::Vector3::new(0.0, 0.0, 1.0)); stamps.len()];
@@ -42,6 +42,7 @@
 //! # }
 //! ```
 
+mod channel;
 mod device;
 pub mod effects;
 mod error;
@@ -60,6 +61,7 @@ mod uncertainty;
 #[cfg(test)]
 mod test_motions;
 
+pub use channel::{AXES, Channel, PerChannel};
 pub use device::{Device, EMBEDDED_DEVICES};
 pub use effects::{
     DeclaredNoise, Dropouts, Effect, EffectKind, EffectSet, EffectSpec, EffectsFile, GridTrace,
@@ -67,7 +69,7 @@ pub use effects::{
     StreamingEffects, lattice_spacing,
 };
 pub use error::{EffectError, ImuError, PlacementProblem};
-pub use mount::{MountedSite, MountedSites, SiteFrame};
+pub use mount::{MountedSensor, MountedSensors, SensorPose};
 pub use noise::{Covariances, NoiseSource, normal_pair};
 pub use placement::{Follow, MAX_RATE_HZ, Placement, SiteChoice};
 pub use placement_file::PlacementSet;

@@ -8,7 +8,7 @@ use crate::{Follow, ImuError, Placement, PoseStd, SensorFrame, SensorTrajectory,
 
 /// Where a sensor is for one pose of the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SiteFrame {
+pub struct SensorPose {
     /// The sensor's frame, m.
     pub world_from_sensor: Isometry3<f64>,
     /// Outward unit normal of what the sensor follows: of the triangle, or of the rest triangle
@@ -18,8 +18,8 @@ pub struct SiteFrame {
     pub triangle_in_world: [Vector3<f64>; 3],
 }
 
-impl SiteFrame {
-    /// The frame with its time.
+impl SensorPose {
+    /// The sensor's frame with its time.
     pub fn at(&self, stamp: Stamp) -> SensorFrame {
         SensorFrame {
             stamp,
@@ -38,7 +38,7 @@ impl SiteFrame {
 /// instead. The sensor's frame is the site's turned by the placement's mount, moved outward by its
 /// distance from the skin.
 #[derive(Clone, Debug)]
-pub struct MountedSite {
+pub struct MountedSensor {
     name: String,
     site: Site,
     follow: Follow,
@@ -52,7 +52,7 @@ pub struct MountedSite {
     subset: VertexSubset,
 }
 
-impl MountedSite {
+impl MountedSensor {
     /// Mounts a placement.
     ///
     /// # Errors
@@ -119,19 +119,19 @@ impl MountedSite {
         self.segment_from_sensor
     }
 
-    /// The frame for one pose of the body.
-    pub fn frame(&self, pose: &BodyPose) -> SiteFrame {
+    /// Where the sensor is for one pose of the body.
+    pub fn pose(&self, body: &BodyPose) -> SensorPose {
         let mut positions = Vec::with_capacity(3);
         let segments = self
             .subset
-            .positions_and_segments_into(pose, &mut positions);
-        self.frame_of(
+            .positions_and_segments_into(body, &mut positions);
+        self.pose_from(
             &segments[self.site.joint.index()],
             [positions[0], positions[1], positions[2]],
         )
     }
 
-    /// The frames for a whole motion.
+    /// Its trajectory over a whole motion.
     ///
     /// # Errors
     /// As [`SensorTrajectory::new`]; stamps beyond the poses, or poses beyond the stamps, are left
@@ -145,16 +145,16 @@ impl MountedSite {
             stamps
                 .iter()
                 .zip(poses)
-                .map(|(stamp, pose)| self.frame(pose).at(*stamp))
+                .map(|(stamp, pose)| self.pose(pose).at(*stamp))
                 .collect(),
         )
     }
 
-    fn frame_of(
+    fn pose_from(
         &self,
         world_from_segment: &Isometry3<f64>,
         corners: [Vector3<f64>; 3],
-    ) -> SiteFrame {
+    ) -> SensorPose {
         let (world_from_sensor, normal_in_world) = match self.follow {
             Follow::Segment => (
                 world_from_segment * self.segment_from_sensor,
@@ -177,7 +177,7 @@ impl MountedSite {
                 )
             }
         };
-        SiteFrame {
+        SensorPose {
             world_from_sensor,
             normal_in_world,
             triangle_in_world: corners,
@@ -187,50 +187,50 @@ impl MountedSite {
 
 /// Several placements on one body, evaluated together: the skeleton is computed once a pose.
 #[derive(Clone, Debug)]
-pub struct MountedSites {
-    sites: Vec<MountedSite>,
+pub struct MountedSensors {
+    sensors: Vec<MountedSensor>,
     subset: Option<VertexSubset>,
 }
 
-impl MountedSites {
+impl MountedSensors {
     /// Mounts placements.
     ///
     /// # Errors
-    /// As [`MountedSite::new`].
+    /// As [`MountedSensor::new`].
     pub fn new(body: &ShapedBody, placements: &[Placement]) -> Result<Self, ImuError> {
-        let sites = placements
+        let sensors = placements
             .iter()
-            .map(|placement| MountedSite::new(body, placement))
+            .map(|placement| MountedSensor::new(body, placement))
             .collect::<Result<Vec<_>, _>>()?;
-        let vertices: Vec<u32> = sites
+        let vertices: Vec<u32> = sensors
             .iter()
-            .flat_map(|site| site.subset.vertices())
+            .flat_map(|sensor| sensor.subset.vertices())
             .collect();
         let refuse = |source| ImuError::Site {
             placement: "(all)".to_owned(),
             source: Box::new(source),
         };
-        let subset = if sites.is_empty() {
+        let subset = if sensors.is_empty() {
             None
         } else {
             Some(body.subset(&vertices).map_err(refuse)?)
         };
-        Ok(Self { sites, subset })
+        Ok(Self { sensors, subset })
     }
 
     /// The mounted placements, in order.
-    pub fn sites(&self) -> &[MountedSite] {
-        &self.sites
+    pub fn sensors(&self) -> &[MountedSensor] {
+        &self.sensors
     }
 
-    /// The frames of all placements for one pose, in order.
-    pub fn frames(&self, pose: &BodyPose) -> Vec<SiteFrame> {
-        let mut frames = Vec::new();
-        self.frames_into(pose, &mut Vec::new(), &mut frames);
-        frames
+    /// Where the sensors of all placements are for one pose of the body, in order.
+    pub fn poses(&self, body: &BodyPose) -> Vec<SensorPose> {
+        let mut poses = Vec::new();
+        self.poses_into(body, &mut Vec::new(), &mut poses);
+        poses
     }
 
-    /// The frames of all placements for a whole motion.
+    /// Their trajectories over a whole motion, in order.
     ///
     /// # Errors
     /// As [`SensorTrajectory::new`]; stamps beyond the poses, or poses beyond the stamps, are left
@@ -240,37 +240,34 @@ impl MountedSites {
         stamps: &[Stamp],
         poses: &[BodyPose],
     ) -> Result<Vec<SensorTrajectory>, ImuError> {
-        let mut by_site: Vec<Vec<SensorFrame>> = self
-            .sites
+        let mut by_sensor: Vec<Vec<SensorFrame>> = self
+            .sensors
             .iter()
             .map(|_| Vec::with_capacity(stamps.len()))
             .collect();
-        let (mut positions, mut frames) = (Vec::new(), Vec::new());
+        let (mut positions, mut sensor_poses) = (Vec::new(), Vec::new());
         for (stamp, pose) in stamps.iter().zip(poses) {
-            self.frames_into(pose, &mut positions, &mut frames);
-            for (series, frame) in by_site.iter_mut().zip(&frames) {
-                series.push(frame.at(*stamp));
+            self.poses_into(pose, &mut positions, &mut sensor_poses);
+            for (series, sensor_pose) in by_sensor.iter_mut().zip(&sensor_poses) {
+                series.push(sensor_pose.at(*stamp));
             }
         }
-        by_site.into_iter().map(SensorTrajectory::new).collect()
+        by_sensor.into_iter().map(SensorTrajectory::new).collect()
     }
 
-    fn frames_into(
+    fn poses_into(
         &self,
-        pose: &BodyPose,
+        body: &BodyPose,
         positions: &mut Vec<Vector3<f64>>,
-        frames: &mut Vec<SiteFrame>,
+        poses: &mut Vec<SensorPose>,
     ) {
-        frames.clear();
+        poses.clear();
         let Some(subset) = &self.subset else { return };
-        let segments = subset.positions_and_segments_into(pose, positions);
+        let segments = subset.positions_and_segments_into(body, positions);
         let corners = positions.chunks_exact(3).map(|c| [c[0], c[1], c[2]]);
-        frames.extend(
-            self.sites
-                .iter()
-                .zip(corners)
-                .map(|(site, corners)| site.frame_of(&segments[site.site.joint.index()], corners)),
-        );
+        poses.extend(self.sensors.iter().zip(corners).map(|(sensor, corners)| {
+            sensor.pose_from(&segments[sensor.site.joint.index()], corners)
+        }));
     }
 }
 

@@ -22,8 +22,8 @@ fn placement(fields: &str) -> Placement {
         .clone()
 }
 
-fn mounted(fields: &str) -> MountedSite {
-    MountedSite::new(&BODY, &placement(fields)).unwrap()
+fn mounted(fields: &str) -> MountedSensor {
+    MountedSensor::new(&BODY, &placement(fields)).unwrap()
 }
 
 /// Turned joints everywhere, the pelvis too.
@@ -41,7 +41,7 @@ fn bent() -> BodyPose {
 #[test]
 fn at_rest_the_frame_stands_on_the_skin_along_the_bone() {
     let site = mounted("site: left_watch");
-    let frame = site.frame(&BodyPose::rest(BODY.joints_in_model()[0]));
+    let frame = site.pose(&BodyPose::rest(BODY.joints_in_model()[0]));
     let [x, y, z] =
         [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| frame.world_from_sensor * axis);
     // The body lies with its model axes along the world's: the left arm points to +x, its back of
@@ -59,10 +59,13 @@ fn at_rest_the_frame_stands_on_the_skin_along_the_bone() {
 fn at_rest_skin_and_segment_agree_and_give_the_mount() {
     for set in [PlacementSet::demo(), PlacementSet::full17()] {
         let pose = BodyPose::rest(Vector3::new(0.3, -0.4, 1.0));
-        for site in MountedSites::new(&BODY, set.placements()).unwrap().sites() {
+        for site in MountedSensors::new(&BODY, set.placements())
+            .unwrap()
+            .sensors()
+        {
             let world_from_segment = BODY.world_from_segments(&pose)[site.joint().index()];
             let by_segment = world_from_segment * site.segment_from_sensor();
-            let by_skin = site.frame(&pose).world_from_sensor;
+            let by_skin = site.pose(&pose).world_from_sensor;
             assert!(
                 (by_segment.translation.vector - by_skin.translation.vector).norm() < 1e-6,
                 "{}",
@@ -86,7 +89,7 @@ fn a_segments_follower_is_rigid_and_a_skins_follower_nearly() {
     let pose = bent();
     let world_from_segment = BODY.world_from_segments(&pose)[rigid.joint().index()];
     let expected = world_from_segment * rigid.segment_from_sensor();
-    let (rigid, soft) = (rigid.frame(&pose), soft.frame(&pose));
+    let (rigid, soft) = (rigid.pose(&pose), soft.pose(&pose));
     assert!(
         (rigid.world_from_sensor.translation.vector - expected.translation.vector).norm() < 1e-12
     );
@@ -118,10 +121,10 @@ fn turning_the_whole_body_turns_the_frames() {
     turned.root_position = (turn * nalgebra::Point3::from(pose.root_position)).coords;
     turned.local_rotations[0] = turn.rotation * pose.local_rotations[0];
     for placement in PlacementSet::full17().placements() {
-        let site = MountedSite::new(&BODY, placement).unwrap();
+        let site = MountedSensor::new(&BODY, placement).unwrap();
         let (before, after) = (
-            turn * site.frame(&pose).world_from_sensor,
-            site.frame(&turned).world_from_sensor,
+            turn * site.pose(&pose).world_from_sensor,
+            site.pose(&turned).world_from_sensor,
         );
         assert!(
             (before.translation.vector - after.translation.vector).norm() < 1e-9,
@@ -139,9 +142,9 @@ fn turning_the_whole_body_turns_the_frames() {
 #[test]
 fn mount_and_distance_act_in_the_sites_frame() {
     let pose = bent();
-    let plain = mounted("site: sternum").frame(&pose);
+    let plain = mounted("site: sternum").pose(&pose);
     let turned = mounted("site: sternum, skin_distance: 0.03, mount: {rotvec: [0.2, -0.5, 1.0]}")
-        .frame(&pose);
+        .pose(&pose);
     let expected = plain.world_from_sensor.rotation * so3::exp(&Vector3::new(0.2, -0.5, 1.0));
     assert!(turned.world_from_sensor.rotation.angle_to(&expected) < 1e-7);
     let step =
@@ -190,8 +193,8 @@ fn sites_are_chosen_by_triangle_and_by_point_too() {
     ));
     let pose = bent();
     assert!(
-        (named.frame(&pose).world_from_sensor.translation.vector
-            - same.frame(&pose).world_from_sensor.translation.vector)
+        (named.pose(&pose).world_from_sensor.translation.vector
+            - same.pose(&pose).world_from_sensor.translation.vector)
             .norm()
             < 1e-9
     );
@@ -207,7 +210,7 @@ fn sites_are_chosen_by_triangle_and_by_point_too() {
 #[test]
 fn sites_that_the_body_lacks_are_refused_by_name() {
     let refusal = |fields: &str| {
-        MountedSite::new(&BODY, &placement(fields))
+        MountedSensor::new(&BODY, &placement(fields))
             .unwrap_err()
             .to_string()
     };
@@ -225,10 +228,10 @@ fn sites_that_the_body_lacks_are_refused_by_name() {
 #[test]
 fn evaluated_together_or_alone_frames_are_the_same() {
     let set = PlacementSet::full17();
-    let together = MountedSites::new(&BODY, set.placements()).unwrap();
+    let together = MountedSensors::new(&BODY, set.placements()).unwrap();
     let pose = bent();
-    for (site, frame) in together.sites().iter().zip(together.frames(&pose)) {
-        assert_eq!(site.frame(&pose), frame, "{}", site.name());
+    for (site, frame) in together.sensors().iter().zip(together.poses(&pose)) {
+        assert_eq!(site.pose(&pose), frame, "{}", site.name());
     }
     let stamps = [0.0, 0.1, 0.2].map(Stamp::from_seconds);
     let trajectories = together

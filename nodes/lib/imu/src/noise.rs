@@ -54,13 +54,14 @@ fn diagonal(variance: f64) -> [f64; 9] {
 /// same bytes come out whatever else is simulated, in whatever order, on however many threads.
 #[derive(Clone, Debug)]
 pub struct NoiseSource {
-    accel: Channel,
-    gyro: Channel,
-    orientation: Channel,
+    accelerometer: WhiteNoise,
+    gyroscope: WhiteNoise,
+    orientation: WhiteNoise,
 }
 
+/// Three axes with one standard deviation and one stream of numbers.
 #[derive(Clone, Debug)]
-struct Channel {
+struct WhiteNoise {
     sigma: f64,
     random: ChaCha12Rng,
 }
@@ -102,13 +103,13 @@ impl NoiseSource {
             return Err(SpatialError::BadRate { rate_hz }.into());
         }
         let root = rate_hz.sqrt();
-        let channel = |number, sigma| Channel {
+        let channel = |number, sigma| WhiteNoise {
             sigma,
             random: stream(seed, placement, number),
         };
         Ok(Self {
-            accel: channel(0, densities.0 * root),
-            gyro: channel(1, densities.1 * root),
+            accelerometer: channel(0, densities.0 * root),
+            gyroscope: channel(1, densities.1 * root),
             orientation: channel(2, orientation_stddev),
         })
     }
@@ -116,20 +117,23 @@ impl NoiseSource {
     /// The reading with this noise; one call a sample, in order of time. The orientation's noise is
     /// a small turn in sensor axes.
     pub fn apply(&mut self, ideal: &ImuSample) -> ImuSample {
-        let Reading { force, rate } = self.draw();
+        let Reading {
+            specific_force,
+            angular_velocity,
+        } = self.draw();
         ImuSample {
             stamp: ideal.stamp,
             world_from_sensor: ideal.world_from_sensor * self.draw_turn(),
-            specific_force: ideal.specific_force + force,
-            angular_velocity: ideal.angular_velocity + rate,
+            specific_force: ideal.specific_force + specific_force,
+            angular_velocity: ideal.angular_velocity + angular_velocity,
         }
     }
 
     /// The noise of the next reading.
     pub fn draw(&mut self) -> Reading {
         Reading {
-            force: self.accel.draw(),
-            rate: self.gyro.draw(),
+            specific_force: self.accelerometer.draw(),
+            angular_velocity: self.gyroscope.draw(),
         }
     }
 
@@ -139,7 +143,7 @@ impl NoiseSource {
     }
 }
 
-impl Channel {
+impl WhiteNoise {
     fn draw(&mut self) -> Vector3<f64> {
         let [x, y] = normal_pair(&mut self.random);
         let [z, _] = normal_pair(&mut self.random);

@@ -19,11 +19,11 @@ pub struct KinematicSample {
     /// The sensor's frame, m.
     pub world_from_sensor: Isometry3<f64>,
     /// Of the frame's origin, m/s2; zero at rest.
-    pub acceleration: Vector3<f64>,
+    pub acceleration_in_world: Vector3<f64>,
     /// Of the frame against the world, rad/s.
-    pub angular_velocity: Vector3<f64>,
+    pub angular_velocity_in_world: Vector3<f64>,
     /// Its derivative, rad/s2; none from schemes that do not give it.
-    pub angular_acceleration: Option<Vector3<f64>>,
+    pub angular_acceleration_in_world: Option<Vector3<f64>>,
     /// What errors of the poses leave in it.
     pub variance: SampleVariance,
 }
@@ -51,8 +51,8 @@ impl KinematicSample {
         ImuSample {
             stamp: self.stamp,
             world_from_sensor: self.world_from_sensor.rotation,
-            specific_force: sensor_from_world * (self.acceleration - GRAVITY_IN_WORLD),
-            angular_velocity: sensor_from_world * self.angular_velocity,
+            specific_force: sensor_from_world * (self.acceleration_in_world - GRAVITY_IN_WORLD),
+            angular_velocity: sensor_from_world * self.angular_velocity_in_world,
         }
     }
 }

@@ -125,9 +125,9 @@ pub(crate) fn at_frame(scheme: Scheme, frames: &[SensorFrame], k: usize) -> Kine
     KinematicSample {
         stamp: frames[k].stamp,
         world_from_sensor: frames[k].world_from_sensor,
-        acceleration,
-        angular_velocity,
-        angular_acceleration: None,
+        acceleration_in_world: acceleration,
+        angular_velocity_in_world: angular_velocity,
+        angular_acceleration_in_world: None,
         variance: SampleVariance::default(),
     }
 }
@@ -166,9 +166,9 @@ pub(crate) fn between_frames(at_frames: &[KinematicSample], stamp: Stamp) -> Kin
             (before.translation.vector + step).into(),
             so3::exp(&turn) * before.rotation,
         ),
-        acceleration: sum(&|sample| sample.acceleration),
-        angular_velocity: sum(&|sample| sample.angular_velocity),
-        angular_acceleration: None,
+        acceleration_in_world: sum(&|sample| sample.acceleration_in_world),
+        angular_velocity_in_world: sum(&|sample| sample.angular_velocity_in_world),
+        angular_acceleration_in_world: None,
         variance: SampleVariance::default(),
     }
 }

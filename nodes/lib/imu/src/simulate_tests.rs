@@ -87,11 +87,12 @@ fn normal_tracking_converges_but_is_blind_about_the_normal() {
             let known = wrist(sample.stamp - START);
             let normal = known.world_from_sensor * nalgebra::Vector3::z();
             assert!(
-                sample.angular_velocity.dot(&normal).abs() < 1e-9,
+                sample.angular_velocity_in_world.dot(&normal).abs() < 1e-9,
                 "nothing about the normal"
             );
-            let across = known.angular_velocity - normal * normal.dot(&known.angular_velocity);
-            square += (sample.angular_velocity - across).norm_squared();
+            let across = known.angular_velocity_in_world
+                - normal * normal.dot(&known.angular_velocity_in_world);
+            square += (sample.angular_velocity_in_world - across).norm_squared();
         }
         (square / samples.len() as f64).sqrt()
     };

@@ -89,11 +89,12 @@ fn stencils_read_live_what_they_read_offline() {
             let offline = simulate_kinematics(&trajectory, scheme, &stamps).unwrap();
             for ((live, _), offline) in live.iter().zip(&offline).skip(4) {
                 assert!(
-                    (live.acceleration - offline.acceleration).norm() < 1e-9,
+                    (live.acceleration_in_world - offline.acceleration_in_world).norm() < 1e-9,
                     "{scheme}"
                 );
                 assert!(
-                    (live.angular_velocity - offline.angular_velocity).norm() < 1e-9,
+                    (live.angular_velocity_in_world - offline.angular_velocity_in_world).norm()
+                        < 1e-9,
                     "{scheme}"
                 );
                 assert!(

@@ -40,11 +40,11 @@ pub(crate) fn wrist(t: f64) -> KinematicSample {
     KinematicSample {
         stamp: START.plus_seconds(t),
         world_from_sensor: Isometry3::from_parts(Vector3::new(x[0], y[0], z[0]).into(), rotation),
-        acceleration: Vector3::new(x[2], y[2], z[2]),
-        angular_velocity: Vector3::z() * yaw[1]
+        acceleration_in_world: Vector3::new(x[2], y[2], z[2]),
+        angular_velocity_in_world: Vector3::z() * yaw[1]
             + about_z * Vector3::y() * pitch[1]
             + about_zy * Vector3::x() * roll[1],
-        angular_acceleration: None,
+        angular_acceleration_in_world: None,
         variance: SampleVariance::default(),
     }
 }
@@ -61,9 +61,9 @@ pub(crate) fn spin(t: f64) -> KinematicSample {
             (Vector3::new(3.0, -4.0, 1.0) + lever_arm).into(),
             rotation,
         ),
-        acceleration: angular_velocity.cross(&angular_velocity.cross(&lever_arm)),
-        angular_velocity,
-        angular_acceleration: Some(Vector3::zeros()),
+        acceleration_in_world: angular_velocity.cross(&angular_velocity.cross(&lever_arm)),
+        angular_velocity_in_world: angular_velocity,
+        angular_acceleration_in_world: Some(Vector3::zeros()),
         variance: SampleVariance::default(),
     }
 }
@@ -117,8 +117,8 @@ pub(crate) fn errors(
     let (mut force, mut turn) = (0.0, 0.0);
     for sample in samples {
         let known = motion(sample.stamp - START);
-        force += (sample.acceleration - known.acceleration).norm_squared();
-        turn += (sample.angular_velocity - known.angular_velocity).norm_squared();
+        force += (sample.acceleration_in_world - known.acceleration_in_world).norm_squared();
+        turn += (sample.angular_velocity_in_world - known.angular_velocity_in_world).norm_squared();
     }
     let count = samples.len() as f64;
     ((force / count).sqrt(), (turn / count).sqrt())

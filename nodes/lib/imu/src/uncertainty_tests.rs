@@ -73,8 +73,8 @@ fn monte_carlo(
     };
     let turned = samples[0].world_from_sensor.rotation;
     let found = SampleVariance {
-        acceleration: of(&|sample| sample.acceleration),
-        angular_velocity: of(&|sample| sample.angular_velocity),
+        acceleration: of(&|sample| sample.acceleration_in_world),
+        angular_velocity: of(&|sample| sample.angular_velocity_in_world),
         orientation: of(&|sample| {
             so3::log(&(sample.world_from_sensor.rotation * turned.inverse()))
         }),

@@ -41,7 +41,7 @@ pub fn align(
         (both.len() >= LEAST).then(|| {
             wahba(
                 both.iter()
-                    .map(|(sample, reading)| (sample.1, reading.rate, 1.0)),
+                    .map(|(sample, reading)| (sample.1, reading.angular_velocity, 1.0)),
             )
             .1 / both.len() as f64
         })
@@ -67,10 +67,10 @@ pub fn align(
     let rate_weight = mean_square(&|(sample, _)| sample.1).max(1e-6).recip();
     let forces = both
         .iter()
-        .map(|(sample, reading)| (sample.0, reading.force, force_weight));
+        .map(|(sample, reading)| (sample.0, reading.specific_force, force_weight));
     let rates = both
         .iter()
-        .map(|(sample, reading)| (sample.1, reading.rate, rate_weight));
+        .map(|(sample, reading)| (sample.1, reading.angular_velocity, rate_weight));
     Ok(Alignment {
         time_offset,
         reference_from_chip: wahba(forces.chain(rates)).0,
@@ -92,9 +92,9 @@ fn matched(
         .filter_map(|sample| {
             let reading = reading_at(stamps, readings, sample.stamp.plus_seconds(offset))?;
             let sensor_from_world = sample.world_from_sensor.rotation.inverse();
-            let force = sensor_from_world * (sample.acceleration - GRAVITY_IN_WORLD);
+            let force = sensor_from_world * (sample.acceleration_in_world - GRAVITY_IN_WORLD);
             Some((
-                (force, sensor_from_world * sample.angular_velocity),
+                (force, sensor_from_world * sample.angular_velocity_in_world),
                 reading,
             ))
         })
@@ -119,10 +119,10 @@ pub(crate) fn reading_at(stamps: &[Stamp], readings: &[Reading], stamp: Stamp) -
     let part = (stamp - from) / (*to - from);
     let between = |a: &Vector3<f64>, b: &Vector3<f64>| a.lerp(b, part);
     let reading = Reading {
-        force: between(&first.force, &last.force),
-        rate: between(&first.rate, &last.rate),
+        specific_force: between(&first.specific_force, &last.specific_force),
+        angular_velocity: between(&first.angular_velocity, &last.angular_velocity),
     };
-    (reading.force + reading.rate)
+    (reading.specific_force + reading.angular_velocity)
         .iter()
         .all(|value| value.is_finite())
         .then_some(reading)
@@ -206,8 +206,8 @@ mod tests {
             .map(|sample| {
                 let ideal = sample.imu();
                 Reading {
-                    force: mount.inverse() * ideal.specific_force,
-                    rate: mount.inverse() * ideal.angular_velocity,
+                    specific_force: mount.inverse() * ideal.specific_force,
+                    angular_velocity: mount.inverse() * ideal.angular_velocity,
                 }
             })
             .collect();
@@ -233,8 +233,8 @@ mod tests {
             .collect();
         let readings = vec![
             Reading {
-                force: Vector3::z(),
-                rate: Vector3::x()
+                specific_force: Vector3::z(),
+                angular_velocity: Vector3::x()
             };
             stamps.len()
         ];
@@ -250,12 +250,12 @@ mod tests {
     fn no_reading_is_made_up_in_a_gap() {
         let stamps = [0.0, 0.01, 0.5, 0.51].map(Stamp::from_seconds);
         let readings = [1.0, 2.0, 3.0, 4.0].map(|x| Reading {
-            force: Vector3::repeat(x),
-            rate: Vector3::zeros(),
+            specific_force: Vector3::repeat(x),
+            angular_velocity: Vector3::zeros(),
         });
         let at = |seconds| {
             reading_at(&stamps, &readings, Stamp::from_seconds(seconds))
-                .map(|reading| reading.force.x)
+                .map(|reading| reading.specific_force.x)
         };
         assert_eq!(
             (at(0.005), at(0.3), at(0.505), at(0.6), at(-0.1)),

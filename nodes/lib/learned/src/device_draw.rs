@@ -181,8 +181,8 @@ impl DrawnDevice {
         let mut noise = NoiseSource::white(densities, 0.0, imu_rate_hz, self.seed, "drawn")?;
         for reading in &mut readings {
             let added = noise.draw();
-            reading.force += added.force;
-            reading.rate += added.rate;
+            reading.specific_force += added.specific_force;
+            reading.angular_velocity += added.angular_velocity;
         }
         model.digital(&mut readings);
         Ok(readings)
@@ -203,10 +203,13 @@ fn track(kinematics: &[KinematicSample], rate_hz: f64) -> KinematicTrack {
         .map(|k| {
             let (from, to) = (k.saturating_sub(1), (k + 1).min(last));
             let seconds = (to - from).max(1) as f64 / rate_hz;
-            let change =
-                (kinematics[to].angular_velocity - kinematics[from].angular_velocity) / seconds;
+            let change = (kinematics[to].angular_velocity_in_world
+                - kinematics[from].angular_velocity_in_world)
+                / seconds;
             kinematics[k].world_from_sensor.rotation.inverse()
-                * kinematics[k].angular_acceleration.unwrap_or(change)
+                * kinematics[k]
+                    .angular_acceleration_in_world
+                    .unwrap_or(change)
         })
         .collect();
     KinematicTrack {
@@ -218,9 +221,9 @@ fn track(kinematics: &[KinematicSample], rate_hz: f64) -> KinematicTrack {
             .iter()
             .map(|sample| sample.world_from_sensor.rotation)
             .collect(),
-        acceleration: own(&|sample| sample.acceleration),
-        angular_velocity: own(&|sample| sample.angular_velocity),
-        angular_acceleration: differences,
+        acceleration_in_segment: own(&|sample| sample.acceleration_in_world),
+        angular_velocity_in_segment: own(&|sample| sample.angular_velocity_in_world),
+        angular_acceleration_in_segment: differences,
     }
 }
 
@@ -276,8 +279,8 @@ mod tests {
             .unwrap();
         for (reading, sample) in readings.iter().zip(kinematics.iter().step_by(4)) {
             let ideal = sample.imu();
-            assert!((reading.force - ideal.specific_force).norm() < 1e-9);
-            assert!((reading.rate - ideal.angular_velocity).norm() < 1e-9);
+            assert!((reading.specific_force - ideal.specific_force).norm() < 1e-9);
+            assert!((reading.angular_velocity - ideal.angular_velocity).norm() < 1e-9);
         }
     }
 

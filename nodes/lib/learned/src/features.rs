@@ -161,9 +161,12 @@ impl Input {
             push(point - centre, PATCH_SIZE);
         }
         if self.on_top_of_analytic() {
-            push(kinematic.acceleration, Quantity::Acceleration.scale());
             push(
-                kinematic.angular_velocity,
+                kinematic.acceleration_in_world,
+                Quantity::Acceleration.scale(),
+            );
+            push(
+                kinematic.angular_velocity_in_world,
                 Quantity::AngularVelocity.scale(),
             );
         }

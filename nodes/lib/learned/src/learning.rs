@@ -217,8 +217,8 @@ mod tests {
         let ideal = motion.kinematics.iter().map(|sample| sample.imu());
         let readings: Vec<Reading> = ideal
             .map(|imu| Reading {
-                force: imu.specific_force,
-                rate: imu.angular_velocity,
+                specific_force: imu.specific_force,
+                angular_velocity: imu.angular_velocity,
             })
             .collect();
         let names = PairNames {

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use cromosim_body::{BodyPose, ShapedBody, VertexSubset};
-use cromosim_imu::{KinematicSample, MountedSite, Placement, Scheme, SiteFrame};
+use cromosim_imu::{KinematicSample, MountedSensor, Placement, Scheme, SensorPose};
 use cromosim_spatial::Stamp;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
@@ -64,7 +64,7 @@ impl LivePlacements {
                 });
             }
             vertices
-                .extend(Patch::new(body, MountedSite::new(body, placement)?.site())?.vertices());
+                .extend(Patch::new(body, MountedSensor::new(body, placement)?.site())?.vertices());
             match schemes
                 .iter_mut()
                 .find(|(scheme, _)| *scheme == placement.scheme())
@@ -96,7 +96,7 @@ impl LivePlacements {
     ///
     /// # Panics
     /// For another number of frames than placements.
-    pub fn push(&mut self, stamp: Stamp, pose: &BodyPose, frames: &[SiteFrame]) {
+    pub fn push(&mut self, stamp: Stamp, pose: &BodyPose, frames: &[SensorPose]) {
         let placements = self.frames.placements;
         assert_eq!(
             frames.len(),
@@ -211,7 +211,7 @@ impl Frames {
         &mut self,
         stamp: Stamp,
         points: &[[Vector3<f64>; PATCH_POINTS]],
-        frames: &[SiteFrame],
+        frames: &[SensorPose],
     ) {
         if self.stamps.len() == 2 * KEPT {
             self.stamps.drain(..KEPT);
@@ -336,9 +336,9 @@ impl Group {
                 Vector3::new(output[0], output[1], output[2]).map(f64::from)
                     * Quantity::BOTH[which].scale()
             });
-            sample.acceleration += acceleration;
-            sample.angular_velocity += rate;
-            sample.angular_acceleration = None;
+            sample.acceleration_in_world += acceleration;
+            sample.angular_velocity_in_world += rate;
+            sample.angular_acceleration_in_world = None;
         }
         Ok(())
     }
@@ -393,7 +393,7 @@ impl Group {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use cromosim_body::BodyModel;
-    use cromosim_imu::{MountedSites, PlacementSet, StreamOptions, StreamingImu};
+    use cromosim_imu::{MountedSensors, PlacementSet, StreamOptions, StreamingImu};
     use cromosim_spatial::uniform_stamps;
 
     use super::*;
@@ -444,7 +444,7 @@ mod tests {
         keep: impl Fn(&str, usize) -> bool,
     ) -> Vec<Vec<KinematicSample>> {
         let body = ShapedBody::new(BodyModel::embedded(), &[]).unwrap();
-        let sites = MountedSites::new(&body, placements).unwrap();
+        let sites = MountedSensors::new(&body, placements).unwrap();
         let options = StreamOptions::resampled(STATES_HZ, 100.0);
         let mut streams: Vec<_> = placements
             .iter()
@@ -460,7 +460,7 @@ mod tests {
         let mut all = vec![Vec::new(); placements.len()];
         for (number, stamp) in stamps.iter().enumerate() {
             let pose = pose(stamp);
-            let frames = sites.frames(&pose);
+            let frames = sites.poses(&pose);
             live.push(*stamp, &pose, &frames);
             let mut released: Vec<_> = streams
                 .iter_mut()
@@ -497,12 +497,12 @@ mod tests {
         for (one, all) in samples.iter().zip(&whole).skip(60) {
             assert_eq!(one.stamp, all.stamp);
             assert!(
-                (one.acceleration - all.acceleration).norm() < 1e-3,
+                (one.acceleration_in_world - all.acceleration_in_world).norm() < 1e-3,
                 "{} {}",
-                one.acceleration,
-                all.acceleration
+                one.acceleration_in_world,
+                all.acceleration_in_world
             );
-            assert!((one.angular_velocity - all.angular_velocity).norm() < 1e-4);
+            assert!((one.angular_velocity_in_world - all.angular_velocity_in_world).norm() < 1e-4);
         }
     }
 
@@ -533,13 +533,13 @@ mod tests {
             for (one, all) in found.iter().zip(&whole).skip(60) {
                 assert_eq!(one.stamp, all.stamp);
                 assert!(
-                    (one.acceleration - all.acceleration).norm() < 1e-3,
+                    (one.acceleration_in_world - all.acceleration_in_world).norm() < 1e-3,
                     "{scheme}: {} {}",
-                    one.acceleration,
-                    all.acceleration
+                    one.acceleration_in_world,
+                    all.acceleration_in_world
                 );
                 assert!(
-                    (one.angular_velocity - all.angular_velocity).norm() < 1e-4,
+                    (one.angular_velocity_in_world - all.angular_velocity_in_world).norm() < 1e-4,
                     "{scheme}"
                 );
             }

@@ -162,20 +162,20 @@ impl PlacementMapping {
         let mapped: [f64; 6] =
             std::array::from_fn(|channel| self.0[channel].apply(values[channel]));
         Reading {
-            force: [mapped[0], mapped[1], mapped[2]].into(),
-            rate: [mapped[3], mapped[4], mapped[5]].into(),
+            specific_force: [mapped[0], mapped[1], mapped[2]].into(),
+            angular_velocity: [mapped[3], mapped[4], mapped[5]].into(),
         }
     }
 }
 
 fn values(reading: &Reading) -> [f64; 6] {
     [
-        reading.force.x,
-        reading.force.y,
-        reading.force.z,
-        reading.rate.x,
-        reading.rate.y,
-        reading.rate.z,
+        reading.specific_force.x,
+        reading.specific_force.y,
+        reading.specific_force.z,
+        reading.angular_velocity.x,
+        reading.angular_velocity.y,
+        reading.angular_velocity.z,
     ]
 }
 
@@ -418,8 +418,8 @@ mod tests {
     #[test]
     fn files_keep_every_digit_and_bad_ones_are_named() {
         let reading = |x: f64| Reading {
-            force: Vector3::new(x, 2.0 * x, 9.8 + x),
-            rate: Vector3::new(-x, 0.1 * x, x * x),
+            specific_force: Vector3::new(x, 2.0 * x, 9.8 + x),
+            angular_velocity: Vector3::new(-x, 0.1 * x, x * x),
         };
         let of = |seed| draw(64, seed).into_iter().map(reading).collect::<Vec<_>>();
         let mapping = PlacementMapping::fit(&of(1), &of(2), "wrist").unwrap();

@@ -69,18 +69,23 @@ impl Pair {
             )?;
             let reference_from_chip = alignment.reference_from_chip;
             Some(Reading {
-                force: reference_from_chip * reading.force,
-                rate: reference_from_chip * reading.rate,
+                specific_force: reference_from_chip * reading.specific_force,
+                angular_velocity: reference_from_chip * reading.angular_velocity,
             })
         };
         let mut measured: Vec<_> = reference.kinematics.iter().map(turned).collect();
         measured.resize(motion.len(), None);
         let in_world = |(reading, sample): (&Option<Reading>, &KinematicSample)| {
             let world_from_sensor = sample.world_from_sensor.rotation;
-            (*reading).map(|Reading { force, rate }| Target {
-                acceleration: world_from_sensor * force + GRAVITY_IN_WORLD,
-                angular_velocity: world_from_sensor * rate,
-            })
+            (*reading).map(
+                |Reading {
+                     specific_force,
+                     angular_velocity,
+                 }| Target {
+                    acceleration: world_from_sensor * specific_force + GRAVITY_IN_WORLD,
+                    angular_velocity: world_from_sensor * angular_velocity,
+                },
+            )
         };
         let mut targets: Vec<_> = measured
             .iter()
@@ -115,8 +120,10 @@ impl Pair {
         let target = (*self.targets.get(sample)?)?;
         let kinematic = self.motion.kinematics.get(sample)?;
         let (value, analytic) = match quantity {
-            Quantity::Acceleration => (target.acceleration, kinematic.acceleration),
-            Quantity::AngularVelocity => (target.angular_velocity, kinematic.angular_velocity),
+            Quantity::Acceleration => (target.acceleration, kinematic.acceleration_in_world),
+            Quantity::AngularVelocity => {
+                (target.angular_velocity, kinematic.angular_velocity_in_world)
+            }
         };
         let wanted = if residual { value - analytic } else { value };
         let wanted = turn * wanted / quantity.scale();

@@ -158,14 +158,17 @@ impl LearnedSimulator {
         let learned =
             |(sample, (acceleration, rate)): (&KinematicSample, (&Vector3<f64>, &Vector3<f64>))| {
                 let (base_acceleration, base_rate) = if self.input.on_top_of_analytic() {
-                    (sample.acceleration, sample.angular_velocity)
+                    (
+                        sample.acceleration_in_world,
+                        sample.angular_velocity_in_world,
+                    )
                 } else {
                     Default::default()
                 };
                 KinematicSample {
-                    acceleration: base_acceleration + acceleration,
-                    angular_velocity: base_rate + rate,
-                    angular_acceleration: None,
+                    acceleration_in_world: base_acceleration + acceleration,
+                    angular_velocity_in_world: base_rate + rate,
+                    angular_acceleration_in_world: None,
                     ..*sample
                 }
             };
@@ -188,8 +191,8 @@ impl LearnedSimulator {
             .zip(&motion.kinematics)
             .map(|(new, old)| {
                 [
-                    new.acceleration - old.acceleration,
-                    new.angular_velocity - old.angular_velocity,
+                    new.acceleration_in_world - old.acceleration_in_world,
+                    new.angular_velocity_in_world - old.angular_velocity_in_world,
                 ]
             })
             .collect();
@@ -199,9 +202,9 @@ impl LearnedSimulator {
         let corrected = |sample: &KinematicSample| {
             let [acceleration, rate] = between(&corrections, start, sample.stamp);
             KinematicSample {
-                acceleration: sample.acceleration + acceleration,
-                angular_velocity: sample.angular_velocity + rate,
-                angular_acceleration: None,
+                acceleration_in_world: sample.acceleration_in_world + acceleration,
+                angular_velocity_in_world: sample.angular_velocity_in_world + rate,
+                angular_acceleration_in_world: None,
                 ..*sample
             }
         };

@@ -2,7 +2,7 @@
 
 use cromosim_body::{BodyPose, ShapedBody};
 use cromosim_imu::{
-    KinematicSample, MountedSite, Placement, Scheme, SensorTrajectory, simulate_kinematics,
+    KinematicSample, MountedSensor, Placement, Scheme, SensorTrajectory, simulate_kinematics,
 };
 use cromosim_spatial::{MAX_STENCIL, Stamp, derivative_weights, so3, uniform_stamps};
 use nalgebra::{Isometry3, Vector3};
@@ -38,7 +38,7 @@ impl SiteMotion {
         stamps: &[Stamp],
         poses: &[BodyPose],
     ) -> Result<Self, LearnedError> {
-        let mounted = MountedSite::new(body, placement)?;
+        let mounted = MountedSensor::new(body, placement)?;
         let trajectory = mounted.trajectory(stamps, poses)?;
         let patch = Patch::new(body, mounted.site())?;
         let frames: Vec<_> = poses.iter().map(|pose| patch.points(pose)).collect();

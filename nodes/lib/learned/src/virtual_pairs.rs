@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use cromosim_body::{BodyModel, BodyPose, ShapedBody};
 use cromosim_imu::{
-    KinematicSample, MountedSite, Placement, Reading, Scheme, SensorFrame, SensorTrajectory,
+    KinematicSample, MountedSensor, Placement, Reading, Scheme, SensorFrame, SensorTrajectory,
     normal_pair, simulate_kinematics,
 };
 use cromosim_spatial::{Stamp, uniform_stamps};
@@ -110,7 +110,7 @@ impl Wearing {
         let worn = ShapedBody::new(model.clone(), &shape)?;
         let stamps = stamps(poses.len(), rate_hz);
 
-        let trajectory = MountedSite::new(&worn, placement)?.trajectory(&stamps, poses)?;
+        let trajectory = MountedSensor::new(&worn, placement)?.trajectory(&stamps, poses)?;
         let fine = uniform_stamps(trajectory.start(), trajectory.end(), FINE_RATE_HZ)?;
         let truth = simulate_kinematics(&trajectory, Scheme::Spline, &fine)?;
         let read_at = uniform_stamps(trajectory.start(), trajectory.end(), NETWORK_RATE_HZ)?;
@@ -200,18 +200,19 @@ impl Worn {
     /// The sensor's frames as the source gives them.
     ///
     /// # Errors
-    /// As [`MountedSite::trajectory`].
+    /// As [`MountedSensor::trajectory`].
     pub fn trajectory(&self) -> Result<SensorTrajectory, LearnedError> {
-        Ok(MountedSite::new(&self.told, &self.placement)?.trajectory(&self.stamps, &self.poses)?)
+        Ok(MountedSensor::new(&self.told, &self.placement)?
+            .trajectory(&self.stamps, &self.poses)?)
     }
 
     /// The frames of the joint that carries the sensor, in the sensor's axes at rest: what a
     /// simulation without skin takes for the sensor.
     ///
     /// # Errors
-    /// As [`MountedSite::trajectory`].
+    /// As [`MountedSensor::trajectory`].
     pub fn joint_trajectory(&self) -> Result<SensorTrajectory, LearnedError> {
-        let mounted = MountedSite::new(&self.told, &self.placement)?;
+        let mounted = MountedSensor::new(&self.told, &self.placement)?;
         let (joint, turn) = (
             mounted.joint().index(),
             mounted.segment_from_sensor().rotation,
@@ -257,7 +258,7 @@ fn doubtful(
             let seconds = *stamp - start;
             let at = ((seconds * FINE_RATE_HZ).round() as usize).min(truth.len() - 1);
             let frame = (seconds * rate_hz).round() as usize;
-            truth[at].acceleration.norm() > FASTEST
+            truth[at].acceleration_in_world.norm() > FASTEST
                 || motion.suspect.get(frame).copied().unwrap_or(false)
         })
         .collect();
@@ -381,8 +382,8 @@ mod tests {
             let left = pair
                 .rms(|sample| {
                     (
-                        kinematics[sample].acceleration,
-                        kinematics[sample].angular_velocity,
+                        kinematics[sample].acceleration_in_world,
+                        kinematics[sample].angular_velocity_in_world,
                     )
                 })
                 .unwrap();

@@ -280,13 +280,13 @@ impl PoseEstimate {
             let segment_from_world = world_from_segment.inverse();
             track.world_from_segment.push(world_from_segment);
             track
-                .acceleration
+                .acceleration_in_segment
                 .push(segment_from_world * acceleration(k));
             track
-                .angular_velocity
+                .angular_velocity_in_segment
                 .push(so3::angular_velocity_in_body(&q, &q_dot));
             track
-                .angular_acceleration
+                .angular_acceleration_in_segment
                 .push(segment_from_world * so3::angular_acceleration_in_world(&q, &q_dot, &q_ddot));
         }
         track

@@ -67,7 +67,8 @@ fn acceleration_error(track: &KinematicTrack) -> f64 {
         .enumerate()
         .filter(|(_, t)| (1.0..58.0).contains(t))
         .map(|(k, t)| {
-            (track.world_from_segment[k] * track.acceleration[k] - motion(t).2).norm_squared()
+            (track.world_from_segment[k] * track.acceleration_in_segment[k] - motion(t).2)
+                .norm_squared()
         })
         .collect();
     (errors.iter().sum::<f64>() / errors.len() as f64).sqrt()
@@ -270,7 +271,7 @@ fn noise_that_wanders_is_told_from_motion_by_its_knee() {
         .clone()
         .map(|k| {
             (0..3)
-                .map(|i| (track.acceleration[every * k][i] - truth[i][k]).powi(2))
+                .map(|i| (track.acceleration_in_segment[every * k][i] - truth[i][k]).powi(2))
                 .sum::<f64>()
         })
         .sum();
@@ -313,7 +314,8 @@ fn the_ends_are_sound() {
         .unwrap()
         .track(200.0);
     let at = |k: usize| {
-        (track.world_from_segment[k] * track.acceleration[k] - motion(k as f64 / track.rate_hz).2)
+        (track.world_from_segment[k] * track.acceleration_in_segment[k]
+            - motion(k as f64 / track.rate_hz).2)
             .norm()
     };
     let worst = (0..100)

@@ -17,11 +17,11 @@ pub struct KinematicTrack {
     /// Orientation of the segment.
     pub world_from_segment: Vec<UnitQuaternion<f64>>,
     /// `R^T a`: acceleration of the origin against the world, in segment axes, m/s2; zero at rest.
-    pub acceleration: Vec<Vector3<f64>>,
+    pub acceleration_in_segment: Vec<Vector3<f64>>,
     /// `w`: against the world, in segment axes, rad/s.
-    pub angular_velocity: Vec<Vector3<f64>>,
+    pub angular_velocity_in_segment: Vec<Vector3<f64>>,
     /// `dw/dt`, in segment axes, rad/s2.
-    pub angular_acceleration: Vec<Vector3<f64>>,
+    pub angular_acceleration_in_segment: Vec<Vector3<f64>>,
 }
 
 impl KinematicTrack {

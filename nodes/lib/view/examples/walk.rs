@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use cromosim_body::{BodyModel, ShapedBody};
-use cromosim_imu::{MountedSites, PlacementSet, Scheme, simulate};
+use cromosim_imu::{MountedSensors, PlacementSet, Scheme, simulate};
 use cromosim_motion::embedded_walk;
 use cromosim_spatial::{Stamp, uniform_stamps};
 use cromosim_view::{Destination, Recording, RecordingOptions};
@@ -41,7 +41,7 @@ fn main() -> anyhow::Result<()> {
         Some("full17") => PlacementSet::full17(),
         _ => PlacementSet::demo(),
     };
-    let sites = MountedSites::new(&body, placements.placements())?;
+    let sites = MountedSensors::new(&body, placements.placements())?;
     let stamps = uniform_stamps(
         Stamp::default(),
         Stamp::from_seconds(walk.duration_s()),

@@ -136,8 +136,8 @@ impl Case {
                 acceleration,
                 angular_velocity,
             }) => KinematicSample {
-                acceleration: *acceleration,
-                angular_velocity: *angular_velocity,
+                acceleration_in_world: *acceleration,
+                angular_velocity_in_world: *angular_velocity,
                 ..*sample
             },
             None => *sample,
@@ -155,8 +155,8 @@ impl Case {
 fn reading(sample: &KinematicSample) -> Reading {
     let imu = sample.imu();
     Reading {
-        force: imu.specific_force,
-        rate: imu.angular_velocity,
+        specific_force: imu.specific_force,
+        angular_velocity: imu.angular_velocity,
     }
 }
 
@@ -175,9 +175,9 @@ fn imusim(trajectory: &SensorTrajectory, stamps: &[Stamp]) -> anyhow::Result<Vec
         KinematicSample {
             stamp: *stamp,
             world_from_sensor: Isometry3::from_parts(motion.position.into(), motion.rotation),
-            acceleration: motion.acceleration,
-            angular_velocity: motion.angular_velocity,
-            angular_acceleration: Some(motion.angular_acceleration),
+            acceleration_in_world: motion.acceleration,
+            angular_velocity_in_world: motion.angular_velocity,
+            angular_acceleration_in_world: Some(motion.angular_acceleration),
             variance: Default::default(),
         }
     };

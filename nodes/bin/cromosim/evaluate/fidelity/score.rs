@@ -22,8 +22,8 @@ impl Sums {
         for (simulated, measured) in simulated.iter().zip(measured) {
             let Some(measured) = measured else { continue };
             let (force, rate) = (
-                simulated.force - measured.force,
-                simulated.rate - measured.rate,
+                simulated.specific_force - measured.specific_force,
+                simulated.angular_velocity - measured.angular_velocity,
             );
             for (square, error) in sums.squares.iter_mut().zip(force.iter().chain(rate.iter())) {
                 *square += error * error;
@@ -227,18 +227,18 @@ fn signal<'a>(readings: impl Iterator<Item = &'a Reading> + Clone) -> [f64; 2] {
     let count = readings.clone().count().max(1) as f64;
     let force = readings
         .clone()
-        .map(|reading| reading.force)
+        .map(|reading| reading.specific_force)
         .sum::<nalgebra::Vector3<f64>>()
         / count;
     let rate = readings
         .clone()
-        .map(|reading| reading.rate)
+        .map(|reading| reading.angular_velocity)
         .sum::<nalgebra::Vector3<f64>>()
         / count;
     let mut sums = [0.0; 2];
     for reading in readings {
-        sums[0] += (reading.force - force).norm_squared();
-        sums[1] += (reading.rate - rate).norm_squared();
+        sums[0] += (reading.specific_force - force).norm_squared();
+        sums[1] += (reading.angular_velocity - rate).norm_squared();
     }
     sums.map(|sum: f64| (sum / (3.0 * count)).sqrt())
 }
@@ -251,8 +251,8 @@ mod tests {
 
     fn reading(x: f64) -> Reading {
         Reading {
-            force: Vector3::new(x, 0.0, 9.0),
-            rate: Vector3::new(0.0, 2.0 * x, 0.0),
+            specific_force: Vector3::new(x, 0.0, 9.0),
+            angular_velocity: Vector3::new(0.0, 2.0 * x, 0.0),
         }
     }
 

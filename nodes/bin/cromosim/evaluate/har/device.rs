@@ -130,7 +130,7 @@ impl DeviceEstimate {
             effects.insert(Effect::new(kind, vec![step])?);
         }
         let stamps = self.stamps(
-            (ideal.force.len().max(1) - 1) as f64 / ideal.rate_hz,
+            (ideal.specific_force.len().max(1) - 1) as f64 / ideal.rate_hz,
             &mut random,
         );
         let model = SensorModel::new(&effects, Stamp::default());
@@ -147,8 +147,8 @@ impl DeviceEstimate {
             for reading in &mut readings {
                 let added = noise.draw();
                 *reading = Reading {
-                    force: reading.force + added.force,
-                    rate: reading.rate + added.rate,
+                    specific_force: reading.specific_force + added.specific_force,
+                    angular_velocity: reading.angular_velocity + added.angular_velocity,
                 };
             }
         }
@@ -211,19 +211,19 @@ fn rest(seconds: &[f64], values: &[[f64; 6]]) -> Option<Rest> {
     let readings: Vec<Reading> = values
         .iter()
         .map(|[a, b, c, x, y, z]| Reading {
-            force: [*a, *b, *c].into(),
-            rate: [*x, *y, *z].into(),
+            specific_force: [*a, *b, *c].into(),
+            angular_velocity: [*x, *y, *z].into(),
         })
         .collect();
     let count = readings.len() as f64;
     let mean_rate = readings
         .iter()
-        .map(|reading| reading.rate)
+        .map(|reading| reading.angular_velocity)
         .sum::<Vector3<f64>>()
         / count;
     let scatter = readings
         .iter()
-        .map(|reading| (reading.rate - mean_rate).norm_squared())
+        .map(|reading| (reading.angular_velocity - mean_rate).norm_squared())
         .sum::<f64>()
         / (3.0 * count);
     if scatter.sqrt() > REST_SCATTER {
@@ -282,10 +282,17 @@ mod tests {
             } else {
                 0.0
             };
-            let rate = Vector3::new(0.01 + turning, -0.02, 0.0) + added.rate;
-            let force = (Vector3::new(0.0, 9.8, 0.0) + added.force)
+            let angular_velocity =
+                Vector3::new(0.01 + turning, -0.02, 0.0) + added.angular_velocity;
+            let specific_force = (Vector3::new(0.0, 9.8, 0.0) + added.specific_force)
                 .map(|value| (value / 0.0625).round() * 0.0625);
-            series.push(seconds, &Reading { force, rate });
+            series.push(
+                seconds,
+                &Reading {
+                    specific_force,
+                    angular_velocity,
+                },
+            );
             seconds += if k % 20 == 19 { 0.03 } else { 0.01 };
         }
         series
@@ -321,8 +328,8 @@ mod tests {
         let ideal = GridTrace {
             start: Stamp::default(),
             rate_hz: 100.0,
-            force: vec![Vector3::new(0.0, 0.0, 9.81); 2000],
-            rate: vec![Vector3::zeros(); 2000],
+            specific_force: vec![Vector3::new(0.0, 0.0, 9.81); 2000],
+            angular_velocity: vec![Vector3::zeros(); 2000],
         };
         let (read, again, other) = (
             estimate.read(&ideal, 5).unwrap(),

@@ -228,8 +228,8 @@ fn cut(recording: &DatasetRecording, placements: &[String]) -> Vec<(Stamp, Vec<S
                 own.push(
                     *stamp - from,
                     &Reading {
-                        force: *force,
-                        rate: *rate,
+                        specific_force: *force,
+                        angular_velocity: *rate,
                     },
                 );
             }

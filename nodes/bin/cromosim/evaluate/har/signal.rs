@@ -37,10 +37,9 @@ pub struct Series {
 impl Series {
     /// Adds a reading at the end.
     pub fn push(&mut self, seconds: f64, reading: &Reading) {
-        let Reading { force, rate } = reading;
+        let (f, w) = (reading.specific_force, reading.angular_velocity);
         self.seconds.push(seconds);
-        self.values
-            .push([force.x, force.y, force.z, rate.x, rate.y, rate.z]);
+        self.values.push([f.x, f.y, f.z, w.x, w.y, w.z]);
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use anyhow::bail;
 use cromosim_body::{BodyModel, BodyPose, ShapedBody};
 use cromosim_imu::{
-    GridTrace, KinematicSample, MountedSite, Placement, Scheme, SensorFrame, SensorTrajectory,
+    GridTrace, KinematicSample, MountedSensor, Placement, Scheme, SensorFrame, SensorTrajectory,
     normal_pair, simulate_kinematics,
 };
 use cromosim_learned::{Examples, LearnedSimulator, NETWORK_RATE_HZ, SiteMotion};
@@ -144,7 +144,7 @@ impl Stage<'_> {
         };
         let kinematics = match (simulator, self.learned) {
             (Simulator::Joint, _) => {
-                let site = MountedSite::new(body, &placement)?;
+                let site = MountedSensor::new(body, &placement)?;
                 // As the sensor lies on the skin, but at the joint.
                 let segment_from_sensor = site.segment_from_sensor().rotation;
                 let frame = |(stamp, pose): (&Stamp, &BodyPose)| {
@@ -160,7 +160,7 @@ impl Stage<'_> {
                 )?)?
             }
             (Simulator::Analytic, _) => {
-                on_grid(&MountedSite::new(body, &placement)?.trajectory(stamps, poses)?)?
+                on_grid(&MountedSensor::new(body, &placement)?.trajectory(stamps, poses)?)?
             }
             (Simulator::Learned, Some(networks)) => {
                 networks.simulate(&SiteMotion::on_body(body, &placement, stamps, poses)?)?
@@ -170,14 +170,14 @@ impl Stage<'_> {
             }
         };
         let ideal = kinematics.iter().map(KinematicSample::imu);
-        let (force, rate) = ideal
+        let (specific_force, angular_velocity) = ideal
             .map(|sample| (sample.specific_force, sample.angular_velocity))
             .unzip();
         Ok(GridTrace {
             start: Stamp::default(),
             rate_hz: NETWORK_RATE_HZ,
-            force,
-            rate,
+            specific_force,
+            angular_velocity,
         })
     }
 }
@@ -216,12 +216,12 @@ pub fn windows(
 
 fn error_free(ideal: &GridTrace) -> Series {
     let values = ideal
-        .force
+        .specific_force
         .iter()
-        .zip(&ideal.rate)
-        .map(|(force, rate)| [force.x, force.y, force.z, rate.x, rate.y, rate.z]);
+        .zip(&ideal.angular_velocity)
+        .map(|(f, w)| [f.x, f.y, f.z, w.x, w.y, w.z]);
     Series {
-        seconds: (0..ideal.force.len())
+        seconds: (0..ideal.specific_force.len())
             .map(|k| k as f64 / ideal.rate_hz)
             .collect(),
         values: values.collect(),

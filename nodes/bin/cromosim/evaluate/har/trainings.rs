@@ -253,13 +253,16 @@ fn turned(real: &Examples, placements: &[String], seed: u64) -> Examples {
         let turns: Vec<_> = wears.iter().map(|wear| wear.turn(&mut random)).collect();
         for row in values.chunks_exact_mut(real.channels.max(1)) {
             for (device, turn) in turns.iter().enumerate() {
-                let Reading { force, rate } = reading(row, device);
+                let Reading {
+                    specific_force,
+                    angular_velocity,
+                } = reading(row, device);
                 write(
                     row,
                     device,
                     &Reading {
-                        force: turn * force,
-                        rate: turn * rate,
+                        specific_force: turn * specific_force,
+                        angular_velocity: turn * angular_velocity,
                     },
                 );
             }
@@ -269,8 +272,18 @@ fn turned(real: &Examples, placements: &[String], seed: u64) -> Examples {
     all
 }
 
-fn write(row: &mut [f32], device: usize, Reading { force, rate }: &Reading) {
-    let values = force.iter().chain(rate.iter()).map(|value| *value as f32);
+fn write(
+    row: &mut [f32],
+    device: usize,
+    Reading {
+        specific_force,
+        angular_velocity,
+    }: &Reading,
+) {
+    let values = specific_force
+        .iter()
+        .chain(angular_velocity.iter())
+        .map(|value| *value as f32);
     row[device * PER_DEVICE..(device + 1) * PER_DEVICE]
         .iter_mut()
         .zip(values)
@@ -280,8 +293,8 @@ fn write(row: &mut [f32], device: usize, Reading { force, rate }: &Reading) {
 fn reading(row: &[f32], device: usize) -> Reading {
     let at = |channel: usize| f64::from(row[device * PER_DEVICE + channel]);
     Reading {
-        force: [at(0), at(1), at(2)].into(),
-        rate: [at(3), at(4), at(5)].into(),
+        specific_force: [at(0), at(1), at(2)].into(),
+        angular_velocity: [at(3), at(4), at(5)].into(),
     }
 }
 

@@ -90,13 +90,21 @@ fn turned_copies_are_the_same_motion_otherwise_worn() {
         let (own, copied) = (rows(&real, window % 2), rows(&copies, window));
         for (one, other) in own.iter().zip(&copied) {
             assert!(
-                (one.force.norm() - other.force.norm()).abs() < 1e-5
-                    && (one.force - other.force).norm() > 1e-3
+                (one.specific_force.norm() - other.specific_force.norm()).abs() < 1e-5
+                    && (one.specific_force - other.specific_force).norm() > 1e-3
             );
             // Both sensors turn together, and all of a window does.
-            assert!((one.force.dot(&one.rate) - other.force.dot(&other.rate)).abs() < 1e-5);
             assert!(
-                (one.force.dot(&own[0].force) - other.force.dot(&copied[0].force)).abs() < 1e-5
+                (one.specific_force.dot(&one.angular_velocity)
+                    - other.specific_force.dot(&other.angular_velocity))
+                .abs()
+                    < 1e-5
+            );
+            assert!(
+                (one.specific_force.dot(&own[0].specific_force)
+                    - other.specific_force.dot(&copied[0].specific_force))
+                .abs()
+                    < 1e-5
             );
         }
     }

@@ -179,8 +179,8 @@ impl Scene {
         ];
         let mut random = ChaCha12Rng::seed_from_u64(self.seed ^ 0xdece);
         for reading in &mut readings {
-            reading.force += normal_vector(&mut random) * sigma[0];
-            reading.rate += normal_vector(&mut random) * sigma[1];
+            reading.specific_force += normal_vector(&mut random) * sigma[0];
+            reading.angular_velocity += normal_vector(&mut random) * sigma[1];
         }
         model.digital(&mut readings);
         let mut dropouts = Dropouts::new(self.effects.get(K::DroppedSamples), self.seed, "wrist");

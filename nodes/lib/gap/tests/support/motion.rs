@@ -119,10 +119,12 @@ impl Motion {
             let now = self.at(from + k as f64 / rate_hz);
             track.world_from_segment.push(now.world_from_segment);
             track
-                .acceleration
+                .acceleration_in_segment
                 .push(now.world_from_segment.inverse() * now.acceleration_in_world);
-            track.angular_velocity.push(now.angular_velocity);
-            track.angular_acceleration.push(now.angular_acceleration);
+            track.angular_velocity_in_segment.push(now.angular_velocity);
+            track
+                .angular_acceleration_in_segment
+                .push(now.angular_acceleration);
         }
         track
     }

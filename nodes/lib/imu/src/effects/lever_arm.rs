@@ -33,8 +33,8 @@ fn starts(_: &ResidualView) -> Vec<Vec<f64>> {
 #[inline]
 pub(super) fn acceleration(
     offset: &Vector3<f64>,
-    rate: &Vector3<f64>,
+    angular_velocity: &Vector3<f64>,
     angular_acceleration: &Vector3<f64>,
 ) -> Vector3<f64> {
-    angular_acceleration.cross(offset) + rate.cross(&rate.cross(offset))
+    angular_acceleration.cross(offset) + angular_velocity.cross(&angular_velocity.cross(offset))
 }

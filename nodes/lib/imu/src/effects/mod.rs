@@ -72,9 +72,9 @@ pub use streaming::StreamingEffects;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reading {
     /// Specific force, m/s2.
-    pub force: Vector3<f64>,
+    pub specific_force: Vector3<f64>,
     /// Angular velocity, rad/s.
-    pub rate: Vector3<f64>,
+    pub angular_velocity: Vector3<f64>,
 }
 
 macro_rules! kinds {

@@ -22,9 +22,9 @@ pub struct GridTrace {
     /// Entries per second.
     pub rate_hz: f64,
     /// Specific force, m/s2.
-    pub force: Vec<Vector3<f64>>,
+    pub specific_force: Vec<Vector3<f64>>,
     /// Angular velocity, rad/s.
-    pub rate: Vec<Vector3<f64>>,
+    pub angular_velocity: Vec<Vector3<f64>>,
 }
 
 /// The deterministic part of an [`EffectSet`], ready to run; the stages in the order of the
@@ -50,13 +50,13 @@ pub struct SensorModel {
     pub(super) low_pass: Option<SecondOrder>,
     pub(super) vibration: Option<Line>,
     pub(super) clock: Clock,
-    pub(super) force: Channel,
-    pub(super) rate: Channel,
+    pub(super) accelerometer: Readout,
+    pub(super) gyroscope: Readout,
 }
 
-/// One channel's stages 7 and 8.
+/// The last two stages of one channel: linear errors, and those of its converter and driver.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Channel {
+pub(super) struct Readout {
     /// `diag(scale) (I + upper)`.
     matrix: Option<Matrix3<f64>>,
     bias: Vector3<f64>,
@@ -67,7 +67,7 @@ pub(super) struct Channel {
     factor: f64,
 }
 
-impl Channel {
+impl Readout {
     fn new(
         effects: &EffectSet,
         [bias, scale, misaligned, noise, drift, limit, lsb, factor]: [EffectKind; 8],
@@ -164,7 +164,7 @@ impl SensorModel {
                     .get(Kind::ClockDrift)
                     .map_or(0.0, |effect| effect.scalar(0)),
             },
-            force: Channel::new(
+            accelerometer: Readout::new(
                 effects,
                 [
                     Kind::AccelBias,
@@ -177,7 +177,7 @@ impl SensorModel {
                     Kind::AccelUnits,
                 ],
             ),
-            rate: Channel::new(
+            gyroscope: Readout::new(
                 effects,
                 [
                     Kind::GyroBias,
@@ -197,34 +197,38 @@ impl SensorModel {
     /// (1); segment axes: `f = a / s + alpha x l + w x (w x l) - c R^T T g`, c = 1, 0 (removed) or
     /// -1 (negated).
     pub fn segment(&self, track: &KinematicTrack) -> GridTrace {
-        let motion = track.acceleration.iter().zip(&track.world_from_segment);
-        let mut force: Vec<Vector3<f64>> = motion
+        let motion = track
+            .acceleration_in_segment
+            .iter()
+            .zip(&track.world_from_segment);
+        let mut specific_force: Vec<Vector3<f64>> = motion
             .map(|(acceleration, world_from_segment)| {
                 acceleration * self.inverse_scale
                     - world_from_segment.inverse_transform_vector(&self.gravity)
             })
             .collect();
         if let Some(offset) = &self.lever_arm {
-            for ((force, rate), angular_acceleration) in force
+            for ((specific_force, angular_velocity), angular_acceleration) in specific_force
                 .iter_mut()
-                .zip(&track.angular_velocity)
-                .zip(&track.angular_acceleration)
+                .zip(&track.angular_velocity_in_segment)
+                .zip(&track.angular_acceleration_in_segment)
             {
-                *force += lever_arm::acceleration(offset, rate, angular_acceleration);
+                *specific_force +=
+                    lever_arm::acceleration(offset, angular_velocity, angular_acceleration);
             }
         }
         GridTrace {
             start: track.start,
             rate_hz: track.rate_hz,
-            force,
-            rate: track.angular_velocity.clone(),
+            specific_force,
+            angular_velocity: track.angular_velocity_in_segment.clone(),
         }
     }
 
     /// Soft tissue under the sensor (2): on the specific force alone.
     pub fn tissue(&self, mut trace: GridTrace) -> GridTrace {
         if let Some(filter) = &self.tissue {
-            filter.apply(&mut trace.force, trace.rate_hz);
+            filter.apply(&mut trace.specific_force, trace.rate_hz);
         }
         trace
     }
@@ -236,20 +240,25 @@ impl SensorModel {
     /// does not matter but for what the low-pass remembers across it.
     pub fn sensor(&self, mut trace: GridTrace) -> GridTrace {
         if self.slip.is_none() && (self.sensor_from_segment.is_some() || self.coupling.is_some()) {
-            for (force, rate) in trace.force.iter_mut().zip(&mut trace.rate) {
+            for (specific_force, angular_velocity) in trace
+                .specific_force
+                .iter_mut()
+                .zip(&mut trace.angular_velocity)
+            {
                 let turned = self.turned(
                     self.sensor_from_segment.as_ref(),
                     &Reading {
-                        force: *force,
-                        rate: *rate,
+                        specific_force: *specific_force,
+                        angular_velocity: *angular_velocity,
                     },
                 );
-                (*force, *rate) = (turned.force, turned.rate);
+                (*specific_force, *angular_velocity) =
+                    (turned.specific_force, turned.angular_velocity);
             }
         }
         if let Some(filter) = &self.low_pass {
-            filter.apply(&mut trace.force, trace.rate_hz);
-            filter.apply(&mut trace.rate, trace.rate_hz);
+            filter.apply(&mut trace.specific_force, trace.rate_hz);
+            filter.apply(&mut trace.angular_velocity, trace.rate_hz);
         }
         trace
     }
@@ -262,16 +271,19 @@ impl SensorModel {
         reading: &Reading,
     ) -> Reading {
         let Reading {
-            mut force,
-            mut rate,
+            mut specific_force,
+            mut angular_velocity,
         } = *reading;
         if let Some(turn) = sensor_from_segment {
-            (force, rate) = (turn * force, turn * rate);
+            (specific_force, angular_velocity) = (turn * specific_force, turn * angular_velocity);
         }
         if let Some(coupling) = &self.coupling {
-            rate += coupling * force;
+            angular_velocity += coupling * specific_force;
         }
-        Reading { force, rate }
+        Reading {
+            specific_force,
+            angular_velocity,
+        }
     }
 
     /// Readings at the true times of the stamps (9), with the vibration (4) in closed form; `trace`
@@ -288,25 +300,27 @@ impl SensorModel {
         let read = |stamp: &Stamp| {
             let seconds = self.clock.true_seconds(*stamp - self.epoch);
             let position = (seconds - start) * trace.rate_hz;
-            let mut reading =
-                match sampling::Place::at(position, trace.force.len().min(trace.rate.len())) {
-                    Some(place) => Reading {
-                        force: place.of(&trace.force),
-                        rate: place.of(&trace.rate),
-                    },
-                    None => Reading {
-                        force: sampling::interpolate(&trace.force, position),
-                        rate: sampling::interpolate(&trace.rate, position),
-                    },
-                };
+            let mut reading = match sampling::GridPosition::at(
+                position,
+                trace.specific_force.len().min(trace.angular_velocity.len()),
+            ) {
+                Some(nodes) => Reading {
+                    specific_force: nodes.interpolate(&trace.specific_force),
+                    angular_velocity: nodes.interpolate(&trace.angular_velocity),
+                },
+                None => Reading {
+                    specific_force: sampling::interpolate(&trace.specific_force, position),
+                    angular_velocity: sampling::interpolate(&trace.angular_velocity, position),
+                },
+            };
             if let Some(slip) = &slip {
                 reading = slip.turn(self, &reading, seconds);
             }
             if let Some(line) = &vibration {
-                let force = line.at(seconds);
-                reading.force += force;
+                let specific_force = line.at(seconds);
+                reading.specific_force += specific_force;
                 if let Some(coupling) = &self.coupling {
-                    reading.rate += coupling * force;
+                    reading.angular_velocity += coupling * specific_force;
                 }
             }
             reading
@@ -318,21 +332,21 @@ impl SensorModel {
     pub fn linear(&self, readings: &mut [Reading], stamps: &[Stamp]) {
         for (reading, stamp) in readings.iter_mut().zip(stamps) {
             let seconds = self.clock.true_seconds(*stamp - self.epoch);
-            reading.force = self.force.linear(&reading.force, seconds);
-            reading.rate = self.rate.linear(&reading.rate, seconds);
+            reading.specific_force = self.accelerometer.linear(&reading.specific_force, seconds);
+            reading.angular_velocity = self.gyroscope.linear(&reading.angular_velocity, seconds);
         }
     }
 
     /// White noise beyond the declared, (m/s2)/sqrt(Hz) and (rad/s)/sqrt(Hz); variances add.
     pub fn noise_density(&self) -> (f64, f64) {
-        (self.force.density, self.rate.density)
+        (self.accelerometer.density, self.gyroscope.density)
     }
 
     /// Saturation, quantisation and units (8, after the noise).
     pub fn digital(&self, readings: &mut [Reading]) {
         for reading in readings {
-            reading.force = self.force.digital(&reading.force);
-            reading.rate = self.rate.digital(&reading.rate);
+            reading.specific_force = self.accelerometer.digital(&reading.specific_force);
+            reading.angular_velocity = self.gyroscope.digital(&reading.angular_velocity);
         }
     }
 
@@ -375,11 +389,11 @@ impl Slip {
         at: f64,
         after: Matrix3<f64>,
     ) -> Self {
-        let position =
-            ((at - start) * trace.rate_hz).clamp(0.0, trace.force.len().saturating_sub(1) as f64);
+        let position = ((at - start) * trace.rate_hz)
+            .clamp(0.0, trace.specific_force.len().saturating_sub(1) as f64);
         let of = |sample: fn(&[Vector3<f64>], f64) -> Vector3<f64>, factor: f64| Reading {
-            force: sample(&trace.force, position) * factor,
-            rate: sample(&trace.rate, position) * factor,
+            specific_force: sample(&trace.specific_force, position) * factor,
+            angular_velocity: sample(&trace.angular_velocity, position) * factor,
         };
         let memory = model.low_pass.map(|filter| {
             (
@@ -406,15 +420,23 @@ impl Slip {
             // Ten time constants later nothing is left.
             if since * TAU * filter.natural_hz < 60.0 {
                 let decay = Reading {
-                    force: filter.homogeneous(since, &value.force, &derivative.force),
-                    rate: filter.homogeneous(since, &value.rate, &derivative.rate),
+                    specific_force: filter.homogeneous(
+                        since,
+                        &value.specific_force,
+                        &derivative.specific_force,
+                    ),
+                    angular_velocity: filter.homogeneous(
+                        since,
+                        &value.angular_velocity,
+                        &derivative.angular_velocity,
+                    ),
                 };
                 let (old, new) = (
                     model.turned(Some(&self.before), &decay),
                     model.turned(Some(&self.after), &decay),
                 );
-                turned.force += old.force - new.force;
-                turned.rate += old.rate - new.rate;
+                turned.specific_force += old.specific_force - new.specific_force;
+                turned.angular_velocity += old.angular_velocity - new.angular_velocity;
             }
         }
         turned

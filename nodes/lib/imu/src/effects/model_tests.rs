@@ -25,13 +25,13 @@ pub(super) fn track(seconds: f64) -> KinematicTrack {
         let t = k as f64 / 200.0;
         let rate = |t: f64| Vector3::new((2.0 * t).sin(), 0.5 * (3.0 * t).cos(), 0.8);
         track.world_from_segment.push(rotation);
-        track.angular_velocity.push(rate(t));
-        track.angular_acceleration.push(Vector3::new(
+        track.angular_velocity_in_segment.push(rate(t));
+        track.angular_acceleration_in_segment.push(Vector3::new(
             2.0 * (2.0 * t).cos(),
             -1.5 * (3.0 * t).sin(),
             0.0,
         ));
-        track.acceleration.push(Vector3::new(
+        track.acceleration_in_segment.push(Vector3::new(
             3.0 * (5.0 * t).sin(),
             2.0 * (4.0 * t).cos(),
             (7.0 * t).sin(),
@@ -61,9 +61,9 @@ fn run(effects: &[(Kind, &[f64])], track: &KinematicTrack, stamps: &[Stamp]) -> 
 fn close(found: &[Reading], expected: impl Fn(usize) -> Reading, tolerance: f64) {
     for (k, found) in found.iter().enumerate() {
         let expected = expected(k);
-        let error = (found.force - expected.force)
+        let error = (found.specific_force - expected.specific_force)
             .norm()
-            .max((found.rate - expected.rate).norm());
+            .max((found.angular_velocity - expected.angular_velocity).norm());
         assert!(
             error < tolerance,
             "reading {k}: {found:?} against {expected:?}"
@@ -73,11 +73,17 @@ fn close(found: &[Reading], expected: impl Fn(usize) -> Reading, tolerance: f64)
 
 /// The ideal reading of entry k, at a lever arm.
 fn ideal(track: &KinematicTrack, k: usize, arm: &Vector3<f64>) -> Reading {
-    let (w, alpha) = (track.angular_velocity[k], track.angular_acceleration[k]);
+    let (w, alpha) = (
+        track.angular_velocity_in_segment[k],
+        track.angular_acceleration_in_segment[k],
+    );
     let up = track.world_from_segment[k].inverse() * Vector3::new(0.0, 0.0, G);
     Reading {
-        force: track.acceleration[k] + up + alpha.cross(arm) + w.cross(&w.cross(arm)),
-        rate: w,
+        specific_force: track.acceleration_in_segment[k]
+            + up
+            + alpha.cross(arm)
+            + w.cross(&w.cross(arm)),
+        angular_velocity: w,
     }
 }
 
@@ -118,8 +124,8 @@ fn effects_on_the_grid_act_as_by_hand() {
     close(
         &mounted,
         |k| Reading {
-            force: turned(ideal(k).force),
-            rate: turned(ideal(k).rate),
+            specific_force: turned(ideal(k).specific_force),
+            angular_velocity: turned(ideal(k).angular_velocity),
         },
         1e-9,
     );
@@ -135,8 +141,8 @@ fn effects_on_the_grid_act_as_by_hand() {
     close(
         &swapped,
         |k| Reading {
-            force: axes(ideal(k).force),
-            rate: axes(ideal(k).rate),
+            specific_force: axes(ideal(k).specific_force),
+            angular_velocity: axes(ideal(k).angular_velocity),
         },
         1e-9,
     );
@@ -146,8 +152,8 @@ fn effects_on_the_grid_act_as_by_hand() {
         close(
             &read,
             |k| Reading {
-                force: track.acceleration[k] + up(k) * factor,
-                rate: track.angular_velocity[k],
+                specific_force: track.acceleration_in_segment[k] + up(k) * factor,
+                angular_velocity: track.angular_velocity_in_segment[k],
             },
             1e-9,
         );
@@ -168,8 +174,8 @@ fn effects_on_the_grid_act_as_by_hand() {
     close(
         &tilted,
         |k| Reading {
-            force: track.acceleration[k] / 2.0 + leaning(k),
-            rate: track.angular_velocity[k],
+            specific_force: track.acceleration_in_segment[k] / 2.0 + leaning(k),
+            angular_velocity: track.angular_velocity_in_segment[k],
         },
         1e-9,
     );
@@ -179,8 +185,8 @@ fn effects_on_the_grid_act_as_by_hand() {
     close(
         &coupled,
         |k| Reading {
-            force: ideal(k).force,
-            rate: ideal(k).rate + g * ideal(k).force,
+            specific_force: ideal(k).specific_force,
+            angular_velocity: ideal(k).angular_velocity + g * ideal(k).specific_force,
         },
         1e-9,
     );
@@ -204,12 +210,16 @@ fn each_reading_is_scaled_shifted_and_made_digital_as_by_hand() {
         &stamps,
     );
     let by_hand = |k: usize| {
-        let (f, w, t) = (ideal(k).force, ideal(k).rate, stamps[k] - START);
+        let (f, w, t) = (
+            ideal(k).specific_force,
+            ideal(k).angular_velocity,
+            stamps[k] - START,
+        );
         let x = 1.1 * (f.x + 0.01 * f.y + 0.02 * f.z) + 0.1 + 0.01 * t;
-        let force = Vector3::new(x, 0.9 * (f.y + 0.03 * f.z) + 0.2, f.z + 0.3 - 0.02 * t);
+        let specific_force = Vector3::new(x, 0.9 * (f.y + 0.03 * f.z) + 0.2, f.z + 0.3 - 0.02 * t);
         Reading {
-            force,
-            rate: Vector3::new(2.0 * w.x, w.y - 0.2, w.z),
+            specific_force,
+            angular_velocity: Vector3::new(2.0 * w.x, w.y - 0.2, w.z),
         }
     };
     close(&read, by_hand, 1e-9);
@@ -227,8 +237,8 @@ fn each_reading_is_scaled_shifted_and_made_digital_as_by_hand() {
     close(
         &digital,
         |k| Reading {
-            force: ideal(k).force.map(clip),
-            rate: ideal(k).rate.map(|v| (v / 0.1).round() * 100.0),
+            specific_force: ideal(k).specific_force.map(clip),
+            angular_velocity: ideal(k).angular_velocity.map(|v| (v / 0.1).round() * 100.0),
         },
         1e-9,
     );
@@ -262,7 +272,7 @@ fn stamps_are_those_of_the_devices_clock() {
     close(
         &read,
         |k| Reading {
-            rate: track.angular_velocity[k] + t(k),
+            angular_velocity: track.angular_velocity_in_segment[k] + t(k),
             ..ideal(&track, k, &Vector3::zeros())
         },
         1e-7,
@@ -324,14 +334,17 @@ fn the_low_pass_remembers_across_a_slip() {
         .enumerate()
         .map(|(k, reading)| {
             let back = so3::exp(&slip).inverse();
-            let (force, rate) = if k < at_index {
-                (reading.force, reading.rate)
+            let (specific_force, rate) = if k < at_index {
+                (reading.specific_force, reading.angular_velocity)
             } else {
-                (back * reading.force, back * reading.rate)
+                (
+                    back * reading.specific_force,
+                    back * reading.angular_velocity,
+                )
             };
             Reading {
-                force,
-                rate: rate + Matrix3::from_row_slice(&g) * force,
+                specific_force,
+                angular_velocity: rate + Matrix3::from_row_slice(&g) * specific_force,
             }
         })
         .collect();
@@ -346,8 +359,8 @@ fn the_low_pass_remembers_across_a_slip() {
     let plain: Vec<Reading> = turned
         .iter()
         .map(|reading| Reading {
-            force: filter.push(reading.force, 0.005),
-            rate: rates.push(reading.rate, 0.005),
+            specific_force: filter.push(reading.specific_force, 0.005),
+            angular_velocity: rates.push(reading.angular_velocity, 0.005),
         })
         .collect();
     close(&read, |k| plain[k], 0.02);
@@ -356,9 +369,9 @@ fn the_low_pass_remembers_across_a_slip() {
 #[test]
 fn vibration_passes_the_filter_and_reaches_the_gyroscope() {
     let mut still = track(4.0);
-    still.acceleration.fill(Vector3::zeros());
-    still.angular_velocity.fill(Vector3::zeros());
-    still.angular_acceleration.fill(Vector3::zeros());
+    still.acceleration_in_segment.fill(Vector3::zeros());
+    still.angular_velocity_in_segment.fill(Vector3::zeros());
+    still.angular_acceleration_in_segment.fill(Vector3::zeros());
     still.world_from_segment.fill(so3::exp(&Vector3::zeros()));
     let stamps = uniform_stamps(START.plus_seconds(1.0), START.plus_seconds(3.0), 333.0).unwrap();
     let g = [0.0, 0.02, 0.0, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0];
@@ -369,11 +382,11 @@ fn vibration_passes_the_filter_and_reaches_the_gyroscope() {
     let by_hand = |gain: f64, delay: f64| {
         let stamps = &stamps;
         move |k: usize| {
-            let force =
+            let specific_force =
                 amplitude * (TAU * 31.7 * (stamps[k] - START) + 0.7 + delay).sin() * gain + gravity;
             Reading {
-                force,
-                rate: Matrix3::from_row_slice(&g) * force,
+                specific_force,
+                angular_velocity: Matrix3::from_row_slice(&g) * specific_force,
             }
         }
     };
@@ -411,8 +424,8 @@ fn the_order_is_that_of_the_measurement_model() {
     close(
         &read,
         |k| Reading {
-            force: m * (mount * ideal(k).force),
-            rate: m * (mount * ideal(k).rate),
+            specific_force: m * (mount * ideal(k).specific_force),
+            angular_velocity: m * (mount * ideal(k).angular_velocity),
         },
         1e-9,
     );
@@ -427,8 +440,9 @@ fn the_order_is_that_of_the_measurement_model() {
     close(
         &read,
         |k| Reading {
-            force: m * ideal(k).force,
-            rate: m * ideal(k).rate + Matrix3::from_row_slice(&g) * m * ideal(k).force,
+            specific_force: m * ideal(k).specific_force,
+            angular_velocity: m * ideal(k).angular_velocity
+                + Matrix3::from_row_slice(&g) * m * ideal(k).specific_force,
         },
         1e-9,
     );
@@ -444,14 +458,15 @@ fn the_order_is_that_of_the_measurement_model() {
         &stamps,
     );
     let scaled = |k: usize| {
-        Vector3::new(2.0, 1.0, 1.0)
-            .component_mul(&(ideal(k).rate + Matrix3::from_row_slice(&g) * ideal(k).force))
+        Vector3::new(2.0, 1.0, 1.0).component_mul(
+            &(ideal(k).angular_velocity + Matrix3::from_row_slice(&g) * ideal(k).specific_force),
+        )
     };
     close(
         &read,
         |k| Reading {
-            force: ideal(k).force + Vector3::repeat(1.0),
-            rate: scaled(k),
+            specific_force: ideal(k).specific_force + Vector3::repeat(1.0),
+            angular_velocity: scaled(k),
         },
         1e-9,
     );
@@ -470,15 +485,18 @@ fn the_order_is_that_of_the_measurement_model() {
     close(
         &read,
         |k| Reading {
-            force: ideal(k).force.map(digital),
-            rate: ideal(k).rate,
+            specific_force: ideal(k).specific_force.map(digital),
+            angular_velocity: ideal(k).angular_velocity,
         },
         1e-9,
     );
     // 2 before 3 and on the force alone: tissue and mount commute, so the gyroscope is what tells.
     let tissue = run(&[(Kind::SoftTissue, &[2.0, 0.3])], &track, &stamps);
-    assert!((0..stamps.len()).all(|k| (tissue[k].rate - ideal(k).rate).norm() < 1e-9));
-    assert!((100..500).any(|k| (tissue[k].force - ideal(k).force).norm() > 0.3));
+    assert!(
+        (0..stamps.len())
+            .all(|k| (tissue[k].angular_velocity - ideal(k).angular_velocity).norm() < 1e-9)
+    );
+    assert!((100..500).any(|k| (tissue[k].specific_force - ideal(k).specific_force).norm() > 0.3));
     // 1 before 2: the lever arm's force goes through the tissue.
     let arm = [0.3, 0.0, 0.0];
     let both = run(
@@ -487,7 +505,9 @@ fn the_order_is_that_of_the_measurement_model() {
         &stamps,
     );
     let mut added: Vec<Vector3<f64>> = (0..stamps.len())
-        .map(|k| self::ideal(&track, k, &Vector3::from(arm)).force - ideal(k).force)
+        .map(|k| {
+            self::ideal(&track, k, &Vector3::from(arm)).specific_force - ideal(k).specific_force
+        })
         .collect();
     super::filter::SecondOrder {
         natural_hz: 2.0,
@@ -498,8 +518,8 @@ fn the_order_is_that_of_the_measurement_model() {
     close(
         &both,
         |k| Reading {
-            force: tissue[k].force + added[k],
-            rate: tissue[k].rate,
+            specific_force: tissue[k].specific_force + added[k],
+            angular_velocity: tissue[k].angular_velocity,
         },
         1e-9,
     );
@@ -513,8 +533,9 @@ fn the_order_is_that_of_the_measurement_model() {
     close(
         &coupled,
         |k| Reading {
-            force: low[k].force,
-            rate: low[k].rate + Matrix3::from_row_slice(&g) * low[k].force,
+            specific_force: low[k].specific_force,
+            angular_velocity: low[k].angular_velocity
+                + Matrix3::from_row_slice(&g) * low[k].specific_force,
         },
         1e-9,
     );

@@ -1,7 +1,8 @@
 //! `accel_noise`, `gyro_noise`: white noise beyond the declared.
 
 use super::EffectKind;
-use super::spec::{Channel, EffectSpec, ParameterSpec, ResidualView, Shape, Stage, median};
+use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage, median};
+use crate::Channel;
 
 pub(super) static ACCEL: EffectSpec = EffectSpec {
     kind: EffectKind::AccelNoise,
@@ -20,7 +21,7 @@ pub(super) static ACCEL: EffectSpec = EffectSpec {
     }],
     random: true,
     continuous: true,
-    starts: |view| starts(view, Channel::Accel),
+    starts: |view| starts(view, Channel::Accelerometer),
 };
 
 pub(super) static GYRO: EffectSpec = EffectSpec {
@@ -40,7 +41,7 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
     }],
     random: true,
     continuous: true,
-    starts: |view| starts(view, Channel::Gyro),
+    starts: |view| starts(view, Channel::Gyroscope),
 };
 
 /// Variance of the third differences, by their median so that smooth model errors and outliers

@@ -1,7 +1,8 @@
 //! `accel_quantization`, `gyro_quantization`: the resolution of a sensor.
 
 use super::EffectKind;
-use super::spec::{Channel, EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
+use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
+use crate::Channel;
 
 pub(super) static ACCEL: EffectSpec = EffectSpec {
     kind: EffectKind::AccelQuantization,
@@ -20,7 +21,7 @@ pub(super) static ACCEL: EffectSpec = EffectSpec {
     }],
     random: false,
     continuous: false,
-    starts: |view| starts(view, Channel::Accel),
+    starts: |view| starts(view, Channel::Accelerometer),
 };
 
 pub(super) static GYRO: EffectSpec = EffectSpec {
@@ -40,7 +41,7 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
     }],
     random: false,
     continuous: false,
-    starts: |view| starts(view, Channel::Gyro),
+    starts: |view| starts(view, Channel::Gyroscope),
 };
 
 fn starts(view: &ResidualView, channel: Channel) -> Vec<Vec<f64>> {

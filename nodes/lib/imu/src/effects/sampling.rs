@@ -5,23 +5,22 @@ use nalgebra::Vector3;
 /// Nodes of the interpolation: Lagrange's polynomial of degree 5, error O(h^6).
 const NODES: usize = 6;
 
-/// A place between the entries of a grid: the first node and the weights of the six from there on.
-pub(super) struct Place {
+/// A position between the entries of a grid: the first node and the weights of the six from there on.
+pub(super) struct GridPosition {
     first: usize,
     weights: [f64; NODES],
 }
 
-impl Place {
-    /// The place at `position` entries from the first; held at the ends. `None` where the grid has
-    /// fewer than six entries.
+impl GridPosition {
+    /// `position` entries after the first, held at the ends; `None` where the grid has fewer than
+    /// six entries.
     #[inline]
     pub(super) fn at(position: f64, length: usize) -> Option<Self> {
-        let first_of = |position: f64| (position as usize).saturating_sub(2).min(length - NODES);
         if length < NODES {
             return None;
         }
         let position = position.clamp(0.0, (length - 1) as f64);
-        let first = first_of(position);
+        let first = (position as usize).saturating_sub(2).min(length - NODES);
         let s = position - first as f64;
         let away: [f64; NODES] = std::array::from_fn(|j| s - j as f64);
         // Products of the others' distances over prod (j - k): -120, 24, -12, 12, -24, 120.
@@ -38,8 +37,9 @@ impl Place {
         Some(Self { first, weights })
     }
 
+    /// The value of a series on the grid at this position.
     #[inline]
-    pub(super) fn of(&self, series: &[Vector3<f64>]) -> Vector3<f64> {
+    pub(super) fn interpolate(&self, series: &[Vector3<f64>]) -> Vector3<f64> {
         let mut sum = Vector3::zeros();
         for (value, weight) in series[self.first..self.first + NODES]
             .iter()
@@ -51,11 +51,11 @@ impl Place {
     }
 }
 
-/// The value at a place; the nearest entry where there are too few, zero where there is none.
+/// The value at a position; the nearest entry where there are too few, zero where there is none.
 #[inline]
 pub(super) fn interpolate(series: &[Vector3<f64>], position: f64) -> Vector3<f64> {
-    match Place::at(position, series.len()) {
-        Some(place) => place.of(series),
+    match GridPosition::at(position, series.len()) {
+        Some(nodes) => nodes.interpolate(series),
         None => {
             let last = series.len().saturating_sub(1);
             series
@@ -66,7 +66,7 @@ pub(super) fn interpolate(series: &[Vector3<f64>], position: f64) -> Vector3<f64
     }
 }
 
-/// Derivative per entry at a place, from the interpolation's values half an entry to both sides and
+/// Derivative per entry at a position, from the interpolation's values half an entry to both sides and
 /// a whole one: error O(h^4).
 pub(super) fn derivative(series: &[Vector3<f64>], position: f64) -> Vector3<f64> {
     let at = |away: f64| interpolate(series, position + away);

@@ -3,7 +3,8 @@
 use cromosim_spatial::Stamp;
 use nalgebra::{Matrix3, Vector3};
 
-use super::{EffectKind, Reading};
+use super::EffectKind;
+use crate::{Channel, Reading};
 
 /// Where in the measurement an effect acts; effects of a stage leave the results of the stages
 /// before it as they are.
@@ -140,13 +141,6 @@ pub struct ResidualView<'a> {
     pub gyro_sigma: f64,
 }
 
-/// One of the two channels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Channel {
-    Accel,
-    Gyro,
-}
-
 impl ResidualView<'_> {
     pub(super) fn len(&self) -> usize {
         self.stamps
@@ -164,10 +158,7 @@ impl ResidualView<'_> {
             .iter()
             .zip(self.simulated)
             .take(self.len())
-            .map(move |(m, s)| match channel {
-                Channel::Accel => (m.force, s.force),
-                Channel::Gyro => (m.rate, s.rate),
-            })
+            .map(move |(m, s)| (m[channel], s[channel]))
     }
 
     /// Measured less simulated.
@@ -177,8 +168,8 @@ impl ResidualView<'_> {
 
     pub(super) fn sigma(&self, channel: Channel) -> f64 {
         match channel {
-            Channel::Accel => self.accel_sigma,
-            Channel::Gyro => self.gyro_sigma,
+            Channel::Accelerometer => self.accel_sigma,
+            Channel::Gyroscope => self.gyro_sigma,
         }
     }
 
@@ -198,12 +189,12 @@ impl ResidualView<'_> {
                 0.0
             }
         };
-        let (accel, gyro) = (weight(Channel::Accel), weight(Channel::Gyro));
-        let forces = self
-            .pairs(Channel::Accel)
+        let (accel, gyro) = (weight(Channel::Accelerometer), weight(Channel::Gyroscope));
+        let accelerometer = self
+            .pairs(Channel::Accelerometer)
             .map(move |(m, s)| m * s.transpose() * accel);
-        forces
-            .zip(self.pairs(Channel::Gyro))
+        accelerometer
+            .zip(self.pairs(Channel::Gyroscope))
             .map(move |(sum, (m, s))| sum + m * s.transpose() * gyro)
     }
 }

@@ -36,8 +36,8 @@ fn case(effects: &[(Kind, &[f64])]) -> Case {
     .unwrap();
     for reading in &mut measured {
         let drawn = noise.draw();
-        reading.force += drawn.force;
-        reading.rate += drawn.rate;
+        reading.specific_force += drawn.specific_force;
+        reading.angular_velocity += drawn.angular_velocity;
     }
     model.digital(&mut measured);
     Case {

@@ -117,7 +117,7 @@ impl StreamingEffects {
         }
         let mut segment = self.segment(model, sample);
         if let Some(filter) = &mut self.tissue {
-            segment.force = filter.push(segment.force, interval);
+            segment.specific_force = filter.push(segment.specific_force, interval);
         }
         let sensor_from_segment = model
             .slip
@@ -126,58 +126,67 @@ impl StreamingEffects {
             .or(model.sensor_from_segment);
         let mut reading = model.turned(sensor_from_segment.as_ref(), &segment);
         if let Some(line) = &model.vibration {
-            let force = line.at(seconds);
-            reading.force += force;
-            reading.rate += model
+            let specific_force = line.at(seconds);
+            reading.specific_force += specific_force;
+            reading.angular_velocity += model
                 .coupling
-                .map_or_else(Vector3::zeros, |coupling| coupling * force);
+                .map_or_else(Vector3::zeros, |coupling| coupling * specific_force);
         }
-        if let Some([force, rate]) = &mut self.low_pass {
+        if let Some([specific_force, angular_velocity]) = &mut self.low_pass {
             reading = Reading {
-                force: force.push(reading.force, interval),
-                rate: rate.push(reading.rate, interval),
+                specific_force: specific_force.push(reading.specific_force, interval),
+                angular_velocity: angular_velocity.push(reading.angular_velocity, interval),
             };
         }
         let mut world_from_sensor =
             sample.world_from_sensor.rotation * orientation(sensor_from_segment.as_ref());
         reading = Reading {
-            force: model.force.linear(&reading.force, seconds),
-            rate: model.rate.linear(&reading.rate, seconds),
+            specific_force: model.accelerometer.linear(&reading.specific_force, seconds),
+            angular_velocity: model.gyroscope.linear(&reading.angular_velocity, seconds),
         };
         if let Some(noise) = &mut self.noise {
-            let Reading { force, rate } = noise.draw();
+            let Reading {
+                specific_force,
+                angular_velocity,
+            } = noise.draw();
             reading = Reading {
-                force: reading.force + force,
-                rate: reading.rate + rate,
+                specific_force: reading.specific_force + specific_force,
+                angular_velocity: reading.angular_velocity + angular_velocity,
             };
             world_from_sensor *= noise.draw_turn();
         }
         ImuSample {
             stamp: model.epoch.plus_seconds(model.clock.stamp_seconds(seconds)),
             world_from_sensor,
-            specific_force: model.force.digital(&reading.force),
-            angular_velocity: model.rate.digital(&reading.rate),
+            specific_force: model.accelerometer.digital(&reading.specific_force),
+            angular_velocity: model.gyroscope.digital(&reading.angular_velocity),
         }
     }
 
     /// 1, in segment axes.
     fn segment(&mut self, model: &SensorModel, sample: &KinematicSample) -> Reading {
         let segment_from_world = sample.world_from_sensor.rotation.inverse();
-        let rate = segment_from_world * sample.angular_velocity;
-        let mut force = segment_from_world * (sample.acceleration - model.gravity);
+        let angular_velocity = segment_from_world * sample.angular_velocity_in_world;
+        let mut specific_force =
+            segment_from_world * (sample.acceleration_in_world - model.gravity);
         if let Some(offset) = &model.lever_arm {
-            let difference =
-                |(stamp, before): (Stamp, Vector3<f64>)| (rate - before) / (sample.stamp - stamp);
+            let difference = |(stamp, before): (Stamp, Vector3<f64>)| {
+                (angular_velocity - before) / (sample.stamp - stamp)
+            };
             let given = sample
-                .angular_acceleration
+                .angular_acceleration_in_world
                 .map(|alpha| segment_from_world * alpha);
             let angular_acceleration = given
                 .or_else(|| self.previous.map(difference))
                 .unwrap_or_default();
-            force += lever_arm::acceleration(offset, &rate, &angular_acceleration);
+            specific_force +=
+                lever_arm::acceleration(offset, &angular_velocity, &angular_acceleration);
         }
-        self.previous = Some((sample.stamp, rate));
-        Reading { force, rate }
+        self.previous = Some((sample.stamp, angular_velocity));
+        Reading {
+            specific_force,
+            angular_velocity,
+        }
     }
 }
 

@@ -58,11 +58,15 @@ fn live_readings_are_those_of_the_model() {
         track
             .world_from_segment
             .push(sample.world_from_sensor.rotation);
-        track.acceleration.push(back * sample.acceleration);
-        track.angular_velocity.push(back * sample.angular_velocity);
         track
-            .angular_acceleration
-            .push(back * sample.angular_acceleration.unwrap());
+            .acceleration_in_segment
+            .push(back * sample.acceleration_in_world);
+        track
+            .angular_velocity_in_segment
+            .push(back * sample.angular_velocity_in_world);
+        track
+            .angular_acceleration_in_segment
+            .push(back * sample.angular_acceleration_in_world.unwrap());
     }
     let stamps: Vec<Stamp> = live.iter().map(|sample| sample.stamp).collect();
     let offline = SensorModel::new(device.effects(), START).run(&track, &stamps);
@@ -70,8 +74,12 @@ fn live_readings_are_those_of_the_model() {
     // The live filters see the vibration begin, and a slip as a step of one interval.
     for (k, (live, offline)) in live.iter().zip(&offline).enumerate().skip(80) {
         if (k as f64 / RATE_HZ - 1.5).abs() > 0.1 {
-            errors.0 = errors.0.max((live.specific_force - offline.force).norm());
-            errors.1 = errors.1.max((live.angular_velocity - offline.rate).norm());
+            errors.0 = errors
+                .0
+                .max((live.specific_force - offline.specific_force).norm());
+            errors.1 = errors
+                .1
+                .max((live.angular_velocity - offline.angular_velocity).norm());
         }
     }
     println!("{errors:?}");
@@ -101,7 +109,7 @@ fn without_an_angular_acceleration_differences_stand_for_it() {
     let bare: Vec<KinematicSample> = motion
         .iter()
         .map(|sample| KinematicSample {
-            angular_acceleration: None,
+            angular_acceleration_in_world: None,
             ..*sample
         })
         .collect();

@@ -1,7 +1,8 @@
 //! `time_offset`: the IMU's stamps are late by a constant.
 
 use super::EffectKind;
-use super::spec::{Channel, EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
+use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
+use crate::Channel;
 
 pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::TimeOffset,
@@ -30,7 +31,7 @@ const REACH: f64 = 1.0;
 /// simulated one best.
 fn starts(view: &ResidualView) -> Vec<Vec<f64>> {
     let (measured, simulated): (Vec<f64>, Vec<f64>) = view
-        .pairs(Channel::Gyro)
+        .pairs(Channel::Gyroscope)
         .map(|(m, s)| (m.norm(), s.norm()))
         .unzip();
     let reach = ((REACH * view.rate_hz) as usize).min(measured.len() / 4);

@@ -1,7 +1,8 @@
 //! `accel_units`, `gyro_units`: units of a driver.
 
 use super::EffectKind;
-use super::spec::{Channel, EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
+use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
+use crate::Channel;
 
 pub(super) static ACCEL: EffectSpec = EffectSpec {
     kind: EffectKind::AccelUnits,
@@ -20,7 +21,7 @@ pub(super) static ACCEL: EffectSpec = EffectSpec {
     }],
     random: false,
     continuous: false,
-    starts: |view| starts(view, Channel::Accel, &ACCEL_FACTORS),
+    starts: |view| starts(view, Channel::Accelerometer, &ACCEL_FACTORS),
 };
 
 pub(super) static GYRO: EffectSpec = EffectSpec {
@@ -40,7 +41,7 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
     }],
     random: false,
     continuous: false,
-    starts: |view| starts(view, Channel::Gyro, &GYRO_FACTORS),
+    starts: |view| starts(view, Channel::Gyroscope, &GYRO_FACTORS),
 };
 
 const G: f64 = crate::STANDARD_GRAVITY;

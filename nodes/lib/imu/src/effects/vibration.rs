@@ -5,8 +5,9 @@ use std::f64::consts::{PI, TAU};
 use cromosim_spatial::{Complex64, FourierPair};
 use nalgebra::{Matrix3x2, Vector3};
 
-use super::spec::{Channel, EffectSpec, ParameterSpec, ResidualView, Shape, Stage, median};
+use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage, median};
 use super::{Effect, EffectKind};
+use crate::Channel;
 
 pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::Vibration,
@@ -88,7 +89,7 @@ const LEAST_HZ: f64 = 2.0;
 /// least squares in absolute time.
 fn starts(view: &ResidualView) -> Vec<Vec<f64>> {
     let neutral = vec![SPEC.neutral()];
-    let residual: Vec<Vector3<f64>> = view.residual(Channel::Accel).collect();
+    let residual: Vec<Vector3<f64>> = view.residual(Channel::Accelerometer).collect();
     if residual.len() < 64 || view.rate_hz.is_nan() || view.rate_hz <= 0.0 {
         return neutral;
     }
@@ -97,7 +98,7 @@ fn starts(view: &ResidualView) -> Vec<Vec<f64>> {
         .iter()
         .map(|stamp| *stamp - view.epoch)
         .collect();
-    let mean = view.mean_residual(Channel::Accel);
+    let mean = view.mean_residual(Channel::Accelerometer);
     let Some((coarse, width)) = coarse_line(&seconds, &residual, &mean, view.rate_hz) else {
         return neutral;
     };

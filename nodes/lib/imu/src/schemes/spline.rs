@@ -23,9 +23,9 @@ pub(crate) fn sample(spline: &PoseSpline, stamp: Stamp) -> KinematicSample {
     KinematicSample {
         stamp,
         world_from_sensor: Isometry3::from_parts(motion.position.into(), motion.rotation),
-        acceleration: motion.acceleration,
-        angular_velocity: motion.angular_velocity,
-        angular_acceleration: Some(motion.angular_acceleration),
+        acceleration_in_world: motion.acceleration,
+        angular_velocity_in_world: motion.angular_velocity,
+        angular_acceleration_in_world: Some(motion.angular_acceleration),
         variance: SampleVariance::default(),
     }
 }
