@@ -11,9 +11,9 @@ use cromosim_bag::BagReader;
 use cromosim_body::{BodyModel, ShapedBody};
 use cromosim_imu::{Scheme, SensorFrame, SensorTrajectory};
 use cromosim_learned::{Input, LearnedSimulator, SiteMotion};
-use cromosim_motion::rigid::parse_tum;
 use cromosim_motion::{embedded_walk, write_bvh};
 use cromosim_msgs::sensor_msgs::Imu;
+use cromosim_recording::rigid::parse_tum;
 use nalgebra::{Isometry3, UnitQuaternion};
 
 /// A device that filters and rings much, so that a short training finds something.

@@ -88,7 +88,8 @@ fn imports_run_one_way() {
         (
             "nodes/lib/recording",
             &[
-                "spatial", "body", "motion", "video", "imu", "learned", "bag", "msgs", "arrays",
+                "spatial", "body", "motion", "video", "imu", "learned", "gap", "bag", "msgs",
+                "arrays",
             ],
         ),
         (

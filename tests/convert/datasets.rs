@@ -3,10 +3,10 @@
 use std::fs;
 
 use cromosim_bag::BagReader;
-use cromosim_motion::rigid::{parse_euroc_imu, parse_tum};
 use cromosim_motion::{MotionOptions, read_motion};
 use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_msgs::sensor_msgs::Imu;
+use cromosim_recording::rigid::{parse_euroc_imu, parse_tum};
 
 use crate::common::{self, refuses, succeed};
 use crate::files::names;

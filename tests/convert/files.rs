@@ -4,8 +4,8 @@ use std::fs;
 use std::path::Path;
 
 use cromosim_body::{BodyModel, ShapedBody};
-use cromosim_motion::rigid::PoseTrajectory;
 use cromosim_motion::{embedded_walk, write_bvh};
+use cromosim_recording::rigid::PoseTrajectory;
 use cromosim_spatial::Stamp;
 use nalgebra::{UnitQuaternion, Vector3};
 

@@ -3,10 +3,10 @@
 use std::fs;
 
 use cromosim_bag::{BagOptions, BagReader, BagWriter};
-use cromosim_motion::rigid::parse_tum;
 use cromosim_motion::{MotionOptions, read_motion};
 use cromosim_msgs::cromosim_msgs::SmplPose;
 use cromosim_msgs::std_msgs::Header;
+use cromosim_recording::rigid::parse_tum;
 use cromosim_spatial::Stamp;
 
 use crate::common::{refuses, succeed};

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use cromosim_motion::rigid::write_tum;
+use cromosim_recording::rigid::write_tum;
 
 use crate::common::{refuses, succeed};
 use crate::files::{names, swing, walk};

@@ -3,11 +3,11 @@
 use std::fs;
 
 use cromosim_bag::{BagOptions, BagReader, BagWriter};
-use cromosim_motion::rigid::{parse_euroc_imu, parse_tum, write_tum};
 use cromosim_msgs::geometry_msgs::{PoseStamped, Transform, TransformStamped};
 use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_msgs::std_msgs::Header;
 use cromosim_msgs::tf2_msgs::TFMessage;
+use cromosim_recording::rigid::{parse_euroc_imu, parse_tum, write_tum};
 use cromosim_spatial::Stamp;
 use nalgebra::{Isometry3, Vector3};
 

@@ -16,7 +16,7 @@ for target in "$@"; do
     case $target in
         npz) find nodes -path '*/tests/data/*.npz' -size -100k -exec cp {} "$seeds" \; ;;
         pickle) cp nodes/lib/arrays/tests/data/* "$seeds" ;;
-        datasets) cp tests/fuzz/samples/datasets/* nodes/lib/arrays/tests/data/*.mat nodes/lib/motion/tests/data/broad.mat "$seeds" ;;
+        datasets) cp tests/fuzz/samples/datasets/* nodes/lib/arrays/tests/data/*.mat nodes/lib/recording/tests/data/broad.mat "$seeds" ;;
         model) cp nodes/lib/body/tests/data/model_* "$seeds" ;;
         poses) find nodes/lib/motion/tests/data/poses nodes/lib/arrays/tests/data -type f -exec cp {} "$seeds" \; ;;
         bvh | c3d) cp nodes/lib/motion/tests/data/*."$target" "$seeds" ;;

@@ -7,7 +7,6 @@ use std::sync::Arc;
 
 use anyhow::{Context, bail};
 use clap::Subcommand;
-use cromosim_bag::BagReader;
 use cromosim_body::{BodyModel, ShapedBody, write_obj};
 
 /// Commands on bodies.
@@ -47,30 +46,6 @@ pub fn model(path: Option<&PathBuf>) -> anyhow::Result<Arc<BodyModel>> {
         Some(path) => BodyModel::read(path)?,
         None => BodyModel::embedded(),
     })
-}
-
-/// The body that what a bag holds of SMPL is for: `given`, or the embedded one, unless the bag says
-/// that it was made on another.
-pub fn of_bag(
-    reader: &BagReader,
-    given: Option<&Arc<BodyModel>>,
-) -> anyhow::Result<Arc<BodyModel>> {
-    if let Some(model) = given {
-        return Ok(model.clone());
-    }
-    let model = BodyModel::embedded();
-    match reader
-        .metadata("cromosim")
-        .and_then(|values| values.get("body"))
-    {
-        Some(body) if body != model.id() => {
-            bail!(
-                "{}: its poses are of the body {body}, not of the embedded one; give --body FILE",
-                reader.path().display()
-            )
-        }
-        _ => Ok(model),
-    }
 }
 
 /// Runs the command.

@@ -8,8 +8,8 @@ use anyhow::bail;
 use clap::Args;
 use cromosim_body::BodyModel;
 use cromosim_motion::SmplMotion;
-use cromosim_motion::datasets::DatasetRecording;
-use cromosim_motion::rigid::{EurocGroundTruth, ImuSeries};
+use cromosim_recording::datasets::DatasetRecording;
+use cromosim_recording::rigid::{EurocGroundTruth, ImuSeries};
 
 use crate::body;
 use crate::motion_arguments::MotionArguments;

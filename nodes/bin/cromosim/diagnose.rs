@@ -14,12 +14,12 @@ use cromosim_gap::{
     Cause, DiagnoseOptions, Diagnosis, Evidence, PlacementAnswer, PlacementDiagnosis, SCHEMA,
 };
 use cromosim_imu::{EffectKind, EffectsFile};
+use cromosim_recording::{RecordedPlacement, read_placements};
 use rayon::prelude::*;
 use serde::Deserialize;
 use serde_json::Value;
 
 use crate::progress::{self, Interrupt};
-use crate::recorded::{self, Recorded};
 
 /// The files in DIR.
 const FILES: [&str; 4] = [
@@ -90,7 +90,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     // Until the files are written a signal may end the process as it likes: there is nothing to
     // clear away.
     let bar = progress::bar(recorded.len() as u64, "diagnosing, placements");
-    let diagnose = |placement: &Recorded| {
+    let diagnose = |placement: &RecordedPlacement| {
         let answer = cromosim_gap::diagnose(&placement.record(), &options)
             .map_err(|error| error.to_string());
         bar.inc(1);
@@ -141,9 +141,9 @@ fn select(
     reader: &BagReader,
     body: Option<&Arc<BodyModel>>,
     only: &[String],
-) -> anyhow::Result<(Vec<Recorded>, Vec<String>, Vec<String>)> {
+) -> anyhow::Result<(Vec<RecordedPlacement>, Vec<String>, Vec<String>)> {
     let file = reader.path().display();
-    let mut found = recorded::read(reader, body)?;
+    let mut found = read_placements(reader, body)?;
     let names: Vec<&str> = found.iter().map(|(name, _)| name.as_str()).collect();
     if let Some(name) = only.iter().find(|name| !names.contains(&name.as_str())) {
         bail!(
@@ -159,7 +159,7 @@ fn select(
                 notes.push(format!("placement {name}: no messages on /imu/{name}/data_raw (sensor_msgs/msg/Imu); skipped"));
             }
             Ok(placement) => recorded.push(placement),
-            Err(error) => failures.push(format!("placement {name}: {error:#}")),
+            Err(error) => failures.push(format!("placement {name}: {error}")),
         }
     }
     if recorded.is_empty() && failures.is_empty() {

@@ -9,12 +9,12 @@ use anyhow::bail;
 use clap::Args;
 use cromosim_bag::BagReader;
 use cromosim_body::{BodyModel, Joint, ShapedBody};
-use cromosim_motion::datasets::{DatasetFiles, DatasetFormat, DatasetRecording, open_dataset};
-use cromosim_motion::rigid::{RigidFormat, sniff_rigid};
 use cromosim_motion::{
     MotionError, MotionFormat, MotionOptions, PoseAxes, PoseFile, PoseTrack, PoseView, SmplMotion,
     open_poses, read_motion_for,
 };
+use cromosim_recording::datasets::{DatasetFiles, DatasetFormat, DatasetRecording, open_dataset};
+use cromosim_recording::rigid::{RigidFormat, sniff_rigid};
 use cromosim_spatial::Stamp;
 
 use crate::body;

@@ -20,7 +20,6 @@ mod map;
 mod motion_arguments;
 mod node;
 mod progress;
-mod recorded;
 mod reference;
 mod simulate;
 mod summary;

@@ -15,6 +15,7 @@ use cromosim_learned::{LearnedSimulator, MappingFile, SiteMotion};
 use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_msgs::std_msgs::Header;
+use cromosim_recording::{RecordedPlacement, read_placements};
 use cromosim_spatial::{KinematicTrack, PoseEstimate, Stamp, uniform_stamps};
 use cromosim_virtual_imu::imu_message;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
@@ -22,7 +23,6 @@ use rayon::prelude::*;
 
 use crate::convert::{Content, source};
 use crate::progress::{self, Interrupt};
-use crate::recorded::{self, Recorded};
 use crate::simulate::{Arguments, read_mapping};
 
 /// How the placements of a recording are simulated.
@@ -53,10 +53,10 @@ pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
         .context("--scheme")?;
     let reader = BagReader::open(recording)?;
     let body = arguments.body.as_deref().map(BodyModel::read).transpose()?;
-    let recorded = recorded::read(&reader, body.as_ref())?
+    let recorded = read_placements(&reader, body.as_ref())?
         .into_iter()
         .map(|(_, placement)| placement)
-        .collect::<anyhow::Result<Vec<_>>>()?;
+        .collect::<Result<Vec<_>, _>>()?;
     let effects = arguments
         .effects
         .as_deref()
@@ -129,7 +129,7 @@ pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()>
         .zip(&poses.rotations)
         .map(frame)
         .collect();
-    let recorded = vec![Recorded {
+    let recorded = vec![RecordedPlacement {
         name: name.clone(),
         frames,
         measured: Vec::new(),
@@ -188,13 +188,13 @@ pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()>
 
 /// Each placement on whatever core is free.
 fn simulate_all(
-    recorded: &[Recorded],
+    recorded: &[RecordedPlacement],
     how: &How,
     arguments: &Arguments,
 ) -> anyhow::Result<Vec<Vec<Imu>>> {
     let interrupt = Interrupt::watch()?;
     let bar = progress::bar(recorded.len() as u64, "simulating, placements");
-    let one = |placement: &Recorded| {
+    let one = |placement: &RecordedPlacement| {
         interrupt.check()?;
         let messages = resimulate(placement, how, arguments);
         bar.inc(1);
@@ -209,7 +209,7 @@ fn simulate_all(
 fn write(
     out: &Path,
     metadata: BTreeMap<String, String>,
-    recorded: &[Recorded],
+    recorded: &[RecordedPlacement],
     simulated: &[Vec<Imu>],
     with_references: bool,
     arguments: &Arguments,
@@ -321,7 +321,10 @@ fn metadata(recording: &Path, how: &How, arguments: &Arguments) -> BTreeMap<Stri
 
 /// The placements whose samples have stamps, from messages or by a rate, and the names of the
 /// others; all where none has any.
-fn with_stamps(recorded: Vec<Recorded>, rate_hz: Option<f64>) -> (Vec<Recorded>, Vec<String>) {
+fn with_stamps(
+    recorded: Vec<RecordedPlacement>,
+    rate_hz: Option<f64>,
+) -> (Vec<RecordedPlacement>, Vec<String>) {
     if rate_hz.is_some()
         || recorded
             .iter()
@@ -343,7 +346,7 @@ fn with_stamps(recorded: Vec<Recorded>, rate_hz: Option<f64>) -> (Vec<Recorded>,
 
 /// The effects file; what it names must be there, while placements that it does not name stay
 /// nominal.
-fn read_effects(file: &Path, recorded: &[Recorded]) -> anyhow::Result<EffectsFile> {
+fn read_effects(file: &Path, recorded: &[RecordedPlacement]) -> anyhow::Result<EffectsFile> {
     let effects = EffectsFile::read(file)?;
     let names: Vec<&str> = recorded
         .iter()
@@ -364,7 +367,11 @@ fn read_effects(file: &Path, recorded: &[Recorded]) -> anyhow::Result<EffectsFil
 }
 
 /// One Imu for each measured message, with its stamp; where nothing was measured, at `--rate`.
-fn resimulate(placement: &Recorded, how: &How, arguments: &Arguments) -> anyhow::Result<Vec<Imu>> {
+fn resimulate(
+    placement: &RecordedPlacement,
+    how: &How,
+    arguments: &Arguments,
+) -> anyhow::Result<Vec<Imu>> {
     let (name, (start, end), seed) = (&placement.name, placement.span(), arguments.seed);
     let stamps = match (placement.measured.as_slice(), arguments.rate) {
         ([], Some(rate_hz)) => uniform_stamps(start, end, rate_hz)?,
@@ -438,7 +445,7 @@ fn resimulate(placement: &Recorded, how: &How, arguments: &Arguments) -> anyhow:
 /// The reference's motion as the diagnosis estimates it, or by a scheme, at least at 200 Hz and
 /// twice the IMU's rate.
 fn track(
-    placement: &Recorded,
+    placement: &RecordedPlacement,
     how: &How,
     imu_rate_hz: f64,
     effects: &EffectSet,
@@ -522,7 +529,7 @@ fn differentiated(
 
 /// The white noise that the messages declare, none where it is unknown: density = sigma /
 /// sqrt(rate).
-fn declared(placement: &Recorded, rate_hz: f64) -> DeclaredNoise {
+fn declared(placement: &RecordedPlacement, rate_hz: f64) -> DeclaredNoise {
     let [accel_density, gyro_density] = placement
         .declared()
         .map(|sigma| sigma.unwrap_or(0.0) / rate_hz.sqrt());
@@ -552,7 +559,7 @@ fn rate(stamps: &[Stamp]) -> f64 {
 }
 
 /// What a user should know of samples that the reference does not cover.
-fn outside(placement: &Recorded) -> Option<String> {
+fn outside(placement: &RecordedPlacement) -> Option<String> {
     let (start, end) = placement.span();
     let covered =
         |message: &&Imu| (start..=end).contains(&Stamp::from_nanos(message.header.stamp.nanos()));

@@ -18,7 +18,8 @@ use cromosim_learned::{LearnedSimulator, MappingFile, Patch, SiteMotion};
 use cromosim_motion::{MotionOptions, SmplMotion, embedded_walk, read_motion_for, read_people};
 use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_msgs::std_msgs::Header;
-use cromosim_spatial::{PoseTimes, Stamp, uniform_stamps};
+use cromosim_recording::FIRST_STAMP;
+use cromosim_spatial::{PoseTimes, uniform_stamps};
 use cromosim_virtual_imu::imu_message;
 use indicatif::ProgressBar;
 use rayon::prelude::*;
@@ -30,9 +31,6 @@ use crate::{body, progress, reference};
 mod played;
 
 use played::{Played, Simulated, write_csv, write_in_order_of_time};
-
-/// Stamp of the first frame: not zero, which TF takes for "the latest".
-pub const BEGINS: Stamp = Stamp::from_nanos(1_000_000_000);
 
 /// Simulate IMUs from motion files, or again from a recording's reference
 #[derive(Args)]
@@ -483,7 +481,7 @@ fn simulate_one(
     bag.attach(
         "placements.yaml",
         "application/yaml",
-        BEGINS,
+        FIRST_STAMP,
         setup.placements.to_yaml().as_bytes(),
     )?;
     write_in_order_of_time(&mut bag, people, &simulated, &setup.interrupt)?;
@@ -497,7 +495,7 @@ fn simulate_one(
         .iter()
         .filter_map(|person| person.stamps.last())
         .max()
-        .map_or(0.0, |last| *last - BEGINS);
+        .map_or(0.0, |last| *last - FIRST_STAMP);
     let placements = setup.placements.placements().len();
     let who = if people.len() > 1 {
         format!("{} people, ", people.len())

@@ -6,7 +6,7 @@ use std::io::Cursor;
 use std::path::Path;
 
 use cromosim_arrays::{Container, Entry, Limits};
-use cromosim_motion::datasets::{
+use cromosim_recording::datasets::{
     DatasetRecording, DipArray, DipRecording, parse_broad, parse_har_spsw, parse_marked_imu, parse_pamap2, parse_realworld, parse_skeleton_npz,
     parse_totalcapture_calibration, parse_totalcapture_reference, parse_totalcapture_sensors, sniff_dataset,
 };

@@ -1,7 +1,7 @@
 //! EuRoC/ASL ground truth and IMU files: no panic, and what was read comes back.
 #![no_main]
 
-use cromosim_motion::rigid::{parse_euroc_ground_truth, parse_euroc_imu, write_euroc_ground_truth, write_euroc_imu};
+use cromosim_recording::rigid::{parse_euroc_ground_truth, parse_euroc_imu, write_euroc_ground_truth, write_euroc_imu};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {

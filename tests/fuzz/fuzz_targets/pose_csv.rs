@@ -1,7 +1,7 @@
 //! Tables of poses and of readings with a header: no panic, and what is written is read again.
 #![no_main]
 
-use cromosim_motion::rigid::{parse_imu_csv, parse_pose_csv, write_imu_csv, write_pose_csv};
+use cromosim_recording::rigid::{parse_imu_csv, parse_pose_csv, write_imu_csv, write_pose_csv};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {

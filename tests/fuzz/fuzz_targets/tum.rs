@@ -1,7 +1,7 @@
 //! TUM trajectories: no panic, and what was read comes back.
 #![no_main]
 
-use cromosim_motion::rigid::{parse_tum, sniff_rigid, write_tum};
+use cromosim_recording::rigid::{parse_tum, sniff_rigid, write_tum};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {

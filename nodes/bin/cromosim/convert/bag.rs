@@ -9,15 +9,13 @@ use cromosim_bag::{BagOptions, BagWriter, Compression};
 use cromosim_body::BodyModel;
 use cromosim_imu::Placement;
 use cromosim_motion::SmplMotion;
-use cromosim_motion::rigid::ImuSeries;
-use cromosim_msgs::cromosim_msgs::SmplPose;
-use cromosim_msgs::std_msgs::Header;
-use cromosim_replay::recording::{
-    Placed, activities_csv, begins, later, of_dataset, write as write_placed,
+use cromosim_recording::rigid::ImuSeries;
+use cromosim_recording::{
+    MessageHeader, PlacementTrace, activities_csv, first_stamp, seconds_to_first_stamp, smpl_pose,
+    stamp_of_frame, write_traces,
 };
 
 use super::{Arguments, Content};
-use crate::simulate::BEGINS;
 
 /// Writes `/reference/NAME` and `/imu/NAME/data_raw` in order of time, and `/imu/NAME/data` where
 /// the device gave orientations; of a motion `/smpl/pose`.
@@ -28,10 +26,10 @@ pub fn write(
     arguments: &Arguments,
 ) -> anyhow::Result<()> {
     let name = arguments.name.as_deref().unwrap_or("body");
-    let placed = |poses, series| Placed {
+    let placed = |reference, imu| PlacementTrace {
         name,
-        poses,
-        series,
+        reference,
+        imu,
         orientations: &[],
     };
     if beside.is_some() && !matches!(content, Content::Poses(_)) {
@@ -47,19 +45,19 @@ pub fn write(
         }
         Content::Poses(poses) => (vec![placed(Some(&poses.trajectory), beside)], None),
         Content::Imu(series) => (vec![placed(None, Some(series))], None),
-        Content::Recording(recording) => (of_dataset(recording), Some(recording)),
+        Content::Recording(recording) => (recording.traces(), Some(recording)),
     };
     for placement in &placements {
         // A placement's name is what a topic's part may be.
         Placement::at_site(placement.name, "left_watch", 1.0)
             .map_err(|(_, problem)| anyhow!("--name {}: {problem}", placement.name))?;
     }
-    let Some(first) = begins(&placements) else {
+    let Some(first) = first_stamp(&placements) else {
         bail!("{}: no pose and no reading", arguments.input.display())
     };
     // A data set's stamps may begin at 0, which TF takes for "the latest".
     let later = if activities.is_some() {
-        later(first)
+        seconds_to_first_stamp(first)
     } else {
         0.0
     };
@@ -72,7 +70,7 @@ pub fn write(
             activities_csv(recording, later).as_bytes(),
         )?;
     }
-    write_placed(&mut bag, &placements, later)?;
+    write_traces(&mut bag, &placements, later)?;
     bag.finish()?;
     Ok(())
 }
@@ -86,21 +84,14 @@ pub fn motion_bag(
     replace: bool,
 ) -> anyhow::Result<()> {
     let mut bag = create(out, command, Some(model), replace)?;
-    for (index, pose) in motion.frames.iter().enumerate() {
-        let stamp = BEGINS.plus_seconds(index as f64 / motion.rate_hz);
-        let mut message = SmplPose {
-            header: Header::new(stamp.nanos, "world"),
-            body_id: "0".to_owned(),
-            gender: motion.gender.name().to_owned(),
-            betas: motion.betas.clone(),
-            shape_space: motion.shape_space.name().to_owned(),
-            confidence: motion
-                .confidence
-                .as_ref()
-                .map_or(1.0, |values| values[index]),
-            ..SmplPose::default()
+    for index in 0..motion.frames.len() {
+        let stamp = stamp_of_frame(motion, index, 0.0);
+        let header = MessageHeader {
+            stamp,
+            frame_id: "world",
+            body_id: "0",
         };
-        message.set_root_and_rotations(pose.root_position, &pose.local_rotations);
+        let message = smpl_pose(motion, index, header);
         bag.write("/smpl/pose", stamp, &message)?;
     }
     bag.finish()?;

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use anyhow::bail;
 use clap::Args;
-use cromosim_motion::datasets::{DatasetFiles, DatasetRecording, PlacedImu};
-use cromosim_motion::rigid::EurocGroundTruth;
+use cromosim_recording::datasets::{DatasetFiles, DatasetRecording, PlacedImu};
+use cromosim_recording::rigid::EurocGroundTruth;
 
 use super::write::Target;
 use super::{Arguments, Content};

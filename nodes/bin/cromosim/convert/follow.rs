@@ -6,11 +6,9 @@ use anyhow::{anyhow, bail};
 use cromosim_body::{BodyModel, Joint, ShapedBody};
 use cromosim_imu::{MountedSensor, Placement};
 use cromosim_motion::SmplMotion;
-use cromosim_motion::rigid::PoseTrajectory;
-use cromosim_spatial::Stamp;
+use cromosim_recording::rigid::PoseTrajectory;
+use cromosim_recording::stamp_of_frame;
 use nalgebra::Isometry3;
-
-use crate::simulate::BEGINS;
 
 /// The segment's frame of a joint.
 pub fn joint(
@@ -61,13 +59,9 @@ fn trajectory(motion: &SmplMotion, frames: impl Iterator<Item = Isometry3<f64>>)
         ..PoseTrajectory::default()
     };
     for (index, frame) in frames.enumerate() {
-        trajectory.stamps.push(stamp(motion, index));
+        trajectory.stamps.push(stamp_of_frame(motion, index, 0.0));
         trajectory.positions.push(frame.translation.vector);
         trajectory.rotations.push(frame.rotation);
     }
     trajectory
-}
-
-fn stamp(motion: &SmplMotion, frame: usize) -> Stamp {
-    BEGINS.plus_seconds(frame as f64 / motion.rate_hz)
 }

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use anyhow::{anyhow, bail};
 use cromosim_bag::BagReader;
-use cromosim_motion::rigid::PoseTrajectory;
 use cromosim_msgs::RosMessage;
 use cromosim_msgs::tf2_msgs::TFMessage;
+use cromosim_recording::rigid::PoseTrajectory;
 use cromosim_spatial::Stamp;
 use nalgebra::Isometry3;
 

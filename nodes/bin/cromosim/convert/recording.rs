@@ -6,18 +6,18 @@ use std::sync::Arc;
 use anyhow::{anyhow, bail};
 use cromosim_bag::BagReader;
 use cromosim_body::BodyModel;
-use cromosim_motion::rigid::{EurocGroundTruth, ImuSeries, PoseTrajectory};
 use cromosim_msgs::RosMessage;
 use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_msgs::tf2_msgs::TFMessage;
+use cromosim_recording::read_poses;
+use cromosim_recording::rigid::{EurocGroundTruth, ImuSeries, PoseTrajectory};
 use cromosim_spatial::Stamp;
 use nalgebra::Vector3;
 
 use super::frames::Tree;
 use super::write::Target;
 use super::{Arguments, Content, states};
-use crate::recorded;
 
 /// Reads the chosen topic.
 pub fn read(
@@ -133,7 +133,7 @@ fn choose(
 
 fn trajectory(reader: &BagReader, topic: &str) -> anyhow::Result<PoseTrajectory> {
     let mut notes = Vec::new();
-    let frames = recorded::poses(reader, topic, &mut notes)?;
+    let frames = read_poses(reader, topic, &mut notes)?;
     notes.iter().for_each(|note| eprintln!("{topic}: {note}"));
     let first = reader.read::<PoseStamped>(topic)?.into_iter().next();
     Ok(PoseTrajectory {

@@ -1,23 +1,19 @@
 //! What the input is, by its content, and what it holds.
 
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 use cromosim_body::BodyModel;
-use cromosim_motion::datasets::open_dataset;
-use cromosim_motion::rigid::sniff_rigid;
 use cromosim_motion::{MotionFormat, read_motion_for};
-pub use cromosim_replay::recording::bytes;
-use cromosim_replay::recording::{Rigid, parse_rigid};
+use cromosim_recording::datasets::open_dataset;
+use cromosim_recording::rigid::sniff_rigid;
+use cromosim_recording::rigid::{RigidContent, parse_rigid};
+pub use cromosim_recording::{read_head as head, read_whole as bytes};
 
 use super::write::Target;
 use super::{Arguments, Content, name, recording};
 
-/// What is looked at to tell what a file is.
-const HEAD_BYTES: u64 = 1 << 16;
 const MCAP: &[u8] = b"\x89MCAP";
 
 /// Reads whatever the input is.
@@ -93,18 +89,10 @@ fn refuse_dataset_options(arguments: &Arguments) -> anyhow::Result<()> {
     }
 }
 
-/// The beginning of a file.
-pub fn head(path: &Path) -> anyhow::Result<Vec<u8>> {
-    let mut head = Vec::new();
-    let read = File::open(path).and_then(|file| file.take(HEAD_BYTES).read_to_end(&mut head));
-    read.with_context(|| format!("{}: cannot be read", path.display()))?;
-    Ok(head)
-}
-
 /// A trajectory or an IMU series; `None` for anything else.
 pub fn rigid(path: &Path, bytes: &[u8]) -> anyhow::Result<Option<Content>> {
     Ok(parse_rigid(bytes, &name(path))?.map(|rigid| match rigid {
-        Rigid::Poses(poses) => Content::Poses(poses),
-        Rigid::Imu(series) => Content::Imu(series),
+        RigidContent::Poses(poses) => Content::Poses(poses),
+        RigidContent::Imu(series) => Content::Imu(series),
     }))
 }

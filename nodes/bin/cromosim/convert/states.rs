@@ -8,9 +8,8 @@ use cromosim_body::{BodyModel, BodyPose, Gender};
 use cromosim_motion::SmplMotion;
 use cromosim_msgs::RosMessage;
 use cromosim_msgs::cromosim_msgs::{SmplPose, SmplState};
+use cromosim_recording::body_for_bag;
 use cromosim_spatial::Stamp;
-
-use crate::body;
 
 /// Frames nearer to a constant rate than this stay as they are, s.
 const JITTER_S: f64 = 1e-5;
@@ -76,7 +75,7 @@ pub fn motion(
             people.join(", ")
         )
     };
-    let model = body::of_bag(reader, given)?;
+    let model = body_for_bag(reader, given)?;
     model
         .check_named_betas(&last.shape_space, &last.gender, &last.betas)
         .with_context(|| place.clone())?;

@@ -8,10 +8,10 @@ use std::sync::Arc;
 use anyhow::{Context, bail};
 use clap::ValueEnum;
 use cromosim_body::{BodyModel, ShapedBody};
-use cromosim_motion::rigid::{
+use cromosim_motion::{SmplMotion, place_markers, write_amass, write_bvh, write_trc};
+use cromosim_recording::rigid::{
     write_euroc_ground_truth, write_euroc_imu, write_imu_csv, write_pose_csv, write_tum,
 };
-use cromosim_motion::{SmplMotion, place_markers, write_amass, write_bvh, write_trc};
 
 use super::{Arguments, Content};
 use crate::motion_arguments::MotionArguments;

@@ -9,10 +9,9 @@ use cromosim_motion::{Person, SmplMotion};
 use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_msgs::sensor_msgs::Imu;
-use cromosim_msgs::std_msgs::Header;
+use cromosim_recording::{MessageHeader, smpl_state, stamp_of_frame};
 use cromosim_spatial::Stamp;
 
-use super::BEGINS;
 use crate::progress::Interrupt;
 
 /// One person of a motion file.
@@ -75,28 +74,18 @@ impl Played {
     }
 
     fn state(&self, frame: usize) -> SmplState {
-        let motion = &self.motion;
-        let body = &motion.frames[frame];
-        let mut state = SmplState {
-            header: Header::new(self.stamps[frame].nanos, "world"),
-            body_id: self.body_id.clone(),
-            gender: motion.gender.name().to_owned(),
-            betas: motion.betas.clone(),
-            shape_space: motion.shape_space.name().to_owned(),
-            confidence: motion
-                .confidence
-                .as_ref()
-                .map_or(1.0, |values| values[frame]),
-            ..SmplState::default()
+        let header = MessageHeader {
+            stamp: self.stamps[frame],
+            frame_id: "world",
+            body_id: &self.body_id,
         };
-        state.set_root_and_rotations(body.root_position, &body.local_rotations);
-        state
+        smpl_state(&self.motion, frame, header)
     }
 }
 
 fn stamps(motion: &SmplMotion, begins_s: f64) -> Vec<Stamp> {
     (0..motion.frames.len())
-        .map(|frame| BEGINS.plus_seconds(begins_s + frame as f64 / motion.rate_hz))
+        .map(|frame| stamp_of_frame(motion, frame, begins_s))
         .collect()
 }
 

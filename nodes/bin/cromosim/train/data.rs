@@ -9,16 +9,15 @@ use cromosim_bag::BagReader;
 use cromosim_body::{BodyModel, BodyPose};
 use cromosim_imu::{Placement, Reading, Scheme, SensorFrame, SensorTrajectory};
 use cromosim_learned::{KnownMotion, Pair, PairNames, SiteMotion, Worn};
-use cromosim_motion::datasets::{DatasetFiles, LabelledClip, open_dataset, parse_skeleton_npz};
 use cromosim_motion::{MotionOptions, read_motion_for, retarget};
-use cromosim_replay::recording::of_dataset;
+use cromosim_recording::datasets::{DatasetFiles, LabelledClip, open_dataset, parse_skeleton_npz};
+use cromosim_recording::read_placements;
 use cromosim_spatial::Stamp;
 use nalgebra::Isometry3;
 use rayon::prelude::*;
 
 use super::config::{Config, Source};
 use crate::progress::{self, Interrupt};
-use crate::recorded;
 
 /// The rate that placements of drawn devices stand for, Hz.
 const RATE_HZ: f64 = 100.0;
@@ -271,8 +270,8 @@ pub fn recorded(
             Ok(())
         };
         if let Some((_, recording)) = open_dataset(&path, &DatasetFiles::default())? {
-            for placed in of_dataset(&recording) {
-                let (Some(poses), Some(series)) = (placed.poses, placed.series) else {
+            for trace in recording.traces() {
+                let (Some(poses), Some(series)) = (trace.reference, trace.imu) else {
                     continue;
                 };
                 let frames = poses
@@ -294,14 +293,14 @@ pub fn recorded(
                     })
                     .collect();
                 add(
-                    placed.name,
+                    trace.name,
                     frames.collect(),
                     series.stamps.clone(),
                     readings,
                 )?;
             }
         } else {
-            for (position, recorded) in recorded::read(&BagReader::open(&path)?, given)? {
+            for (position, recorded) in read_placements(&BagReader::open(&path)?, given)? {
                 let recorded =
                     recorded.with_context(|| format!("{}: {position}", path.display()))?;
                 let record = recorded.record();

@@ -6,7 +6,6 @@ mod config;
 mod motion;
 mod outlet;
 mod player;
-pub mod recording;
 mod services;
 mod source;
 

@@ -8,13 +8,10 @@ use cromosim_motion::{
     read_people,
 };
 use cromosim_msgs::cromosim_msgs::SmplPose;
-use cromosim_msgs::std_msgs::Header;
+use cromosim_recording::{FIRST_STAMP, MessageHeader, smpl_pose, stamp_of_frame};
 use cromosim_spatial::Stamp;
 
 use crate::config::Config;
-
-/// Recorded time of a motion's first frame: not zero, which TF takes for "the latest".
-const MOTION_BEGINS: i64 = 1_000_000_000;
 
 /// Motions with their times, on one clock.
 pub struct MotionSource {
@@ -26,7 +23,7 @@ pub struct MotionSource {
 struct Track {
     topic: String,
     body_id: String,
-    /// Recorded time of the first frame, s after [`MOTION_BEGINS`].
+    /// Recorded time of the first frame, s after [`FIRST_STAMP`].
     begins_s: f64,
     motion: SmplMotion,
     next: usize,
@@ -112,7 +109,7 @@ impl MotionSource {
             .iter()
             .map(|track| track.recorded(0))
             .min()
-            .unwrap_or(MOTION_BEGINS)
+            .unwrap_or(FIRST_STAMP.nanos)
     }
 
     /// Recorded time of the last frame of all, ns.
@@ -121,7 +118,7 @@ impl MotionSource {
             .iter()
             .map(|track| track.recorded(track.motion.frames.len().saturating_sub(1)))
             .max()
-            .unwrap_or(MOTION_BEGINS)
+            .unwrap_or(FIRST_STAMP.nanos)
     }
 
     /// The person whose frame comes next, and when; of several at one time the first. None at the
@@ -159,7 +156,7 @@ impl MotionSource {
 
 impl Track {
     fn recorded(&self, frame: usize) -> i64 {
-        MOTION_BEGINS + ((self.begins_s + frame as f64 / self.motion.rate_hz) * 1e9).round() as i64
+        stamp_of_frame(&self.motion, frame, self.begins_s).nanos
     }
 
     fn due(&self) -> Option<i64> {
@@ -168,22 +165,12 @@ impl Track {
 
     /// The next frame.
     fn message(&self, frame_id: &str, stamp: Stamp) -> SmplPose {
-        let (motion, frame) = (&self.motion, self.next);
-        let body = &motion.frames[frame];
-        let mut message = SmplPose {
-            header: Header::new(stamp.nanos, frame_id.to_owned()),
-            body_id: self.body_id.clone(),
-            gender: motion.gender.name().to_owned(),
-            betas: motion.betas.clone(),
-            shape_space: motion.shape_space.name().to_owned(),
-            confidence: motion
-                .confidence
-                .as_ref()
-                .map_or(1.0, |values| values[frame]),
-            ..SmplPose::default()
+        let header = MessageHeader {
+            stamp,
+            frame_id,
+            body_id: &self.body_id,
         };
-        message.set_root_and_rotations(body.root_position, &body.local_rotations);
-        message
+        smpl_pose(&self.motion, self.next, header)
     }
 
     fn describe(&self) -> String {

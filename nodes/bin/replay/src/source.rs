@@ -1,20 +1,15 @@
 //! What is played: motions as poses, or everything in a bag.
 
-use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use cromosim_bag::{BagReader, Message, Messages, Selection};
 use cromosim_msgs::cromosim_msgs::SmplPose;
+use cromosim_recording::{is_bag, write_as_bag};
 use cromosim_spatial::Stamp;
 use tempfile::TempDir;
 
 use crate::config::Config;
 use crate::motion::MotionSource;
-use crate::recording;
-
-/// How an MCAP file begins.
-const MCAP: [u8; 5] = *b"\x89MCAP";
 
 /// Everything that is played, in order of recorded time.
 pub enum Source {
@@ -177,16 +172,10 @@ impl Source {
 
 /// A bag stays as it is; what else can be played as one is made into a bag in a folder of its own.
 fn as_bag(path: &Path) -> anyhow::Result<(PathBuf, Option<TempDir>)> {
-    let mut magic = [0; MCAP.len()];
-    let other = path.is_file()
-        && File::open(path)
-            .and_then(|mut file| file.read_exact(&mut magic))
-            .is_ok()
-        && magic != MCAP;
-    if other {
+    if !is_bag(path) {
         let folder = tempfile::tempdir()?;
         let bag = folder.path().join("recording.mcap");
-        if recording::to_bag(path, &bag)? {
+        if write_as_bag(path, &bag)? {
             return Ok((bag, Some(folder)));
         }
     }

@@ -6,9 +6,7 @@
 //! markers (C3D, TRC) a body is fitted, which stays on the recording's floor; the [`MarkerReport`]
 //! says how well. [`embedded_walk`] is a motion without a file.
 //!
-//! [`camera`] places in-place poses that were estimated from video in the world; [`rigid`] reads
-//! and writes trajectories and IMU files of rigid bodies; [`datasets`] imports recordings with real
-//! IMUs.
+//! [`camera`] places in-place poses that were estimated from video in the world.
 //!
 //! Files of SMPL parameters (AMASS, and estimates from video: VIBE, WHAM, GVHMR, TRAM, PHALP,
 //! SLAHMR) need no retargeting; the [`PoseReport`] says what was taken. Betas of another kind of
@@ -29,7 +27,6 @@ mod axes;
 mod bvh;
 mod c3d;
 pub mod camera;
-pub mod datasets;
 mod error;
 mod format;
 mod markers;
@@ -39,7 +36,6 @@ mod poses;
 mod read;
 mod report;
 mod retarget;
-pub mod rigid;
 mod skeleton_map;
 mod trc;
 mod walk;
@@ -55,7 +51,7 @@ pub use error::MotionError;
 pub use format::MotionFormat;
 pub use markers::{
     MarkerClip, MarkerFit, MarkerOptions, MarkerPlace, MarkerReport, MarkerSet, SetMarker,
-    fit_markers, place_markers,
+    fit_markers, fit_rigid, place_markers,
 };
 pub use motion::SmplMotion;
 pub use options::{MotionOptions, RestChoice, UpAxis};

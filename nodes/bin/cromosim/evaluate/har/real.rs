@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use cromosim_imu::Reading;
 use cromosim_learned::Examples;
-use cromosim_motion::datasets::{DatasetFiles, DatasetFormat, DatasetRecording, open_dataset};
+use cromosim_recording::datasets::{DatasetFiles, DatasetFormat, DatasetRecording, open_dataset};
 use cromosim_spatial::Stamp;
 
 use super::activities::Activities;
@@ -216,7 +216,7 @@ fn cut(recording: &DatasetRecording, placements: &[String]) -> Vec<(Stamp, Vec<S
         common = common.iter().flat_map(both).collect();
     }
     let series = |from: Stamp, to: Stamp| -> Vec<Series> {
-        let of = |imu: &&cromosim_motion::datasets::PlacedImu| {
+        let of = |imu: &&cromosim_recording::datasets::PlacedImu| {
             let mut own = Series::default();
             let stamps = &imu.series.stamps;
             let inside = stamps.partition_point(|stamp| *stamp < from)

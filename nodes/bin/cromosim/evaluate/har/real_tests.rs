@@ -1,5 +1,5 @@
 #![allow(clippy::unwrap_used)]
-use cromosim_motion::datasets::{ActivitySpan, PlacedImu};
+use cromosim_recording::datasets::{ActivitySpan, PlacedImu};
 use nalgebra::Vector3;
 
 use super::*;

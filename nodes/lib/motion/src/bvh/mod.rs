@@ -60,6 +60,23 @@ pub struct BvhClip {
 }
 
 impl BvhClip {
+    /// A clip of other origin than a BVH file: `values` are frame-major, the joints' channels in
+    /// order; there is at least one joint and one whole frame.
+    pub fn from_parts(
+        name: &str,
+        joints: Vec<BvhJoint>,
+        frame_time_s: f64,
+        values: Vec<f64>,
+    ) -> Self {
+        Self {
+            name: name.to_owned(),
+            channel_count: joints.iter().map(|joint| joint.channels.len()).sum(),
+            joints,
+            frame_time_s,
+            values,
+        }
+    }
+
     /// The name given to [`parse_bvh`].
     pub fn name(&self) -> &str {
         &self.name

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::start::rigid;
+use super::start::fit_rigid;
 
 /// Frames that are looked at.
 const CANDIDATES: usize = 400;
@@ -64,7 +64,7 @@ fn unlikeness(left: &[Option<Vector3<f64>>], right: &[Option<Vector3<f64>>]) -> 
     if pairs.len() < 3 {
         return 0.0;
     }
-    let Some((turn, shift)) = rigid(&pairs) else {
+    let Some((turn, shift)) = fit_rigid(&pairs) else {
         return 0.0;
     };
     let squares: f64 = pairs

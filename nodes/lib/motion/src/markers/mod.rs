@@ -19,4 +19,4 @@ pub(crate) use clip::{checked_rate, unit_scale};
 pub use fit::{MarkerOptions, fit_markers, place_markers};
 pub use report::{MarkerFit, MarkerReport};
 pub use set::{MarkerPlace, MarkerSet, SetMarker};
-pub(crate) use start::rigid;
+pub use start::fit_rigid;

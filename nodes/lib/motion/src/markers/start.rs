@@ -67,13 +67,14 @@ pub(super) fn placed(
     if pairs.len() < 3 {
         return None;
     }
-    let (turn, shift) = rigid(&pairs)?;
+    let (turn, shift) = fit_rigid(&pairs)?;
     (pose.root_position, pose.local_rotations[0]) = (shift, turn);
     Some(pose)
 }
 
-/// The rotation R and shift t that minimise the squares of `R a + t - b` (Kabsch 1976).
-pub(crate) fn rigid(
+/// The rotation R and shift t that minimise the sum of squares of `R a + t - b` over pairs `(a, b)`
+/// of points (Kabsch 1976); `None` where the singular values do not converge.
+pub fn fit_rigid(
     pairs: &[(Vector3<f64>, Vector3<f64>)],
 ) -> Option<(UnitQuaternion<f64>, Vector3<f64>)> {
     let count = pairs.len() as f64;

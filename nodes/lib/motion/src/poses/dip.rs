@@ -1,5 +1,5 @@
 //! DIP-IMU (Huang et al. 2018): `gt` (N, 72), the reference poses in place at 60 Hz. What its
-//! sensors measured is read by [`DipRecording`](crate::datasets::DipRecording).
+//! sensors measured is read by the crate `recording`.
 
 use std::io::{Read, Seek};
 
@@ -9,7 +9,9 @@ use cromosim_body::ShapeSpace;
 use super::track::{PoseAxes, PoseTrack};
 use super::values::{Budget, frame_count, numbers, of_axis_angles};
 use crate::MotionError;
-use crate::datasets::DIP_RATE_HZ;
+
+/// Frames per second of DIP-IMU's arrays, Hz.
+const DIP_RATE_HZ: f64 = 60.0;
 
 pub(super) fn track<R: Read + Seek>(
     container: &mut Container<R>,

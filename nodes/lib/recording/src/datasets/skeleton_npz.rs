@@ -10,9 +10,9 @@ use std::io::{Read, Seek};
 use std::path::Path;
 
 use cromosim_arrays::{Limits, NpzReader};
+use cromosim_motion::{BvhClip, BvhJoint, Channel, MAX_JOINTS};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-use crate::bvh::{BvhClip, BvhJoint, Channel, MAX_JOINTS};
 use crate::rigid::RigidError;
 use crate::rigid::table::unit_quaternion;
 
@@ -129,13 +129,7 @@ pub fn parse_skeleton_npz<R: Read + Seek>(
             ));
         }
     }
-    let clip = BvhClip {
-        name: name.to_owned(),
-        joints,
-        frame_time_s: rate_hz.recip(),
-        values,
-        channel_count: 3 * (count + 1),
-    };
+    let clip = BvhClip::from_parts(name, joints, rate_hz.recip(), values);
     let subject = npz.text("subject")?.unwrap_or_default();
     let atypical = npz.text("atypical")?.unwrap_or_default();
     let suspect = npz

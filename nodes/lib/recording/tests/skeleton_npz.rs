@@ -7,8 +7,8 @@ use std::fs::File;
 
 use common::shared_data;
 use cromosim_body::BodyModel;
-use cromosim_motion::datasets::parse_skeleton_npz;
 use cromosim_motion::{MotionOptions, parse_bvh, retarget};
+use cromosim_recording::datasets::parse_skeleton_npz;
 
 #[test]
 fn a_clip_is_the_bvh_it_was_made_from() {

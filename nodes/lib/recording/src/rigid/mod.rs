@@ -8,6 +8,7 @@
 //! without repeated stamps; quaternions may be off length 1 by a hundredth, as printed digits make
 //! them, and are normalised where they are off by more than 1e-9.
 
+mod content;
 mod error;
 mod euroc;
 mod header;
@@ -18,6 +19,7 @@ mod sniff;
 pub(crate) mod table;
 mod tum;
 
+pub use content::{RigidContent, parse_rigid};
 pub use error::RigidError;
 pub use euroc::{
     EurocGroundTruth, parse_euroc_ground_truth, parse_euroc_imu, write_euroc_ground_truth,

@@ -1,8 +1,7 @@
-//! What a recording holds of its placements: reference poses and the messages of the real IMUs.
+//! The placements of a bag: reference poses, and the messages of the real IMUs.
 
 use std::sync::Arc;
 
-use anyhow::{Context, anyhow, bail};
 use cromosim_bag::BagReader;
 use cromosim_body::{BodyModel, BodyPose, ShapedBody};
 use cromosim_gap::{ImuSeries, PlacementRecord, PoseSeries};
@@ -13,59 +12,75 @@ use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_spatial::Stamp;
 
-use crate::body;
+use crate::{RecordingError, body_for_bag};
 
 /// A placement of a recording: its reference, and its real IMU where there is one.
-pub struct Recorded {
-    /// Name.
+#[derive(Clone, Debug)]
+pub struct RecordedPlacement {
+    /// The NAME of `/reference/NAME` and `/imu/NAME/data_raw`.
     pub name: String,
     /// The reference: finite, in the order of time, no stamp twice, at least one.
     pub frames: Vec<SensorFrame>,
-    /// Messages of `/imu/NAME/data_raw`.
+    /// Messages of `/imu/NAME/data_raw` as they were recorded; empty where nothing was measured.
     pub measured: Vec<Imu>,
-    /// What a user should know of what was left out.
+    /// What was left out of the reference, a sentence each.
     pub notes: Vec<String>,
 }
 
-/// The placements with a reference, each on its own: what is wrong with one does not hide the
-/// others. `body` is for a recording of SMPL states.
-pub fn read(
+/// The placements of a bag that have a reference, by name, each on its own: what is wrong with one
+/// does not hide the others.
+///
+/// References are the topics `/reference/NAME` (PoseStamped). A bag without any holds SMPL states
+/// on `/smpl/state` and an attachment `placements.yaml`: then the sites' poses on the body are the
+/// references, and `body` is the body where it is not the embedded one.
+///
+/// ```no_run
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let bag = cromosim_bag::BagReader::open("recording.mcap".as_ref())?;
+/// for (name, placement) in cromosim_recording::read_placements(&bag, None)? {
+///     let record = placement?.record();
+///     println!("{name}: {} readings", record.imu.readings.len());
+/// }
+/// # Ok(()) }
+/// ```
+///
+/// # Errors
+/// [`RecordingError::NoReference`], and what is wrong with states, body or placements; within the
+/// list what is wrong with that placement's topics.
+#[allow(clippy::type_complexity)]
+pub fn read_placements(
     reader: &BagReader,
     body: Option<&Arc<BodyModel>>,
-) -> anyhow::Result<Vec<(String, anyhow::Result<Recorded>)>> {
-    let references = names(reader, "/reference/", "", PoseStamped::TYPE_NAME);
+) -> Result<Vec<(String, Result<RecordedPlacement, RecordingError>)>, RecordingError> {
+    let references = names_between(reader, "/reference/", "", PoseStamped::TYPE_NAME);
     if references.is_empty() {
-        let trajectories = from_states(reader, body)?.into_iter();
+        let trajectories = poses_from_states(reader, body)?.into_iter();
         return Ok(trajectories
             .map(|(name, frames)| (name.clone(), with_imu(reader, name, frames, Vec::new())))
             .collect());
     }
     let read = |name: String| {
         let mut notes = Vec::new();
-        let recorded = from_reference(reader, &name, &mut notes)
+        let recorded = read_poses(reader, &format!("/reference/{name}"), &mut notes)
             .and_then(|frames| with_imu(reader, name.clone(), frames, notes));
         (name, recorded)
     };
     Ok(references.into_iter().map(read).collect())
 }
 
-/// The parts of topic names of a type between `prefix` and `suffix`, in order.
-fn names(reader: &BagReader, prefix: &str, suffix: &str, type_name: &str) -> Vec<String> {
-    let topics = reader
-        .summary()
-        .topics
-        .iter()
-        .filter(|counted| counted.topic.type_name == type_name);
+/// The parts of topic names of a type between `prefix` and `suffix`, sorted.
+pub(crate) fn names_between(
+    reader: &BagReader,
+    prefix: &str,
+    suffix: &str,
+    type_name: &str,
+) -> Vec<String> {
+    let topics = reader.summary().topics.iter();
     let mut names: Vec<String> = topics
+        .filter(|counted| counted.topic.type_name == type_name)
         .filter_map(|counted| {
-            Some(
-                counted
-                    .topic
-                    .name
-                    .strip_prefix(prefix)?
-                    .strip_suffix(suffix)?
-                    .to_owned(),
-            )
+            let name = counted.topic.name.strip_prefix(prefix)?;
+            Some(name.strip_suffix(suffix)?.to_owned())
         })
         .collect();
     names.sort();
@@ -77,14 +92,14 @@ fn with_imu(
     name: String,
     frames: Vec<SensorFrame>,
     notes: Vec<String>,
-) -> anyhow::Result<Recorded> {
-    let has_imu = names(reader, "/imu/", "/data_raw", Imu::TYPE_NAME).contains(&name);
+) -> Result<RecordedPlacement, RecordingError> {
+    let has_imu = names_between(reader, "/imu/", "/data_raw", Imu::TYPE_NAME).contains(&name);
     let measured = if has_imu {
         reader.read::<Imu>(&format!("/imu/{name}/data_raw"))?
     } else {
         Vec::new()
     };
-    Ok(Recorded {
+    Ok(RecordedPlacement {
         name,
         frames,
         measured: measured.into_iter().map(|(_, message)| message).collect(),
@@ -92,22 +107,16 @@ fn with_imu(
     })
 }
 
-fn from_reference(
-    reader: &BagReader,
-    name: &str,
-    notes: &mut Vec<String>,
-) -> anyhow::Result<Vec<SensorFrame>> {
-    poses(reader, &format!("/reference/{name}"), notes)
-}
-
 /// The poses of a PoseStamped topic: finite, in the order of time, no stamp twice, at least one.
-/// `notes` says what was left out.
-pub fn poses(
+/// What was left out is added to `notes`.
+///
+/// # Errors
+/// [`RecordingError::Pose`], [`RecordingError::NoFinitePose`], and what is wrong with the bag.
+pub fn read_poses(
     reader: &BagReader,
     topic: &str,
     notes: &mut Vec<String>,
-) -> anyhow::Result<Vec<SensorFrame>> {
-    let file = reader.path().display();
+) -> Result<Vec<SensorFrame>, RecordingError> {
     let messages = reader.read::<PoseStamped>(topic)?;
     let count = messages.len();
     let mut frames = Vec::with_capacity(count);
@@ -124,7 +133,12 @@ pub fn poses(
         let world_from_sensor = message
             .pose
             .try_into()
-            .map_err(|error| anyhow!("{file}, {topic} at {:.6} s: {error}", stamp.as_seconds()))?;
+            .map_err(|source| RecordingError::Pose {
+                path: reader.path().to_owned(),
+                topic: topic.to_owned(),
+                seconds: stamp.as_seconds(),
+                source,
+            })?;
         frames.push(SensorFrame::new(stamp, world_from_sensor));
     }
     let finite = frames.len();
@@ -135,7 +149,11 @@ pub fn poses(
         ));
     }
     if frames.is_empty() {
-        bail!("{file}, {topic}: no pose but NaN or infinite ones ({count} messages)");
+        return Err(RecordingError::NoFinitePose {
+            path: reader.path().to_owned(),
+            topic: topic.to_owned(),
+            count,
+        });
     }
     frames.sort_by_key(|frame| frame.stamp);
     frames.dedup_by_key(|frame| frame.stamp);
@@ -148,16 +166,16 @@ pub fn poses(
     Ok(frames)
 }
 
-/// The sites' poses from the recording's states and its attachment `placements.yaml`.
-fn from_states(
+/// The sites' poses from the bag's states and its attachment `placements.yaml`.
+fn poses_from_states(
     reader: &BagReader,
     body: Option<&Arc<BodyModel>>,
-) -> anyhow::Result<Vec<(String, Vec<SensorFrame>)>> {
+) -> Result<Vec<(String, Vec<SensorFrame>)>, RecordingError> {
     let path = reader.path().display();
     let Some(placements) = reader.attachment("placements.yaml") else {
-        bail!(
-            "{path}: the recording holds neither /reference/NAME (geometry_msgs/msg/PoseStamped) nor an attachment placements.yaml beside SMPL states; there is no reference"
-        );
+        return Err(RecordingError::NoReference {
+            path: reader.path().to_owned(),
+        });
     };
     let placements = PlacementSet::parse(
         &String::from_utf8_lossy(placements),
@@ -167,62 +185,60 @@ fn from_states(
     states.sort_by_key(|(_, state)| state.header.stamp.nanos());
     states.dedup_by_key(|(_, state)| state.header.stamp.nanos());
     let Some((_, last)) = states.last() else {
-        bail!("{path}: /smpl/state holds no message")
+        return Err(RecordingError::NoMessage {
+            path: reader.path().to_owned(),
+            topic: "/smpl/state".to_owned(),
+        });
     };
-    let model = body::of_bag(reader, body)?;
+    let model = body_for_bag(reader, body)?;
     model
         .check_named_betas(&last.shape_space, &last.gender, &last.betas)
-        .with_context(|| format!("{path}, /smpl/state"))?;
+        .map_err(|error| RecordingError::from(error).at(format!("{path}, /smpl/state")))?;
     let shaped = ShapedBody::new(model, &last.betas)?;
     let sites = MountedSensors::new(&shaped, placements.placements())?;
+    let states = states.iter().map(|(_, state)| state);
     let stamps: Vec<Stamp> = states
-        .iter()
-        .map(|(_, state)| Stamp::from_nanos(state.header.stamp.nanos()))
+        .clone()
+        .map(|state| Stamp::from_nanos(state.header.stamp.nanos()))
         .collect();
-    let pose = |state: &SmplState| {
-        state
-            .root_and_rotations()
-            .map(|(root_position, local_rotations)| BodyPose {
-                root_position,
-                local_rotations,
-            })
-    };
-    let poses = states
-        .iter()
-        .map(|(_, state)| pose(state))
-        .collect::<Result<Vec<_>, _>>()?;
-    let frames = sites
-        .trajectories(&stamps, &poses)?
-        .into_iter()
-        .map(|trajectory| trajectory.frames().to_vec());
-    Ok(placements
-        .placements()
-        .iter()
+    let poses = states.map(body_pose).collect::<Result<Vec<_>, _>>()?;
+    let trajectories = sites.trajectories(&stamps, &poses)?.into_iter();
+    let frames = trajectories.map(|trajectory| trajectory.frames().to_vec());
+    let names = placements.placements().iter();
+    Ok(names
         .map(|placement| placement.name().to_owned())
         .zip(frames)
         .collect())
 }
 
-impl Recorded {
+/// The pose that a state carries.
+pub(crate) fn body_pose(state: &SmplState) -> Result<BodyPose, RecordingError> {
+    let (root_position, local_rotations) = state.root_and_rotations()?;
+    Ok(BodyPose {
+        root_position,
+        local_rotations,
+    })
+}
+
+impl RecordedPlacement {
     /// The reference as poses.
     pub fn poses(&self) -> PoseSeries {
+        let world_from_sensor = self.frames.iter().map(|frame| &frame.world_from_sensor);
         PoseSeries {
             stamps: self.frames.iter().map(|frame| frame.stamp).collect(),
-            positions: self
-                .frames
-                .iter()
-                .map(|frame| frame.world_from_sensor.translation.vector)
+            positions: world_from_sensor
+                .clone()
+                .map(|pose| pose.translation.vector)
                 .collect(),
-            rotations: self
-                .frames
-                .iter()
-                .map(|frame| frame.world_from_sensor.rotation)
-                .collect(),
+            rotations: world_from_sensor.map(|pose| pose.rotation).collect(),
         }
     }
 
     /// The reference as the derivative schemes take it.
-    pub fn trajectory(&self) -> anyhow::Result<SensorTrajectory> {
+    ///
+    /// # Errors
+    /// Where it is shorter than two poses.
+    pub fn trajectory(&self) -> Result<SensorTrajectory, RecordingError> {
         Ok(SensorTrajectory::new(self.frames.clone())?)
     }
 
@@ -234,8 +250,8 @@ impl Recorded {
         )
     }
 
-    /// Standard deviation per sample and axis that the first message declares: accelerometer,
-    /// gyroscope; none where it is unknown.
+    /// Standard deviation per sample and axis that the first message declares: accelerometer
+    /// (m/s2), gyroscope (rad/s); none where it is unknown.
     pub fn declared(&self) -> [Option<f64>; 2] {
         let Some(first) = self.measured.first() else {
             return [None, None];
@@ -252,26 +268,26 @@ impl Recorded {
         })
     }
 
-    /// What a diagnosis takes.
+    /// Stamps of the measured messages.
+    pub fn measured_stamps(&self) -> impl Iterator<Item = Stamp> {
+        let messages = self.measured.iter();
+        messages.map(|message| Stamp::from_nanos(message.header.stamp.nanos()))
+    }
+
+    /// The reference and the readings as a diagnosis takes them.
     pub fn record(&self) -> PlacementRecord {
         let reading = |message: &Imu| Reading {
             specific_force: message.linear_acceleration.into(),
             angular_velocity: message.angular_velocity.into(),
         };
-        let stamps = self
-            .measured
-            .iter()
-            .map(|message| Stamp::from_nanos(message.header.stamp.nanos()))
-            .collect();
-        let imu = ImuSeries {
-            stamps,
-            readings: self.measured.iter().map(reading).collect(),
-            declared: self.declared(),
-        };
         PlacementRecord {
             name: self.name.clone(),
             reference: self.poses(),
-            imu,
+            imu: ImuSeries {
+                stamps: self.measured_stamps().collect(),
+                readings: self.measured.iter().map(reading).collect(),
+                declared: self.declared(),
+            },
         }
     }
 }

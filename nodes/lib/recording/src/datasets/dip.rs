@@ -27,8 +27,6 @@ pub const DIP_SENSORS: [&str; 17] = [
     "lankle",
     "rankle",
 ];
-/// Its rate, Hz.
-pub const DIP_RATE_HZ: f64 = 60.0;
 
 /// A decoded array in C order.
 #[derive(Clone, Copy, Debug)]

@@ -6,11 +6,11 @@ use std::io::{Read, Seek};
 use std::path::Path;
 
 use cromosim_arrays::{Container, Limits};
+use cromosim_motion::fit_rigid;
 use cromosim_spatial::Stamp;
 use nalgebra::Vector3;
 
 use super::{DatasetRecording, PlacedImu};
-use crate::markers::rigid;
 use crate::rigid::{PoseTrajectory, RigidError};
 
 /// Twenty minutes at 200 Hz take a tenth of this.
@@ -170,7 +170,7 @@ fn poses(markers: &[Vec<Option<Vector3<f64>>>], rate_hz: f64) -> Option<PoseTraj
             .filter_map(|(own, seen)| Some((*own, seen?)))
             .collect();
         if pairs.len() >= LEAST {
-            rigid(&pairs)
+            fit_rigid(&pairs)
         } else {
             None
         }

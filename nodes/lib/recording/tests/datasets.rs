@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use std::io::{Cursor, Write as _};
 
 use cromosim_body::Joint;
-use cromosim_motion::datasets::{
+use cromosim_recording::datasets::{
     DIP_SENSORS, DatasetFiles, DatasetFormat, DipArray, DipRecording, open_dataset, parse_broad,
     parse_har_spsw, parse_marked_imu, parse_pamap2, parse_realworld,
     parse_totalcapture_calibration, parse_totalcapture_reference, parse_totalcapture_sensors,

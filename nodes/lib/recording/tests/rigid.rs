@@ -3,10 +3,10 @@
 
 mod common;
 
-use cromosim_motion::rigid::{
+use cromosim_recording::rigid::{
     EurocGroundTruth, ImuSeries, PoseTrajectory, RigidFormat, parse_euroc_ground_truth,
-    parse_euroc_imu, parse_pose_csv, parse_tum, sniff_rigid, write_euroc_ground_truth,
-    write_euroc_imu, write_pose_csv, write_tum,
+    parse_euroc_imu, parse_imu_csv, parse_pose_csv, parse_tum, sniff_rigid,
+    write_euroc_ground_truth, write_euroc_imu, write_imu_csv, write_pose_csv, write_tum,
 };
 use cromosim_spatial::Stamp;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -235,4 +235,45 @@ fn damage_never_panics() {
     ] {
         common::damaged(&sample, 400, parse_all);
     }
+}
+
+#[test]
+fn readings_come_back_from_a_table_and_other_names_are_known() {
+    let ours = "stamp_ns,orientation_w,angular_velocity_x,angular_velocity_y,angular_velocity_z,linear_acceleration_x,linear_acceleration_y,linear_acceleration_z\n\
+                5,,0.1,0.2,0.3,1,2,9.8\n7,,0.1,0.2,0.25,1,2,9.75\n";
+    let other = "time [ns];acc_x;acc_y;acc_z;gyr_x;gyr_y;gyr_z\n5;1;2;9.8;0.1;0.2;0.3\n7;1;2;9.75;0.1;0.2;0.25\n";
+    let series = parse_imu_csv(ours.as_bytes(), "a.csv").unwrap();
+    assert_eq!(series, parse_imu_csv(other.as_bytes(), "b.csv").unwrap());
+    assert_eq!(
+        series,
+        parse_imu_csv(write_imu_csv(&series).as_bytes(), "c.csv").unwrap()
+    );
+    assert_eq!(series.angular_velocity[1], Vector3::new(0.1, 0.2, 0.25));
+    for text in [ours, other, &write_imu_csv(&series)] {
+        assert_eq!(
+            sniff_rigid(text.as_bytes()),
+            Some(RigidFormat::ImuCsv),
+            "{text}"
+        );
+    }
+    let poses = "stamp_ns,x,y,z,qx,qy,qz,qw,angular_velocity_x,acceleration_x\n";
+    assert_eq!(sniff_rigid(poses.as_bytes()), Some(RigidFormat::PoseCsv));
+    let error = parse_imu_csv(b"stamp,acc_x,acc_y,acc_z\n1,2,3,4\n", "d.csv")
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.starts_with(
+            "d.csv, line 1: the header names no angular velocity (gyro) x; it has stamp"
+        ),
+        "{error}"
+    );
+    assert!(
+        parse_imu_csv(
+            b"t,a_x,a_y,a_z,w_x,w_y,w_z\n1,2,3,4,5,6,7\n1,2,3,4,5,6,7\n",
+            "e.csv"
+        )
+        .unwrap_err()
+        .to_string()
+        .contains("line 3")
+    );
 }

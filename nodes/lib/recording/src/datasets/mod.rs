@@ -17,7 +17,7 @@ mod skeleton_npz;
 mod totalcapture;
 
 pub use broad::parse_broad;
-pub use dip::{DIP_RATE_HZ, DIP_SENSORS, DipArray, DipRecording};
+pub use dip::{DIP_SENSORS, DipArray, DipRecording};
 pub use har_spsw::{HAR_SPSW_RATE_HZ, parse_har_spsw};
 pub use marked_imu::parse_marked_imu;
 pub use open::{DatasetFiles, DatasetFormat, open_dataset, sniff_dataset};

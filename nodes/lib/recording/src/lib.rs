@@ -1,0 +1,34 @@
+//! Recordings as users have them: bags with references and IMUs, recordings of public data sets,
+//! trajectories of rigid bodies, tables of IMU readings.
+//!
+//! - [`read_placements`] gives each placement of a bag: its reference poses and the messages of its
+//!   real IMU.
+//! - [`datasets`] imports what other people recorded; [`rigid`] reads and writes trajectories (TUM,
+//!   EuRoC, tables) and IMU series.
+//! - [`PlacementTrace`] is what either of them says of one placement; [`write_traces`] writes it
+//!   under the topics that every command and node knows: `/reference/NAME`, `/imu/NAME/data_raw`,
+//!   `/imu/NAME/data`. [`write_as_bag`] does so for a file of any of these kinds.
+//! - [`smpl_pose`] and [`smpl_state`] fill a message from a motion's frame.
+//!
+//! Nothing here needs a ROS node: offline commands, training and evaluation read recordings by
+//! these functions alone.
+
+mod bag_file;
+mod body;
+pub mod datasets;
+mod error;
+mod file;
+mod messages;
+mod placement;
+pub mod rigid;
+mod trace;
+
+pub use bag_file::{is_bag, write_as_bag};
+pub use body::body_for_bag;
+pub use error::RecordingError;
+pub use file::{read_head, read_whole};
+pub use messages::{FIRST_STAMP, MessageHeader, smpl_pose, smpl_state, stamp_of_frame};
+pub use placement::{RecordedPlacement, read_placements, read_poses};
+pub use trace::{
+    PlacementTrace, activities_csv, first_stamp, seconds_to_first_stamp, write_traces,
+};
