@@ -1,9 +1,7 @@
-//! Arrays: as they lie in a file, and as numbers in C order.
+//! Arrays of numbers and text: as they lie in a file, and in C order.
 
 use crate::blob::Blob;
 use crate::dtype::{DType, Kind, half};
-use crate::value::Value;
-use std::sync::Arc;
 
 /// An array in C order (last dimension fastest).
 #[derive(Clone, Debug, PartialEq)]
@@ -14,23 +12,17 @@ pub struct Array<T> {
     pub values: Vec<T>,
 }
 
-/// An array as it lies in the file: any element type, byte order and strides.
+/// An array of elements of fixed size as it lies in a file: any element type, byte order and strides.
 #[derive(Clone, Debug)]
-pub struct ArrayData {
+pub(crate) struct PlainArray {
     dtype: DType,
     shape: Vec<usize>,
-    elements: Elements,
+    bytes: Blob,
+    /// In elements.
+    strides: Vec<usize>,
 }
 
-#[derive(Clone, Debug)]
-enum Elements {
-    /// Strides count elements.
-    Raw { bytes: Blob, strides: Vec<usize> },
-    /// In C order.
-    Objects(Arc<Vec<Value>>),
-}
-
-impl ArrayData {
+impl PlainArray {
     /// An array in C or Fortran order over exactly `bytes`.
     pub(crate) fn contiguous(
         dtype: DType,
@@ -60,7 +52,8 @@ impl ArrayData {
         Ok(Self {
             dtype,
             shape,
-            elements: Elements::Raw { bytes, strides },
+            bytes,
+            strides,
         })
     }
 
@@ -105,42 +98,25 @@ impl ArrayData {
             Self {
                 dtype,
                 shape,
-                elements: Elements::Raw {
-                    bytes: part,
-                    strides,
-                },
+                bytes: part,
+                strides,
             },
             repeated,
         ))
     }
 
-    /// An array of objects in C order.
-    pub(crate) fn objects(shape: Vec<usize>, values: Vec<Value>) -> Result<Self, String> {
-        if element_count(&shape)? != values.len() {
-            return Err(format!(
-                "{} objects for an array of shape {shape:?}",
-                values.len()
-            ));
-        }
-        Ok(Self {
-            dtype: DType::new(Kind::Object, 8),
-            shape,
-            elements: Elements::Objects(Arc::new(values)),
-        })
-    }
-
     /// The type of the elements.
-    pub fn dtype(&self) -> DType {
+    pub(crate) fn dtype(&self) -> DType {
         self.dtype
     }
 
     /// The dimensions; none for a scalar.
-    pub fn shape(&self) -> &[usize] {
+    pub(crate) fn shape(&self) -> &[usize] {
         &self.shape
     }
 
     /// Number of elements.
-    pub fn element_count(&self) -> usize {
+    pub(crate) fn element_count(&self) -> usize {
         if self.shape.contains(&0) {
             0
         } else {
@@ -148,19 +124,9 @@ impl ArrayData {
         }
     }
 
-    /// The elements of an array of objects, in C order; none of another.
-    pub fn object_elements(&self) -> &[Value] {
-        match &self.elements {
-            Elements::Objects(values) => values,
-            Elements::Raw { .. } => &[],
-        }
-    }
-
     /// The element bytes in C order through `decode`, which sees exactly one element.
-    pub(crate) fn decoded<T>(&self, decode: impl Fn(&[u8]) -> T) -> Vec<T> {
-        let Elements::Raw { bytes, strides } = &self.elements else {
-            return Vec::new();
-        };
+    fn decoded<T>(&self, decode: impl Fn(&[u8]) -> T) -> Vec<T> {
+        let (bytes, strides) = (&self.bytes, &self.strides);
         let (count, size) = (self.element_count(), self.dtype.size);
         if size == 0 {
             return (0..count).map(|_| decode(&[])).collect();
@@ -245,13 +211,15 @@ impl ArrayData {
     }
 }
 
-/// Elements without bytes (numpy `U0`) cost the file nothing: this many are enough.
+/// Most elements without bytes (numpy `U0`), which cost the file nothing.
 const EMPTY_LIMIT: usize = 1 << 16;
+/// Most dimensions of an array; those of numpy 1 (numpy 2 has 64).
 const RANK_LIMIT: usize = 32;
-/// No dimension of an empty array needs more.
+/// Largest dimension of an array that is empty because another one is 0.
 const EMPTY_DIMENSION_LIMIT: usize = 1 << 24;
 
-fn element_count(shape: &[usize]) -> Result<usize, String> {
+/// How many elements an array has, once its shape is found to be possible.
+pub(crate) fn element_count(shape: &[usize]) -> Result<usize, String> {
     if shape.len() > RANK_LIMIT {
         return Err(format!(
             "{} dimensions; numpy has at most {RANK_LIMIT}",
@@ -319,11 +287,11 @@ mod tests {
         };
         let dtype = DType::parse(">i2").unwrap();
         let fortran =
-            ArrayData::contiguous(dtype, vec![2, 3], true, bytes(&[1, 4, 2, 5, 3, -6])).unwrap();
+            PlainArray::contiguous(dtype, vec![2, 3], true, bytes(&[1, 4, 2, 5, 3, -6])).unwrap();
         assert_eq!(fortran.as_integers().unwrap(), [1, 2, 3, 4, 5, -6]);
         assert_eq!(fortran.as_floats().unwrap()[5], -6.0);
         let (expanded, shown) =
-            ArrayData::strided(dtype, &bytes(&[9, 7, 8]), 1, vec![3, 2], vec![0, 1]).unwrap();
+            PlainArray::strided(dtype, &bytes(&[9, 7, 8]), 1, vec![3, 2], vec![0, 1]).unwrap();
         assert_eq!(
             (expanded.as_integers().unwrap(), shown),
             (vec![7, 8, 7, 8, 7, 8], 12)
@@ -334,14 +302,14 @@ mod tests {
             (0, vec![2], vec![usize::MAX]),
             (usize::MAX, vec![1], vec![1]),
         ] {
-            assert!(ArrayData::strided(dtype, &bytes(&[9, 7, 8]), first, shape, strides).is_err());
+            assert!(PlainArray::strided(dtype, &bytes(&[9, 7, 8]), first, shape, strides).is_err());
         }
     }
 
     #[test]
     fn declared_sizes_are_checked() {
         let check = |shape: &[usize], descr: &str, length: usize| {
-            ArrayData::contiguous(
+            PlainArray::contiguous(
                 DType::parse(descr).unwrap(),
                 shape.to_vec(),
                 false,

@@ -9,12 +9,11 @@
 
 use std::sync::Arc;
 
-use crate::array::ArrayData;
 use crate::blob::Blob;
-use crate::container::inflated;
 use crate::dtype::{DType, Kind};
+use crate::inflate::inflated;
 use crate::limits::{Budget, Limits};
-use crate::value::{Dict, Value};
+use crate::value::{ArrayData, Dict, Value};
 
 /// How each such file begins.
 pub(crate) const START: &[u8] = b"MATLAB 5.0 MAT";

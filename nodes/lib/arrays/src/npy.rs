@@ -1,12 +1,13 @@
 //! numpy's `.npy`: a header in text, then the elements (format versions 1 to 3).
 
-use crate::array::ArrayData;
+use std::borrow::Cow;
+use std::sync::Arc;
+
 use crate::blob::Blob;
 use crate::dtype::{DType, Kind};
 use crate::limits::Budget;
 use crate::pickle::{self, Fault};
-use crate::value::Value;
-use std::sync::Arc;
+use crate::value::{ArrayData, Value};
 
 pub(crate) const MAGIC: &[u8] = b"\x93NUMPY";
 /// Bytes from which every header that is read can be parsed.
@@ -26,31 +27,7 @@ pub struct NpyHeader {
 impl NpyHeader {
     /// The header at the start of `bytes` and where the data begin.
     pub(crate) fn parse(bytes: &[u8]) -> Result<(Self, usize), String> {
-        let cut = || "the numpy header is cut short".to_owned();
-        if !bytes.starts_with(MAGIC) {
-            return Err("not a numpy array".to_owned());
-        }
-        let (length, start): (usize, usize) = match bytes.get(6).ok_or_else(cut)? {
-            1 => (
-                usize::from(u16::from_le_bytes(fixed(bytes, 8).ok_or_else(cut)?)),
-                10,
-            ),
-            2 | 3 => (
-                u32::from_le_bytes(fixed(bytes, 8).ok_or_else(cut)?) as usize,
-                12,
-            ),
-            version => {
-                return Err(format!(
-                    "numpy format version {version} is unknown; versions 1 to 3 are read"
-                ));
-            }
-        };
-        let text = bytes
-            .get(start..start.saturating_add(length))
-            .filter(|_| length + start <= HEADER_BYTES_LIMIT);
-        let text = String::from_utf8_lossy(
-            text.ok_or_else(|| format!("the header is cut short or too long ({length} bytes)"))?,
-        );
+        let (text, end) = header_text(bytes)?;
         let value = |key: &str| {
             text.split_once(&format!("'{key}':"))
                 .map(|(_, rest)| rest.trim_start())
@@ -81,15 +58,41 @@ impl NpyHeader {
                     .map_err(|_| format!("shape ({shape}) is not of sizes"))
             })
             .collect::<Result<_, _>>()?;
-        Ok((
-            Self {
-                element,
-                fortran_order,
-                shape,
-            },
-            start + length,
-        ))
+        let header = Self {
+            element,
+            fortran_order,
+            shape,
+        };
+        Ok((header, end))
     }
+}
+
+/// The Python literal in a header, and where it ends.
+fn header_text(bytes: &[u8]) -> Result<(Cow<'_, str>, usize), String> {
+    let cut = || "the numpy header is cut short".to_owned();
+    if !bytes.starts_with(MAGIC) {
+        return Err("not a numpy array".to_owned());
+    }
+    let (length, start): (usize, usize) = match bytes.get(6).ok_or_else(cut)? {
+        1 => (
+            usize::from(u16::from_le_bytes(fixed(bytes, 8).ok_or_else(cut)?)),
+            10,
+        ),
+        2 | 3 => (
+            u32::from_le_bytes(fixed(bytes, 8).ok_or_else(cut)?) as usize,
+            12,
+        ),
+        version => {
+            return Err(format!(
+                "numpy format version {version} is unknown; versions 1 to 3 are read"
+            ));
+        }
+    };
+    let text = bytes
+        .get(start..start.saturating_add(length))
+        .filter(|_| length + start <= HEADER_BYTES_LIMIT)
+        .ok_or_else(|| format!("the header is cut short or too long ({length} bytes)"))?;
+    Ok((String::from_utf8_lossy(text), start + length))
 }
 
 fn fixed<const N: usize>(bytes: &[u8], start: usize) -> Option<[u8; N]> {

@@ -10,7 +10,6 @@ use zip::result::ZipError;
 use crate::ArraysError;
 use crate::array::Array;
 use crate::blob::Blob;
-use crate::container::pickle_error;
 use crate::entry::Entry;
 use crate::error::invalid;
 use crate::limits::{Budget, Limits};
@@ -130,7 +129,7 @@ impl<R: Read + Seek> NpzReader<R> {
                 crate::pickle::Reason::Unsound(message) if !objects => {
                     self.unreadable(key, invalid(message))
                 }
-                _ => pickle_error(&self.path, key, fault),
+                _ => fault.into_error(&self.path, key),
             })?;
         Ok(Some(Entry {
             path: Arc::clone(&self.path),

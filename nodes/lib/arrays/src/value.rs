@@ -1,10 +1,13 @@
-//! What a container holds, as Python would see it.
+//! What a container holds, as Python would see it. Arrays of objects hold values and values hold
+//! arrays, so that both stand here.
 
 use std::collections::HashMap;
 use std::fmt;
 use std::sync::Arc;
 
-use crate::array::ArrayData;
+use crate::array::{PlainArray, element_count};
+use crate::blob::Blob;
+use crate::dtype::{DType, Kind};
 
 /// A Python value. Cloning is cheap: what it holds is shared, as it was in the file.
 #[derive(Clone)]
@@ -141,6 +144,114 @@ impl Value {
             Self::Array(_) => "an array",
             Self::Sparse(_) => "a sparse matrix",
             Self::Name(_) => "a name",
+        }
+    }
+}
+
+/// An array as it lies in the file: elements of any type, byte order and strides, or objects.
+#[derive(Clone, Debug)]
+pub struct ArrayData(Elements);
+
+#[derive(Clone, Debug)]
+enum Elements {
+    Plain(PlainArray),
+    Objects {
+        shape: Vec<usize>,
+        /// In C order.
+        values: Arc<Vec<Value>>,
+    },
+}
+
+impl ArrayData {
+    /// An array in C or Fortran order over exactly `bytes`.
+    pub(crate) fn contiguous(
+        dtype: DType,
+        shape: Vec<usize>,
+        fortran_order: bool,
+        bytes: Blob,
+    ) -> Result<Self, String> {
+        let plain = PlainArray::contiguous(dtype, shape, fortran_order, bytes)?;
+        Ok(Self(Elements::Plain(plain)))
+    }
+
+    /// A view of `bytes`, see [`PlainArray::strided`].
+    pub(crate) fn strided(
+        dtype: DType,
+        bytes: &Blob,
+        first: usize,
+        shape: Vec<usize>,
+        strides: Vec<usize>,
+    ) -> Result<(Self, u64), String> {
+        let (plain, repeated) = PlainArray::strided(dtype, bytes, first, shape, strides)?;
+        Ok((Self(Elements::Plain(plain)), repeated))
+    }
+
+    /// An array of objects in C order.
+    pub(crate) fn objects(shape: Vec<usize>, values: Vec<Value>) -> Result<Self, String> {
+        if element_count(&shape)? != values.len() {
+            return Err(format!(
+                "{} objects for an array of shape {shape:?}",
+                values.len()
+            ));
+        }
+        Ok(Self(Elements::Objects {
+            shape,
+            values: Arc::new(values),
+        }))
+    }
+
+    /// The type of the elements.
+    pub fn dtype(&self) -> DType {
+        match &self.0 {
+            Elements::Plain(plain) => plain.dtype(),
+            Elements::Objects { .. } => DType::new(Kind::Object, 8),
+        }
+    }
+
+    /// The dimensions; none for a scalar.
+    pub fn shape(&self) -> &[usize] {
+        match &self.0 {
+            Elements::Plain(plain) => plain.shape(),
+            Elements::Objects { shape, .. } => shape,
+        }
+    }
+
+    /// Number of elements.
+    pub fn element_count(&self) -> usize {
+        match &self.0 {
+            Elements::Plain(plain) => plain.element_count(),
+            Elements::Objects { values, .. } => values.len(),
+        }
+    }
+
+    /// The elements of an array of objects, in C order; empty for any other array.
+    pub fn object_elements(&self) -> &[Value] {
+        match &self.0 {
+            Elements::Plain(_) => &[],
+            Elements::Objects { values, .. } => values,
+        }
+    }
+
+    /// Numbers as float64; `None` for text, objects, complex numbers and records.
+    pub(crate) fn as_floats(&self) -> Option<Vec<f64>> {
+        self.plain()?.as_floats()
+    }
+
+    /// Whole numbers; `None` for elements of another type. Unsigned ones above i64's range become
+    /// its largest value.
+    pub(crate) fn as_integers(&self) -> Option<Vec<i64>> {
+        self.plain()?.as_integers()
+    }
+
+    /// Text elements (numpy `U` or `S`), without the zeros that pad them; `None` for any other.
+    pub(crate) fn as_texts(&self) -> Option<Vec<String>> {
+        self.plain()?.as_texts()
+    }
+
+    fn plain(&self) -> Option<&PlainArray> {
+        match &self.0 {
+            Elements::Plain(plain) => Some(plain),
+            Elements::Objects { .. } => None,
         }
     }
 }

@@ -136,8 +136,9 @@ fn types_other_than_numbers() {
 
 #[test]
 fn formats_are_told_by_content() {
-    let format =
-        |name: &str| Format::of(&mut Cursor::new(std::fs::read(sample(name)).unwrap())).unwrap();
+    let format = |name: &str| {
+        Format::detect(&mut Cursor::new(std::fs::read(sample(name)).unwrap())).unwrap()
+    };
     let cases = [
         ("amass.npz", Format::Zip),
         ("gvhmr.pt", Format::Zip),
@@ -166,7 +167,7 @@ fn formats_are_told_by_content() {
         "x,y\n1,2\n",
     ] {
         assert_eq!(
-            Format::of(&mut Cursor::new(other)).unwrap(),
+            Format::detect(&mut Cursor::new(other)).unwrap(),
             None,
             "{other}"
         );

@@ -13,9 +13,9 @@ pub struct Axis {
 /// A mark on an axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tick {
-    /// Where.
+    /// Where it stands, in the axis' unit.
     pub value: f64,
-    /// Empty for a mark between others.
+    /// The number beside it; empty for a mark between others.
     pub label: String,
 }
 

@@ -12,14 +12,20 @@ const PLOT: f64 = 220.0;
 const BAR: f64 = 30.0;
 /// A group's least wished width, for its label.
 const SLOT: f64 = 88.0;
+/// Space between groups, in bars.
+const GROUP_SPACE: f64 = 0.8;
+/// Least width of a chart.
 const NARROWEST: f64 = 420.0;
+/// Largest width: that of a page's section.
 const WIDEST: f64 = 1080.0;
+/// Room that the vertical axis is taken to need.
+const AXIS_ROOM: f64 = 64.0;
 /// Size of the numbers on the bars.
 const VALUE: f64 = 10.0;
 /// Labels that do not fit below their group in so many lines lean over.
 const LINES: usize = 4;
 
-/// A bar.
+/// A bar, with its interval where there is one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bar {
     /// What it belongs to: bars of one series have one colour; the legend lists series in the order
@@ -59,12 +65,10 @@ struct Layout {
     series: Vec<String>,
     /// Width of a group with the space around it.
     slot: f64,
+    /// Width of a bar with the space after it.
     bar: f64,
-    /// Of the groups: whole, and in lines.
-    labels: Vec<(String, Vec<String>)>,
-    leaning: bool,
-    below: f64,
-    /// Of the numbers on the bars.
+    labels: Labels,
+    /// Decimals of the numbers on the bars.
     decimals: usize,
 }
 
@@ -100,7 +104,7 @@ impl BarChart {
             names.join(", ")
         );
         let mut svg = frame.open(
-            frame.bottom() + layout.below,
+            frame.bottom() + layout.labels.below,
             &described,
             &self.y_label,
             Sample::Box,
@@ -144,33 +148,8 @@ impl BarChart {
     fn layout(&self) -> Layout {
         let series = self.series();
         let (chart, slot) = size(self.groups.len(), series.len());
-        let bar = (slot / (series.len() as f64 + 0.8)).min(BAR);
-        let in_lines = |group: &Group| {
-            (
-                group.label.clone(),
-                wrapped(&group.label, slot - 6.0, LABEL),
-            )
-        };
-        let labels: Vec<(String, Vec<String>)> = self.groups.iter().map(in_lines).collect();
-        let lines = || labels.iter().map(|(_, lines)| lines);
-        let widest = lines()
-            .flatten()
-            .map(|line| width(line, LABEL))
-            .fold(0.0, f64::max);
-        let leaning = widest > slot || lines().any(|lines| lines.len() > LINES);
-        let longest = self
-            .groups
-            .iter()
-            .map(|group| width(&group.label, LABEL))
-            .fold(0.0, f64::max);
-        // At 40 degrees.
-        let (below, least_left) = match leaning {
-            true => (24.0 + 0.65 * longest, 0.77 * longest - slot / 2.0 + 8.0),
-            false => (
-                12.0 + 14.0 * lines().map(Vec::len).max().unwrap_or(0) as f64,
-                0.0,
-            ),
-        };
+        let bar = (slot / (series.len() as f64 + GROUP_SPACE)).min(BAR);
+        let labels = Labels::new(&self.groups, slot);
         let bars = || self.groups.iter().flat_map(|group| &group.bars);
         let ends = bars()
             .flat_map(|bar| {
@@ -181,15 +160,6 @@ impl BarChart {
                 ]
             })
             .flatten();
-        let greatest = bars()
-            .map(|bar| bar.value.abs())
-            .filter(|value| value.is_finite())
-            .fold(0.0, f64::max);
-        let decimals = if greatest > 0.0 {
-            (2.0 - greatest.log10().floor()).clamp(0.0, 7.0) as usize
-        } else {
-            0
-        };
         let parts = Parts {
             title: &self.title,
             width: chart,
@@ -197,7 +167,7 @@ impl BarChart {
             y: Axis::from_zero(ends.chain(self.level.as_ref().map(|level| level.value))),
             series: &series,
             level: self.level.as_ref(),
-            least_left,
+            least_left: labels.least_left,
         };
         let frame = Frame::new(&parts);
         // What the labels took at the left is missing between the bars.
@@ -209,24 +179,83 @@ impl BarChart {
             slot: slot * shrunk,
             bar: bar * shrunk,
             labels,
+            decimals: three_digits(bars().map(|bar| bar.value)),
+        }
+    }
+}
+
+/// The labels of the groups, and the room that they take.
+struct Labels {
+    /// Each whole, and in lines.
+    texts: Vec<(String, Vec<String>)>,
+    /// Whether they lean over, because lines do not fit below their groups.
+    leaning: bool,
+    /// Room below the axis.
+    below: f64,
+    /// Room at the left that the first one takes where it leans over.
+    least_left: f64,
+}
+
+impl Labels {
+    fn new(groups: &[Group], slot: f64) -> Self {
+        let in_lines = |group: &Group| {
+            (
+                group.label.clone(),
+                wrapped(&group.label, slot - 6.0, LABEL),
+            )
+        };
+        let texts: Vec<(String, Vec<String>)> = groups.iter().map(in_lines).collect();
+        let lines = || texts.iter().map(|(_, lines)| lines);
+        let widest = lines()
+            .flatten()
+            .map(|line| width(line, LABEL))
+            .fold(0.0, f64::max);
+        let leaning = widest > slot || lines().any(|lines| lines.len() > LINES);
+        let longest = groups
+            .iter()
+            .map(|group| width(&group.label, LABEL))
+            .fold(0.0, f64::max);
+        // At 40 degrees: 0.65 and 0.77 are its sine and cosine, rounded up.
+        let (below, least_left) = match leaning {
+            true => (24.0 + 0.65 * longest, 0.77 * longest - slot / 2.0 + 8.0),
+            false => (
+                12.0 + 14.0 * lines().map(Vec::len).max().unwrap_or(0) as f64,
+                0.0,
+            ),
+        };
+        Self {
+            texts,
             leaning,
             below,
-            decimals,
+            least_left,
         }
+    }
+}
+
+/// Decimals with which the greatest of the values has three digits.
+fn three_digits(values: impl Iterator<Item = f64>) -> usize {
+    let greatest = values
+        .map(f64::abs)
+        .filter(|value| value.is_finite())
+        .fold(0.0, f64::max);
+    if greatest > 0.0 {
+        (2.0 - greatest.log10().floor()).clamp(0.0, 7.0) as usize
+    } else {
+        0
     }
 }
 
 /// Width of the chart and of a group with the space around it.
 fn size(groups: usize, series: usize) -> (f64, f64) {
     let groups = groups.max(1) as f64;
-    let slot = (BAR * (series as f64 + 0.8)).max(SLOT);
-    let wished = (64.0 + groups * slot).clamp(NARROWEST, WIDEST);
-    (wished.round(), (wished - 64.0) / groups)
+    let slot = (BAR * (series as f64 + GROUP_SPACE)).max(SLOT);
+    let wished = (AXIS_ROOM + groups * slot).clamp(NARROWEST, WIDEST);
+    (wished.round(), (wished - AXIS_ROOM) / groups)
 }
 
 impl Layout {
     fn middle(&self, group: usize) -> f64 {
-        let all = self.slot * self.labels.len() as f64;
+        let all = self.slot * self.labels.texts.len() as f64;
         (self.frame.left + self.frame.right() - all) / 2.0 + self.slot * (group as f64 + 0.5)
     }
 
@@ -285,9 +314,9 @@ impl Layout {
     fn write_labels(&self, svg: &mut String) {
         let bottom = self.frame.bottom();
         svg.push_str("<g class=\"groups\">");
-        for (index, (label, lines)) in self.labels.iter().enumerate() {
+        for (index, (label, lines)) in self.labels.texts.iter().enumerate() {
             let x = self.middle(index);
-            if self.leaning {
+            if self.labels.leaning {
                 let (y, label) = (bottom + 14.0, escape(label));
                 let _ = write!(
                     svg,

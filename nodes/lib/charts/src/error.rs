@@ -1,4 +1,4 @@
-//! What can go wrong.
+//! Errors of this crate.
 
 use thiserror::Error;
 
@@ -8,11 +8,11 @@ pub enum ChartsError {
     /// A picture of no or of absurd size was asked for.
     #[error("a picture {width_px} pixels wide: at least {least} and at most {most} are possible")]
     Width {
-        /// What was asked for.
+        /// The width that was asked for, pixels.
         width_px: u32,
-        /// The least.
+        /// The least width, pixels.
         least: u32,
-        /// The most.
+        /// The largest width, pixels.
         most: u32,
     },
     /// The text is no SVG picture.
@@ -24,9 +24,9 @@ pub enum ChartsError {
     /// The pixels could not be written.
     #[error("the picture of {width} by {height} pixels could not be written as PNG: {reason}")]
     Encode {
-        /// Pixels.
+        /// Width of the picture, pixels.
         width: u32,
-        /// Pixels.
+        /// Height of the picture, pixels.
         height: u32,
         /// What the encoder says.
         reason: String,

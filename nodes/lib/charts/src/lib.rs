@@ -29,6 +29,15 @@
 //! Whatever text a chart is given is escaped; numbers that are not finite are left out of the
 //! picture. Colours can be told apart with the common kinds of colour blindness (a test simulates
 //! them), and lines differ by their marks too.
+//!
+//! Why no library draws or writes:
+//! - `plotters` 0.3 (5 packages with its SVG backend alone) writes each colour into its element, where
+//!   these pictures name a class whose colour the page's theme says.
+//! - `charming` 0.6 describes charts that JavaScript draws: its pages load echarts from a network, and
+//!   without a browser it takes V8 (`ssr`, 180 packages).
+//! - `maud` 0.27 (9 packages) would write the pages, whose HTML stands in two files of 300 lines here;
+//!   it leaves apostrophes and control characters as they are, which [`text::escape`] does not, since
+//!   the same text goes into SVG, which is XML.
 
 mod axis;
 mod bars;
@@ -39,6 +48,7 @@ mod page;
 mod panel;
 #[cfg(feature = "png")]
 mod png;
+mod style;
 mod table;
 #[cfg(test)]
 mod tests;

@@ -6,23 +6,29 @@ use crate::frame::{Frame, LABEL, Level, Parts, Sample, colour, mark, whisker};
 use crate::text::{escape, trimmed, width};
 use crate::{Axis, Tick};
 
+/// Width of the picture; lengths are in its own units, in which letters are 11.5 high.
 const WIDTH: f64 = 560.0;
+/// Height of the part where the lines run.
 const PLOT: f64 = 240.0;
+/// Room below it for the numbers and the label of the axis.
+const BELOW: f64 = 38.0;
+/// Most decades of a logarithmic axis.
+const DECADES: f64 = 9.0;
 /// Where the points of all lines stand at so few places, the axis is marked there.
 const FEW: usize = 8;
-/// Intervals of several lines at one place stand side by side: so far apart, and no farther than
-/// this from their place.
+/// Distance of the intervals of several lines at one place, which stand side by side.
 const APART: f64 = 3.0;
+/// How far from their place they stand at most.
 const ASIDE: f64 = 6.0;
 /// A line of more points has no marks.
 const MARKS: usize = 30;
 
-/// A measured point.
+/// A measured point, with its interval where there is one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
-    /// Along.
+    /// Value on the horizontal axis.
     pub x: f64,
-    /// Up; not finite interrupts the line.
+    /// Value on the vertical axis; one that is not finite interrupts the line.
     pub y: f64,
     /// Both ends of its interval, in the unit of y (not distances from it).
     pub interval: Option<(f64, f64)>,
@@ -72,31 +78,12 @@ impl LineChart {
 
     /// The picture as an `svg` element.
     pub fn svg(&self) -> String {
-        let points = || self.drawn().flat_map(|(_, line)| line);
-        let ends = points()
-            .flat_map(|point| {
-                [
-                    Some(point.y),
-                    point.interval.map(|ends| ends.0),
-                    point.interval.map(|ends| ends.1),
-                ]
-            })
-            .flatten();
         let series: Vec<String> = self.lines.iter().map(|line| line.label.clone()).collect();
-        let y = Axis::linear(ends.chain(self.level.as_ref().map(|level| level.value)));
-        let parts = Parts {
-            title: &self.title,
-            width: WIDTH,
-            plot_height: PLOT,
-            y,
-            series: &series,
-            level: self.level.as_ref(),
-            least_left: 0.0,
-        };
-        let frame = Frame::new(&parts);
-        let xs: Vec<f64> = points().map(|point| point.x).collect();
+        let points: Vec<Point> = self.drawn().flat_map(|(_, line)| line).collect();
+        let frame = self.frame(&series, &points);
+        let xs: Vec<f64> = points.iter().map(|point| point.x).collect();
         let x = if self.logarithmic_x {
-            Axis::logarithmic(xs.iter().copied(), 9.0)
+            Axis::logarithmic(xs.iter().copied(), DECADES)
         } else {
             Axis::linear(xs.iter().copied())
         };
@@ -108,7 +95,7 @@ impl LineChart {
             series.join(", ")
         );
         let mut svg = frame.open(
-            frame.bottom() + 38.0,
+            frame.bottom() + BELOW,
             &described,
             &self.y_label,
             Sample::Line,
@@ -116,7 +103,7 @@ impl LineChart {
         let scale = Scale { frame: &frame, x };
         scale.write_axis(&mut svg, &xs, &self.x_label);
         frame.write_level(&mut svg, self.level.as_ref());
-        let spread = points().any(|point| point.interval.is_some());
+        let spread = points.iter().any(|point| point.interval.is_some());
         for (number, line) in self.drawn() {
             let half = (self.lines.len() as f64 - 1.0) / 2.0;
             let aside = if spread && half > 0.0 {
@@ -131,6 +118,28 @@ impl LineChart {
         }
         svg.push_str("</svg>");
         svg
+    }
+
+    fn frame(&self, series: &[String], points: &[Point]) -> Frame {
+        let ends = points
+            .iter()
+            .flat_map(|point| {
+                [
+                    Some(point.y),
+                    point.interval.map(|ends| ends.0),
+                    point.interval.map(|ends| ends.1),
+                ]
+            })
+            .flatten();
+        Frame::new(&Parts {
+            title: &self.title,
+            width: WIDTH,
+            plot_height: PLOT,
+            y: Axis::linear(ends.chain(self.level.as_ref().map(|level| level.value))),
+            series,
+            level: self.level.as_ref(),
+            least_left: 0.0,
+        })
     }
 
     /// Each line with those of its points that have a place; an interruption as a point that is not

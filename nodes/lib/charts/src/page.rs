@@ -2,13 +2,9 @@
 
 use std::fmt::Write;
 
+use crate::style::{CHARTS, STYLE};
 use crate::text::{escape, inline};
 use crate::{BarChart, LineChart, Panel, Table};
-
-/// The style of every page: light and dark, tables, panels of curves, the parts of a diagnosis.
-pub(crate) const STYLE: &str = include_str!("style.css");
-/// The style of charts, beside it.
-pub(crate) const CHARTS: &str = include_str!("charts.css");
 
 /// A whole document: the title (as plain text) stands in the head and above the body, which is
 /// markup. `further` is CSS beside the house's own.
@@ -33,11 +29,11 @@ pub fn write_panels(page: &mut String, panels: &[Panel]) {
 /// Any chart.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Chart {
-    /// Bars.
+    /// Groups of bars with intervals.
     Bars(BarChart),
-    /// Points and lines.
+    /// Points with intervals, joined by lines.
     Lines(LineChart),
-    /// Curves.
+    /// A panel of curves.
     Panel(Panel),
 }
 
@@ -72,37 +68,37 @@ impl Chart {
 /// A part of a section. Words may hold `**bold**` and `` `code` ``.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Block {
-    /// A paragraph.
+    /// A paragraph of running text.
     Text(String),
     /// A paragraph in small letters: how something was measured, what to mind.
     Note(String),
-    /// Points of a list.
+    /// A list with bullets, one text a point.
     List(Vec<String>),
-    /// A table.
+    /// A table, which scrolls where the page is narrow.
     Table(Table),
     /// Charts, side by side where they fit.
     Charts(Vec<Chart>),
-    /// What is folded away under a line.
+    /// Blocks that are folded away under a line, which says what they are.
     Details(String, Vec<Block>),
 }
 
-/// A section.
+/// A section of a page: a heading and what stands below it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Section {
-    /// Its heading.
+    /// The heading.
     pub title: String,
-    /// From top to bottom.
+    /// What stands below the heading, from top to bottom.
     pub blocks: Vec<Block>,
 }
 
-/// A page.
+/// A page in one HTML file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Page {
-    /// In the window's bar and at the top.
+    /// Plain text, in the window's bar and at the top.
     pub title: String,
     /// Below the title: what this is, in a sentence or two.
     pub lead: String,
-    /// From top to bottom.
+    /// What the page consists of, from top to bottom.
     pub sections: Vec<Section>,
 }
 

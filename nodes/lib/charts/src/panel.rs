@@ -11,7 +11,8 @@ const LEFT: f64 = 58.0;
 const RIGHT: f64 = 10.0;
 const TOP: f64 = 22.0;
 const BOTTOM: f64 = 36.0;
-/// How far a drawn line may stray from its points.
+/// How far a drawn line may stray from its points, in the picture's own units: less than a third of a
+/// line's width.
 const TOLERANCE: f64 = 0.3;
 
 /// A line of a panel.

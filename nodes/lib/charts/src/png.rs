@@ -6,9 +6,11 @@ use resvg::tiny_skia::{Color, Pixmap, Transform};
 use resvg::usvg::{Options, Tree, fontdb};
 
 use crate::ChartsError;
-use crate::page::{CHARTS, STYLE};
+use crate::style::{CHARTS, STYLE};
 
+/// Least width of a picture, pixels.
 const LEAST_PX: u32 = 16;
+/// Largest width and height, pixels: 256 MiB of RGBA.
 const MOST_PX: u32 = 8192;
 const FAMILY: &str = "DejaVu Sans";
 

@@ -559,7 +559,7 @@ fn colours_differ_for_colour_blind_eyes_too() {
                 .clamp(0.0, 1.0)
         }))
     };
-    let themes: Vec<Vec<&str>> = page::CHARTS
+    let themes: Vec<Vec<&str>> = style::CHARTS
         .lines()
         .filter(|line| line.contains("--c0:"))
         .map(|line| {

@@ -35,7 +35,7 @@ pub fn significant(value: f64, digits: usize) -> String {
     decimals(value, (digits as i32 - 1 - exponent).max(0) as usize)
 }
 
-/// The same without zeros at its end.
+/// As [`significant`], without zeros at the end of its fraction.
 pub fn trimmed(value: f64, digits: usize) -> String {
     let text = significant(value, digits);
     match text.split_once('.') {
@@ -51,7 +51,7 @@ pub fn trimmed(value: f64, digits: usize) -> String {
     }
 }
 
-/// A number with so many decimals.
+/// A number with so many decimals; `–` for none, a typographic minus, no `-0.00`.
 pub fn decimals(value: f64, decimals: usize) -> String {
     if !value.is_finite() {
         return "–".to_owned();
@@ -102,8 +102,8 @@ fn paired(text: &str, mark: &str, tag: &str) -> String {
     marked
 }
 
-/// About how wide a line of text is drawn, in units of `size`; for DejaVu Sans Condensed, and a
-/// little much for most system fonts.
+/// About how wide a line of text is drawn, in the unit of `size`: for DejaVu Sans Condensed; most
+/// system fonts are a little narrower.
 pub(crate) fn width(text: &str, size: f64) -> f64 {
     let em = |character: char| match character {
         'i' | 'j' | 'l' | 'I' | '.' | ',' | ':' | ';' | '|' | '!' | '\'' | ' ' => 0.31,

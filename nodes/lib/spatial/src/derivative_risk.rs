@@ -4,29 +4,23 @@ use std::ops::Range;
 
 use crate::SpatialError;
 use crate::basis::ORDER;
-use crate::select::Scratch;
-use crate::system::SplineSystem;
+use crate::derivative::Derivative;
+use crate::equations::{Scratch, SplineEquations};
 
-/// The derivative that a spline is meant for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Derivative {
-    /// As an angular velocity is of a rotation.
-    First,
-    /// As an acceleration is of a position.
-    Second,
-}
-
-/// Step of the walk from the weight of the greatest likelihood, and how far it may go; decimal
-/// logarithms.
+/// Step of the walk from the weight of the greatest likelihood, decimal logarithm: the search's own
+/// finest step.
 const STEP: f64 = 0.5;
+/// Most steps of the walk, four decades of the weight; no source.
 const FARTHEST: i32 = 8;
-/// The other half's derivative is taken with so much less smoothing that it is all but unbiased.
+/// How much less smoothing the other half's derivative has, decimal logarithm: so little that its
+/// bias hardly counts. A tenth of the weight moves the cutoff by 10^(1/10), a quarter; no source.
 const PILOT_STEP: f64 = -1.0;
-/// Below this weight next to nothing is smoothed, and there is nothing to gain.
+/// Below this weight the response at the Nyquist frequency, 1 / (1 + weight pi^10), is above 0.01 and
+/// nearly all below half of it passes: there is nothing to gain. No source.
 const LEAST_WEIGHT: f64 = 1e-3;
 
-/// At a cut, where the series goes on beyond the run, so many samples are not compared: the run's
-/// end is none of the whole spline's.
+/// Samples that are not compared at a cut, where the series goes on beyond the run: the run ends
+/// there, the whole spline does not. No source.
 const CUT_MARGIN: usize = 32;
 
 /// One run of samples, split into every second sample and the others.
@@ -38,7 +32,7 @@ pub(crate) struct SplitRun {
 
 #[derive(Clone, Debug)]
 struct Half {
-    system: SplineSystem,
+    equations: SplineEquations,
     /// For each sample that is compared: the first function over it, and the derivative's row.
     rows: Vec<(u32, [f64; ORDER])>,
 }
@@ -58,45 +52,22 @@ impl SplitRun {
         let margin = |cut: bool| if cut { CUT_MARGIN } else { 1 };
         let compared = margin(range.start > 0)..run.len() - margin(range.end < times.len());
         let half = |parity: usize| {
-            let system = SplineSystem::from_times(
-                run[parity..].iter().step_by(2).copied().collect(),
-                1.0,
-                0.0,
-            );
+            let times: Vec<f64> = run[parity..].iter().step_by(2).copied().collect();
+            let equations = SplineEquations::from_times(&times, 1.0, 0.0);
             let row = |t: &f64| {
-                let first = system.basis.interval_of(*t);
+                let first = equations.basis.interval_of(*t);
                 (
                     first as u32,
-                    system.basis.derivatives(first, *t, derivative.order()),
+                    equations.basis.derivatives(first, *t, derivative.order()),
                 )
             };
             let rows = run[compared.clone()].iter().map(row).collect();
-            Half { system, rows }
+            Half { equations, rows }
         };
         Self {
             halves: [half(0), half(1)],
             range,
         }
-    }
-}
-
-impl Derivative {
-    fn order(self) -> usize {
-        match self {
-            Self::First => 1,
-            Self::Second => 2,
-        }
-    }
-
-    /// Variance of the derivative (per sample interval) that white noise of variance one leaves at
-    /// a weight, away from the ends: `1/pi integral of w^2k / (1 + weight w^10)^2 = weight^-a B(a,
-    /// 2 - a) / (10 pi)`, a = (2 k + 1) / 10.
-    fn variance(self, weight: f64) -> f64 {
-        let (a, beta) = match self {
-            Self::First => (0.3, 2.718_255_454_215_654),
-            Self::Second => (0.5, std::f64::consts::FRAC_PI_2),
-        };
-        weight.powf(-a) * beta / (10.0 * std::f64::consts::PI)
     }
 }
 
@@ -169,7 +140,7 @@ fn prepare<const C: usize>(
             .collect();
         let mut scratch = Scratch::default();
         run.halves[parity]
-            .system
+            .equations
             .solve(&values, halved(pilot_weight), &mut scratch)?;
         Ok(Work {
             values,
@@ -189,7 +160,7 @@ fn difference<const C: usize>(
     weight: f64,
 ) -> Result<f64, SpatialError> {
     for (half, work) in run.halves.iter().zip(works.iter_mut()) {
-        half.system
+        half.equations
             .solve(&work.values, halved(weight), &mut work.scratch)?;
     }
     let mut sum = 0.0;
@@ -246,7 +217,7 @@ mod tests {
             .collect()
     }
 
-    /// Root mean square error of a derivative of a jittered sum of tones (), or of a jittered row
+    /// Root mean square error of a derivative of a jittered sum of tones (`smooth`), or of a jittered row
     /// of sharp bumps.
     fn error(smooth: bool, order: usize, smoothing: Smoothing) -> f64 {
         let signal = |t: f64| {

@@ -4,21 +4,38 @@ use std::sync::Arc;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-use crate::floor::{Floor, LARGEST_GAIN, LARGEST_LOSS, LARGEST_RISE, local_spectra, undo};
-use crate::holes::fill_holes;
-use crate::raster::Raster;
+use crate::gaps::fill_gaps;
+use crate::noise_floor::{
+    LARGEST_GAIN, LARGEST_REPORTED_GAIN, LARGEST_RISE, NoiseFloor, undoing_gain,
+};
+use crate::pose_spectra::local_spectra;
+use crate::sample_grid::SampleGrid;
 use crate::segments::Segments;
 use crate::{FourierPair, KinematicTrack, SpatialError, Spectrum, Stamp, so3};
 
-/// How far the poses are continued beyond their ends, s.
+/// How far the poses are continued beyond their ends, s; no source.
 const LEAD_S: f64 = 1.5;
+/// The same in entries at most, and at most a part of the series: the cost of a continuation grows
+/// with the third power of its length. No source.
+const LARGEST_LEAD: usize = 300;
+const LEAST_SERIES_PER_LEAD: usize = 4;
+/// Zeros after a series in its transforms, s, so that its ends do not meet. No source.
+const PADDING_S: f64 = 4.0;
+/// Fewest poses that a spectrum is learnt from; no source.
+const FEWEST_POSES: usize = 16;
+/// Least rate of the kinematics that an IMU model starts from, Hz: it resolves all motion that poses
+/// show. No source for the number.
+const LEAST_TRACK_RATE_HZ: f64 = 200.0;
+/// Mean variance of a quaternion's four components, for a variance of 1 per axis of the rotation
+/// vector: `q = (1, v / 2)` for a small v, so that their sum is 3 / 4.
+const QUATERNION_PER_ROTVEC: f64 = 3.0 / 16.0;
 
 /// White noise of poses: standard deviation per sample and axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PoseNoise {
-    /// m.
+    /// Of the position, m.
     pub position: f64,
-    /// rad.
+    /// Of the rotation vector, rad.
     pub rotation: f64,
 }
 
@@ -30,7 +47,7 @@ pub struct PoseNoise {
 /// Wiener's filter `W(f) = max(0, 1 - N / S(f))`, zero where S is hardly above N, gives the
 /// estimate with the least mean square error, whose own error has the density `W N`. S is taken
 /// with short and long windows, whichever says more. Derivatives are taken in the Fourier domain,
-/// where they are exact. Holes between samples are filled by the likeliest series of the same
+/// where they are exact. Gaps between samples are filled by the likeliest series of the same
 /// spectrum and are reported by [`PoseEstimate::gaps`].
 #[derive(Clone, Debug)]
 pub struct PoseEstimate {
@@ -39,12 +56,12 @@ pub struct PoseEstimate {
     count: usize,
     /// Entries that the coordinates hold before the first pose and after the last.
     lead: usize,
-    /// Position and sign-continuous quaternion on the grid, holes filled.
+    /// Position and sign-continuous quaternion on the grid, gaps filled.
     coordinates: Arc<Vec<Vec<f64>>>,
     /// Spectra around each window's centre: of position, of rotation.
     local: Arc<[Vec<Spectrum>; 2]>,
-    position: Floor,
-    rotation: Floor,
+    position: NoiseFloor,
+    rotation: NoiseFloor,
     gaps: Vec<(Stamp, Stamp)>,
     /// Cutoff of a smoothing that is undone.
     undone_hz: Option<f64>,
@@ -63,43 +80,43 @@ impl PoseEstimate {
         rotations: &[UnitQuaternion<f64>],
     ) -> Result<Self, SpatialError> {
         check(stamps, positions, rotations)?;
-        let raster = Raster::new(stamps)?;
+        let grid = SampleGrid::from_stamps(stamps)?;
         let quaternions = so3::sign_continuous(rotations);
         let coordinates: Vec<Vec<f64>> = (0..7)
             .map(|channel| {
-                let of = |index: usize| {
+                let value = |index: usize| {
                     if channel < 3 {
                         positions[index][channel]
                     } else {
                         quaternions[index].coords[channel - 3]
                     }
                 };
-                raster.resample(stamps, of)
+                grid.resample(stamps, value)
             })
             .collect();
-        Ok(Self::on_raster(&raster, coordinates))
+        Ok(Self::on_grid(&grid, coordinates))
     }
 
-    fn on_raster(raster: &Raster, mut coordinates: Vec<Vec<f64>>) -> Self {
-        let rate_hz = raster.rate_hz;
-        let holes = raster.holes();
+    fn on_grid(grid: &SampleGrid, mut coordinates: Vec<Vec<f64>>) -> Self {
+        let rate_hz = grid.rate_hz;
+        let gaps = grid.gaps();
         let learn = |coordinates: &[Vec<f64>]| {
             [
-                Floor::learn(&coordinates[..3], rate_hz, LARGEST_RISE[0]),
-                Floor::learn(&coordinates[3..], rate_hz, LARGEST_RISE[1]),
+                NoiseFloor::learn(&coordinates[..3], rate_hz, LARGEST_RISE[0]),
+                NoiseFloor::learn(&coordinates[3..], rate_hz, LARGEST_RISE[1]),
             ]
         };
         let mut floors = learn(&coordinates);
-        // Twice, because the first spectra saw straight lines across the holes.
-        for _ in 0..if holes.is_empty() { 0 } else { 2 } {
+        // Twice, because the first spectra saw straight lines across the gaps.
+        for _ in 0..if gaps.is_empty() { 0 } else { 2 } {
             let transform = FourierPair::new(FourierPair::good_length(
-                raster.count + (4.0 * rate_hz) as usize,
+                grid.count + (PADDING_S * rate_hz) as usize,
             ));
             let (positions, quaternions) = coordinates.split_at_mut(3);
-            fill_holes(positions, &holes, floors[0].spectrum(), &transform, rate_hz);
-            fill_holes(
+            fill_gaps(positions, &gaps, floors[0].spectrum(), &transform, rate_hz);
+            fill_gaps(
                 quaternions,
-                &holes,
+                &gaps,
                 floors[1].spectrum(),
                 &transform,
                 rate_hz,
@@ -112,13 +129,15 @@ impl PoseEstimate {
         ];
         let [mut position, mut rotation] = floors;
         // Beyond the ends as well: what is likely there keeps the last poses' derivatives sound.
-        let lead = ((LEAD_S * rate_hz) as usize).min(300).min(raster.count / 4);
+        let lead = ((LEAD_S * rate_hz) as usize)
+            .min(LARGEST_LEAD)
+            .min(grid.count / LEAST_SERIES_PER_LEAD);
         let (positions, quaternions) = coordinates.split_at_mut(3);
         lengthen(positions, lead, position.spectrum(), rate_hz);
         lengthen(quaternions, lead, rotation.spectrum(), rate_hz);
         position.localise(&local[0], rate_hz, None);
         rotation.localise(&local[1], rate_hz, None);
-        let (start, count, gaps) = (raster.start, raster.count, raster.gaps());
+        let (start, count, gaps) = (grid.start, grid.count, grid.gap_stamps());
         Self {
             start,
             rate_hz,
@@ -160,7 +179,7 @@ impl PoseEstimate {
         let sigma = |density: f64| (density * self.rate_hz / 2.0).sqrt();
         PoseNoise {
             position: sigma(self.position.white),
-            rotation: sigma(self.rotation.white * 16.0 / 3.0),
+            rotation: sigma(self.rotation.white / QUATERNION_PER_ROTVEC),
         }
     }
 
@@ -171,7 +190,7 @@ impl PoseEstimate {
         rotation
             .density
             .iter_mut()
-            .for_each(|value| *value *= 16.0 / 3.0);
+            .for_each(|value| *value *= 1.0 / QUATERNION_PER_ROTVEC);
         (self.position.spectrum().clone(), rotation)
     }
 
@@ -195,28 +214,29 @@ impl PoseEstimate {
     /// One-sided density per axis of the estimate's error at a frequency: position [m2/Hz],
     /// rotation vector [rad2/Hz].
     pub fn error_density(&self, frequency_hz: f64) -> (f64, f64) {
-        let density = |floor: &Floor| floor.noise_at(frequency_hz) * floor.filter_at(frequency_hz);
+        let density =
+            |floor: &NoiseFloor| floor.noise_at(frequency_hz) * floor.filter_at(frequency_hz);
         (
             density(&self.position),
-            density(&self.rotation) * 16.0 / 3.0,
+            density(&self.rotation) / QUATERNION_PER_ROTVEC,
         )
     }
 
     /// Share of the motion at a frequency that the estimate keeps, of position and of rotation, and
     /// the gain that undoes a smoothing.
     pub fn filter_at(&self, frequency_hz: f64) -> (f64, f64, f64) {
-        let gain = undo(frequency_hz, self.undone_hz, self.rate_hz);
+        let gain = undoing_gain(frequency_hz, self.undone_hz, self.rate_hz);
         (
             self.position.filter_at(frequency_hz),
             self.rotation.filter_at(frequency_hz),
-            gain.min(LARGEST_LOSS),
+            gain.min(LARGEST_REPORTED_GAIN),
         )
     }
 
     /// The kinematics on a grid that serves an IMU of some rate: at least that and 200 Hz, which
     /// resolves all motion that poses show.
     pub fn track_for(&self, imu_rate_hz: f64) -> KinematicTrack {
-        self.track(imu_rate_hz.max(200.0))
+        self.track(imu_rate_hz.max(LEAST_TRACK_RATE_HZ))
     }
 
     /// The kinematics on a grid of at least `least_rate_hz`, a whole multiple of the poses' rate,
@@ -232,50 +252,28 @@ impl PoseEstimate {
             lead: self.lead,
             count,
         };
-        let gain = |hz: f64| undo(hz, self.undone_hz, self.rate_hz).min(LARGEST_GAIN);
-        let mut accelerations = Vec::new();
-        for channel in 0..3 {
-            accelerations.extend(segments.derivatives(
-                &self.coordinates[channel],
-                &self.position.windows,
-                &gain,
-                &[2],
-            ));
-        }
-        let (mut values, mut rates, mut seconds) = (Vec::new(), Vec::new(), Vec::new());
-        for channel in 3..7 {
-            let mut all = segments
-                .derivatives(
-                    &self.coordinates[channel],
-                    &self.rotation.windows,
-                    &gain,
-                    &[0, 1, 2],
-                )
-                .into_iter();
-            values.extend(all.next());
-            rates.extend(all.next());
-            seconds.extend(all.next());
-        }
-        let quaternion =
-            |of: &[Vec<f64>], k: usize| Quaternion::new(of[3][k], of[0][k], of[1][k], of[2][k]);
-        let acceleration = |k: usize| {
-            Vector3::new(
-                accelerations[0][k],
-                accelerations[1][k],
-                accelerations[2][k],
-            )
+        let gain = |hz: f64| undoing_gain(hz, self.undone_hz, self.rate_hz).min(LARGEST_GAIN);
+        let derivatives = |channel: usize, orders: &[i32]| {
+            let windows = if channel < 3 {
+                &self.position.windows
+            } else {
+                &self.rotation.windows
+            };
+            segments.derivatives(&self.coordinates[channel], windows, &gain, orders)
         };
+        let accelerations = [0, 1, 2].map(|channel| derivatives(channel, &[2]).swap_remove(0));
+        let [i, j, k, w] = [3, 4, 5, 6].map(|channel| derivatives(channel, &[0, 1, 2]));
+        let quaternion = |order: usize, at: usize| {
+            Quaternion::new(w[order][at], i[order][at], j[order][at], k[order][at])
+        };
+        let acceleration = |at: usize| Vector3::from(accelerations.each_ref().map(|axis| axis[at]));
         let mut track = KinematicTrack {
             start: self.start,
             rate_hz,
             ..KinematicTrack::default()
         };
         for k in 0..count {
-            let (q, q_dot, q_ddot) = (
-                quaternion(&values, k),
-                quaternion(&rates, k),
-                quaternion(&seconds, k),
-            );
+            let [q, q_dot, q_ddot] = [0, 1, 2].map(|order| quaternion(order, k));
             let world_from_segment = UnitQuaternion::from_quaternion(q);
             let segment_from_world = world_from_segment.inverse();
             track.world_from_segment.push(world_from_segment);
@@ -306,9 +304,9 @@ fn lengthen(series: &mut [Vec<f64>], lead: usize, spectrum: &Spectrum, rate_hz: 
         *values = before.chain(values.iter().copied()).chain(after).collect();
     }
     let transform = FourierPair::new(FourierPair::good_length(
-        count + 2 * lead + (4.0 * rate_hz) as usize,
+        count + 2 * lead + (PADDING_S * rate_hz) as usize,
     ));
-    fill_holes(
+    fill_gaps(
         series,
         &[0..lead, lead + count..count + 2 * lead],
         spectrum,
@@ -317,6 +315,7 @@ fn lengthen(series: &mut [Vec<f64>], lead: usize, spectrum: &Spectrum, rate_hz: 
     );
 }
 
+/// Refuses poses that do not go together, are too few or are not finite.
 fn check(
     stamps: &[Stamp],
     positions: &[Vector3<f64>],
@@ -334,10 +333,10 @@ fn check(
             });
         }
     }
-    if stamps.len() < 16 {
+    if stamps.len() < FEWEST_POSES {
         return Err(SpatialError::TooFewSamples {
             got: stamps.len(),
-            needed: 16,
+            needed: FEWEST_POSES,
         });
     }
     if let Some(index) = (1..stamps.len()).find(|&k| stamps[k] <= stamps[k - 1]) {

@@ -136,8 +136,8 @@ fn a_smoothing_is_undone() {
         100.0,
         |_| true,
     );
-    let gain = |f: f64| 1.0 / undo(f, Some(3.0), 100.0);
-    assert!(undo(3.9, Some(3.0), 100.0) < LARGEST_GAIN);
+    let gain = |f: f64| 1.0 / undoing_gain(f, Some(3.0), 100.0);
+    assert!(undoing_gain(3.9, Some(3.0), 100.0) < LARGEST_GAIN);
     for (k, position) in positions.iter_mut().enumerate() {
         let t = k as f64 / 100.0;
         let clean = motion(t).0;
@@ -183,7 +183,7 @@ fn white_noise_alone_passes_nowhere() {
     let series: Vec<Vec<f64>> = (0..3)
         .map(|_| (0..count).map(|_| random.draw()).collect())
         .collect();
-    let floor = Floor::learn(&series, 200.0, 1.0);
+    let floor = NoiseFloor::learn(&series, 200.0, 1.0);
     let passing: Vec<f64> = floor
         .filter
         .iter()
@@ -242,7 +242,7 @@ fn noise_that_wanders_is_told_from_motion_by_its_knee() {
                 .collect()
         })
         .collect();
-    let floor = Floor::learn(&noisy, rate_hz, 1.0);
+    let floor = NoiseFloor::learn(&noisy, rate_hz, 1.0);
     for hz in [8.0, 12.0, 20.0, 30.0] {
         let ratio = floor.noise_at(hz) / noise(hz);
         assert!((0.4..2.5).contains(&ratio), "{ratio} at {hz} Hz");

@@ -2,7 +2,7 @@
 
 use crate::{SpatialError, Stamp};
 
-/// Two days at 100 Hz; the samples of so many stamps take some gigabytes.
+/// Most stamps that are made at once: two days at 100 Hz, whose samples take some gigabytes.
 const MAX_STAMPS: f64 = 2e7;
 
 /// Checks that times (s) are finite and strictly increasing.
@@ -41,19 +41,24 @@ pub fn uniform_stamps(first: Stamp, last: Stamp, rate_hz: f64) -> Result<Vec<Sta
     if !(rate_hz > 0.0 && rate_hz.is_finite()) {
         return Err(SpatialError::BadRate { rate_hz });
     }
-    let expected = (last - first) * rate_hz + 1.0;
-    if expected > MAX_STAMPS {
-        return Err(SpatialError::TooManyStamps {
-            count: expected,
-            limit: MAX_STAMPS,
-            rate_hz,
-        });
-    }
+    check_count((last - first) * rate_hz + 1.0, rate_hz)?;
     let stamps = (0..).map_while(|k: i64| {
         let stamp = first.plus_seconds(k as f64 / rate_hz);
         (stamp <= last).then_some(stamp)
     });
     Ok(stamps.collect())
+}
+
+/// Refuses more entries than fit into memory.
+pub(crate) fn check_count(count: f64, rate_hz: f64) -> Result<(), SpatialError> {
+    if count > MAX_STAMPS {
+        return Err(SpatialError::TooManyStamps {
+            count,
+            limit: MAX_STAMPS,
+            rate_hz,
+        });
+    }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -7,13 +7,13 @@ use crate::banded::Factor;
 use crate::basis::ORDER;
 use crate::system::SplineSystem;
 
-/// Weights of samples in an estimate: of value, first (1/s) and second derivative (1/s2), one row a
-/// sample.
+/// Weights of samples in what a spline says at one time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SampleWeights {
-    /// Number of the sample of the first row; those before it and after the last row do not count.
+    /// Index of the sample that the first row belongs to; samples before it and after the last row
+    /// have no weight.
     pub first: usize,
-    /// Weights.
+    /// One row a sample: its weight in the value, in the first (1/s) and the second derivative (1/s2).
     pub rows: Vec<[f64; 3]>,
 }
 
@@ -38,16 +38,16 @@ impl Influence {
     pub fn new(system: &Arc<SplineSystem>, weight: f64) -> Result<Self, SpatialError> {
         Ok(Self {
             system: system.clone(),
-            factor: system.factor(weight)?,
+            factor: system.equations.factor(weight)?,
         })
     }
 
     /// The weights at a time; times outside the samples are moved to the nearest end.
     pub fn at(&self, seconds: f64) -> SampleWeights {
-        let (first, values) = self.system.basis_at(seconds);
+        let (first, values) = self.system.equations.basis_at(seconds);
         let right: [[f64; 3]; ORDER] = std::array::from_fn(|j| values.map(|row| row[j]));
         let (start, solution) = self.factor.solve_near(first, &right);
-        let (first, rows) = self.system.transposed(start, &solution);
+        let (first, rows) = self.system.equations.transposed(start, &solution);
         SampleWeights { first, rows }
     }
 }

@@ -30,29 +30,34 @@
 mod banded;
 mod basis;
 mod confidence;
+mod derivative;
 mod derivative_risk;
 mod difference;
+mod end_derivatives;
+mod equations;
 mod error;
 mod estimate;
-mod floor;
+mod gaps;
 mod grid;
-mod holes;
 mod influence;
+mod noise_floor;
+mod noise_shape;
+mod pose_spectra;
 mod pose_spline;
-mod raster;
+mod sample_grid;
 mod segments;
-mod select;
 pub mod so3;
 mod spectrum;
 mod spline;
 mod stamp;
 mod system;
 mod track;
+mod weight_search;
 
 pub use confidence::{
     CONFIDENCE_LENGTH_M, HALF_CONFIDENCE_STD_M, confidence_of_std, std_of_confidence,
 };
-pub use derivative_risk::Derivative;
+pub use derivative::Derivative;
 pub use difference::{MAX_STENCIL, derivative_weights};
 pub use error::SpatialError;
 pub use estimate::{PoseEstimate, PoseNoise};
@@ -62,9 +67,9 @@ pub use pose_spline::{
     Motion, PoseSmoothing, PoseSpline, PoseTimes, position_channels, rotation_channels,
 };
 pub use rustfft::num_complex::Complex64;
-pub use select::WeightSearch;
 pub use spectrum::{FourierPair, Spectrum, welch};
 pub use spline::{Smoothing, SmoothingSpline};
 pub use stamp::Stamp;
 pub use system::SplineSystem;
 pub use track::KinematicTrack;
+pub use weight_search::WeightSearch;

@@ -7,34 +7,34 @@ use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 use crate::grid::relative_seconds;
 use crate::{Derivative, Smoothing, SmoothingSpline, SpatialError, SplineSystem, Stamp, so3};
 
-/// How a frame moves at one time, against the world and in its axes.
+/// How a frame moves at one time, against the world and in the world's axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
-    /// world_from_body.
+    /// Rotation world_from_body.
     pub rotation: UnitQuaternion<f64>,
-    /// Origin, m.
+    /// Origin of the body in the world, m.
     pub position: Vector3<f64>,
-    /// m/s.
+    /// Of the origin in world axes, m/s.
     pub velocity: Vector3<f64>,
-    /// m/s2, zero at rest.
+    /// Of the origin in world axes, m/s2; zero at rest.
     pub acceleration: Vector3<f64>,
-    /// rad/s.
+    /// Against the world in world axes, rad/s.
     pub angular_velocity: Vector3<f64>,
-    /// rad/s2.
+    /// Its time derivative, rad/s2.
     pub angular_acceleration: Vector3<f64>,
 }
 
 /// Smoothing of the two halves of a [`PoseSpline`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseSmoothing {
-    /// Of the position.
+    /// Of the position; default: chosen for the acceleration.
     pub position: Smoothing,
-    /// Of the rotation.
+    /// Of the rotation; default: chosen for the angular velocity.
     pub rotation: Smoothing,
 }
 
 impl Default for PoseSmoothing {
-    /// What the samples ask for, for the sake of acceleration and angular velocity.
+    /// As much as the samples ask for, so that acceleration and angular velocity err least.
     fn default() -> Self {
         Self {
             position: Smoothing::AutomaticFor(Derivative::Second),
@@ -114,7 +114,11 @@ impl PoseSpline {
 
     /// The motion at a stamp; stamps outside the samples are moved to the nearest end.
     pub fn evaluate(&self, stamp: Stamp) -> Motion {
-        let (first, values) = self.times.system.basis_at(stamp - self.times.origin);
+        let (first, values) = self
+            .times
+            .system
+            .equations
+            .basis_at(stamp - self.times.origin);
         let [position, velocity, acceleration] =
             self.position.combine(first, &values).map(Vector3::from);
         let [s, s_dot, s_ddot] = self.rotation.combine(first, &values).map(Quaternion::from);
@@ -128,12 +132,12 @@ impl PoseSpline {
         }
     }
 
-    /// The position's spline.
+    /// The spline of the position, m.
     pub fn position(&self) -> &SmoothingSpline<3> {
         &self.position
     }
 
-    /// The quaternion's spline (channels i, j, k, w).
+    /// The spline of the quaternion (channels i, j, k, w; not normalised).
     pub fn rotation(&self) -> &SmoothingSpline<4> {
         &self.rotation
     }

@@ -7,21 +7,24 @@ use rustfft::num_complex::Complex64;
 use crate::FourierPair;
 use crate::spectrum::interpolated;
 
-/// Distance of the windows' centres, s; each is cross-faded with its neighbours over this time.
+/// Distance of the windows' centres, s; each is cross-faded with its neighbours over this time. No source.
 pub(crate) const HOP_S: f64 = 2.0;
-/// What is taken beyond the cross-fade on either side, s: room for the filter's response, then a
-/// taper.
+/// What is taken beyond the cross-fade on either side, s: room for the filter's response. No source.
 const MARGIN_S: f64 = 1.0;
+/// What is taken beyond that, s, and faded out by a raised cosine. No source.
 const TAPER_S: f64 = 1.5;
 
 /// A zero-phase filter by its weights at evenly spaced frequencies.
 #[derive(Clone, Debug)]
 pub(crate) struct Filter {
+    /// Distance of two frequencies, Hz.
     pub spacing_hz: f64,
+    /// Gains from 0 Hz on.
     pub weights: Vec<f64>,
 }
 
 impl Filter {
+    /// Gain at a frequency.
     pub fn at(&self, frequency_hz: f64) -> f64 {
         interpolated(&self.weights, frequency_hz / self.spacing_hz)
     }
@@ -38,15 +41,26 @@ pub(crate) fn centres(count: usize, rate_hz: f64) -> Vec<usize> {
 
 /// How a series is cut, filtered and put together again.
 pub(crate) struct Segments {
-    /// Of the series.
+    /// Samples of the series per second.
     pub rate_hz: f64,
-    /// Samples, and entries of the series before the first of them (as many follow the last).
+    /// Number of samples that were measured.
     pub samples: usize,
+    /// Entries of the series before the first of them; as many follow the last.
     pub lead: usize,
     /// Entries of the result per sample.
     pub factor: usize,
     /// Entries of the result.
     pub count: usize,
+}
+
+/// The stretch of a series around one window's centre, in the Fourier domain.
+struct Stretch {
+    /// Index of its first sample; negative before the series' start.
+    first: i64,
+    /// The straight line that was taken off: value at the first sample, and per sample.
+    level: f64,
+    slope: f64,
+    spectrum: Vec<Complex64>,
 }
 
 impl Segments {
@@ -62,68 +76,110 @@ impl Segments {
         orders: &[i32],
     ) -> Vec<Vec<f64>> {
         let half = ((HOP_S + MARGIN_S + TAPER_S) * self.rate_hz).ceil() as usize;
-        let length = FourierPair::good_length(2 * half + 1);
-        let forward = FourierPair::new(length);
-        let inverse = FourierPair::new(length * self.factor);
-        let spacing_hz = self.rate_hz / length as f64;
+        let forward = FourierPair::new(FourierPair::good_length(2 * half + 1));
+        let inverse = FourierPair::new(forward.length() * self.factor);
         let mut results = vec![vec![0.0; self.count]; orders.len()];
-        let mut values = vec![Complex64::default(); length];
         let mut filtered = vec![Complex64::default(); inverse.length()];
-        for (window, (filter, centre)) in filters
-            .iter()
-            .zip(centres(self.samples, self.rate_hz))
-            .enumerate()
-        {
-            let first = centre as i64 - half as i64;
-            let value = |k: usize| continued(series, first + (k + self.lead) as i64);
-            let last = 2 * half;
-            let (level, slope) = (value(0), (value(last) - value(0)) / last as f64);
-            values.fill(Complex64::default());
-            for (k, slot) in values.iter_mut().enumerate().take(last + 1) {
-                let from_edge = k.min(last - k) as f64 / self.rate_hz;
-                let taper = if from_edge < TAPER_S {
-                    0.5 - 0.5 * (PI * from_edge / TAPER_S).cos()
-                } else {
-                    1.0
-                };
-                *slot = Complex64::new((value(k) - level - slope * k as f64) * taper, 0.0);
-            }
-            forward.forward(&mut values);
+        let centres = centres(self.samples, self.rate_hz);
+        for (window, (filter, centre)) in filters.iter().zip(centres).enumerate() {
+            let stretch = self.stretch(series, centre, half, &forward);
             for (order, result) in orders.iter().zip(&mut results) {
-                filtered.fill(Complex64::default());
-                for k in 0..length.div_ceil(2) {
-                    let frequency_hz = k as f64 * spacing_hz;
-                    let weight = filter.at(frequency_hz) * gain(frequency_hz);
-                    if weight == 0.0 {
-                        continue;
-                    }
-                    let value = values[k]
-                        * Complex64::new(0.0, TAU * frequency_hz).powi(*order)
-                        * (weight * self.factor as f64);
-                    filtered[k] = value;
-                    if k > 0 {
-                        filtered[inverse.length() - k] = value.conj();
-                    }
-                }
+                self.differentiate(&stretch, *order, filter, gain, &mut filtered);
                 inverse.inverse(&mut filtered);
-                let line = |entry: i64| match order {
-                    0 => level + slope * (entry as f64 / self.factor as f64 - first as f64),
-                    1 => slope * self.rate_hz,
-                    _ => 0.0,
-                };
-                let hop = HOP_S * self.rate_hz * self.factor as f64;
-                // The exact centre, not the sample next to it: the raised cosines add up to 1.
-                let middle = window as f64 * hop;
-                let from = (middle - hop).ceil().max(0.0) as usize;
-                let to = ((middle + hop).floor() as usize).min(self.count - 1);
-                for (entry, sum) in result.iter_mut().enumerate().take(to + 1).skip(from) {
-                    let weight = 0.5 + 0.5 * (PI * (entry as f64 - middle) / hop).cos();
-                    let place = entry as i64 - first * self.factor as i64;
-                    *sum += weight * (filtered[place as usize].re + line(entry as i64));
-                }
+                self.add_faded(result, window, &stretch, *order, &filtered);
             }
         }
         results
+    }
+
+    /// `half` samples on either side of a centre, less the line between their ends, tapered.
+    fn stretch(
+        &self,
+        series: &[f64],
+        centre: usize,
+        half: usize,
+        transform: &FourierPair,
+    ) -> Stretch {
+        let first = centre as i64 - half as i64;
+        let value = |k: usize| continued(series, first + (k + self.lead) as i64);
+        let last = 2 * half;
+        let (level, slope) = (value(0), (value(last) - value(0)) / last as f64);
+        let mut spectrum = vec![Complex64::default(); transform.length()];
+        for (k, slot) in spectrum.iter_mut().enumerate().take(last + 1) {
+            let from_edge = k.min(last - k) as f64 / self.rate_hz;
+            let taper = if from_edge < TAPER_S {
+                0.5 - 0.5 * (PI * from_edge / TAPER_S).cos()
+            } else {
+                1.0
+            };
+            *slot = Complex64::new((value(k) - level - slope * k as f64) * taper, 0.0);
+        }
+        transform.forward(&mut spectrum);
+        Stretch {
+            first,
+            level,
+            slope,
+            spectrum,
+        }
+    }
+
+    /// The spectrum of a derivative at the result's rate, into `filtered`.
+    fn differentiate(
+        &self,
+        stretch: &Stretch,
+        order: i32,
+        filter: &Filter,
+        gain: &dyn Fn(f64) -> f64,
+        filtered: &mut [Complex64],
+    ) {
+        let length = stretch.spectrum.len();
+        let spacing_hz = self.rate_hz / length as f64;
+        let result_length = filtered.len();
+        filtered.fill(Complex64::default());
+        for k in 0..length.div_ceil(2) {
+            let frequency_hz = k as f64 * spacing_hz;
+            let weight = filter.at(frequency_hz) * gain(frequency_hz);
+            if weight == 0.0 {
+                continue;
+            }
+            let value = stretch.spectrum[k]
+                * Complex64::new(0.0, TAU * frequency_hz).powi(order)
+                * (weight * self.factor as f64);
+            filtered[k] = value;
+            if k > 0 {
+                filtered[result_length - k] = value.conj();
+            }
+        }
+    }
+
+    /// Adds a window's part of a derivative, and the derivative of the line that was taken off, to
+    /// the result.
+    fn add_faded(
+        &self,
+        result: &mut [f64],
+        window: usize,
+        stretch: &Stretch,
+        order: i32,
+        filtered: &[Complex64],
+    ) {
+        let line = |entry: i64| match order {
+            0 => {
+                stretch.level
+                    + stretch.slope * (entry as f64 / self.factor as f64 - stretch.first as f64)
+            }
+            1 => stretch.slope * self.rate_hz,
+            _ => 0.0,
+        };
+        let hop = HOP_S * self.rate_hz * self.factor as f64;
+        // The exact centre, not the sample next to it: the raised cosines add up to 1.
+        let middle = window as f64 * hop;
+        let from = (middle - hop).ceil().max(0.0) as usize;
+        let to = ((middle + hop).floor() as usize).min(self.count - 1);
+        for (entry, sum) in result.iter_mut().enumerate().take(to + 1).skip(from) {
+            let weight = 0.5 + 0.5 * (PI * (entry as f64 - middle) / hop).cos();
+            let place = entry as i64 - stretch.first * self.factor as i64;
+            *sum += weight * (filtered[place as usize].re + line(entry as i64));
+        }
     }
 }
 

@@ -22,12 +22,25 @@ fn exp_and_log_are_inverse_from_tiny_to_nearly_half_a_turn() {
 }
 
 #[test]
+fn exp_and_log_are_those_of_nalgebra_to_the_last_digits() {
+    for scale in [1e-15, 1e-9, 1e-6, 1e-5, 1e-4, 2e-4, 0.1, 1.0, 3.0, 3.141] {
+        let rotvec = Vector3::new(0.36, -0.48, 0.8) * scale;
+        let (own, theirs) = (exp(&rotvec), UnitQuaternion::from_scaled_axis(rotvec));
+        assert!((own.coords - theirs.coords).norm() <= 3e-16, "{scale}");
+        assert!(
+            (log(&own) - own.scaled_axis()).norm() <= 6e-16 * scale,
+            "{scale}"
+        );
+    }
+}
+
+#[test]
 fn exp_agrees_with_rodrigues() {
     let rotvec = Vector3::new(0.5, -1.0, 0.7);
-    let (angle, k) = (rotvec.norm(), hat(&rotvec.normalize()));
+    let (angle, k): (f64, Matrix3<f64>) = (rotvec.norm(), rotvec.normalize().cross_matrix());
     let rodrigues = Matrix3::identity() + k * angle.sin() + k * k * (1.0 - angle.cos());
     assert!((exp(&rotvec).to_rotation_matrix().matrix() - rodrigues).norm() < 1e-14);
-    assert_eq!(vee(&hat(&rotvec)), rotvec);
+    assert_eq!(vee(&rotvec.cross_matrix()), rotvec);
 }
 
 #[test]

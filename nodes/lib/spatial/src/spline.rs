@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use crate::SpatialError;
 use crate::basis::BasisValues;
-use crate::derivative_risk::Derivative;
-use crate::select::{LOWEST_LOG_WEIGHT, Scratch, centred};
-use crate::system::SplineSystem;
+use crate::derivative::Derivative;
+use crate::equations::Scratch;
+use crate::system::{SplineSystem, centred};
+use crate::weight_search::LOWEST_LOG_WEIGHT;
 
 /// How much a spline smooths.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -51,7 +52,9 @@ impl Smoothing {
             Self::CutoffHz(rate_hz) if !(rate_hz > 0.0 && rate_hz.is_finite()) => {
                 Err(SpatialError::BadRate { rate_hz })
             }
-            Self::CutoffHz(cutoff_hz) => Ok(system.weight_of_cutoff(cutoff_hz).max(lowest)),
+            Self::CutoffHz(cutoff_hz) => {
+                Ok(system.equations.weight_of_cutoff(cutoff_hz).max(lowest))
+            }
             Self::Weight(weight) if !(weight >= 0.0 && weight.is_finite()) => {
                 Err(SpatialError::BadWeight { weight })
             }
@@ -96,11 +99,11 @@ impl<const C: usize> SmoothingSpline<C> {
         values: &[[f64; C]],
         smoothing: Smoothing,
     ) -> Result<Self, SpatialError> {
-        system.check(values)?;
+        system.equations.check(values)?;
         let weight = smoothing.weight(system, values)?;
         let mut scratch = Scratch::default();
         let (first, centred) = centred(values);
-        system.solve(&centred, weight, &mut scratch)?;
+        system.equations.solve(&centred, weight, &mut scratch)?;
         // The basis functions sum to one, so a constant may go onto the coefficients.
         for coefficient in &mut scratch.coefficients {
             for c in 0..C {
@@ -117,11 +120,11 @@ impl<const C: usize> SmoothingSpline<C> {
     /// Value, first and second derivative (per s, per s^2) at a time; times outside the samples are
     /// moved to the nearest end.
     pub fn evaluate(&self, seconds: f64) -> [[f64; C]; 3] {
-        let (first, values) = self.system.basis_at(seconds);
+        let (first, values) = self.system.equations.basis_at(seconds);
         self.combine(first, &values)
     }
 
-    /// As [`SmoothingSpline::evaluate`], from what [`SplineSystem::basis_at`] gave.
+    /// As [`SmoothingSpline::evaluate`], from what [`crate::equations::SplineEquations::basis_at`] gave.
     pub(crate) fn combine(&self, first: usize, values: &BasisValues) -> [[f64; C]; 3] {
         let mut result = [[0.0; C]; 3];
         for (j, coefficient) in self.coefficients[first..first + values[0].len()]
@@ -144,27 +147,7 @@ impl<const C: usize> SmoothingSpline<C> {
 
     /// Frequency at which the smoothing's response is one half, Hz.
     pub fn cutoff_hz(&self) -> f64 {
-        self.system.cutoff_of_weight(self.weight)
-    }
-}
-
-impl SplineSystem {
-    /// First function and the basis' values and derivatives, per s and s^2, at a time moved into
-    /// the range.
-    pub(crate) fn basis_at(&self, seconds: f64) -> (usize, BasisValues) {
-        let end = self.basis.interval(self.basis.interval_count() - 1).1;
-        let t = ((seconds - self.origin) / self.interval).clamp(0.0, end);
-        let first = self.basis.interval_of(t);
-        let [value, slope, second] = self.basis.values(first, t);
-        let per_second = 1.0 / self.interval;
-        (
-            first,
-            [
-                value,
-                slope.map(|s| s * per_second),
-                second.map(|s| s * per_second * per_second),
-            ],
-        )
+        self.system.equations.cutoff_of_weight(self.weight)
     }
 }
 

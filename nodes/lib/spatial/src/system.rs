@@ -1,25 +1,25 @@
-//! The equations of a smoothing spline: everything that depends on the times alone.
+//! Smoothing splines on one set of times, and the choice of their weight from the samples.
 
 use std::ops::Range;
 use std::sync::OnceLock;
 
 use crate::SpatialError;
-use crate::banded::{Banded, Factor};
-use crate::basis::{Basis, DEGREE, ORDER};
-use crate::derivative_risk::{Derivative, SplitRun};
-use crate::difference::{MAX_STENCIL, derivative_weights};
+use crate::derivative::Derivative;
+use crate::derivative_risk::{SplitRun, refine};
+use crate::equations::{Scratch, SplineEquations};
 use crate::grid::check_times;
-use crate::select::{Scratch, searched_ranges};
+use crate::weight_search::{HIGHEST_LOG_WEIGHT, LOWEST_LOG_WEIGHT, WeightSearch};
 
-/// Derivative that smoothing penalises. Five is the highest that a quintic has; the response to
-/// noise, `1 / (1 + weight w^10)`, then falls the most sharply, and motion below the cutoff passes
-/// with the least loss.
-pub(crate) const PENALTY_ORDER: usize = 5;
-
-/// Towards the ends the penalty falls linearly over so many intervals: with samples on one side
-/// only, the same weight would let the fifth derivative's natural condition bend the curve
-/// (measured: the error of a smoothed acceleration there falls by a third).
-const EASED_INTERVALS: f64 = 40.0;
+/// With fewer samples than this there is too little to learn a weight from. No source.
+const FEWEST_SAMPLES: usize = 16;
+/// Most samples that a search looks at: its time is then bounded, whatever the length of the series.
+/// No source.
+const SEARCHED_SAMPLES: usize = 768;
+/// Runs of samples, spread evenly over the series, in which they lie. No source.
+const SEARCHED_RUNS: usize = 3;
+/// How near the weight that leaves a wanted residual is found, decimal logarithm: the cutoff within
+/// 0.2 %.
+const RESIDUAL_LOG_STEP: f64 = 0.01;
 
 /// The equations of smoothing splines on one set of times, made once and shared by all series on
 /// these times.
@@ -34,34 +34,13 @@ const EASED_INTERVALS: f64 = 40.0;
 /// they settle the ends to sixth order, among noisy ones they weigh next to nothing.
 #[derive(Clone, Debug)]
 pub struct SplineSystem {
-    pub(crate) basis: Basis,
-    /// Median sample interval, s.
-    pub(crate) interval: f64,
-    /// Time of the first sample, s.
-    pub(crate) origin: f64,
-    sample_count: usize,
-    /// Values of the basis functions at the samples: sample k lies under the functions from min(k,
-    /// N - 2) on.
-    collocation: Vec<[f64; ORDER]>,
-    ends: [EndDerivative; 4],
-    /// Fifth derivative over each knot interval, times the root of its share in the penalty: `|rows
-    /// c|^2 = c^T P c`.
-    penalty_rows: Vec<[f64; ORDER]>,
-    gram: Banded,
-    penalty: Banded,
+    pub(crate) equations: SplineEquations,
+    /// Of the samples, in median intervals since the first.
     times: Vec<f64>,
-    runs: OnceLock<Vec<(Range<usize>, SplineSystem)>>,
+    /// See [`SplineSystem::runs`].
+    runs: OnceLock<Vec<(Range<usize>, SplineEquations)>>,
+    /// See [`SplineSystem::split_runs`].
     split_runs: [OnceLock<Vec<SplitRun>>; 2],
-}
-
-/// A derivative at one end as an observation: `row . c[first ..] = sum_j stencil[j] y[start + j]`.
-#[derive(Clone, Copy, Debug)]
-struct EndDerivative {
-    first: usize,
-    row: [f64; ORDER],
-    start: usize,
-    stencil: [f64; MAX_STENCIL],
-    weight: f64,
 }
 
 impl SplineSystem {
@@ -78,85 +57,43 @@ impl SplineSystem {
         }
         check_times(seconds)?;
         let interval = median_interval(seconds);
-        let times = seconds
+        let times: Vec<f64> = seconds
             .iter()
             .map(|t| (t - seconds[0]) / interval)
             .collect();
-        Ok(Self::from_times(times, interval, seconds[0]))
-    }
-
-    /// `times`: at least two, increasing, in intervals since the origin.
-    pub(crate) fn from_times(times: Vec<f64>, interval: f64, origin: f64) -> Self {
-        let basis = Basis::new(&times);
-        let last_interval = basis.interval_count() - 1;
-        let collocation: Vec<_> = times
-            .iter()
-            .enumerate()
-            .map(|(k, &t)| basis.derivatives(k.min(last_interval), t, 0))
-            .collect();
-        let mut gram = Banded::zeros(basis.count());
-        for (k, row) in collocation.iter().enumerate() {
-            add_outer_product(&mut gram, k.min(last_interval), row, 1.0);
-        }
-        let ends = end_derivatives(&basis, &times);
-        for end in &ends {
-            add_outer_product(&mut gram, end.first, &end.row, end.weight);
-        }
-        let penalty_rows = penalty_rows(&basis);
-        let mut penalty = Banded::zeros(basis.count());
-        for (first, row) in penalty_rows.iter().enumerate() {
-            add_outer_product(&mut penalty, first, row, 1.0);
-        }
-        let (sample_count, runs, split_runs) = (times.len(), OnceLock::new(), Default::default());
-        Self {
-            basis,
-            interval,
-            origin,
-            sample_count,
-            collocation,
-            ends,
-            penalty_rows,
-            gram,
-            penalty,
+        Ok(Self {
+            equations: SplineEquations::from_times(&times, interval, seconds[0]),
             times,
-            runs,
-            split_runs,
-        }
-    }
-
-    /// Number of samples.
-    pub fn sample_count(&self) -> usize {
-        self.sample_count
-    }
-
-    /// Median sample interval, s.
-    pub fn median_interval(&self) -> f64 {
-        self.interval
+            runs: OnceLock::new(),
+            split_runs: Default::default(),
+        })
     }
 
     /// The runs of samples that a search for a weight looks at, empty where it looks at all; made
     /// when first asked for. Their times count in this system's interval, so that a weight means
     /// the same in all of them.
-    pub(crate) fn runs(&self) -> &[(Range<usize>, SplineSystem)] {
+    fn runs(&self) -> &[(Range<usize>, SplineEquations)] {
         self.runs.get_or_init(|| {
-            let ranges = searched_ranges(self.sample_count).into_iter();
-            ranges
-                .map(|range| {
-                    (
-                        range.clone(),
-                        Self::from_times(self.times[range].to_vec(), self.interval, self.origin),
-                    )
-                })
+            let SplineEquations {
+                interval, origin, ..
+            } = self.equations;
+            let run = |range: Range<usize>| {
+                let times = &self.times[range.clone()];
+                (range, SplineEquations::from_times(times, interval, origin))
+            };
+            searched_ranges(self.times.len())
+                .into_iter()
+                .map(run)
                 .collect()
         })
     }
 
     /// The same runs, or the whole, split into halves for [`Derivative`]; made when first asked
     /// for.
-    pub(crate) fn split_runs(&self, derivative: Derivative) -> &[SplitRun] {
+    fn split_runs(&self, derivative: Derivative) -> &[SplitRun] {
         self.split_runs[derivative as usize].get_or_init(|| {
-            let ranges = match searched_ranges(self.sample_count) {
-                ranges if ranges.is_empty() => std::iter::once(0..self.sample_count).collect(),
+            let ranges = match searched_ranges(self.times.len()) {
+                ranges if ranges.is_empty() => std::iter::once(0..self.times.len()).collect(),
                 ranges => ranges,
             };
             ranges
@@ -166,240 +103,104 @@ impl SplineSystem {
         })
     }
 
-    /// Weight whose response `1 / (1 + weight w^10)` is one half at `cutoff_hz`.
-    pub fn weight_of_cutoff(&self, cutoff_hz: f64) -> f64 {
-        (std::f64::consts::TAU * cutoff_hz * self.interval).powi(-2 * PENALTY_ORDER as i32)
-    }
-
-    /// Frequency at which a weight's response is one half, Hz.
-    pub fn cutoff_of_weight(&self, weight: f64) -> f64 {
-        weight.powf(-0.5 / PENALTY_ORDER as f64) / (std::f64::consts::TAU * self.interval)
-    }
-
-    /// Checks that `values` belong to these times and are finite.
-    pub(crate) fn check<const C: usize>(&self, values: &[[f64; C]]) -> Result<(), SpatialError> {
-        if values.len() != self.sample_count {
-            return Err(SpatialError::LengthMismatch {
-                what: "values",
-                expected: self.sample_count,
-                found: values.len(),
-            });
-        }
-        match values
-            .iter()
-            .position(|value| value.iter().any(|v| !v.is_finite()))
-        {
-            Some(index) => Err(SpatialError::NotFinite {
-                index,
-                what: "value",
-            }),
-            None => Ok(()),
-        }
-    }
-
-    /// Minimises `|y - B c|^2 + weight c^T P c`; the coefficients come in `scratch`.
+    /// Score of a weight for samples on these times, smaller is better: with n observations, n
+    /// functions, m = 5 and C channels that share weight and noise, `C ((n - m) ln(Q / C (n - m)) +
+    /// ln |B^T B + weight P| - (n - m) ln weight)`, Q the penalised residual square.
     ///
-    /// A large weight drowns B in the sum `B^T B + weight P`: solutions are then refined with the
-    /// residual of the least-squares problem itself, in which B and P are apart, to an error that
-    /// grows with the root of the weight only.
-    pub(crate) fn solve<const C: usize>(
+    /// # Errors
+    /// Samples of the wrong number or not finite, or a singular system.
+    pub fn score<const C: usize>(
         &self,
         values: &[[f64; C]],
         weight: f64,
-        scratch: &mut Scratch<C>,
-    ) -> Result<(), SpatialError> {
-        scratch
-            .factor
-            .factor_sum(&self.gram, weight, &self.penalty)?;
-        scratch.coefficients.clear();
-        scratch.coefficients.resize(self.basis.count(), [0.0; C]);
-        let refinements = if weight < 1e2 {
-            0
-        } else {
-            1 + usize::from(weight > 1e8)
-        };
-        for _ in 0..=refinements {
-            self.residual(values, weight, scratch);
-            scratch.factor.solve(&mut scratch.correction);
-            for (coefficient, correction) in
-                scratch.coefficients.iter_mut().zip(&scratch.correction)
-            {
-                for c in 0..C {
-                    coefficient[c] += correction[c];
-                }
-            }
-        }
-        Ok(())
+    ) -> Result<f64, SpatialError> {
+        self.equations.check(values)?;
+        self.equations
+            .score(values, weight, &mut Scratch::default())
     }
 
-    /// `B^T B + weight P`, factored.
-    pub(crate) fn factor(&self, weight: f64) -> Result<Factor, SpatialError> {
-        let mut factor = Factor::default();
-        factor.factor_sum(&self.gram, weight, &self.penalty)?;
-        Ok(factor)
-    }
-
-    /// What the samples are multiplied with in `x^T B^T y`, the derivatives at the ends included,
-    /// for coefficients x that are zero but from `start` on: one row a sample, and the first
-    /// sample.
-    pub(crate) fn transposed<const C: usize>(
-        &self,
-        start: usize,
-        x: &[[f64; C]],
-    ) -> (usize, Vec<[f64; C]>) {
-        let last_interval = self.basis.interval_count() - 1;
-        let dot = |first: usize, row: &[f64; ORDER]| -> [f64; C] {
-            let entry = |j: usize| {
-                (first + j)
-                    .checked_sub(start)
-                    .and_then(|i| x.get(i))
-                    .copied()
-                    .unwrap_or([0.0; C])
-            };
-            (0..ORDER).fold([0.0; C], |sum, j| {
-                std::array::from_fn(|c| sum[c] + row[j] * entry(j)[c])
-            })
-        };
-        let (mut low, mut high) = (
-            start.saturating_sub(DEGREE),
-            (start + x.len()).min(self.sample_count),
-        );
-        let reached = self
-            .ends
-            .iter()
-            .filter(|end| end.first < start + x.len() && start < end.first + ORDER);
-        let reached: Vec<&EndDerivative> = reached.collect();
-        for end in &reached {
-            low = low.min(end.start);
-            high = high.max((end.start + MAX_STENCIL).min(self.sample_count));
-        }
-        low = low.min(high);
-        let mut rows: Vec<[f64; C]> = (low..high)
-            .map(|k| dot(k.min(last_interval), &self.collocation[k]))
-            .collect();
-        for end in reached {
-            let weighted = dot(end.first, &end.row).map(|d| d * end.weight);
-            for (row, w) in rows[end.start - low..].iter_mut().zip(end.stencil) {
-                (0..C).for_each(|c| row[c] += w * weighted[c]);
-            }
-        }
-        (low, rows)
-    }
-
-    /// `B^T (y - B c) - weight P c` of the coefficients in `scratch`, into its correction; returns
-    /// `|y - B c|^2 + weight c^T P c`, over all channels, summed from the residuals themselves.
-    pub(crate) fn residual<const C: usize>(
+    /// The largest weight that leaves at most `std` per channel, root mean square: what it leaves
+    /// grows with the weight, so halving finds it.
+    pub(crate) fn weight_of_residual<const C: usize>(
         &self,
         values: &[[f64; C]],
-        weight: f64,
-        scratch: &mut Scratch<C>,
-    ) -> f64 {
-        let Scratch {
-            coefficients,
-            correction,
-            ..
-        } = scratch;
-        correction.clear();
-        correction.resize(self.basis.count(), [0.0; C]);
-        let last_interval = self.basis.interval_count() - 1;
-        let mut sum = 0.0;
-        for (k, (value, row)) in values.iter().zip(&self.collocation).enumerate() {
-            let first = k.min(last_interval);
-            sum += add_residual(
-                &coefficients[first..],
-                row,
-                value,
-                1.0,
-                &mut correction[first..],
-            );
-        }
-        for end in &self.ends {
-            let target = end.target(values);
-            sum += add_residual(
-                &coefficients[end.first..],
-                &end.row,
-                &target,
-                end.weight,
-                &mut correction[end.first..],
-            );
-        }
-        for (first, row) in self.penalty_rows.iter().enumerate() {
-            sum += add_residual(
-                &coefficients[first..],
-                row,
-                &[0.0; C],
-                weight,
-                &mut correction[first..],
-            );
-        }
-        sum
-    }
-
-    /// `|y - B c|^2` over the samples and channels alone.
-    pub(crate) fn distance<const C: usize>(
-        &self,
-        values: &[[f64; C]],
-        coefficients: &[[f64; C]],
-    ) -> f64 {
-        let last_interval = self.basis.interval_count() - 1;
-        let square = |(k, (value, row)): (usize, (&[f64; C], &[f64; ORDER]))| -> f64 {
-            let near = &coefficients[k.min(last_interval)..];
-            (0..C)
-                .map(|c| {
-                    (value[c]
-                        - row
-                            .iter()
-                            .zip(near)
-                            .map(|(w, near)| w * near[c])
-                            .sum::<f64>())
-                    .powi(2)
-                })
-                .sum()
+        std: f64,
+    ) -> Result<f64, SpatialError> {
+        let (_, centred) = centred(values);
+        let mut scratch = Scratch::default();
+        let mut leaves = |log: f64| -> Result<f64, SpatialError> {
+            self.equations
+                .solve(&centred, 10f64.powf(log), &mut scratch)?;
+            let distance = self.equations.distance(&centred, &scratch.coefficients);
+            Ok((distance / (C * values.len()) as f64).sqrt())
         };
-        values
-            .iter()
-            .zip(&self.collocation)
-            .enumerate()
-            .map(square)
-            .sum()
-    }
-}
-
-impl EndDerivative {
-    fn target<const C: usize>(&self, values: &[[f64; C]]) -> [f64; C] {
-        let mut target = [0.0; C];
-        for (value, w) in values[self.start..].iter().zip(self.stencil) {
-            for c in 0..C {
-                target[c] += w * value[c];
+        let (mut low, mut high) = (LOWEST_LOG_WEIGHT, HIGHEST_LOG_WEIGHT);
+        if leaves(high)? <= std {
+            return Ok(10f64.powf(high));
+        }
+        while high - low > RESIDUAL_LOG_STEP {
+            let middle = 0.5 * (low + high);
+            if leaves(middle)? <= std {
+                low = middle
+            } else {
+                high = middle
             }
         }
-        target
+        Ok(10f64.powf(low))
     }
-}
 
-/// Residual of one row: its weighted square is returned, its weighted product with the row added to
-/// `correction`.
-#[inline]
-fn add_residual<const C: usize>(
-    coefficients: &[[f64; C]],
-    row: &[f64; ORDER],
-    value: &[f64; C],
-    weight: f64,
-    correction: &mut [[f64; C]],
-) -> f64 {
-    let mut residual = *value;
-    for (coefficient, b) in coefficients[..ORDER].iter().zip(row) {
-        for c in 0..C {
-            residual[c] -= b * coefficient[c];
+    /// The weight that suits these samples best: of the greatest likelihood, or near it that of the
+    /// least error of a derivative.
+    pub(crate) fn search<const C: usize>(
+        &self,
+        values: &[[f64; C]],
+        derivative: Option<Derivative>,
+    ) -> Result<f64, SpatialError> {
+        let lowest = 10f64.powf(LOWEST_LOG_WEIGHT);
+        if self.times.len() < FEWEST_SAMPLES {
+            return Ok(lowest);
+        }
+        let (_, centred) = centred(values);
+        let mut scratch = Scratch::default();
+        let mut search = WeightSearch::new();
+        while let Some(weight) = search.next_weight() {
+            let score = self.over_runs(|range, equations| {
+                equations.score(&centred[range], weight, &mut scratch)
+            });
+            search.record(score.unwrap_or(f64::INFINITY));
+        }
+        let likelihood = search.best().unwrap_or(lowest);
+        let Some(derivative) = derivative else {
+            return Ok(likelihood);
+        };
+        let mut free = 0.0;
+        let square = self.over_runs(|range, equations| {
+            equations.solve(&centred[range.clone()], likelihood, &mut scratch)?;
+            free += (C * equations.free_count()) as f64;
+            Ok(equations.residual(&centred[range], likelihood, &mut scratch))
+        })?;
+        Ok(refine(
+            self.split_runs(derivative),
+            &centred,
+            likelihood,
+            square / free,
+            derivative,
+        ))
+    }
+
+    /// Sum over the runs that a search looks at, or over the whole.
+    fn over_runs(
+        &self,
+        mut term: impl FnMut(Range<usize>, &SplineEquations) -> Result<f64, SpatialError>,
+    ) -> Result<f64, SpatialError> {
+        match self.runs() {
+            [] => term(0..self.times.len(), &self.equations),
+            runs => runs
+                .iter()
+                .map(|(range, equations)| term(range.clone(), equations))
+                .sum(),
         }
     }
-    let weighted = residual.map(|r| weight * r);
-    for (entry, b) in correction[..ORDER].iter_mut().zip(row) {
-        for c in 0..C {
-            entry[c] += b * weighted[c];
-        }
-    }
-    (0..C).map(|c| residual[c] * weighted[c]).sum()
 }
 
 fn median_interval(seconds: &[f64]) -> f64 {
@@ -408,47 +209,53 @@ fn median_interval(seconds: &[f64]) -> f64 {
     *intervals.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-fn end_derivatives(basis: &Basis, times: &[f64]) -> [EndDerivative; 4] {
-    let (count, last_interval) = (times.len(), basis.interval_count() - 1);
-    let used = count.min(MAX_STENCIL);
-    let at = |start: usize, first: usize, t: f64, order: usize| {
-        let stencil = derivative_weights(&times[start..start + used], t)[order];
-        let square: f64 = stencil.iter().map(|w| w * w).sum();
-        let weight = if square > 0.0 { 1.0 / square } else { 1.0 };
-        EndDerivative {
-            first,
-            row: basis.derivatives(first, t, order),
-            start,
-            stencil,
-            weight,
-        }
-    };
-    let (start, end) = (times[0], times[count - 1]);
-    [
-        at(0, 0, start, 1),
-        at(0, 0, start, 2),
-        at(count - used, last_interval, end, 1),
-        at(count - used, last_interval, end, 2),
-    ]
-}
-
-fn add_outer_product(matrix: &mut Banded, first: usize, row: &[f64; ORDER], weight: f64) {
-    for i in 0..ORDER {
-        for j in 0..=i {
-            matrix.rows[first + i][i - j] += weight * row[i] * row[j];
-        }
+/// Ranges of samples that a search looks at; empty where it looks at all.
+fn searched_ranges(sample_count: usize) -> Vec<Range<usize>> {
+    if sample_count <= SEARCHED_SAMPLES {
+        return Vec::new();
     }
+    let length = SEARCHED_SAMPLES / SEARCHED_RUNS;
+    let spare = sample_count - SEARCHED_SAMPLES;
+    let start = |run: usize| run * length + (2 * run + 1) * spare / (2 * SEARCHED_RUNS);
+    (0..SEARCHED_RUNS)
+        .map(|run| start(run)..start(run) + length)
+        .collect()
 }
 
-/// The fifth derivatives are constant between knots.
-fn penalty_rows(basis: &Basis) -> Vec<[f64; ORDER]> {
-    let row = |first: usize| {
-        let (start, end) = basis.interval(first);
-        let from_end = first.min(basis.interval_count() - 1 - first) as f64 + 0.5;
-        let share = (end - start) * (from_end / EASED_INTERVALS).min(1.0);
-        basis
-            .derivatives(first, 0.5 * (start + end), PENALTY_ORDER)
-            .map(|d| d * share.sqrt())
-    };
-    (0..basis.interval_count()).map(row).collect()
+/// The first value, and all values less the first: differences do not change, and rounding does not
+/// grow with the distance from zero.
+pub(crate) fn centred<const C: usize>(values: &[[f64; C]]) -> ([f64; C], Vec<[f64; C]>) {
+    let first = values.first().copied().unwrap_or([0.0; C]);
+    (
+        first,
+        values
+            .iter()
+            .map(|value| std::array::from_fn(|c| value[c] - first[c]))
+            .collect(),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn searched_ranges_are_spread_over_the_series() {
+        assert!(searched_ranges(SEARCHED_SAMPLES).is_empty());
+        let ranges = searched_ranges(6000);
+        assert_eq!(
+            ranges.iter().map(Range::len).sum::<usize>(),
+            SEARCHED_SAMPLES
+        );
+        assert!(
+            ranges[0].start > 500
+                && ranges[2].end < 5500
+                && ranges.windows(2).all(|w| w[0].end < w[1].start)
+        );
+        assert!(
+            searched_ranges(SEARCHED_SAMPLES + 1)
+                .windows(2)
+                .all(|w| w[0].end <= w[1].start)
+        );
+    }
 }

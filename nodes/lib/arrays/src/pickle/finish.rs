@@ -2,14 +2,13 @@
 
 use std::sync::Arc;
 
+use super::fault::{Fault, Reason};
 use super::machine::Machine;
 use super::node::{Id, Node, Opaque, Source, Tensor};
-use super::torch::tensor_array;
-use super::{Fault, Reason};
-use crate::array::ArrayData;
 use crate::blob::Blob;
 use crate::dtype::{DType, Kind};
-use crate::value::{Dict, Sparse, SparseKind, Value};
+use crate::limits::Budget;
+use crate::value::{ArrayData, Dict, Sparse, SparseKind, Value};
 
 /// What a value in a list or dictionary takes, about.
 const VALUE_BYTES: u64 = 64;
@@ -140,20 +139,10 @@ impl Finisher<'_, '_> {
             }
             Node::Objects(shape, items) => {
                 let (items, height) = self.items(&items, depth)?;
-                return Ok((
-                    Value::Array(Arc::new(ArrayData::objects(shape, items)?)),
-                    height,
-                ));
+                let array = ArrayData::objects(shape, items)?;
+                return Ok((Value::Array(Arc::new(array)), height));
             }
-            Node::Dict(pairs) => {
-                let (keys, values): (Vec<_>, Vec<_>) = pairs.into_iter().unzip();
-                let ((keys, key_height), (values, height)) =
-                    (self.items(&keys, depth)?, self.items(&values, depth)?);
-                return Ok((
-                    Value::Dict(Arc::new(Dict::new(keys.into_iter().zip(values)))),
-                    height.max(key_height),
-                ));
-            }
+            Node::Dict(pairs) => return self.dictionary(pairs, depth),
             // It also lies where nothing is skipped.
             Node::Opaque(opaque) => return Err(self.refuse(*opaque)),
             Node::Sparse(kind, state) => {
@@ -167,6 +156,14 @@ impl Finisher<'_, '_> {
             }
         };
         Ok((value, 0))
+    }
+
+    fn dictionary(&mut self, pairs: Vec<(Id, Id)>, depth: usize) -> Result<(Value, usize), String> {
+        let (keys, values): (Vec<_>, Vec<_>) = pairs.into_iter().unzip();
+        let ((keys, key_height), (values, height)) =
+            (self.items(&keys, depth)?, self.items(&values, depth)?);
+        let dict = Dict::new(keys.into_iter().zip(values));
+        Ok((Value::Dict(Arc::new(dict)), height.max(key_height)))
     }
 
     fn items(&mut self, ids: &[Id], depth: usize) -> Result<(Vec<Value>, usize), String> {
@@ -340,4 +337,17 @@ fn size(value: &Value) -> Option<usize> {
         }
         _ => None,
     }
+}
+
+/// The array of a tensor, once its storage is at hand.
+fn tensor_array(tensor: &Tensor, storage: &Blob, budget: &mut Budget) -> Result<ArrayData, String> {
+    let (array, repeated) = ArrayData::strided(
+        tensor.dtype,
+        storage,
+        tensor.first,
+        tensor.shape.clone(),
+        tensor.strides.clone(),
+    )?;
+    budget.take_expanded(repeated)?;
+    Ok(array)
 }

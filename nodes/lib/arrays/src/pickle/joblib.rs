@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
+use super::fault::Reason;
 use super::machine::Machine;
 use super::node::{Id, Node};
-use super::{Reason, read_nested};
-use crate::array::ArrayData;
+use super::read::read_nested;
 use crate::dtype::Kind;
+use crate::value::ArrayData;
 
 impl Machine<'_> {
     /// The array whose `NumpyArrayWrapper` has `state`: its bytes begin where the pickle stands,

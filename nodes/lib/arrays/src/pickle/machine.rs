@@ -1,10 +1,14 @@
-//! The stack machine.
+//! The stack machine: its state, and what its opcodes do to it.
 
+use super::fault::{Fault, Reason};
 use super::known::known;
 use super::node::{Id, Node, Opaque};
-use super::{Fault, NESTING_LIMIT, Reason, text};
 use crate::blob::Blob;
 use crate::limits::Budget;
+
+/// How deep pickles may lie within pickles: arrays of objects in joblib files, torch storages in
+/// plain pickles.
+const NESTING_LIMIT: usize = 4;
 
 /// What a node and its place on the stack take, about.
 const NODE_BYTES: u64 = 96;
@@ -48,152 +52,32 @@ impl<'a> Machine<'a> {
         })
     }
 
-    /// Runs to the end of the pickle; the result is what is left on the stack.
-    pub fn run(&mut self) -> Result<Id, Fault> {
-        // One machine reads the pickles of a legacy torch file one after another: each starts
-        // afresh.
+    /// Forgets all but the nodes: one machine reads the pickles of a legacy torch file one after
+    /// another.
+    pub fn restart(&mut self) {
         (self.memo_count, self.opcodes) = (0, 0);
         self.memo.clear();
         self.stack.clear();
         self.marks.clear();
-        loop {
-            let offset = self.position;
-            self.opcode_at = offset;
-            let fault = |reason: Reason| Fault { offset, reason };
-            self.opcodes += 1;
-            self.budget.opcodes = self.budget.opcodes.checked_sub(1).ok_or_else(|| {
-                fault(
-                    format!(
-                        "more than {} opcodes; raise Limits::opcodes if the file is sound",
-                        self.budget.limits.opcodes
-                    )
-                    .into(),
-                )
-            })?;
-            let opcode = self
-                .take(1)
-                .map_err(fault)?
-                .first()
-                .copied()
-                .unwrap_or_default();
-            if opcode == b'.' {
-                return self.pop().map_err(fault);
-            }
-            self.step(opcode).map_err(fault)?;
-        }
     }
 
-    /// Protocols 0 and 1.
-    fn step(&mut self, opcode: u8) -> Result<(), Reason> {
-        match opcode {
-            b'(' => self.marks.push(self.stack.len()),
-            b'0' => self.drop_top()?,
-            b'1' => drop(self.pop_mark()?),
-            b'2' => self.stack.push(self.top()?),
-            b'F' => self.push_line("a float", |line| text::float(line).map(Node::Float))?,
-            b'I' | b'L' => self.push_line("an integer", text::integer)?,
-            b'S' => self.push_line("a quoted string", |line| {
-                text::quoted(line).map(|bytes| Node::OldText(bytes.into()))
-            })?,
-            b'V' => self.push_line("a string", |line| {
-                text::raw_unicode(line).map(|text| Node::Text(text.into()))
-            })?,
-            b'G' => self.push_fixed(|bytes: [u8; 8]| Node::Float(f64::from_be_bytes(bytes)))?,
-            b'J' => self.push_fixed(|bytes| Node::Int(i32::from_le_bytes(bytes).into()))?,
-            b'K' => self.push_fixed(|[byte]| Node::Int(byte.into()))?,
-            b'M' => self.push_fixed(|bytes| Node::Int(u16::from_le_bytes(bytes).into()))?,
-            b'N' => self.push(Node::None)?,
-            b'T' => self.sized::<4>(|bytes| Ok(Node::OldText(bytes)))?,
-            b'U' => self.sized::<1>(|bytes| Ok(Node::OldText(bytes)))?,
-            b'X' => self.sized::<4>(utf8)?,
-            b']' => self.push(Node::List(Vec::new()))?,
-            b'}' => self.push(Node::Dict(Vec::new()))?,
-            b')' => self.push(Node::Tuple(Vec::new()))?,
-            b'l' => self.push_mark(Node::List)?,
-            b't' => self.push_mark(Node::Tuple)?,
-            b'd' => {
-                let items = self.pop_mark()?;
-                self.push(Node::Dict(pairs(&items)?))?;
-            }
-            b'a' => self.append(1)?,
-            b'e' => self.append_mark()?,
-            b's' => self.set_items(false)?,
-            b'u' => self.set_items(true)?,
-            b'g' | b'p' => self.memo_by_line(opcode == b'g')?,
-            b'h' => self.memo_by_bytes::<1>(true)?,
-            b'j' => self.memo_by_bytes::<4>(true)?,
-            b'q' => self.memo_by_bytes::<1>(false)?,
-            b'r' => self.memo_by_bytes::<4>(false)?,
-            b'c' => self.global_by_lines()?,
-            b'R' => self.reduce()?,
-            b'b' => self.build()?,
-            b'i' | b'o' => self.old_instance(opcode == b'i')?,
-            b'Q' => self.persistent()?,
-            _ => self.step_newer(opcode)?,
-        }
-        Ok(())
+    /// Takes the next opcode and counts it.
+    pub fn next_opcode(&mut self) -> Result<u8, Reason> {
+        self.opcode_at = self.position;
+        self.opcodes += 1;
+        self.budget.opcodes = self.budget.opcodes.checked_sub(1).ok_or_else(|| {
+            format!(
+                "more than {} opcodes; raise Limits::opcodes if the file is sound",
+                self.budget.limits.opcodes
+            )
+        })?;
+        let opcode = self.take(1)?;
+        Ok(opcode.first().copied().unwrap_or_default())
     }
 
-    /// Protocols 2 to 5.
-    fn step_newer(&mut self, opcode: u8) -> Result<(), Reason> {
-        match opcode {
-            0x80 => drop(self.take(1)?),
-            0x81 => self.new_object()?,
-            0x85..=0x87 => {
-                let items = self.pop_several(usize::from(opcode - 0x84))?;
-                self.push(Node::Tuple(items))?;
-            }
-            0x88 => self.push(Node::Bool(true))?,
-            0x89 => self.push(Node::Bool(false))?,
-            0x8a => self.sized::<1>(|bytes| {
-                text::long(&bytes).ok_or_else(|| "an integer is too long".into())
-            })?,
-            0x8b => self.sized::<4>(|bytes| {
-                text::long(&bytes).ok_or_else(|| "an integer is too long".into())
-            })?,
-            b'B' => self.sized::<4>(|bytes| Ok(Node::Bytes(bytes)))?,
-            b'C' => self.sized::<1>(|bytes| Ok(Node::Bytes(bytes)))?,
-            0x8c => self.sized::<1>(utf8)?,
-            0x8d => self.sized::<8>(utf8)?,
-            0x8e | 0x96 => self.sized::<8>(|bytes| Ok(Node::Bytes(bytes)))?,
-            0x8f => self.push(Node::List(Vec::new()))?,
-            0x90 => self.append_mark()?,
-            0x91 => self.push_mark(Node::List)?,
-            0x92 => {
-                let keywords = self.pop()?;
-                if !matches!(self.node(keywords), Node::Dict(pairs) if pairs.is_empty()) {
-                    return Err(
-                        "an object is made with keywords, which this reader does not know".into(),
-                    );
-                }
-                self.new_object()?;
-            }
-            0x93 => {
-                let (name, module) = (self.pop()?, self.pop()?);
-                let (Some(module), Some(name)) = (self.text(module), self.text(name)) else {
-                    return Err("a name is no text".into());
-                };
-                self.global(&module, &name)?;
-            }
-            0x94 => self.memoize()?,
-            0x95 => drop(self.take(8)?), // a frame is a hint for reading ahead
-            b'P' => return Err("a persistent id in text; only torch's are known".into()),
-            0x82..=0x84 => {
-                return Err(
-                    "a name from Python's extension registry, which is not in the file".into(),
-                );
-            }
-            0x97 | 0x98 => {
-                return Err("a buffer outside of the pickle, which is not in the file".into());
-            }
-            _ => {
-                return Err(format!(
-                    "0x{opcode:02x} is no opcode; the file may be damaged, or be no pickle"
-                )
-                .into());
-            }
-        }
-        Ok(())
+    /// The stack's height is a mark.
+    pub fn mark(&mut self) {
+        self.marks.push(self.stack.len());
     }
 
     pub fn push(&mut self, node: Node) -> Result<(), Reason> {
@@ -246,7 +130,7 @@ impl<'a> Machine<'a> {
     }
 
     /// `POP` also takes a mark off.
-    fn drop_top(&mut self) -> Result<(), Reason> {
+    pub fn drop_top(&mut self) -> Result<(), Reason> {
         if self.marks.last() == Some(&self.stack.len()) {
             self.marks.pop();
             return Ok(());
@@ -254,7 +138,7 @@ impl<'a> Machine<'a> {
         self.pop().map(drop)
     }
 
-    fn pop_several(&mut self, count: usize) -> Result<Vec<Id>, Reason> {
+    pub fn pop_several(&mut self, count: usize) -> Result<Vec<Id>, Reason> {
         let start = self
             .stack
             .len()
@@ -273,7 +157,7 @@ impl<'a> Machine<'a> {
         Ok(self.stack.split_off(mark.min(self.stack.len())))
     }
 
-    fn push_mark(&mut self, node: impl FnOnce(Vec<Id>) -> Node) -> Result<(), Reason> {
+    pub fn push_mark(&mut self, node: impl FnOnce(Vec<Id>) -> Node) -> Result<(), Reason> {
         let items = self.pop_mark()?;
         self.push(node(items))
     }
@@ -309,7 +193,7 @@ impl<'a> Machine<'a> {
         Ok(line)
     }
 
-    fn push_line(
+    pub fn push_line(
         &mut self,
         what: &str,
         node: impl FnOnce(&[u8]) -> Option<Node>,
@@ -319,7 +203,7 @@ impl<'a> Machine<'a> {
         self.push(node(&line).ok_or_else(|| format!("`{}` is not {what}", shortened(&line)))?)
     }
 
-    fn push_fixed<const N: usize>(
+    pub fn push_fixed<const N: usize>(
         &mut self,
         node: impl FnOnce([u8; N]) -> Node,
     ) -> Result<(), Reason> {
@@ -328,7 +212,7 @@ impl<'a> Machine<'a> {
     }
 
     /// A length of N bytes, least significant first, and as many bytes.
-    fn sized<const N: usize>(
+    pub fn sized<const N: usize>(
         &mut self,
         node: impl FnOnce(Blob) -> Result<Node, Reason>,
     ) -> Result<(), Reason> {
@@ -338,12 +222,12 @@ impl<'a> Machine<'a> {
         self.push(node(bytes)?)
     }
 
-    fn append(&mut self, count: usize) -> Result<(), Reason> {
+    pub fn append(&mut self, count: usize) -> Result<(), Reason> {
         let items = self.pop_several(count)?;
         self.extend_top(items)
     }
 
-    fn append_mark(&mut self) -> Result<(), Reason> {
+    pub fn append_mark(&mut self) -> Result<(), Reason> {
         let items = self.pop_mark()?;
         self.extend_top(items)
     }
@@ -358,7 +242,7 @@ impl<'a> Machine<'a> {
         Ok(())
     }
 
-    fn set_items(&mut self, many: bool) -> Result<(), Reason> {
+    pub fn set_items(&mut self, many: bool) -> Result<(), Reason> {
         let items = if many {
             self.pop_mark()?
         } else {
@@ -373,7 +257,7 @@ impl<'a> Machine<'a> {
         Ok(())
     }
 
-    fn memo_by_line(&mut self, get: bool) -> Result<(), Reason> {
+    pub fn memo_by_line(&mut self, get: bool) -> Result<(), Reason> {
         let line = self.line()?;
         let index = std::str::from_utf8(&line)
             .ok()
@@ -381,7 +265,7 @@ impl<'a> Machine<'a> {
         self.memo(index.ok_or("a memo number is no number")?, get)
     }
 
-    fn memo_by_bytes<const N: usize>(&mut self, get: bool) -> Result<(), Reason> {
+    pub fn memo_by_bytes<const N: usize>(&mut self, get: bool) -> Result<(), Reason> {
         let index = little_endian(self.fixed::<N>()?);
         self.memo(usize::try_from(index).unwrap_or(usize::MAX), get)
     }
@@ -412,11 +296,11 @@ impl<'a> Machine<'a> {
         Ok(())
     }
 
-    fn memoize(&mut self) -> Result<(), Reason> {
+    pub fn memoize(&mut self) -> Result<(), Reason> {
         self.memo(self.memo_count, false)
     }
 
-    fn global_by_lines(&mut self) -> Result<(), Reason> {
+    pub fn global_by_lines(&mut self) -> Result<(), Reason> {
         let (module, name) = (self.line()?, self.line()?);
         self.global(
             &String::from_utf8_lossy(&module),
@@ -446,11 +330,6 @@ impl<'a> Machine<'a> {
     pub fn skips(&self) -> bool {
         self.nesting == 0 && !self.budget.skipped.is_empty()
     }
-}
-
-fn utf8(bytes: Blob) -> Result<Node, Reason> {
-    // Lone surrogates, which Python lets pass, are no text here.
-    Ok(Node::Text(String::from_utf8_lossy(&bytes).into()))
 }
 
 pub(super) fn pairs(items: &[Id]) -> Result<Vec<(Id, Id)>, Reason> {

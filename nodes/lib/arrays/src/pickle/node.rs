@@ -3,10 +3,9 @@
 use std::sync::Arc;
 
 use super::known::Known;
-use crate::array::ArrayData;
 use crate::blob::Blob;
 use crate::dtype::DType;
-use crate::value::{SparseKind, Value};
+use crate::value::{ArrayData, SparseKind, Value};
 
 /// Index into the arena.
 pub(super) type Id = u32;

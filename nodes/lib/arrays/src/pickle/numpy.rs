@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use super::Reason;
+use super::fault::Reason;
 use super::machine::{Machine, shortened};
 use super::node::{Id, Node};
-use crate::array::ArrayData;
 use crate::blob::Blob;
 use crate::dtype::{DType, Kind};
+use crate::value::ArrayData;
 
 impl Machine<'_> {
     /// `numpy.dtype('f8', False, True)`.

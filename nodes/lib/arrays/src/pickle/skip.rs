@@ -1,8 +1,8 @@
 //! Entries of dictionaries that are left out unread, whatever they hold.
 
+use super::fault::{Fault, Reason};
 use super::machine::Machine;
 use super::node::{Id, Node};
-use super::{Fault, Reason};
 
 /// Takes the entries off that the budget names by their keys from the root on. Unknown names may
 /// stand below them, and nowhere else in the pickle: the first that does is refused.

@@ -4,16 +4,13 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use super::finish::finish;
+use super::fault::{Fault, Reason};
 use super::known::Known;
 use super::machine::Machine;
 use super::node::{Id, Node, Source, Storage, Tensor};
-use super::{Fault, Reason};
-use crate::array::ArrayData;
 use crate::blob::Blob;
 use crate::dtype::DType;
 use crate::limits::Budget;
-use crate::value::Value;
 
 /// How files begin that torch wrote before version 1.6, and storages in plain pickles: a pickled
 /// number.
@@ -106,55 +103,19 @@ impl Machine<'_> {
     }
 }
 
-/// The array of a tensor, once its storage is at hand.
-pub(super) fn tensor_array(
-    tensor: &Tensor,
-    storage: &Blob,
-    budget: &mut Budget,
-) -> Result<ArrayData, String> {
-    let (array, repeated) = ArrayData::strided(
-        tensor.dtype,
-        storage,
-        tensor.first,
-        tensor.shape.clone(),
-        tensor.strides.clone(),
-    )?;
-    budget.take_expanded(repeated)?;
-    Ok(array)
-}
-
-/// The value of `data.pkl` in a torch archive; `storage` fetches the entry of a storage.
-pub(crate) fn read_zipped(
-    content: &Blob,
-    budget: &mut Budget,
-    storage: &mut dyn FnMut(&str) -> Result<Blob, String>,
-) -> Result<Value, Fault> {
-    let mut machine = Machine::new(content.clone(), budget, 0)?;
-    let root = machine.run()?;
-    finish(machine, root, storage)
-}
-
-/// The value of a file that torch wrote before version 1.6.
-pub(crate) fn read_legacy(content: &Blob, budget: &mut Budget) -> Result<Value, Fault> {
-    let Legacy { root, id, storages } = Legacy::new(content, budget, 0)?;
-    finish(root, id, &mut |key| {
-        storages
-            .get(key)
-            .cloned()
-            .ok_or_else(|| format!("storage {key} is missing"))
-    })
-}
-
 /// Five pickles (magic number, version, system, root object, storage keys), then of each storage
 /// its element count and its elements.
-struct Legacy<'a> {
-    root: Machine<'a>,
-    id: Id,
-    storages: HashMap<Arc<str>, Blob>,
+pub(super) struct Legacy<'a> {
+    /// The machine that read them all.
+    pub root: Machine<'a>,
+    /// The root object.
+    pub id: Id,
+    /// The bytes of each storage by its key.
+    pub storages: HashMap<Arc<str>, Blob>,
 }
 
 impl<'a> Legacy<'a> {
-    fn new(content: &Blob, budget: &'a mut Budget, nesting: usize) -> Result<Self, Fault> {
+    pub fn new(content: &Blob, budget: &'a mut Budget, nesting: usize) -> Result<Self, Fault> {
         if !content.starts_with(LEGACY_START) {
             return Err(Fault::new(0, "torch's magic number is missing"));
         }

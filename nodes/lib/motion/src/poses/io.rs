@@ -29,7 +29,7 @@ pub fn open_poses(path: &Path, view: PoseView) -> Result<Option<PoseFile>, Motio
         return Ok(None);
     }
     let mut reader = BufReader::new(file);
-    if Format::of(&mut reader).map_err(unreadable)?.is_none() {
+    if Format::detect(&mut reader).map_err(unreadable)?.is_none() {
         return Ok(None);
     }
     let mut container = Container::without(reader, path, Limits::default(), super::amass::SKIPPED)?;

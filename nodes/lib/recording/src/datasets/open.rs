@@ -113,7 +113,7 @@ pub fn open_dataset(
         return Ok(None);
     }
     let name = path.display().to_string();
-    let recording = match Format::of(&mut reader).map_err(unreadable)? {
+    let recording = match Format::detect(&mut reader).map_err(unreadable)? {
         None => return text(path, &name, beside),
         Some(Format::Zip) if realworld::is_realworld(open(path)?) => {
             (DatasetFormat::RealWorld, realworld(path, &name, beside)?)

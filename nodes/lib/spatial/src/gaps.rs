@@ -1,4 +1,4 @@
-//! Filling holes in stationary series.
+//! Filling gaps in stationary series.
 
 use std::ops::Range;
 
@@ -7,18 +7,22 @@ use rustfft::num_complex::Complex64;
 
 use crate::{FourierPair, Spectrum};
 
-/// Holes longer than this are left as they are: nothing is known in their middle.
-const LONGEST: usize = 600;
+/// Longest gap that is filled, entries: in the middle of longer ones nothing is known, and the cost
+/// grows with the third power. No source for the number.
+const LONGEST_GAP: usize = 600;
+/// Added to the diagonal of a matrix whose other entries are at most 1, so that rounding does not
+/// make it singular; no source.
+const RIDGE: f64 = 1e-12;
 
-/// Replaces the entries in `holes` by the likeliest ones, given the others and the series' spectrum
+/// Replaces the entries in `gaps` by the likeliest ones, given the others and the series' spectrum
 /// S.
 ///
 /// For a stationary Gaussian series the negative log-likelihood is `1/2 x^T C^-1 x`, where C^-1 has
 /// the spectrum 1/S; its minimum over the missing entries m, given the observed o, solves `C^-1_mm
 /// x_m = -C^-1_mo x_o`. The straight line between the series' ends is left out.
-pub(crate) fn fill_holes(
+pub(crate) fn fill_gaps(
     series: &mut [Vec<f64>],
-    holes: &[Range<usize>],
+    gaps: &[Range<usize>],
     spectrum: &Spectrum,
     transform: &FourierPair,
     rate_hz: f64,
@@ -45,9 +49,9 @@ pub(crate) fn fill_holes(
     transform.inverse(&mut kernel);
     // Never cut short: what is smooth and large has to cancel over its whole length.
     let kernel = |distance: usize| kernel[distance].re;
-    for hole in holes.iter().filter(|hole| hole.len() <= LONGEST) {
-        let matrix = DMatrix::from_fn(hole.len(), hole.len(), |i, j| {
-            kernel(i.abs_diff(j)) + if i == j { 1e-12 } else { 0.0 }
+    for gap in gaps.iter().filter(|gap| gap.len() <= LONGEST_GAP) {
+        let matrix = DMatrix::from_fn(gap.len(), gap.len(), |i, j| {
+            kernel(i.abs_diff(j)) + if i == j { RIDGE } else { 0.0 }
         });
         let Some(factor) = matrix.cholesky() else {
             continue;
@@ -55,18 +59,18 @@ pub(crate) fn fill_holes(
         for values in series.iter_mut() {
             let last = values.len() - 1;
             let line = |k: usize| values[0] + (values[last] - values[0]) * k as f64 / last as f64;
-            let right = DVector::from_fn(hole.len(), |i, _| {
-                let entry = hole.start + i;
+            let right = DVector::from_fn(gap.len(), |i, _| {
+                let entry = gap.start + i;
                 -(0..values.len())
-                    .filter(|k| !hole.contains(k))
+                    .filter(|k| !gap.contains(k))
                     .map(|k| kernel(k.abs_diff(entry)) * (values[k] - line(k)))
                     .sum::<f64>()
             });
             let missing = factor.solve(&right);
-            let filled: Vec<f64> = (0..hole.len())
-                .map(|i| missing[i] + line(hole.start + i))
+            let filled: Vec<f64> = (0..gap.len())
+                .map(|i| missing[i] + line(gap.start + i))
                 .collect();
-            values[hole.clone()].copy_from_slice(&filled);
+            values[gap.clone()].copy_from_slice(&filled);
         }
     }
 }

@@ -1,0 +1,367 @@
+//! The equations of a smoothing spline: everything that depends on the times alone.
+
+use crate::SpatialError;
+use crate::banded::{Banded, Factor};
+use crate::basis::{Basis, BasisValues, DEGREE, ORDER};
+use crate::difference::MAX_STENCIL;
+use crate::end_derivatives::{EndDerivative, end_derivatives};
+
+/// Derivative that smoothing penalises. Five is the highest that a quintic has; the response to
+/// noise, `1 / (1 + weight w^10)`, then falls the most sharply, and motion below the cutoff passes
+/// with the least loss.
+pub(crate) const PENALTY_ORDER: usize = 5;
+
+/// Towards the ends the penalty falls linearly over so many intervals: with samples on one side
+/// only, the same weight would let the fifth derivative's natural condition bend the curve
+/// (measured: the error of a smoothed acceleration there falls by a third).
+const EASED_INTERVALS: f64 = 40.0;
+
+/// From these weights on a solution is refined once, and once more: at a weight of 10^k about k of
+/// the sixteen digits of `B^T B` drown in the sum. The two weights have no source.
+const REFINED_ONCE: f64 = 1e2;
+const REFINED_TWICE: f64 = 1e8;
+
+/// The equations of smoothing splines on one set of times: see [`crate::SplineSystem`].
+#[derive(Clone, Debug)]
+pub(crate) struct SplineEquations {
+    pub(crate) basis: Basis,
+    /// Median sample interval, s.
+    pub(crate) interval: f64,
+    /// Time of the first sample, s.
+    pub(crate) origin: f64,
+    pub(crate) sample_count: usize,
+    /// Values of the basis functions at the samples: sample k lies under the functions from min(k,
+    /// N - 2) on.
+    collocation: Vec<[f64; ORDER]>,
+    ends: [EndDerivative; 4],
+    /// Fifth derivative over each knot interval, times the root of its share in the penalty: `|rows
+    /// c|^2 = c^T P c`.
+    penalty_rows: Vec<[f64; ORDER]>,
+    gram: Banded,
+    penalty: Banded,
+}
+
+/// Memory that solving reuses.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Scratch<const C: usize> {
+    pub(crate) factor: Factor,
+    pub(crate) coefficients: Vec<[f64; C]>,
+    pub(crate) correction: Vec<[f64; C]>,
+}
+
+impl SplineEquations {
+    /// `times`: at least two, increasing, in intervals since the origin.
+    pub(crate) fn from_times(times: &[f64], interval: f64, origin: f64) -> Self {
+        let basis = Basis::new(times);
+        let last_interval = basis.interval_count() - 1;
+        let collocation: Vec<_> = times
+            .iter()
+            .enumerate()
+            .map(|(k, &t)| basis.derivatives(k.min(last_interval), t, 0))
+            .collect();
+        let mut gram = Banded::zeros(basis.count());
+        for (k, row) in collocation.iter().enumerate() {
+            add_outer_product(&mut gram, k.min(last_interval), row, 1.0);
+        }
+        let ends = end_derivatives(&basis, times);
+        for end in &ends {
+            add_outer_product(&mut gram, end.first, &end.row, end.weight);
+        }
+        let penalty_rows = penalty_rows(&basis);
+        let mut penalty = Banded::zeros(basis.count());
+        for (first, row) in penalty_rows.iter().enumerate() {
+            add_outer_product(&mut penalty, first, row, 1.0);
+        }
+        Self {
+            basis,
+            interval,
+            origin,
+            sample_count: times.len(),
+            collocation,
+            ends,
+            penalty_rows,
+            gram,
+            penalty,
+        }
+    }
+
+    /// Checks that `values` belong to these times and are finite.
+    pub(crate) fn check<const C: usize>(&self, values: &[[f64; C]]) -> Result<(), SpatialError> {
+        if values.len() != self.sample_count {
+            return Err(SpatialError::LengthMismatch {
+                what: "values",
+                expected: self.sample_count,
+                found: values.len(),
+            });
+        }
+        match values
+            .iter()
+            .position(|value| value.iter().any(|v| !v.is_finite()))
+        {
+            Some(index) => Err(SpatialError::NotFinite {
+                index,
+                what: "value",
+            }),
+            None => Ok(()),
+        }
+    }
+
+    /// Minimises `|y - B c|^2 + weight c^T P c`; the coefficients come in `scratch`.
+    ///
+    /// A large weight drowns B in the sum `B^T B + weight P`: solutions are then refined with the
+    /// residual of the least-squares problem itself, in which B and P are apart, to an error that
+    /// grows with the root of the weight only.
+    pub(crate) fn solve<const C: usize>(
+        &self,
+        values: &[[f64; C]],
+        weight: f64,
+        scratch: &mut Scratch<C>,
+    ) -> Result<(), SpatialError> {
+        scratch
+            .factor
+            .factor_sum(&self.gram, weight, &self.penalty)?;
+        scratch.coefficients.clear();
+        scratch.coefficients.resize(self.basis.count(), [0.0; C]);
+        let refinements = usize::from(weight >= REFINED_ONCE) + usize::from(weight > REFINED_TWICE);
+        for _ in 0..=refinements {
+            self.residual(values, weight, scratch);
+            scratch.factor.solve(&mut scratch.correction);
+            for (coefficient, correction) in
+                scratch.coefficients.iter_mut().zip(&scratch.correction)
+            {
+                for c in 0..C {
+                    coefficient[c] += correction[c];
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// `B^T B + weight P`, factored.
+    pub(crate) fn factor(&self, weight: f64) -> Result<Factor, SpatialError> {
+        let mut factor = Factor::default();
+        factor.factor_sum(&self.gram, weight, &self.penalty)?;
+        Ok(factor)
+    }
+
+    /// What the samples are multiplied with in `x^T B^T y`, the derivatives at the ends included,
+    /// for coefficients x that are zero but from `start` on: one row a sample, and the first
+    /// sample.
+    pub(crate) fn transposed<const C: usize>(
+        &self,
+        start: usize,
+        x: &[[f64; C]],
+    ) -> (usize, Vec<[f64; C]>) {
+        let last_interval = self.basis.interval_count() - 1;
+        let dot = |first: usize, row: &[f64; ORDER]| -> [f64; C] {
+            let entry = |j: usize| {
+                (first + j)
+                    .checked_sub(start)
+                    .and_then(|i| x.get(i))
+                    .copied()
+                    .unwrap_or([0.0; C])
+            };
+            (0..ORDER).fold([0.0; C], |sum, j| {
+                std::array::from_fn(|c| sum[c] + row[j] * entry(j)[c])
+            })
+        };
+        let (mut low, mut high) = (
+            start.saturating_sub(DEGREE),
+            (start + x.len()).min(self.sample_count),
+        );
+        let reached = self
+            .ends
+            .iter()
+            .filter(|end| end.first < start + x.len() && start < end.first + ORDER);
+        let reached: Vec<&EndDerivative> = reached.collect();
+        for end in &reached {
+            low = low.min(end.start);
+            high = high.max((end.start + MAX_STENCIL).min(self.sample_count));
+        }
+        low = low.min(high);
+        let mut rows: Vec<[f64; C]> = (low..high)
+            .map(|k| dot(k.min(last_interval), &self.collocation[k]))
+            .collect();
+        for end in reached {
+            let weighted = dot(end.first, &end.row).map(|d| d * end.weight);
+            for (row, w) in rows[end.start - low..].iter_mut().zip(end.stencil) {
+                (0..C).for_each(|c| row[c] += w * weighted[c]);
+            }
+        }
+        (low, rows)
+    }
+
+    /// `B^T (y - B c) - weight P c` of the coefficients in `scratch`, into its correction; returns
+    /// `|y - B c|^2 + weight c^T P c`, over all channels, summed from the residuals themselves.
+    pub(crate) fn residual<const C: usize>(
+        &self,
+        values: &[[f64; C]],
+        weight: f64,
+        scratch: &mut Scratch<C>,
+    ) -> f64 {
+        let Scratch {
+            coefficients,
+            correction,
+            ..
+        } = scratch;
+        correction.clear();
+        correction.resize(self.basis.count(), [0.0; C]);
+        let last_interval = self.basis.interval_count() - 1;
+        let mut sum = 0.0;
+        for (k, (value, row)) in values.iter().zip(&self.collocation).enumerate() {
+            let first = k.min(last_interval);
+            sum += add_residual(
+                &coefficients[first..],
+                row,
+                value,
+                1.0,
+                &mut correction[first..],
+            );
+        }
+        for end in &self.ends {
+            let target = end.target(values);
+            sum += add_residual(
+                &coefficients[end.first..],
+                &end.row,
+                &target,
+                end.weight,
+                &mut correction[end.first..],
+            );
+        }
+        for (first, row) in self.penalty_rows.iter().enumerate() {
+            sum += add_residual(
+                &coefficients[first..],
+                row,
+                &[0.0; C],
+                weight,
+                &mut correction[first..],
+            );
+        }
+        sum
+    }
+
+    /// `|y - B c|^2` over the samples and channels alone.
+    pub(crate) fn distance<const C: usize>(
+        &self,
+        values: &[[f64; C]],
+        coefficients: &[[f64; C]],
+    ) -> f64 {
+        let last_interval = self.basis.interval_count() - 1;
+        let square = |(k, (value, row)): (usize, (&[f64; C], &[f64; ORDER]))| -> f64 {
+            let near = &coefficients[k.min(last_interval)..];
+            (0..C)
+                .map(|c| {
+                    (value[c]
+                        - row
+                            .iter()
+                            .zip(near)
+                            .map(|(w, near)| w * near[c])
+                            .sum::<f64>())
+                    .powi(2)
+                })
+                .sum()
+        };
+        values
+            .iter()
+            .zip(&self.collocation)
+            .enumerate()
+            .map(square)
+            .sum()
+    }
+
+    /// First function and the basis' values and derivatives, per s and s^2, at a time moved into
+    /// the range.
+    pub(crate) fn basis_at(&self, seconds: f64) -> (usize, BasisValues) {
+        let end = self.basis.interval(self.basis.interval_count() - 1).1;
+        let t = ((seconds - self.origin) / self.interval).clamp(0.0, end);
+        let first = self.basis.interval_of(t);
+        let [value, slope, second] = self.basis.values(first, t);
+        let per_second = 1.0 / self.interval;
+        (
+            first,
+            [
+                value,
+                slope.map(|s| s * per_second),
+                second.map(|s| s * per_second * per_second),
+            ],
+        )
+    }
+
+    /// Weight whose response `1 / (1 + weight w^10)` is one half at `cutoff_hz`.
+    pub(crate) fn weight_of_cutoff(&self, cutoff_hz: f64) -> f64 {
+        (std::f64::consts::TAU * cutoff_hz * self.interval).powi(-2 * PENALTY_ORDER as i32)
+    }
+
+    /// Frequency at which a weight's response is one half, Hz.
+    pub(crate) fn cutoff_of_weight(&self, weight: f64) -> f64 {
+        weight.powf(-0.5 / PENALTY_ORDER as f64) / (std::f64::consts::TAU * self.interval)
+    }
+
+    /// Observations, the four derivatives at the ends among them, less the polynomial part.
+    pub(crate) fn free_count(&self) -> usize {
+        self.sample_count + 4 - PENALTY_ORDER
+    }
+
+    /// Score of a weight, see [`crate::SplineSystem::score`].
+    pub(crate) fn score<const C: usize>(
+        &self,
+        values: &[[f64; C]],
+        weight: f64,
+        scratch: &mut Scratch<C>,
+    ) -> Result<f64, SpatialError> {
+        self.solve(values, weight, scratch)?;
+        let square = self.residual(values, weight, scratch);
+        let free = self.free_count() as f64;
+        // A series at rest leaves nothing: any weight is right for it, and the logarithm must stay
+        // finite.
+        let mean_square = square / (C as f64 * free) + f64::MIN_POSITIVE;
+        Ok(C as f64
+            * (free * mean_square.ln() + scratch.factor.log_determinant() - free * weight.ln()))
+    }
+}
+
+/// Residual of one row: its weighted square is returned, its weighted product with the row added to
+/// `correction`.
+#[inline]
+fn add_residual<const C: usize>(
+    coefficients: &[[f64; C]],
+    row: &[f64; ORDER],
+    value: &[f64; C],
+    weight: f64,
+    correction: &mut [[f64; C]],
+) -> f64 {
+    let mut residual = *value;
+    for (coefficient, b) in coefficients[..ORDER].iter().zip(row) {
+        for c in 0..C {
+            residual[c] -= b * coefficient[c];
+        }
+    }
+    let weighted = residual.map(|r| weight * r);
+    for (entry, b) in correction[..ORDER].iter_mut().zip(row) {
+        for c in 0..C {
+            entry[c] += b * weighted[c];
+        }
+    }
+    (0..C).map(|c| residual[c] * weighted[c]).sum()
+}
+
+fn add_outer_product(matrix: &mut Banded, first: usize, row: &[f64; ORDER], weight: f64) {
+    for i in 0..ORDER {
+        for j in 0..=i {
+            matrix.rows[first + i][i - j] += weight * row[i] * row[j];
+        }
+    }
+}
+
+/// The fifth derivatives are constant between knots.
+fn penalty_rows(basis: &Basis) -> Vec<[f64; ORDER]> {
+    let row = |first: usize| {
+        let (start, end) = basis.interval(first);
+        let from_end = first.min(basis.interval_count() - 1 - first) as f64 + 0.5;
+        let share = (end - start) * (from_end / EASED_INTERVALS).min(1.0);
+        basis
+            .derivatives(first, 0.5 * (start + end), PENALTY_ORDER)
+            .map(|d| d * share.sqrt())
+    };
+    (0..basis.interval_count()).map(row).collect()
+}

@@ -1,0 +1,123 @@
+//! The density of poses' noise over the frequency.
+
+use crate::Spectrum;
+
+/// A third of an octave, about (2^(1/3) = 1.26): the bands in which a spectrum's fall is measured.
+const THIRD_OCTAVE: f64 = 1.3;
+/// Slowest plateau that may be noise, Hz: below, the fall of motion itself may slow down. No source.
+const LEAST_PLATEAU_HZ: f64 = 12.0;
+/// The search for a knee ends at this part of the Nyquist frequency; no source.
+const LAST_PLATEAU: f64 = 0.9;
+/// Factor from one candidate for a knee to the next; no source.
+const PLATEAU_STEP: f64 = 1.05;
+/// Parts of the Nyquist frequency between which the median density is the white floor; no source.
+const TOP: (f64, f64) = (0.70, 0.97);
+/// The same in parts: lines (of the frames that were resampled) lift some of them, not all.
+const TOP_PARTS: [(f64, f64); 4] = [(0.6, 0.7), (0.7, 0.8), (0.8, 0.9), (0.9, 0.97)];
+/// Parts of the Nyquist frequency that the top is compared with, to see whether it is level; no
+/// source.
+const BELOW_TOP: (f64, f64) = (0.45, 0.6);
+/// Fall from the middle of the band to its top, as a factor, up to which the top counts as level. No
+/// source.
+const LEVEL_TOP: f64 = 1.35;
+/// What of the density a third of an octave leaves of motion at most: f^-3.3, a little less steep
+/// than the fourth power with which displacements of bodies fall. No source for the exponent.
+const MOTION_THIRD: f64 = 0.42;
+/// The same where a clear knee lies before it, f^-5.3; no source.
+const MOTION_THIRD_AFTER_KNEE: f64 = 0.25;
+/// A knee is clear where the third of an octave before it left less than this part of what the one
+/// after it leaves; no source.
+const CLEAR_KNEE: f64 = 0.45;
+/// From one third of an octave to the next, noise rises at most by this factor: more is a line. No
+/// source.
+const LARGEST_THIRD_RISE: f64 = 1.7;
+/// A knee lies this far above the least of the top, as a factor: else the top is as good a floor. No
+/// source.
+const LEAST_KNEE: f64 = 4.0;
+/// Below this frequency, Hz, the noise is held, since a power law grows without bound; no source.
+const HELD_BELOW_HZ: f64 = 0.1;
+
+/// Density of the noise over the frequency: level, or a power law around a knee.
+///
+/// White noise shows as a level top of the spectrum. Where the top falls, the poses were resampled
+/// from fewer frames, filtered, or come from a tracker whose errors wander: then noise begins at
+/// the knee where the spectrum first falls slower than motion does (displacement of bodies falls
+/// with the fourth power of the frequency and more; f^-3.3 is the border here), and rises a little
+/// below the knee.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct NoiseShape {
+    /// Density at the knee, or everywhere, unit^2/Hz.
+    pub level: f64,
+    knee_hz: f64,
+    /// Negative exponent below the knee.
+    below: f64,
+    /// Negative exponent above the knee; 0 for white noise.
+    pub above: f64,
+}
+
+impl NoiseShape {
+    /// The shape of the noise under a spectrum of poses at `rate_hz`; below the knee it rises by at
+    /// most the power `largest_rise` of the frequency.
+    pub fn learn(spectrum: &Spectrum, rate_hz: f64, largest_rise: f64) -> Self {
+        let nyquist_hz = rate_hz / 2.0;
+        let level = |from_hz: f64, to_hz: f64| spectrum.median(from_hz, to_hz).unwrap_or(0.0);
+        let part = |(from, to): (f64, f64)| level(from * nyquist_hz, to * nyquist_hz);
+        let white = Self {
+            level: part(TOP),
+            knee_hz: nyquist_hz,
+            below: 0.0,
+            above: 0.0,
+        };
+        let least = TOP_PARTS
+            .map(part)
+            .into_iter()
+            .fold(f64::INFINITY, f64::min);
+        if part(BELOW_TOP) < LEVEL_TOP * least {
+            return white;
+        }
+        let mut from_hz = LEAST_PLATEAU_HZ;
+        while from_hz * THIRD_OCTAVE.powi(3) < LAST_PLATEAU * nyquist_hz {
+            let thirds = [-2, -1, 0, 1, 2].map(|k| {
+                level(
+                    THIRD_OCTAVE.powi(k) * from_hz,
+                    THIRD_OCTAVE.powi(k + 1) * from_hz,
+                )
+            });
+            if falls_slower_than_motion(&thirds) && thirds[2] > LEAST_KNEE * least {
+                return Self::from_knee(&thirds, from_hz, largest_rise);
+            }
+            from_hz *= PLATEAU_STEP;
+        }
+        white
+    }
+
+    /// The power law from the densities of five thirds of an octave, the middle one from `from_hz` on.
+    fn from_knee(thirds: &[f64; 5], from_hz: f64, largest_rise: f64) -> Self {
+        let above = ((thirds[2] / thirds[4]).ln() / THIRD_OCTAVE.powi(2).ln()).max(0.0);
+        Self {
+            // At the knee itself some motion is left.
+            level: thirds[2].min(thirds[3] * THIRD_OCTAVE.powf(above)),
+            knee_hz: THIRD_OCTAVE.sqrt() * from_hz,
+            below: above.min(largest_rise),
+            above,
+        }
+    }
+
+    /// Density at a frequency, unit^2/Hz.
+    pub fn at(&self, frequency_hz: f64) -> f64 {
+        let ratio = self.knee_hz / frequency_hz.max(HELD_BELOW_HZ);
+        self.level * ratio.powf(if ratio > 1.0 { self.below } else { self.above })
+    }
+}
+
+/// Whether the spectrum falls slower than motion from the middle one of five thirds of an octave on.
+fn falls_slower_than_motion(thirds: &[f64; 5]) -> bool {
+    let before = thirds[1] / thirds[0];
+    [thirds[3] / thirds[2], thirds[4] / thirds[3]]
+        .iter()
+        .all(|&ratio| {
+            ratio < LARGEST_THIRD_RISE
+                && (ratio > MOTION_THIRD
+                    || ratio > MOTION_THIRD_AFTER_KNEE && before < CLEAR_KNEE * ratio)
+        })
+}
