@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes the README's tables anew: `tests/reproduce.sh OUT [PART...]`, parts below; all of them where none is named.
+# Makes the tables of the crates' READMEs anew: `tests/reproduce.sh OUT [PART...]`, parts below; all of them where none is named.
 # Needs the third-party data (CROMOSIM_DATA, else ../shared/data beside the checkout); `diagnosis` needs the Python packages of tests/withheld
 # (CROMOSIM_PYTHON, else python3), `speed` an otherwise quiet machine.
 set -euo pipefail
