@@ -40,18 +40,20 @@ fn export_obj(out: &Path, model: &Arc<BodyModel>, betas: &[f64]) -> anyhow::Resu
         .with_context(cannot)
 }
 
+/// The model of the file that `--body` names, where it does.
+pub fn given(path: Option<&Path>) -> anyhow::Result<Option<Arc<BodyModel>>> {
+    Ok(path.map(BodyModel::read).transpose()?)
+}
+
 /// The model of a file, or the embedded one.
-pub fn model(path: Option<&PathBuf>) -> anyhow::Result<Arc<BodyModel>> {
-    Ok(match path {
-        Some(path) => BodyModel::read(path)?,
-        None => BodyModel::embedded(),
-    })
+pub fn model(path: Option<&Path>) -> anyhow::Result<Arc<BodyModel>> {
+    Ok(given(path)?.unwrap_or_else(BodyModel::embedded))
 }
 
 /// Runs the command.
 pub fn run(command: &Command) -> anyhow::Result<()> {
     let Command::Export { out, body, betas } = command;
-    let model = model(body.as_ref())?;
+    let model = model(body.as_deref())?;
     match out.extension().and_then(|ending| ending.to_str()) {
         Some("npz") if betas.is_empty() => model.write_npz(out)?,
         Some("npz") => {

@@ -1,30 +1,15 @@
 //! `cromosim convert`: motions, trajectories of rigid bodies, IMU series and recordings into each
 //! other's files.
 
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::path::PathBuf;
 
-use anyhow::bail;
-use clap::Args;
-use cromosim_body::BodyModel;
-use cromosim_motion::SmplMotion;
-use cromosim_recording::datasets::DatasetRecording;
-use cromosim_recording::rigid::{EurocGroundTruth, ImuSeries};
+use clap::builder::PossibleValue;
+use clap::{Args, ValueEnum};
+use cromosim_recording::convert::{Conversion, Followed, ReadOptions, Target, convert};
+use cromosim_recording::datasets::DatasetFiles;
 
 use crate::body;
 use crate::motion_arguments::MotionArguments;
-
-pub mod bag;
-mod dataset;
-mod follow;
-mod frames;
-mod recording;
-pub mod source;
-mod states;
-pub mod write;
-
-use dataset::DatasetArguments;
-use write::{Target, Written};
 
 /// Convert a motion, a trajectory of a rigid body, an IMU series or a recording into another format
 #[derive(Args)]
@@ -37,7 +22,7 @@ pub struct Arguments {
     out: PathBuf,
     /// The format to write
     #[arg(long, value_enum, value_name = "FORMAT")]
-    to: Option<Target>,
+    to: Option<Format>,
     /// Replace OUT where it exists
     #[arg(long)]
     force: bool,
@@ -67,131 +52,102 @@ pub struct Arguments {
     /// Body model as npz or pickle rather than the embedded one
     #[arg(long, value_name = "FILE")]
     body: Option<PathBuf>,
-    #[command(flatten)]
-    dataset: DatasetArguments,
+    /// Of a data set: this placement alone
+    #[arg(long, value_name = "NAME")]
+    placement: Option<String>,
+    /// Of TotalCapture: the folder of gt_skel_gbl_pos.txt and gt_skel_gbl_ori.txt; default: looked
+    /// for beside the file
+    #[arg(long, value_name = "DIR")]
+    reference: Option<PathBuf>,
+    /// Of RealWorld: the gyroscope's zip; default: the one beside the accelerometer's
+    #[arg(long, value_name = "FILE")]
+    gyroscope: Option<PathBuf>,
     #[command(flatten)]
     motion: MotionArguments,
 }
 
-/// What a file holds.
-pub enum Content {
-    Motion(Box<SmplMotion>),
-    Poses(EurocGroundTruth),
-    Imu(ImuSeries),
-    Recording(Box<DatasetRecording>),
-}
+/// A format, as the command line names it.
+#[derive(Clone, Copy)]
+pub struct Format(Target);
 
-impl Content {
-    /// Its kind, with the article.
-    pub const fn name(&self) -> &'static str {
-        match self {
-            Self::Motion(_) => "a motion",
-            Self::Poses(_) => "a trajectory",
-            Self::Imu(_) => "an IMU series",
-            Self::Recording(_) => "a recording of a data set",
-        }
+impl ValueEnum for Format {
+    fn value_variants<'a>() -> &'a [Self] {
+        const ALL: [Format; Target::ALL.len()] = {
+            let mut all = [Format(Target::Bag); Target::ALL.len()];
+            let mut k = 0;
+            while k < all.len() {
+                all[k] = Format(Target::ALL[k]);
+                k += 1;
+            }
+            all
+        };
+        &ALL
     }
 
-    /// Frames or rows.
-    pub fn count(&self) -> usize {
-        match self {
-            Self::Motion(motion) => motion.frames.len(),
-            Self::Poses(poses) => poses.trajectory.stamps.len(),
-            Self::Imu(series) => series.stamps.len(),
-            Self::Recording(recording) => recording
-                .imus
-                .iter()
-                .map(|imu| imu.series.stamps.len())
-                .sum(),
-        }
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let (name, help) = match self.0 {
+            Target::Amass => ("amass", "npz with AMASS' keys"),
+            Target::Bvh => ("bvh", "BVH in SMPL's skeleton"),
+            Target::Trc => ("trc", "Markers on the body"),
+            Target::Tum => ("tum", "TUM trajectory"),
+            Target::Euroc => ("euroc", "EuRoC/ASL ground truth, or IMU file"),
+            Target::Csv => ("csv", "Table with a header: poses, or readings"),
+            Target::Bag => (
+                "bag",
+                "rosbag2 MCAP with /reference/NAME and /imu/NAME/data_raw; of a motion /smpl/pose with its confidence",
+            ),
+        };
+        Some(PossibleValue::new(name).help(help))
+    }
+}
+
+impl Format {
+    /// The format that was given, or that the ending of the output says.
+    pub fn or_ending(given: Option<Self>, out: &std::path::Path) -> anyhow::Result<Target> {
+        Ok(given.map_or_else(|| Target::for_ending(out), |Self(target)| Ok(target))?)
     }
 }
 
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let target = Target::of(arguments.to, &arguments.out)?;
-    if arguments.out.exists() && !arguments.force {
-        bail!(
-            "{}: exists already; --force replaces it",
-            arguments.out.display()
-        );
-    }
-    if arguments.imu.is_some() && target != Target::Bag {
-        bail!("--imu goes into a bag; OUT is {}", target.describe());
-    }
-    let model = body::model(arguments.body.as_ref())?;
-    let content = followed(
-        source::read(arguments, &model, target)?,
-        arguments,
-        &model,
+    let target = Format::or_ending(arguments.to, &arguments.out)?;
+    let followed = match (&arguments.joint, &arguments.site) {
+        (Some(joint), _) => Some(Followed::Joint(joint.clone())),
+        (None, site) => site.clone().map(Followed::Site),
+    };
+    let options = ReadOptions {
+        motion: arguments.motion.options()?,
+        body: body::given(arguments.body.as_deref())?,
+        followed,
+        topic: arguments.topic.clone(),
+        frame: arguments.frame.clone(),
+        fixed_frame: arguments.fixed_frame.clone(),
+        placement: arguments.placement.clone(),
+        files: DatasetFiles {
+            reference: arguments.reference.clone(),
+            gyroscope: arguments.gyroscope.clone(),
+        },
+        name: arguments.name.clone(),
+    };
+    let converted = convert(&Conversion {
+        input: arguments.input.clone(),
+        out: arguments.out.clone(),
         target,
-    )?;
-    let (is_motion, count) = (matches!(content, Content::Motion(_)), content.count());
-    match write::written(&content, target, &model, arguments)? {
-        Written::Bytes(bytes) => write::file(&arguments.out, &bytes, arguments.force)?,
-        Written::Bag => bag::write(&content, imu(arguments)?.as_ref(), &model, arguments)?,
-    }
+        options,
+        imu: arguments.imu.clone(),
+        replace: arguments.force,
+    })?;
+    converted.notes.iter().for_each(|note| eprintln!("{note}"));
     println!(
-        "{}: {} of {count} {}",
+        "{}: {} of {} {}",
         arguments.out.display(),
         target.describe(),
-        if is_motion { "frames" } else { "rows" }
+        converted.count,
+        if converted.is_motion {
+            "frames"
+        } else {
+            "rows"
+        }
     );
     Ok(())
-}
-
-/// A motion's joint or site, where one is asked for.
-fn followed(
-    content: Content,
-    arguments: &Arguments,
-    model: &Arc<BodyModel>,
-    target: Target,
-) -> anyhow::Result<Content> {
-    let Content::Motion(motion) = content else {
-        if let Some(name) = arguments.joint.as_ref().or(arguments.site.as_ref()) {
-            bail!(
-                "{}: {} has no joint or site {name}; leave --joint and --site out",
-                arguments.input.display(),
-                content.name()
-            );
-        }
-        return Ok(content);
-    };
-    let trajectory = match (&arguments.joint, &arguments.site) {
-        (Some(joint), _) => follow::joint(&motion, model, joint)?,
-        (None, Some(site)) => follow::site(&motion, model, site)?,
-        (None, None) if target.takes_motions() => return Ok(Content::Motion(motion)),
-        (None, None) => bail!(
-            "{}: a motion has 24 joints, and {} holds one trajectory; give --joint or --site (simulate writes a motion's IMUs)",
-            arguments.input.display(),
-            target.describe()
-        ),
-    };
-    Ok(Content::Poses(EurocGroundTruth {
-        trajectory,
-        ..EurocGroundTruth::default()
-    }))
-}
-
-/// The IMU series beside a trajectory.
-fn imu(arguments: &Arguments) -> anyhow::Result<Option<ImuSeries>> {
-    let Some(path) = &arguments.imu else {
-        return Ok(None);
-    };
-    match source::rigid(path, &source::bytes(path)?)? {
-        Some(Content::Imu(series)) => Ok(Some(series)),
-        Some(_) => bail!(
-            "{}: a trajectory; --imu takes an IMU series",
-            path.display()
-        ),
-        None => bail!(
-            "{}: not an IMU series: expected EuRoC's columns or a table with a header that names them",
-            path.display()
-        ),
-    }
-}
-
-/// A file's place in errors.
-fn name(path: &Path) -> String {
-    path.display().to_string()
 }

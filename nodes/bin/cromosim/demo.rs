@@ -279,7 +279,7 @@ impl Arguments {
         {
             bail!("--duration {seconds}: expected a positive number of seconds");
         }
-        let model = body::model(self.body.as_ref())?;
+        let model = body::model(self.body.as_deref())?;
         let motion = match &self.motion {
             Some(path) => cromosim_motion::read_motion_for(path, &model, &Default::default())?,
             None => cromosim_motion::embedded_walk(),

@@ -3,22 +3,19 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
-use anyhow::bail;
 use clap::Args;
 use cromosim_bag::BagReader;
-use cromosim_body::{BodyModel, Joint, ShapedBody};
-use cromosim_motion::{
-    MotionError, MotionFormat, MotionOptions, PoseAxes, PoseFile, PoseTrack, PoseView, SmplMotion,
-    open_poses, read_motion_for,
+use cromosim_body::Joint;
+use cromosim_motion::{PoseAxes, SmplMotion};
+use cromosim_recording::datasets::{DatasetFormat, DatasetRecording};
+use cromosim_recording::inspect::{
+    BodyInspection, Inspection, PersonInspection, PosesInspection, RigidExtent, RigidInspection,
+    inspect, path_length,
 };
-use cromosim_recording::datasets::{DatasetFiles, DatasetFormat, DatasetRecording, open_dataset};
-use cromosim_recording::rigid::{RigidFormat, sniff_rigid};
-use cromosim_spatial::Stamp;
+use cromosim_recording::rigid::RigidFormat;
 
 use crate::body;
-use crate::convert::{Content, source};
 use crate::motion_arguments::MotionArguments;
 
 /// Say what is in a file
@@ -39,89 +36,50 @@ pub struct Arguments {
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let options = arguments.motion.options()?;
-    let model = body::model(arguments.body.as_ref())?;
+    let model = body::model(arguments.body.as_deref())?;
     for path in &arguments.files {
-        inspect(path, &model, &options)?;
+        match inspect(path, &model, &options)? {
+            Inspection::Bag(reader) => print_bag(path, &reader),
+            Inspection::Recording(format, recording) => print_recording(path, format, &recording),
+            Inspection::Rigid(rigid) => print_rigid(path, &rigid),
+            Inspection::Body(body) => print_body(path, &body),
+            Inspection::Poses(poses) => print_poses(path, &poses),
+            Inspection::Motion(motion) => print_motion(path, &motion),
+        }
     }
     Ok(())
 }
 
-fn inspect(path: &Path, model: &Arc<BodyModel>, options: &MotionOptions) -> anyhow::Result<()> {
-    if path.is_dir() {
-        return inspect_bag(path);
-    }
-    let head = source::head(path)?;
-    match head.as_slice() {
-        [0x89, b'M', b'C', b'A', b'P', ..] => inspect_bag(path),
-        [] => bail!("{}: the file is empty", path.display()),
-        _ if let Some((format, recording)) = open_dataset(path, &DatasetFiles::default())? => {
-            inspect_recording(path, format, &recording);
-            Ok(())
-        }
-        _ => match open_poses(path, PoseView::World) {
-            Err(MotionError::BodyFile { .. }) => inspect_body(path),
-            Err(error) => Err(error.into()),
-            Ok(Some(file)) => inspect_poses(file, model, options),
-            Ok(None) => match sniff_rigid(&head).filter(|_| MotionFormat::of(&head).is_none()) {
-                Some(format) => inspect_rigid(path, format),
-                None => inspect_motion(path, model, options),
-            },
-        },
-    }
-}
-
-/// A trajectory or an IMU series.
-fn inspect_rigid(path: &Path, format: RigidFormat) -> anyhow::Result<()> {
-    let Some(content) = source::rigid(path, &source::bytes(path)?)? else {
-        bail!("{}: the file changed", path.display())
-    };
-    let kind = match format {
+fn print_rigid(path: &Path, rigid: &RigidInspection) {
+    let kind = match rigid.format {
         RigidFormat::Tum => "trajectory (TUM)",
         RigidFormat::EurocGroundTruth => "trajectory (EuRoC ground truth)",
         RigidFormat::PoseCsv => "trajectory (table with a header)",
         RigidFormat::EurocImu => "IMU series (EuRoC)",
         RigidFormat::ImuCsv => "IMU series (table with a header)",
     };
-    let (stamps, more) = match &content {
-        Content::Poses(poses) => {
-            let length: f64 = poses
-                .trajectory
-                .positions
-                .windows(2)
-                .map(|pair| (pair[1] - pair[0]).norm())
-                .sum();
-            let length = length.abs(); // the sum of nothing is -0
-            (&poses.trajectory.stamps, format!("path of {length:.2} m"))
-        }
-        Content::Imu(series) => {
-            let mean = |vectors: &[nalgebra::Vector3<f64>]| {
-                vectors.iter().map(|v| v.norm()).sum::<f64>() / vectors.len() as f64
-            };
-            let (force, rate) = (mean(&series.specific_force), mean(&series.angular_velocity));
-            (
-                &series.stamps,
-                format!(
-                    "mean specific force {force:.3} m/s2, mean angular velocity {rate:.4} rad/s"
-                ),
-            )
-        }
-        Content::Motion(_) | Content::Recording(_) => return Ok(()),
-    };
-    let [first, last] = [stamps[0], stamps[stamps.len() - 1]];
-    let rate =
-        median_rate(stamps).map_or_else(String::new, |rate| format!(" at {rate:.3} Hz (median)"));
+    let rate = rigid
+        .median_rate_hz
+        .map_or_else(String::new, |rate| format!(" at {rate:.3} Hz (median)"));
     println!(
         "{}: {kind}, {} rows{rate}, {:.3} s from {:.6} s on",
         path.display(),
-        stamps.len(),
-        last - first,
-        first.as_seconds()
+        rigid.rows,
+        rigid.duration_s,
+        rigid.first.as_seconds()
     );
-    println!("  {more}");
-    Ok(())
+    match rigid.extent {
+        RigidExtent::Path(length) => println!("  path of {length:.2} m"),
+        RigidExtent::Means {
+            specific_force,
+            angular_velocity,
+        } => println!(
+            "  mean specific force {specific_force:.3} m/s2, mean angular velocity {angular_velocity:.4} rad/s"
+        ),
+    }
 }
 
-fn inspect_recording(path: &Path, format: DatasetFormat, recording: &DatasetRecording) {
+fn print_recording(path: &Path, format: DatasetFormat, recording: &DatasetRecording) {
     let many = if recording.imus.len() == 1 { "" } else { "s" };
     println!(
         "{}: recording of {format}, {} IMU{many} at {:.3} Hz",
@@ -135,10 +93,8 @@ fn inspect_recording(path: &Path, format: DatasetFormat, recording: &DatasetReco
             .first()
             .zip(stamps.last())
             .map_or(0.0, |(first, last)| *last - *first);
-        let reference = recording
-            .references
-            .iter()
-            .find(|(name, _)| *name == imu.placement);
+        let mut references = recording.references.iter();
+        let reference = references.find(|(name, _)| *name == imu.placement);
         let reference = reference.map_or_else(String::new, |(_, poses)| {
             format!(", reference of {} poses", poses.stamps.len())
         });
@@ -158,24 +114,15 @@ fn inspect_recording(path: &Path, format: DatasetFormat, recording: &DatasetReco
         *lengths.entry(&span.activity).or_default() += span.end - span.start;
     }
     if !lengths.is_empty() {
+        let lengths = lengths.iter();
         let lengths: Vec<String> = lengths
-            .iter()
             .map(|(activity, seconds)| format!("{activity} {seconds:.1} s"))
             .collect();
         println!("  {}", lengths.join(", "));
     }
 }
 
-fn median_rate(stamps: &[Stamp]) -> Option<f64> {
-    let mut intervals: Vec<f64> = stamps.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    intervals.sort_unstable_by(f64::total_cmp);
-    intervals
-        .get(intervals.len() / 2)
-        .map(|interval| interval.recip())
-}
-
-fn inspect_bag(path: &Path) -> anyhow::Result<()> {
-    let reader = BagReader::open(path)?;
+fn print_bag(path: &Path, reader: &BagReader) {
     let summary = reader.summary();
     println!(
         "{}: bag, {} messages, {:.3} s",
@@ -183,12 +130,8 @@ fn inspect_bag(path: &Path) -> anyhow::Result<()> {
         summary.message_count(),
         summary.duration()
     );
-    let width = summary
-        .topics
-        .iter()
-        .map(|counted| counted.topic.name.len())
-        .max()
-        .unwrap_or(0);
+    let names = summary.topics.iter().map(|counted| &counted.topic.name);
+    let width = names.map(String::len).max().unwrap_or(0);
     for counted in &summary.topics {
         let (name, rate) = (&counted.topic.name, summary.rate(&counted.topic.name));
         let rate = rate.map_or_else(String::new, |rate| format!("{rate:9.2} Hz"));
@@ -210,50 +153,36 @@ fn inspect_bag(path: &Path) -> anyhow::Result<()> {
             values.keys().cloned().collect::<Vec<_>>().join(", ")
         );
     }
-    Ok(())
 }
 
-fn inspect_body(path: &Path) -> anyhow::Result<()> {
-    let model = BodyModel::read(path)?;
-    let body = ShapedBody::new(model.clone(), &[])?;
-    let heights = body.rest_vertices().iter().map(|vertex| vertex.y);
-    let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| {
-        (low.min(y), high.max(y))
-    });
+fn print_body(path: &Path, body: &BodyInspection) {
     println!(
         "{}: body {}, {} vertices, {} triangles, {} joints, {} betas, gender {}, {:.3} m tall",
         path.display(),
-        model.id(),
-        model.vertex_count(),
-        model.faces().len(),
+        body.id,
+        body.vertices,
+        body.triangles,
         Joint::ALL.len(),
-        model.beta_count(),
-        model.gender().map_or("not stated", |gender| gender.name()),
-        high - low
+        body.betas,
+        body.gender.map_or("not stated", |gender| gender.name()),
+        body.height_m
     );
-    Ok(())
 }
 
-fn inspect_poses(
-    file: PoseFile,
-    model: &Arc<BodyModel>,
-    options: &MotionOptions,
-) -> anyhow::Result<()> {
+fn print_poses(path: &Path, poses: &PosesInspection) {
+    let people = match poses.people.len() {
+        1 => "one person".to_owned(),
+        count => format!("{count} people"),
+    };
     println!(
-        "{}: motion, {} in SMPL's joints, {}",
-        file.path.display(),
-        file.format,
-        people(file.tracks.len())
+        "{}: motion, {} in SMPL's joints, {people}",
+        path.display(),
+        poses.format
     );
-    for track in &file.tracks {
-        println!("  {}", person(track));
+    for person in &poses.people {
+        println!("  {}", person_line(person));
     }
-    let source = options
-        .source_body
-        .as_deref()
-        .map(BodyModel::read)
-        .transpose()?;
-    match file.into_motion(model, source.as_ref(), options) {
+    match &poses.motion {
         Ok(motion) => {
             if let Some(report) = &motion.poses {
                 println!(
@@ -263,28 +192,16 @@ fn inspect_poses(
                     motion.rate_hz
                 );
             }
-            println!("  {}", extent(&motion));
+            println!("  {}", extent(motion));
         }
-        // What it is, is said; that it lacks a rate, for instance, is for whoever plays it to
-        // settle.
         Err(error) => println!("  not played as it is: {error}"),
     }
-    Ok(())
 }
 
-fn people(count: usize) -> String {
-    if count == 1 {
-        "one person".to_owned()
-    } else {
-        format!("{count} people")
-    }
-}
-
-/// A line about one person of a pose file.
-fn person(track: &PoseTrack) -> String {
-    let betas = track.mean_betas();
-    let up = match track.axes {
+fn person_line(person: &PersonInspection) -> String {
+    let up = match person.axes {
         PoseAxes::Camera => "camera axes (x right, y down, z forward)".to_owned(),
+        // No negative zeros.
         PoseAxes::Up(up) => format!(
             "up ({:.2}, {:.2}, {:.2})",
             up.x + 0.0,
@@ -293,41 +210,33 @@ fn person(track: &PoseTrack) -> String {
         ),
         PoseAxes::Detect => "world axes, up not stated".to_owned(),
     };
-    let ids = track
-        .frame_ids
-        .as_ref()
-        .and_then(|ids| Some(format!(" ({} to {})", ids.first()?, ids.last()?)));
+    let ids = person.frame_ids.as_ref();
+    let ids = ids.map(|ids| format!(" ({} to {})", ids.start(), ids.end()));
+    let rate = person
+        .rate_hz
+        .map_or_else(|| "rate not stated".to_owned(), |hz| format!("{hz} Hz"));
+    let trajectory = if person.has_trajectory {
+        ""
+    } else {
+        ", no trajectory"
+    };
+    let betas = if person.betas.is_empty() {
+        String::new()
+    } else {
+        format!(" {:.2?}", person.betas)
+    };
     format!(
-        "person {}: {} frames{}, {}, gender {}, {up}{}, {} betas of {}{}",
-        track.person,
-        track.rotations.len(),
+        "person {}: {} frames{}, {rate}, gender {}, {up}{trajectory}, {} betas of {}{betas}",
+        person.person,
+        person.frames,
         ids.unwrap_or_default(),
-        track.rate_hz.map_or_else(
-            || "rate not stated".to_owned(),
-            |rate_hz| format!("{rate_hz} Hz")
-        ),
-        track.gender.map_or("not stated", |gender| gender.name()),
-        if track.trans.is_some() {
-            ""
-        } else {
-            ", no trajectory"
-        },
-        betas.len(),
-        track.shape_space,
-        if betas.is_empty() {
-            String::new()
-        } else {
-            format!(" {betas:.2?}")
-        },
+        person.gender.map_or("not stated", |gender| gender.name()),
+        person.betas.len(),
+        person.shape_space,
     )
 }
 
-fn inspect_motion(
-    path: &Path,
-    model: &Arc<BodyModel>,
-    options: &MotionOptions,
-) -> anyhow::Result<()> {
-    let motion = read_motion_for(path, model, options)?;
+fn print_motion(path: &Path, motion: &SmplMotion) {
     println!(
         "{}: motion, {} frames at {:.4} Hz, {:.3} s",
         path.display(),
@@ -346,15 +255,13 @@ fn inspect_motion(
     if let Some(report) = &motion.markers {
         println!("  {report}");
         println!("  betas {:.2?}", report.betas);
-        for (what, labels) in [("absent", &report.absent), ("unknown", &report.unknown)]
-            .iter()
-            .filter(|(_, labels)| !labels.is_empty())
-        {
-            println!("  {what}: {}", labels.join(", "));
+        for (what, labels) in [("absent", &report.absent), ("unknown", &report.unknown)] {
+            if !labels.is_empty() {
+                println!("  {what}: {}", labels.join(", "));
+            }
         }
     }
-    println!("  {}", extent(&motion));
-    Ok(())
+    println!("  {}", extent(motion));
 }
 
 /// How far the pelvis goes.
@@ -364,13 +271,12 @@ fn extent(motion: &SmplMotion) -> String {
         .iter()
         .map(|frame| frame.root_position)
         .collect();
-    let length: f64 = positions
-        .windows(2)
-        .map(|pair| (pair[1] - pair[0]).norm())
-        .sum();
     let heights = positions.iter().map(|position| position.z);
     let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| {
         (low.min(z), high.max(z))
     });
-    format!("pelvis: path of {length:.2} m, {low:.2} to {high:.2} m above the floor")
+    format!(
+        "pelvis: path of {:.2} m, {low:.2} to {high:.2} m above the floor",
+        path_length(&positions)
+    )
 }

@@ -57,42 +57,6 @@ pub struct MotionArguments {
 }
 
 impl MotionArguments {
-    /// The part that is asked for: its beginning and its length, s, checked.
-    pub fn part(&self) -> anyhow::Result<(f64, Option<f64>)> {
-        if !(self.start >= 0.0 && self.start.is_finite()) {
-            bail!("--start {}: expected 0 or more seconds", self.start);
-        }
-        if let Some(seconds) = self
-            .duration
-            .filter(|seconds| !(*seconds > 0.0 && seconds.is_finite()))
-        {
-            bail!("--duration {seconds}: expected a positive number of seconds");
-        }
-        Ok((self.start, self.duration))
-    }
-
-    /// The first option that was given; `--start` and `--duration`, which other things than motions
-    /// may have too, on demand.
-    pub fn given(&self, with_part: bool) -> Option<&'static str> {
-        let given = [
-            (self.up_axis != "auto", "--up-axis"),
-            (self.unit.is_some(), "--unit"),
-            (with_part && self.start != 0.0, "--start"),
-            (with_part && self.duration.is_some(), "--duration"),
-            (self.skeleton.is_some(), "--skeleton"),
-            (self.motion_rate.is_some(), "--motion-rate"),
-            (self.marker_set.is_some(), "--marker-set"),
-            (self.subject.is_some(), "--subject"),
-            (self.placements_as_given, "--placements-as-given"),
-            (self.person.is_some(), "--person"),
-            (self.shape != "detect", "--shape"),
-            (self.source_body.is_some(), "--source-body"),
-        ];
-        given
-            .into_iter()
-            .find_map(|(given, option)| given.then_some(option))
-    }
-
     /// The options, checked.
     pub fn options(&self) -> anyhow::Result<MotionOptions> {
         let up_axis = match self.up_axis.as_str() {

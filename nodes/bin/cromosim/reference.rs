@@ -15,13 +15,13 @@ use cromosim_learned::{LearnedSimulator, MappingFile, SiteMotion};
 use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_msgs::std_msgs::Header;
-use cromosim_recording::{RecordedPlacement, read_placements};
+use cromosim_recording::rigid::{RigidContent, parse_rigid};
+use cromosim_recording::{RecordedPlacement, read_placements, read_whole};
 use cromosim_spatial::{KinematicTrack, PoseEstimate, Stamp, uniform_stamps};
 use cromosim_virtual_imu::imu_message;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
-use crate::convert::{Content, source};
 use crate::progress::{self, Interrupt};
 use crate::simulate::{Arguments, read_mapping};
 
@@ -111,7 +111,8 @@ pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()>
     if let Err((_, problem)) = Placement::at_site(name, "left_watch", 1.0) {
         bail!("--placement {name}: {problem}");
     }
-    let Some(Content::Poses(poses)) = source::rigid(trajectory, &source::bytes(trajectory)?)?
+    let Some(RigidContent::Poses(poses)) =
+        parse_rigid(&read_whole(trajectory)?, &trajectory.display().to_string())?
     else {
         bail!(
             "{}: not a trajectory of a rigid body: expected TUM, EuRoC ground truth or a table of poses with a header",

@@ -240,7 +240,7 @@ impl Setup {
             .map(|placement| Device::resolve(placement.device(), folder))
             .collect::<Result<_, _>>()?;
         Ok(Self {
-            model: body::model(arguments.body.as_ref())?,
+            model: body::model(arguments.body.as_deref())?,
             devices,
             motion: arguments.motion.options()?,
             seed: arguments.seed,

@@ -12,11 +12,11 @@ use cromosim_motion::camera::{
     TrajectoryOptions, global_trajectory,
 };
 use cromosim_motion::{MotionOptions, PoseView, SmplMotion, open_poses, read_motion_for};
+use cromosim_recording::convert::{MotionFile, write_motion};
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
 
 use crate::body;
-use crate::convert::bag;
-use crate::convert::write::{self, Target};
+use crate::convert::Format;
 use crate::motion_arguments::MotionArguments;
 
 /// Place in-place poses of a video in the world, by keypoints, depth maps and cameras
@@ -31,7 +31,7 @@ pub struct Arguments {
     out: PathBuf,
     /// The format to write: amass, bvh, trc or bag
     #[arg(long, value_enum, value_name = "FORMAT")]
-    to: Option<Target>,
+    to: Option<Format>,
     /// Folder of OpenPose's *_keypoints.json (BODY_25)
     #[arg(long, value_name = "DIR")]
     keypoints: PathBuf,
@@ -91,7 +91,7 @@ fn size(text: &str) -> Result<[usize; 2], String> {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let target = Target::of(arguments.to, &arguments.out)?;
+    let target = Format::or_ending(arguments.to, &arguments.out)?;
     if !target.takes_motions() {
         bail!(
             "{}: {} holds no motion of a body; give .npz, .bvh, .trc or .mcap",
@@ -106,12 +106,13 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         );
     }
     let options = options(arguments)?;
-    let model = body::model(arguments.body.as_ref())?;
+    let motion_options = arguments.motion.options()?;
+    let model = body::model(arguments.body.as_deref())?;
     let (mut clip, first_frame) = clip(
         &arguments.poses,
         pixels(arguments.image),
         &model,
-        &arguments.motion.options()?,
+        &motion_options,
     )?;
     let folder = CameraFolder {
         keypoints: arguments.keypoints.clone(),
@@ -122,18 +123,13 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let mut files = folder.read(clip.poses.len(), options.least_confidence)?;
     (clip.keypoints, clip.cameras) = (files.keypoints, files.cameras);
     let placed = global_trajectory(&clip, &mut files.depth, &model, &options)?;
-    if target == Target::Bag {
-        bag::motion_bag(
-            &placed.motion,
-            &model,
-            "trajectory",
-            &arguments.out,
-            arguments.force,
-        )?;
-    } else {
-        let bytes = write::motion_bytes(&placed.motion, target, &model, &arguments.motion)?;
-        write::file(&arguments.out, &bytes, arguments.force)?;
-    }
+    let file = MotionFile {
+        target,
+        options: &motion_options,
+        command: "trajectory",
+        replace: arguments.force,
+    };
+    write_motion(&placed.motion, &model, &file, &arguments.out)?;
     println!(
         "{}: {} of {} frames",
         arguments.out.display(),

@@ -119,7 +119,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     } else {
         Settings::full(arguments.seed)
     };
-    let model = body::model(arguments.body.as_ref())?;
+    let model = body::model(arguments.body.as_deref())?;
     let learned = arguments
         .learned
         .as_deref()

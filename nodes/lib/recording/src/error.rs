@@ -89,6 +89,114 @@ pub enum RecordingError {
         /// Identifier of the body that the bag names.
         body: String,
     },
+    /// A file that is there already.
+    #[error("{}: exists already; --force replaces it", path.display())]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The operating system refuses to write.
+    #[error("{}: cannot be written: {source}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        source: std::io::Error,
+    },
+    /// A file, or a topic in it, that does not suit what is asked of it.
+    #[error("{}: {problem}", path.display())]
+    Unsuitable {
+        /// The file, with the topic where it is a bag's.
+        path: PathBuf,
+        /// What it is, and what to do.
+        problem: String,
+    },
+    /// A name that does not say which format to write.
+    #[error(
+        "{}: the ending does not say what to write (.npz, .bvh, .trc, .tum, .txt, .csv or .mcap do); give --to",
+        path.display()
+    )]
+    UnknownEnding {
+        /// The file to write.
+        path: PathBuf,
+    },
+    /// An IMU series for a file that cannot hold it beside a trajectory.
+    #[error("--imu goes into a bag; OUT is {target}")]
+    ImuBesideNoBag {
+        /// What is written, with the article.
+        target: &'static str,
+    },
+    /// An IMU series beside something else than a trajectory.
+    #[error("--imu goes beside a trajectory, but {} is {content}", path.display())]
+    ImuBesideNoTrajectory {
+        /// The input.
+        path: PathBuf,
+        /// What it is, with the article.
+        content: &'static str,
+    },
+    /// A part that begins before the recording.
+    #[error("--start {start_s}: expected 0 or more seconds")]
+    BadStart {
+        /// As given, s.
+        start_s: f64,
+    },
+    /// A part without length.
+    #[error("--duration {duration_s}: expected a positive number of seconds")]
+    BadDuration {
+        /// As given, s.
+        duration_s: f64,
+    },
+    /// A joint that SMPL does not have.
+    #[error("--joint {name}: SMPL has no such joint; it has {}", known.join(", "))]
+    UnknownJoint {
+        /// As given.
+        name: String,
+        /// SMPL's names.
+        known: Vec<&'static str>,
+    },
+    /// A site that the body does not have.
+    #[error("--site {name}: {problem}")]
+    Site {
+        /// As given.
+        name: String,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// A placement's name that cannot be part of a topic.
+    #[error("{option} {name}: {problem}")]
+    PlacementName {
+        /// The command line's option that gave it.
+        option: &'static str,
+        /// As given.
+        name: String,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// A frame of TF with two parents.
+    #[error(
+        "{}, {topic}: frame {frame} hangs on {} and on {}",
+        path.display(), parents[0], parents[1]
+    )]
+    TwoParents {
+        /// The bag.
+        path: PathBuf,
+        /// The topic.
+        topic: String,
+        /// The frame.
+        frame: String,
+        /// Its parents.
+        parents: [String; 2],
+    },
+    /// A topic of readings that are all NaN or infinite.
+    #[error("{}, {topic}: no finite reading ({count} messages)", path.display())]
+    NoFiniteReading {
+        /// The bag.
+        path: PathBuf,
+        /// The topic.
+        topic: String,
+        /// Messages on it.
+        count: usize,
+    },
     /// An error with the place where it happened.
     #[error("{place}: {source}")]
     At {

@@ -8,6 +8,8 @@
 //! - [`PlacementTrace`] is what either of them says of one placement; [`write_traces`] writes it
 //!   under the topics that every command and node knows: `/reference/NAME`, `/imu/NAME/data_raw`,
 //!   `/imu/NAME/data`. [`write_as_bag`] does so for a file of any of these kinds.
+//! - [`convert`](mod@convert) reads any file and writes any format; [`inspect`](mod@inspect) says
+//!   what is in a file.
 //! - [`smpl_pose`] and [`smpl_state`] fill a message from a motion's frame.
 //!
 //! Nothing here needs a ROS node: offline commands, training and evaluation read recordings by
@@ -15,14 +17,17 @@
 
 mod bag_file;
 mod body;
+pub mod convert;
 pub mod datasets;
 mod error;
 mod file;
+pub mod inspect;
 mod messages;
 mod placement;
 pub mod rigid;
 mod trace;
 
+pub(crate) use bag_file::MCAP_MAGIC;
 pub use bag_file::{is_bag, write_as_bag};
 pub use body::body_for_bag;
 pub use error::RecordingError;

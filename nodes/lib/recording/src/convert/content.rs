@@ -1,0 +1,44 @@
+//! What a file holds.
+
+use cromosim_motion::SmplMotion;
+
+use crate::datasets::DatasetRecording;
+use crate::rigid::{EurocGroundTruth, ImuSeries};
+
+/// What a file holds, whatever its format.
+#[derive(Clone, Debug)]
+pub enum Content {
+    /// The motion of a body.
+    Motion(Box<SmplMotion>),
+    /// The trajectory of a rigid body.
+    Poses(EurocGroundTruth),
+    /// The readings of one IMU.
+    Imu(ImuSeries),
+    /// Several IMUs with their references.
+    Recording(Box<DatasetRecording>),
+}
+
+impl Content {
+    /// Its kind in words, with the article.
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Motion(_) => "a motion",
+            Self::Poses(_) => "a trajectory",
+            Self::Imu(_) => "an IMU series",
+            Self::Recording(_) => "a recording of a data set",
+        }
+    }
+
+    /// Frames of a motion, else rows; of a recording those of all IMUs together.
+    pub fn count(&self) -> usize {
+        match self {
+            Self::Motion(motion) => motion.frames.len(),
+            Self::Poses(poses) => poses.trajectory.stamps.len(),
+            Self::Imu(series) => series.stamps.len(),
+            Self::Recording(recording) => {
+                let imus = recording.imus.iter();
+                imus.map(|imu| imu.series.stamps.len()).sum()
+            }
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! A data set's recording: which part and which of its placements is taken.
+
+use std::path::Path;
+
+use super::{Content, Read, ReadOptions, Target};
+use crate::RecordingError;
+use crate::datasets::{DatasetRecording, PlacedImu};
+use crate::rigid::EurocGroundTruth;
+
+/// The chosen part and placements, under another name where it is one and a name is given; of one
+/// placement what the target holds.
+pub(super) fn chosen(
+    path: &Path,
+    mut recording: DatasetRecording,
+    target: Target,
+    options: &ReadOptions,
+) -> Result<Read, RecordingError> {
+    let unsuitable = |problem: String| RecordingError::Unsuitable {
+        path: path.to_owned(),
+        problem,
+    };
+    if let Some(option) = options.motion_setting(false) {
+        return Err(unsuitable(format!(
+            "{option} is for motions, and this is a recording of a data set; leave it out"
+        )));
+    }
+    cut(path, &mut recording, options)?;
+    let known = recording
+        .imus
+        .iter()
+        .map(|imu| imu.placement.as_str())
+        .collect::<Vec<_>>()
+        .join(", ");
+    if let Some(placement) = &options.placement {
+        recording.imus.retain(|imu| imu.placement == *placement);
+        if recording.imus.is_empty() {
+            return Err(unsuitable(format!(
+                "--placement {placement}: no such placement; there are {known}"
+            )));
+        }
+    }
+    if target != Target::Bag && recording.imus.len() != 1 {
+        return Err(unsuitable(format!(
+            "several placements; give --placement, one of {known}"
+        )));
+    }
+    if let Some(name) = &options.name {
+        if recording.imus.len() != 1 {
+            return Err(unsuitable(format!(
+                "--name {name} is for one placement; give --placement, one of {known}"
+            )));
+        }
+        rename(&mut recording, name);
+    }
+    let left_out = recording.imus.iter().filter(|imu| imu.rows_left_out > 0);
+    let notes = left_out.map(|imu| note_left_out(path, imu)).collect();
+    let content = match target {
+        Target::Bag => Content::Recording(Box::new(recording)),
+        Target::Tum => {
+            let placement = recording.imus[0].placement.clone();
+            let mut references = recording.references.into_iter();
+            let Some((_, trajectory)) = references.find(|(name, _)| *name == placement) else {
+                return Err(unsuitable(format!(
+                    "the recording has no reference of {placement}, and a TUM trajectory holds no readings"
+                )));
+            };
+            Content::Poses(EurocGroundTruth {
+                trajectory,
+                ..EurocGroundTruth::default()
+            })
+        }
+        _ => Content::Imu(recording.imus.swap_remove(0).series),
+    };
+    Ok(Read { content, notes })
+}
+
+/// The part of the recording from `start_s` on, `duration_s` long.
+fn cut(
+    path: &Path,
+    recording: &mut DatasetRecording,
+    options: &ReadOptions,
+) -> Result<(), RecordingError> {
+    let (start, duration) = (options.motion.start_s, options.motion.duration_s);
+    if !(start >= 0.0 && start.is_finite()) {
+        return Err(RecordingError::BadStart { start_s: start });
+    }
+    if let Some(duration_s) = duration.filter(|seconds| !(*seconds > 0.0 && seconds.is_finite())) {
+        return Err(RecordingError::BadDuration { duration_s });
+    }
+    let Some((first, last)) = recording.span() else {
+        return Ok(());
+    };
+    let from = first.plus_seconds(start);
+    if from > last {
+        return Err(RecordingError::Unsuitable {
+            path: path.to_owned(),
+            problem: format!(
+                "--start {start}: the recording ends after {:.3} s",
+                last - first
+            ),
+        });
+    }
+    let to = duration.map_or(last, |seconds| from.plus_seconds(seconds));
+    recording.between(from, to);
+    Ok(())
+}
+
+/// Another name for the only placement and its reference.
+fn rename(recording: &mut DatasetRecording, name: &str) {
+    let old = std::mem::replace(&mut recording.imus[0].placement, name.to_owned());
+    for (reference, _) in &mut recording.references {
+        if *reference == old {
+            name.clone_into(reference);
+        }
+    }
+}
+
+fn note_left_out(path: &Path, imu: &PlacedImu) -> String {
+    format!(
+        "{}: {}: {} rows of the file without readings, or out of the order of time, are left out",
+        path.display(),
+        imu.placement,
+        imu.rows_left_out
+    )
+}

@@ -1,0 +1,111 @@
+//! What the input is, by its content, and what it holds.
+
+use std::path::Path;
+
+use cromosim_body::BodyModel;
+use cromosim_motion::{MotionFormat, read_motion_for};
+
+use super::{Content, ReadOptions, Target, bag_topic, dataset};
+use crate::datasets::open_dataset;
+use crate::rigid::{RigidContent, parse_rigid, sniff_rigid};
+use crate::{MCAP_MAGIC, RecordingError, read_head, read_whole};
+
+/// What was read.
+#[derive(Clone, Debug)]
+pub struct Read {
+    /// What the file holds.
+    pub content: Content,
+    /// What was left out or changed, a line each.
+    pub notes: Vec<String>,
+}
+
+impl From<Content> for Read {
+    fn from(content: Content) -> Self {
+        Self {
+            content,
+            notes: Vec::new(),
+        }
+    }
+}
+
+/// Reads whatever the file is; of a bag and of a data set what `target` can hold.
+///
+/// # Errors
+/// What is wrong with the file; settings that its kind does not take.
+pub fn read_content(
+    path: &Path,
+    options: &ReadOptions,
+    target: Target,
+) -> Result<Read, RecordingError> {
+    let unsuitable = |problem: String| RecordingError::Unsuitable {
+        path: path.to_owned(),
+        problem,
+    };
+    let head = if path.is_dir() {
+        MCAP_MAGIC.to_vec()
+    } else {
+        read_head(path)?
+    };
+    if head.starts_with(&MCAP_MAGIC) {
+        refuse_dataset_settings(path, options)?;
+        let read = bag_topic::read(path, options, target)?;
+        refuse_motion_settings(path, &read.content, options)?;
+        return Ok(read);
+    }
+    if let Some(option) = options.bag_setting() {
+        return Err(unsuitable(format!(
+            "{option} chooses from a bag, which this file is not"
+        )));
+    }
+    if head.is_empty() {
+        return Err(unsuitable("the file is empty".to_owned()));
+    }
+    if let Some((_, recording)) = open_dataset(path, &options.files)? {
+        return dataset::chosen(path, recording, target, options);
+    }
+    refuse_dataset_settings(path, options)?;
+    // Motions first: an AMC's frame can look like a row of numbers.
+    if MotionFormat::of(&head).is_none()
+        && sniff_rigid(&head).is_some()
+        && let Some(rigid) = parse_rigid(&read_whole(path)?, &path.display().to_string())?
+    {
+        let content = match rigid {
+            RigidContent::Poses(poses) => Content::Poses(poses),
+            RigidContent::Imu(series) => Content::Imu(series),
+        };
+        refuse_motion_settings(path, &content, options)?;
+        return Ok(content.into());
+    }
+    let model = options.body.clone().unwrap_or_else(BodyModel::embedded);
+    let motion = read_motion_for(path, &model, &options.motion)?;
+    Ok(Content::Motion(Box::new(motion)).into())
+}
+
+fn refuse_motion_settings(
+    path: &Path,
+    content: &Content,
+    options: &ReadOptions,
+) -> Result<(), RecordingError> {
+    match options.motion_setting(true) {
+        Some(option) if !matches!(content, Content::Motion(_)) => Err(RecordingError::Unsuitable {
+            path: path.to_owned(),
+            problem: format!(
+                "{option} is for motions, and this is {}; leave it out",
+                content.name()
+            ),
+        }),
+        _ => Ok(()),
+    }
+}
+
+fn refuse_dataset_settings(path: &Path, options: &ReadOptions) -> Result<(), RecordingError> {
+    match options.dataset_setting() {
+        Some(option) => Err(RecordingError::Unsuitable {
+            path: path.to_owned(),
+            problem: format!(
+                "{option} is for recordings of data sets, which this file is not; leave it out"
+            ),
+        }),
+        None => Ok(()),
+    }
+}
