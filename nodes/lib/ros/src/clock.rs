@@ -2,11 +2,10 @@
 
 use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use cromosim_spatial::Stamp;
 
-use crate::reader::system_now;
 use crate::shutdown::Shutdown;
 use crate::wake::lock;
 
@@ -105,6 +104,14 @@ impl Clock {
         drop(jumps);
         self.inner.ticked.notify_all();
     }
+}
+
+/// What the system clock shows, since the UNIX epoch.
+pub(crate) fn system_now() -> Stamp {
+    let nanos = SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .map_or(0, |since| since.as_nanos());
+    Stamp::from_nanos(i64::try_from(nanos).unwrap_or(i64::MAX))
 }
 
 #[cfg(test)]

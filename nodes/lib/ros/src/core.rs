@@ -19,7 +19,6 @@ use std::time::{Duration, Instant};
 use ros2_client::entities_info::{NodeEntitiesInfo, ParticipantEntitiesInfo};
 use ros2_client::{Context, MessageTypeName, builtin_topics};
 use rustdds::{DomainParticipant, QosPolicies, Topic, TopicKind};
-use serde::Deserialize;
 
 use crate::clock::Clock;
 use crate::error::{RosResult, dds};
@@ -54,23 +53,6 @@ pub(crate) struct Core {
     subscriber: rustdds::Subscriber,
     context: Context,
     pub(crate) participant: DomainParticipant,
-}
-
-/// `rmw_dds_common/msg/ParticipantEntitiesInfo` as it is received: which nodes live in a
-/// participant, and which endpoints are theirs. Ours for reading: ros2-client's type does not let
-/// the endpoints out.
-#[derive(Debug, Deserialize)]
-pub(crate) struct ParticipantInfo {
-    pub(crate) participant: Gid,
-    pub(crate) nodes: Vec<NodeInfo>,
-}
-
-#[derive(Debug, Deserialize)]
-pub(crate) struct NodeInfo {
-    pub(crate) namespace: String,
-    pub(crate) name: String,
-    pub(crate) readers: Vec<Gid>,
-    pub(crate) writers: Vec<Gid>,
 }
 
 use builtin_topics::ros_discovery::{TOPIC_NAME as INFO_TOPIC, TYPE_NAME as INFO_TYPE};
@@ -135,10 +117,11 @@ impl Core {
             limit: usize::MAX,
             skip_past: false,
         };
-        Ok(Reader::new(reader, None, options))
+        Ok(Reader::new(reader, options))
     }
 
-    /// Makes a reader on an absolute name and tells peers that it is this node's.
+    /// Makes a reader on an absolute name and tells peers that it is this node's, until the guard
+    /// is dropped.
     pub(crate) fn reader(
         self: &Arc<Self>,
         kind: Kind,
@@ -146,7 +129,7 @@ impl Core {
         type_name: &str,
         qos: Qos,
         bell: Arc<Bell>,
-    ) -> RosResult<Reader> {
+    ) -> RosResult<(Reader, EndpointGuard)> {
         let topic = self.topic(kind, name, type_name, qos)?;
         let reader: RawReader = self
             .subscriber
@@ -161,17 +144,18 @@ impl Core {
             limit: qos.queue_length(),
             skip_past: qos.durability == Durability::Volatile,
         };
-        let reader = Reader::new(reader, Some(guard), options);
+        let reader = Reader::new(reader, options);
         if helped {
             let inbox = reader.inbox();
             self.add_worker(Box::new(move || {
                 inbox.upgrade().inspect(|inbox| inbox.pump()).is_some()
             }));
         }
-        Ok(reader)
+        Ok((reader, guard))
     }
 
-    /// Makes a writer on an absolute name and tells peers that it is this node's.
+    /// Makes a writer on an absolute name and tells peers that it is this node's, until the guard
+    /// is dropped.
     pub(crate) fn writer(
         self: &Arc<Self>,
         kind: Kind,

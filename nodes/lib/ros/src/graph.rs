@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 
 use rustdds::dds::statusevents::DomainParticipantStatusEvent as Event;
 
-use crate::core::{NodeInfo, ParticipantInfo};
 use crate::names::NodeName;
+use crate::participant_info::{NodeInfo, ParticipantInfo};
 use crate::qos::Qos;
 use crate::raw::Gid;
 use crate::shutdown::Shutdown;

@@ -6,12 +6,12 @@ use std::sync::{Arc, Mutex, OnceLock, Weak};
 use log::{Level, LevelFilter, Log, Metadata, Record};
 use ros2_client::{Log as LogMessage, ROSTime};
 
+use crate::clock::system_now;
 use crate::core::Core;
 use crate::error::RosResult;
 use crate::publisher::RawPublisher;
 use crate::qos::Qos;
 use crate::raw::RawMessage;
-use crate::reader::system_now;
 use crate::wake::lock;
 
 /// How much is logged: for everything, and for single log targets.
@@ -54,7 +54,7 @@ impl LogLevels {
         Ok(())
     }
 
-    fn of(&self, target: &str) -> LevelFilter {
+    fn for_target(&self, target: &str) -> LevelFilter {
         let root = target.split("::").next().unwrap_or(target);
         *self
             .targets
@@ -63,7 +63,8 @@ impl LogLevels {
             .unwrap_or(&self.default)
     }
 
-    fn most(&self) -> LevelFilter {
+    /// The most that any target logs.
+    fn most_verbose(&self) -> LevelFilter {
         self.targets
             .values()
             .copied()
@@ -92,13 +93,13 @@ fn logger() -> &'static Logger {
 pub fn init_logging(levels: &LogLevels) {
     *lock(&logger().levels) = levels.clone();
     if log::set_logger(logger()).is_ok() || std::ptr::addr_eq(log::logger(), logger()) {
-        log::set_max_level(levels.most());
+        log::set_max_level(levels.most_verbose());
     }
 }
 
 impl Log for Logger {
     fn enabled(&self, metadata: &Metadata<'_>) -> bool {
-        metadata.level() <= lock(&self.levels).of(metadata.target())
+        metadata.level() <= lock(&self.levels).for_target(metadata.target())
     }
 
     fn log(&self, record: &Record<'_>) {
@@ -184,13 +185,19 @@ mod tests {
     #[test]
     fn levels_are_for_all_or_for_a_target() {
         let mut levels = LogLevels::default();
-        assert_eq!(levels.of("cromosim_ros::node"), LevelFilter::Info);
-        assert_eq!(levels.of("rustdds::rtps::reader"), LevelFilter::Error);
+        assert_eq!(levels.for_target("cromosim_ros::node"), LevelFilter::Info);
+        assert_eq!(
+            levels.for_target("rustdds::rtps::reader"),
+            LevelFilter::Error
+        );
         levels.set("debug").unwrap();
         levels.set("rustdds:=WARN").unwrap();
-        assert_eq!(levels.of("cromosim_ros::node"), LevelFilter::Debug);
-        assert_eq!(levels.of("rustdds::rtps::reader"), LevelFilter::Warn);
-        assert_eq!(levels.most(), LevelFilter::Debug);
+        assert_eq!(levels.for_target("cromosim_ros::node"), LevelFilter::Debug);
+        assert_eq!(
+            levels.for_target("rustdds::rtps::reader"),
+            LevelFilter::Warn
+        );
+        assert_eq!(levels.most_verbose(), LevelFilter::Debug);
         assert!(levels.set("loud").is_err());
     }
 }

@@ -15,11 +15,11 @@ use serde::de::DeserializeOwned;
 use crate::args::RosArgs;
 use crate::clock::Clock;
 use crate::core::Core;
-use crate::discovery::Network;
 use crate::error::RosResult;
 use crate::graph::{Endpoint, TopicInfo, count_topics};
 use crate::logging::Rosout;
 use crate::names::{NodeName, ros_type_name, topic_from_dds};
+use crate::node_options::NodeOptions;
 use crate::parameter::{Parameters, USE_SIM_TIME, serve_parameters};
 use crate::publisher::{Publisher, RawPublisher};
 use crate::qos::Qos;
@@ -29,61 +29,6 @@ use crate::shutdown::Shutdown;
 use crate::spin::spawn_thread;
 use crate::subscription::{Listening, RawSubscription, Subscription};
 use crate::wake::{Bell, lock};
-
-/// What a node is started with. Everything is checked before DDS is touched, so `--check-config`
-/// needs no more than this.
-#[derive(Clone)]
-pub struct NodeOptions {
-    /// The node's name, after `__node` and `__ns`.
-    pub name: NodeName,
-    /// Its parameters, files and `-p` applied.
-    pub parameters: Parameters,
-    /// The domain, and how far the node looks for peers.
-    pub network: Network,
-    /// What ends it.
-    pub shutdown: Shutdown,
-    /// The command line, for remaps.
-    pub args: RosArgs,
-    /// Whether to offer the parameter services.
-    pub parameter_services: bool,
-}
-
-impl NodeOptions {
-    /// A node of this name, unless the command line renames it, with the network from the
-    /// environment. Ended by its own [`Shutdown`]; set [`Shutdown::on_signals`] in `main`.
-    ///
-    /// # Errors
-    /// Where a parameter, a name or an environment variable is wrong; one line that names the
-    /// place.
-    pub fn new(default_name: &str, args: &RosArgs, parameters: &Parameters) -> RosResult<Self> {
-        let name = args.node_name(default_name)?;
-        parameters.apply(args, &name)?;
-        let network = Network::from_env()?;
-        let (parameters, args) = (parameters.clone(), args.clone());
-        Ok(Self {
-            name,
-            parameters,
-            network,
-            shutdown: Shutdown::new(),
-            args,
-            parameter_services: true,
-        })
-    }
-
-    /// With this shutdown.
-    #[must_use]
-    pub fn shutdown(mut self, shutdown: &Shutdown) -> Self {
-        self.shutdown = shutdown.clone();
-        self
-    }
-
-    /// In this network.
-    #[must_use]
-    pub fn network(mut self, network: Network) -> Self {
-        self.network = network;
-        self
-    }
-}
 
 /// A running ROS 2 node. Cloning shares it; with the last clone its thread ends and peers are told.
 ///
@@ -294,7 +239,7 @@ impl Node {
         ServiceClient::new(self.core(), self.resolve(name)?, type_name)
     }
 
-    /// How many endpoints of others an endpoint of this node is connected to.
+    /// How many endpoints of other nodes an endpoint of this node is matched to.
     pub fn matched(&self, endpoint: Gid) -> usize {
         self.core().graph.matched(endpoint)
     }

@@ -86,11 +86,6 @@ impl RawMessage {
         &self.bytes
     }
 
-    /// All bytes, the four of the encoding included.
-    pub fn into_cdr(self) -> Vec<u8> {
-        self.bytes
-    }
-
     pub(crate) fn is_little_endian_cdr(&self) -> bool {
         self.bytes[..2] == LITTLE_ENDIAN_CDR[..2]
     }

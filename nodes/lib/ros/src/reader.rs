@@ -1,16 +1,14 @@
 //! A DDS reader that rings a bell.
 
 use std::collections::VecDeque;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, Weak};
 use std::task::{Wake, Waker};
-use std::time::{SystemTime, UNIX_EPOCH};
 
 use cromosim_spatial::Stamp;
 use rustdds::no_key::DeserializedCacheChange;
 use rustdds::rpc::SampleIdentity;
 
-use crate::core::EndpointGuard;
+use crate::clock::system_now;
 use crate::raw::{Gid, RawMessage, RawReader, Received, stamp_from_dds};
 use crate::wake::{Bell, lock};
 
@@ -22,7 +20,6 @@ use crate::wake::{Bell, lock};
 /// while that one is busy, by the node's thread.
 pub(crate) struct Reader {
     inbox: Arc<Inbox>,
-    _guard: Option<EndpointGuard>,
 }
 
 /// How a reader is made.
@@ -44,7 +41,6 @@ pub(crate) struct Inbox {
     waker: Waker,
     queue: Mutex<VecDeque<Result<Sample, String>>>,
     limit: usize,
-    overflow: AtomicU64,
     not_before: Option<Stamp>,
 }
 
@@ -75,11 +71,7 @@ pub(crate) struct Sample {
 }
 
 impl Reader {
-    pub(crate) fn new(
-        reader: RawReader,
-        guard: Option<EndpointGuard>,
-        options: ReaderOptions,
-    ) -> Self {
+    pub(crate) fn new(reader: RawReader, options: ReaderOptions) -> Self {
         let ReaderOptions {
             bell,
             helper,
@@ -98,12 +90,10 @@ impl Reader {
             waker,
             queue: Mutex::default(),
             limit,
-            overflow: AtomicU64::new(0),
             not_before,
         };
         Self {
             inbox: Arc::new(inbox),
-            _guard: guard,
         }
     }
 
@@ -128,11 +118,6 @@ impl Reader {
             self.inbox.pump_into(&mut queue);
         }
         queue.pop_front().transpose()
-    }
-
-    /// How many messages were thrown away because they were not taken in time.
-    pub(crate) fn overflow(&self) -> u64 {
-        self.inbox.overflow.load(Ordering::Relaxed)
     }
 
     pub(crate) fn inbox(&self) -> Weak<Inbox> {
@@ -169,7 +154,6 @@ impl Inbox {
             }
             if queue.len() >= self.limit {
                 queue.pop_front();
-                self.overflow.fetch_add(1, Ordering::Relaxed);
             }
             queue.push_back(sample);
         }
@@ -202,12 +186,4 @@ impl Drop for Inbox {
     fn drop(&mut self) {
         self.reader.set_waker(None);
     }
-}
-
-/// The system clock.
-pub(crate) fn system_now() -> Stamp {
-    let nanos = SystemTime::now()
-        .duration_since(UNIX_EPOCH)
-        .map_or(0, |since| since.as_nanos());
-    Stamp::from_nanos(i64::try_from(nanos).unwrap_or(i64::MAX))
 }

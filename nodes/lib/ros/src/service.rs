@@ -22,7 +22,7 @@ use crate::core::{Core, EndpointGuard};
 use crate::error::{RosError, RosResult, dds};
 use crate::names::Kind;
 use crate::qos::Qos;
-use crate::raw::{Gid, RawMessage, RawWriter};
+use crate::raw::{RawMessage, RawWriter};
 use crate::reader::{Reader, Sample};
 use crate::wake::{Bell, lock};
 
@@ -98,7 +98,7 @@ impl Drop for ServiceServer {
 struct Serving {
     requests: Reader,
     responses: RawWriter,
-    _guard: EndpointGuard,
+    _guards: [EndpointGuard; 2],
     mapping: Mapping,
     name: String,
 }
@@ -113,14 +113,14 @@ where
     Q: DeserializeOwned,
     A: Serialize,
 {
-    let requests = core.reader(
+    let (requests, requests_guard) = core.reader(
         Kind::Request,
         &name,
         &format!("{type_name}_Request"),
         Qos::services(),
         Arc::clone(&core.bell),
     )?;
-    let (responses, guard) = core.writer(
+    let (responses, responses_guard) = core.writer(
         Kind::Response,
         &name,
         &format!("{type_name}_Response"),
@@ -129,7 +129,7 @@ where
     let serving = Serving {
         requests,
         responses,
-        _guard: guard,
+        _guards: [requests_guard, responses_guard],
         mapping: Mapping::from_env(),
         name: name.clone(),
     };
@@ -209,8 +209,9 @@ fn request_identity(sample: &Sample) -> SampleIdentity {
 /// Calls a service of another node.
 pub struct ServiceClient<Q, A> {
     requests: RawWriter,
-    _guard: EndpointGuard,
+    request_guard: EndpointGuard,
     responses: Reader,
+    _response_guard: EndpointGuard,
     core: Arc<Core>,
     mapping: Mapping,
     count: AtomicI64,
@@ -223,7 +224,7 @@ pub struct ServiceClient<Q, A> {
 
 impl<Q: Serialize, A: DeserializeOwned> ServiceClient<Q, A> {
     pub(crate) fn new(core: &Arc<Core>, name: String, type_name: &str) -> RosResult<Self> {
-        let (requests, guard) = core.writer(
+        let (requests, request_guard) = core.writer(
             Kind::Request,
             &name,
             &format!("{type_name}_Request"),
@@ -232,7 +233,7 @@ impl<Q: Serialize, A: DeserializeOwned> ServiceClient<Q, A> {
         let bell = Bell::new();
         core.shutdown.ring_at_request(&bell);
         core.graph.ring_at_change(&bell);
-        let responses = core.reader(
+        let (responses, response_guard) = core.reader(
             Kind::Response,
             &name,
             &format!("{type_name}_Response"),
@@ -241,8 +242,9 @@ impl<Q: Serialize, A: DeserializeOwned> ServiceClient<Q, A> {
         )?;
         Ok(Self {
             requests,
-            _guard: guard,
+            request_guard,
             responses,
+            _response_guard: response_guard,
             core: Arc::clone(core),
             mapping: Mapping::from_env(),
             count: AtomicI64::new(0),
@@ -255,7 +257,7 @@ impl<Q: Serialize, A: DeserializeOwned> ServiceClient<Q, A> {
 
     /// True where a server reads requests and sends answers.
     pub fn is_available(&self) -> bool {
-        self.core.graph.matched(self._guard.gid) > 0
+        self.core.graph.matched(self.request_guard.gid) > 0
             && self.core.graph.matched(self.responses.gid()) > 0
     }
 
@@ -280,7 +282,7 @@ impl<Q: Serialize, A: DeserializeOwned> ServiceClient<Q, A> {
         }
         // The server's answers must find this client.
         self.core.graph.settle(self.responses.gid());
-        self.core.graph.settle(self._guard.gid);
+        self.core.graph.settle(self.request_guard.gid);
         let asked = self.send(request)?;
         loop {
             let sample = self
@@ -364,10 +366,5 @@ impl<Q: Serialize, A: DeserializeOwned> ServiceClient<Q, A> {
     /// The service, absolute.
     pub fn name(&self) -> &str {
         &self.name
-    }
-
-    /// The DDS identity of the requests.
-    pub fn gid(&self) -> Gid {
-        self._guard.gid
     }
 }

@@ -12,10 +12,11 @@ use cromosim_msgs::rosgraph_msgs::Clock as ClockMessage;
 use futures_core::Stream;
 use rustdds::StatusEvented;
 
-use crate::core::{Core, ParticipantInfo, Worker};
+use crate::core::{Core, Worker};
 use crate::error::{RosError, RosResult, dds};
 use crate::names::Kind;
 use crate::parameter::{Parameters, USE_SIM_TIME};
+use crate::participant_info::ParticipantInfo;
 use crate::qos::Qos;
 use crate::wake::lock;
 
@@ -107,7 +108,10 @@ fn clock_worker(core: &Arc<Core>, parameters: &Parameters) -> Worker {
                 .inspect_err(|error: &RosError| log::error!("use_sim_time: {error}"))
                 .ok();
         }
-        while let Some(taken) = reader.as_ref().and_then(|reader| reader.take().transpose()) {
+        while let Some(taken) = reader
+            .as_ref()
+            .and_then(|(reader, _)| reader.take().transpose())
+        {
             match taken.and_then(|sample| sample.received.message.decode::<ClockMessage>()) {
                 Ok(message) => core.clock.tick(message.clock.nanos()),
                 Err(problem) => log::warn!("/clock: {problem}"),

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use cromosim_msgs::RosMessage;
 use serde::de::DeserializeOwned;
 
-use crate::core::Core;
+use crate::core::{Core, EndpointGuard};
 use crate::error::{RosError, RosResult, dds};
 use crate::names::Kind;
 use crate::qos::Qos;
@@ -20,6 +20,8 @@ use crate::wake::Bell;
 /// Receives messages of one type as bytes: for recorders.
 pub struct RawSubscription {
     reader: Reader,
+    // Behind the reader, which must go first.
+    _guard: EndpointGuard,
     core: Arc<Core>,
     topic: String,
     type_name: String,
@@ -35,9 +37,10 @@ impl RawSubscription {
     ) -> RosResult<Self> {
         let bell = Bell::new();
         core.shutdown.ring_at_request(&bell);
-        let reader = core.reader(Kind::Topic, &topic, type_name, qos, bell)?;
+        let (reader, guard) = core.reader(Kind::Topic, &topic, type_name, qos, bell)?;
         Ok(Self {
             reader,
+            _guard: guard,
             core: Arc::clone(core),
             topic,
             type_name: type_name.to_owned(),
@@ -85,11 +88,6 @@ impl RawSubscription {
     pub fn ring(&self, bell: Arc<Bell>) {
         self.core.shutdown.ring_at_request(&bell);
         self.reader.ring(bell);
-    }
-
-    /// How many messages were thrown away because more than `depth` (and 64) were waiting.
-    pub fn overflow(&self) -> u64 {
-        self.reader.overflow()
     }
 
     /// The topic, absolute, after remapping.
@@ -214,6 +212,7 @@ impl<M: RosMessage> Subscription<M> {
         self.raw.ring(bell);
     }
 
+    /// Calls `callback` for every message, on a thread of its own, until the result is dropped.
     pub(crate) fn run(
         self,
         mut callback: impl FnMut(Received<M>) + Send + 'static,

@@ -5,8 +5,9 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_norway::{Mapping, Value};
 
+use super::declaration::Parameter;
 use super::file::flatten;
-use super::store::{Parameter, Parameters};
+use super::store::Parameters;
 use super::value::{from_yaml, to_yaml};
 use crate::error::{RosError, RosResult};
 
@@ -39,7 +40,7 @@ impl Parameters {
             self.declare(Parameter {
                 untyped,
                 in_config: true,
-                ..Parameter::of_value(&name, default).read_only()
+                ..Parameter::with_value(&name, default).read_only()
             })?;
         }
         Ok(())

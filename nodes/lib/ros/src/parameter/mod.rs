@@ -2,13 +2,15 @@
 //! open to the standard services.
 
 mod config;
+mod declaration;
 mod file;
 mod services;
 mod store;
 mod value;
 
+pub use declaration::Parameter;
 pub use ros2_client::ParameterValue;
-pub use store::{Parameter, Parameters};
+pub use store::Parameters;
 pub use value::ParameterScalar;
 
 pub(crate) use file::{Override, read_params_file};

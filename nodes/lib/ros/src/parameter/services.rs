@@ -11,7 +11,8 @@ use ros2_client::rcl_interfaces::{
 };
 use ros2_client::{ParameterValue, builtin_interfaces};
 
-use super::store::{Parameter, Parameters};
+use super::declaration::Parameter;
+use super::store::Parameters;
 use crate::core::Core;
 use crate::error::RosResult;
 use crate::publisher::RawPublisher;
@@ -89,21 +90,26 @@ pub(crate) fn serve_parameters(
         core: Arc::clone(core),
         events,
     });
+    let mut servers = readers(core, parameters)?;
+    servers.extend(setters(core, &setter)?);
+    Ok(servers)
+}
+
+/// The services that ask: values, types, names and descriptions.
+fn readers(core: &Arc<Core>, parameters: &Parameters) -> RosResult<Vec<ServiceServer>> {
     let name = |service: &str| format!("{}/{service}", core.name);
-    let [get, types, list, describe] = std::array::from_fn(|_| parameters.clone());
-    let (one_by_one, together) = (Arc::clone(&setter), setter);
-    let unset = |value: Option<ParameterValue>| value.unwrap_or(ParameterValue::NotSet);
+    let [values, types, names, descriptions] = std::array::from_fn(|_| parameters.clone());
+    let or_unset = |value: Option<ParameterValue>| value.unwrap_or(ParameterValue::NotSet);
     Ok(vec![
         serve(
             core,
             name("get_parameters"),
             "rcl_interfaces/srv/GetParameters",
-            move |request: GetParametersRequest| GetParametersResponse {
-                values: request
-                    .names
-                    .iter()
-                    .map(|name| unset(get.value(name)).into())
-                    .collect(),
+            move |request: GetParametersRequest| {
+                let value = |name: &String| or_unset(values.value(name)).into();
+                GetParametersResponse {
+                    values: request.names.iter().map(value).collect(),
+                }
             },
         )?,
         serve(
@@ -111,7 +117,7 @@ pub(crate) fn serve_parameters(
             name("get_parameter_types"),
             "rcl_interfaces/srv/GetParameterTypes",
             move |request: GetParameterTypesRequest| {
-                let kind = |name: &String| unset(types.value(name)).to_parameter_type() as u8;
+                let kind = |name: &String| or_unset(types.value(name)).to_parameter_type() as u8;
                 GetParameterTypesResponse {
                     values: request.names.iter().map(kind).collect(),
                 }
@@ -119,14 +125,40 @@ pub(crate) fn serve_parameters(
         )?,
         serve(
             core,
+            name("list_parameters"),
+            "rcl_interfaces/srv/ListParameters",
+            move |request: ListParametersRequest| ListParametersResponse {
+                result: list_names(names.names(), &request.prefixes, request.depth),
+            },
+        )?,
+        serve(
+            core,
+            name("describe_parameters"),
+            "rcl_interfaces/srv/DescribeParameters",
+            move |request: DescribeParametersRequest| {
+                let described = |name: &String| descriptor(name, descriptions.describe(name));
+                DescribeParametersResponse {
+                    values: request.names.iter().map(described).collect(),
+                }
+            },
+        )?,
+    ])
+}
+
+/// The services that change parameters: each for itself, or all or none.
+fn setters(core: &Arc<Core>, setter: &Arc<Setter>) -> RosResult<[ServiceServer; 2]> {
+    let name = |service: &str| format!("{}/{service}", core.name);
+    let (one_by_one, together) = (Arc::clone(setter), Arc::clone(setter));
+    Ok([
+        serve(
+            core,
             name("set_parameters"),
             "rcl_interfaces/srv/SetParameters",
-            move |request: SetParametersRequest| SetParametersResponse {
-                results: request
-                    .parameter
-                    .iter()
-                    .map(|one| one_by_one.set(std::slice::from_ref(one)))
-                    .collect(),
+            move |request: SetParametersRequest| {
+                let set = |one| one_by_one.set(std::slice::from_ref(one));
+                SetParametersResponse {
+                    results: request.parameter.iter().map(set).collect(),
+                }
             },
         )?,
         serve(
@@ -135,26 +167,6 @@ pub(crate) fn serve_parameters(
             "rcl_interfaces/srv/SetParametersAtomically",
             move |request: SetParametersRequest| SetParametersAtomicallyResponse {
                 result: together.set(&request.parameter),
-            },
-        )?,
-        serve(
-            core,
-            name("list_parameters"),
-            "rcl_interfaces/srv/ListParameters",
-            move |request: ListParametersRequest| ListParametersResponse {
-                result: list_names(list.names(), &request.prefixes, request.depth),
-            },
-        )?,
-        serve(
-            core,
-            name("describe_parameters"),
-            "rcl_interfaces/srv/DescribeParameters",
-            move |request: DescribeParametersRequest| DescribeParametersResponse {
-                values: request
-                    .names
-                    .iter()
-                    .map(|name| descriptor(name, describe.describe(name)))
-                    .collect(),
             },
         )?,
     ])
@@ -190,7 +202,7 @@ fn list_names(names: Vec<String>, prefixes: &[String], depth: u64) -> ListParame
 fn descriptor(name: &str, parameter: Option<Parameter>) -> raw::ParameterDescriptor {
     let known = parameter.is_some();
     let parameter = parameter.unwrap_or_else(|| {
-        Parameter::of_value(name, ParameterValue::NotSet).about("not a parameter of this node")
+        Parameter::with_value(name, ParameterValue::NotSet).about("not a parameter of this node")
     });
     let whole = matches!(
         parameter.value,

@@ -5,7 +5,8 @@ use std::sync::{Arc, Mutex, Weak};
 
 use ros2_client::ParameterValue;
 
-use super::value::{ParameterScalar, coerce, numbers, to_text, type_name};
+use super::declaration::Parameter;
+use super::value::{ParameterScalar, to_text};
 use crate::args::RosArgs;
 use crate::error::{RosError, RosResult};
 use crate::names::NodeName;
@@ -14,98 +15,6 @@ use crate::wake::{Bell, lock};
 
 pub(crate) const USE_SIM_TIME: &str = "use_sim_time";
 const QOS_OVERRIDES: &str = "qos_overrides.";
-
-/// A parameter to declare: its name, default, and what is known about it.
-#[derive(Clone, Debug)]
-pub struct Parameter {
-    pub(crate) name: String,
-    pub(crate) value: ParameterValue,
-    pub(crate) description: String,
-    pub(crate) read_only: bool,
-    pub(crate) range: Option<(f64, f64)>,
-    pub(crate) untyped: bool,
-    pub(crate) in_config: bool,
-}
-
-impl Parameter {
-    /// A parameter with its default, which fixes the type.
-    pub fn new(name: &str, default: impl ParameterScalar) -> Self {
-        Self::of_value(name, default.into_value())
-    }
-
-    pub(crate) fn of_value(name: &str, value: ParameterValue) -> Self {
-        let description = String::new();
-        Self {
-            name: name.to_owned(),
-            value,
-            description,
-            read_only: false,
-            range: None,
-            untyped: false,
-            in_config: false,
-        }
-    }
-
-    /// With a description for `ros2 param describe`.
-    #[must_use]
-    pub fn about(mut self, description: &str) -> Self {
-        description.clone_into(&mut self.description);
-        self
-    }
-
-    /// Numbers from `least` to `most`, both included.
-    #[must_use]
-    pub fn range(mut self, least: f64, most: f64) -> Self {
-        self.range = Some((least, most));
-        self
-    }
-
-    /// Cannot change after the start.
-    #[must_use]
-    pub fn read_only(mut self) -> Self {
-        self.read_only = true;
-        self
-    }
-
-    /// Can change at run time: the node asks for the value again and again, or registers
-    /// [`Parameters::on_set`].
-    #[must_use]
-    pub fn writable(mut self) -> Self {
-        self.read_only = false;
-        self
-    }
-
-    fn check(&self, given: ParameterValue, place: &str) -> RosResult<ParameterValue> {
-        let found = to_text(&given);
-        let refuse = |expected: String| {
-            let (place, name) = (place.to_owned(), self.name.clone());
-            RosError::ParameterValue {
-                place,
-                name,
-                expected,
-                found,
-            }
-        };
-        let value = if self.untyped {
-            Some(given)
-        } else {
-            coerce(given, &self.value)
-        };
-        match (value, self.range) {
-            (None, _) => Err(refuse(type_name(&self.value).to_owned())),
-            (Some(value), Some((least, most)))
-                if numbers(&value)
-                    .iter()
-                    .any(|number| !(least..=most).contains(number)) =>
-            {
-                Err(refuse(format!("{least} to {most}")))
-            }
-            (Some(value), _) => Ok(value),
-        }
-    }
-}
-
-type OnSet = Box<dyn FnMut(&str, &ParameterValue) -> Result<(), String> + Send>;
 
 /// The parameters of a node. Cloning shares them.
 #[derive(Clone, Default)]
@@ -116,25 +25,21 @@ pub struct Parameters {
 #[derive(Default)]
 struct Store {
     declared: BTreeMap<String, Parameter>,
-    /// Names below which everything is taken, and whether that belongs to the configuration.
-    open: Vec<(String, bool)>,
+    /// Names below which everything is taken into the configuration.
+    open: Vec<String>,
     /// Full name of a `qos_overrides` parameter: value and place.
     qos: BTreeMap<String, (ParameterValue, String)>,
-    on_set: Vec<OnSet>,
     bells: Vec<Weak<Bell>>,
 }
 
 impl Store {
-    /// Whether an undeclared name is taken, and if so, whether it belongs to the configuration.
-    fn is_open(&self, name: &str) -> Option<bool> {
-        let below = |prefix: &str| {
-            name.strip_prefix(prefix)
+    /// Whether an undeclared name is taken, as a part of the configuration.
+    fn is_open(&self, name: &str) -> bool {
+        let below = |prefix: &String| {
+            name.strip_prefix(prefix.as_str())
                 .is_some_and(|rest| rest.len() > 1 && rest.starts_with('.'))
         };
-        self.open
-            .iter()
-            .find(|(prefix, _)| below(prefix))
-            .map(|(_, in_config)| *in_config)
+        self.open.iter().any(below)
     }
 }
 
@@ -174,22 +79,13 @@ impl Parameters {
         self.declare(change(parameter))
     }
 
-    /// Takes every parameter below `prefix.`, without asking for its type.
-    pub fn open(&self, prefix: &str) {
-        lock(&self.inner).open.push((prefix.to_owned(), false));
-    }
-
+    /// Takes every parameter below `prefix.` into the configuration, without asking for its type.
     pub(crate) fn open_config(&self, prefix: &str) {
-        lock(&self.inner).open.push((prefix.to_owned(), true));
+        lock(&self.inner).open.push(prefix.to_owned());
     }
 
     pub(crate) fn open_configs(&self) -> Vec<String> {
-        lock(&self.inner)
-            .open
-            .iter()
-            .filter(|(_, in_config)| *in_config)
-            .map(|(prefix, _)| prefix.clone())
-            .collect()
+        lock(&self.inner).open.clone()
     }
 
     /// Takes over what parameter files and `-p` say for this node, in the order of the command
@@ -228,15 +124,6 @@ impl Parameters {
         lock(&self.inner).declared.keys().cloned().collect()
     }
 
-    /// Calls `callback` before a parameter changes at run time; its error refuses the change and is
-    /// the reason given to the caller.
-    pub fn on_set(
-        &self,
-        callback: impl FnMut(&str, &ParameterValue) -> Result<(), String> + Send + 'static,
-    ) {
-        lock(&self.inner).on_set.push(Box::new(callback));
-    }
-
     /// Rings the bell after every change at run time.
     pub fn ring_at_change(&self, bell: &Arc<Bell>) {
         lock(&self.inner).bells.push(Arc::downgrade(bell));
@@ -245,14 +132,16 @@ impl Parameters {
     /// Changes a parameter at run time, as the parameter services do.
     ///
     /// # Errors
-    /// Where the parameter is unknown or read-only, the value does not fit, or a callback refuses
-    /// it.
+    /// Where the parameter is unknown or read-only, or the value does not fit.
     pub fn set(&self, name: &str, value: impl ParameterScalar) -> RosResult<()> {
         self.set_all(&[(name.to_owned(), value.into_value())], "set")
             .map(drop)
     }
 
-    /// Changes all or none; the values as they are now.
+    /// Changes parameters at run time, all or none; the values as they are now.
+    ///
+    /// # Errors
+    /// Where a parameter is unknown or read-only, or a value does not fit.
     pub(crate) fn set_all(
         &self,
         changes: &[(String, ParameterValue)],
@@ -271,24 +160,6 @@ impl Parameters {
             }
             checked.push((name.clone(), self.checked(name, value.clone(), place)?));
         }
-        // Taken out: a callback may ask for parameters.
-        let mut callbacks = std::mem::take(&mut lock(&self.inner).on_set);
-        let refused = checked.iter().find_map(|(name, value)| {
-            let expected = callbacks
-                .iter_mut()
-                .find_map(|callback| callback(name, value).err())?;
-            Some(RosError::ParameterValue {
-                place: place.to_owned(),
-                name: name.clone(),
-                expected,
-                found: to_text(value),
-            })
-        });
-        let mut store = lock(&self.inner);
-        callbacks.append(&mut store.on_set);
-        store.on_set = callbacks;
-        drop(store);
-        refused.map_or(Ok(()), Err)?;
         checked
             .iter()
             .for_each(|(name, value)| self.store(name, value.clone()));
@@ -315,10 +186,7 @@ impl Parameters {
     fn checked(&self, name: &str, value: ParameterValue, place: &str) -> RosResult<ParameterValue> {
         let (parameter, open) = {
             let store = lock(&self.inner);
-            (
-                store.declared.get(name).cloned(),
-                store.is_open(name).is_some(),
-            )
+            (store.declared.get(name).cloned(), store.is_open(name))
         };
         match parameter {
             Some(parameter) => parameter.check(value, place),
@@ -329,12 +197,12 @@ impl Parameters {
 
     fn store(&self, name: &str, value: ParameterValue) {
         let mut store = lock(&self.inner);
-        let in_config = store.is_open(name).unwrap_or(false);
+        let in_config = store.is_open(name);
         let fresh = || Parameter {
             untyped: true,
             in_config,
             read_only: in_config,
-            ..Parameter::of_value(name, ParameterValue::NotSet)
+            ..Parameter::with_value(name, ParameterValue::NotSet)
         };
         store
             .declared
