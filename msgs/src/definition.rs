@@ -83,7 +83,7 @@ pub struct FieldType {
 impl FieldType {
     /// The same arity of another element.
     #[must_use]
-    pub const fn of(self, element: Element) -> Self {
+    pub const fn with_element(self, element: Element) -> Self {
         Self {
             element,
             arity: self.arity,

@@ -30,7 +30,7 @@ macro_rules! ros_message {
                 fields: &[$(
                     $crate::Field {
                         name: stringify!($field),
-                        field_type: <$ty as $crate::RosField>::FIELD_TYPE$(.of($crate::Element::$element))?,
+                        field_type: <$ty as $crate::RosField>::FIELD_TYPE$(.with_element($crate::Element::$element))?,
                     },
                 )*],
                 constants: &[$( (stringify!($constant), $value as i64), )*],

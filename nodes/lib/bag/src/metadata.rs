@@ -69,7 +69,7 @@ struct FileInformation {
 
 impl Information {
     /// The record of a bag of these files, each with what it holds.
-    pub(crate) fn of(files: &[(String, &BagSummary)]) -> Self {
+    pub(crate) fn from_summaries(files: &[(String, &BagSummary)]) -> Self {
         let mut all = BagSummary::default();
         files.iter().for_each(|(_, summary)| all.add(summary));
         let topics = all.topics.iter().map(|counted| TopicCount {

@@ -115,7 +115,7 @@ fn recover_directory(path: &Path, output: &Path, in_place: bool) -> Result<Recov
         .tempfile_in(output)
         .map_err(io_error(&target, "create"))?;
     metadata
-        .write_all(Information::of(&counted).yaml().as_bytes())
+        .write_all(Information::from_summaries(&counted).yaml().as_bytes())
         .map_err(io_error(&target, "write"))?;
     metadata
         .persist(&target)

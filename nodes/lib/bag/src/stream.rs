@@ -147,7 +147,7 @@ impl<W: Write + Seek> StreamWriter<W> {
     ) -> Result<(), BagError> {
         let id = match self.by_name.get(topic) {
             Some(&id) if self.summary.topics[id.0].topic.type_name == M::TYPE_NAME => id,
-            _ => self.add_topic(&Topic::of::<M>(topic))?,
+            _ => self.add_topic(&Topic::for_message::<M>(topic))?,
         };
         let payload = cdr::encode(message).map_err(|reason| BagError::Encode {
             topic: topic.to_owned(),
@@ -295,7 +295,7 @@ impl<W: Write + Seek> StreamWriter<W> {
         for counted in &self.summary.topics {
             summary.count(&counted.topic, counted.message_count);
         }
-        let information = Information::of(&[(file_name.to_owned(), &summary)]);
+        let information = Information::from_summaries(&[(file_name.to_owned(), &summary)]);
         self.write_metadata(
             "rosbag2",
             BTreeMap::from([("serialized_metadata".to_owned(), information.inner_yaml())]),

@@ -28,7 +28,7 @@ pub struct Topic {
 
 impl Topic {
     /// The topic `name` with messages of type `M`, offered as [`QosProfile::usual`].
-    pub fn of<M: RosMessage>(name: &str) -> Self {
+    pub fn for_message<M: RosMessage>(name: &str) -> Self {
         Self::known(name, M::TYPE)
     }
 

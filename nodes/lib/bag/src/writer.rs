@@ -223,7 +223,7 @@ impl BagWriter {
         let (_, summary) = stream
             .finish(&file_name)
             .map_err(|error| placed(error, options.live, &target))?;
-        let metadata = Information::of(&[(file_name, &summary)]).yaml();
+        let metadata = Information::from_summaries(&[(file_name, &summary)]).yaml();
         let finish = || io_error(&target, "write");
         match place {
             Place::LiveFile => {}

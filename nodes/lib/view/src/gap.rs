@@ -5,77 +5,21 @@ use std::path::Path;
 use std::time::Duration;
 
 use cromosim_spatial::Stamp;
+use re_sdk::RecordingStream;
 use re_sdk::log::TimeColumn;
-use re_sdk::{EntityPath, RecordingStream};
 use re_sdk_types::archetypes::{Scalars, SeriesLines, TextDocument};
 use re_sdk_types::components::MediaType;
 
+use crate::gap_data::{GAP_AXES, GapPlacement, gap_path};
 use crate::gap_layout::{self, GapLayout};
 use crate::gap_spectrum::log_spectrum;
 use crate::layout::TIMELINE;
 use crate::{Destination, ViewError, sinks, style};
 
-/// Paths of the six axes below a placement, and the unit of each.
-pub(crate) const GAP_AXES: [(&str, &str); 6] = [
-    ("accel_x", "m/s²"),
-    ("accel_y", "m/s²"),
-    ("accel_z", "m/s²"),
-    ("gyro_x", "rad/s"),
-    ("gyro_y", "rad/s"),
-    ("gyro_z", "rad/s"),
-];
+/// Names and colours of the lines of both simulations.
+const BEFORE_AND_AFTER: [(&str, [u8; 3]); 2] = [("before", style::BEFORE), ("after", style::AFTER)];
 /// How long the last flush may take before it counts as lost.
 const FLUSH_TIMEOUT: Duration = Duration::from_secs(20);
-
-/// One placement's curves. All lists by stamp have the same length.
-#[derive(Clone, Debug, Default)]
-pub struct GapPlacement {
-    /// Its name.
-    pub name: String,
-    /// Verdict and causes, as Markdown.
-    pub words: String,
-    /// Of each reading.
-    pub stamps: Vec<Stamp>,
-    /// Accelerometer [m/s²], gyroscope [rad/s], as recorded.
-    pub measured: Vec<[f64; 6]>,
-    /// The nominal simulation.
-    pub before: Vec<[f64; 6]>,
-    /// With all named causes.
-    pub after: Vec<[f64; 6]>,
-    /// Whitened residual over time.
-    pub course: Vec<GapCoursePoint>,
-    /// Spectra of one axis of each channel.
-    pub spectra: Vec<GapSpectrum>,
-}
-
-/// Mean square of the whitened residual around a time; 1 is noise alone.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct GapCoursePoint {
-    /// Since the placement's first stamp, s.
-    pub seconds: f64,
-    /// Accelerometer before and after.
-    pub accel: [f64; 2],
-    /// Gyroscope before and after.
-    pub gyro: [f64; 2],
-}
-
-/// One-sided densities on common frequencies.
-#[derive(Clone, Debug, Default)]
-pub struct GapSpectrum {
-    /// What is shown, with its unit.
-    pub title: String,
-    /// Hz.
-    pub frequencies: Vec<f64>,
-    /// Lines on these frequencies: name and density. `measured`, `before`, `after` and `predicted`
-    /// have the colours of the curves.
-    pub lines: Vec<(String, Vec<f64>)>,
-}
-
-/// The path of something of a placement; the name is one part of it, whatever characters it has.
-pub(crate) fn gap_path(placement: &str, parts: &[&str]) -> EntityPath {
-    let parts = ["gap", placement].into_iter().chain(parts.iter().copied());
-    EntityPath::new(parts.map(Into::into).collect())
-}
 
 /// Writes a diagnosis to an `.rrd` file, with a layout: a page of words, and a tab for each
 /// placement; the first placement is open.
@@ -156,80 +100,68 @@ struct Writer<'a> {
 
 impl Writer<'_> {
     fn write(&self) -> Result<(), ViewError> {
-        let GapPlacement {
-            name,
-            words,
-            stamps,
-            measured,
-            before,
-            after,
-            course,
-            spectra,
-        } = self.placement;
-        self.stream
-            .log_static(gap_path(name, &["words"]), &markdown(words))?;
-        let times: Vec<i64> = stamps
+        let placement = self.placement;
+        self.stream.log_static(
+            gap_path(&placement.name, &["words"]),
+            &markdown(&placement.words),
+        )?;
+        let times: Vec<i64> = placement
+            .stamps
             .iter()
             .map(|stamp| stamp.nanos.saturating_sub(self.start.nanos))
             .collect();
-        for (axis, (axis_name, _)) in GAP_AXES.into_iter().enumerate() {
-            let curves: Vec<[f64; 3]> = (0..stamps.len())
-                .map(|k| [measured[k][axis], before[k][axis], after[k][axis]])
-                .collect();
-            let series = [
-                ("measured", style::MEASURED),
-                ("before", style::BEFORE),
-                ("after", style::AFTER),
-            ];
-            self.lines(&["curves", axis_name], series, &times, &curves)?;
-            let residuals: Vec<[f64; 2]> = (0..stamps.len())
-                .map(|k| {
-                    [
-                        measured[k][axis] - before[k][axis],
-                        measured[k][axis] - after[k][axis],
-                    ]
-                })
-                .collect();
-            self.lines(
-                &["residual", axis_name],
-                [("before", style::BEFORE), ("after", style::AFTER)],
-                &times,
-                &residuals,
-            )?;
+        for axis in 0..GAP_AXES.len() {
+            self.write_axis(axis, &times)?;
         }
-        let first = times.first().copied().unwrap_or(0);
+        self.write_course(times.first().copied().unwrap_or(0))?;
+        for (index, spectrum) in placement.spectra.iter().enumerate() {
+            let path = gap_path(&placement.name, &["spectrum", &index.to_string()]);
+            log_spectrum(self.stream, &path, spectrum)?;
+        }
+        Ok(())
+    }
+
+    /// Curves and residuals of one axis.
+    fn write_axis(&self, axis: usize, times: &[i64]) -> Result<(), ViewError> {
+        let GapPlacement {
+            measured,
+            before,
+            after,
+            ..
+        } = self.placement;
+        let (axis_name, _) = GAP_AXES[axis];
+        let curves: Vec<[f64; 3]> = (0..times.len())
+            .map(|k| [measured[k][axis], before[k][axis], after[k][axis]])
+            .collect();
+        let [before_line, after_line] = BEFORE_AND_AFTER;
+        let series = [("measured", style::MEASURED), before_line, after_line];
+        self.lines(&["curves", axis_name], series, times, &curves)?;
+        let residuals: Vec<[f64; 2]> = curves
+            .iter()
+            .map(|[measured, before, after]| [measured - before, measured - after])
+            .collect();
+        self.lines(
+            &["residual", axis_name],
+            BEFORE_AND_AFTER,
+            times,
+            &residuals,
+        )
+    }
+
+    /// The whitened residual over time, dB over the noise; `first`: the first stamp on the
+    /// timeline, ns.
+    fn write_course(&self, first: i64) -> Result<(), ViewError> {
+        let course = &self.placement.course;
         let times: Vec<i64> = course
             .iter()
             .map(|point| first + (point.seconds * 1e9).round() as i64)
             .collect();
         let decibels =
             |[before, after]: [f64; 2]| [before, after].map(|value| 10.0 * value.max(1e-3).log10());
-        for (channel, values) in [
-            (
-                "accel",
-                course
-                    .iter()
-                    .map(|point| decibels(point.accel))
-                    .collect::<Vec<_>>(),
-            ),
-            (
-                "gyro",
-                course.iter().map(|point| decibels(point.gyro)).collect(),
-            ),
-        ] {
-            self.lines(
-                &["course", channel],
-                [("before", style::BEFORE), ("after", style::AFTER)],
-                &times,
-                &values,
-            )?;
-        }
-        for (index, spectrum) in spectra.iter().enumerate() {
-            log_spectrum(
-                self.stream,
-                &gap_path(name, &["spectrum", &index.to_string()]),
-                spectrum,
-            )?;
+        let accel: Vec<_> = course.iter().map(|point| decibels(point.accel)).collect();
+        let gyro: Vec<_> = course.iter().map(|point| decibels(point.gyro)).collect();
+        for (channel, values) in [("accel", accel), ("gyro", gyro)] {
+            self.lines(&["course", channel], BEFORE_AND_AFTER, &times, &values)?;
         }
         Ok(())
     }

@@ -10,7 +10,7 @@ use re_sdk_types::blueprint::components::{
 use re_sdk_types::datatypes::{Range1D, Range2D};
 
 use crate::blueprint_store::{BlueprintStore, Part, Property, View};
-use crate::gap::{GAP_AXES, GapPlacement, gap_path};
+use crate::gap_data::{GAP_AXES, GapPlacement, gap_path};
 use crate::gap_spectrum::{MARGIN, SIZE};
 use crate::layout::TIMELINE;
 use crate::{ViewError, style};

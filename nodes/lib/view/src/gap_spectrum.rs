@@ -5,7 +5,7 @@ use re_sdk::{EntityPath, RecordingStream};
 use re_sdk_types::archetypes::{LineStrips2D, Points2D};
 use re_sdk_types::components::Color;
 
-use crate::gap::GapSpectrum;
+use crate::gap_data::GapSpectrum;
 use crate::{ViewError, style};
 
 /// Size of the picture between its axes, in the view's own units.
@@ -25,7 +25,8 @@ struct Frame {
 }
 
 impl Frame {
-    fn of(spectrum: &GapSpectrum) -> Option<Self> {
+    /// Covers all lines, within the decades that are shown.
+    fn for_spectrum(spectrum: &GapSpectrum) -> Option<Self> {
         let logs = |values: &mut dyn Iterator<Item = f64>| {
             values
                 .filter(|value| value.is_finite() && *value > 0.0)
@@ -77,7 +78,7 @@ pub(crate) fn log_spectrum(
     path: &EntityPath,
     spectrum: &GapSpectrum,
 ) -> Result<(), ViewError> {
-    let Some(frame) = Frame::of(spectrum) else {
+    let Some(frame) = Frame::for_spectrum(spectrum) else {
         return Ok(());
     };
     log_axes(stream, path, &frame)?;

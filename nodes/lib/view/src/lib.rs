@@ -43,18 +43,21 @@
 mod blueprint_store;
 mod error;
 mod gap;
+mod gap_data;
 mod gap_layout;
 mod gap_spectrum;
 mod layout;
 mod mesh;
 mod options;
+mod placement_look;
 mod recording;
 mod reduce;
 mod sinks;
 mod style;
 
 pub use error::ViewError;
-pub use gap::{GapCoursePoint, GapPlacement, GapSpectrum, write_gap};
+pub use gap::write_gap;
+pub use gap_data::{GapCoursePoint, GapPlacement, GapSpectrum};
 pub use mesh::DisplayMesh;
 pub use options::{Destination, RecordingOptions, TimeAxis};
 pub use recording::{Recording, Summary};

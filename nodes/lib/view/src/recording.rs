@@ -5,19 +5,18 @@ use std::time::Duration;
 
 use cromosim_spatial::Stamp;
 use nalgebra::{Isometry3, Vector3};
-use re_sdk::log::TimeColumn;
 use re_sdk::time::TimeCell;
 use re_sdk::{EntityPath, RecordingStream};
 use re_sdk_types::archetypes::{
-    Arrows3D, Boxes3D, LineStrips3D, Mesh3D, Points3D, Scalars, SeriesLines, Transform3D,
-    ViewCoordinates,
+    LineStrips3D, Mesh3D, Points3D, Scalars, Transform3D, ViewCoordinates,
 };
-use re_sdk_types::components::{FillMode, RotationQuat};
+use re_sdk_types::components::RotationQuat;
 use re_sdk_types::datatypes::Quaternion;
 
 use crate::layout::{
     ANCHOR, ANCHOR_POINTS, Layout, QUANTITIES, TIMELINE, WORLD, imu_path, sensor_path,
 };
+use crate::placement_look::log_placement_look;
 use crate::{Destination, DisplayMesh, RecordingOptions, TimeAxis, ViewError, sinks, style};
 
 const BODY: &str = "/world/body";
@@ -259,61 +258,6 @@ impl Recording {
         Ok(())
     }
 
-    /// Adds many IMU samples at once, as one chunk per quantity: far cheaper than one by one, for
-    /// data that are all there.
-    ///
-    /// # Errors
-    /// [`ViewError::Count`] where the lists differ in length.
-    pub fn log_imu_batch(
-        &mut self,
-        placement: &str,
-        stamps: &[Stamp],
-        specific_forces: &[Vector3<f64>],
-        angular_velocities: &[Vector3<f64>],
-    ) -> Result<(), ViewError> {
-        for (what, found) in [
-            ("specific forces", specific_forces.len()),
-            ("angular velocities", angular_velocities.len()),
-        ] {
-            if found != stamps.len() {
-                return Err(ViewError::Count {
-                    what,
-                    expected: stamps.len(),
-                    found,
-                });
-            }
-        }
-        let Some(&first) = stamps.first() else {
-            return Ok(());
-        };
-        self.see_placement(first, placement)?;
-        let nanos: Vec<i64> = stamps
-            .iter()
-            .map(|&stamp| self.nanos_on_timeline(stamp))
-            .collect();
-        for ((quantity, _), values) in QUANTITIES
-            .into_iter()
-            .zip([specific_forces, angular_velocities])
-        {
-            let times = match self.options.time_axis {
-                TimeAxis::SinceStart => {
-                    TimeColumn::new_duration_nanos(TIMELINE, nanos.iter().copied())
-                }
-                TimeAxis::Date => {
-                    TimeColumn::new_timestamp_nanos_since_epoch(TIMELINE, nanos.iter().copied())
-                }
-            };
-            let scalars = Scalars::new(values.iter().flat_map(|value| value.iter().copied()));
-            let columns = scalars
-                .columns(values.iter().map(|_| 3))
-                .map_err(|error| ViewError::Sdk(Box::new(error)))?;
-            self.stream
-                .send_columns(imu_path(placement, quantity), [times], columns)?;
-        }
-        self.summary.imu_samples += stamps.len() as u64;
-        Ok(())
-    }
-
     /// Hands everything logged so far to the destinations. Worth calling now and then in a long
     /// run: only here, and at the end, does a full disk or a viewer that went away become known.
     ///
@@ -418,39 +362,8 @@ impl Recording {
         Ok(())
     }
 
-    /// Writes what does not change of a placement: its box, name and axes, and how its curves look.
     fn add_placement(&mut self, name: &str) -> Result<(), ViewError> {
-        let color = style::sensor_color(self.placements.len());
-        let path = sensor_path(name);
-        let [_, _, half_height] = style::HALF_BOX;
-        let case =
-            Boxes3D::from_centers_and_half_sizes([[0.0, 0.0, half_height]], [style::HALF_BOX]);
-        self.stream.log_static(
-            path.join(&"case".into()),
-            &case.with_colors([color]).with_fill_mode(FillMode::Solid),
-        )?;
-        let vectors: [[f32; 3]; 3] = std::array::from_fn(|axis| {
-            std::array::from_fn(|k| if k == axis { style::AXIS_LENGTH } else { 0.0 })
-        });
-        let axes = Arrows3D::from_vectors(vectors)
-            .with_colors(style::AXES.map(style::color))
-            .with_radii([style::AXIS_RADIUS]);
-        self.stream.log_static(path.join(&"axes".into()), &axes)?;
-        let label = Points3D::new([style::LABEL_POINT])
-            .with_radii([0.001])
-            .with_colors([color])
-            .with_labels([name]);
-        self.stream
-            .log_static(path.join(&"name".into()), &label.with_show_labels(true))?;
-        for (quantity, _) in QUANTITIES {
-            let series = SeriesLines::new()
-                .with_names(["x", "y", "z"])
-                .with_colors(style::AXES.map(style::color));
-            self.stream.log_static(
-                imu_path(name, quantity),
-                &series.with_widths([1.5, 1.5, 1.5]),
-            )?;
-        }
+        log_placement_look(&self.stream, name, self.placements.len())?;
         self.placements.push(name.to_owned());
         Ok(())
     }

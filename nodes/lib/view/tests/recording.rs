@@ -180,32 +180,6 @@ fn placements_that_appear_later_get_their_curves_in_one_go() {
 }
 
 #[test]
-fn a_batch_is_the_same_as_one_by_one() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("run.rrd");
-    let mut recording = Recording::open(
-        &[Destination::File { path: path.clone() }],
-        RecordingOptions::default(),
-    )
-    .unwrap();
-    let stamps: Vec<Stamp> = (0..50)
-        .map(|k| Stamp::from_seconds(3.0 + 0.01 * f64::from(k)))
-        .collect();
-    let values = vec![Vector3::new(1.0, 2.0, 3.0); 50];
-    recording
-        .log_imu_batch("head", &stamps, &values, &values)
-        .unwrap();
-    let error = recording
-        .log_imu_batch("head", &stamps, &values[1..], &values)
-        .unwrap_err();
-    assert_eq!(error.to_string(), "specific forces: expected 50, found 49");
-    assert_eq!(recording.finish().unwrap().imu_samples, 50);
-    let content = read(&path);
-    assert_eq!(content.rows["/imu/head/specific_force"], 50);
-    assert_eq!(content.times.iter().max(), Some(&490_000_000));
-}
-
-#[test]
 fn a_skeleton_alone_is_followed_too() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.rrd");
