@@ -8,6 +8,7 @@ mod outlet;
 mod player;
 mod services;
 mod source;
+mod system_clock;
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -22,6 +23,7 @@ pub use source::{Item, Source};
 
 use outlet::Outlet;
 use services::Remote;
+use system_clock::system_nanos;
 
 const ABOUT: &str = "replay: plays a motion file as smpl/pose, each of several people as person_NAME/smpl/pose, or a bag with everything in it";
 /// From ready to the first message, ns.
@@ -109,10 +111,6 @@ fn check(config: &Config) -> anyhow::Result<()> {
     );
     // Opened here too, so that --check-config finds what is wrong with the file.
     Source::open(config).map(drop)
-}
-
-fn system_nanos() -> i64 {
-    cromosim_ros::Clock::system_now().nanos
 }
 
 struct Playback<'a> {

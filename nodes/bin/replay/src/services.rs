@@ -7,7 +7,7 @@ use cromosim_msgs::rosbag2_interfaces as srv;
 use cromosim_ros::{Bell, Node, RosError, ServiceServer};
 
 use crate::player::Player;
-use crate::system_nanos;
+use crate::system_clock::system_nanos;
 
 /// Shared between the playing loop and the services.
 #[derive(Clone)]
