@@ -2,12 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use anyhow::bail;
 use clap::Subcommand;
 
-mod bootstrap;
 mod fidelity;
 mod har;
-mod output;
 
 /// Evaluations.
 #[derive(Subcommand)]
@@ -19,7 +18,7 @@ pub enum Command {
     Har(Box<har::Arguments>),
 }
 
-/// Runs one.
+/// Runs one of them.
 pub fn run(command: &Command) -> anyhow::Result<()> {
     match command {
         Command::Fidelity(arguments) => fidelity::run(arguments),
@@ -34,4 +33,16 @@ fn data_folder(given: Option<&Path>) -> PathBuf {
         .map(Path::to_owned)
         .or_else(stated)
         .unwrap_or_else(|| PathBuf::from("../shared/data"))
+}
+
+/// Refuses a folder that holds results already, unless `force`.
+fn refuse_existing(out: &Path, names: &[&str], force: bool) -> anyhow::Result<()> {
+    let mut existing = names.iter().map(|name| out.join(name));
+    if let Some(path) = existing.find(|path| path.exists() && !force) {
+        bail!(
+            "{}: exists already; give another --out, or --force to replace it",
+            path.display()
+        );
+    }
+    Ok(())
 }

@@ -1,11 +1,11 @@
 //! Progress on work that takes longer than a second, and its end by a signal.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use anyhow::bail;
-
+use cromosim_evaluation::Observer;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 /// A bar of `steps` steps on standard error; invisible where that is no terminal.
@@ -41,16 +41,63 @@ impl Interrupt {
         self.0.load(Ordering::Relaxed)
     }
 
-    /// The flag itself, for libraries that look at it.
-    pub fn flag(&self) -> &AtomicBool {
-        &self.0
-    }
-
     /// An error once a signal has come: whoever writes a file gives it up.
     pub fn check(&self) -> anyhow::Result<()> {
         if self.is_set() {
             bail!("interrupted; what was being written is given up");
         }
         Ok(())
+    }
+}
+
+/// A user at a terminal, who waits for an evaluation or a training and may interrupt it.
+pub struct Terminal {
+    interrupt: Interrupt,
+    bar: Mutex<Option<ProgressBar>>,
+}
+
+impl Terminal {
+    /// Watches for signals as [`Interrupt::watch`].
+    pub fn watch() -> anyhow::Result<Self> {
+        Ok(Self {
+            interrupt: Interrupt::watch()?,
+            bar: Mutex::new(None),
+        })
+    }
+
+    fn bar(&self) -> MutexGuard<'_, Option<ProgressBar>> {
+        self.bar.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Observer for Terminal {
+    fn begin(&self, work: &str, steps: u64) {
+        *self.bar() = Some(bar(steps, work));
+    }
+
+    fn advance(&self, steps: u64) {
+        if let Some(bar) = self.bar().as_ref() {
+            bar.inc(steps);
+        }
+    }
+
+    fn describe(&self, work: &str) {
+        if let Some(bar) = self.bar().as_ref() {
+            bar.set_message(work.to_owned());
+        }
+    }
+
+    fn end(&self) {
+        if let Some(bar) = self.bar().take() {
+            bar.finish_and_clear();
+        }
+    }
+
+    fn note(&self, line: &str) {
+        println!("{line}");
+    }
+
+    fn interrupted(&self) -> bool {
+        self.interrupt.is_set()
     }
 }

@@ -12,7 +12,6 @@
 
 use std::path::Path;
 use std::process::Command;
-use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use cromosim_learned::train::{
@@ -68,7 +67,7 @@ fn training(shape: &NetworkShape, engine: &mut dyn Engine) -> Vec<f64> {
     let mut progress = |_: &_| stamps.push(Instant::now());
     let mut hooks = Hooks {
         progress: &mut progress,
-        interrupt: &AtomicBool::new(false),
+        interrupted: &|| false,
         checkpoint: None,
     };
     let data = Data {

@@ -1,7 +1,5 @@
 //! The training of a classifier: one after the other inside, so that many run beside each other.
 
-use std::sync::atomic::{AtomicBool, Ordering};
-
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
@@ -96,7 +94,8 @@ impl Deck {
 
 /// Trains a classifier on pools of windows; every batch takes as many of each, the first pools one
 /// more where they do not divide it. Within a pool all classes count alike ([`Examples::balance`]);
-/// the loss is the weighted mean of the cross-entropy. None where it was interrupted.
+/// the loss is the weighted mean of the cross-entropy. `interrupted` is asked before each step; none where it
+/// said yes.
 ///
 /// On the calling thread alone; the same seed gives the same bits.
 ///
@@ -107,7 +106,7 @@ pub fn train_classifier(
     options: &ClassifierOptions,
     pools: &[&Examples],
     seed: u64,
-    interrupt: &AtomicBool,
+    interrupted: &dyn Fn() -> bool,
 ) -> Result<Option<Classifier>, LearnedError> {
     options.check(pools.len())?;
     let mut classifier = Classifier::new(shape.clone(), seed)?;
@@ -133,7 +132,7 @@ pub fn train_classifier(
     let mut gradients = vec![0.0; classifier.parameters.len()];
     let (mut windows, mut labels, mut weights) = (Vec::new(), Vec::new(), Vec::new());
     for step in 0..options.steps {
-        if interrupt.load(Ordering::Relaxed) {
+        if interrupted() {
             return Ok(None);
         }
         windows.clear();

@@ -50,7 +50,7 @@ fn examples(count: usize, seed: u64) -> Examples {
 }
 
 fn train(pools: &[&Examples], seed: u64) -> Classifier {
-    train_classifier(&shape(), &options(), pools, seed, &AtomicBool::new(false))
+    train_classifier(&shape(), &options(), pools, seed, &|| false)
         .unwrap()
         .unwrap()
 }
@@ -100,7 +100,7 @@ fn every_window_comes_once_before_any_comes_again() {
 fn what_is_unsound_is_named_and_an_interrupt_ends_it() {
     let pool = examples(20, 1);
     let message = |options: ClassifierOptions, pools: &[&Examples]| {
-        train_classifier(&shape(), &options, pools, 1, &AtomicBool::new(false))
+        train_classifier(&shape(), &options, pools, 1, &|| false)
             .unwrap_err()
             .to_string()
     };
@@ -136,7 +136,7 @@ fn what_is_unsound_is_named_and_an_interrupt_ends_it() {
     };
     assert!(message(diverged, &[&pool]).contains("it has diverged"));
     assert_eq!(
-        train_classifier(&shape(), &options(), &[&pool], 1, &AtomicBool::new(true)).unwrap(),
+        train_classifier(&shape(), &options(), &[&pool], 1, &|| true).unwrap(),
         None
     );
 }

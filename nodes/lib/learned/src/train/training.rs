@@ -1,7 +1,6 @@
 //! The loop.
 
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::adam::{Adam, clip};
 use super::batch::Batches;
@@ -41,8 +40,8 @@ pub struct Progress {
 pub struct Hooks<'a> {
     /// Called after every step.
     pub progress: &'a mut dyn FnMut(&Progress),
-    /// Once set, the training stops after the step that runs, with a checkpoint.
-    pub interrupt: &'a AtomicBool,
+    /// Asked after every step; once it says yes, the training stops with a checkpoint.
+    pub interrupted: &'a dyn Fn() -> bool,
     /// Where checkpoints go.
     pub checkpoint: Option<&'a Path>,
 }
@@ -174,10 +173,7 @@ impl Training {
         {
             Some(Stop::Early)
         } else {
-            hooks
-                .interrupt
-                .load(Ordering::Relaxed)
-                .then_some(Stop::Interrupted)
+            (hooks.interrupted)().then_some(Stop::Interrupted)
         }
     }
 

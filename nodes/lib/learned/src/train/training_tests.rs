@@ -1,4 +1,5 @@
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::*;
 use crate::Direction;
@@ -95,7 +96,7 @@ fn run(
             data,
             &mut Hooks {
                 progress: &mut progress,
-                interrupt: &interrupt,
+                interrupted: &|| interrupt.load(Ordering::Relaxed),
                 checkpoint,
             },
         )
@@ -247,10 +248,10 @@ fn batches_and_options_that_cannot_be_are_refused() {
     ];
     for (change, expected) in changes {
         let mut training = Training::new(shape(), options(3)).unwrap();
-        let (interrupt, mut progress) = (AtomicBool::new(false), |_: &Progress| {});
+        let mut progress = |_: &Progress| {};
         let mut hooks = Hooks {
             progress: &mut progress,
-            interrupt: &interrupt,
+            interrupted: &|| false,
             checkpoint: None,
         };
         let data = Data {

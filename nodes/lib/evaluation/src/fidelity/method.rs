@@ -1,0 +1,51 @@
+//! The simulators that are compared.
+
+use serde::{Deserialize, Serialize};
+
+/// A way from a motion to readings. A further one gets a variant here, a place in [`Method::ALL`],
+/// a title, and its kinematics in `Case::simulate`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// The skeleton's joint in place of the skin, as IMUTube has it; the scheme of `Analytic`.
+    Joint,
+    /// Splines of position and rotation, smoothed as IMUSim smooths.
+    Imusim,
+    /// The skin's frame by Richardson's extrapolation: the paper's analytic simulator.
+    Analytic,
+    /// Splines that choose their smoothing themselves: our analytic simulator.
+    Spline,
+    /// The networks on top of the spline.
+    Learned,
+    /// The networks, then the distribution mapping.
+    Mapped,
+    /// What networks would leave that say exactly what was measured: the errors of the source's
+    /// orientation, which they do not touch.
+    Perfect,
+}
+
+impl Method {
+    /// All, in the order of the tables.
+    pub const ALL: [Self; 7] = [
+        Self::Joint,
+        Self::Imusim,
+        Self::Analytic,
+        Self::Spline,
+        Self::Learned,
+        Self::Mapped,
+        Self::Perfect,
+    ];
+
+    /// The name in tables.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Joint => "joint (IMUTube)",
+            Self::Imusim => "IMUSim-like",
+            Self::Analytic => "analytic (Richardson)",
+            Self::Spline => "spline",
+            Self::Learned => "learned",
+            Self::Mapped => "learned, mapped",
+            Self::Perfect => "(perfect networks)",
+        }
+    }
+}

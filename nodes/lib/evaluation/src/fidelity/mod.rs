@@ -1,0 +1,99 @@
+//! How far simulators are from measured IMUs: root mean square errors on people and positions that
+//! no network has seen.
+
+mod cases;
+mod errors;
+mod method;
+mod protocol;
+mod results;
+mod tables;
+
+use std::path::PathBuf;
+
+use cromosim_learned::{LearnedSimulator, MappingFile};
+use rayon::prelude::*;
+
+pub use method::Method;
+pub use protocol::{Protocol, Study};
+pub use results::{FidelityResults, MethodResults, PositionResults, StudyResults};
+
+use crate::EvaluationError;
+use crate::observer::{self, Observer};
+use crate::training_data::{DataFolder, DataSource};
+use cases::Case;
+use errors::SquaredErrors;
+
+/// What a comparison is run on.
+pub struct FidelityOptions {
+    /// Where the protocol's files are, and the body.
+    pub data: DataFolder,
+    /// A folder of models that `cromosim train` wrote, by the protocol's names; without, the models
+    /// that come with the suite.
+    pub models: Option<PathBuf>,
+    /// One draw of person and device for each motion and site.
+    pub quick: bool,
+}
+
+/// Scores all methods on all recordings of a protocol.
+///
+/// # Errors
+/// Files that cannot be read, and [`EvaluationError::Interrupted`].
+pub fn evaluate_fidelity(
+    protocol: &Protocol,
+    options: &FidelityOptions,
+    observer: &dyn Observer,
+) -> Result<FidelityResults, EvaluationError> {
+    let studies = protocol
+        .studies
+        .iter()
+        .map(|study| run_study(study, protocol.seed, options, observer))
+        .collect::<Result<_, _>>()?;
+    Ok(FidelityResults::new(protocol, options.quick, studies))
+}
+
+/// All methods on all recordings of a study.
+fn run_study(
+    study: &Study,
+    seed: u64,
+    options: &FidelityOptions,
+    observer: &dyn Observer,
+) -> Result<StudyResults, EvaluationError> {
+    let learned = match &options.models {
+        _ if study.model == "none" => None,
+        Some(folder) => Some(LearnedSimulator::read(&folder.join(&study.model))?),
+        None => Some(LearnedSimulator::named(&study.model)?),
+    };
+    let cases = |sources: &[DataSource], seed: u64| {
+        cases::cases(sources, &options.data, seed, options.quick, observer)
+    };
+    let test = cases(&study.test, seed)?;
+    let mapping = match &learned {
+        Some(networks) => {
+            cases::fit_mapping(&cases(&study.mapping, seed.wrapping_add(1))?, networks)?
+        }
+        None => MappingFile::default(),
+    };
+    observer.begin(
+        &format!("study {}, recordings", study.name),
+        test.len() as u64,
+    );
+    let one = |case: &Case| -> Result<Vec<Option<SquaredErrors>>, EvaluationError> {
+        observer::check(observer)?;
+        let errors = |method: Method| {
+            let readings = case.simulate(method, learned.as_ref(), &mapping)?;
+            Ok(readings.map(|readings| SquaredErrors::between(&readings, case.measured())))
+        };
+        let errors = Method::ALL
+            .into_iter()
+            .map(errors)
+            .collect::<Result<_, EvaluationError>>()?;
+        observer.advance(1);
+        Ok(errors)
+    };
+    let errors: Vec<Vec<Option<SquaredErrors>>> = test
+        .par_iter()
+        .map(one)
+        .collect::<Result<_, EvaluationError>>()?;
+    observer.end();
+    Ok(StudyResults::new(study, &test, &errors, seed))
+}
