@@ -100,7 +100,7 @@ impl<R: Read + Seek> Container<R> {
         self.format
     }
 
-    /// The file's name.
+    /// The file, as it was named to the reader.
     pub fn path(&self) -> &Path {
         &self.path
     }

@@ -15,13 +15,13 @@ pub enum Kind {
     Float,
     /// The upper half of a float32 (torch.bfloat16).
     Bfloat,
-    /// Two floats.
+    /// Real and imaginary part, floats of half the size.
     Complex,
     /// UCS-4 text of fixed length, padded with zeros (numpy `U`).
     Text,
     /// Bytes of fixed length, padded with zeros (numpy `S`).
     Bytes,
-    /// Any Python object.
+    /// A Python object, pickled.
     Object,
     /// What this crate does not interpret: records, dates.
     Opaque,

@@ -36,7 +36,7 @@ impl Entry {
         &self.key
     }
 
-    /// The file.
+    /// The file that the value came in, for messages.
     pub fn path(&self) -> &Path {
         &self.path
     }

@@ -1,4 +1,4 @@
-//! What can go wrong while arrays are read.
+//! Errors of this crate.
 
 use std::io;
 use std::path::PathBuf;
@@ -11,25 +11,25 @@ pub enum ArraysError {
     /// The file cannot be opened.
     #[error("{}: cannot open: {source}", path.display())]
     Open {
-        /// The file.
+        /// The file, as it was named to the reader.
         path: PathBuf,
-        /// The reason.
+        /// What the operating system or the decompressor says.
         source: io::Error,
     },
     /// The file's bytes cannot be read.
     #[error("{}: cannot read: {source}", path.display())]
     Read {
-        /// The file.
+        /// The file, as it was named to the reader.
         path: PathBuf,
-        /// The reason.
+        /// What the operating system or the decompressor says.
         source: io::Error,
     },
     /// No container of arrays begins like this.
     #[error("{}: begins with {start}, which no .npy, .npz, pickle, joblib, torch or .mat file does", path.display())]
     Unrecognised {
-        /// The file.
+        /// The file, as it was named to the reader.
         path: PathBuf,
-        /// Its first bytes.
+        /// Its first bytes, those that are no letters as escapes.
         start: String,
     },
     /// HDF5, which this reader does not know.
@@ -38,37 +38,37 @@ pub enum ArraysError {
         path.display()
     )]
     Hdf5 {
-        /// The file.
+        /// The file, as it was named to the reader.
         path: PathBuf,
     },
     /// The file's zip directory is unsound.
     #[error("{}: not a zip archive (.npz, .pt) ({source}); it may be cut short", path.display())]
     Archive {
-        /// The file.
+        /// The file, as it was named to the reader.
         path: PathBuf,
-        /// The reason.
+        /// What the operating system or the decompressor says.
         source: io::Error,
     },
     /// An array cannot be decoded.
     #[error("{}: {}unreadable: {source}", path.display(), at(key))]
     Unreadable {
-        /// The file.
+        /// The file, as it was named to the reader.
         path: PathBuf,
-        /// The array.
+        /// Key of the array within the file.
         key: String,
-        /// The reason.
+        /// What the operating system or the decompressor says.
         source: io::Error,
     },
     /// A pickle is unsound, or holds what this reader does not know.
     #[error("{}: {}pickle, byte {offset}: {reason}", path.display(), at(key))]
     Pickle {
-        /// The file.
+        /// The file, as it was named to the reader.
         path: PathBuf,
         /// The entry that is a pickle.
         key: String,
         /// Where in the (decompressed) pickle.
         offset: usize,
-        /// The reason.
+        /// What is wrong, in words.
         reason: String,
     },
     /// A pickle names what this reader does not rebuild.
@@ -77,7 +77,7 @@ pub enum ArraysError {
         path.display(), at(key)
     )]
     Refused {
-        /// The file.
+        /// The file, as it was named to the reader.
         path: PathBuf,
         /// The entry that is a pickle.
         key: String,
@@ -86,12 +86,12 @@ pub enum ArraysError {
         /// The Python name, module first.
         name: String,
     },
-    /// Something is missing.
+    /// A key that must be there is missing.
     #[error("{}: key {key} is missing; there are: {known}", path.display())]
     MissingKey {
-        /// The file.
+        /// The file, as it was named to the reader.
         path: PathBuf,
-        /// What was looked for.
+        /// The key that was asked for.
         key: String,
         /// The keys that are there.
         known: String,
@@ -99,45 +99,45 @@ pub enum ArraysError {
     /// A value is of another type.
     #[error("{}: {}is {found}, expected {expected}", path.display(), at(key))]
     Type {
-        /// The file.
+        /// The file, as it was named to the reader.
         path: PathBuf,
-        /// Which value.
+        /// Keys from the root to the value, joined by dots.
         key: String,
-        /// What it is.
+        /// Python's type of the value, and a glimpse of it.
         found: String,
-        /// What suits.
+        /// What would suit, in words.
         expected: String,
     },
     /// An array holds elements of a type that does not suit.
     #[error("{}: {}elements are {found}, expected {expected}", path.display(), at(key))]
     ElementType {
-        /// The file.
+        /// The file, as it was named to the reader.
         path: PathBuf,
-        /// The array.
+        /// Key of the array within the file.
         key: String,
         /// numpy's type description in the file.
         found: String,
-        /// What suits.
+        /// What would suit, in words.
         expected: &'static str,
     },
     /// An array has an unsuitable shape.
     #[error("{}: {}shape is {found:?}, expected {expected}", path.display(), at(key))]
     Shape {
-        /// The file.
+        /// The file, as it was named to the reader.
         path: PathBuf,
-        /// The array.
+        /// Key of the array within the file.
         key: String,
         /// The shape in the file.
         found: Vec<u64>,
-        /// What suits.
+        /// What would suit, in words.
         expected: String,
     },
     /// A value is NaN or infinite.
     #[error("{}: {}element {element} (C order) is {value}", path.display(), at(key))]
     NotFinite {
-        /// The file.
+        /// The file, as it was named to the reader.
         path: PathBuf,
-        /// The array.
+        /// Key of the array within the file.
         key: String,
         /// Flat index, last dimension fastest.
         element: usize,
@@ -147,13 +147,13 @@ pub enum ArraysError {
     /// More than the limits allow.
     #[error("{}: {}{bytes} bytes or more, but {limit} are allowed", path.display(), at(key))]
     TooLarge {
-        /// The file.
+        /// The file, as it was named to the reader.
         path: PathBuf,
-        /// The array.
+        /// Key of the array within the file.
         key: String,
-        /// Its size.
+        /// Bytes that it takes, or more.
         bytes: u64,
-        /// The largest allowed.
+        /// Most bytes that are allowed.
         limit: u64,
     },
 }

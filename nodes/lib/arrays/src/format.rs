@@ -5,7 +5,7 @@ use std::io::{self, Read, Seek, SeekFrom};
 use crate::pickle::LEGACY_START;
 use crate::{mat, npy};
 
-/// How HDF5 begins.
+/// The first bytes of HDF5.
 const HDF5_START: &[u8] = b"\x89HDF\r\n\x1a\n";
 
 /// How a file of arrays is packed.

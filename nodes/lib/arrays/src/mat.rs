@@ -15,18 +15,22 @@ use crate::inflate::inflated;
 use crate::limits::{Budget, Limits};
 use crate::value::{ArrayData, Dict, Value};
 
-/// How each such file begins.
+/// The first bytes of each such file.
 pub(crate) const START: &[u8] = b"MATLAB 5.0 MAT";
 const HEADER_BYTES: usize = 128;
-/// Types of elements.
+/// Type of an element that is an array.
 const MATRIX: u32 = 14;
+/// Type of an element that is a zlib stream of others.
 const COMPRESSED: u32 = 15;
-/// The class of arrays of text; numbers are 6 (double) to 15 (uint64).
+/// The class of arrays of text.
 const CHARACTERS: u8 = 4;
+/// The classes of numbers, from 6 (double) to 15 (uint64).
 const NUMBERS: std::ops::RangeInclusive<u8> = 6..=15;
+/// Flag of an array with an imaginary part.
 const COMPLEX: u8 = 0x08;
-/// MATLAB itself stops at 63 letters.
+/// Longest name that is read, bytes; MATLAB itself stops at 63 letters.
 const NAME_LIMIT: usize = 1 << 12;
+/// Most dimensions that are read.
 const DIMENSIONS_LIMIT: usize = 32;
 
 /// All arrays of a file by their names.

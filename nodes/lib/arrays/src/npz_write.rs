@@ -13,7 +13,7 @@ pub struct NpzWriter<W: Write + Seek> {
 }
 
 impl<W: Write + Seek> NpzWriter<W> {
-    /// Starts an archive.
+    /// Starts an archive at the writer's position.
     pub fn new(writer: W) -> Self {
         Self {
             archive: ZipWriter::new(writer),
@@ -74,7 +74,7 @@ impl<W: Write + Seek> NpzWriter<W> {
         )
     }
 
-    /// Ends the archive.
+    /// Writes the archive's directory and gives the writer back.
     ///
     /// # Errors
     /// What `writer` says.

@@ -13,28 +13,28 @@ use crate::dtype::{DType, Kind};
 #[derive(Clone)]
 #[non_exhaustive]
 pub enum Value {
-    /// `None`.
+    /// Python's `None`.
     None,
-    /// `bool`.
+    /// A `bool`.
     Bool(bool),
-    /// `int` within 64 bits.
+    /// An `int` within 64 bits.
     Int(i64),
     /// Any other `int`: its decimal digits, or its bytes as `0x…` (two's complement, most
     /// significant first).
     BigInt(Arc<str>),
-    /// `float`.
+    /// A `float`, 64 bits.
     Float(f64),
-    /// `complex`: real and imaginary part.
+    /// A `complex`: real and imaginary part.
     Complex(f64, f64),
     /// `str`; of Python 2 also a `str` of sound UTF-8.
     Text(Arc<str>),
-    /// `bytes`, `bytearray`; of Python 2 a `str` that is no text.
+    /// `bytes` or `bytearray`; of Python 2 a `str` that is no text.
     Bytes(Arc<[u8]>),
-    /// `list`, `set`, `frozenset` (in the file's order).
+    /// A `list`, `set`, `frozenset` (in the file's order).
     List(Arc<Vec<Value>>),
-    /// `tuple`, `torch.Size`.
+    /// A `tuple` or `torch.Size`.
     Tuple(Arc<Vec<Value>>),
-    /// `dict`, `OrderedDict`, `defaultdict`.
+    /// A `dict`, `OrderedDict` or `defaultdict`.
     Dict(Arc<Dict>),
     /// A numpy array or scalar, a torch tensor, a chumpy array.
     Array(Arc<ArrayData>),
@@ -54,16 +54,16 @@ pub struct Dict {
 /// Which index of a sparse matrix is compressed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SparseKind {
-    /// `csc_matrix`: columns.
+    /// Of a `csc_matrix`: the column index.
     Columns,
-    /// `csr_matrix`: rows.
+    /// Of a `csr_matrix`: the row index.
     Rows,
 }
 
 /// A sparse matrix; indices are checked against the shape.
 #[derive(Debug)]
 pub struct Sparse {
-    /// Rows and columns.
+    /// Number of rows and of columns.
     pub shape: [usize; 2],
     /// Row, column and value of each stored element, in the file's order.
     pub entries: Vec<(u32, u32, f64)>,

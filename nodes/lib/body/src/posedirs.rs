@@ -23,7 +23,7 @@ const SMALLEST: f64 = 2e-6;
 /// Beyond so many sigma a Gaussian of these coefficients is far below [`SMALLEST`].
 const REACH_IN_SIGMA: f64 = 7.5;
 
-/// `assets/posedirs.json`.
+/// The constants of the three terms, as `assets/posedirs.json` holds them.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Constants {

@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use crate::skin_tables::RestTiles;
 use crate::{BodyError, BodyModel, BodyPose, JOINT_COUNT, Joint};
 
-/// A body of one person.
+/// A body model with the shape of one person.
 #[derive(Clone, Debug)]
 pub struct ShapedBody {
     model: Arc<BodyModel>,
@@ -70,7 +70,7 @@ impl ShapedBody {
         })
     }
 
-    /// What was shaped.
+    /// The model that was shaped.
     pub fn model(&self) -> &Arc<BodyModel> {
         &self.model
     }

@@ -4,16 +4,17 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::{BodyModel, JOINT_COUNT, Joint};
 
-/// How well a bone length is known, m: skeletons put their joints up to a centimetre or so apart.
+/// How well a bone length is known, m: skeletons put their joints about a centimetre apart. No source
+/// for the number.
 const LENGTH_SIGMA_M: f64 = 0.01;
-/// Shapes beyond are no shapes of people, standard deviations.
+/// Largest beta, standard deviations: of a thousand people three lie beyond it in one beta.
 const LARGEST_BETA: f64 = 3.0;
 /// Lengths are nearly linear in betas: the steps halve the remaining error many times over.
 const STEPS: usize = 4;
 
 /// Lengths that differ by more from the mean body's, once that has the source's size, are no
 /// property of the person: the skeletons put their joints at different places (Daz figures have
-/// their shoulder joints a third nearer to the spine).
+/// their shoulder joints a third nearer to the spine). No source for the number.
 const LARGEST_DEPARTURE: f64 = 0.2;
 
 /// A length of the skeleton and its measure in the source, m.
@@ -155,7 +156,7 @@ fn remaining(joints: &[Vector3<f64>; JOINT_COUNT], targets: &[Target]) -> f64 {
     (squares / targets.len().max(1) as f64).sqrt()
 }
 
-/// One Gauss-Newton step.
+/// One Gauss-Newton step of the betas, which are then held within [`LARGEST_BETA`].
 fn step(
     betas: &mut DVector<f64>,
     joints: &[Vector3<f64>; JOINT_COUNT],

@@ -1,11 +1,11 @@
-//! Confidence of a pose and standard deviation of its position, one from the other.
+//! The confidence of a pose and the standard deviation of its position, each from the other.
 
-/// Standard deviation per axis at which the confidence is one half, m: an error as long as a wrist
-/// is wide.
+/// Standard deviation per axis at which the confidence is one half, m: about the width of a hand. A
+/// convention, not a measurement.
 pub const HALF_CONFIDENCE_STD_M: f64 = 0.1;
 
-/// What a position's standard deviation is divided by for that of a rotation, m: a limb turned by
-/// so much misses by the one at its end.
+/// Length by which a position's standard deviation is divided to give that of a rotation, m: that of a
+/// limb, which misses by the one at its end when it turns by the other. A convention.
 pub const CONFIDENCE_LENGTH_M: f64 = 0.5;
 
 /// Confidence in [0, 1] of a position whose standard deviation per axis is `std_m` (root of a third

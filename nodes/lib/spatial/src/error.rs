@@ -1,4 +1,4 @@
-//! What can go wrong.
+//! Errors of this crate.
 
 use thiserror::Error;
 
@@ -8,9 +8,9 @@ pub enum SpatialError {
     /// Too few samples for the operation.
     #[error("{got} samples given, at least {needed} needed")]
     TooFewSamples {
-        /// Samples given.
+        /// Number of samples given.
         got: usize,
-        /// Samples needed.
+        /// Number of samples needed.
         needed: usize,
     },
     /// A time equals the one before it or goes backwards.
@@ -50,7 +50,7 @@ pub enum SpatialError {
     NotARotation {
         /// Frobenius norm of `R^T R - I`.
         orthogonality_error: f64,
-        /// Determinant.
+        /// det R, 1 for a rotation.
         determinant: f64,
     },
     /// A rate that is zero, negative or not finite.
@@ -64,9 +64,9 @@ pub enum SpatialError {
         "{count:.3e} samples at {rate_hz} Hz; at most {limit:.0e} are made at once: lower the rate or cut the motion"
     )]
     TooManyStamps {
-        /// How many it would be.
+        /// Number of samples that it would be.
         count: f64,
-        /// How many are allowed.
+        /// Most samples that are made at once.
         limit: f64,
         /// The rate given, Hz.
         rate_hz: f64,
@@ -74,7 +74,7 @@ pub enum SpatialError {
     /// A smoothing weight that is negative or not finite.
     #[error("a smoothing weight of {weight}; give zero or a positive number")]
     BadWeight {
-        /// The weight given.
+        /// The weight as given, no unit.
         weight: f64,
     },
     /// A distance from the samples that is negative or not finite.

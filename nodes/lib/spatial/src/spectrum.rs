@@ -126,7 +126,7 @@ impl std::fmt::Debug for FourierPair {
 }
 
 impl FourierPair {
-    /// Plans both.
+    /// Plans both transforms of series of `length` entries.
     pub fn new(length: usize) -> Self {
         let mut planner = FftPlanner::new();
         Self {
@@ -136,17 +136,17 @@ impl FourierPair {
         }
     }
 
-    /// Number of entries.
+    /// Entries of a series that is transformed.
     pub fn length(&self) -> usize {
         self.length
     }
 
-    /// In place.
+    /// `X_k = sum_n x_n exp(-2 pi i k n / length)`, in place.
     pub fn forward(&self, values: &mut [Complex64]) {
         self.forward.process(values);
     }
 
-    /// In place, divided by the length.
+    /// The inverse of [`FourierPair::forward`], divided by the length, in place.
     pub fn inverse(&self, values: &mut [Complex64]) {
         self.inverse.process(values);
         let factor = 1.0 / self.length as f64;

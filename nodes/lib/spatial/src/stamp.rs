@@ -1,4 +1,4 @@
-//! Time stamps.
+//! Time stamps in whole nanoseconds.
 
 use std::ops::Sub;
 
@@ -39,7 +39,7 @@ impl Stamp {
 }
 
 impl Sub for Stamp {
-    /// Seconds.
+    /// Seconds from `earlier` to this stamp.
     type Output = f64;
 
     fn sub(self, earlier: Self) -> f64 {

@@ -25,12 +25,12 @@ pub struct KinematicTrack {
 }
 
 impl KinematicTrack {
-    /// Entries.
+    /// Number of entries.
     pub fn len(&self) -> usize {
         self.world_from_segment.len()
     }
 
-    /// Whether there is none.
+    /// Whether the track has no entry.
     pub fn is_empty(&self) -> bool {
         self.world_from_segment.is_empty()
     }

@@ -25,7 +25,7 @@ pub struct WeightSearch {
 }
 
 impl WeightSearch {
-    /// A fresh search.
+    /// A search that has scored no weight yet.
     pub fn new() -> Self {
         Self::default()
     }

@@ -51,7 +51,7 @@ pub(super) struct Opaque {
     pub name: Arc<str>,
     /// Where the pickle names it.
     pub offset: usize,
-    /// Arguments, state, items.
+    /// The nodes that it was given: arguments, state, items.
     pub parts: Vec<Id>,
 }
 
