@@ -7,7 +7,7 @@ ros_message! {
     /// One named finding.
     #[derive(Default, Eq)]
     pub struct KeyValue {
-        /// Its name.
+        /// What was looked at, such as `gap, m/s2`.
         pub key: String,
         /// What was found.
         pub value: String,
@@ -25,9 +25,9 @@ ros_message! {
         pub name: String,
         /// What is the matter.
         pub message: String,
-        /// Which device.
+        /// Serial number or the like of the device; may be empty.
         pub hardware_id: String,
-        /// Details.
+        /// Findings in numbers and words.
         pub values: Vec<KeyValue>,
     }
     /// All is well.
@@ -45,7 +45,7 @@ ros_message! {
     /// The states of several components at one time.
     #[derive(Default, Eq)]
     pub struct DiagnosticArray {
-        /// Time.
+        /// When the states were so.
         pub header: Header,
         /// One for each component.
         pub status: Vec<DiagnosticStatus>,

@@ -4,7 +4,7 @@ use crate::std_msgs::Header;
 
 ros_message! {
     "geometry_msgs/msg/Vector3", "../std/geometry_msgs/msg/Vector3.msg", Message;
-    /// A vector.
+    /// Three components in the frame of the header; the unit is said where it is used.
     #[derive(Copy, Default)]
     pub struct Vector3 {
         /// First component.
@@ -64,7 +64,7 @@ ros_message! {
     pub struct Pose {
         /// Position, m.
         pub position: Point,
-        /// Orientation.
+        /// Rotation from the body to the frame of the header.
         pub orientation: Quaternion,
     }
 }

@@ -97,7 +97,7 @@ ros_message! {
     /// Response of [`IsPaused`].
     #[derive(Default)]
     pub struct IsPausedResponse {
-        /// Whether it is.
+        /// True while nothing is played or recorded.
         pub paused: bool,
     }
 }
@@ -228,7 +228,7 @@ ros_message! {
 }
 
 ros_service! {
-    /// Starts again.
+    /// Starts playback again, from a time that may be given.
     "rosbag2_interfaces/srv/Play", Play, PlayRequest, PlayResponse
 }
 

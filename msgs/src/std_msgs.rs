@@ -7,7 +7,7 @@ ros_message! {
     /// When a message was true, and in which frame.
     #[derive(Default, Eq)]
     pub struct Header {
-        /// When.
+        /// When what the message says was so.
         pub stamp: Time,
         /// Name of the frame.
         pub frame_id: std::string::String,
@@ -19,7 +19,7 @@ ros_message! {
     /// Plain text.
     #[derive(Default, Eq)]
     pub struct String {
-        /// The text.
+        /// UTF-8, without a bound on its length.
         pub data: std::string::String,
     }
 }

@@ -18,7 +18,7 @@ pub enum BagError {
         path: PathBuf,
         /// What was attempted.
         action: &'static str,
-        /// Why not.
+        /// What it said.
         source: io::Error,
     },
     /// A recording stopped because it could not be written; what was written before is kept.
@@ -26,19 +26,19 @@ pub enum BagError {
     RecordingStopped {
         /// The bag, as the user named it.
         path: PathBuf,
-        /// Why.
+        /// What the operating system said.
         source: io::Error,
     },
     /// Not an MCAP file at all.
     #[error("{}: not an MCAP file: it does not start with the MCAP magic bytes", path.display())]
     NotMcap {
-        /// The file.
+        /// The MCAP file.
         path: PathBuf,
     },
     /// The file ends too early: a recorder was killed, or the file was cut.
     #[error("{}, byte {at} of {size}: the bag is cut off here; mend it with `cromosim bag recover {}`", path.display(), path.display())]
     Unfinished {
-        /// The file.
+        /// The MCAP file.
         path: PathBuf,
         /// Where the first incomplete record starts.
         at: u64,
@@ -48,7 +48,7 @@ pub enum BagError {
     /// The file holds what no MCAP writer writes.
     #[error("{}, byte {at}: {reason}; what is whole can be saved with `cromosim bag recover {}`", path.display(), path.display())]
     Corrupt {
-        /// The file.
+        /// The MCAP file.
         path: PathBuf,
         /// Start of the record.
         at: u64,
@@ -58,13 +58,13 @@ pub enum BagError {
     /// A bag directory without its table of contents.
     #[error("{}: no metadata.yaml in this directory; where it holds .mcap files, `cromosim bag recover {}` makes it anew", path.display(), path.display())]
     NoMetadata {
-        /// The directory.
+        /// Where `metadata.yaml` should be.
         path: PathBuf,
     },
     /// A `metadata.yaml` that does not say what it must.
     #[error("{}: {reason}", path.display())]
     Metadata {
-        /// The file.
+        /// The MCAP file.
         path: PathBuf,
         /// What is wrong with it.
         reason: String,
@@ -72,7 +72,7 @@ pub enum BagError {
     /// A bag of a kind that this crate does not read.
     #[error("{}: {what} is not supported, only MCAP bags without file compression", path.display())]
     Unsupported {
-        /// The bag.
+        /// As the user named it.
         path: PathBuf,
         /// What it uses.
         what: String,
@@ -80,7 +80,7 @@ pub enum BagError {
     /// No such topic.
     #[error("{}: no topic {topic}; it holds {}", path.display(), list(known))]
     UnknownTopic {
-        /// The bag.
+        /// As the user named it.
         path: PathBuf,
         /// The topic asked for.
         topic: String,
@@ -90,7 +90,7 @@ pub enum BagError {
     /// A topic of another type than asked for, or written before.
     #[error("topic {topic}: expected {expected}, found {found}")]
     WrongType {
-        /// The topic.
+        /// Its absolute name.
         topic: String,
         /// The type asked for.
         expected: String,
@@ -100,7 +100,7 @@ pub enum BagError {
     /// A message that does not decode.
     #[error("topic {topic}, message at {} ns: {reason}", log_time.nanos)]
     Decode {
-        /// Its topic.
+        /// Absolute name of its topic.
         topic: String,
         /// When it was logged.
         log_time: Stamp,
@@ -110,11 +110,11 @@ pub enum BagError {
     /// A message that cannot be encoded.
     #[error("topic {topic}: cannot encode {type_name}: {reason}")]
     Encode {
-        /// Its topic.
+        /// Absolute name of its topic.
         topic: String,
-        /// Its type.
+        /// `package/msg/Name`.
         type_name: &'static str,
-        /// Why not.
+        /// What the encoder says.
         reason: String,
     },
     /// MCAP holds no time before the epoch.
@@ -122,21 +122,21 @@ pub enum BagError {
     BeforeEpoch {
         /// The topic or attachment.
         topic: String,
-        /// The time.
+        /// Since the UNIX epoch; negative.
         nanos: i64,
     },
     /// The output is there already.
     #[error("{}: is there already; name another one, or move it away", path.display())]
     Exists {
-        /// The output.
+        /// What was to be written.
         path: PathBuf,
     },
     /// MCAP's own limits (65535 topics) were passed.
     #[error("{}: cannot write: {reason}", path.display())]
     Refused {
-        /// The bag.
+        /// As the user named it.
         path: PathBuf,
-        /// Why.
+        /// Which limit was passed.
         reason: String,
     },
 }

@@ -28,9 +28,9 @@ pub struct QosProfile {
 /// A span of time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct QosTime {
-    /// Seconds.
+    /// Whole seconds.
     pub sec: u64,
-    /// Nanoseconds after them.
+    /// Nanoseconds beyond the whole seconds.
     pub nsec: u64,
 }
 

@@ -61,7 +61,7 @@ impl Selection {
 /// One message of a bag, not yet decoded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Message {
-    /// Its topic.
+    /// The topic that it was published on.
     pub topic: Arc<Topic>,
     /// The writer's running number.
     pub sequence: u32,

@@ -28,7 +28,7 @@ pub struct Recovery {
 /// A place where a bag is damaged.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Damage {
-    /// The file.
+    /// The damaged MCAP file.
     pub path: PathBuf,
     /// Start of the damaged record, bytes from the start of the file.
     pub at: u64,

@@ -18,9 +18,9 @@ pub struct BagSummary {
 /// A topic and how many messages it has.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CountedTopic {
-    /// The topic.
+    /// Its name, type and encoding.
     pub topic: Arc<Topic>,
-    /// Its messages.
+    /// How many messages it has.
     pub message_count: u64,
 }
 

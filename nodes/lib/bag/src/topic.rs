@@ -18,7 +18,7 @@ pub struct Topic {
     pub type_name: String,
     /// Language of the schema: `ros2msg`, or empty where there is none.
     pub schema_encoding: String,
-    /// The schema.
+    /// Text of the message type and of all types in it.
     pub schema: Vec<u8>,
     /// Encoding of the messages: `cdr`.
     pub message_encoding: String,

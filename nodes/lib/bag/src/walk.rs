@@ -26,7 +26,7 @@ pub(crate) const LARGEST_RECORD: u64 = 1 << 30;
 /// One record of the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct RecordAt {
-    /// Its kind.
+    /// Its kind: one of [`op`].
     pub(crate) opcode: u8,
     /// Where it starts in the file.
     pub(crate) start: u64,
@@ -198,7 +198,7 @@ pub struct Attachment {
     pub log_time: Stamp,
     /// When it was made.
     pub create_time: Stamp,
-    /// Its content.
+    /// Its bytes, as they were attached.
     pub content: Vec<u8>,
 }
 

@@ -117,7 +117,7 @@ impl BagWriter {
     /// See [`StreamWriter::write`].
     ///
     /// # Errors
-    /// As there.
+    /// As there; live bags as [`Self::add_topic`] says.
     pub fn write<M: RosMessage>(
         &mut self,
         topic: &str,
@@ -131,7 +131,7 @@ impl BagWriter {
     /// See [`StreamWriter::write_payload`].
     ///
     /// # Errors
-    /// As there.
+    /// As there; live bags as [`Self::add_topic`] says.
     pub fn write_payload(
         &mut self,
         topic: TopicId,
@@ -148,7 +148,7 @@ impl BagWriter {
     /// See [`StreamWriter::attach`].
     ///
     /// # Errors
-    /// As there.
+    /// As there; live bags as [`Self::add_topic`] says.
     pub fn attach(
         &mut self,
         name: &str,
@@ -163,7 +163,7 @@ impl BagWriter {
     /// See [`StreamWriter::write_metadata`].
     ///
     /// # Errors
-    /// As there.
+    /// As there; live bags as [`Self::add_topic`] says.
     pub fn write_metadata(
         &mut self,
         name: &str,
@@ -177,7 +177,7 @@ impl BagWriter {
     /// this process. A live recorder calls it at least every 250 ms.
     ///
     /// # Errors
-    /// As above.
+    /// [`BagError::RecordingStopped`] for live bags, [`BagError::Io`] for others.
     pub fn flush(&mut self) -> Result<(), BagError> {
         let result = self.stream.flush();
         self.placed(result)
@@ -187,7 +187,7 @@ impl BagWriter {
     /// Takes milliseconds.
     ///
     /// # Errors
-    /// As above.
+    /// [`BagError::RecordingStopped`] for live bags, [`BagError::Io`] for others.
     pub fn sync(&mut self) -> Result<(), BagError> {
         self.flush()?;
         let result = self
@@ -210,7 +210,7 @@ impl BagWriter {
     /// Completes the bag and gives it its name.
     ///
     /// # Errors
-    /// As above.
+    /// [`BagError::RecordingStopped`] for live bags, [`BagError::Io`] for others.
     pub fn finish(self) -> Result<BagSummary, BagError> {
         let Self {
             stream,

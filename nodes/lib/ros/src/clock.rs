@@ -41,7 +41,7 @@ impl Clock {
         }
     }
 
-    /// Now.
+    /// The system clock's time; with `use_sim_time`, what `/clock` said last.
     pub fn now(&self) -> Stamp {
         if self.is_simulated() {
             Stamp::from_nanos(self.inner.sim_nanos.load(Ordering::SeqCst))

@@ -19,7 +19,7 @@ pub enum RosError {
     /// A parameter file cannot be read or does not have ROS 2's layout.
     #[error("{}{}: {problem}", path.display(), line.map(|line| format!(", line {line}")).unwrap_or_default())]
     ParamsFile {
-        /// The file.
+        /// As the command line names it.
         path: PathBuf,
         /// The line, counted from 1, where known.
         line: Option<usize>,
@@ -41,7 +41,7 @@ pub enum RosError {
     ParameterValue {
         /// File and line, or the argument.
         place: String,
-        /// The parameter.
+        /// Its full name, with dots.
         name: String,
         /// The type, or the bounds.
         expected: String,
@@ -51,9 +51,9 @@ pub enum RosError {
     /// A parameter that cannot change any more.
     #[error("{place}: parameter '{name}' is read-only; give it at the start")]
     ReadOnly {
-        /// Who tried.
+        /// What asked for the change: a service, or the program.
         place: String,
-        /// The parameter.
+        /// Its full name, with dots.
         name: String,
     },
     /// The parameters do not make a valid configuration.
@@ -65,9 +65,9 @@ pub enum RosError {
     /// An environment variable has no valid value.
     #[error("environment variable {variable}={value}: expected {expected}")]
     Environment {
-        /// The variable.
+        /// As the shell knows it, such as `ROS_DOMAIN_ID`.
         variable: &'static str,
-        /// Its value.
+        /// As it is set.
         value: String,
         /// What it may be.
         expected: &'static str,
@@ -75,12 +75,12 @@ pub enum RosError {
     /// A name of a node, topic, service or type that ROS 2 does not allow.
     #[error("name '{name}': {problem}")]
     Name {
-        /// The name.
+        /// As it was given.
         name: String,
         /// The rule it breaks.
         problem: String,
     },
-    /// DDS refused.
+    /// DDS refused: no port is free, say, or no network interface can be used.
     #[error("{doing}: {problem}")]
     Dds {
         /// What was being done.
@@ -92,7 +92,7 @@ pub enum RosError {
     /// message was not sent.
     #[error("topic {topic}: a reliable subscription does not keep up, message not sent")]
     WindowFull {
-        /// The topic.
+        /// Absolute, after remapping.
         topic: String,
     },
     /// Bytes that are not this message.
@@ -110,7 +110,7 @@ pub enum RosError {
     /// No answer came in time.
     #[error("service {service}: no answer within {waited:?}")]
     ServiceTimeout {
-        /// The service.
+        /// Absolute, after remapping.
         service: String,
         /// How long was waited.
         waited: Duration,

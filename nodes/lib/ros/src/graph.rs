@@ -37,9 +37,9 @@ pub struct TopicInfo {
     pub name: String,
     /// `package/msg/Name`; a topic with two types (somebody's mistake) stands twice.
     pub type_name: String,
-    /// Publishers.
+    /// How many publishers it has.
     pub publishers: usize,
-    /// Subscriptions.
+    /// How many subscriptions it has.
     pub subscriptions: usize,
 }
 

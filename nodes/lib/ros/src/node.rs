@@ -90,12 +90,12 @@ impl Node {
         &self.running.core
     }
 
-    /// The name.
+    /// Namespace and name, after remapping.
     pub fn name(&self) -> &NodeName {
         &self.core().name
     }
 
-    /// The parameters.
+    /// As declared, with the values that files, command line and services gave them.
     pub fn parameters(&self) -> &Parameters {
         &self.running.parameters
     }

@@ -94,7 +94,7 @@ impl RawMessage {
 /// A message as it came in.
 #[derive(Clone, Debug)]
 pub struct Received<M> {
-    /// The message.
+    /// Decoded, or as bytes from a raw subscription.
     pub message: M,
     /// When the publisher sent it, by the system clock of the publisher's machine; none where it
     /// does not say.
@@ -103,7 +103,7 @@ pub struct Received<M> {
     pub received_stamp: Stamp,
     /// The publisher's own count, from 1: gaps are losses.
     pub sequence_number: i64,
-    /// The publisher.
+    /// Which publisher sent it.
     pub publisher: Gid,
 }
 
@@ -114,7 +114,7 @@ pub struct Received<M> {
 pub struct Gid([u8; 16]);
 
 impl Gid {
-    /// The bytes.
+    /// GUID prefix (12 bytes: the participant), then entity id (4).
     pub fn bytes(&self) -> &[u8; 16] {
         &self.0
     }
