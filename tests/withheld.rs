@@ -53,5 +53,12 @@ fn a_few_withheld_cases_are_graded() {
                 .all(exact)
         })
         .count();
-    assert!(right >= 5, "{right} of 6 cases right\n{text}");
+    // All six are right on the motions that include people's (CROMOSIM_DATA). Without them the
+    // generator hides the same effects in other, synthetic motions, on which one may be missed.
+    let least = if std::env::var_os("CROMOSIM_DATA").is_some() {
+        6
+    } else {
+        5
+    };
+    assert!(right >= least, "{right} of 6 cases right\n{text}");
 }
