@@ -6,7 +6,7 @@ mod common;
 
 use std::process::Command;
 
-use common::{CROMOSIM, python, root};
+use common::{CROMOSIM, python, root, shared_data};
 
 #[test]
 fn a_few_withheld_cases_are_graded() {
@@ -53,12 +53,8 @@ fn a_few_withheld_cases_are_graded() {
                 .all(exact)
         })
         .count();
-    // All six are right on the motions that include people's (CROMOSIM_DATA). Without them the
+    // All six are right on the motions that include people's (the shared data). Without them the
     // generator hides the same effects in other, synthetic motions, on which one may be missed.
-    let least = if std::env::var_os("CROMOSIM_DATA").is_some() {
-        6
-    } else {
-        5
-    };
+    let least = if shared_data().is_some() { 6 } else { 5 };
     assert!(right >= least, "{right} of 6 cases right\n{text}");
 }
