@@ -77,6 +77,7 @@ const STILL_CIRCULAR: &[&str] = &[
     "nodes/lib/imu/",
     "nodes/lib/learned/",
     "nodes/lib/motion/",
+    "nodes/lib/recording/",
     "nodes/lib/video/",
     "nodes/bin/cromosim/",
 ];
