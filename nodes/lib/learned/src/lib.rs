@@ -62,5 +62,5 @@ pub use shape::{Direction, MOST_PARAMETERS, NetworkShape, Tensor};
 pub use simulator::LearnedSimulator;
 pub use site_motion::{NETWORK_RATE_HZ, SiteMotion};
 pub use streaming::{StreamingBatch, StreamingNetwork};
-pub use virtual_pairs::{KnownMotion, Wearing, Worn};
+pub use virtual_pairs::{DrawnWearer, KnownMotion, WearerRanges};
 pub use windows::{Blend, HOP, WINDOW, window_starts};

@@ -60,10 +60,10 @@ impl RankMapping {
             knots.push((simulated[first], quantile(&measured, mean_rank)));
             first += equal;
         }
-        Ok(Self::of(thinned(knots)))
+        Ok(Self::from_knots(thinned(knots)))
     }
 
-    fn of(knots: Vec<(f64, f64)>) -> Self {
+    fn from_knots(knots: Vec<(f64, f64)>) -> Self {
         let (simulated, measured) = knots.into_iter().unzip();
         Self {
             simulated,

@@ -54,7 +54,7 @@ impl LearnedSimulator {
                 Path::new(name).join(format!("{}.safetensors", Quantity::BOTH[which].name()));
             Network::from_bytes(files[which], &path).map(|(network, notes)| (path, network, notes))
         });
-        Self::of_files([acceleration?, angular_velocity?])
+        Self::from_files([acceleration?, angular_velocity?])
     }
 
     /// A folder that `cromosim train` wrote, or the name of a model that comes with the suite where

@@ -136,7 +136,7 @@ impl NetworkShape {
     }
 
     pub(crate) fn places(&self) -> Places {
-        Places::of(
+        Places::from_tensors(
             self.tensors(),
             self.convolutions,
             self.layers,
@@ -146,8 +146,13 @@ impl NetworkShape {
 }
 
 impl Places {
-    /// Of tensors in the order of convolutions, LSTM layers, linear layer.
-    pub fn of(tensors: Vec<Tensor>, convolutions: usize, layers: usize, directions: usize) -> Self {
+    /// The places of tensors that stand in the order of convolutions, LSTM layers, linear layer.
+    pub fn from_tensors(
+        tensors: Vec<Tensor>,
+        convolutions: usize,
+        layers: usize,
+        directions: usize,
+    ) -> Self {
         let mut ranges = tensors.into_iter().map(|tensor| tensor.range);
         let mut next = || ranges.next().unwrap_or_default();
         Self {

@@ -68,11 +68,11 @@ impl LearnedSimulator {
             let path = folder.join(format!("{}.safetensors", quantity.name()));
             Network::read(&path).map(|(network, notes)| (path, network, notes))
         });
-        Self::of_files([acceleration?, angular_velocity?])
+        Self::from_files([acceleration?, angular_velocity?])
     }
 
     /// Files in the order of [`Quantity::BOTH`], with their notes.
-    pub(crate) fn of_files(
+    pub(crate) fn from_files(
         files: [(PathBuf, Network, BTreeMap<String, String>); 2],
     ) -> Result<Self, LearnedError> {
         let mut inputs = Vec::new();

@@ -34,26 +34,26 @@ const WIDEST_SHAPE: f64 = 2.5;
 /// How drawn people differ from what a simulation is told of them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Wearing {
+pub struct WearerRanges {
     /// Devices and mounts.
     #[serde(default)]
     pub devices: DeviceRanges,
     /// Errors of the motion that the simulation is given.
     pub source: SourceErrors,
     /// Standard deviation of the true shape's coefficients.
-    #[serde(default = "Wearing::usual_shape")]
+    #[serde(default = "WearerRanges::usual_shape")]
     pub shape: f64,
     /// Standard deviation of the error of the coefficients that the simulation is given.
-    #[serde(default = "Wearing::usual_shape_error")]
+    #[serde(default = "WearerRanges::usual_shape_error")]
     pub shape_error: f64,
     /// The motion is played this many times as fast, uniform.
-    #[serde(default = "Wearing::as_recorded")]
+    #[serde(default = "WearerRanges::as_recorded")]
     pub speed: [f64; 2],
 }
 
-impl Wearing {
+impl WearerRanges {
     /// A source with drawn devices and people.
-    pub fn of(source: SourceErrors) -> Self {
+    pub fn with_source(source: SourceErrors) -> Self {
         let (shape, shape_error, speed) = (
             Self::usual_shape(),
             Self::usual_shape_error(),
@@ -91,21 +91,12 @@ impl Wearing {
         motion: &KnownMotion<'_>,
         placement: &Placement,
         seed: u64,
-    ) -> Result<Worn, LearnedError> {
+    ) -> Result<DrawnWearer, LearnedError> {
         let mut random = ChaCha12Rng::seed_from_u64(seed);
         let speed = self.speed[0] + (self.speed[1] - self.speed[0]) * random.random::<f64>();
         let (poses, rate_hz) = (motion.poses, motion.rate_hz * speed);
-        let betas = |random: &mut ChaCha12Rng, around: &[f64], sigma: f64| -> Vec<f64> {
-            let draw = |beta: &f64| {
-                (beta + sigma * normal_pair(random)[0]).clamp(-WIDEST_SHAPE, WIDEST_SHAPE)
-            };
-            around.iter().map(draw).collect()
-        };
-        let shape = betas(
-            &mut random,
-            &vec![0.0; model.beta_count().min(SHAPES)],
-            self.shape,
-        );
+        let mean_shape = vec![0.0; model.beta_count().min(SHAPES)];
+        let shape = betas(&mut random, &mean_shape, self.shape);
         let told = ShapedBody::new(model.clone(), &betas(&mut random, &shape, self.shape_error))?;
         let worn = ShapedBody::new(model.clone(), &shape)?;
         let stamps = stamps(poses.len(), rate_hz);
@@ -142,7 +133,7 @@ impl Wearing {
             )
         };
         let doubtful = doubtful(motion, rate_hz, &truth, &read_at);
-        Ok(Worn {
+        Ok(DrawnWearer {
             told,
             placement: placement.clone(),
             stamps,
@@ -153,6 +144,13 @@ impl Wearing {
             doubtful,
         })
     }
+}
+
+/// Coefficients of shape around others, with this standard deviation.
+fn betas(random: &mut ChaCha12Rng, around: &[f64], sigma: f64) -> Vec<f64> {
+    let draw =
+        |beta: &f64| (beta + sigma * normal_pair(random)[0]).clamp(-WIDEST_SHAPE, WIDEST_SHAPE);
+    around.iter().map(draw).collect()
 }
 
 /// A motion that is known.
@@ -169,7 +167,7 @@ pub struct KnownMotion<'a> {
 
 /// A drawn person with a drawn device in a motion, and what a simulation is told of it.
 #[derive(Clone, Debug)]
-pub struct Worn {
+pub struct DrawnWearer {
     told: ShapedBody,
     placement: Placement,
     /// The motion with the errors of its source.
@@ -183,7 +181,7 @@ pub struct Worn {
     doubtful: Vec<bool>,
 }
 
-impl Worn {
+impl DrawnWearer {
     /// The motion as the source gives it, differentiated by a scheme.
     ///
     /// # Errors
@@ -225,7 +223,7 @@ impl Worn {
         )?)
     }
 
-    /// The pair of a motion of [`Worn::motion`]. The clock and mount of the device are fitted as a
+    /// The pair of a motion of [`DrawnWearer::motion`]. The clock and mount of the device are fitted as a
     /// real one's would be, to the motion without the errors of a source worse than motion capture.
     ///
     /// # Errors
@@ -369,7 +367,7 @@ mod tests {
         let (model, poses) = (BodyModel::embedded(), poses(120.0, 6.0));
         let placement = Placement::at_site("left_wrist", "left_watch", 100.0).unwrap();
         let analytic = |source, scheme| {
-            let worn = Wearing::of(source)
+            let worn = WearerRanges::with_source(source)
                 .draw(&model, &known(&poses), &placement, 7)
                 .unwrap();
             let pair = worn.pair(names(), worn.motion(scheme).unwrap()).unwrap();
@@ -399,9 +397,9 @@ mod tests {
     fn a_seed_gives_the_same_pair_and_another_another() {
         let (model, poses) = (BodyModel::embedded(), poses(120.0, 3.0));
         let placement = Placement::at_site("left_wrist", "left_watch", 100.0).unwrap();
-        let wearing = Wearing {
+        let wearing = WearerRanges {
             speed: [0.8, 1.25],
-            ..Wearing::of(SourceErrors::WHAM)
+            ..WearerRanges::with_source(SourceErrors::WHAM)
         };
         let pair = |seed| {
             let worn = wearing

@@ -65,24 +65,7 @@ pub(super) fn run_plan(
         .collect();
     let second = CompletedJobs::run(second, experiment)?;
     experiment.observer.end();
-    if !chosen.is_empty() {
-        for share in &settings.shares {
-            let done = if *share < 1.0 { &second } else { &first };
-            let wanted = curve_jobs(&chosen, *share, settings);
-            let condition = Condition {
-                training: TrainingData::Mixed,
-                variant: None,
-                share: *share,
-            };
-            let runs = done.runs(|job| wanted.contains(job));
-            results.push(ConditionResults::from_runs(
-                condition,
-                true,
-                runs,
-                settings.seed,
-            ));
-        }
-    }
+    results.extend(curve_results(&chosen, &first, &second, settings));
     Ok(PlanResults {
         comparisons: comparisons(&results, settings.seed),
         conditions: results,
@@ -158,6 +141,31 @@ fn curve_jobs(chosen: &[ChosenVariant], share: f64, settings: &Settings) -> Vec<
             .filter(move |job| job.tested == [tested])
     };
     chosen.iter().enumerate().flat_map(jobs_of_person).collect()
+}
+
+/// Mix2R at every share, each person's with the variant that is chosen for them; `whole` holds the
+/// trainings with all training subjects, `parts` the others. Empty where nothing was chosen.
+fn curve_results(
+    chosen: &[ChosenVariant],
+    whole: &CompletedJobs,
+    parts: &CompletedJobs,
+    settings: &Settings,
+) -> Vec<ConditionResults> {
+    if chosen.is_empty() {
+        return Vec::new();
+    }
+    let at_share = |share: &f64| {
+        let done = if *share < 1.0 { parts } else { whole };
+        let wanted = curve_jobs(chosen, *share, settings);
+        let condition = Condition {
+            training: TrainingData::Mixed,
+            variant: None,
+            share: *share,
+        };
+        let runs = done.runs(|job| wanted.contains(job));
+        ConditionResults::from_runs(condition, true, runs, settings.seed)
+    };
+    settings.shares.iter().map(at_share).collect()
 }
 
 /// Trainings with what they gave.

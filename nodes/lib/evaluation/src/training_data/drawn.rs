@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use cromosim_body::BodyModel;
 use cromosim_imu::Placement;
-use cromosim_learned::{PairNames, Wearing, Worn};
+use cromosim_learned::{DrawnWearer, PairNames, WearerRanges};
 use rayon::prelude::*;
 
 use super::clips::read_motion_clip;
@@ -29,7 +29,7 @@ pub fn draw_wearers<T: Send>(
     data: &DataFolder,
     seed: u64,
     observer: &dyn Observer,
-    make: impl Fn(Worn, PairNames) -> Result<T, EvaluationError> + Sync,
+    make: impl Fn(DrawnWearer, PairNames) -> Result<T, EvaluationError> + Sync,
 ) -> Result<Vec<T>, EvaluationError> {
     let files = source.motion_files(&data.folder)?;
     let draws = Draws {
@@ -64,7 +64,7 @@ struct Draws<'a> {
     source: &'a DataSource,
     model: Arc<BodyModel>,
     placements: Vec<Placement>,
-    wearing: Wearing,
+    wearing: WearerRanges,
     seed: u64,
 }
 
@@ -74,7 +74,7 @@ impl Draws<'_> {
         &self,
         number: usize,
         path: &Path,
-        make: impl Fn(Worn, PairNames) -> Result<T, EvaluationError>,
+        make: impl Fn(DrawnWearer, PairNames) -> Result<T, EvaluationError>,
     ) -> Result<Vec<T>, EvaluationError> {
         let motion = read_motion_clip(path, &self.model)?;
         let mut made = Vec::new();

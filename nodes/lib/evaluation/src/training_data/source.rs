@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use cromosim_body::BodyModel;
 use cromosim_imu::SensorFrame;
-use cromosim_learned::{DeviceRanges, SourceErrors, Wearing};
+use cromosim_learned::{DeviceRanges, SourceErrors, WearerRanges};
 use serde::Deserialize;
 
 use super::files::matching_files;
@@ -105,16 +105,16 @@ fn whole() -> [f64; 2] {
 
 impl DataSource {
     /// How drawn people wear drawn devices.
-    pub fn wearing(&self) -> Wearing {
+    pub fn wearing(&self) -> WearerRanges {
         let errors = self.source.errors();
         let errors = SourceErrors {
             rate_hz: self.rate_hz.unwrap_or(errors.rate_hz),
             ..errors
         };
-        Wearing {
+        WearerRanges {
             devices: self.devices.clone(),
             speed: self.speed,
-            ..Wearing::of(errors)
+            ..WearerRanges::with_source(errors)
         }
     }
 

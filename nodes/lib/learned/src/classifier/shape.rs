@@ -81,7 +81,7 @@ impl ClassifierShape {
     }
 
     pub(super) fn places(&self) -> Places {
-        Places::of(self.tensors(), self.convolutions, self.layers, 1)
+        Places::from_tensors(self.tensors(), self.convolutions, self.layers, 1)
     }
 }
 

@@ -94,8 +94,8 @@ impl Deck {
 
 /// Trains a classifier on pools of windows; every batch takes as many of each, the first pools one
 /// more where they do not divide it. Within a pool all classes count alike ([`Examples::balance`]);
-/// the loss is the weighted mean of the cross-entropy. `interrupted` is asked before each step; none where it
-/// said yes.
+/// the loss is the weighted mean of the cross-entropy. `interrupted` is asked before each step;
+/// none where it said yes.
 ///
 /// On the calling thread alone; the same seed gives the same bits.
 ///
@@ -112,20 +112,9 @@ pub fn train_classifier(
     let mut classifier = Classifier::new(shape.clone(), seed)?;
     let steps = pools.first().map_or(0, |pool| pool.steps);
     classifier.check_steps(steps)?;
-    for pool in pools {
-        pool.check(shape.inputs, shape.classes)?;
-        if pool.is_empty() || pool.steps != steps {
-            return Err(LearnedError::TooFew {
-                what: "windows of a pool".to_owned(),
-                found: pool.len(),
-                needed: 1,
-            });
-        }
-    }
-    let balances: Vec<Vec<f32>> = pools
-        .iter()
-        .map(|pool| pool.balance(shape.classes))
-        .collect();
+    check_pools(pools, steps, shape)?;
+    let balance = |pool: &&Examples| pool.balance(shape.classes);
+    let balances: Vec<Vec<f32>> = pools.iter().map(balance).collect();
     let mut decks: Vec<Deck> = pools.iter().map(|pool| Deck::new(pool.len())).collect();
     let (mut order, mut dropped) = (random(seed, 1), random(seed, 2));
     let mut adam = Adam::new(classifier.parameters.len());
@@ -170,6 +159,25 @@ pub fn train_classifier(
         adam.step(&mut classifier.parameters, &gradients, rate, step + 1);
     }
     Ok(Some(classifier))
+}
+
+/// Pools that fit the shape, none of them empty, with windows of so many steps.
+fn check_pools(
+    pools: &[&Examples],
+    steps: usize,
+    shape: &ClassifierShape,
+) -> Result<(), LearnedError> {
+    for pool in pools {
+        pool.check(shape.inputs, shape.classes)?;
+        if pool.is_empty() || pool.steps != steps {
+            return Err(LearnedError::TooFew {
+                what: "windows of a pool".to_owned(),
+                found: pool.len(),
+                needed: 1,
+            });
+        }
+    }
+    Ok(())
 }
 
 /// The loss of a batch and its gradient.
