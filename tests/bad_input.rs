@@ -211,6 +211,75 @@ fn placements_and_settings() {
 }
 
 #[test]
+fn options_of_another_mode_of_simulate() {
+    let folder = tempfile::tempdir().unwrap();
+    let reference = ["simulate", "--reference", "r.mcap", "--out", "out.mcap"];
+    let rigid = [
+        "simulate", "--rigid", "r.tum", "--rate", "100", "--out", "out.mcap",
+    ];
+    let of_motions: [&[&str]; 15] = [
+        &["--placements", "p.yaml"],
+        &["--csv", "csv"],
+        &["--pose-error-correlation", "1"],
+        &["--up-axis", "z"],
+        &["--unit", "0.01"],
+        &["--start", "1"],
+        &["--duration", "1"],
+        &["--skeleton", "s.asf"],
+        &["--motion-rate", "60"],
+        &["--marker-set", "plug_in_gait"],
+        &["--subject", "anna"],
+        &["--placements-as-given"],
+        &["--person", "1"],
+        &["--shape", "mean"],
+        &["--source-body", "b.npz"],
+    ];
+    for option in of_motions {
+        for (mode, name) in [(&reference[..], "--reference"), (&rigid[..], "--rigid")] {
+            refuses(
+                folder.path(),
+                &[mode, option].concat(),
+                &[option[0], "goes with motion files", name],
+            );
+        }
+    }
+    let motions = ["simulate", "--out", "out.mcap"];
+    let cases: [(&[&str], &[&str], &str); 10] = [
+        (&motions, &["--placement", "wrist"], "not with motion files"),
+        (&motions, &["--device", "d.yaml"], "not with motion files"),
+        (&motions, &["--effects", "e.yaml"], "not with motion files"),
+        (
+            &reference,
+            &["--placement", "wrist"],
+            "not with --reference",
+        ),
+        (&reference, &["--device", "d.yaml"], "not with --reference"),
+        (&reference, &["--learned", "video"], "not with --reference"),
+        (&reference, &["--mapping", "m.yaml"], "not with --reference"),
+        (&reference, &["--rigid", "r.tum"], "give one of them"),
+        (&rigid, &["--body", "b.npz"], "not with --rigid"),
+        (&rigid, &["walk.bvh"], "--rigid"),
+    ];
+    for (mode, option, expected) in cases {
+        refuses(
+            folder.path(),
+            &[mode, option].concat(),
+            &[option[0], expected],
+        );
+    }
+    refuses(
+        folder.path(),
+        &["simulate", "--rigid", "r.tum", "--out", "out.mcap"],
+        &["--rate"],
+    );
+    refuses(
+        folder.path(),
+        &[&rigid[..], &["--device", "d.yaml", "--effects", "e.yaml"]].concat(),
+        &["--device", "--effects"],
+    );
+}
+
+#[test]
 fn parameters_of_nodes() {
     let folder = tempfile::tempdir().unwrap();
     let node = |name: &'static str, parameter: &'static str| {

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
+use simulate_arguments::Mode;
 
 mod bag;
 mod body;
@@ -22,6 +23,7 @@ mod node;
 mod progress;
 mod reference;
 mod simulate;
+mod simulate_arguments;
 mod summary;
 mod train;
 mod trajectory;
@@ -46,7 +48,7 @@ enum Command {
     Demo(demo::Arguments),
     /// Simulate IMUs from motion files, or again from a recording's reference; offline, on all
     /// cores
-    Simulate(Box<simulate::Arguments>),
+    Simulate(Box<simulate_arguments::Arguments>),
     /// Say which effects separate a recording's real IMUs from their simulation, and how far the
     /// gap falls with them
     Diagnose(diagnose::Arguments),
@@ -101,10 +103,18 @@ fn completion(shell: Shell, out: Option<PathBuf>) -> anyhow::Result<()> {
     }
 }
 
+fn simulate(arguments: &simulate_arguments::Arguments) -> anyhow::Result<()> {
+    match arguments.mode()? {
+        Mode::Motions => simulate::run(arguments),
+        Mode::Reference(recording) => reference::run(recording, arguments),
+        Mode::Rigid(trajectory) => reference::run_rigid(trajectory, arguments),
+    }
+}
+
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Demo(arguments) => demo::run(&arguments),
-        Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::Simulate(arguments) => simulate(&arguments),
         Command::Diagnose(arguments) => diagnose::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Convert(arguments) => convert::run(&arguments),

@@ -23,7 +23,8 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use crate::progress::{self, Interrupt};
-use crate::simulate::{Arguments, read_mapping};
+use crate::simulate::read_mapping;
+use crate::simulate_arguments::Arguments;
 
 /// How the placements of a recording are simulated.
 #[derive(Default)]
@@ -107,7 +108,7 @@ pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()>
         .map(str::parse)
         .transpose()
         .context("--scheme")?;
-    let name = &arguments.placement;
+    let name = arguments.placement.as_deref().unwrap_or("body");
     if let Err((_, problem)) = Placement::at_site(name, "left_watch", 1.0) {
         bail!("--placement {name}: {problem}");
     }
@@ -131,7 +132,7 @@ pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()>
         .map(frame)
         .collect();
     let recorded = vec![RecordedPlacement {
-        name: name.clone(),
+        name: name.to_owned(),
         frames,
         measured: Vec::new(),
         notes: Vec::new(),
@@ -153,7 +154,7 @@ pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()>
             declared_noise,
             effects: device.effects().clone(),
         };
-        effects.placements.insert(name.clone(), of_device);
+        effects.placements.insert(name.to_owned(), of_device);
     }
     let learned = arguments
         .learned
@@ -162,7 +163,7 @@ pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()>
         .transpose()?;
     // What the networks learned on top of.
     let scheme = scheme.or(learned.as_ref().map(|_| Scheme::Spline));
-    let mapping = read_mapping(arguments.mapping.as_deref(), &[name.as_str()])?;
+    let mapping = read_mapping(arguments.mapping.as_deref(), &[name])?;
     let how = How {
         scheme,
         effects,

@@ -1,4 +1,4 @@
-//! `cromosim simulate`: motion files to bags, without DDS, on all cores.
+//! `cromosim simulate MOTIONS`: motion files to bags, without DDS, on all cores.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -7,12 +7,11 @@ use std::str::FromStr;
 use std::sync::Arc;
 
 use anyhow::{Context, bail};
-use clap::Args;
 use cromosim_bag::{BagOptions, BagWriter, Compression};
 use cromosim_body::{BodyModel, ShapedBody};
 use cromosim_imu::{
-    Covariances, Device, MAX_RATE_HZ, MountedSensor, MountedSensors, PlacementSet, PoseStd,
-    Reading, Scheme, SensorTrajectory, StreamingEffects, simulate_kinematics_on,
+    Covariances, Device, MountedSensor, MountedSensors, PlacementSet, PoseStd, Reading, Scheme,
+    SensorTrajectory, StreamingEffects, simulate_kinematics_on,
 };
 use cromosim_learned::{LearnedSimulator, MappingFile, Patch, SiteMotion};
 use cromosim_motion::{MotionOptions, SmplMotion, embedded_walk, read_motion_for, read_people};
@@ -24,94 +23,13 @@ use cromosim_virtual_imu::imu_message;
 use indicatif::ProgressBar;
 use rayon::prelude::*;
 
-use crate::motion_arguments::MotionArguments;
 use crate::progress::Interrupt;
-use crate::{body, progress, reference};
+use crate::simulate_arguments::Arguments;
+use crate::{body, progress};
 
 mod played;
 
 use played::{Played, Simulated, write_csv, write_in_order_of_time};
-
-/// Simulate IMUs from motion files, or again from a recording's reference
-#[derive(Args)]
-#[command(group = clap::ArgGroup::new("recorded").args(["reference", "rigid"]).multiple(false))]
-pub struct Arguments {
-    /// Motion files (BVH, ASF/AMC, C3D, TRC); none: the embedded walk
-    motions: Vec<PathBuf>,
-    /// Re-simulate the IMUs of this recording from its reference motion instead
-    #[arg(long, value_name = "RECORDING", conflicts_with_all = ["motions", "placements", "csv", "up_axis", "unit", "start", "duration", "skeleton", "motion_rate", "marker_set", "subject", "placements_as_given"])]
-    pub reference: Option<PathBuf>,
-    /// Simulate an IMU on a rigid body (robot, prop) that moves along this trajectory (TUM, EuRoC
-    /// or CSV) instead
-    #[arg(long, value_name = "FILE", requires = "rate", conflicts_with_all = ["motions", "placements", "body", "csv", "up_axis", "unit", "start", "duration", "skeleton", "motion_rate", "marker_set", "subject", "placements_as_given"])]
-    pub rigid: Option<PathBuf>,
-    /// With --rigid: the placement's name, in /imu/NAME/data_raw
-    #[arg(long, value_name = "NAME", default_value = "body", requires = "rigid")]
-    pub placement: String,
-    /// With --rigid: a device's name or file, for its noise and effects; default: an ideal sensor
-    #[arg(
-        long,
-        value_name = "DEVICE",
-        requires = "rigid",
-        conflicts_with = "effects"
-    )]
-    pub device: Option<String>,
-    /// With --reference or --rigid: the effects of each placement (YAML, as a diagnosis writes
-    /// them) rather than the nominal simulation
-    #[arg(long, value_name = "FILE", requires = "recorded")]
-    pub effects: Option<PathBuf>,
-    /// The bag to write (.mcap, or a rosbag2 directory); with several motions a directory for one
-    /// .mcap each
-    #[arg(long, value_name = "OUT")]
-    pub out: PathBuf,
-    /// Sensor placements (YAML) rather than left_wrist, right_ankle, pelvis, sternum and head
-    #[arg(long, value_name = "FILE")]
-    placements: Option<PathBuf>,
-    /// Derivative scheme for every placement: spline, richardson, triangle, normal_tracking or
-    /// second_difference. With --reference the default is the estimate that a diagnosis uses
-    #[arg(long, value_name = "NAME")]
-    pub scheme: Option<String>,
-    /// Messages per second rather than the placements' own rate, Hz
-    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
-    pub rate: Option<f64>,
-    /// Body model as npz or pickle rather than the embedded one; with --reference that of the
-    /// recording's SMPL states
-    #[arg(long, value_name = "FILE")]
-    pub body: Option<PathBuf>,
-    /// Seed of the sensor noise
-    #[arg(long, default_value_t = 0)]
-    pub seed: u64,
-    /// Leave out the random part of the sensor errors
-    #[arg(long)]
-    pub no_noise: bool,
-    /// How long errors of the poses hold, for the covariances that follow from a motion's
-    /// confidence, s; 0: new with each pose
-    #[arg(
-        long,
-        value_name = "SECONDS",
-        default_value_t = 0.0,
-        allow_negative_numbers = true
-    )]
-    pose_error_correlation: f64,
-    /// Write the samples of each placement as CSV into this directory too
-    #[arg(long, value_name = "DIR")]
-    csv: Option<PathBuf>,
-    #[command(flatten)]
-    motion: MotionArguments,
-    /// Networks (motion_capture, motion_capture_60, video, streaming, streaming_video, or a folder
-    /// that `cromosim train` wrote) that correct acceleration and angular velocity before the
-    /// device's effects; with --rigid the scheme is then spline unless --scheme names one, as in
-    /// training
-    #[arg(long, value_name = "MODEL", conflicts_with = "reference")]
-    pub learned: Option<PathBuf>,
-    /// A distribution mapping (a file that `cromosim map` wrote), applied last to the placements
-    /// that it names
-    #[arg(long, value_name = "FILE", conflicts_with = "reference")]
-    pub mapping: Option<PathBuf>,
-    /// Replace OUT where it exists
-    #[arg(long)]
-    pub force: bool,
-}
 
 /// What is the same for all motions of a call.
 struct Setup {
@@ -129,28 +47,8 @@ struct Setup {
     interrupt: Interrupt,
 }
 
-/// Runs the command.
+/// Runs `simulate MOTIONS`.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    if let Some(rate) = arguments
-        .rate
-        .filter(|rate| !(*rate > 0.0 && *rate <= MAX_RATE_HZ))
-    {
-        bail!(
-            "--rate {rate}: expected a positive number of messages a second, at most {MAX_RATE_HZ}"
-        );
-    }
-    if !(arguments.pose_error_correlation >= 0.0 && arguments.pose_error_correlation.is_finite()) {
-        bail!(
-            "--pose-error-correlation {}: expected 0 s or more",
-            arguments.pose_error_correlation
-        );
-    }
-    if let Some(trajectory) = &arguments.rigid {
-        return reference::run_rigid(trajectory, arguments);
-    }
-    if let Some(recording) = &arguments.reference {
-        return reference::run(recording, arguments);
-    }
     let setup = Setup::new(arguments)?;
     if arguments.motions.len() <= 1 {
         let people = setup.read(arguments.motions.first())?;

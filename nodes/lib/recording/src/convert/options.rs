@@ -52,7 +52,7 @@ pub struct ReadOptions {
 impl ReadOptions {
     /// The command line's name of the first setting of motion files that is not as by default;
     /// start and duration, which other things than motions may have too, on demand.
-    pub(super) fn motion_setting(&self, with_part: bool) -> Option<&'static str> {
+    pub fn motion_setting(&self, with_part: bool) -> Option<&'static str> {
         let motion = &self.motion;
         first_of([
             (motion.up_axis != UpAxis::Detect, "--up-axis"),

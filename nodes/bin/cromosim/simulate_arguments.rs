@@ -1,0 +1,201 @@
+//! The arguments of `cromosim simulate`: three modes, and which options each of them takes.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::bail;
+use clap::Args;
+use cromosim_imu::MAX_RATE_HZ;
+use cromosim_recording::convert::ReadOptions;
+
+use crate::motion_arguments::MotionArguments;
+
+// Headings of the help: what an option goes with.
+const MOTIONS: &str = "Options of motion files";
+const RIGID: &str = "Options of --rigid";
+const RECORDED: &str = "Options of --reference and --rigid";
+const NETWORKS: &str = "Options of motion files and --rigid";
+const BODIES: &str = "Options of motion files and --reference";
+
+/// Simulate IMUs from motion files, or again from a recording's reference
+#[derive(Args)]
+pub struct Arguments {
+    /// Motion files (BVH, ASF/AMC, C3D, TRC); none: the embedded walk
+    pub motions: Vec<PathBuf>,
+    /// Re-simulate the IMUs of this recording from its reference motion instead
+    #[arg(long, value_name = "RECORDING")]
+    pub reference: Option<PathBuf>,
+    /// Simulate an IMU on a rigid body (robot, prop) that moves along this trajectory (TUM, EuRoC
+    /// or CSV) instead
+    #[arg(long, value_name = "FILE")]
+    pub rigid: Option<PathBuf>,
+    /// The placement's name, in /imu/NAME/data_raw [default: body]
+    #[arg(long, value_name = "NAME", help_heading = RIGID)]
+    pub placement: Option<String>,
+    /// A device's name or file, for its noise and effects; default: an ideal sensor
+    #[arg(long, value_name = "DEVICE", help_heading = RIGID)]
+    pub device: Option<String>,
+    /// The effects of each placement (YAML, as a diagnosis writes
+    /// them) rather than the nominal simulation
+    #[arg(long, value_name = "FILE", help_heading = RECORDED)]
+    pub effects: Option<PathBuf>,
+    /// The bag to write (.mcap, or a rosbag2 directory); with several motions a directory for one
+    /// .mcap each
+    #[arg(long, value_name = "OUT")]
+    pub out: PathBuf,
+    /// Sensor placements (YAML) rather than left_wrist, right_ankle, pelvis, sternum and head
+    #[arg(long, value_name = "FILE", help_heading = MOTIONS)]
+    pub placements: Option<PathBuf>,
+    /// Derivative scheme for every placement: spline, richardson, triangle, normal_tracking or
+    /// second_difference. With --reference the default is the estimate that a diagnosis uses
+    #[arg(long, value_name = "NAME")]
+    pub scheme: Option<String>,
+    /// Messages per second rather than the placements' own rate, Hz
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    pub rate: Option<f64>,
+    /// Body model as npz or pickle rather than the embedded one; with --reference that of the
+    /// recording's SMPL states
+    #[arg(long, value_name = "FILE", help_heading = BODIES)]
+    pub body: Option<PathBuf>,
+    /// Seed of the sensor noise
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+    /// Leave out the random part of the sensor errors
+    #[arg(long)]
+    pub no_noise: bool,
+    /// How long errors of the poses hold, for the covariances that follow from a motion's
+    /// confidence, s; 0: new with each pose
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 0.0,
+        allow_negative_numbers = true,
+        help_heading = MOTIONS
+    )]
+    pub pose_error_correlation: f64,
+    /// Write the samples of each placement as CSV into this directory too
+    #[arg(long, value_name = "DIR", help_heading = MOTIONS)]
+    pub csv: Option<PathBuf>,
+    #[command(flatten, next_help_heading = MOTIONS)]
+    pub motion: MotionArguments,
+    /// Networks (motion_capture, motion_capture_60, video, streaming, streaming_video, or a folder
+    /// that `cromosim train` wrote) that correct acceleration and angular velocity before the
+    /// device's effects; with --rigid the scheme is then spline unless --scheme names one, as in
+    /// training
+    #[arg(long, value_name = "MODEL", help_heading = NETWORKS)]
+    pub learned: Option<PathBuf>,
+    /// A distribution mapping (a file that `cromosim map` wrote), applied last to the placements
+    /// that it names
+    #[arg(long, value_name = "FILE", help_heading = NETWORKS)]
+    pub mapping: Option<PathBuf>,
+    /// Replace OUT where it exists
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// What is simulated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode<'a> {
+    /// The IMUs of a body that moves as motion files say.
+    Motions,
+    /// The IMUs of this recording again, from its reference.
+    Reference(&'a Path),
+    /// An IMU on a rigid body that moves along this trajectory.
+    Rigid(&'a Path),
+}
+
+impl Mode<'_> {
+    /// What the user gave to choose it.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Motions => "motion files",
+            Self::Reference(_) => "--reference",
+            Self::Rigid(_) => "--rigid",
+        }
+    }
+}
+
+impl Arguments {
+    /// The mode, where the numbers are sound and every option is one that the mode takes.
+    ///
+    /// # Errors
+    /// One line that names the option and what it goes with.
+    pub fn mode(&self) -> anyhow::Result<Mode<'_>> {
+        if let Some(rate) = self
+            .rate
+            .filter(|rate| !(*rate > 0.0 && *rate <= MAX_RATE_HZ))
+        {
+            bail!(
+                "--rate {rate}: expected a positive number of messages a second, at most {MAX_RATE_HZ}"
+            );
+        }
+        if !(self.pose_error_correlation >= 0.0 && self.pose_error_correlation.is_finite()) {
+            bail!(
+                "--pose-error-correlation {}: expected 0 s or more",
+                self.pose_error_correlation
+            );
+        }
+        let mode = match (&self.reference, &self.rigid) {
+            (None, None) => Mode::Motions,
+            (Some(recording), None) => Mode::Reference(recording),
+            (None, Some(trajectory)) => Mode::Rigid(trajectory),
+            (Some(_), Some(_)) => {
+                bail!("--reference and --rigid are two modes of simulate; give one of them")
+            }
+        };
+        if let Some(motion) = self.motions.first().filter(|_| mode != Mode::Motions) {
+            bail!(
+                "{}: a motion file goes without {}; leave one of them out",
+                motion.display(),
+                mode.name()
+            );
+        }
+        for (option, modes) in self.given()? {
+            if !modes.contains(&mode.name()) {
+                bail!(
+                    "{option} goes with {}, not with {}; leave it out",
+                    modes.join(" and "),
+                    mode.name()
+                );
+            }
+        }
+        if self.device.is_some() && self.effects.is_some() {
+            bail!("--device and --effects both say what errs; give one of them");
+        }
+        if matches!(mode, Mode::Rigid(_)) && self.rate.is_none() {
+            bail!("--rigid needs --rate HZ: the messages of the IMU per second");
+        }
+        Ok(mode)
+    }
+
+    /// The options that were given and that not every mode takes, with the modes that do.
+    fn given(&self) -> anyhow::Result<Vec<(&'static str, &'static [&'static str])>> {
+        const MOTION_FILES: &[&str] = &["motion files"];
+        const RIGID_BODIES: &[&str] = &["--rigid"];
+        const RECORDINGS: &[&str] = &["--reference", "--rigid"];
+        const NOT_REFERENCE: &[&str] = &["motion files", "--rigid"];
+        const NOT_RIGID: &[&str] = &["motion files", "--reference"];
+        let motion = ReadOptions {
+            motion: self.motion.options()?,
+            ..ReadOptions::default()
+        };
+        let mut given = Vec::from_iter(motion.motion_setting(true).map(|it| (it, MOTION_FILES)));
+        let options = [
+            (self.placements.is_some(), "--placements", MOTION_FILES),
+            (self.csv.is_some(), "--csv", MOTION_FILES),
+            (
+                self.pose_error_correlation != 0.0,
+                "--pose-error-correlation",
+                MOTION_FILES,
+            ),
+            (self.placement.is_some(), "--placement", RIGID_BODIES),
+            (self.device.is_some(), "--device", RIGID_BODIES),
+            (self.effects.is_some(), "--effects", RECORDINGS),
+            (self.learned.is_some(), "--learned", NOT_REFERENCE),
+            (self.mapping.is_some(), "--mapping", NOT_REFERENCE),
+            (self.body.is_some(), "--body", NOT_RIGID),
+        ];
+        let options = options.into_iter().filter(|(is_given, ..)| *is_given);
+        given.extend(options.map(|(_, option, modes)| (option, modes)));
+        Ok(given)
+    }
+}
