@@ -5,7 +5,7 @@
 mod common;
 #[path = "../nodes/lib/motion/tests/common/containers.rs"]
 mod containers;
-#[path = "../nodes/lib/motion/tests/common/shot.rs"]
+#[path = "../nodes/lib/video/tests/shot/mod.rs"]
 mod shot;
 
 use std::fs;
@@ -19,11 +19,11 @@ use containers::Py;
 use cromosim_arrays::NpzWriter;
 use cromosim_bag::BagReader;
 use cromosim_body::{BodyModel, BodyPose, ShapedBody};
-use cromosim_motion::camera::{DepthEncoding, standing_height, write_openpose, write_raw_depth};
 use cromosim_motion::{MotionOptions, SmplMotion, embedded_walk, read_motion, write_bvh};
 use cromosim_msgs::cromosim_msgs::SmplPose;
 use cromosim_ros::testing::{environment, in_private_network, network};
 use cromosim_ros::{Node, NodeOptions, Parameters, Qos, RosArgs};
+use cromosim_video::{DepthEncoding, standing_height, write_openpose, write_raw_depth};
 use nalgebra::{UnitQuaternion, Vector3};
 use shot::Shot;
 

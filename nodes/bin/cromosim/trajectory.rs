@@ -7,11 +7,11 @@ use std::sync::Arc;
 use anyhow::bail;
 use clap::Args;
 use cromosim_body::BodyModel;
-use cromosim_motion::camera::{
+use cromosim_motion::{MotionOptions, PoseView, SmplMotion, open_poses, read_motion_for};
+use cromosim_video::{
     CameraAxes, CameraClip, CameraFolder, DepthEncoding, FolderLayout, ScaleSource, Trajectory,
     TrajectoryOptions, global_trajectory,
 };
-use cromosim_motion::{MotionOptions, PoseView, SmplMotion, open_poses, read_motion_for};
 use cromosim_recording::convert::{MotionFile, write_motion};
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
 

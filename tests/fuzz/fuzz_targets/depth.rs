@@ -1,7 +1,7 @@
 //! Depth maps in every form, and cameras: no panic, no memory beyond what the bytes can hold.
 #![no_main]
 
-use cromosim_motion::camera::{CameraAxes, DepthEncoding, parse_camera, parse_depth, parse_plain_depth};
+use cromosim_video::{CameraAxes, DepthEncoding, parse_camera, parse_depth, parse_plain_depth};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {

@@ -1,7 +1,7 @@
 //! OpenPose's keypoints: no panic, and a pelvis is only found where the torso is.
 #![no_main]
 
-use cromosim_motion::camera::{parse_openpose, pelvis_pixel, track_person};
+use cromosim_video::{parse_openpose, pelvis_pixel, track_person};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {

@@ -6,8 +6,6 @@
 //! markers (C3D, TRC) a body is fitted, which stays on the recording's floor; the [`MarkerReport`]
 //! says how well. [`embedded_walk`] is a motion without a file.
 //!
-//! [`camera`] places in-place poses that were estimated from video in the world.
-//!
 //! Files of SMPL parameters (AMASS, and estimates from video: VIBE, WHAM, GVHMR, TRAM, PHALP,
 //! SLAHMR) need no retargeting; the [`PoseReport`] says what was taken. Betas of another kind of
 //! body than the one at hand are left out or fitted ([`ShapeChoice`]). [`read_people`] takes
@@ -26,7 +24,6 @@ mod asf;
 mod axes;
 mod bvh;
 mod c3d;
-pub mod camera;
 mod error;
 mod format;
 mod markers;
@@ -53,7 +50,7 @@ pub use markers::{
     MarkerClip, MarkerFit, MarkerOptions, MarkerPlace, MarkerReport, MarkerSet, SetMarker,
     fit_markers, fit_rigid, place_markers,
 };
-pub use motion::SmplMotion;
+pub use motion::{SmplMotion, continuous, slerp};
 pub use options::{MotionOptions, RestChoice, UpAxis};
 pub use poses::{
     CameraPoses, MAX_POSES, Person, PoseAxes, PoseFile, PoseFormat, PoseReport, PoseTrack,

@@ -189,7 +189,7 @@ impl SmplMotion {
 
 /// Quaternions of each joint with signs chosen so that neighbours are near each other (q and -q are
 /// the same rotation).
-pub(crate) fn continuous(mut frames: Vec<BodyPose>) -> Vec<BodyPose> {
+pub fn continuous(mut frames: Vec<BodyPose>) -> Vec<BodyPose> {
     for index in 1..frames.len() {
         for joint in 0..JOINT_COUNT {
             if frames[index].local_rotations[joint]
@@ -207,7 +207,7 @@ pub(crate) fn continuous(mut frames: Vec<BodyPose>) -> Vec<BodyPose> {
 
 /// Spherical linear interpolation the short way round; at 180 degrees, where the way is not unique,
 /// some one of them.
-pub(crate) fn slerp(
+pub fn slerp(
     from: &UnitQuaternion<f64>,
     to: &UnitQuaternion<f64>,
     fraction: f64,

@@ -6,7 +6,6 @@ pub mod containers;
 pub mod export;
 pub mod known;
 pub mod marker_files;
-pub mod shot;
 
 use std::path::PathBuf;
 

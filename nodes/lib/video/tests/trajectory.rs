@@ -2,19 +2,21 @@
 //! and what must be achieved.
 #![allow(clippy::unwrap_used)]
 
+#[path = "../../motion/tests/common/mod.rs"]
 mod common;
+mod shot;
 
-use common::shot::{self, Errors, RATE_HZ, Shot};
 use cromosim_arrays::NpzWriter;
 use cromosim_body::{BodyModel, ShapedBody};
-use cromosim_motion::camera::{
+use cromosim_motion::{MotionOptions, SmplMotion, embedded_walk, read_motion};
+use cromosim_video::{
     CameraAxes, CameraClip, CameraError, CameraFolder, DepthEncoding, DepthMap, FolderLayout,
     GlobalTrajectory, Gravity, ObjectLength, ScaleSource, Trajectory, TrajectoryOptions,
     confidence_of_std, global_trajectory, parse_camera, parse_depth, parse_openpose,
     standing_height, std_of_confidence, write_openpose, write_raw_depth,
 };
-use cromosim_motion::{MotionOptions, SmplMotion, embedded_walk, read_motion};
 use nalgebra::{Isometry3, Vector3};
+use shot::{Errors, RATE_HZ, Shot};
 
 fn height(motion: &SmplMotion) -> f64 {
     standing_height(&ShapedBody::new(BodyModel::embedded(), &motion.betas).unwrap())

@@ -3,9 +3,7 @@
 
 use cromosim_body::{BodyModel, BodyPose, Gender, Joint, ShapedBody};
 use cromosim_motion::SmplMotion;
-use cromosim_motion::camera::{
-    BODY_25_COUNT, Camera, CameraClip, DepthMap, Keypoint, PersonKeypoints,
-};
+use cromosim_video::{BODY_25_COUNT, Camera, CameraClip, DepthMap, Keypoint, PersonKeypoints};
 use nalgebra::{Isometry3, UnitQuaternion, Vector2, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -3,12 +3,12 @@
 use cromosim_body::BodyPose;
 use nalgebra::{Isometry3, UnitQuaternion};
 
-use super::{Camera, CameraClip};
-use crate::motion::slerp;
+use crate::{Camera, CameraClip};
+use cromosim_motion::slerp;
 
 /// Poses with their root orientation in the reconstruction's world, root at its origin, and how
 /// many poses and cameras were bridged.
-pub(super) struct Placed {
+pub(crate) struct Placed {
     pub poses: Vec<BodyPose>,
     /// Positions in the reconstruction's unit.
     pub cameras: Vec<Camera>,
@@ -19,7 +19,7 @@ pub(super) struct Placed {
 /// world_from_pelvis = world_from_camera camera_from_pelvis. Frames without a pose, or without a
 /// camera, take what lies between the neighbours that have one. `None` where there is no pose or no
 /// camera at all.
-pub(super) fn placed(clip: &CameraClip) -> Option<Placed> {
+pub(crate) fn placed(clip: &CameraClip) -> Option<Placed> {
     let (cameras, cameras_bridged) = bridged(&clip.cameras, between_cameras)?;
     let own: Vec<Option<BodyPose>> = clip
         .poses

@@ -4,7 +4,7 @@
 use cromosim_body::ShapedBody;
 use nalgebra::{Vector2, Vector3};
 
-use super::{
+use crate::{
     Camera, CameraClip, DepthMap, Measurement, PelvisSkin, TrajectoryOptions, pelvis_pixel,
     position_by_keypoints, surface_depth,
 };

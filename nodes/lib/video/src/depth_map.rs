@@ -5,7 +5,7 @@ use std::path::Path;
 
 use cromosim_arrays::{Container, Kind, Limits, Value};
 
-use super::CameraError;
+use crate::CameraError;
 
 /// More pixels than this are no depth map.
 pub const MAX_DEPTH_PIXELS: usize = 64 << 20;

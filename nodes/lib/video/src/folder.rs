@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::Vector2;
 
-use super::{
+use crate::{
     Camera, CameraAxes, CameraError, DepthEncoding, DepthMap, DepthProvider, MAX_DEPTH_PIXELS,
     PersonKeypoints, parse_camera, parse_depth, parse_openpose, parse_plain_depth, track_person,
 };

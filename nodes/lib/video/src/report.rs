@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{FilterNoise, ScaleEstimate};
+use crate::{FilterNoise, ScaleEstimate};
 
 /// What the trajectory rests on and how sure it is.
 #[derive(Clone, Debug, PartialEq)]

@@ -3,7 +3,7 @@
 use cromosim_body::{BodyPose, Joint, ShapedBody};
 use nalgebra::{Vector2, Vector3};
 
-use super::{Camera, DepthMap};
+use crate::{Camera, DepthMap};
 
 /// Radius of the window around the pelvis by the torso's length.
 const WINDOW_BY_TORSO: f64 = 0.15;

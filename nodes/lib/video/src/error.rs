@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use cromosim_arrays::ArraysError;
 use cromosim_body::BodyError;
 
-/// An error of [`crate::camera`]: one line that names the file, the place and what to do.
+/// An error of this crate: one line that names the file, the place and what to do.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CameraError {

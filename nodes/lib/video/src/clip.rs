@@ -3,7 +3,7 @@
 use cromosim_body::{BodyPose, Gender};
 use nalgebra::Vector2;
 
-use super::{Camera, CameraError, DepthMap, PersonKeypoints};
+use crate::{Camera, CameraError, DepthMap, PersonKeypoints};
 
 /// One person's shot: per frame a pose in camera axes (x right, y down, z forward), as VIBE and its
 /// kind give it, the keypoints, and the camera. All lists have the frames' length.
@@ -113,7 +113,7 @@ impl CameraClip {
         }
     }
 
-    pub(super) fn value(&self, what: String, value: f64, expected: &'static str) -> CameraError {
+    pub(crate) fn value(&self, what: String, value: f64, expected: &'static str) -> CameraError {
         CameraError::Value {
             name: self.name.clone(),
             what,

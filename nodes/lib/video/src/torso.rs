@@ -2,7 +2,7 @@
 
 use nalgebra::Vector2;
 
-use super::keypoints::{PersonKeypoints, body_25};
+use crate::keypoints::{PersonKeypoints, body_25};
 
 /// Distance between the hip joints by that between the shoulder joints: 0.175 m by 0.335 m of the
 /// embedded body.
@@ -87,8 +87,8 @@ pub fn pelvis_pixel(person: &PersonKeypoints, least_confidence: f64) -> Option<P
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
-    use super::super::{BODY_25_COUNT, Keypoint};
     use super::*;
+    use crate::{BODY_25_COUNT, Keypoint};
 
     #[test]
     fn the_mid_hip_is_found_from_what_is_seen() {

@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::{BODY_25_COUNT, CameraError, Keypoint, PersonKeypoints};
+use crate::{BODY_25_COUNT, CameraError, Keypoint, PersonKeypoints};
 
 /// Larger files are refused; a person takes about 1 kB.
 const MAX_BYTES: usize = 16 << 20;

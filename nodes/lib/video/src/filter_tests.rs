@@ -3,8 +3,8 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::super::learn_noise;
 use super::*;
+use crate::learn_noise;
 
 const DT: f64 = 1.0 / 30.0;
 const NOISE: FilterNoise = FilterNoise {

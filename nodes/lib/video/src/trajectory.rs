@@ -5,17 +5,16 @@ use std::sync::Arc;
 use cromosim_body::{BodyModel, ShapedBody};
 use nalgebra::{Isometry3, Vector3};
 
-use super::observe::{ObservedBody, RootObservation, measure, observe};
-use super::placed::placed;
-use super::stand::{InSource, Upright, mean_up, stand_up};
-use super::{
+use crate::observe::{ObservedBody, RootObservation, measure, observe};
+use crate::placed::placed;
+use crate::stand::{InSource, Upright, mean_up, stand_up};
+use crate::{
     Camera, CameraClip, CameraError, DepthProvider, FilterNoise, GATE, Gate, Gravity, Measurement,
     PelvisSkin, RootState, ScaleEstimate, ScaleSource, TrajectoryReport, average_betas,
     combined_scale, confidence_of_std, kalman_filter, learn_noise, scale_of_frame, scale_of_object,
     standing_height,
 };
-use crate::SmplMotion;
-use crate::motion::continuous;
+use cromosim_motion::{SmplMotion, continuous};
 
 /// Whether the root moves.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]

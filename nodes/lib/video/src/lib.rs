@@ -1,6 +1,6 @@
-//! A global trajectory for poses that are estimated in a camera's axes, as by VIBE: the root from
-//! keypoints, depth maps and camera parameters (the way of CROMOSim, Hao et al. 2022), with its
-//! uncertainty.
+//! From a video's estimates to motion in the world: poses that VIBE and its kind estimate in a
+//! camera's axes get a global trajectory. The root comes from keypoints, depth maps and camera
+//! parameters (the method of CROMOSim, Hao et al. 2022), with its uncertainty.
 //!
 //! The steps are pure functions: [`track_person`] (who), [`pelvis_pixel`] (where in the image),
 //! [`surface_depth`] and [`PelvisSkin`] (how far), [`position_by_keypoints`], [`scale_of_frame`],

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::filter::{FilterNoise, Gate, Measurement, kalman_filter};
+use crate::filter::{FilterNoise, Gate, Measurement, kalman_filter};
 
 /// A parameter of the search, as a logarithm.
 struct Parameter {

@@ -3,7 +3,7 @@
 use cromosim_body::{BodyPose, Joint, ShapedBody};
 use nalgebra::{Matrix3, Vector2, Vector3};
 
-use super::{Camera, DepthMap, PersonKeypoints};
+use crate::{Camera, DepthMap, PersonKeypoints};
 
 /// Where the scale comes from.
 #[derive(Clone, Debug, PartialEq)]
@@ -294,8 +294,8 @@ mod tests {
     use cromosim_body::BodyModel;
     use nalgebra::{Isometry3, UnitQuaternion};
 
-    use super::super::{BODY_25_COUNT, Keypoint};
     use super::*;
+    use crate::{BODY_25_COUNT, Keypoint};
 
     fn camera() -> Camera {
         Camera::centred(

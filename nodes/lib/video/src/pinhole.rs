@@ -25,7 +25,7 @@ impl CameraAxes {
     }
 }
 
-/// The camera of one frame. Axes: x right, y down, z forward. Pixels as in [`super::Keypoint`].
+/// The camera of one frame. Axes: x right, y down, z forward. Pixels as in [`crate::Keypoint`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     /// Focal lengths along u and v, px.

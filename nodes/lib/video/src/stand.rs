@@ -3,12 +3,12 @@
 use cromosim_body::{BodyPose, Joint, ShapedBody};
 use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 
-use super::ground::{Soles, UpHints, floor_height, floor_normal, upright};
-use super::placed::Placed;
-use super::{Camera, CameraClip, CameraError, Gravity, RootState, TrajectoryOptions};
+use crate::ground::{Soles, UpHints, floor_height, floor_normal, upright};
+use crate::placed::Placed;
+use crate::{Camera, CameraClip, CameraError, Gravity, RootState, TrajectoryOptions};
 
 /// Poses and track in the reconstruction's world, metres.
-pub(super) struct InSource {
+pub(crate) struct InSource {
     pub placed: Placed,
     pub metres: f64,
     pub smoothed: Option<Vec<RootState>>,
@@ -71,7 +71,7 @@ impl InSource {
 }
 
 /// Up as the cameras are held on average.
-pub(super) fn mean_up(cameras: &[Camera]) -> Vector3<f64> {
+pub(crate) fn mean_up(cameras: &[Camera]) -> Vector3<f64> {
     cameras
         .iter()
         .map(|camera| camera.world_from_camera.rotation * -Vector3::y())
@@ -79,7 +79,7 @@ pub(super) fn mean_up(cameras: &[Camera]) -> Vector3<f64> {
 }
 
 /// Everything upright.
-pub(super) struct Upright {
+pub(crate) struct Upright {
     pub poses: Vec<BodyPose>,
     pub states: Vec<RootState>,
     pub world_from_source: Isometry3<f64>,
@@ -88,7 +88,7 @@ pub(super) struct Upright {
 }
 
 /// Turns everything to z up and sets it on the floor.
-pub(super) fn stand_up(
+pub(crate) fn stand_up(
     clip: &CameraClip,
     source: &InSource,
     shaped: &ShapedBody,

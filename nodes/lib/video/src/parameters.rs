@@ -7,7 +7,7 @@ use cromosim_arrays::{Limits, NpzReader};
 use cromosim_spatial::so3;
 use nalgebra::{Isometry3, Matrix3, Vector2, Vector3};
 
-use super::{Camera, CameraAxes, CameraError};
+use crate::{Camera, CameraAxes, CameraError};
 
 /// Names that the arrays go by, in files of different hands.
 const INTRINSICS: [&str; 4] = ["intrinsics", "intrinsic", "K", "cam_K"];
