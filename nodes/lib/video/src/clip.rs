@@ -3,7 +3,10 @@
 use cromosim_body::{BodyPose, Gender};
 use nalgebra::Vector2;
 
-use crate::{Camera, CameraError, DepthMap, PersonKeypoints};
+use crate::depth_map::DepthMap;
+use crate::error::VideoError;
+use crate::keypoints::PersonKeypoints;
+use crate::pinhole::Camera;
 
 /// One person's shot: per frame a pose in camera axes (x right, y down, z forward), as VIBE and its
 /// kind give it, the keypoints, and the camera. All lists have the frames' length.
@@ -37,11 +40,11 @@ pub trait DepthProvider {
     ///
     /// # Errors
     /// What reading it says.
-    fn depth(&mut self, frame: usize) -> Result<Option<DepthMap>, CameraError>;
+    fn depth(&mut self, frame: usize) -> Result<Option<DepthMap>, VideoError>;
 }
 
-impl<F: FnMut(usize) -> Result<Option<DepthMap>, CameraError>> DepthProvider for F {
-    fn depth(&mut self, frame: usize) -> Result<Option<DepthMap>, CameraError> {
+impl<F: FnMut(usize) -> Result<Option<DepthMap>, VideoError>> DepthProvider for F {
+    fn depth(&mut self, frame: usize) -> Result<Option<DepthMap>, VideoError> {
         self(frame)
     }
 }
@@ -50,8 +53,8 @@ impl CameraClip {
     /// Lengths agree and numbers are finite.
     ///
     /// # Errors
-    /// [`CameraError::Length`], [`CameraError::Value`].
-    pub fn check(&self) -> Result<(), CameraError> {
+    /// [`VideoError::Length`], [`VideoError::Value`].
+    pub fn check(&self) -> Result<(), VideoError> {
         let expected = self.poses.len();
         let lists = [
             ("pose_confidence", self.pose_confidence.len()),
@@ -67,7 +70,7 @@ impl CameraClip {
             ),
         ];
         if let Some((what, found)) = lists.into_iter().find(|(_, found)| *found != expected) {
-            return Err(CameraError::Length {
+            return Err(VideoError::Length {
                 name: self.name.clone(),
                 what,
                 expected,
@@ -105,7 +108,7 @@ impl CameraClip {
         Ok(())
     }
 
-    fn positive(&self, what: &str, value: f64) -> Result<(), CameraError> {
+    fn positive(&self, what: &str, value: f64) -> Result<(), VideoError> {
         if value > 0.0 && value.is_finite() {
             Ok(())
         } else {
@@ -113,8 +116,8 @@ impl CameraClip {
         }
     }
 
-    pub(crate) fn value(&self, what: String, value: f64, expected: &'static str) -> CameraError {
-        CameraError::Value {
+    pub(crate) fn value(&self, what: String, value: f64, expected: &'static str) -> VideoError {
+        VideoError::Value {
             name: self.name.clone(),
             what,
             value,

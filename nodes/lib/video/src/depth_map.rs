@@ -5,7 +5,7 @@ use std::path::Path;
 
 use cromosim_arrays::{Container, Kind, Limits, Value};
 
-use crate::CameraError;
+use crate::error::VideoError;
 
 /// More pixels than this are no depth map.
 pub const MAX_DEPTH_PIXELS: usize = 64 << 20;
@@ -81,12 +81,12 @@ const CV_32FC1: i32 = 5;
 /// bytes together; then float32, row by row.
 ///
 /// # Errors
-/// [`CameraError::Depth`] with the byte.
+/// [`VideoError::Depth`] with the byte.
 pub fn parse_raw_depth(
     bytes: &[u8],
     encoding: DepthEncoding,
     name: &str,
-) -> Result<DepthMap, CameraError> {
+) -> Result<DepthMap, VideoError> {
     let Some((header, content)) = bytes.split_first_chunk::<RAW_HEADER>() else {
         return Err(depth_error(
             name,
@@ -117,14 +117,14 @@ pub fn parse_raw_depth(
 /// Plain little-endian float32, row by row.
 ///
 /// # Errors
-/// [`CameraError::Depth`] where the size does not fit.
+/// [`VideoError::Depth`] where the size does not fit.
 pub fn parse_plain_depth(
     bytes: &[u8],
     width: usize,
     height: usize,
     encoding: DepthEncoding,
     name: &str,
-) -> Result<DepthMap, CameraError> {
+) -> Result<DepthMap, VideoError> {
     floats(bytes, 0, (width, height), encoding, name)
 }
 
@@ -134,7 +134,7 @@ fn floats(
     (width, height): (usize, usize),
     encoding: DepthEncoding,
     name: &str,
-) -> Result<DepthMap, CameraError> {
+) -> Result<DepthMap, VideoError> {
     let pixels = checked_pixels(width, height, name)?;
     if bytes.len() != 4 * pixels {
         let problem = format!(
@@ -161,13 +161,13 @@ fn floats(
 /// unknown depths.
 ///
 /// # Errors
-/// [`CameraError::Arrays`], [`CameraError::Depth`] for too many pixels and for elements that are no
+/// [`VideoError::Arrays`], [`VideoError::Depth`] for too many pixels and for elements that are no
 /// floats.
 pub fn parse_npy_depth(
     bytes: &[u8],
     encoding: DepthEncoding,
     name: &str,
-) -> Result<DepthMap, CameraError> {
+) -> Result<DepthMap, VideoError> {
     let limits = Limits {
         decoded_bytes: bytes.len() as u64,
         opcodes: 0,
@@ -202,9 +202,9 @@ pub fn parse_npy_depth(
 /// A grey PNG of 16 bits, in millimetres; 0 is unknown. Depths come out in metres.
 ///
 /// # Errors
-/// [`CameraError::Png`].
-pub fn parse_png_depth(bytes: &[u8], name: &str) -> Result<DepthMap, CameraError> {
-    let problem = |problem: String| CameraError::Png {
+/// [`VideoError::Png`].
+pub fn parse_png_depth(bytes: &[u8], name: &str) -> Result<DepthMap, VideoError> {
+    let problem = |problem: String| VideoError::Png {
         name: name.to_owned(),
         problem,
     };
@@ -251,12 +251,12 @@ pub fn parse_png_depth(bytes: &[u8], name: &str) -> Result<DepthMap, CameraError
 /// A depth map of any of the forms with a header, told by its content.
 ///
 /// # Errors
-/// [`CameraError::Depth`], [`CameraError::Arrays`], [`CameraError::Png`].
+/// [`VideoError::Depth`], [`VideoError::Arrays`], [`VideoError::Png`].
 pub fn parse_depth(
     bytes: &[u8],
     encoding: DepthEncoding,
     name: &str,
-) -> Result<DepthMap, CameraError> {
+) -> Result<DepthMap, VideoError> {
     match bytes {
         [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => parse_npy_depth(bytes, encoding, name),
         [0x89, b'P', b'N', b'G', ..] => parse_png_depth(bytes, name),
@@ -287,7 +287,7 @@ fn decoded(value: f32, encoding: DepthEncoding) -> f32 {
     }
 }
 
-fn checked_pixels(width: usize, height: usize, name: &str) -> Result<usize, CameraError> {
+fn checked_pixels(width: usize, height: usize, name: &str) -> Result<usize, VideoError> {
     width
         .checked_mul(height)
         .filter(|pixels| (1..=MAX_DEPTH_PIXELS).contains(pixels))
@@ -300,12 +300,12 @@ fn checked_pixels(width: usize, height: usize, name: &str) -> Result<usize, Came
         })
 }
 
-fn map(width: usize, height: usize, depths: Vec<f32>, name: &str) -> Result<DepthMap, CameraError> {
+fn map(width: usize, height: usize, depths: Vec<f32>, name: &str) -> Result<DepthMap, VideoError> {
     DepthMap::new(width, height, depths).ok_or_else(|| depth_error(name, 0, "no pixels".to_owned()))
 }
 
-fn depth_error(name: &str, offset: usize, problem: String) -> CameraError {
-    CameraError::Depth {
+fn depth_error(name: &str, offset: usize, problem: String) -> VideoError {
+    VideoError::Depth {
         name: name.to_owned(),
         offset,
         problem,

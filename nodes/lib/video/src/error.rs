@@ -9,7 +9,7 @@ use cromosim_body::BodyError;
 /// An error of this crate: one line that names the file, the place and what to do.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum CameraError {
+pub enum VideoError {
     /// A file or folder cannot be read.
     #[error("{}: cannot read: {source}", path.display())]
     Read {

@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
-use crate::learn_noise;
+use crate::learn::learn_noise;
 
 const DT: f64 = 1.0 / 30.0;
 const NOISE: FilterNoise = FilterNoise {

@@ -8,10 +8,13 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::Vector2;
 
-use crate::{
-    Camera, CameraAxes, CameraError, DepthEncoding, DepthMap, DepthProvider, MAX_DEPTH_PIXELS,
-    PersonKeypoints, parse_camera, parse_depth, parse_openpose, parse_plain_depth, track_person,
-};
+use crate::clip::DepthProvider;
+use crate::depth_map::{DepthEncoding, DepthMap, MAX_DEPTH_PIXELS, parse_depth, parse_plain_depth};
+use crate::error::VideoError;
+use crate::keypoints::{PersonKeypoints, track_person};
+use crate::openpose::parse_openpose;
+use crate::parameters::parse_camera;
+use crate::pinhole::{Camera, CameraAxes};
 
 /// Larger files are no frame.
 const MAX_BYTES: u64 = 8 * MAX_DEPTH_PIXELS as u64 + 4096;
@@ -74,8 +77,8 @@ impl CameraFolder {
     /// it are left alone.
     ///
     /// # Errors
-    /// [`CameraError::Read`], [`CameraError::NoFrames`], and those of the parsers.
-    pub fn read(&self, frames: usize, least_confidence: f64) -> Result<FolderFrames, CameraError> {
+    /// [`VideoError::Read`], [`VideoError::NoFrames`], and those of the parsers.
+    pub fn read(&self, frames: usize, least_confidence: f64) -> Result<FolderFrames, VideoError> {
         let frames = frames.min(MAX_FRAMES);
         let keypoint_files =
             self.numbered(&self.keypoints, &["_keypoints.json"], "*_keypoints.json")?;
@@ -128,8 +131,8 @@ impl CameraFolder {
         folder: &Path,
         endings: &[&str],
         expected: &'static str,
-    ) -> Result<BTreeMap<usize, PathBuf>, CameraError> {
-        let unreadable = |source| CameraError::Read {
+    ) -> Result<BTreeMap<usize, PathBuf>, VideoError> {
+        let unreadable = |source| VideoError::Read {
             path: folder.to_owned(),
             source,
         };
@@ -155,7 +158,7 @@ impl CameraFolder {
             }
         }
         if found.is_empty() {
-            return Err(CameraError::NoFrames {
+            return Err(VideoError::NoFrames {
                 path: folder.to_owned(),
                 expected,
             });
@@ -171,7 +174,7 @@ impl CameraFolder {
 }
 
 impl DepthProvider for FolderDepth {
-    fn depth(&mut self, frame: usize) -> Result<Option<DepthMap>, CameraError> {
+    fn depth(&mut self, frame: usize) -> Result<Option<DepthMap>, VideoError> {
         let Some(path) = self.files.get(&frame) else {
             return Ok(None);
         };
@@ -196,8 +199,8 @@ fn last_number(stem: &str) -> Option<usize> {
     stem[start..end].parse().ok()
 }
 
-fn read(path: &Path) -> Result<Vec<u8>, CameraError> {
-    let unreadable = |source| CameraError::Read {
+fn read(path: &Path) -> Result<Vec<u8>, VideoError> {
+    let unreadable = |source| VideoError::Read {
         path: path.to_owned(),
         source,
     };
@@ -208,7 +211,7 @@ fn read(path: &Path) -> Result<Vec<u8>, CameraError> {
         .read_to_end(&mut bytes)
         .map_err(unreadable)?;
     if bytes.len() as u64 > MAX_BYTES {
-        return Err(CameraError::TooLarge {
+        return Err(VideoError::TooLarge {
             name: path.display().to_string(),
             bytes: bytes.len() as u64,
             limit: MAX_BYTES,

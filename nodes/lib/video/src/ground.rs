@@ -119,7 +119,7 @@ pub fn floor_normal(
     let mut slope = Vector2::<f64>::zeros();
     for _ in 0..20 {
         let up = (start + basis[0] * slope.x + basis[1] * slope.y).normalize();
-        let Some(data) = PlaneSums::of(feet, &up, &start, flat, rate_hz) else {
+        let Some(data) = PlaneSums::new(feet, &up, &start, flat, rate_hz) else {
             break;
         };
         let (information, pull) = data.reliable();
@@ -163,7 +163,9 @@ impl PlaneSums {
         (information, pulled)
     }
 
-    fn of(
+    /// Sums about the plane of normal `up`; `None` without feet. `flat` gives a vector's two
+    /// coordinates across `start`.
+    fn new(
         feet: &[(Vector3<f64>, Vector3<f64>)],
         up: &Vector3<f64>,
         start: &Vector3<f64>,

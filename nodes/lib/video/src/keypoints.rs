@@ -50,7 +50,7 @@ struct TorsoBox {
 impl TorsoBox {
     /// Around the torso's points above `least_confidence`; at least three, and never thinner than a
     /// third of its length, since a torso seen from the side has a width, too.
-    fn of(person: &PersonKeypoints, least_confidence: f64) -> Option<Self> {
+    fn around_torso(person: &PersonKeypoints, least_confidence: f64) -> Option<Self> {
         let seen: Vec<&Keypoint> = body_25::TORSO
             .iter()
             .map(|&index| &person[index])
@@ -109,7 +109,7 @@ pub fn track_person(frames: &[Vec<PersonKeypoints>], least_confidence: f64) -> V
         .map(|people| {
             people
                 .iter()
-                .map(|person| TorsoBox::of(person, least_confidence))
+                .map(|person| TorsoBox::around_torso(person, least_confidence))
                 .collect()
         })
         .collect();

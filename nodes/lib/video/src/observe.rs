@@ -4,10 +4,14 @@
 use cromosim_body::ShapedBody;
 use nalgebra::{Vector2, Vector3};
 
-use crate::{
-    Camera, CameraClip, DepthMap, Measurement, PelvisSkin, TrajectoryOptions, pelvis_pixel,
-    position_by_keypoints, surface_depth,
-};
+use crate::clip::CameraClip;
+use crate::depth_map::DepthMap;
+use crate::filter::Measurement;
+use crate::options::TrajectoryOptions;
+use crate::pinhole::Camera;
+use crate::scale::position_by_keypoints;
+use crate::surface::{PelvisSkin, surface_depth};
+use crate::torso::pelvis_pixel;
 
 /// How exactly the skin's distance before the joint is known, m: clothing, and limbs that the pose
 /// has elsewhere.

@@ -2,7 +2,8 @@
 
 use serde::Deserialize;
 
-use crate::{BODY_25_COUNT, CameraError, Keypoint, PersonKeypoints};
+use crate::error::VideoError;
+use crate::keypoints::{BODY_25_COUNT, Keypoint, PersonKeypoints};
 
 /// Larger files are refused; a person takes about 1 kB.
 const MAX_BYTES: usize = 16 << 20;
@@ -24,17 +25,17 @@ struct Person {
 /// OpenPose gives now and then, become 1.
 ///
 /// # Errors
-/// [`CameraError::Json`] with line and column, [`CameraError::Keypoints`],
-/// [`CameraError::TooLarge`].
-pub fn parse_openpose(bytes: &[u8], name: &str) -> Result<Vec<PersonKeypoints>, CameraError> {
+/// [`VideoError::Json`] with line and column, [`VideoError::Keypoints`],
+/// [`VideoError::TooLarge`].
+pub fn parse_openpose(bytes: &[u8], name: &str) -> Result<Vec<PersonKeypoints>, VideoError> {
     if bytes.len() > MAX_BYTES {
-        return Err(CameraError::TooLarge {
+        return Err(VideoError::TooLarge {
             name: name.to_owned(),
             bytes: bytes.len() as u64,
             limit: MAX_BYTES as u64,
         });
     }
-    let file: File = serde_json::from_slice(bytes).map_err(|source| CameraError::Json {
+    let file: File = serde_json::from_slice(bytes).map_err(|source| VideoError::Json {
         name: name.to_owned(),
         source,
     })?;
@@ -45,8 +46,8 @@ pub fn parse_openpose(bytes: &[u8], name: &str) -> Result<Vec<PersonKeypoints>, 
         .collect()
 }
 
-fn keypoints(values: &[f64], person: usize, name: &str) -> Result<PersonKeypoints, CameraError> {
-    let problem = |problem: String| CameraError::Keypoints {
+fn keypoints(values: &[f64], person: usize, name: &str) -> Result<PersonKeypoints, VideoError> {
+    let problem = |problem: String| VideoError::Keypoints {
         name: name.to_owned(),
         person,
         problem,

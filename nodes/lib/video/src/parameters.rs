@@ -7,10 +7,12 @@ use cromosim_arrays::{Limits, NpzReader};
 use cromosim_spatial::so3;
 use nalgebra::{Isometry3, Matrix3, Vector2, Vector3};
 
-use crate::{Camera, CameraAxes, CameraError};
+use crate::error::VideoError;
+use crate::pinhole::{Camera, CameraAxes};
 
-/// Names that the arrays go by, in files of different hands.
+/// Names under which tools write the intrinsics.
 const INTRINSICS: [&str; 4] = ["intrinsics", "intrinsic", "K", "cam_K"];
+/// Names under which tools write world_from_camera.
 const CAMERA_TO_WORLD: [&str; 6] = [
     "extrinsics",
     "camera_to_world",
@@ -34,73 +36,17 @@ const LIMITS: Limits = Limits {
 /// intrinsics are for.
 ///
 /// # Errors
-/// [`CameraError::Parameters`], [`CameraError::Arrays`] for a damaged archive or array.
+/// [`VideoError::Parameters`], [`VideoError::Arrays`] for a damaged archive or array.
 pub fn parse_camera(
     bytes: &[u8],
     image_px: Vector2<f64>,
     axes: CameraAxes,
     name: &str,
-) -> Result<Camera, CameraError> {
-    let mut npz = NpzReader::with_limits(Cursor::new(bytes), Path::new(name), LIMITS)?;
-    let keys = npz.keys();
-    let problem = |key: &str, problem: String| CameraError::Parameters {
-        name: name.to_owned(),
-        key: key.to_owned(),
-        problem,
-    };
-    let find = |names: &[&'static str]| {
-        names
-            .iter()
-            .copied()
-            .find(|name| keys.iter().any(|key| key == name))
-    };
-    let missing = |names: &[&str]| {
-        problem(
-            names[0],
-            format!("absent, as is any of {}", names[1..].join(", ")),
-        )
-    };
-    let key = find(&INTRINSICS).ok_or_else(|| missing(&INTRINSICS))?;
-    let (focal_px, principal_point_px) = match &array(&mut npz, key)?[..] {
-        [fx, fy] => (Vector2::new(*fx, *fy), image_px / 2.0),
-        [fx, fy, cx, cy] => (Vector2::new(*fx, *fy), Vector2::new(*cx, *cy)),
-        [fx, _, cx, _, fy, cy, _, _, _] => (Vector2::new(*fx, *fy), Vector2::new(*cx, *cy)),
-        other => {
-            return Err(problem(
-                key,
-                format!(
-                    "expected (fx, fy), (fx, fy, cx, cy) or 3 x 3, found {} numbers",
-                    other.len()
-                ),
-            ));
-        }
-    };
-    if !(focal_px.min() > 0.0
-        && focal_px.max() < LARGEST_PIXEL
-        && principal_point_px.amax() < LARGEST_PIXEL)
-    {
-        let found = format!(
-            "focal lengths {} and {}, expected pixels above 0",
-            focal_px.x, focal_px.y
-        );
-        return Err(problem(key, found));
-    }
-    let key = find(&CAMERA_TO_WORLD).ok_or_else(|| missing(&CAMERA_TO_WORLD))?;
-    let values = array(&mut npz, key)?;
-    if values.len() != 16 && values.len() != 12 {
-        return Err(problem(
-            key,
-            format!(
-                "expected a 4 x 4 or 3 x 4 matrix, found {} numbers",
-                values.len()
-            ),
-        ));
-    }
-    let rotation = Matrix3::from_fn(|row, column| values[4 * row + column]);
-    let position = Vector3::from_fn(|row, _| values[4 * row + 3]);
-    let rotation = so3::rotation_from_matrix(&rotation, 1e-2)
-        .map_err(|error| problem(key, error.to_string()))?;
-    let world_from_camera = axes.to_open_cv(Isometry3::from_parts(position.into(), rotation));
+) -> Result<Camera, VideoError> {
+    let npz = NpzReader::with_limits(Cursor::new(bytes), Path::new(name), LIMITS)?;
+    let mut file = CameraFile { npz, name };
+    let (focal_px, principal_point_px) = file.intrinsics(image_px)?;
+    let world_from_camera = axes.to_open_cv(file.world_from_camera()?);
     Ok(Camera {
         focal_px,
         principal_point_px,
@@ -109,16 +55,93 @@ pub fn parse_camera(
     })
 }
 
-/// The numbers of a small array of any of the shapes that cameras come in: a vector, a matrix, or a
-/// stack of one matrix.
-fn array(npz: &mut NpzReader<Cursor<&[u8]>>, key: &str) -> Result<Vec<f64>, CameraError> {
-    let entry = npz.at(key)?;
-    let shape: &[Option<usize>] = match entry.shape()?.len() {
-        1 => &[None],
-        3 => &[Some(1), None, None],
-        _ => &[None, None],
-    };
-    Ok(entry.floats(shape, "a vector or a matrix")?.values)
+struct CameraFile<'a> {
+    npz: NpzReader<Cursor<&'a [u8]>>,
+    name: &'a str,
+}
+
+impl CameraFile<'_> {
+    fn problem(&self, key: &str, problem: String) -> VideoError {
+        VideoError::Parameters {
+            name: self.name.to_owned(),
+            key: key.to_owned(),
+            problem,
+        }
+    }
+
+    /// The first of the names that the file has.
+    fn find(&self, names: &[&'static str]) -> Result<&'static str, VideoError> {
+        let keys = self.npz.keys();
+        let found = names
+            .iter()
+            .copied()
+            .find(|name| keys.iter().any(|key| key == name));
+        found.ok_or_else(|| {
+            let others = names[1..].join(", ");
+            self.problem(names[0], format!("absent, as is any of {others}"))
+        })
+    }
+
+    /// Focal lengths and principal point, px.
+    fn intrinsics(
+        &mut self,
+        image_px: Vector2<f64>,
+    ) -> Result<(Vector2<f64>, Vector2<f64>), VideoError> {
+        let key = self.find(&INTRINSICS)?;
+        let (focal_px, principal_point_px) = match &self.array(key)?[..] {
+            [fx, fy] => (Vector2::new(*fx, *fy), image_px / 2.0),
+            [fx, fy, cx, cy] => (Vector2::new(*fx, *fy), Vector2::new(*cx, *cy)),
+            [fx, _, cx, _, fy, cy, _, _, _] => (Vector2::new(*fx, *fy), Vector2::new(*cx, *cy)),
+            other => {
+                let found = format!(
+                    "expected (fx, fy), (fx, fy, cx, cy) or 3 x 3, found {} numbers",
+                    other.len()
+                );
+                return Err(self.problem(key, found));
+            }
+        };
+        if focal_px.min() > 0.0
+            && focal_px.max() < LARGEST_PIXEL
+            && principal_point_px.amax() < LARGEST_PIXEL
+        {
+            return Ok((focal_px, principal_point_px));
+        }
+        let found = format!(
+            "focal lengths {} and {}, expected pixels above 0",
+            focal_px.x, focal_px.y
+        );
+        Err(self.problem(key, found))
+    }
+
+    /// The camera's pose, in the file's own axes and unit.
+    fn world_from_camera(&mut self) -> Result<Isometry3<f64>, VideoError> {
+        let key = self.find(&CAMERA_TO_WORLD)?;
+        let values = self.array(key)?;
+        if values.len() != 16 && values.len() != 12 {
+            let found = format!(
+                "expected a 4 x 4 or 3 x 4 matrix, found {} numbers",
+                values.len()
+            );
+            return Err(self.problem(key, found));
+        }
+        let rotation = Matrix3::from_fn(|row, column| values[4 * row + column]);
+        let position = Vector3::from_fn(|row, _| values[4 * row + 3]);
+        let rotation = so3::rotation_from_matrix(&rotation, 1e-2)
+            .map_err(|error| self.problem(key, error.to_string()))?;
+        Ok(Isometry3::from_parts(position.into(), rotation))
+    }
+
+    /// The numbers of a small array of any of the shapes that cameras come in: a vector, a matrix,
+    /// or a stack of one matrix.
+    fn array(&mut self, key: &str) -> Result<Vec<f64>, VideoError> {
+        let entry = self.npz.at(key)?;
+        let shape: &[Option<usize>] = match entry.shape()?.len() {
+            1 => &[None],
+            3 => &[Some(1), None, None],
+            _ => &[None, None],
+        };
+        Ok(entry.floats(shape, "a vector or a matrix")?.values)
+    }
 }
 
 #[cfg(test)]

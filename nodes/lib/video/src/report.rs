@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-use crate::{FilterNoise, ScaleEstimate};
+use crate::filter::FilterNoise;
+use crate::scale::ScaleEstimate;
 
 /// What the trajectory rests on and how sure it is.
 #[derive(Clone, Debug, PartialEq)]

@@ -295,7 +295,7 @@ mod tests {
     use nalgebra::{Isometry3, UnitQuaternion};
 
     use super::*;
-    use crate::{BODY_25_COUNT, Keypoint};
+    use crate::keypoints::{BODY_25_COUNT, Keypoint};
 
     fn camera() -> Camera {
         Camera::centred(

@@ -3,7 +3,8 @@
 use cromosim_body::{BodyPose, Joint, ShapedBody};
 use nalgebra::{Vector2, Vector3};
 
-use crate::{Camera, DepthMap};
+use crate::depth_map::DepthMap;
+use crate::pinhole::Camera;
 
 /// Radius of the window around the pelvis by the torso's length.
 const WINDOW_BY_TORSO: f64 = 0.15;

@@ -88,7 +88,7 @@ pub fn pelvis_pixel(person: &PersonKeypoints, least_confidence: f64) -> Option<P
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::{BODY_25_COUNT, Keypoint};
+    use crate::keypoints::{BODY_25_COUNT, Keypoint};
 
     #[test]
     fn the_mid_hip_is_found_from_what_is_seen() {

@@ -3,78 +3,33 @@
 use std::sync::Arc;
 
 use cromosim_body::{BodyModel, ShapedBody};
+use cromosim_motion::{SmplMotion, continuous};
+use cromosim_spatial::confidence_of_std;
 use nalgebra::{Isometry3, Vector3};
 
-use crate::observe::{ObservedBody, RootObservation, measure, observe};
-use crate::placed::placed;
-use crate::stand::{InSource, Upright, mean_up, stand_up};
-use crate::{
-    Camera, CameraClip, CameraError, DepthProvider, FilterNoise, GATE, Gate, Gravity, Measurement,
-    PelvisSkin, RootState, ScaleEstimate, ScaleSource, TrajectoryReport, average_betas,
-    combined_scale, confidence_of_std, kalman_filter, learn_noise, scale_of_frame, scale_of_object,
-    standing_height,
-};
-use cromosim_motion::{SmplMotion, continuous};
-
-/// Whether the root moves.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Trajectory {
-    /// From depth maps: the paper's CROMOSim.
-    #[default]
-    Depth,
-    /// The root stays where it is: the paper's CROMOSim Lite.
-    None,
-}
-
-/// Settings of [`global_trajectory`].
-#[derive(Clone, Debug, PartialEq)]
-pub struct TrajectoryOptions {
-    /// Whether the root moves.
-    pub trajectory: Trajectory,
-    /// Metres per unit of depth maps and cameras.
-    pub scale: ScaleSource,
-    /// Which way is up.
-    pub gravity: Gravity,
-    /// Keypoints below it are not there, 0 to 1.
-    pub least_confidence: f64,
-    /// Standard deviation of a keypoint of confidence 1 in an image of 1080 rows, px; a factor on
-    /// it is learnt.
-    pub keypoint_std_px: f64,
-    /// Standard deviation of a depth by itself from frame to frame: 0.02 is 2 %; a factor on it is
-    /// learnt.
-    pub depth_std: f64,
-    /// Standard deviation of the slow error of a depth map's scale by itself, which no smoothing
-    /// takes out: it is added to the covariance along the view.
-    pub depth_scale_std: f64,
-}
-
-impl TrajectoryOptions {
-    /// With this scale; up from the floor; keypoints from confidence 0.3 on, 5 px; depth 2 % from
-    /// frame to frame, 5 % slowly.
-    pub fn new(scale: ScaleSource) -> Self {
-        Self {
-            trajectory: Trajectory::Depth,
-            scale,
-            gravity: Gravity::Floor,
-            least_confidence: 0.3,
-            keypoint_std_px: 5.0,
-            depth_std: 0.02,
-            depth_scale_std: 0.05,
-        }
-    }
-}
+use crate::clip::{CameraClip, DepthProvider, average_betas};
+use crate::error::VideoError;
+use crate::filter::{FilterNoise, GATE, Gate, Measurement, RootState, kalman_filter};
+use crate::ground::Gravity;
+use crate::learn::learn_noise;
+use crate::measurements::measure_frames;
+use crate::options::{Trajectory, TrajectoryOptions};
+use crate::pinhole::Camera;
+use crate::report::TrajectoryReport;
+use crate::scale::ScaleEstimate;
+use crate::source_poses::source_poses;
+use crate::stand::{SourceMotion, Upright, mean_up, stand_up};
 
 /// The root's track in the reconstruction's world, metres, step by step.
 #[derive(Clone, Debug)]
 pub struct RootTrack {
     /// What each frame says by itself.
     pub measured: Vec<Option<Measurement>>,
-    /// Whether it was used.
+    /// Whether the filter used the frame's measurement.
     pub accepted: Vec<bool>,
-    /// Knowing the past.
+    /// The filter's states, each from the frames up to it.
     pub filtered: Vec<RootState>,
-    /// Knowing all frames.
+    /// The smoother's states, each from all frames.
     pub smoothed: Vec<RootState>,
 }
 
@@ -88,72 +43,56 @@ pub struct GlobalTrajectory {
     /// Root position, velocity, acceleration and covariances in that world, one a frame; empty
     /// without a trajectory.
     pub states: Vec<RootState>,
-    /// The steps before; `None` without a trajectory.
+    /// The track that the states come from; `None` without a trajectory.
     pub track: Option<RootTrack>,
-    /// The world from the reconstruction's, both in metres.
+    /// From the reconstruction's world (scaled to metres) into the motion's.
     pub world_from_source: Isometry3<f64>,
-    /// In numbers.
+    /// What was used, left out and found.
     pub report: TrajectoryReport,
 }
-
-const LEAST_MEASUREMENTS: usize = 10;
-/// Frames within this time err alike, s.
-const SCALE_BLOCK_S: f64 = 1.0;
 
 /// The motion in the world of a clip in camera axes, for `body` with the clip's average betas.
 ///
 /// # Errors
-/// [`CameraError::Length`] and [`CameraError::Value`] for a clip that contradicts itself,
-/// [`CameraError::TooFewFrames`], [`CameraError::Scale`], [`CameraError::Gravity`], and those of
+/// [`VideoError::Length`] and [`VideoError::Value`] for a clip that contradicts itself,
+/// [`VideoError::TooFewFrames`], [`VideoError::Scale`], [`VideoError::Gravity`], and those of
 /// the depth maps and the body.
 pub fn global_trajectory(
     clip: &CameraClip,
     depths: &mut dyn DepthProvider,
     body: &Arc<BodyModel>,
     options: &TrajectoryOptions,
-) -> Result<GlobalTrajectory, CameraError> {
+) -> Result<GlobalTrajectory, VideoError> {
     clip.check()?;
-    check_options(clip, options)?;
+    options.check(clip)?;
     let betas = average_betas(&clip.betas, &clip.pose_confidence);
     let shaped = ShapedBody::new(body.clone(), &betas)?;
-    let none = || CameraError::TooFewFrames {
+    let none = || VideoError::TooFewFrames {
         name: clip.name.clone(),
         found: 0,
         frames: clip.poses.len(),
         needed: 1,
     };
-    let placed = placed(clip).ok_or_else(none)?;
-    let (scale, track, noise) = match options.trajectory {
-        Trajectory::None => (None, None, None),
+    let poses = source_poses(clip).ok_or_else(none)?;
+    let depth_track = match options.trajectory {
+        Trajectory::None => None,
         Trajectory::Depth => {
-            let (scale, measured) = measurements(clip, depths, &shaped, options)?;
-            let dt = clip.rate_hz.recip();
-            let (track, noise) = smooth_track(measured, dt, &roughly_up(options, &placed.cameras));
-            (Some(scale), Some(track), Some(noise))
+            let (scale, measured) = measure_frames(clip, depths, &shaped, options)?;
+            let up = roughly_up(options, &poses.cameras);
+            Some(DepthTrack::new(scale, measured, clip.rate_hz.recip(), &up))
         }
     };
-    let metres = scale.map_or(1.0, |scale| scale.metres_per_unit);
-    let source = InSource {
-        placed,
-        metres,
-        smoothed: track.as_ref().map(|track| track.smoothed.clone()),
+    let source = SourceMotion {
+        poses,
+        metres_per_unit: depth_track
+            .as_ref()
+            .map_or(1.0, |track| track.scale.metres_per_unit),
+        smoothed: depth_track
+            .as_ref()
+            .map(|track| track.root.smoothed.clone()),
     };
     let upright = stand_up(clip, &source, &shaped, options)?;
-    let report = report(
-        clip,
-        options,
-        (scale, noise, track.as_ref()),
-        &upright,
-        &source,
-        betas.clone(),
-    );
-    let confidence = (!upright.states.is_empty()).then(|| {
-        upright
-            .states
-            .iter()
-            .map(|state| confidence_of_std(std_of(state)))
-            .collect()
-    });
+    let report = report(clip, depth_track.as_ref(), &upright, &source, &betas);
     let motion = SmplMotion {
         name: clip.name.clone(),
         rate_hz: clip.rate_hz,
@@ -161,7 +100,7 @@ pub fn global_trajectory(
         shape_space: body.shape_space(),
         betas,
         frames: continuous(upright.poses),
-        confidence,
+        confidence: confidence(&upright.states),
         report: None,
         poses: None,
         markers: None,
@@ -169,154 +108,59 @@ pub fn global_trajectory(
     Ok(GlobalTrajectory {
         motion,
         states: upright.states,
-        track,
+        track: depth_track.map(|track| track.root),
         world_from_source: upright.world_from_source,
         report,
     })
 }
 
-fn check_options(clip: &CameraClip, options: &TrajectoryOptions) -> Result<(), CameraError> {
-    let positive = |value: f64| value > 0.0 && value.is_finite();
-    for (what, value) in [
-        ("keypoint_std_px", options.keypoint_std_px),
-        ("depth_std", options.depth_std),
-    ] {
-        if !positive(value) {
-            return Err(clip.value(what.to_owned(), value, "a finite number above 0"));
-        }
-    }
-    let size = match &options.scale {
-        ScaleSource::Given(scale) => ("scale", *scale),
-        ScaleSource::BodyHeight(height) => ("body height", *height),
-        ScaleSource::Object(objects) => (
-            "object length",
-            objects
-                .iter()
-                .map(|object| object.length_m)
-                .fold(1.0, f64::min),
-        ),
-    };
-    if !positive(size.1) {
-        return Err(clip.value(size.0.to_owned(), size.1, "a finite number above 0"));
-    }
-    for (what, value) in [
-        ("least_confidence", options.least_confidence),
-        ("depth_scale_std", options.depth_scale_std),
-    ] {
-        if !(0.0..1.0).contains(&value) {
-            return Err(clip.value(what.to_owned(), value, "0 to below 1"));
-        }
-    }
-    match options.gravity {
-        Gravity::Given(up) if !(up.norm() > 1e-9 && up.norm().is_finite()) => {
-            Err(CameraError::Gravity {
-                name: clip.name.clone(),
-                problem: format!("({}, {}, {}) is no direction", up.x, up.y, up.z),
-            })
-        }
-        _ => Ok(()),
-    }
+/// The root's track by depth maps, with the scale and the noise that it was found with.
+struct DepthTrack {
+    scale: ScaleEstimate,
+    noise: FilterNoise,
+    root: RootTrack,
 }
 
-/// The scale, and what each frame measures at that scale.
-fn measurements(
-    clip: &CameraClip,
-    depths: &mut dyn DepthProvider,
-    shaped: &ShapedBody,
-    options: &TrajectoryOptions,
-) -> Result<(ScaleEstimate, Vec<Option<Measurement>>), CameraError> {
-    let size = if let ScaleSource::BodyHeight(height) = options.scale {
-        height / standing_height(shaped)
-    } else {
-        1.0
-    };
-    let mut body = ObservedBody {
-        shaped,
-        skin: PelvisSkin::new(shaped),
-        size,
-    };
-    let mut observations: Vec<Option<RootObservation>> = Vec::with_capacity(clip.poses.len());
-    let mut of_objects = Vec::new();
-    for frame in 0..clip.poses.len() {
-        let map = depths.depth(frame)?;
-        if let (ScaleSource::Object(objects), Some(map), Some(camera)) =
-            (&options.scale, &map, &clip.cameras[frame])
-        {
-            let camera = camera.resized(clip.keypoint_image_px);
-            let here = objects.iter().filter(|object| object.frame == frame);
-            of_objects.extend(
-                here.filter_map(|object| scale_of_object(object, map, &camera))
-                    .map(|scale| (scale, 1.0)),
-            );
-        }
-        observations.push(map.and_then(|map| observe(clip, frame, &map, &mut body, options)));
-    }
-    let found = observations.iter().flatten().count();
-    if found < LEAST_MEASUREMENTS {
-        let (name, frames) = (clip.name.clone(), clip.poses.len());
-        return Err(CameraError::TooFewFrames {
-            name,
-            found,
-            frames,
-            needed: LEAST_MEASUREMENTS,
-        });
-    }
-    let scale = scale(clip, &observations, &of_objects, options)?;
-    let measured = observations
-        .iter()
-        .zip(&clip.cameras)
-        .map(|(observation, camera)| {
-            let camera = camera.as_ref()?.resized(clip.keypoint_image_px);
-            Some(measure(
-                observation.as_ref()?,
-                &camera,
-                scale.metres_per_unit,
-                options.depth_std,
-            ))
-        });
-    Ok((scale, measured.collect()))
-}
-
-fn scale(
-    clip: &CameraClip,
-    observations: &[Option<RootObservation>],
-    of_objects: &[(f64, f64)],
-    options: &TrajectoryOptions,
-) -> Result<ScaleEstimate, CameraError> {
-    let problem = |problem: &str| CameraError::Scale {
-        name: clip.name.clone(),
-        problem: problem.to_owned(),
-    };
-    match &options.scale {
-        ScaleSource::Given(metres_per_unit) => Ok(ScaleEstimate {
-            metres_per_unit: *metres_per_unit,
-            relative_std: 0.0,
-            observations: 0,
-        }),
-        ScaleSource::Object(_) => combined_scale(of_objects, 1)
-            .ok_or_else(|| problem("no depth is known at the ends of the known lengths")),
-        ScaleSource::BodyHeight(_) => {
-            let of_frame = |observation: &RootObservation, camera: &Option<Camera>| {
-                let ray = camera
-                    .as_ref()?
-                    .resized(clip.keypoint_image_px)
-                    .ray(observation.pixel);
-                let behind_skin = observation.behind_skin_m / ray.norm();
-                let scale = scale_of_frame(
-                    observation.distance_by_keypoints_m?,
-                    behind_skin,
-                    observation.skin_depth,
-                )?;
-                Some((scale, observation.confidence))
+impl DepthTrack {
+    /// Learns the noise, filters, smooths, and decides once more about every frame from both sides:
+    /// an outlier at the start of a gap can fool the prediction, but not the smoothed track. `dt`
+    /// is the time between frames, s.
+    fn new(
+        scale: ScaleEstimate,
+        measured: Vec<Option<Measurement>>,
+        dt: f64,
+        up: &Vector3<f64>,
+    ) -> Self {
+        let noise = learn_noise(&measured, dt, up);
+        let mut run = kalman_filter(&measured, dt, &noise, Gate::Mahalanobis);
+        for _ in 0..2 {
+            let smoothed = run.smoothed(dt);
+            let near = |(measurement, state): (&Option<Measurement>, &RootState)| {
+                let Some(measurement) = measurement else {
+                    return false;
+                };
+                let residual = measurement.position - state.position;
+                let spread = noise.covariance(measurement) + state.position_covariance;
+                spread
+                    .cholesky()
+                    .is_some_and(|factor| residual.dot(&factor.solve(&residual)) < GATE)
             };
-            let each = observations
-                .iter()
-                .zip(&clip.cameras)
-                .filter_map(|(observation, camera)| of_frame(observation.as_ref()?, camera));
-            let each: Vec<(f64, f64)> = each.collect();
-            let block = (SCALE_BLOCK_S * clip.rate_hz).round().max(1.0) as usize;
-            combined_scale(&each, block)
-                .ok_or_else(|| problem("in no frame are six joints of the body seen"))
+            let accepted: Vec<bool> = measured.iter().zip(&smoothed).map(near).collect();
+            if accepted == run.accepted {
+                break;
+            }
+            run = kalman_filter(&measured, dt, &noise, Gate::Fixed(&accepted));
+        }
+        let (filtered, smoothed) = (run.filtered(), run.smoothed(dt));
+        Self {
+            scale,
+            noise,
+            root: RootTrack {
+                measured,
+                accepted: run.accepted,
+                filtered,
+                smoothed,
+            },
         }
     }
 }
@@ -329,106 +173,75 @@ fn roughly_up(options: &TrajectoryOptions, cameras: &[Camera]) -> Vector3<f64> {
     }
 }
 
-/// Learns the noise, filters, smooths, and decides once more about every frame from both sides: an
-/// outlier at the start of a gap can fool the prediction, but not the smoothed track.
-fn smooth_track(
-    measured: Vec<Option<Measurement>>,
-    dt: f64,
-    up: &Vector3<f64>,
-) -> (RootTrack, FilterNoise) {
-    let noise = learn_noise(&measured, dt, up);
-    let mut run = kalman_filter(&measured, dt, &noise, Gate::Mahalanobis);
-    for _ in 0..2 {
-        let smoothed = run.smoothed(dt);
-        let near = |(measurement, state): (&Option<Measurement>, &RootState)| {
-            let Some(measurement) = measurement else {
-                return false;
-            };
-            let residual = measurement.position - state.position;
-            let spread = noise.covariance(measurement) + state.position_covariance;
-            spread
-                .cholesky()
-                .is_some_and(|factor| residual.dot(&factor.solve(&residual)) < GATE)
-        };
-        let accepted: Vec<bool> = measured.iter().zip(&smoothed).map(near).collect();
-        if accepted == run.accepted {
-            break;
-        }
-        run = kalman_filter(&measured, dt, &noise, Gate::Fixed(&accepted));
-    }
-    let (filtered, smoothed) = (run.filtered(), run.smoothed(dt));
-    (
-        RootTrack {
-            measured,
-            accepted: run.accepted,
-            filtered,
-            smoothed,
-        },
-        noise,
-    )
+/// Standard deviation of the position per axis, m.
+fn position_std(state: &RootState) -> f64 {
+    (state.position_covariance.trace() / 3.0).sqrt()
 }
 
-fn std_of(state: &RootState) -> f64 {
-    (state.position_covariance.trace() / 3.0).sqrt()
+/// One value a frame in [0, 1]; `None` without a trajectory.
+fn confidence(states: &[RootState]) -> Option<Vec<f64>> {
+    let of_state = |state| confidence_of_std(position_std(state));
+    (!states.is_empty()).then(|| states.iter().map(of_state).collect())
+}
+
+/// Standard deviation of the velocity per axis, m/s.
+fn velocity_std(state: &RootState) -> f64 {
+    (state.velocity_covariance.trace() / 3.0).sqrt()
+}
+
+/// Which frames made the track.
+#[derive(Default)]
+struct FrameUse {
+    used: usize,
+    left_out: Vec<usize>,
+    gated: Vec<usize>,
+    longest_gap: usize,
+}
+
+impl FrameUse {
+    fn in_track(track: &RootTrack) -> Self {
+        let mut frames = Self::default();
+        let mut gap = 0;
+        for (frame, accepted) in track.accepted.iter().enumerate() {
+            match (accepted, track.measured[frame].is_some()) {
+                (true, _) => frames.used += 1,
+                (false, true) => frames.gated.push(frame),
+                (false, false) => frames.left_out.push(frame),
+            }
+            gap = if *accepted { 0 } else { gap + 1 };
+            frames.longest_gap = frames.longest_gap.max(gap);
+        }
+        frames
+    }
 }
 
 fn report(
     clip: &CameraClip,
-    options: &TrajectoryOptions,
-    (scale, noise, track): (
-        Option<ScaleEstimate>,
-        Option<FilterNoise>,
-        Option<&RootTrack>,
-    ),
+    depth_track: Option<&DepthTrack>,
     upright: &Upright,
-    source: &InSource,
-    betas: Vec<f64>,
+    source: &SourceMotion,
+    betas: &[f64],
 ) -> TrajectoryReport {
-    let frames = clip.poses.len();
-    let (mut left_out, mut gated) = (Vec::new(), Vec::new());
-    let (mut gap, mut longest_gap) = (0_usize, 0);
-    for (frame, accepted) in track
-        .iter()
-        .flat_map(|track| track.accepted.iter().enumerate())
-    {
-        let measured = track.is_some_and(|track| track.measured[frame].is_some());
-        match (accepted, measured) {
-            (true, _) => gap = 0,
-            (false, true) => gated.push(frame),
-            (false, false) => left_out.push(frame),
-        }
-        gap += usize::from(!accepted);
-        longest_gap = longest_gap.max(gap);
-    }
+    let frames =
+        depth_track.map_or_else(FrameUse::default, |track| FrameUse::in_track(&track.root));
     let median = |mut values: Vec<f64>| {
         values.sort_by(f64::total_cmp);
         values.get(values.len() / 2).copied().unwrap_or(0.0)
     };
-    let used = if options.trajectory == Trajectory::None {
-        0
-    } else {
-        frames - left_out.len() - gated.len()
-    };
     TrajectoryReport {
-        frames,
-        used,
-        left_out,
-        gated,
-        longest_gap_s: longest_gap as f64 / clip.rate_hz,
-        poses_bridged: source.placed.poses_bridged,
-        cameras_bridged: source.placed.cameras_bridged,
-        scale,
-        noise,
-        position_std_m: median(upright.states.iter().map(std_of).collect()),
-        velocity_std: median(
-            upright
-                .states
-                .iter()
-                .map(|state| (state.velocity_covariance.trace() / 3.0).sqrt())
-                .collect(),
-        ),
+        frames: clip.poses.len(),
+        used: frames.used,
+        left_out: frames.left_out,
+        gated: frames.gated,
+        longest_gap_s: frames.longest_gap as f64 / clip.rate_hz,
+        poses_bridged: source.poses.poses_bridged,
+        cameras_bridged: source.poses.cameras_bridged,
+        scale: depth_track.map(|track| track.scale),
+        noise: depth_track.map(|track| track.noise),
+        position_std_m: median(upright.states.iter().map(position_std).collect()),
+        velocity_std: median(upright.states.iter().map(velocity_std).collect()),
         up_in_source: upright.up_in_source.into(),
         floor_rms_m: upright.floor_rms_m,
-        betas,
+        betas: betas.to_vec(),
     }
 }

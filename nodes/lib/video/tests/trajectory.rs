@@ -9,11 +9,12 @@ mod shot;
 use cromosim_arrays::NpzWriter;
 use cromosim_body::{BodyModel, ShapedBody};
 use cromosim_motion::{MotionOptions, SmplMotion, embedded_walk, read_motion};
+use cromosim_spatial::{confidence_of_std, std_of_confidence};
 use cromosim_video::{
-    CameraAxes, CameraClip, CameraError, CameraFolder, DepthEncoding, DepthMap, FolderLayout,
-    GlobalTrajectory, Gravity, ObjectLength, ScaleSource, Trajectory, TrajectoryOptions,
-    confidence_of_std, global_trajectory, parse_camera, parse_depth, parse_openpose,
-    standing_height, std_of_confidence, write_openpose, write_raw_depth,
+    CameraAxes, CameraClip, CameraFolder, DepthEncoding, DepthMap, FolderLayout, GlobalTrajectory,
+    Gravity, ObjectLength, ScaleSource, Trajectory, TrajectoryOptions, VideoError,
+    global_trajectory, parse_camera, parse_depth, parse_openpose, standing_height, write_openpose,
+    write_raw_depth,
 };
 use nalgebra::{Isometry3, Vector3};
 use shot::{Errors, RATE_HZ, Shot};
@@ -22,9 +23,9 @@ fn height(motion: &SmplMotion) -> f64 {
     standing_height(&ShapedBody::new(BodyModel::embedded(), &motion.betas).unwrap())
 }
 
-fn solve(shot: &Shot, options: &TrajectoryOptions) -> Result<GlobalTrajectory, CameraError> {
+fn solve(shot: &Shot, options: &TrajectoryOptions) -> Result<GlobalTrajectory, VideoError> {
     let mut depths =
-        |frame: usize| -> Result<Option<DepthMap>, CameraError> { Ok(shot.depths[frame].clone()) };
+        |frame: usize| -> Result<Option<DepthMap>, VideoError> { Ok(shot.depths[frame].clone()) };
     global_trajectory(&shot.clip, &mut depths, &BodyModel::embedded(), options)
 }
 

@@ -1,14 +1,15 @@
-//! Poses from the camera's axes into the world.
+//! Poses from the camera's axes into the world of the reconstruction ("source").
 
 use cromosim_body::BodyPose;
+use cromosim_motion::slerp;
 use nalgebra::{Isometry3, UnitQuaternion};
 
-use crate::{Camera, CameraClip};
-use cromosim_motion::slerp;
+use crate::clip::CameraClip;
+use crate::pinhole::Camera;
 
 /// Poses with their root orientation in the reconstruction's world, root at its origin, and how
 /// many poses and cameras were bridged.
-pub(crate) struct Placed {
+pub(crate) struct SourcePoses {
     pub poses: Vec<BodyPose>,
     /// Positions in the reconstruction's unit.
     pub cameras: Vec<Camera>,
@@ -19,7 +20,7 @@ pub(crate) struct Placed {
 /// world_from_pelvis = world_from_camera camera_from_pelvis. Frames without a pose, or without a
 /// camera, take what lies between the neighbours that have one. `None` where there is no pose or no
 /// camera at all.
-pub(crate) fn placed(clip: &CameraClip) -> Option<Placed> {
+pub(crate) fn source_poses(clip: &CameraClip) -> Option<SourcePoses> {
     let (cameras, cameras_bridged) = bridged(&clip.cameras, between_cameras)?;
     let own: Vec<Option<BodyPose>> = clip
         .poses
@@ -36,7 +37,7 @@ pub(crate) fn placed(clip: &CameraClip) -> Option<Placed> {
         })
         .collect();
     let (poses, poses_bridged) = bridged(&own, between_poses)?;
-    Some(Placed {
+    Some(SourcePoses {
         poses,
         cameras,
         poses_bridged,
@@ -44,7 +45,7 @@ pub(crate) fn placed(clip: &CameraClip) -> Option<Placed> {
     })
 }
 
-/// Every item, holes filled between the items around them, and how many were filled. `None` without
+/// Every item, gaps filled between the items around them, and how many were filled. `None` without
 /// any item.
 fn bridged<T: Clone>(
     items: &[Option<T>],
