@@ -9,7 +9,8 @@
 //! Files of SMPL parameters (AMASS, and estimates from video: VIBE, WHAM, GVHMR, TRAM, PHALP,
 //! SLAHMR) need no retargeting; the [`PoseReport`] says what was taken. Betas of another kind of
 //! body than the one at hand are left out or fitted ([`ShapeChoice`]). [`read_people`] takes
-//! several people of a file, or everybody, [`read_camera_poses`] leaves poses in the camera's axes.
+//! several people of a file, or everybody; [`PoseFile::into_camera_poses`] leaves poses in the
+//! camera's axes.
 //!
 //! ```
 //! let walk = cromosim_motion::embedded_walk();
@@ -54,8 +55,7 @@ pub use motion::{SmplMotion, continuous, slerp};
 pub use options::{MotionOptions, RestChoice, UpAxis};
 pub use poses::{
     CameraPoses, MAX_POSES, Person, PoseAxes, PoseFile, PoseFormat, PoseReport, PoseTrack,
-    PoseView, RateOrigin, ShapeChoice, ShapeOrigin, VIDEO_RATE_HZ, open_poses, read_camera_poses,
-    read_people,
+    PoseView, RateOrigin, ShapeChoice, ShapeOrigin, VIDEO_RATE_HZ, open_poses, read_people,
 };
 pub use read::{read_motion, read_motion_for};
 pub use report::RetargetReport;

@@ -7,6 +7,9 @@ use serde::Deserialize;
 
 use crate::{MarkerOptions, MarkerSet, MotionError, ShapeChoice, SkeletonMap};
 
+/// What [`MotionOptions::person`] says for everybody.
+const EVERYBODY: &str = "all";
+
 /// The direction that points up in the source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -91,6 +94,32 @@ pub struct MotionOptions {
 }
 
 impl MotionOptions {
+    /// Whether [`Self::person`] asks for several people: `all`, or names with commas between (`7,`
+    /// is several that are one).
+    pub fn asks_for_several(&self) -> bool {
+        self.person
+            .as_deref()
+            .is_some_and(|person| person == EVERYBODY || person.contains(','))
+    }
+
+    /// The names asked for; none for everybody.
+    pub(crate) fn people(&self) -> Option<Vec<&str>> {
+        let person = self
+            .person
+            .as_deref()
+            .filter(|&person| person != EVERYBODY)?;
+        let names: Vec<&str> = person
+            .split(',')
+            .map(str::trim)
+            .filter(|name| !name.is_empty())
+            .collect();
+        Some(if names.is_empty() {
+            vec![person]
+        } else {
+            names
+        })
+    }
+
     /// The chosen map, from its file if it is no embedded one; `None` where it is to be detected.
     pub(crate) fn map(&self) -> Result<Option<SkeletonMap>, MotionError> {
         let Some(given) = &self.skeleton_map else {

@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 use super::track::{PoseAxes, PoseTrack, Rotations};
 use super::values::{
     Budget, RATES_HZ, RATES_TEXT, SHARED_JOINTS, betas, body_angles, frame_count, gender, numbers,
-    of_axis_angles, of_root_and_body, vectors, wrong,
+    rotations_from_axis_angles, rotations_from_root_and_body, vectors, wrong,
 };
 use crate::MotionError;
 
@@ -40,17 +40,17 @@ pub(super) fn tracks<R: Read + Seek>(
         _ => ShapeSpace::Smpl,
     };
     let details = container.get("stageii_debug_details")?;
-    let of_details = |key: &str| details.as_ref().and_then(|details| details.get(key));
+    let in_details = |key: &str| details.as_ref().and_then(|details| details.get(key));
     let rate = match container.get("mocap_framerate")? {
         None => container
             .get("mocap_frame_rate")?
-            .or_else(|| of_details("mocap_frame_rate")),
+            .or_else(|| in_details("mocap_frame_rate")),
         rate => rate,
     };
     let gender = gender(
         container
             .get("gender")?
-            .or_else(|| of_details("gender"))
+            .or_else(|| in_details("gender"))
             .as_ref(),
     );
     Ok(vec![PoseTrack {
@@ -63,12 +63,13 @@ pub(super) fn tracks<R: Read + Seek>(
         trans: Some(trans),
         pelvis_turns: None,
         axes: PoseAxes::Up(Vector3::z()),
-        rate_hz: rate.as_ref().map(rate_of).transpose()?,
+        rate_hz: rate.as_ref().map(checked_rate).transpose()?,
         confidence: None,
     }])
 }
 
-fn rate_of(entry: &Entry) -> Result<f64, MotionError> {
+/// The rate, Hz, where a motion can have it.
+fn checked_rate(entry: &Entry) -> Result<f64, MotionError> {
     let rate_hz = entry.float()?;
     if RATES_HZ.contains(&rate_hz) {
         Ok(rate_hz)
@@ -108,7 +109,7 @@ fn poses<R: Read + Seek>(
         budget.take(key, count)?;
         let rows = numbers(&entry, &[None, None], "(N, 156)")?;
         return Ok((
-            of_axis_angles(
+            rotations_from_axis_angles(
                 &rows.values,
                 width,
                 if width == 72 { 24 } else { SHARED_JOINTS },
@@ -122,7 +123,7 @@ fn poses<R: Read + Seek>(
     let root = numbers(&root, &[Some(count), Some(3)], "(N, 3)")?;
     let body = body_angles(&container.at("pose_body")?, count)?;
     Ok((
-        of_root_and_body(&root.values, &body.values),
+        rotations_from_root_and_body(&root.values, &body.values),
         3 * SHARED_JOINTS,
     ))
 }

@@ -7,12 +7,11 @@ use cromosim_body::{BodyModel, BodyPose, Gender, JOINT_COUNT, ShapeSpace, Shaped
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::bridge::Played;
-use super::file::too_long;
+use super::format::{MAX_POSES, PoseFormat, VIDEO_RATE_HZ};
 use super::report::{PoseReport, RateOrigin, ShapeOrigin};
 use super::shape::Shape;
 use super::track::{PoseAxes, PoseTrack, world_from_level_camera};
-use super::values::{RATES_HZ, RATES_TEXT, problem};
-use super::{MAX_POSES, PoseFormat, VIDEO_RATE_HZ};
+use super::values::{RATES_HZ, RATES_TEXT, problem, too_long};
 use crate::axes::{axis_name, minimal_rotation, nearest_axis};
 use crate::motion::{continuous, slerp};
 use crate::retarget::{floor, scale};
@@ -25,9 +24,9 @@ const CLEARLY_UP: f64 = 0.6;
 /// trajectory.
 #[derive(Clone, Debug)]
 pub struct CameraPoses {
-    /// Names the file.
+    /// The file's name.
     pub name: String,
-    /// The person in it.
+    /// The file's name or number for the person.
     pub person: String,
     /// Frames per second, Hz.
     pub rate_hz: f64,
@@ -48,8 +47,10 @@ pub struct CameraPoses {
 pub(super) struct OnBody<'a> {
     pub path: &'a Path,
     pub format: PoseFormat,
+    /// Everybody in the file and their numbers of frames.
     pub people: &'a [(String, usize)],
     pub body: &'a Arc<BodyModel>,
+    /// The body that the file's betas are for, where it is given.
     pub source_body: Option<&'a Arc<BodyModel>>,
     pub options: &'a MotionOptions,
 }
@@ -61,7 +62,41 @@ struct Frames {
     played: Played,
 }
 
+/// How a track's poses become poses of the body in the world.
+struct WorldPoses<'a> {
+    track: &'a PoseTrack,
+    world_from_file: UnitQuaternion<f64>,
+    /// The pelvis joint at rest in the axes of the body that `trans` goes with, m.
+    pelvis_in_model: Vector3<f64>,
+    /// Factor on the way: the body's leg length by that of the file's own body.
+    leg_ratio: f64,
+}
+
+impl WorldPoses<'_> {
+    fn pose(&self, frame: usize) -> BodyPose {
+        let mut local_rotations = self.track.rotations[frame];
+        local_rotations[0] = self.world_from_file * local_rotations[0];
+        let root_position = match &self.track.trans {
+            Some(trans) => {
+                let turn = self
+                    .track
+                    .pelvis_turns
+                    .as_ref()
+                    .map_or_else(UnitQuaternion::identity, |turns| turns[frame]);
+                self.world_from_file * (turn * self.pelvis_in_model + trans[frame]) * self.leg_ratio
+            }
+            None => Vector3::zeros(),
+        };
+        BodyPose {
+            root_position,
+            local_rotations,
+        }
+    }
+}
+
 impl OnBody<'_> {
+    /// The track as a motion in a world with z up, its feet on the floor where the file's own floor
+    /// is not known.
     pub fn motion(&self, track: PoseTrack) -> Result<SmplMotion, MotionError> {
         let (rate_hz, rate_origin) = self.rate(&track)?;
         let shape = Shape::choose(
@@ -73,37 +108,12 @@ impl OnBody<'_> {
         )?;
         let shaped = ShapedBody::new(self.body.clone(), &shape.betas)?;
         let (world_from_file, up_axis) = self.world_from_file(&track)?;
-        let pelvis_in_model = match &shape.source_joints {
-            Some(joints) => joints[0],
-            None if track.shape_space != self.body.shape_space() => usual_pelvis(track.shape_space),
-            None => shaped.joints_in_model()[0],
-        };
-        let metres = shape.source_joints.as_ref().map_or(1.0, |source| {
-            leg_length(shaped.joints_in_model()) / leg_length(source)
-        });
-        let pose = |frame: usize| {
-            let mut local_rotations = track.rotations[frame];
-            local_rotations[0] = world_from_file * local_rotations[0];
-            let root_position = match &track.trans {
-                Some(trans) => {
-                    let turn = track
-                        .pelvis_turns
-                        .as_ref()
-                        .map_or_else(UnitQuaternion::identity, |turns| turns[frame]);
-                    world_from_file * (turn * pelvis_in_model + trans[frame]) * metres
-                }
-                None => Vector3::zeros(),
-            };
-            BodyPose {
-                root_position,
-                local_rotations,
-            }
-        };
+        let poses = self.world_poses(&track, &shape, &shaped, world_from_file);
         let Frames {
             poses,
             confidence,
             played,
-        } = self.frames(&track, rate_hz, pose)?;
+        } = self.frames(&track, rate_hz, |frame| poses.pose(frame))?;
         let mut frames = continuous(poses);
         // MoCap knows its floor; a video's is a guess, and another body's feet are elsewhere.
         let knows_floor = !self.format.is_video() && shape.origin == ShapeOrigin::File;
@@ -113,21 +123,10 @@ impl OnBody<'_> {
             floor::stand_on_floor(&shaped, &mut frames, rate_hz)
         };
         let report = PoseReport {
-            format: self.format,
-            person: track.person.clone(),
-            people: self.people.to_vec(),
             rate_origin,
-            gender: track.gender,
-            shape_space: track.shape_space,
-            source_betas: track.mean_betas(),
-            shape_origin: shape.origin,
-            betas_left_out: shape.betas_left_out,
             up_axis,
-            has_trajectory: track.trans.is_some(),
-            first_frame: first_frame(&track, &played),
-            bridged_frames: played.length - played.frames.len(),
-            left_out_frames: track.rotations.len() - played.frames.len(),
             floor_shift_m,
+            ..self.report(&track, &shape, &played)
         };
         Ok(SmplMotion {
             name: self.path.display().to_string(),
@@ -147,7 +146,51 @@ impl OnBody<'_> {
         })
     }
 
-    /// `None` for poses that are not in a camera's axes.
+    fn world_poses<'a>(
+        &self,
+        track: &'a PoseTrack,
+        shape: &Shape,
+        shaped: &ShapedBody,
+        world_from_file: UnitQuaternion<f64>,
+    ) -> WorldPoses<'a> {
+        let pelvis_in_model = match &shape.source_joints {
+            Some(joints) => joints[0],
+            None if track.shape_space != self.body.shape_space() => usual_pelvis(track.shape_space),
+            None => shaped.joints_in_model()[0],
+        };
+        let leg_ratio = shape.source_joints.as_ref().map_or(1.0, |source| {
+            leg_length(shaped.joints_in_model()) / leg_length(source)
+        });
+        WorldPoses {
+            track,
+            world_from_file,
+            pelvis_in_model,
+            leg_ratio,
+        }
+    }
+
+    /// What track and shape say; rate, up axis and floor are the motion's to fill in.
+    fn report(&self, track: &PoseTrack, shape: &Shape, played: &Played) -> PoseReport {
+        PoseReport {
+            format: self.format,
+            person: track.person.clone(),
+            people: self.people.to_vec(),
+            rate_origin: RateOrigin::File,
+            gender: track.gender,
+            shape_space: track.shape_space,
+            source_betas: track.mean_betas(),
+            shape_origin: shape.origin,
+            betas_left_out: shape.betas_left_out,
+            up_axis: String::new(),
+            has_trajectory: track.trans.is_some(),
+            first_frame: first_frame(track, played),
+            bridged_frames: played.length - played.frames.len(),
+            left_out_frames: track.rotations.len() - played.frames.len(),
+            floor_shift_m: 0.0,
+        }
+    }
+
+    /// The track in the camera's axes, in place; `None` where the file has it in a world.
     pub fn camera_poses(&self, track: &PoseTrack) -> Result<Option<CameraPoses>, MotionError> {
         if track.axes != PoseAxes::Camera {
             return Ok(None);
@@ -171,13 +214,13 @@ impl OnBody<'_> {
                 .is_ok();
         let betas_at = |frame: usize| {
             track
-                .betas_of(frame)
+                .betas_at(frame)
                 .iter()
                 .take(self.body.beta_count())
                 .copied()
                 .collect()
         };
-        let places = played.places(track.frame_ids.as_deref());
+        let sources = played.sources(track.frame_ids.as_deref());
         Ok(Some(CameraPoses {
             name: self.path.display().to_string(),
             person: track.person.clone(),
@@ -187,7 +230,7 @@ impl OnBody<'_> {
             poses: continuous(poses),
             pose_confidence: confidence,
             betas: if own {
-                places
+                sources
                     .into_iter()
                     .map(|(frame, _)| betas_at(frame))
                     .collect()
@@ -197,7 +240,7 @@ impl OnBody<'_> {
         }))
     }
 
-    /// The option, else the file, else what is usual for video.
+    /// The rate, Hz: the option's, else the file's, else what is usual for video.
     fn rate(&self, track: &PoseTrack) -> Result<(f64, RateOrigin), MotionError> {
         if let Some(rate_hz) = self.options.rate_hz {
             let expected = RATES_TEXT.to_owned();
@@ -233,7 +276,7 @@ impl OnBody<'_> {
         pose: impl Fn(usize) -> BodyPose,
     ) -> Result<Frames, MotionError> {
         let ids = track.frame_ids.as_deref();
-        let played = Played::of(ids, track.rotations.len(), rate_hz);
+        let played = Played::longest_part(ids, track.rotations.len(), rate_hz);
         if played.length > MAX_POSES {
             return Err(too_long(self.path));
         }
@@ -241,7 +284,7 @@ impl OnBody<'_> {
             Vec::with_capacity(played.length),
             Vec::with_capacity(played.length),
         );
-        for (frame, fraction) in played.places(ids) {
+        for (frame, fraction) in played.sources(ids) {
             if fraction == 0.0 {
                 poses.push(pose(frame));
                 confidence.push(
@@ -297,6 +340,7 @@ fn first_frame(track: &PoseTrack, played: &Played) -> i64 {
         .map_or(0, |ids| ids[played.frames.start])
 }
 
+/// The pose `fraction` of the way from one to the other.
 fn between(from: &BodyPose, to: &BodyPose, fraction: f64) -> BodyPose {
     BodyPose {
         root_position: from.root_position.lerp(&to.root_position, fraction),

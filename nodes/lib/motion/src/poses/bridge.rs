@@ -1,10 +1,10 @@
-//! Frames that a track lacks.
+//! Which part of a track is played, and how the frames that it lacks are bridged.
 
 use std::ops::Range;
 
-/// Longer gaps are no longer bridged, s: a person may do anything meanwhile.
+/// Longer gaps are not bridged, s: a person may do anything meanwhile.
 pub(super) const LONGEST_GAP_S: f64 = 1.0;
-/// Nor are more frames, whatever the rate.
+/// Gaps of more frames are not bridged either, whatever the rate.
 const LONGEST_GAP_FRAMES: f64 = 240.0;
 
 /// The part of a track that is played: the longest one without a gap that is too long.
@@ -17,8 +17,8 @@ pub(super) struct Played {
 }
 
 impl Played {
-    /// Of `count` frames numbered by `ids`, which rise.
-    pub fn of(ids: Option<&[i64]>, count: usize, rate_hz: f64) -> Self {
+    /// The longest such part of `count` frames numbered by `ids`, which rise.
+    pub fn longest_part(ids: Option<&[i64]>, count: usize, rate_hz: f64) -> Self {
         let Some(ids) = ids else {
             return Self {
                 frames: 0..count,
@@ -59,18 +59,18 @@ impl Played {
         }
     }
 
-    /// Of each frame of the motion the track's frame at or before it, and how far it is from there
+    /// For each frame of the motion the track's frame at or before it, and how far it is from there
     /// to the next one, in [0, 1).
-    pub fn places(&self, ids: Option<&[i64]>) -> Vec<(usize, f64)> {
-        let mut places = Vec::with_capacity(self.length);
+    pub fn sources(&self, ids: Option<&[i64]>) -> Vec<(usize, f64)> {
+        let mut sources = Vec::with_capacity(self.length);
         for index in self.frames.clone() {
             let step = match ids {
                 Some(ids) if index + 1 < self.frames.end => ids[index + 1] - ids[index],
                 _ => 1,
             };
-            places.extend((0..step).map(|part| (index, part as f64 / step as f64)));
+            sources.extend((0..step).map(|part| (index, part as f64 / step as f64)));
         }
-        places
+        sources
     }
 }
 
@@ -80,9 +80,9 @@ mod tests {
 
     #[test]
     fn short_gaps_are_bridged_and_long_ones_split() {
-        let whole = Played::of(None, 5, 30.0);
+        let whole = Played::longest_part(None, 5, 30.0);
         assert_eq!(
-            (whole.clone(), whole.places(None)[4]),
+            (whole.clone(), whole.sources(None)[4]),
             (
                 Played {
                     frames: 0..5,
@@ -92,7 +92,7 @@ mod tests {
             )
         );
         let ids = [3, 4, 8, 100, 101];
-        let played = Played::of(Some(&ids), 5, 30.0);
+        let played = Played::longest_part(Some(&ids), 5, 30.0);
         assert_eq!(
             played,
             Played {
@@ -101,15 +101,18 @@ mod tests {
             }
         );
         assert_eq!(
-            played.places(Some(&ids)),
+            played.sources(Some(&ids)),
             [(0, 0.0), (1, 0.0), (1, 0.25), (1, 0.5), (1, 0.75), (2, 0.0)]
         );
-        assert_eq!(Played::of(Some(&[0, 31]), 2, 30.0).length, 32);
-        assert_eq!(Played::of(Some(&[0, 32]), 2, 30.0).length, 1);
+        assert_eq!(Played::longest_part(Some(&[0, 31]), 2, 30.0).length, 32);
+        assert_eq!(Played::longest_part(Some(&[0, 32]), 2, 30.0).length, 1);
         assert_eq!(
-            Played::of(Some(&[i64::MIN, 0, 1, i64::MAX]), 4, 30.0).frames,
+            Played::longest_part(Some(&[i64::MIN, 0, 1, i64::MAX]), 4, 30.0).frames,
             1..3
         );
-        assert_eq!(Played::of(Some(&[0, 241, 500]), 3, 1e4).length, 242);
+        assert_eq!(
+            Played::longest_part(Some(&[0, 241, 500]), 3, 1e4).length,
+            242
+        );
     }
 }

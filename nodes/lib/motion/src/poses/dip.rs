@@ -7,7 +7,7 @@ use cromosim_arrays::{Array, Container};
 use cromosim_body::ShapeSpace;
 
 use super::track::{PoseAxes, PoseTrack};
-use super::values::{Budget, frame_count, numbers, of_axis_angles};
+use super::values::{Budget, frame_count, numbers, rotations_from_axis_angles};
 use crate::MotionError;
 
 /// Frames per second of DIP-IMU's arrays, Hz.
@@ -29,7 +29,7 @@ pub(super) fn track<R: Read + Seek>(
             values: Vec::new(),
         },
         frame_ids: None,
-        rotations: of_axis_angles(&rows.values, 72, 24),
+        rotations: rotations_from_axis_angles(&rows.values, 72, 24),
         trans: None,
         pelvis_turns: None,
         axes: PoseAxes::Detect,

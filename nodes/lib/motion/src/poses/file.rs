@@ -1,4 +1,4 @@
-//! A file of poses: whose format it is, who is in it.
+//! A file of poses: which format it has, and who is in it.
 
 use std::io::{Read, Seek};
 use std::path::{Path, PathBuf};
@@ -8,21 +8,12 @@ use cromosim_arrays::{ArraysError, Container, Entry};
 use cromosim_body::BodyModel;
 
 use super::body::{CameraPoses, OnBody};
+use super::format::{MAX_POSES, PoseFormat, PoseView};
 use super::report::people_text;
 use super::track::PoseTrack;
-use super::values::{Budget, problem};
-use super::{PoseFormat, amass, dip, gvhmr, phalp, slahmr, tram, vibe, wham};
+use super::values::{Budget, problem, too_long};
+use super::{amass, dip, gvhmr, phalp, slahmr, tram, vibe, wham};
 use crate::{MotionError, MotionOptions, SmplMotion};
-
-/// Which of its estimates is taken of a file that holds both.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum PoseView {
-    /// The one in a world, where there is one.
-    #[default]
-    World,
-    /// The one in the camera's axes.
-    Camera,
-}
 
 /// The people of a file, at least one.
 #[derive(Clone, Debug)]
@@ -50,112 +41,37 @@ impl PoseFile {
     ) -> Result<Self, MotionError> {
         let path = container.path().to_owned();
         let mut budget = Budget::new(&path);
-        let found = |format, tracks| {
-            Ok(Self {
-                path: path.clone(),
-                format,
-                tracks,
-            })
-        };
         let keys = container.keys();
-        let has = |wanted: &[&str]| {
-            wanted
-                .iter()
-                .all(|wanted| keys.iter().any(|key| key == wanted))
-        };
-        if has(&["v_template"]) {
+        if has_all(&keys, &["v_template"]) {
             return Err(MotionError::BodyFile { path });
         }
-        if has(&["smpl_params_global"]) {
-            return found(
-                PoseFormat::Gvhmr,
-                vec![gvhmr::track(&container.root()?, view, &mut budget)?],
-            );
-        }
-        if has(&["pred_rotmat"]) {
-            let camera = if view == PoseView::World {
-                camera()?
-            } else {
-                None
-            };
-            return found(
-                PoseFormat::Tram,
-                vec![tram::track(
-                    &container.root()?,
-                    camera.as_ref(),
-                    view,
-                    &mut budget,
-                )?],
-            );
-        }
-        if has(&["root_orient", "cam_R"]) {
-            let tracks = slahmr::tracks(container, &mut budget)?;
-            return if tracks.is_empty() {
-                Err(problem(&path, "track_mask", "nobody is seen in any frame"))
-            } else {
-                found(PoseFormat::Slahmr, tracks)
-            };
-        }
-        if has(&["trans"])
-            && (has(&["poses"]) || has(&["fullpose"]) || has(&["root_orient", "pose_body"]))
-        {
-            return found(PoseFormat::Amass, amass::tracks(container, &mut budget)?);
-        }
-        if has(&["gt", "imu_ori", "imu_acc"]) {
-            return found(PoseFormat::Dip, vec![dip::track(container, &mut budget)?]);
-        }
-        let is_npz = keys
-            .first()
-            .is_some_and(|key| !matches!(container.header(key), Ok(None)));
-        let unknown = |found: String| {
-            Err(MotionError::UnknownPoses {
-                path: path.clone(),
-                found,
-            })
-        };
-        if is_npz {
-            return unknown(format!("the keys {}", first_of(&keys)));
-        }
-        let root = container.root()?;
-        let Ok(entries) = root.pairs() else {
-            return unknown(root.value().type_name().to_owned());
-        };
-        let Some((_, first)) = entries.first() else {
-            return unknown("an empty dictionary".to_owned());
-        };
-        let people = entries.iter().map(|(_, person)| person);
-        if first.get("pose_world").is_some() {
-            found(
-                PoseFormat::Wham,
-                people
-                    .map(|person| wham::track(person, view, &mut budget))
-                    .collect::<Result<_, _>>()?,
-            )
-        } else if first.get("pose").is_some() {
-            found(
-                PoseFormat::Vibe,
-                people
-                    .map(|person| vibe::track(person, &mut budget))
-                    .collect::<Result<_, _>>()?,
-            )
-        } else if first.get("tid").is_some() && first.get("smpl").is_some() {
-            let tracks = phalp::tracks(&root, &mut budget)?;
-            if tracks.is_empty() {
-                Err(problem(&path, "tid", "nobody is seen in any frame"))
-            } else {
-                found(PoseFormat::Phalp, tracks)
+        let by_keys = tracks_by_keys(container, &keys, view, camera, &mut budget)?;
+        let (format, tracks) = match by_keys {
+            Some(found) => found,
+            None => {
+                let is_npz = keys
+                    .first()
+                    .is_some_and(|key| !matches!(container.header(key), Ok(None)));
+                if is_npz {
+                    let found = format!("the keys {}", first_of(&keys));
+                    return Err(MotionError::UnknownPoses { path, found });
+                }
+                tracks_by_items(&path, &container.root()?, view, &mut budget)?
             }
-        } else {
-            unknown(format!(
-                "the keys {}",
-                first_of(
-                    &entries
-                        .iter()
-                        .map(|(_, entry)| entry.key().to_owned())
-                        .collect::<Vec<_>>()
-                )
-            ))
+        };
+        if tracks.is_empty() {
+            let key = if format == PoseFormat::Phalp {
+                "tid"
+            } else {
+                "track_mask"
+            };
+            return Err(problem(&path, key, "nobody is seen in any frame"));
         }
+        Ok(Self {
+            path,
+            format,
+            tracks,
+        })
     }
 
     /// Everybody and their numbers of frames.
@@ -166,8 +82,7 @@ impl PoseFile {
             .collect()
     }
 
-    /// The place of a person among the tracks; of the one with most frames (the first of these)
-    /// without a name.
+    /// Index of a person's track; without a name, of the longest one (the first of these).
     ///
     /// # Errors
     /// [`MotionError::UnknownPerson`] with the people that there are.
@@ -177,11 +92,11 @@ impl PoseFile {
                 .rev()
                 .max_by_key(|&index| self.tracks[index].rotations.len())
         };
-        let place = match person {
+        let index = match person {
             Some(person) => self.tracks.iter().position(|track| track.person == person),
             None => longest(),
         };
-        place.ok_or_else(|| MotionError::UnknownPerson {
+        index.ok_or_else(|| MotionError::UnknownPerson {
             path: self.path.clone(),
             person: person.unwrap_or_default().to_owned(),
             known: people_text(&self.people()),
@@ -235,7 +150,7 @@ impl PoseFile {
             .map(Some)
             .collect();
         let on_body = self.on_body(&people, body, source_body, options);
-        let mut left = super::MAX_POSES;
+        let mut left = MAX_POSES;
         let mut motion = |track: PoseTrack| {
             let motion = on_body.motion(track)?;
             left = left
@@ -287,17 +202,79 @@ impl PoseFile {
     }
 }
 
-pub(super) fn too_long(path: &Path) -> MotionError {
-    problem(
-        path,
-        "frame_ids",
-        format!(
-            "more than {} frames with the gaps bridged; cut the file into parts",
-            super::MAX_POSES
-        ),
-    )
+/// Whether all wanted keys are there.
+fn has_all(keys: &[String], wanted: &[&str]) -> bool {
+    wanted
+        .iter()
+        .all(|wanted| keys.iter().any(|key| key == wanted))
 }
 
+/// The tracks of a file whose own keys tell its format; `None` for any other file.
+fn tracks_by_keys<R: Read + Seek>(
+    container: &mut Container<R>,
+    keys: &[String],
+    view: PoseView,
+    camera: impl FnOnce() -> Result<Option<Entry>, ArraysError>,
+    budget: &mut Budget,
+) -> Result<Option<(PoseFormat, Vec<PoseTrack>)>, MotionError> {
+    let has = |wanted: &[&str]| has_all(keys, wanted);
+    Ok(Some(if has(&["smpl_params_global"]) {
+        let track = gvhmr::track(&container.root()?, view, budget)?;
+        (PoseFormat::Gvhmr, vec![track])
+    } else if has(&["pred_rotmat"]) {
+        let camera = if view == PoseView::World {
+            camera()?
+        } else {
+            None
+        };
+        let track = tram::track(&container.root()?, camera.as_ref(), view, budget)?;
+        (PoseFormat::Tram, vec![track])
+    } else if has(&["root_orient", "cam_R"]) {
+        (PoseFormat::Slahmr, slahmr::tracks(container, budget)?)
+    } else if has(&["trans"])
+        && (has(&["poses"]) || has(&["fullpose"]) || has(&["root_orient", "pose_body"]))
+    {
+        (PoseFormat::Amass, amass::tracks(container, budget)?)
+    } else if has(&["gt", "imu_ori", "imu_acc"]) {
+        (PoseFormat::Dip, vec![dip::track(container, budget)?])
+    } else {
+        return Ok(None);
+    }))
+}
+
+/// The tracks of a dictionary of people or of frames, told by the keys of its first item.
+fn tracks_by_items(
+    path: &Path,
+    root: &Entry,
+    view: PoseView,
+    budget: &mut Budget,
+) -> Result<(PoseFormat, Vec<PoseTrack>), MotionError> {
+    let unknown = |found: String| MotionError::UnknownPoses {
+        path: path.to_owned(),
+        found,
+    };
+    let Ok(entries) = root.pairs() else {
+        return Err(unknown(root.value().type_name().to_owned()));
+    };
+    let Some((_, first)) = entries.first() else {
+        return Err(unknown("an empty dictionary".to_owned()));
+    };
+    let people = entries.iter().map(|(_, person)| person);
+    if first.get("pose_world").is_some() {
+        let tracks = people.map(|person| wham::track(person, view, budget));
+        Ok((PoseFormat::Wham, tracks.collect::<Result<_, _>>()?))
+    } else if first.get("pose").is_some() {
+        let tracks = people.map(|person| vibe::track(person, budget));
+        Ok((PoseFormat::Vibe, tracks.collect::<Result<_, _>>()?))
+    } else if first.get("tid").is_some() && first.get("smpl").is_some() {
+        Ok((PoseFormat::Phalp, phalp::tracks(root, budget)?))
+    } else {
+        let keys: Vec<String> = people.map(|entry| entry.key().to_owned()).collect();
+        Err(unknown(format!("the keys {}", first_of(&keys))))
+    }
+}
+
+/// The first twelve keys, for an error.
 fn first_of(keys: &[String]) -> String {
     let more = if keys.len() > 12 {
         format!(" and {} more", keys.len() - 12)

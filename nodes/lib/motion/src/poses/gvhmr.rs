@@ -6,9 +6,11 @@ use cromosim_arrays::Entry;
 use cromosim_body::ShapeSpace;
 use nalgebra::Vector3;
 
-use super::file::PoseView;
+use super::format::PoseView;
 use super::track::{PoseAxes, PoseTrack};
-use super::values::{Budget, betas, body_angles, frame_count, numbers, of_root_and_body, vectors};
+use super::values::{
+    Budget, betas, body_angles, frame_count, numbers, rotations_from_root_and_body, vectors,
+};
 use crate::MotionError;
 
 pub(super) fn track(
@@ -39,7 +41,7 @@ pub(super) fn track(
         shape_space: ShapeSpace::SmplX,
         betas: betas(parameters.get("betas").as_ref(), count)?,
         frame_ids: None,
-        rotations: of_root_and_body(&orient.values, &body.values),
+        rotations: rotations_from_root_and_body(&orient.values, &body.values),
         trans,
         pelvis_turns: None,
         axes,

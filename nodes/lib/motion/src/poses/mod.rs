@@ -24,6 +24,7 @@ mod body;
 mod bridge;
 mod dip;
 mod file;
+mod format;
 mod gvhmr;
 mod io;
 mod people;
@@ -37,63 +38,13 @@ mod values;
 mod vibe;
 mod wham;
 
-use std::fmt;
-
 pub use body::CameraPoses;
-pub use file::{PoseFile, PoseView};
+pub use file::PoseFile;
+pub use format::{MAX_POSES, PoseFormat, PoseView, VIDEO_RATE_HZ};
+pub use io::open_poses;
 pub(crate) use io::read_poses;
-pub use io::{open_poses, read_camera_poses};
 pub use people::{Person, read_people};
 pub use report::{PoseReport, RateOrigin, ShapeOrigin};
 pub use shape::ShapeChoice;
 pub(crate) use shape::skeleton_betas;
 pub use track::{PoseAxes, PoseTrack};
-
-/// Frames of all people of a file together: nine hours at 30 Hz.
-pub const MAX_POSES: usize = 1 << 20;
-/// Video estimates do not say their frame rate; Hz.
-pub const VIDEO_RATE_HZ: f64 = 30.0;
-
-/// Who wrote a file of SMPL parameters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum PoseFormat {
-    /// AMASS (Mahmood et al. 2019), the releases for SMPL, SMPL-H and SMPL-X, and MoSh++'s stage
-    /// II.
-    Amass,
-    /// VIBE (Kocabas et al. 2020).
-    Vibe,
-    /// WHAM (Shin et al. 2024).
-    Wham,
-    /// GVHMR (Shen et al. 2024).
-    Gvhmr,
-    /// TRAM (Wang et al. 2024).
-    Tram,
-    /// PHALP (Rajasegaran et al. 2022), the tracker of 4D-Humans (Goel et al. 2023).
-    Phalp,
-    /// SLAHMR (Ye et al. 2023).
-    Slahmr,
-    /// DIP-IMU's reference poses (Huang et al. 2018).
-    Dip,
-}
-
-impl PoseFormat {
-    /// Whether it comes from video, and so knows neither the frame rate nor the floor.
-    pub fn is_video(self) -> bool {
-        !matches!(self, Self::Amass | Self::Dip)
-    }
-}
-
-impl fmt::Display for PoseFormat {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(match self {
-            Self::Amass => "AMASS",
-            Self::Vibe => "VIBE",
-            Self::Wham => "WHAM",
-            Self::Gvhmr => "GVHMR",
-            Self::Tram => "TRAM",
-            Self::Phalp => "PHALP",
-            Self::Slahmr => "SLAHMR",
-            Self::Dip => "DIP-IMU",
-        })
-    }
-}

@@ -5,12 +5,9 @@ use std::sync::Arc;
 
 use cromosim_body::BodyModel;
 
-use super::file::PoseView;
+use super::format::PoseView;
 use super::io::{open_poses, source_body};
 use crate::{MotionError, MotionOptions, SmplMotion};
-
-/// What [`MotionOptions::person`] says for everybody.
-const EVERYBODY: &str = "all";
 
 /// One of the people in a file.
 #[derive(Clone, Debug)]
@@ -25,34 +22,6 @@ pub struct Person {
     pub begins_s: f64,
     /// What the person does.
     pub motion: SmplMotion,
-}
-
-impl MotionOptions {
-    /// Whether [`Self::person`] asks for several people: `all`, or names with commas between (`7,`
-    /// is several that are one).
-    pub fn asks_for_several(&self) -> bool {
-        self.person
-            .as_deref()
-            .is_some_and(|person| person == EVERYBODY || person.contains(','))
-    }
-
-    /// The names asked for; none for everybody.
-    pub(crate) fn people(&self) -> Option<Vec<&str>> {
-        let person = self
-            .person
-            .as_deref()
-            .filter(|&person| person != EVERYBODY)?;
-        let names: Vec<&str> = person
-            .split(',')
-            .map(str::trim)
-            .filter(|name| !name.is_empty())
-            .collect();
-        Some(if names.is_empty() {
-            vec![person]
-        } else {
-            names
-        })
-    }
 }
 
 /// The people that [`MotionOptions::person`] names (`all` or nothing: everybody; else names with

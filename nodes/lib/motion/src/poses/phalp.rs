@@ -9,9 +9,10 @@ use cromosim_arrays::{Array, Entry};
 use cromosim_body::ShapeSpace;
 
 use super::track::{PoseAxes, PoseTrack};
-use super::values::{Budget, betas, in_frames, of_matrices, wrong};
+use super::values::{Budget, betas, in_frames, numbers, rotations_from_matrices, wrong};
 use crate::MotionError;
 
+/// Everybody whom the file names, by number.
 pub(super) fn tracks(root: &Entry, budget: &mut Budget) -> Result<Vec<PoseTrack>, MotionError> {
     let mut frames = Vec::new();
     for (index, (_, frame)) in root.pairs()?.into_iter().enumerate() {
@@ -23,10 +24,8 @@ pub(super) fn tracks(root: &Entry, budget: &mut Budget) -> Result<Vec<PoseTrack>
     frames.sort_by_key(|(time, _)| *time);
     let mut people: BTreeMap<i64, PoseTrack> = BTreeMap::new();
     for (time, frame) in &frames {
-        let numbers = frame.at("tid")?;
-        let ids = numbers
-            .integers(&[None], "(P), one number a person")?
-            .values;
+        let tid = frame.at("tid")?;
+        let ids = tid.integers(&[None], "(P), one number a person")?.values;
         let bodies = frame.at("smpl")?;
         let items = bodies.items()?;
         if items.len() != ids.len() {
@@ -42,12 +41,12 @@ pub(super) fn tracks(root: &Entry, budget: &mut Budget) -> Result<Vec<PoseTrack>
             }
             None => Vec::new(),
         };
-        for (place, (id, body)) in ids.iter().zip(&items).enumerate() {
+        for (index, (id, body)) in ids.iter().zip(&items).enumerate() {
             budget.take(body.key(), 1)?;
             let track = people.entry(*id).or_insert_with(|| empty(*id));
             if track.frame_ids.as_ref().and_then(|times| times.last()) == Some(time) {
                 return Err(wrong(
-                    &numbers,
+                    &tid,
                     format!("person {id} stands twice in the frame of time {time}"),
                 ));
             }
@@ -55,13 +54,14 @@ pub(super) fn tracks(root: &Entry, budget: &mut Budget) -> Result<Vec<PoseTrack>
                 track,
                 *time,
                 body,
-                lost.get(place).is_none_or(|&frames| frames <= 0),
+                lost.get(index).is_none_or(|&frames| frames <= 0),
             )?;
         }
     }
     Ok(people.into_values().collect())
 }
 
+/// A track without frames.
 fn empty(id: i64) -> PoseTrack {
     PoseTrack {
         person: id.to_string(),
@@ -81,6 +81,7 @@ fn empty(id: i64) -> PoseTrack {
     }
 }
 
+/// Adds a frame to a track.
 fn add(track: &mut PoseTrack, time: i64, body: &Entry, seen: bool) -> Result<(), MotionError> {
     let mut rotations = matrices(&body.at("global_orient")?, 1)?;
     rotations.extend(matrices(&body.at("body_pose")?, 23)?);
@@ -119,6 +120,6 @@ fn matrices(
     } else {
         &[Some(count), Some(3), Some(3)]
     };
-    let array = super::values::numbers(entry, expected, &format!("({count}, 3, 3)"))?;
-    of_matrices(entry, &array.values)
+    let array = numbers(entry, expected, &format!("({count}, 3, 3)"))?;
+    rotations_from_matrices(entry, &array.values)
 }

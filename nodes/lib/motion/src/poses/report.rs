@@ -4,7 +4,7 @@ use std::fmt;
 
 use cromosim_body::{Gender, ShapeSpace};
 
-use super::PoseFormat;
+use super::format::PoseFormat;
 
 /// Who says how many frames a second has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

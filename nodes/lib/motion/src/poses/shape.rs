@@ -1,4 +1,4 @@
-//! Whose shape a motion has on a body.
+//! Which shape a motion's body has.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -15,15 +15,15 @@ use crate::MotionError;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ShapeChoice {
-    /// Of skeletons, the fit. Of SMPL parameters: the file's betas where they are those of the
+    /// For skeletons, the fit. For SMPL parameters the file's betas where they are those of the
     /// body; else a fit where `source_body` is given; else the mean body, and the report says so.
     #[default]
     Detect,
     /// The file's betas; an error where they are those of another kind of body, or where there are
     /// none.
     File,
-    /// Fitted to the person's bone lengths: of a skeleton, or of `source_body` with the file's
-    /// betas.
+    /// Fitted to the person's bone lengths: those of the skeleton, or of `source_body` with the
+    /// file's betas.
     Fit,
     /// The mean body.
     Mean,
@@ -31,6 +31,7 @@ pub enum ShapeChoice {
 
 /// A shape, and the body that the file's `trans` goes with.
 pub(super) struct Shape {
+    /// Shape coefficients of the body at hand.
     pub betas: Vec<f64>,
     pub origin: ShapeOrigin,
     /// The person's joints on the file's own body, m, where that is another than the one at hand.
@@ -58,17 +59,17 @@ impl Shape {
         };
         match (choice, source_body, checked) {
             (ShapeChoice::Mean, ..) => Ok(mean()),
-            _ if own => Ok(Self::of_file(betas, body)),
+            _ if own => Ok(Self::from_file(betas, body)),
             (ShapeChoice::Detect | ShapeChoice::Fit, Some(source_body), _) => {
                 Self::fitted(path, track, &betas, body, source_body)
             }
             (ShapeChoice::File | ShapeChoice::Fit, _, Err(source)) => Err(foreign(path, source)),
-            // The mean of any body is said by zeros, or by no betas at all.
+            // Zeros, or no betas at all, are the mean of any body.
             _ => Ok(mean()),
         }
     }
 
-    fn of_file(mut betas: Vec<f64>, body: &BodyModel) -> Self {
+    fn from_file(mut betas: Vec<f64>, body: &BodyModel) -> Self {
         let betas_left_out = betas
             .iter()
             .skip(body.beta_count())
@@ -97,7 +98,7 @@ impl Shape {
             betas,
             betas_left_out,
             ..
-        } = Self::of_file(betas.to_vec(), source_body);
+        } = Self::from_file(betas.to_vec(), source_body);
         let joints = *ShapedBody::new(source_body.clone(), &betas)?.joints_in_model();
         let ShapeFit {
             betas,

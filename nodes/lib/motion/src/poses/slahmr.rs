@@ -4,124 +4,159 @@
 
 use std::io::{Read, Seek};
 
-use cromosim_arrays::{Array, Container};
+use cromosim_arrays::{Array, Container, Entry};
 use cromosim_body::ShapeSpace;
 use nalgebra::Vector3;
 
 use super::track::{PoseAxes, PoseTrack};
-use super::values::{Budget, numbers, of_root_and_body, wrong};
+use super::values::{Budget, numbers, rotations_from_root_and_body, wrong};
 use crate::MotionError;
 
-/// More than any video shows.
+/// More people than any video shows.
 const MAX_PEOPLE: usize = 1000;
 
+/// Everybody who is seen in at least one frame.
 pub(super) fn tracks<R: Read + Seek>(
     container: &mut Container<R>,
     budget: &mut Budget,
 ) -> Result<Vec<PoseTrack>, MotionError> {
-    let root = container.at("root_orient")?;
-    let shape = root.shape()?;
-    // One person alone may come without the first dimension.
-    let alone = shape.len() == 2;
-    let (people, count) = match shape[..] {
-        [count, 3] => (1, count),
-        [people, count, 3] if (1..=MAX_PEOPLE).contains(&people) => (people, count),
-        _ => {
-            return Err(wrong(
-                &root,
-                format!("shape is {shape:?}, expected (P, T, 3) of at most {MAX_PEOPLE} people"),
-            ));
+    let video = Video::read(container, budget)?;
+    let tracks = (0..video.people).filter_map(|person| {
+        let track = upright(video.track(person));
+        match &video.seen {
+            Some(seen) => only_seen(track, &seen.values[person * video.frames..][..video.frames]),
+            None => Some(track),
         }
-    };
-    budget.take(root.key(), people.saturating_mul(count))?;
-    let expected = |width: usize| {
-        if alone {
-            vec![Some(count), Some(width)]
+    });
+    Ok(tracks.collect())
+}
+
+/// The arrays of a file: P people over T frames.
+struct Video {
+    people: usize,
+    frames: usize,
+    /// (P, T, 3), axis times angle.
+    orients: Array<f64>,
+    /// (P, T, 63), axis times angle.
+    bodies: Array<f64>,
+    /// (P, T, 3), m.
+    trans: Array<f64>,
+    /// (P, B).
+    betas: Option<Array<f64>>,
+    /// (P, T), 0 where the person is not seen.
+    seen: Option<Array<f64>>,
+    axes: PoseAxes,
+}
+
+impl Video {
+    fn read<R: Read + Seek>(
+        container: &mut Container<R>,
+        budget: &mut Budget,
+    ) -> Result<Self, MotionError> {
+        let root = container.at("root_orient")?;
+        let shape = root.shape()?;
+        let (people, frames) = people_and_frames(&root)?;
+        budget.take(root.key(), people.saturating_mul(frames))?;
+        // One person alone may come without the first dimension.
+        let expected = |width: usize| match shape.len() {
+            2 => vec![Some(frames), Some(width)],
+            _ => vec![Some(people), Some(frames), Some(width)],
+        };
+        let orients = numbers(&root, &expected(3), "(P, T, 3)")?;
+        let text = format!("({people}, {frames}, 3)");
+        let trans = numbers(&container.at("trans")?, &expected(3), &text)?;
+        let bodies = container.at("pose_body")?;
+        let wide = if bodies.shape()?.len() == shape.len() {
+            expected(63)
         } else {
-            vec![Some(people), Some(count), Some(width)]
-        }
-    };
-    let orients = numbers(&root, &expected(3), "(P, T, 3)")?;
-    let trans = numbers(
-        &container.at("trans")?,
-        &expected(3),
-        &format!("({people}, {count}, 3)"),
-    )?;
-    let bodies = container.at("pose_body")?;
-    let flat = bodies.shape()?.len() == shape.len();
-    let wide = if flat {
-        expected(63)
-    } else {
-        [&expected(21)[..], &[Some(3)]].concat()
-    };
-    let bodies = numbers(&bodies, &wide, &format!("({people}, {count}, 63)"))?;
-    let betas = match container.get("betas")? {
-        Some(entry) => {
-            let rank = entry.shape()?.len();
-            let rows = if rank == 1 {
-                vec![None]
-            } else {
-                vec![Some(people), None]
-            };
-            Some(numbers(&entry, &rows, &format!("({people}, B)"))?)
-        }
-        None => None,
-    };
-    let seen = match container.get("track_mask")? {
-        Some(entry) => Some(numbers(
-            &entry,
-            &[Some(people), Some(count)],
-            &format!("({people}, {count})"),
-        )?),
-        None => None,
-    };
-    let axes = axes(container)?;
-    let person = |index: usize| {
-        let rotations = of_root_and_body(
-            &orients.values[index * count * 3..][..count * 3],
-            &bodies.values[index * count * 63..][..count * 63],
-        );
-        let places = trans.values[index * count * 3..][..count * 3]
+            [&expected(21)[..], &[Some(3)]].concat()
+        };
+        let bodies = numbers(&bodies, &wide, &format!("({people}, {frames}, 63)"))?;
+        Ok(Self {
+            people,
+            frames,
+            orients,
+            bodies,
+            trans,
+            betas: optional(container, "betas", &format!("({people}, B)"), |rank| {
+                if rank == 1 {
+                    vec![None]
+                } else {
+                    vec![Some(people), None]
+                }
+            })?,
+            seen: optional(
+                container,
+                "track_mask",
+                &format!("({people}, {frames})"),
+                |_| vec![Some(people), Some(frames)],
+            )?,
+            axes: axes(container)?,
+        })
+    }
+
+    /// A person's poses in all frames.
+    fn track(&self, person: usize) -> PoseTrack {
+        let (first, count) = (person * self.frames, self.frames);
+        let trans = self.trans.values[first * 3..][..count * 3]
             .chunks_exact(3)
             .map(Vector3::from_column_slice);
-        let beta_count = betas
+        let beta_count = self
+            .betas
             .as_ref()
             .and_then(|betas| betas.shape.last().copied())
             .unwrap_or(0);
-        let own_betas = betas.iter().flat_map(|betas| {
-            betas
-                .values
-                .iter()
-                .copied()
-                .skip(index * beta_count)
-                .take(beta_count)
+        let betas = self.betas.iter().flat_map(|betas| {
+            let all = betas.values.iter().copied();
+            all.skip(person * beta_count).take(beta_count)
         });
-        let track = PoseTrack {
-            person: index.to_string(),
+        PoseTrack {
+            person: person.to_string(),
             gender: None,
             shape_space: ShapeSpace::Smpl,
             betas: Array {
                 shape: vec![1, beta_count],
-                values: own_betas.collect(),
+                values: betas.collect(),
             },
             frame_ids: None,
-            rotations,
-            trans: Some(places.collect()),
+            rotations: rotations_from_root_and_body(
+                &self.orients.values[first * 3..][..count * 3],
+                &self.bodies.values[first * 63..][..count * 63],
+            ),
+            trans: Some(trans.collect()),
             pelvis_turns: None,
-            axes,
+            axes: self.axes,
             rate_hz: None,
             confidence: None,
-        };
-        upright(track)
+        }
+    }
+}
+
+/// The numbers of people and of frames by the shape of `root_orient`.
+fn people_and_frames(root: &Entry) -> Result<(usize, usize), MotionError> {
+    let shape = root.shape()?;
+    match shape[..] {
+        [frames, 3] => Ok((1, frames)),
+        [people, frames, 3] if (1..=MAX_PEOPLE).contains(&people) => Ok((people, frames)),
+        _ => Err(wrong(
+            root,
+            format!("shape is {shape:?}, expected (P, T, 3) of at most {MAX_PEOPLE} people"),
+        )),
+    }
+}
+
+/// The numbers under a key, where it is there; `expected` is the shape by the array's rank.
+fn optional<R: Read + Seek>(
+    container: &mut Container<R>,
+    key: &str,
+    text: &str,
+    expected: impl Fn(usize) -> Vec<Option<usize>>,
+) -> Result<Option<Array<f64>>, MotionError> {
+    let Some(entry) = container.get(key)? else {
+        return Ok(None);
     };
-    let tracks = (0..people)
-        .map(person)
-        .enumerate()
-        .filter_map(|(index, track)| match &seen {
-            Some(seen) => only_seen(track, &seen.values[index * count..][..count]),
-            None => Some(track),
-        });
-    Ok(tracks.collect())
+    let rank = entry.shape()?.len();
+    Ok(Some(numbers(&entry, &expected(rank), text)?))
 }
 
 /// The frames in which the person is seen; `None` without any.
@@ -147,7 +182,7 @@ fn upright(mut track: PoseTrack) -> PoseTrack {
     track
 }
 
-/// Up is the floor's normal.
+/// Up is the normal of the floor where the file has one, else it is found by the heads.
 fn axes<R: Read + Seek>(container: &mut Container<R>) -> Result<PoseAxes, MotionError> {
     let Some(entry) = container.get("floor_plane")? else {
         return Ok(PoseAxes::Detect);

@@ -1,4 +1,4 @@
-//! One person's poses, as a file says them.
+//! One person's poses as a file has them.
 
 use cromosim_arrays::Array;
 use cromosim_body::{Gender, JOINT_COUNT, ShapeSpace};
@@ -33,7 +33,7 @@ pub struct PoseTrack {
     pub frame_ids: Option<Vec<i64>>,
     /// One a frame, N.
     pub rotations: Vec<Rotations>,
-    /// SMPL's `trans`, m, N; absent where the file knows no place that can be trusted.
+    /// SMPL's `trans`, m, N; absent where the file has no position that can be trusted.
     pub trans: Option<Vec<Vector3<f64>>>,
     /// What turned `trans` after SMPL was evaluated, where frames differ in it: the pelvis stands
     /// at turn J_0 + trans.
@@ -61,7 +61,7 @@ impl PoseTrack {
     }
 
     /// Shape coefficients of one frame.
-    pub(crate) fn betas_of(&self, frame: usize) -> &[f64] {
+    pub(crate) fn betas_at(&self, frame: usize) -> &[f64] {
         let [rows, count] = self.betas.shape[..] else {
             return &[];
         };

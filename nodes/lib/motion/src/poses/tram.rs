@@ -6,15 +6,16 @@ use cromosim_arrays::Entry;
 use cromosim_body::ShapeSpace;
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::file::PoseView;
+use super::format::{MAX_POSES, PoseView};
 use super::track::{PoseAxes, PoseTrack};
 use super::values::{
-    Budget, betas, frame_count, frame_ids, in_frames, numbers, of_matrices, vectors, wrong,
+    Budget, betas, frame_count, frame_ids, in_frames, numbers, rotations_from_matrices, vectors,
+    wrong,
 };
 use crate::MotionError;
 
 /// Frames of the longest camera track.
-const MAX_CAMERAS: usize = super::MAX_POSES;
+const MAX_CAMERAS: usize = MAX_POSES;
 
 pub(super) fn track(
     root: &Entry,
@@ -36,7 +37,7 @@ pub(super) fn track(
         shape_space: ShapeSpace::Smpl,
         betas: betas(root.get("pred_shape").as_ref(), count)?,
         frame_ids: frame_ids(root.get("frame").as_ref(), count)?,
-        rotations: in_frames(&of_matrices(&matrices, &values.values)?),
+        rotations: in_frames(&rotations_from_matrices(&matrices, &values.values)?),
         trans: None,
         pelvis_turns: None,
         axes: PoseAxes::Camera,
@@ -59,8 +60,8 @@ fn in_world(mut track: PoseTrack, root: &Entry, camera: &Entry) -> Result<PoseTr
         ));
     }
     let values = numbers(&turns, &[None, Some(3), Some(3)], "(T, 3, 3)")?;
-    let rotations = of_matrices(&turns, &values.values)?;
-    let places = vectors(&camera.at("world_cam_T")?, cameras)?;
+    let rotations = rotations_from_matrices(&turns, &values.values)?;
+    let positions = vectors(&camera.at("world_cam_T")?, cameras)?;
     let trans_in_camera = vectors(&root.at("pred_trans")?, track.rotations.len())?;
     let (mut trans, mut pelvis_turns) = (
         Vec::with_capacity(trans_in_camera.len()),
@@ -76,8 +77,8 @@ fn in_world(mut track: PoseTrack, root: &Entry, camera: &Entry) -> Result<PoseTr
             .unwrap_or(frame as i64);
         let found: Option<(&UnitQuaternion<f64>, &Vector3<f64>)> = usize::try_from(id)
             .ok()
-            .and_then(|id| Some((rotations.get(id)?, places.get(id)?)));
-        let Some((world_from_camera, place)) = found else {
+            .and_then(|id| Some((rotations.get(id)?, positions.get(id)?)));
+        let Some((world_from_camera, position)) = found else {
             return Err(wrong(
                 &turns,
                 format!(
@@ -86,7 +87,7 @@ fn in_world(mut track: PoseTrack, root: &Entry, camera: &Entry) -> Result<PoseTr
             ));
         };
         rotations_of_joints[0] = world_from_camera * rotations_of_joints[0];
-        trans.push(world_from_camera * trans_in_camera + place);
+        trans.push(world_from_camera * trans_in_camera + position);
         pelvis_turns.push(*world_from_camera);
     }
     Ok(PoseTrack {

@@ -6,7 +6,7 @@ use cromosim_arrays::{Array, ArraysError, Entry, Value};
 use cromosim_body::{Gender, JOINT_COUNT};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-use super::MAX_POSES;
+use super::format::MAX_POSES;
 use super::track::Rotations;
 use crate::MotionError;
 
@@ -17,12 +17,12 @@ const LARGEST: f64 = 1e6;
 /// Frame rates of motions, Hz.
 pub(super) const RATES_HZ: std::ops::RangeInclusive<f64> = 0.1..=10_000.0;
 pub(super) const RATES_TEXT: &str = "0.1 to 10000 Hz";
-/// More than any model has.
+/// More shape coefficients than any model has.
 const MAX_BETAS: usize = 400;
 /// How far columns of a rotation matrix may be from orthonormal: half precision stays below.
 const ORTHONORMAL_WITHIN: f64 = 0.01;
 
-/// What may still be read of a file.
+/// How many frames may still be read of a file.
 pub(super) struct Budget {
     path: PathBuf,
     frames: usize,
@@ -36,7 +36,7 @@ impl Budget {
         }
     }
 
-    /// Takes `count` frames off: before memory is taken for them, and at least one.
+    /// Takes `count` frames off, before memory is allocated for them. At least one is needed.
     pub fn take(&mut self, key: &str, count: usize) -> Result<(), MotionError> {
         if count == 0 {
             return Err(problem(
@@ -57,6 +57,7 @@ impl Budget {
     }
 }
 
+/// The error for what stands under `key`.
 pub(super) fn problem(path: &Path, key: &str, problem: impl Into<String>) -> MotionError {
     MotionError::Key {
         path: path.to_owned(),
@@ -65,6 +66,19 @@ pub(super) fn problem(path: &Path, key: &str, problem: impl Into<String>) -> Mot
     }
 }
 
+/// A motion that would have more frames than are read.
+pub(super) fn too_long(path: &Path) -> MotionError {
+    problem(
+        path,
+        "frame_ids",
+        format!(
+            "more than {} frames with the gaps bridged; cut the file into parts",
+            MAX_POSES
+        ),
+    )
+}
+
+/// The error for what stands in `entry`.
 pub(super) fn wrong(entry: &Entry, text: impl Into<String>) -> MotionError {
     problem(entry.path(), entry.key(), text)
 }
@@ -112,10 +126,14 @@ pub(super) fn vectors(entry: &Entry, count: usize) -> Result<Vec<Vector3<f64>>, 
         .collect())
 }
 
-/// Of rows that are a joint's axis times angle each (rad), the rotations of the first `joints`;
+/// From rows of axis times angle (rad, three numbers a joint) the rotations of the first `joints`;
 /// identity for the rest of SMPL's.
-pub(super) fn of_axis_angles(rows: &[f64], width: usize, joints: usize) -> Vec<Rotations> {
-    let of_row = |row: &[f64]| -> Rotations {
+pub(super) fn rotations_from_axis_angles(
+    rows: &[f64],
+    width: usize,
+    joints: usize,
+) -> Vec<Rotations> {
+    let rotations = |row: &[f64]| -> Rotations {
         std::array::from_fn(|joint| match row.get(3 * joint..3 * joint + 3) {
             Some(angles) if joint < joints => {
                 UnitQuaternion::from_scaled_axis(Vector3::from_column_slice(angles))
@@ -123,17 +141,17 @@ pub(super) fn of_axis_angles(rows: &[f64], width: usize, joints: usize) -> Vec<R
             _ => UnitQuaternion::identity(),
         })
     };
-    rows.chunks_exact(width.max(1)).map(of_row).collect()
+    rows.chunks_exact(width.max(1)).map(rotations).collect()
 }
 
-/// Of root (N, 3) and body (N, 63) or (N, 21, 3) in axis times angle.
-pub(super) fn of_root_and_body(root: &[f64], body: &[f64]) -> Vec<Rotations> {
+/// From axis times angle (rad) of the root (N, 3) and the body (N, 63) or (N, 21, 3).
+pub(super) fn rotations_from_root_and_body(root: &[f64], body: &[f64]) -> Vec<Rotations> {
     let rows: Vec<f64> = root
         .chunks_exact(3)
         .zip(body.chunks_exact(63))
         .flat_map(|(root, body)| [root, body].concat())
         .collect();
-    of_axis_angles(&rows, 3 * SHARED_JOINTS, SHARED_JOINTS)
+    rotations_from_axis_angles(&rows, 3 * SHARED_JOINTS, SHARED_JOINTS)
 }
 
 /// The body's poses of 21 joints: (N, 63) or (N, 21, 3).
@@ -146,8 +164,8 @@ pub(super) fn body_angles(entry: &Entry, count: usize) -> Result<Array<f64>, Mot
     numbers(entry, expected, &format!("({count}, 63)"))
 }
 
-/// Rotation matrices one after the other, row by row; `first` counts them in the entry.
-pub(super) fn of_matrices(
+/// From rotation matrices one after the other, each row by row.
+pub(super) fn rotations_from_matrices(
     entry: &Entry,
     values: &[f64],
 ) -> Result<Vec<UnitQuaternion<f64>>, MotionError> {

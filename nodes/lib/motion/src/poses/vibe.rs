@@ -5,7 +5,9 @@ use cromosim_arrays::Entry;
 use cromosim_body::ShapeSpace;
 
 use super::track::{PoseAxes, PoseTrack};
-use super::values::{Budget, betas, frame_count, frame_ids, gender, numbers, of_axis_angles};
+use super::values::{
+    Budget, betas, frame_count, frame_ids, gender, numbers, rotations_from_axis_angles,
+};
 use crate::MotionError;
 
 pub(super) fn track(person: &Entry, budget: &mut Budget) -> Result<PoseTrack, MotionError> {
@@ -28,7 +30,7 @@ pub(super) fn in_camera(
         shape_space: ShapeSpace::Smpl,
         betas: betas(person.get("betas").as_ref(), count)?,
         frame_ids: frame_ids(person.get("frame_ids").as_ref(), count)?,
-        rotations: of_axis_angles(&rows.values, 72, 24),
+        rotations: rotations_from_axis_angles(&rows.values, 72, 24),
         trans: None,
         pelvis_turns: None,
         axes: PoseAxes::Camera,

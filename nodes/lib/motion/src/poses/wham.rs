@@ -4,7 +4,7 @@
 use cromosim_arrays::Entry;
 use nalgebra::Vector3;
 
-use super::file::PoseView;
+use super::format::PoseView;
 use super::track::{PoseAxes, PoseTrack};
 use super::values::{Budget, vectors};
 use super::vibe::in_camera;
