@@ -1,18 +1,19 @@
-//! AMC (Acclaim motion capture): the degrees of freedom of an ASF skeleton, frame by frame.
+//! AMC (Acclaim motion capture): the degrees of freedom of an ASF skeleton, frame by frame. No
+//! crate was found that reads it.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::asf::turned;
-use crate::bvh::cursor::{Cursor, Token};
 use crate::markers::checked_rate;
+use crate::text::{Cursor, Token, without_byte_order_mark};
 use crate::{AsfChannel, AsfSkeleton, BvhClip, BvhJoint, Channel, MotionError};
 
-/// Frames per second of an AMC file whose rate nobody gives: the file does not say, and most of the
-/// CMU database has 120 Hz.
+/// Frames per second of an AMC file whose rate is not given, Hz: the file does not say, and most of
+/// the CMU database has 120 Hz.
 pub const AMC_RATE_HZ: f64 = 120.0;
 
-/// Parses the text of an AMC file that moves `skeleton`, into the same form as a BVH file: so it is
-/// retargeted by the same code. `rate_hz` is the recording's ([`AMC_RATE_HZ`] where unknown);
+/// Parses the text of an AMC file that moves `skeleton` into the same form as a BVH file, so that
+/// the same code retargets it. `rate_hz` is the recording's ([`AMC_RATE_HZ`] where unknown);
 /// `name` stands in the errors. No file is touched.
 ///
 /// With M the turn by a bone's numbers (about fixed axes, the first number first) and C its axes at
@@ -30,24 +31,22 @@ pub fn parse_amc(
     rate_hz: f64,
 ) -> Result<BvhClip, MotionError> {
     let rate_hz = checked_rate(name, rate_hz)?;
-    let cursor = Cursor::new(text.strip_prefix('\u{feff}').unwrap_or(text), name);
+    let cursor = Cursor::new(without_byte_order_mark(text), name);
     let mut parser = Parser {
         cursor,
         skeleton,
         degrees: skeleton.degrees,
     };
     let values = parser.frames()?;
-    let joints = joints(skeleton);
-    let channel_count = joints.iter().map(|joint| joint.channels.len()).sum();
-    Ok(BvhClip {
-        name: name.to_owned(),
-        joints,
-        frame_time_s: 1.0 / rate_hz,
+    Ok(BvhClip::from_parts(
+        name,
+        joints(skeleton),
+        1.0 / rate_hz,
         values,
-        channel_count,
-    })
+    ))
 }
 
+/// The channels of a joint that turns, in the order in which [`zyx_degrees`] gives them.
 const TURNS: [Channel; 3] = [
     Channel::Rotation(2),
     Channel::Rotation(1),
@@ -78,6 +77,14 @@ fn joints(skeleton: &AsfSkeleton) -> Vec<BvhJoint> {
         tip: Some(bone.rest_span),
     });
     std::iter::once(root).chain(bones).collect()
+}
+
+/// What a frame says of the root and of each bone.
+struct Frame {
+    /// Position (file units) and rotation.
+    root: Option<(Vector3<f64>, UnitQuaternion<f64>)>,
+    /// parent_from_joint of each bone.
+    turns: Vec<Option<UnitQuaternion<f64>>>,
 }
 
 struct Parser<'a> {
@@ -145,9 +152,10 @@ impl<'a> Parser<'a> {
         start: Token<'a>,
         values: &mut Vec<f64>,
     ) -> Result<Option<Token<'a>>, MotionError> {
-        let skeleton = self.skeleton;
-        let mut root = None;
-        let mut turns: Vec<Option<UnitQuaternion<f64>>> = vec![None; skeleton.bones.len()];
+        let mut frame = Frame {
+            root: None,
+            turns: vec![None; self.skeleton.bones.len()],
+        };
         let next = loop {
             let Some(line) = self.content_line() else {
                 break None;
@@ -157,60 +165,66 @@ impl<'a> Parser<'a> {
             if bone.parse::<u64>().is_ok() && words.clone().next().is_none() {
                 break Some(line);
             }
-            let repeated = |parser: &Self| {
-                parser.cursor.unexpected(
-                    "a bone once in a frame",
-                    Some(Token {
-                        text: bone,
-                        line: line.line,
-                    }),
-                )
-            };
-            if bone.eq_ignore_ascii_case("root") {
-                if root.replace(self.root(words, line)?).is_some() {
-                    return Err(repeated(self));
-                }
-                continue;
-            }
-            let Some(index) = skeleton.bone(bone) else {
-                return Err(self.cursor.unexpected(
-                    &format!("a bone of {}", skeleton.name),
-                    Some(Token {
-                        text: bone,
-                        line: line.line,
-                    }),
-                ));
-            };
-            let freedoms = &skeleton.bones[index].freedoms;
-            let angles = self.angles(words, freedoms.len(), line)?;
-            let c = skeleton.bones[index].skeleton_from_bone;
-            let turn = c * turned(freedoms.iter().copied().zip(angles)) * c.inverse();
-            if turns[index].replace(turn).is_some() {
-                return Err(repeated(self));
-            }
+            self.bone(bone, words, line, &mut frame)?;
         };
-        let Some((position, turn)) = root else {
-            return Err(self
-                .cursor
-                .unexpected("a line of root in every frame", Some(start)));
+        self.write(&frame, start, values)?;
+        Ok(next)
+    }
+
+    /// A line of a frame: the name of the root or of a bone, and its numbers.
+    fn bone(
+        &self,
+        name: &str,
+        numbers: std::str::SplitWhitespace<'_>,
+        line: Token<'_>,
+        frame: &mut Frame,
+    ) -> Result<(), MotionError> {
+        let unexpected = |expected: &str| {
+            let found = Token {
+                text: name,
+                line: line.line,
+            };
+            self.cursor.unexpected(expected, Some(found))
         };
+        let repeated = if name.eq_ignore_ascii_case("root") {
+            frame.root.replace(self.root(numbers, line)?).is_some()
+        } else {
+            let Some(index) = self.skeleton.bone(name) else {
+                return Err(unexpected(&format!("a bone of {}", self.skeleton.name)));
+            };
+            let bone = &self.skeleton.bones[index];
+            let angles = self.angles(numbers, bone.freedoms.len(), line)?;
+            let c = bone.skeleton_from_bone;
+            let turn = c * turned(bone.freedoms.iter().copied().zip(angles)) * c.inverse();
+            frame.turns[index].replace(turn).is_some()
+        };
+        if repeated {
+            return Err(unexpected("a bone once in a frame"));
+        }
+        Ok(())
+    }
+
+    /// Adds a frame's numbers to `values`; every bone that turns must be in it.
+    fn write(
+        &self,
+        frame: &Frame,
+        start: Token<'_>,
+        values: &mut Vec<f64>,
+    ) -> Result<(), MotionError> {
+        let missing = |name: &str| {
+            let expected = format!("a line of {name} in every frame");
+            self.cursor.unexpected(&expected, Some(start))
+        };
+        let (position, turn) = frame.root.ok_or_else(|| missing("root"))?;
         values.extend(position.iter());
         values.extend(zyx_degrees(&turn));
-        for (bone, turn) in skeleton
-            .bones
-            .iter()
-            .zip(&turns)
-            .filter(|(bone, _)| !bone.freedoms.is_empty())
-        {
-            let Some(turn) = turn else {
-                return Err(self.cursor.unexpected(
-                    &format!("a line of {} in every frame", bone.name),
-                    Some(start),
-                ));
-            };
-            values.extend(zyx_degrees(turn));
+        for (bone, turn) in self.skeleton.bones.iter().zip(&frame.turns) {
+            if !bone.freedoms.is_empty() {
+                let turn = turn.as_ref().ok_or_else(|| missing(&bone.name))?;
+                values.extend(zyx_degrees(turn));
+            }
         }
-        Ok(next)
+        Ok(())
     }
 
     /// Position (file units) and rotation of the root.

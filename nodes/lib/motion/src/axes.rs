@@ -1,6 +1,34 @@
-//! Rotations between directions.
+//! The up axis of a file, and rotations between directions.
 
 use nalgebra::{Matrix3, Rotation3, Unit, UnitQuaternion, Vector3};
+use serde::Deserialize;
+
+/// The direction that points up in the source.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum UpAxis {
+    /// Found from where the head is over the feet.
+    #[default]
+    Detect,
+    /// x is up.
+    X,
+    /// y is up, as in most BVH files.
+    Y,
+    /// z is up.
+    Z,
+}
+
+impl UpAxis {
+    /// The direction in the file's axes; `None` for `Detect`.
+    pub fn direction(self) -> Option<Vector3<f64>> {
+        match self {
+            Self::Detect => None,
+            Self::X => Some(Vector3::x()),
+            Self::Y => Some(Vector3::y()),
+            Self::Z => Some(Vector3::z()),
+        }
+    }
+}
 
 /// The rotation whose x axis is `x` and whose y axis is `y` made perpendicular to it. Identity
 /// where the two are parallel or zero.

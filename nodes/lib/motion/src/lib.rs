@@ -35,24 +35,24 @@ mod read;
 mod report;
 mod retarget;
 mod skeleton_map;
+mod text;
 mod trc;
 mod walk;
 
 pub use amass_write::write_amass;
 pub use amc::{AMC_RATE_HZ, parse_amc};
 pub use asf::{AsfBone, AsfChannel, AsfSkeleton, parse_asf};
-pub use bvh::{
-    BvhClip, BvhJoint, Channel, MAX_JOINTS, MAX_VALUE, SkeletonPose, parse_bvh, write_bvh,
-};
+pub use axes::UpAxis;
+pub use bvh::{BvhClip, BvhJoint, Channel, MAX_JOINTS, SkeletonPose, parse_bvh, write_bvh};
 pub use c3d::parse_c3d;
 pub use error::MotionError;
 pub use format::MotionFormat;
 pub use markers::{
-    MarkerClip, MarkerFit, MarkerOptions, MarkerPlace, MarkerReport, MarkerSet, SetMarker,
+    MarkerClip, MarkerFit, MarkerOptions, MarkerReport, MarkerSet, MarkerSite, SetMarker,
     fit_markers, fit_rigid, place_markers,
 };
 pub use motion::{SmplMotion, continuous, slerp};
-pub use options::{MotionOptions, RestChoice, UpAxis};
+pub use options::{MotionOptions, RestChoice};
 pub use poses::{
     CameraPoses, MAX_POSES, Person, PoseAxes, PoseFile, PoseFormat, PoseReport, PoseTrack,
     PoseView, RateOrigin, ShapeChoice, ShapeOrigin, VIDEO_RATE_HZ, open_poses, read_people,

@@ -215,6 +215,28 @@ pub fn slerp(
     from * UnitQuaternion::from_scaled_axis((from.inverse() * to).scaled_axis() * fraction)
 }
 
+/// All numbers of the poses are finite; `name` names the motion in the error.
+pub(crate) fn check_finite(name: &str, frames: &[BodyPose]) -> Result<(), MotionError> {
+    for (frame, pose) in frames.iter().enumerate() {
+        let not_finite = |what| MotionError::NotFinite {
+            name: name.to_owned(),
+            frame,
+            what,
+        };
+        if !pose.root_position.iter().all(|value| value.is_finite()) {
+            return Err(not_finite("the root position"));
+        }
+        if !pose
+            .local_rotations
+            .iter()
+            .all(|rotation| rotation.coords.iter().all(|value| value.is_finite()))
+        {
+            return Err(not_finite("a rotation"));
+        }
+    }
+    Ok(())
+}
+
 fn catmull_rom(points: &[Vector3<f64>; 4], u: f64) -> Vector3<f64> {
     let (slope_from, slope_to) = (0.5 * (points[2] - points[0]), 0.5 * (points[3] - points[1]));
     let (u2, u3) = (u * u, u * u * u);

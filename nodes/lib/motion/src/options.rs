@@ -2,40 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use nalgebra::Vector3;
 use serde::Deserialize;
 
+use crate::axes::UpAxis;
 use crate::{MarkerOptions, MarkerSet, MotionError, ShapeChoice, SkeletonMap};
 
 /// What [`MotionOptions::person`] says for everybody.
 const EVERYBODY: &str = "all";
-
-/// The direction that points up in the source.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum UpAxis {
-    /// Found from where the head is over the feet.
-    #[default]
-    Detect,
-    /// x is up.
-    X,
-    /// y is up, as in most BVH files.
-    Y,
-    /// z is up.
-    Z,
-}
-
-impl UpAxis {
-    /// The direction in the file's axes; `None` for `Detect`.
-    pub fn direction(self) -> Option<Vector3<f64>> {
-        match self {
-            Self::Detect => None,
-            Self::X => Some(Vector3::x()),
-            Self::Y => Some(Vector3::y()),
-            Self::Z => Some(Vector3::z()),
-        }
-    }
-}
 
 /// The pose of the source that is compared with SMPL's T-pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Deserialize)]

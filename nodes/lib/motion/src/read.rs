@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 use cromosim_body::BodyModel;
 
-use crate::bvh::shortened;
 use crate::poses::read_poses;
+use crate::text::shortened;
 use crate::{
     AMC_RATE_HZ, BvhClip, MarkerClip, MotionError, MotionFormat, MotionOptions, SmplMotion,
     fit_markers, parse_amc, parse_asf, parse_bvh, parse_c3d, parse_trc, retarget,

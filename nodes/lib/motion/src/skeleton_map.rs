@@ -144,40 +144,16 @@ impl SkeletonMap {
                 origin: origin.to_owned(),
                 source,
             })?;
-        let content = |key: &str, problem: &str| MotionError::MapContent {
+        let content = |key: String, problem: &str| MotionError::MapContent {
             origin: origin.to_owned(),
-            key: key.to_owned(),
+            key,
             problem: problem.to_owned(),
         };
-        let mut joints: [Option<String>; JOINT_COUNT] = Default::default();
-        for (smpl, source) in raw.joints {
-            let joint = Joint::from_name(&smpl)
-                .ok_or_else(|| content(&format!("joints.{smpl}"), "SMPL has no such joint"))?;
-            joints[joint.index()] = Some(source);
-        }
-        let missing = INDISPENSABLE
-            .iter()
-            .find(|joint| joints[joint.index()].is_none());
-        if let Some(joint) = missing {
-            return Err(content(
-                &format!("joints.{joint}"),
-                "missing, and indispensable",
-            ));
-        }
-        if joints[Joint::Neck.index()].is_none() && joints[Joint::Head.index()].is_none() {
-            return Err(content(
-                "joints.neck",
-                "missing, and so is head; one of them is needed",
-            ));
-        }
-        if raw
-            .unit_scale_m
-            .is_some_and(|scale| !(scale > 0.0 && scale.is_finite()))
-        {
-            return Err(content(
-                "unit_scale_m",
-                "expected metres per unit, more than 0",
-            ));
+        let unit = raw.unit_scale_m;
+        let joints = smpl_joints(raw.joints).map_err(|(key, problem)| content(key, problem))?;
+        if unit.is_some_and(|scale| !(scale > 0.0 && scale.is_finite())) {
+            let problem = "expected metres per unit, more than 0";
+            return Err(content("unit_scale_m".to_owned(), problem));
         }
         let mut rest_axes = Vec::new();
         for (joint, RawAxes { x, y }) in raw.rest_axes {
@@ -186,10 +162,8 @@ impl SkeletonMap {
                 && (y.norm() - 1.0).abs() < 1e-3
                 && x.dot(&y).abs() < 1e-3;
             if !orthonormal {
-                return Err(content(
-                    &format!("rest_axes.{joint}"),
-                    "x and y are not of length 1 and perpendicular",
-                ));
+                let problem = "x and y are not of length 1 and perpendicular";
+                return Err(content(format!("rest_axes.{joint}"), problem));
             }
             rest_axes.push((joint, frame_of(x, y)));
         }
@@ -200,7 +174,7 @@ impl SkeletonMap {
             hand_point: raw.hand_point,
             thumb_side: raw.thumb_side,
             feet: raw.feet,
-            unit_scale_m: raw.unit_scale_m,
+            unit_scale_m: unit,
             rest_axes,
         })
     }
@@ -217,7 +191,7 @@ impl SkeletonMap {
 
     /// Joints of the map that `clip` does not have.
     pub fn missing_in(&self, clip: &BvhClip) -> Vec<String> {
-        let names = Names::of(clip);
+        let names = Names::in_clip(clip);
         self.joints
             .iter()
             .flatten()
@@ -228,7 +202,7 @@ impl SkeletonMap {
 
     /// The map with the clip's joint indices; an error where an indispensable joint is not there.
     pub(crate) fn bind(&self, clip: &BvhClip) -> Result<BoundMap, MotionError> {
-        let names = Names::of(clip);
+        let names = Names::in_clip(clip);
         let joints: [Option<usize>; JOINT_COUNT] = std::array::from_fn(|index| {
             self.joints[index]
                 .as_deref()
@@ -306,7 +280,7 @@ impl SkeletonMap {
     /// leaves out the fewest.
     pub(crate) fn detect(clip: &BvhClip) -> Result<BoundMap, MotionError> {
         let maps = Self::embedded()?;
-        let names = Names::of(clip);
+        let names = Names::in_clip(clip);
         let found = |map: &Self| {
             map.joints
                 .iter()
@@ -339,6 +313,30 @@ impl SkeletonMap {
     }
 }
 
+/// The source's names by SMPL's joints; the key and what is wrong with it where a name is unknown or
+/// missing.
+fn smpl_joints(
+    names: BTreeMap<String, String>,
+) -> Result<[Option<String>; JOINT_COUNT], (String, &'static str)> {
+    let mut joints: [Option<String>; JOINT_COUNT] = Default::default();
+    for (smpl, source) in names {
+        let joint = Joint::from_name(&smpl)
+            .ok_or_else(|| (format!("joints.{smpl}"), "SMPL has no such joint"))?;
+        joints[joint.index()] = Some(source);
+    }
+    let missing = INDISPENSABLE
+        .iter()
+        .find(|joint| joints[joint.index()].is_none());
+    if let Some(joint) = missing {
+        return Err((format!("joints.{joint}"), "missing, and indispensable"));
+    }
+    if joints[Joint::Neck.index()].is_none() && joints[Joint::Head.index()].is_none() {
+        let problem = "missing, and so is head; one of them is needed";
+        return Err(("joints.neck".to_owned(), problem));
+    }
+    Ok(joints)
+}
+
 /// The tip beyond a joint, or else its farthest child: of a hand's children a finger, not the
 /// thumb.
 fn beyond(clip: &BvhClip, joint: usize) -> Option<Point> {
@@ -362,7 +360,7 @@ fn beyond(clip: &BvhClip, joint: usize) -> Option<Point> {
 struct Names(Vec<String>);
 
 impl Names {
-    fn of(clip: &BvhClip) -> Self {
+    fn in_clip(clip: &BvhClip) -> Self {
         Self(
             clip.joints()
                 .iter()

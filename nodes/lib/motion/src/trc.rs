@@ -4,9 +4,9 @@ use std::fmt::Write;
 
 use nalgebra::Point3;
 
-use crate::bvh::cursor::{Cursor, Token};
+use crate::MotionError;
 use crate::markers::{MarkerClip, checked_rate, unit_scale};
-use crate::{MAX_VALUE, MotionError};
+use crate::text::{Cursor, MAX_VALUE, Token, without_byte_order_mark};
 
 /// The largest number of markers that is read.
 const MAX_MARKERS: usize = 10_000;
@@ -37,7 +37,7 @@ struct Header {
 /// [`MotionError::Setting`], with the line where there is one. A point takes a byte of the text at
 /// least: memory stays proportional to it.
 pub fn parse_trc(text: &str, name: &str) -> Result<MarkerClip, MotionError> {
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let text = without_byte_order_mark(text);
     let mut cursor = Cursor::new(text, name);
     let first = cursor.next_line();
     if !first.is_some_and(|line| is_trc(line.text)) {

@@ -1,7 +1,7 @@
 //! The MOTION section: number of frames, frame time, one line a frame.
 
-use super::cursor::{Cursor, Token};
 use crate::MotionError;
+use crate::text::{Cursor, Token};
 
 /// Frame times that are believed, s: 100 kHz down to one frame in ten seconds.
 const FRAME_TIMES_S: std::ops::RangeInclusive<f64> = 1e-5..=10.0;

@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
-use super::cursor::{Cursor, Token};
-use super::{BvhJoint, Channel, MAX_JOINTS};
+use super::clip::{BvhJoint, Channel, MAX_JOINTS};
 use crate::MotionError;
+use crate::text::{Cursor, Token};
 
 /// An open brace: a joint or the end site of one.
 enum Level {

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use super::{BvhClip, Channel};
+use super::clip::{BvhClip, Channel};
 
 /// A clip's skeleton in one posture.
 #[derive(Clone, Debug, PartialEq)]

@@ -5,22 +5,25 @@
 //! analog samples, which are passed over. Numbers are 32-bit floats where the scale is negative,
 //! else 16-bit integers to be multiplied by it; their bytes stand in the order of the processor
 //! that wrote them.
+//!
+//! The crate c3dio (0.8.0, the newest) is not used: it panics on damaged files; a file of fewer
+//! than 512 bytes is enough.
 
+mod layout;
 mod numbers;
 mod parameters;
 
 use nalgebra::Point3;
 
-use crate::markers::{MarkerClip, checked_rate};
-use crate::{MAX_VALUE, MotionError};
+use crate::MotionError;
+use crate::markers::{MarkerClip, checked_rate, unit_scale};
+use crate::text::{MAX_VALUE, shortened};
+use layout::{BLOCK, Layout, wrong};
 use numbers::{Bytes, Processor};
 use parameters::Parameters;
 
-const BLOCK: usize = 512;
 /// The second byte of every C3D file.
 const KEY: u8 = 0x50;
-/// The frame counts of 16 bits end here: longer recordings say this, and their data go on.
-const MANY_FRAMES: usize = 65_535;
 
 /// Whether the bytes begin like a C3D file: the key, and a known processor in the parameter section
 /// (nearly always the second block).
@@ -35,17 +38,6 @@ fn has_key(bytes: &[u8]) -> bool {
     bytes.len() >= BLOCK && bytes[1] == KEY && bytes[0] >= 2
 }
 
-/// Where the numbers of a frame are.
-struct Layout {
-    points: usize,
-    /// Analog samples in a frame.
-    analog: usize,
-    frames: usize,
-    data_start: usize,
-    /// `None` for floats.
-    integer_scale: Option<f64>,
-}
-
 /// Parses the bytes of a C3D file; `name` stands in the errors. No file is touched.
 ///
 /// A point that was not seen (negative fourth word), is not finite or stands exactly at the origin
@@ -57,42 +49,9 @@ struct Layout {
 /// proportional to the file: a point takes at least eight of its bytes, whatever counts it
 /// declares.
 pub fn parse_c3d(bytes: &[u8], name: &str) -> Result<MarkerClip, MotionError> {
-    let wrong = |offset: usize, expected: &str, found: String| MotionError::Bytes {
-        name: name.to_owned(),
-        offset,
-        expected: expected.to_owned(),
-        found,
-    };
-    if !has_key(bytes) {
-        let found = format!(
-            "{} bytes that begin with {:02x?}",
-            bytes.len(),
-            &bytes[..bytes.len().min(2)]
-        );
-        return Err(wrong(
-            0,
-            "a C3D header of 512 bytes (second byte 0x50)",
-            found,
-        ));
-    }
-    let section = (usize::from(bytes[0]) - 1) * BLOCK;
-    let Some(&[_, _, _, processor]) = bytes.get(section..section + 4) else {
-        return Err(wrong(
-            section,
-            "the parameter section that byte 0 points at",
-            "the end of the file".to_owned(),
-        ));
-    };
-    let Some(processor) = Processor::from_code(processor) else {
-        return Err(wrong(
-            section + 3,
-            "processor 84 (Intel), 85 (DEC) or 86 (MIPS)",
-            processor.to_string(),
-        ));
-    };
-    let file = Bytes { bytes, processor };
+    let (file, section) = parameter_section(bytes, name)?;
     let parameters = Parameters::read(file, section + 4);
-    let layout = layout(file, &parameters, name)?;
+    let layout = Layout::read(file, &parameters, name)?;
     let header_rate = file.float(20).map_or(0.0, f64::from);
     let rate_hz = checked_rate(
         name,
@@ -109,13 +68,14 @@ pub fn parse_c3d(bytes: &[u8], name: &str) -> Result<MarkerClip, MotionError> {
     let unit_scale_m = if unit.is_empty() {
         Some(0.001)
     } else {
-        crate::markers::unit_scale(&unit)
+        unit_scale(&unit)
     };
     let Some(unit_scale_m) = unit_scale_m else {
         return Err(wrong(
+            name,
             section,
             "POINT:UNITS of mm, cm, m, in or ft",
-            format!("\"{}\"", crate::bvh::shortened(&unit)),
+            format!("\"{}\"", shortened(&unit)),
         ));
     };
     Ok(MarkerClip {
@@ -127,83 +87,38 @@ pub fn parse_c3d(bytes: &[u8], name: &str) -> Result<MarkerClip, MotionError> {
     })
 }
 
-fn layout(file: Bytes<'_>, parameters: &Parameters<'_>, name: &str) -> Result<Layout, MotionError> {
-    let wrong = |offset: usize, expected: &str, found: String| MotionError::Bytes {
-        name: name.to_owned(),
-        offset,
-        expected: expected.to_owned(),
-        found,
-    };
-    // Sixteen-bit numbers of the header, which is there in full.
-    let word = |index: usize| usize::from(file.unsigned(2 * (index - 1)).unwrap_or(0));
-    let positive = |parameter: &str| {
-        parameters
-            .number("POINT", parameter)
-            .filter(|number| *number >= 1.0)
-            .map(|number| number as usize)
-    };
-    let points = positive("USED").unwrap_or(word(2));
-    if points == 0 {
-        return Err(wrong(
-            2,
-            "points",
-            "none: the file has analog channels at most".to_owned(),
-        ));
+/// The file with its processor, and the byte at which the parameter section begins.
+fn parameter_section<'a>(bytes: &'a [u8], name: &str) -> Result<(Bytes<'a>, usize), MotionError> {
+    if !has_key(bytes) {
+        let found = format!(
+            "{} bytes that begin with {:02x?}",
+            bytes.len(),
+            &bytes[..bytes.len().min(2)]
+        );
+        let expected = "a C3D header of 512 bytes (second byte 0x50)";
+        return Err(wrong(name, 0, expected, found));
     }
-    let scale = parameters
-        .number("POINT", "SCALE")
-        .filter(|scale| *scale != 0.0)
-        .or(file.float(12).map(f64::from))
-        .unwrap_or(0.0);
-    if scale == 0.0 || !scale.is_finite() {
+    let section = (usize::from(bytes[0]) - 1) * BLOCK;
+    let Some(&[_, _, _, processor]) = bytes.get(section..section + 4) else {
+        let expected = "the parameter section that byte 0 points at";
         return Err(wrong(
-            12,
-            "a scale that is finite and not 0",
-            scale.to_string(),
+            name,
+            section,
+            expected,
+            "the end of the file".to_owned(),
         ));
-    }
-    let data_start = (positive("DATA_START").unwrap_or(word(9)))
-        .saturating_sub(1)
-        .saturating_mul(BLOCK);
-    let integer_scale = (scale > 0.0).then_some(scale);
-    let analog = word(3);
-    let frame_bytes = points
-        .saturating_mul(4)
-        .saturating_add(analog)
-        .saturating_mul(if integer_scale.is_some() { 2 } else { 4 });
-    let available = file.bytes.len().saturating_sub(data_start) / frame_bytes;
-    let of_header = (word(5) + 1).saturating_sub(word(4));
-    let declared = parameters
-        .trial_frames()
-        .or(positive("LONG_FRAMES"))
-        .or(positive("FRAMES"))
-        .unwrap_or(of_header);
-    let frames = if declared >= MANY_FRAMES {
-        declared.min(available)
-    } else {
-        declared
     };
-    if data_start < BLOCK || frames == 0 || frames > available {
-        let expected = format!("{declared} frames (at least 1) of {frame_bytes} bytes");
-        return Err(wrong(
-            data_start,
-            &expected,
-            format!("{available} frames up to the end of the file"),
-        ));
-    }
-    Ok(Layout {
-        points,
-        analog,
-        frames,
-        data_start,
-        integer_scale,
-    })
+    let Some(processor) = Processor::from_code(processor) else {
+        let expected = "processor 84 (Intel), 85 (DEC) or 86 (MIPS)";
+        return Err(wrong(name, section + 3, expected, processor.to_string()));
+    };
+    Ok((Bytes { bytes, processor }, section))
 }
 
-/// One label a point; points without one are called `*1`, `*2`, …
+/// One label for each point; points without one are called `*1`, `*2`, …
 fn labels(parameters: &Parameters<'_>, points: usize) -> Vec<String> {
     let mut labels = parameters.strings("POINT", "LABELS");
-    // Counts of 8 bits: what is beyond 255 labels stands in LABELS2 and so on.
+    // A count has 8 bits: labels beyond 255 stand in LABELS2 and so on.
     for part in 2..=(points / 255 + 1) {
         labels.extend(parameters.strings("POINT", &format!("LABELS{part}")));
     }
@@ -218,6 +133,7 @@ fn labels(parameters: &Parameters<'_>, points: usize) -> Vec<String> {
     labels
 }
 
+/// All points of all frames, m.
 fn frames(file: Bytes<'_>, layout: &Layout, unit_scale_m: f64) -> Vec<Vec<Option<Point3<f64>>>> {
     let width = if layout.integer_scale.is_some() { 2 } else { 4 };
     let frame_bytes = (4 * layout.points + layout.analog) * width;
@@ -232,11 +148,11 @@ fn frames(file: Bytes<'_>, layout: &Layout, unit_scale_m: f64) -> Vec<Vec<Option
             Some(_) => file.integer(offset + 6)? >= 0,
             None => file.float(offset + 12)? >= 0.0,
         };
-        let place = Point3::new(number(0)?, number(1)?, number(2)?);
-        let usual = place.coords.amax() < MAX_VALUE
-            && place.coords.iter().all(|value| value.is_finite())
-            && place != Point3::origin();
-        (seen && usual).then(|| place * unit_scale_m)
+        let position = Point3::new(number(0)?, number(1)?, number(2)?);
+        let usual = position.coords.amax() < MAX_VALUE
+            && position.coords.iter().all(|value| value.is_finite())
+            && position != Point3::origin();
+        (seen && usual).then(|| position * unit_scale_m)
     };
     let frame = |index: usize| {
         let start = layout.data_start + index * frame_bytes;

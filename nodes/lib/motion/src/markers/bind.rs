@@ -2,10 +2,10 @@
 //! world.
 
 use cromosim_body::{BodyModel, Joint, Site};
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Point3, UnitQuaternion, Vector3};
 
 use super::clip::MarkerClip;
-use super::fit::MarkerOptions;
+use super::options::MarkerOptions;
 use super::set::{MarkerSet, SetMarker};
 use crate::MotionError;
 use crate::axes::{minimal_rotation, nearest_axis};
@@ -17,15 +17,21 @@ const SAMPLES: usize = 500;
 
 /// A recording's markers in the set's order.
 pub(super) struct Bound<'a> {
+    /// The set's markers that the recording has.
     pub markers: Vec<&'a SetMarker>,
+    /// Where they are on the body.
     pub sites: Vec<Site>,
+    /// Labels of the set that the recording does not have.
     pub absent: Vec<String>,
+    /// Labels of the recording that the set does not have.
     pub unknown: Vec<String>,
+    /// A signed axis of the file.
     pub up_in_file: Vector3<f64>,
     /// (frames, markers), m, world (z up).
     pub frames: Vec<Vec<Option<Vector3<f64>>>>,
 }
 
+/// Looks the set's markers up in the recording and turns the recording's up axis to z.
 pub(super) fn bind<'a>(
     clip: &MarkerClip,
     body: &BodyModel,
@@ -33,29 +39,7 @@ pub(super) fn bind<'a>(
     options: &MarkerOptions,
 ) -> Result<Bound<'a>, MotionError> {
     let labels = clip.labels_of(options.subject.as_deref())?;
-    let column = |marker: &SetMarker| {
-        let same = |label: &&str| {
-            label.eq_ignore_ascii_case(&marker.label)
-                || marker
-                    .aliases
-                    .iter()
-                    .any(|alias| label.eq_ignore_ascii_case(alias))
-        };
-        labels
-            .iter()
-            .position(|label| label.as_ref().is_some_and(same))
-    };
-    let found: Vec<(&SetMarker, usize)> = set
-        .markers()
-        .iter()
-        .filter_map(|marker| Some((marker, column(marker)?)))
-        .collect();
-    let absent: Vec<String> = set
-        .markers()
-        .iter()
-        .filter(|marker| column(marker).is_none())
-        .map(|marker| marker.label.clone())
-        .collect();
+    let (found, absent) = matched(&labels, set);
     if found.len() < FEWEST_MARKERS {
         return Err(MotionError::MarkerLabels {
             name: clip.name.clone(),
@@ -80,33 +64,16 @@ pub(super) fn bind<'a>(
         .iter()
         .map(|(marker, _)| marker.site_on(body, set.name()))
         .collect::<Result<Vec<_>, _>>()?;
-    let scale = match options.unit_scale_m {
-        Some(scale) if scale > 0.0 && scale.is_finite() => scale / clip.unit_scale_m,
-        Some(value) => {
-            let expected = "metres per unit, more than 0".to_owned();
-            return Err(MotionError::Setting {
-                name: clip.name.clone(),
-                setting: "unit_scale_m",
-                value,
-                expected,
-            });
-        }
-        None => 1.0,
-    };
-    let row = |frame: &Vec<Option<nalgebra::Point3<f64>>>| -> Vec<Option<Vector3<f64>>> {
+    let scale = scale(clip, options)?;
+    let row = |frame: &Vec<Option<Point3<f64>>>| -> Vec<Option<Vector3<f64>>> {
+        let point = |column: usize| frame.get(column).copied().flatten();
         found
             .iter()
-            .map(|(_, column)| {
-                frame
-                    .get(*column)
-                    .copied()
-                    .flatten()
-                    .map(|point| point.coords * scale)
-            })
+            .map(|(_, column)| point(*column).map(|point| point.coords * scale))
             .collect()
     };
     let mut frames: Vec<_> = clip.frames.iter().map(row).collect();
-    let up_in_file = orientation(clip, body, &sites, &frames, options)?;
+    let up_in_file = up_axis(clip, body, &sites, &frames, options)?;
     let world_from_file = minimal_rotation(up_in_file, Vector3::z());
     turn(&mut frames, world_from_file);
     Ok(Bound {
@@ -119,14 +86,76 @@ pub(super) fn bind<'a>(
     })
 }
 
+/// The set's markers that have a label in the recording, each with its column, and the labels of
+/// those that have none. Case does not matter.
+fn matched<'a>(
+    labels: &[Option<&str>],
+    set: &'a MarkerSet,
+) -> (Vec<(&'a SetMarker, usize)>, Vec<String>) {
+    let column = |marker: &SetMarker| {
+        let same = |label: &&str| {
+            label.eq_ignore_ascii_case(&marker.label)
+                || marker
+                    .aliases
+                    .iter()
+                    .any(|alias| label.eq_ignore_ascii_case(alias))
+        };
+        labels
+            .iter()
+            .position(|label| label.as_ref().is_some_and(same))
+    };
+    let (mut found, mut absent) = (Vec::new(), Vec::new());
+    for marker in set.markers() {
+        match column(marker) {
+            Some(column) => found.push((marker, column)),
+            None => absent.push(marker.label.clone()),
+        }
+    }
+    (found, absent)
+}
+
+/// Factor on the clip's metres where the options name another unit.
+fn scale(clip: &MarkerClip, options: &MarkerOptions) -> Result<f64, MotionError> {
+    match options.unit_scale_m {
+        Some(scale) if scale > 0.0 && scale.is_finite() => Ok(scale / clip.unit_scale_m),
+        Some(value) => {
+            let expected = "metres per unit, more than 0".to_owned();
+            Err(MotionError::Setting {
+                name: clip.name.clone(),
+                setting: "unit_scale_m",
+                value,
+                expected,
+            })
+        }
+        None => Ok(1.0),
+    }
+}
+
 fn turn(frames: &mut [Vec<Option<Vector3<f64>>>], world_from_file: UnitQuaternion<f64>) {
     for point in frames.iter_mut().flatten().flatten() {
         *point = world_from_file * *point;
     }
 }
 
+/// Segments whose markers are near the floor, and near the head, of who stands.
+const LOW: [Joint; 6] = [
+    Joint::LeftFoot,
+    Joint::RightFoot,
+    Joint::LeftAnkle,
+    Joint::RightAnkle,
+    Joint::LeftKnee,
+    Joint::RightKnee,
+];
+const HIGH: [Joint; 5] = [
+    Joint::Neck,
+    Joint::Head,
+    Joint::LeftCollar,
+    Joint::RightCollar,
+    Joint::Spine3,
+];
+
 /// The up axis, as chosen or from feet to head; and a check that the person is of a person's size.
-fn orientation(
+fn up_axis(
     clip: &MarkerClip,
     body: &BodyModel,
     sites: &[Site],
@@ -134,42 +163,18 @@ fn orientation(
     options: &MarkerOptions,
 ) -> Result<Vector3<f64>, MotionError> {
     let heights: Vec<f64> = sites.iter().map(|site| height(body, site)).collect();
-    let of = |joints: &[Joint]| {
+    let markers_on = |joints: &[Joint]| {
         (0..sites.len())
             .filter(|&index| joints.contains(&sites[index].joint))
             .collect::<Vec<_>>()
     };
-    let low = of(&[
-        Joint::LeftFoot,
-        Joint::RightFoot,
-        Joint::LeftAnkle,
-        Joint::RightAnkle,
-        Joint::LeftKnee,
-        Joint::RightKnee,
-    ]);
-    let high = of(&[
-        Joint::Neck,
-        Joint::Head,
-        Joint::LeftCollar,
-        Joint::RightCollar,
-        Joint::Spine3,
-    ]);
+    let (low, high) = (markers_on(&LOW), markers_on(&HIGH));
     let (mut sum, mut ratios) = (Vector3::zeros(), Vec::new());
     for frame in frames.iter().step_by(frames.len().div_ceil(SAMPLES).max(1)) {
-        let middle = |group: &[usize]| {
-            let seen: Vec<(Vector3<f64>, f64)> = group
-                .iter()
-                .filter_map(|&index| Some((frame[index]?, heights[index])))
-                .collect();
-            let count = seen.len() as f64;
-            (!seen.is_empty()).then(|| {
-                (
-                    seen.iter().map(|(place, _)| place).sum::<Vector3<f64>>() / count,
-                    seen.iter().map(|(_, height)| height).sum::<f64>() / count,
-                )
-            })
-        };
-        let (Some(low), Some(high)) = (middle(&low), middle(&high)) else {
+        let (Some(low), Some(high)) = (
+            middle(frame, &low, &heights),
+            middle(frame, &high, &heights),
+        ) else {
             continue;
         };
         sum += (high.0 - low.0).try_normalize(0.0).unwrap_or_default();
@@ -196,6 +201,29 @@ fn orientation(
             name: clip.name.clone(),
             mean: mean.into(),
         })
+}
+
+/// Mean position of the markers of a group that are seen, and their mean height on the mean shape,
+/// m.
+fn middle(
+    frame: &[Option<Vector3<f64>>],
+    group: &[usize],
+    heights: &[f64],
+) -> Option<(Vector3<f64>, f64)> {
+    let seen: Vec<(Vector3<f64>, f64)> = group
+        .iter()
+        .filter_map(|&index| Some((frame[index]?, heights[index])))
+        .collect();
+    let count = seen.len() as f64;
+    (!seen.is_empty()).then(|| {
+        (
+            seen.iter()
+                .map(|(position, _)| position)
+                .sum::<Vector3<f64>>()
+                / count,
+            seen.iter().map(|(_, height)| height).sum::<f64>() / count,
+        )
+    })
 }
 
 /// Height of a site on the mean shape in T-pose, m, model axes.

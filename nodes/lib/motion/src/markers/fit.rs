@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use cromosim_body::{BodyModel, Gender, Joint, Site};
+use cromosim_body::{BodyModel, BodyPose, Gender, Joint, Site};
 use cromosim_spatial::confidence_of_std;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -10,47 +10,20 @@ use rayon::prelude::*;
 use super::bind::{Bound, bind};
 use super::clip::MarkerClip;
 use super::keyframes::choose;
+use super::options::MarkerOptions;
 use super::prior::PosePrior;
 use super::report::{MarkerFit, MarkerReport};
-use super::set::MarkerSet;
+use super::set::{MarkerSet, SetMarker};
 use super::shape::{Keyframe, Person, fit_person, joint_sigmas};
 use super::skin::{ShapedSkin, Skin};
 use super::start::{cold_start, trunk_markers};
 use super::track::Tracker;
 use crate::axes::axis_name;
-use crate::motion::continuous;
-use crate::{MotionError, SmplMotion, UpAxis};
+use crate::motion::{check_finite, continuous};
+use crate::{MotionError, SmplMotion};
 
 /// Frames that the shape is fitted to.
 const KEYFRAMES: usize = 12;
-
-/// How to fit a body to markers; every field has a default.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MarkerOptions {
-    /// The subject whose markers are taken; needed where the labels name several.
-    pub subject: Option<String>,
-    /// The recording's up axis.
-    pub up_axis: UpAxis,
-    /// Metres per unit of the file; as the file says where absent.
-    pub unit_scale_m: Option<f64>,
-    /// Fits where each marker is stuck, about a centimetre around the set's place; else the set is
-    /// taken at its word.
-    pub fit_placement: bool,
-    /// The largest number of shape coefficients that are fitted.
-    pub betas: usize,
-}
-
-impl Default for MarkerOptions {
-    fn default() -> Self {
-        Self {
-            subject: None,
-            up_axis: UpAxis::Detect,
-            unit_scale_m: None,
-            fit_placement: true,
-            betas: 10,
-        }
-    }
-}
 
 /// Finds the body that moved under the markers, after MoSh (Loper et al. 2014): shape, and where
 /// the markers are stuck, from twelve frames that are unlike each other; then, with these held, a
@@ -75,35 +48,13 @@ pub fn fit_markers(
 ) -> Result<(SmplMotion, MarkerReport), MotionError> {
     let bound = bind(clip, body, set, options)?;
     let skin = Skin::new(body, &bound.sites, options.betas.min(body.beta_count()))?;
-    let stuck_at: Vec<Vector3<f64>> = bound
-        .markers
-        .iter()
-        .map(|marker| Vector3::new(0.0, 0.0, marker.height_m))
-        .collect();
-    let (prior, trunk) = (
-        PosePrior::standing(),
-        trunk_markers(
-            &bound
-                .sites
-                .iter()
-                .map(|site| site.joint)
-                .collect::<Vec<Joint>>(),
-        ),
-    );
+    let stuck_at = stuck_at(bound.markers.iter().copied());
+    let prior = PosePrior::standing();
+    let joints: Vec<Joint> = bound.sites.iter().map(|site| site.joint).collect();
+    let trunk = trunk_markers(&joints);
     let chosen = choose(&bound.frames, KEYFRAMES);
     let mean = skin.shaped(&[], &stuck_at)?;
-    let keyframe = |&index: &usize| {
-        let observed = bound.frames[index].clone();
-        let pose = cold_start(&mean, &observed, &trunk, &prior, &[])?;
-        Some(Keyframe { observed, pose })
-    };
-    let mut keyframes: Vec<Keyframe> = chosen
-        .par_iter()
-        .map(keyframe)
-        .collect::<Vec<_>>()
-        .into_iter()
-        .flatten()
-        .collect();
+    let mut keyframes = keyframes(&bound, &chosen, &mean, &trunk, &prior);
     if keyframes.is_empty() {
         return Err(MotionError::NoMarkers {
             name: clip.name.clone(),
@@ -117,42 +68,28 @@ pub fn fit_markers(
         options.fit_placement,
     )?;
     let shaped = skin.shaped(&person.betas, &person.placements)?;
-    let known: Vec<_> = keyframes.iter().map(|frame| frame.pose.clone()).collect();
     let tracker = Tracker {
         skin: &shaped,
         prior: &prior,
         trunk: &trunk,
         rate_hz: clip.rate_hz,
-        known: &known,
+        known: &poses(&keyframes),
     };
     let frames = continuous(tracker.track(&bound.frames));
-    crate::retarget::check_finite(&clip.name, &frames)?;
+    check_finite(&clip.name, &frames)?;
     let (markers, rms_m) = marker_fits(&bound, &shaped, &person, &stuck_at, &frames);
-    let missing = bound
-        .frames
-        .iter()
-        .flatten()
-        .filter(|point| point.is_none())
-        .count();
     let sigmas = joint_sigmas(&shaped, &prior, &keyframes, rms_m / f64::sqrt(3.0));
-    let confidence = bound
-        .frames
-        .iter()
-        .map(|frame| confidence(&sigmas, frame, set.markers().len()))
-        .collect();
+    let confidence_of = |frame: &Vec<_>| confidence(&sigmas, frame, set.markers().len());
+    let confidence = bound.frames.iter().map(confidence_of).collect();
     let report = MarkerReport {
-        marker_set: set.name().to_owned(),
         subjects: clip.subjects(),
-        up_axis: axis_name(bound.up_in_file),
         unit_scale_m: options.unit_scale_m.unwrap_or(clip.unit_scale_m),
         markers,
         rms_m,
-        missing_share: missing as f64 / (bound.frames.len() * bound.sites.len()) as f64,
         keyframes: chosen,
         betas: person.betas.clone(),
         joint_sigma_m: Joint::ALL.into_iter().zip(sigmas).collect(),
-        absent: bound.absent,
-        unknown: bound.unknown,
+        ..binding_report(bound, set)
     };
     let motion = SmplMotion {
         name: clip.name.clone(),
@@ -169,8 +106,61 @@ pub fn fit_markers(
     Ok((motion, report))
 }
 
-/// Of a frame, by the joints' median standard deviation along an axis; it grows as the root of the
-/// set's markers over those seen.
+/// Where a set has its markers in the frames of their triangles, m.
+fn stuck_at<'a>(markers: impl Iterator<Item = &'a SetMarker>) -> Vec<Vector3<f64>> {
+    markers
+        .map(|marker| Vector3::new(0.0, 0.0, marker.height_m))
+        .collect()
+}
+
+/// The chosen frames, each with a pose that is found from its markers alone; without those in which
+/// none is found.
+fn keyframes(
+    bound: &Bound<'_>,
+    chosen: &[usize],
+    mean: &ShapedSkin<'_>,
+    trunk: &[bool],
+    prior: &PosePrior,
+) -> Vec<Keyframe> {
+    let keyframe = |&index: &usize| {
+        let observed = bound.frames[index].clone();
+        let pose = cold_start(mean, &observed, trunk, prior, &[])?;
+        Some(Keyframe { observed, pose })
+    };
+    let found: Vec<Option<Keyframe>> = chosen.par_iter().map(keyframe).collect();
+    found.into_iter().flatten().collect()
+}
+
+fn poses(keyframes: &[Keyframe]) -> Vec<BodyPose> {
+    keyframes.iter().map(|frame| frame.pose.clone()).collect()
+}
+
+/// What the labels and the frames say; the fit's own results are to be filled in.
+fn binding_report(bound: Bound<'_>, set: &MarkerSet) -> MarkerReport {
+    let missing = bound
+        .frames
+        .iter()
+        .flatten()
+        .filter(|point| point.is_none())
+        .count();
+    MarkerReport {
+        marker_set: set.name().to_owned(),
+        subjects: Vec::new(),
+        up_axis: axis_name(bound.up_in_file),
+        unit_scale_m: 0.0,
+        markers: Vec::new(),
+        absent: bound.absent,
+        unknown: bound.unknown,
+        rms_m: 0.0,
+        missing_share: missing as f64 / (bound.frames.len() * bound.sites.len()) as f64,
+        keyframes: Vec::new(),
+        betas: Vec::new(),
+        joint_sigma_m: Vec::new(),
+    }
+}
+
+/// A frame's confidence by the joints' median standard deviation along an axis, which grows as the
+/// root of the set's markers over those seen.
 fn confidence(joint_sigmas_m: &[f64], frame: &[Option<Vector3<f64>>], markers: usize) -> f64 {
     let mut sigmas = joint_sigmas_m.to_vec();
     sigmas.sort_unstable_by(f64::total_cmp);
@@ -188,7 +178,7 @@ fn marker_fits(
     shaped: &ShapedSkin<'_>,
     person: &Person,
     stuck_at: &[Vector3<f64>],
-    poses: &[cromosim_body::BodyPose],
+    poses: &[BodyPose],
 ) -> (Vec<MarkerFit>, f64) {
     let mut sums = vec![(0.0, 0_usize); bound.sites.len()];
     for (frame, pose) in bound.frames.iter().zip(poses) {
@@ -219,7 +209,7 @@ fn marker_fits(
 /// Where a set's markers are on a body in a pose of its own shape: what [`fit_markers`] would see.
 ///
 /// # Errors
-/// [`MotionError`] where a place of the set is not on the body.
+/// [`MotionError`] where a marker of the set is not on the body.
 pub fn place_markers(
     motion: &SmplMotion,
     body: &Arc<BodyModel>,
@@ -231,12 +221,7 @@ pub fn place_markers(
         .map(|marker| marker.site_on(body, set.name()))
         .collect::<Result<_, _>>()?;
     let skin = Skin::new(body, &sites, 0)?;
-    let stuck_at: Vec<Vector3<f64>> = set
-        .markers()
-        .iter()
-        .map(|marker| Vector3::new(0.0, 0.0, marker.height_m))
-        .collect();
-    let shaped = skin.shaped(&motion.betas, &stuck_at)?;
+    let shaped = skin.shaped(&motion.betas, &stuck_at(set.markers().iter()))?;
     let frame = |pose| {
         shaped
             .posed(pose)
@@ -269,7 +254,7 @@ mod tests {
                 .map(|marker| (marker < count).then(Vector3::zeros))
                 .collect()
         };
-        let of = |count: usize| {
+        let std_m = |count: usize| {
             cromosim_spatial::std_of_confidence(confidence(
                 &[0.001, 0.003, 0.002, 0.009, 0.001],
                 &seen(count),
@@ -277,7 +262,7 @@ mod tests {
             ))
         };
         let median_m = 0.002 / f64::sqrt(3.0);
-        assert!((of(40) - median_m).abs() < 1e-9 && (of(10) - 2.0 * median_m).abs() < 1e-9);
+        assert!((std_m(40) - median_m).abs() < 1e-9 && (std_m(10) - 2.0 * median_m).abs() < 1e-9);
         assert_eq!(confidence(&[0.002], &seen(0), 40), 0.0);
     }
 }

@@ -176,10 +176,10 @@ pub(super) fn cost(
     pose: &BodyPose,
     posed: &Posed,
 ) -> f64 {
-    let of_marker = |(seen, marker): (&Option<Vector3<f64>>, &Vector3<f64>)| {
+    let marker_cost = |(seen, marker): (&Option<Vector3<f64>>, &Vector3<f64>)| {
         seen.map_or(0.0, |seen| huber((marker - seen).norm(), terms.huber_m).0)
     };
-    let markers: f64 = observed.iter().zip(&posed.markers).map(of_marker).sum();
+    let markers: f64 = observed.iter().zip(&posed.markers).map(marker_cost).sum();
     let mut turns = 0.0;
     for (joint, own) in pose.local_rotations.iter().enumerate() {
         let away = (terms.prior.means[joint].inverse() * own).scaled_axis();

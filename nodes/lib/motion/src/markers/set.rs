@@ -43,7 +43,7 @@ struct RawMarker {
 
 /// Where on the skin a marker is stuck.
 #[derive(Clone, Debug, PartialEq)]
-pub enum MarkerPlace {
+pub enum MarkerSite {
     /// A named site of the body.
     Site(String),
     /// A vertex of the mesh; only for the body it was found on.
@@ -51,8 +51,8 @@ pub enum MarkerPlace {
     /// A point of a triangle; only for the body it was found on.
     Barycentric(u32, [f64; 3]),
     /// Where a ray leaves the skin of the mean shape in T-pose: from the point `along` of the way
-    /// between two joints (0 the first, 1 the second) in `direction` (left, up, forward). The same
-    /// place on every body.
+    /// between two joints (0 the first, 1 the second) in `direction` (left, up, forward). Means the
+    /// same point of the skin on every body.
     Ray {
         /// The joint that the way begins at.
         from: Joint,
@@ -72,18 +72,18 @@ pub struct SetMarker {
     pub label: String,
     /// Other labels of the same marker.
     pub aliases: Vec<String>,
-    /// Where it is stuck.
-    pub place: MarkerPlace,
+    /// Where on the skin it is stuck.
+    pub site: MarkerSite,
     /// Its centre over the skin along the normal, m.
     pub height_m: f64,
 }
 
-/// A marker set: labels and places.
+/// A marker set: labels, and where on the skin each marker is stuck.
 ///
 /// As YAML: `name`, `description`, `height_mm` (centres over the skin; usual markers 9.5) and
 /// `markers`: label to one of `{site: NAME}`, `{vertex: N}`, `{triangle: N, barycentrics: [a, b,
 /// c]}`, `{from: JOINT, to: JOINT, along: SHARE, direction: [left, up, forward]}` (see
-/// [`MarkerPlace::Ray`]; `to` and `along` may be left out), each with `height_mm` and `aliases` of
+/// [`MarkerSite::Ray`]; `to` and `along` may be left out), each with `height_mm` and `aliases` of
 /// its own where wanted.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MarkerSet {
@@ -133,11 +133,11 @@ impl MarkerSet {
                 return Err(content(&key, "height_mm is not from 0 to 200"));
             }
             let aliases = raw_marker.aliases.clone();
-            let place = place(raw_marker).map_err(|problem| content(&key, &problem))?;
+            let site = site(raw_marker).map_err(|problem| content(&key, &problem))?;
             markers.push(SetMarker {
                 label,
                 aliases,
-                place,
+                site,
                 height_m: height_mm * 1e-3,
             });
         }
@@ -164,7 +164,7 @@ impl MarkerSet {
     }
 }
 
-fn place(raw: RawMarker) -> Result<MarkerPlace, String> {
+fn site(raw: RawMarker) -> Result<MarkerSite, String> {
     let given = [
         raw.site.is_some(),
         raw.vertex.is_some(),
@@ -188,10 +188,10 @@ fn place(raw: RawMarker) -> Result<MarkerPlace, String> {
         raw.triangle.zip(raw.barycentrics),
         raw.from.zip(raw.direction),
     ) {
-        (Some(site), ..) => Ok(MarkerPlace::Site(site)),
-        (_, Some(vertex), ..) => Ok(MarkerPlace::Vertex(vertex)),
+        (Some(site), ..) => Ok(MarkerSite::Site(site)),
+        (_, Some(vertex), ..) => Ok(MarkerSite::Vertex(vertex)),
         (_, _, Some((triangle, barycentrics)), _) => {
-            Ok(MarkerPlace::Barycentric(triangle, barycentrics))
+            Ok(MarkerSite::Barycentric(triangle, barycentrics))
         }
         (_, _, _, Some((from, direction))) => {
             let joint = |name: &str| {
@@ -204,7 +204,7 @@ fn place(raw: RawMarker) -> Result<MarkerPlace, String> {
                     "expected along from -10 to 10 and a direction that is not 0".to_owned(),
                 );
             }
-            Ok(MarkerPlace::Ray {
+            Ok(MarkerSite::Ray {
                 from: joint(&from)?,
                 to,
                 along,
@@ -227,12 +227,12 @@ impl SetMarker {
             key: format!("markers.{}", self.label),
             problem: problem.to_owned(),
         };
-        match &self.place {
-            MarkerPlace::Site(name) => Ok(body.site(name)?),
-            MarkerPlace::Barycentric(triangle, barycentrics) => {
+        match &self.site {
+            MarkerSite::Site(name) => Ok(body.site(name)?),
+            MarkerSite::Barycentric(triangle, barycentrics) => {
                 Ok(body.site_at(*triangle, *barycentrics)?)
             }
-            MarkerPlace::Vertex(vertex) => {
+            MarkerSite::Vertex(vertex) => {
                 let corner =
                     |triangle: &[u32; 3]| triangle.iter().position(|corner| corner == vertex);
                 let found = body
@@ -251,7 +251,7 @@ impl SetMarker {
                     std::array::from_fn(|index| f64::from(u8::from(index == corner))),
                 )?)
             }
-            MarkerPlace::Ray {
+            MarkerSite::Ray {
                 from,
                 to,
                 along,

@@ -154,10 +154,10 @@ impl<'a> Problem<'a> {
     ) -> f64 {
         let departure = self.departure(person);
         let prior = 0.5 * departure.component_mul(&departure).dot(&self.precisions());
-        let of_frame = |(frame, pose): &(&Keyframe, BodyPose)| {
+        let frame_cost = |(frame, pose): &(&Keyframe, BodyPose)| {
             cost(&frame.observed, &self.terms(), pose, &shaped.posed(pose))
         };
-        prior + frames.iter().map(of_frame).sum::<f64>()
+        prior + frames.iter().map(frame_cost).sum::<f64>()
     }
 
     fn minimise(
@@ -374,11 +374,11 @@ pub(super) fn joint_sigmas(
             jacobian
                 .fixed_view_mut::<3, 3>(0, 0)
                 .copy_from(&Matrix3::identity());
-            let place = posed.segments[joint.index()].translation.vector;
+            let position = posed.segments[joint.index()].translation.vector;
             let mut ancestor = joint.parent();
             while let Some(turning) = ancestor {
                 let segment = &posed.segments[turning.index()];
-                let block = -(place - segment.translation.vector).cross_matrix()
+                let block = -(position - segment.translation.vector).cross_matrix()
                     * segment.rotation.to_rotation_matrix().matrix();
                 jacobian
                     .fixed_view_mut::<3, 3>(0, 3 + 3 * turning.index())

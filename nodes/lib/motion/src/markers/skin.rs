@@ -14,8 +14,9 @@
 use std::sync::Arc;
 
 use cromosim_body::{BodyModel, BodyPose, JOINT_COUNT, Joint, ShapedBody, Site, VertexSubset};
-use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Vector3};
 
+use super::skin_weights::{skin_weights, unit};
 use crate::MotionError;
 
 /// A marker's skin, before it has a shape.
@@ -28,7 +29,7 @@ struct Patch {
 /// One joint that moves a marker.
 struct Slot {
     joint: usize,
-    /// Place of the nearest joint towards the pelvis among the slots.
+    /// Index of the nearest joint towards the pelvis among the slots.
     parent: Option<usize>,
     /// The corner and b_i w_is of the corners that this segment carries.
     shares: Vec<(usize, f64)>,
@@ -38,9 +39,11 @@ struct Slot {
 pub(super) struct Skin {
     pub body: Arc<BodyModel>,
     patches: Vec<Patch>,
+    /// The triangles' corners, three a marker.
     vertices: Vec<u32>,
-    /// Of each corner, how each shape coefficient moves it at rest, m.
+    /// For each corner how each shape coefficient moves it at rest, m.
     corner_directions: Vec<Vec<Vector3<f64>>>,
+    /// How each shape coefficient moves the joints at rest, m.
     joint_directions: Vec<[Vector3<f64>; JOINT_COUNT]>,
 }
 
@@ -56,7 +59,9 @@ pub(super) struct ShapedSkin<'a> {
 
 /// The markers in a pose.
 pub(super) struct Posed {
+    /// m, world.
     pub markers: Vec<Vector3<f64>>,
+    /// The triangles' frames [tangent, binormal, normal].
     pub frames: Vec<Matrix3<f64>>,
     pub segments: [Isometry3<f64>; JOINT_COUNT],
 }
@@ -155,7 +160,7 @@ impl Patch {
             let parent = Joint::ALL[joint]
                 .parent()
                 .and_then(|parent| joints.iter().position(|&other| other == parent.index()));
-            let of_corner = |(corner, weights): (usize, &Vec<(usize, f64)>)| {
+            let share = |(corner, weights): (usize, &Vec<(usize, f64)>)| {
                 let weight: f64 = weights
                     .iter()
                     .filter(|(other, _)| *other == joint)
@@ -166,7 +171,7 @@ impl Patch {
             let shares = weights
                 .iter()
                 .enumerate()
-                .map(of_corner)
+                .map(share)
                 .filter(|(_, share)| *share != 0.0)
                 .collect();
             Slot {
@@ -192,14 +197,14 @@ impl ShapedSkin<'_> {
             .iter()
             .map(triangle_frame)
             .collect();
-        let place = |marker: usize| {
+        let position = |marker: usize| {
             let [a, b, c] = self.skin.patches[marker].barycentrics;
             corners[3 * marker] * a
                 + corners[3 * marker + 1] * b
                 + corners[3 * marker + 2] * c
                 + frames[marker] * self.placements[marker]
         };
-        let markers = (0..frames.len()).map(place).collect();
+        let markers = (0..frames.len()).map(position).collect();
         Posed {
             markers,
             frames,
@@ -289,75 +294,11 @@ fn triangle_frame(corners: &[Vector3<f64>; 3]) -> Matrix3<f64> {
     Matrix3::from_columns(&[tangent, normal.cross(&tangent), normal])
 }
 
-fn unit(beta: usize) -> Vec<f64> {
-    let mut betas = vec![0.0; beta + 1];
-    betas[beta] = 1.0;
-    betas
-}
-
-/// Skin weights of vertices, read off the body's motion: between two shapes in the same pose the
-/// pose corrections are the same, so that, with one joint turned by R, `v(beta) - v(0) - d = W (R -
-/// I) (d - D)`: d and D are how shape moves the vertex and the joint at rest, and W sums the
-/// weights of the joint and all beyond it. Half turns about three axes and up to ten shapes give W
-/// by least squares.
-fn skin_weights(
-    body: &Arc<BodyModel>,
-    vertices: &[u32],
-) -> Result<Vec<Vec<(usize, f64)>>, MotionError> {
-    let mean = ShapedBody::new(body.clone(), &[])?;
-    let still = mean.subset(vertices)?;
-    let (_, directions) = body.joint_shape_directions();
-    let mut products = vec![[(0.0, 0.0); JOINT_COUNT]; vertices.len()];
-    for (beta, joint_directions) in directions.iter().enumerate().take(10) {
-        let shape = ShapedBody::new(body.clone(), &unit(beta))?;
-        let moved = shape.subset(vertices)?;
-        for joint in 0..JOINT_COUNT {
-            for axis in 0..3 {
-                let turn =
-                    UnitQuaternion::from_scaled_axis(Vector3::ith(axis, std::f64::consts::PI));
-                let mut pose = BodyPose::rest(Vector3::zeros());
-                pose.local_rotations[joint] = turn;
-                let (with, without) = (moved.positions(&pose), still.positions(&pose));
-                // Poses hold the pelvis in place, shapes move it.
-                for (index, &vertex) in vertices.iter().enumerate() {
-                    let rest = shape.rest_vertices()[vertex as usize]
-                        - mean.rest_vertices()[vertex as usize];
-                    let pelvis = joint_directions[0];
-                    let measured = with[index] - without[index] - (rest - pelvis);
-                    let lever = rest - joint_directions[joint];
-                    let expected = turn * lever - lever;
-                    products[index][joint].0 += expected.dot(&measured);
-                    products[index][joint].1 += expected.norm_squared();
-                }
-            }
-        }
-    }
-    let weights = |products: &[(f64, f64); JOINT_COUNT]| {
-        let sums =
-            products.map(|(measured, square)| if square > 0.0 { measured / square } else { 0.0 });
-        let own = |joint: Joint| {
-            (
-                joint.index(),
-                sums[joint.index()]
-                    - joint
-                        .children()
-                        .map(|child| sums[child.index()])
-                        .sum::<f64>(),
-            )
-        };
-        // What rounding leaves is a thousand times smaller.
-        Joint::ALL
-            .map(own)
-            .into_iter()
-            .filter(|(_, weight)| weight.abs() > 1e-7)
-            .collect()
-    };
-    Ok(products.iter().map(weights).collect())
-}
-
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
+    use nalgebra::UnitQuaternion;
+
     use super::*;
 
     fn pose() -> BodyPose {

@@ -58,9 +58,9 @@ pub(super) fn placed(
             .filter_map(|index| Some((model[index], observed[index]?)))
             .collect()
     };
-    let of_trunk = pairs(true);
-    let pairs = if of_trunk.len() >= 3 {
-        of_trunk
+    let trunk_pairs = pairs(true);
+    let pairs = if trunk_pairs.len() >= 3 {
+        trunk_pairs
     } else {
         pairs(false)
     };
@@ -78,18 +78,18 @@ pub fn fit_rigid(
     pairs: &[(Vector3<f64>, Vector3<f64>)],
 ) -> Option<(UnitQuaternion<f64>, Vector3<f64>)> {
     let count = pairs.len() as f64;
-    let middle_a = pairs.iter().map(|pair| pair.0).sum::<Vector3<f64>>() / count;
-    let middle_b = pairs.iter().map(|pair| pair.1).sum::<Vector3<f64>>() / count;
+    let mean_a = pairs.iter().map(|pair| pair.0).sum::<Vector3<f64>>() / count;
+    let mean_b = pairs.iter().map(|pair| pair.1).sum::<Vector3<f64>>() / count;
     let product: Matrix3<f64> = pairs
         .iter()
-        .map(|(a, b)| (b - middle_b) * (a - middle_a).transpose())
+        .map(|(a, b)| (b - mean_b) * (a - mean_a).transpose())
         .sum();
     let svd = product.try_svd(true, true, 1e-12, 200)?;
     let (u, v_t) = (svd.u?, svd.v_t?);
     let sign = (u * v_t).determinant().signum();
     let turn = u * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, sign)) * v_t;
     let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn));
-    Some((turn, middle_b - turn * middle_a))
+    Some((turn, mean_b - turn * mean_a))
 }
 
 /// The pose of a frame from nothing but its markers; `others` are poses seen elsewhere in the

@@ -5,7 +5,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::rest::Rest;
 use crate::axes::{frame_of, minimal_rotation};
-use crate::skeleton_map::{BoundMap, FeetAtRest};
+use crate::skeleton_map::{BoundMap, FeetAtRest, Point};
 
 type Joints = [Vector3<f64>; JOINT_COUNT];
 
@@ -46,7 +46,7 @@ const RIGHT: Limb = Limb {
     foot: Joint::RightFoot,
 };
 
-/// Of each SMPL segment the rotation, in the body's axes, from SMPL's T-pose to the source's rest
+/// For each SMPL segment the rotation, in the body's axes, from SMPL's T-pose to the source's rest
 /// pose.
 ///
 /// Trunk: two vectors, from the hips to the neck and across the hips (pelvis) or shoulders (spine
@@ -74,7 +74,7 @@ pub(super) fn alignments(
         Joint::Head,
         UnitQuaternion::identity(),
     );
-    for (limb, hand_point, toe_point, thumb_side) in [
+    let sides = [
         (&LEFT, map.hands.left, map.toes.left, map.thumb_sides.left),
         (
             &RIGHT,
@@ -82,57 +82,67 @@ pub(super) fn alignments(
             map.toes.right,
             map.thumb_sides.right,
         ),
-    ] {
+    ];
+    for (limb, hand_point, toe_point, thumb_side) in sides {
         alignments[limb.collar.index()] = chest;
-        let upper_arm = bone(
-            map,
-            rest,
-            joints,
-            limb.shoulder,
-            limb.elbow,
-            UnitQuaternion::identity(),
-        );
-        let forearm = bone(map, rest, joints, limb.elbow, limb.wrist, upper_arm);
+        let [upper_arm, forearm, hand] = arm(map, rest, joints, limb, hand_point, thumb_side);
         alignments[limb.shoulder.index()] = upper_arm;
         alignments[limb.elbow.index()] = forearm;
-        let wrist = rest.joint(map, limb.wrist);
-        let hand = wrist
-            .zip(hand_point.and_then(|point| rest.point(point)))
-            .map(|(wrist, point)| point - wrist);
-        let side = thumb_side.and_then(|[from, to]| Some(rest.point(to)? - rest.point(from)?));
-        let ours = joints[limb.hand.index()] - joints[limb.wrist.index()];
-        let hand = hand_alignment(ours, hand, side, forearm);
         alignments[limb.wrist.index()] = hand;
         alignments[limb.hand.index()] = hand;
-        let thigh = bone(
-            map,
-            rest,
-            joints,
-            limb.hip,
-            limb.knee,
-            UnitQuaternion::identity(),
-        );
-        let shin = bone(map, rest, joints, limb.knee, limb.ankle, thigh);
+        let [thigh, shin, foot] = leg(map, rest, joints, limb, toe_point);
         alignments[limb.hip.index()] = thigh;
         alignments[limb.knee.index()] = shin;
-        let toe = rest
-            .joint(map, limb.ankle)
-            .zip(toe_point.and_then(|point| rest.point(point)))
-            .map(|(ankle, toe)| toe - ankle);
-        let level = if map.feet == FeetAtRest::WithShins {
-            shin
-        } else {
-            UnitQuaternion::identity()
-        };
-        let foot = foot_alignment(
-            joints[limb.foot.index()] - joints[limb.ankle.index()],
-            toe,
-            level,
-        );
         alignments[limb.ankle.index()] = foot;
         alignments[limb.foot.index()] = foot;
     }
     alignments
+}
+
+/// Upper arm, forearm and hand.
+fn arm(
+    map: &BoundMap,
+    rest: &Rest,
+    joints: &Joints,
+    limb: &Limb,
+    hand_point: Option<Point>,
+    thumb_side: Option<[Point; 2]>,
+) -> [UnitQuaternion<f64>; 3] {
+    let unturned = UnitQuaternion::identity();
+    let upper_arm = bone(map, rest, joints, limb.shoulder, limb.elbow, unturned);
+    let forearm = bone(map, rest, joints, limb.elbow, limb.wrist, upper_arm);
+    let hand = rest
+        .joint(map, limb.wrist)
+        .zip(hand_point.and_then(|point| rest.point(point)))
+        .map(|(wrist, point)| point - wrist);
+    let side = thumb_side.and_then(|[from, to]| Some(rest.point(to)? - rest.point(from)?));
+    let ours = joints[limb.hand.index()] - joints[limb.wrist.index()];
+    let hand = hand_alignment(ours, hand, side, forearm);
+    [upper_arm, forearm, hand]
+}
+
+/// Thigh, shin and foot.
+fn leg(
+    map: &BoundMap,
+    rest: &Rest,
+    joints: &Joints,
+    limb: &Limb,
+    toe_point: Option<Point>,
+) -> [UnitQuaternion<f64>; 3] {
+    let unturned = UnitQuaternion::identity();
+    let thigh = bone(map, rest, joints, limb.hip, limb.knee, unturned);
+    let shin = bone(map, rest, joints, limb.knee, limb.ankle, thigh);
+    let toe = rest
+        .joint(map, limb.ankle)
+        .zip(toe_point.and_then(|point| rest.point(point)))
+        .map(|(ankle, toe)| toe - ankle);
+    let level = if map.feet == FeetAtRest::WithShins {
+        shin
+    } else {
+        unturned
+    };
+    let ours = joints[limb.foot.index()] - joints[limb.ankle.index()];
+    [thigh, shin, foot_alignment(ours, toe, level)]
 }
 
 /// From the lines mid-hips to neck (exactly) and right to left.

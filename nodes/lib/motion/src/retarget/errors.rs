@@ -3,17 +3,18 @@
 use cromosim_body::{BodyPose, JOINT_COUNT, Joint, ShapedBody};
 use nalgebra::Vector3;
 
-use super::Source;
 use super::floor::quantile;
+use super::source::Source;
+use crate::RetargetReport;
 use crate::axes::angle_between;
 use crate::skeleton_map::Point;
 
 /// Angles over all frames, degrees.
-pub(super) struct BoneDirections {
-    pub median_deg: f64,
-    pub max_deg: f64,
+struct BoneDirections {
+    median_deg: f64,
+    max_deg: f64,
     /// Median of each bone, worst first.
-    pub bones: Vec<(String, f64)>,
+    bones: Vec<(String, f64)>,
 }
 
 /// A bone or line: its name, and where it begins and ends in both skeletons.
@@ -23,8 +24,34 @@ struct Line {
     theirs: ([Point; 2], [Point; 2]),
 }
 
+/// The report as far as source and bones tell it; `frames` are compared with the clip's frames from
+/// `first` on.
+pub(super) fn report(
+    source: &Source<'_>,
+    shaped: &ShapedBody,
+    frames: &[BodyPose],
+    first: usize,
+) -> RetargetReport {
+    let directions = bone_directions(source, shaped, frames, first);
+    RetargetReport {
+        map: source.map.name.clone(),
+        up_axis: String::new(),
+        unit_scale_m: source.unit_scale_m,
+        source_height_m: 0.0,
+        rest: source.rest.origin.to_string(),
+        leg_ratio: 0.0,
+        frames_left_out: first,
+        bone_direction_median_deg: directions.median_deg,
+        bone_direction_max_deg: directions.max_deg,
+        bones: directions.bones,
+        betas: Vec::new(),
+        bone_length_rms_m: 0.0,
+        floor_shift_m: 0.0,
+    }
+}
+
 /// Compares `frames` with the clip's frames from `first` on.
-pub(super) fn bone_directions(
+fn bone_directions(
     source: &Source<'_>,
     shaped: &ShapedBody,
     frames: &[BodyPose],

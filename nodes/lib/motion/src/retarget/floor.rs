@@ -18,7 +18,7 @@ impl Sole {
     /// The soles of a shaped body, left and right: the outermost low vertices before and behind the
     /// toe joint, fixed to toes and foot.
     pub fn both(shaped: &ShapedBody) -> [Self; 2] {
-        let of = |ankle: Joint, foot: Joint, side: f64| {
+        let sole = |ankle: Joint, foot: Joint, side: f64| {
             let joints = shaped.joints_in_model();
             let own = shaped
                 .rest_vertices()
@@ -48,8 +48,8 @@ impl Sole {
             Self { ankle, points }
         };
         [
-            of(Joint::LeftAnkle, Joint::LeftFoot, 1.0),
-            of(Joint::RightAnkle, Joint::RightFoot, -1.0),
+            sole(Joint::LeftAnkle, Joint::LeftFoot, 1.0),
+            sole(Joint::RightAnkle, Joint::RightFoot, -1.0),
         ]
     }
 

@@ -3,8 +3,8 @@
 use cromosim_body::{BodyPose, JOINT_COUNT, Joint, ShapedBody};
 use nalgebra::Vector3;
 
-use super::Source;
-use super::rest::Stance;
+use super::source::Source;
+use super::stance::Stance;
 
 /// How long a blend from the T-pose may last, s.
 const LONGEST_BLEND_S: f64 = 0.25;
@@ -23,7 +23,7 @@ pub(super) fn frames_to_leave_out(
     frames: &[BodyPose],
 ) -> usize {
     let t_pose =
-        |index: usize| Stance::of(&source.clip.pose_of_frame(index), &source.map).is_t_pose();
+        |index: usize| Stance::in_pose(&source.clip.pose_of_frame(index), &source.map).is_t_pose();
     let leading = (0..frames.len()).take_while(|&index| t_pose(index)).count();
     if leading == 0 || leading * 2 > frames.len() {
         return 0;

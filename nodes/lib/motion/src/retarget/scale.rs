@@ -5,10 +5,11 @@ use std::sync::Arc;
 use cromosim_body::{BodyModel, Joint};
 use nalgebra::Vector3;
 
-use super::rest::{Rest, Stance};
-use crate::axes::nearest_axis;
+use super::rest::Rest;
+use super::stance::Stance;
+use crate::axes::{UpAxis, nearest_axis};
 use crate::skeleton_map::BoundMap;
-use crate::{BvhClip, MotionError, UpAxis};
+use crate::{BvhClip, MotionError};
 
 /// Metres per unit: metre, centimetre, millimetre, inch, foot, and CMU's own (inches times 0.45).
 const USUAL_UNITS_M: [f64; 6] = [1.0, 0.01, 0.001, 0.0254, 0.3048, 0.0254 / 0.45];
@@ -28,15 +29,15 @@ pub(super) fn up_axis(
         return Ok(direction);
     }
     let mean = mean_upward(clip, map);
-    let zero = Stance::of(&clip.zero_pose(), map);
-    let of_zero_pose = zero.stands().then(|| nearest_axis(zero.trunk));
-    let agreed = of_zero_pose.filter(|axis| axis.dot(&mean) > 0.3);
-    let of_motion = [Vector3::y(), Vector3::z()]
+    let zero = Stance::in_pose(&clip.zero_pose(), map);
+    let by_zero_pose = zero.stands().then(|| nearest_axis(zero.trunk));
+    let agreed = by_zero_pose.filter(|axis| axis.dot(&mean) > 0.3);
+    let by_motion = [Vector3::y(), Vector3::z()]
         .into_iter()
         .find(|axis| axis.dot(&mean) > 0.6);
     agreed
-        .or(of_motion)
-        .or(of_zero_pose)
+        .or(by_motion)
+        .or(by_zero_pose)
         .ok_or_else(|| MotionError::UpAxis {
             name: clip.name().to_owned(),
             mean: mean.into(),

@@ -1,82 +1,11 @@
-//! ASF (Acclaim skeleton file): bones with lengths, directions, axes and degrees of freedom.
-//!
-//! A bone begins where its parent ends and goes `direction * length` further, in the skeleton's
-//! axes at rest. `axis` gives the bone's own axes C at rest by three angles about fixed axes, the
-//! first named first; the degrees of freedom in an AMC file turn about C's axes.
+//! The sections of the file.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use crate::bvh::cursor::{Cursor, Token};
+use super::bones::{RawBone, RawBones};
+use super::skeleton::{AsfChannel, AsfSkeleton, turned};
+use crate::text::{Cursor, Token, without_byte_order_mark};
 use crate::{MAX_JOINTS, MotionError};
-
-/// One number of a bone or of the root in a frame of an AMC file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum AsfChannel {
-    /// `TX`, `TY`, `TZ` of the root: position along axis 0, 1, 2, file units.
-    Translation(usize),
-    /// `RX`, `RY`, `RZ`: turn about axis 0, 1, 2 of the bone's axes.
-    Rotation(usize),
-}
-
-/// One bone; it begins where its parent ends.
-#[derive(Clone, Debug, PartialEq)]
-pub struct AsfBone {
-    /// As in the file.
-    pub name: String,
-    /// Index of the parent, always smaller than the bone's own; `None` for bones that begin at the
-    /// root.
-    pub parent: Option<usize>,
-    /// From the bone's beginning to its end at rest, skeleton axes, file units.
-    pub rest_span: Vector3<f64>,
-    /// C: skeleton_from_bone at rest.
-    pub skeleton_from_bone: UnitQuaternion<f64>,
-    /// The axes (0 x, 1 y, 2 z) that the bone turns about, in the order of an AMC line's numbers.
-    pub freedoms: Vec<usize>,
-    /// Smallest and largest angle of each freedom, rad, where the file has them all; they are not
-    /// enforced.
-    pub limits: Vec<[f64; 2]>,
-}
-
-/// A parsed ASF file.
-#[derive(Clone, Debug, PartialEq)]
-pub struct AsfSkeleton {
-    /// The name given to [`parse_asf`].
-    pub name: String,
-    /// `length` of `:units`: CMU's files have 0.45, their unit is an inch divided by it.
-    pub length_unit: f64,
-    /// Whether angles of the skeleton are degrees (else radians).
-    pub degrees: bool,
-    /// What the root's numbers in an AMC file are.
-    pub root_order: Vec<AsfChannel>,
-    /// Root at rest, file units.
-    pub root_position: Vector3<f64>,
-    /// Root at rest: the axes that the root's turns are about.
-    pub root_orientation: UnitQuaternion<f64>,
-    /// Parents before children.
-    pub bones: Vec<AsfBone>,
-}
-
-impl AsfSkeleton {
-    /// The bone called `name` (as written, in any case).
-    pub fn bone(&self, name: &str) -> Option<usize> {
-        self.bones
-            .iter()
-            .position(|bone| bone.name.eq_ignore_ascii_case(name))
-    }
-}
-
-/// The rotation of three angles (rad) about fixed axes, the first one first: R = R_last R_middle
-/// R_first.
-pub(crate) fn turned(angles: impl IntoIterator<Item = (usize, f64)>) -> UnitQuaternion<f64> {
-    angles
-        .into_iter()
-        .fold(UnitQuaternion::identity(), |before, (axis, angle)| {
-            UnitQuaternion::from_axis_angle(
-                &[Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()][axis.min(2)],
-                angle,
-            ) * before
-        })
-}
 
 fn axis_index(letter: &str) -> Option<usize> {
     ["x", "y", "z"].iter().position(|known| *known == letter)
@@ -104,23 +33,21 @@ impl<'a> Line<'a> {
     }
 }
 
-/// What a bone of `:bonedata` says; turned into an [`AsfBone`] once the hierarchy is known.
-struct RawBone {
-    name: String,
-    direction: Vector3<f64>,
-    length: f64,
-    skeleton_from_bone: UnitQuaternion<f64>,
+/// The lines of a bone as far as they are read.
+#[derive(Default)]
+struct BoneFields {
+    name: Option<String>,
+    direction: Option<Vector3<f64>>,
+    length: Option<f64>,
+    axis: UnitQuaternion<f64>,
     freedoms: Vec<usize>,
     limits: Vec<[f64; 2]>,
-    line: usize,
 }
 
 struct Parser<'a> {
     cursor: Cursor<'a>,
     skeleton: AsfSkeleton,
-    raw: Vec<RawBone>,
-    /// Child's name, parent's name (`None` for the root), line.
-    edges: Vec<(&'a str, Option<&'a str>, usize)>,
+    bones: RawBones<'a>,
 }
 
 /// Parses the text of an ASF file; `name` stands in the errors. No file is touched.
@@ -145,12 +72,11 @@ pub fn parse_asf(text: &str, name: &str) -> Result<AsfSkeleton, MotionError> {
         root_orientation: UnitQuaternion::identity(),
         bones: Vec::new(),
     };
-    let cursor = Cursor::new(text.strip_prefix('\u{feff}').unwrap_or(text), name);
+    let cursor = Cursor::new(without_byte_order_mark(text), name);
     let mut parser = Parser {
         cursor,
         skeleton,
-        raw: Vec::new(),
-        edges: Vec::new(),
+        bones: RawBones::default(),
     };
     let mut line = parser.next_line();
     if !line
@@ -163,12 +89,16 @@ pub fn parse_asf(text: &str, name: &str) -> Result<AsfSkeleton, MotionError> {
         line = match section.keyword().as_str() {
             ":units" => parser.units()?,
             ":root" => parser.root()?,
-            ":bonedata" => parser.bones()?,
+            ":bonedata" => parser.bone_data()?,
             ":hierarchy" => parser.hierarchy()?,
             _ => parser.skip_section(),
         };
     }
-    parser.finish()
+    let bones = parser.bones.in_order(&parser.cursor)?;
+    Ok(AsfSkeleton {
+        bones,
+        ..parser.skeleton
+    })
 }
 
 impl<'a> Parser<'a> {
@@ -327,15 +257,15 @@ impl<'a> Parser<'a> {
         }
     }
 
-    fn bones(&mut self) -> Result<Option<Line<'a>>, MotionError> {
+    fn bone_data(&mut self) -> Result<Option<Line<'a>>, MotionError> {
         loop {
             let Some(line) = self.next_line() else {
                 return Ok(None);
             };
             match line.keyword().as_str() {
-                "begin" if self.raw.len() < MAX_JOINTS => {
+                "begin" if self.bones.raw.len() < MAX_JOINTS => {
                     let bone = self.bone(line.number)?;
-                    self.raw.push(bone);
+                    self.bones.raw.push(bone);
                 }
                 "begin" => {
                     let name = self.cursor.name().to_owned();
@@ -354,69 +284,79 @@ impl<'a> Parser<'a> {
 
     /// After `begin`, up to and with `end`.
     fn bone(&mut self, begin: usize) -> Result<RawBone, MotionError> {
-        let (mut name, mut direction, mut length, mut axis) =
-            (None, None, None, UnitQuaternion::identity());
-        let (mut freedoms, mut limits) = (Vec::new(), Vec::new());
+        let mut bone = BoneFields::default();
         let mut in_limits = false;
         loop {
             let Some(line) = self.next_line() else {
                 return Err(self.unexpected("end of the bone", None));
             };
             let keyword = line.keyword();
+            if keyword == "end" {
+                break;
+            }
             let continues = in_limits && keyword.parse::<f64>().is_ok();
             in_limits = continues || keyword == "limits";
-            match keyword.as_str() {
-                "name" if line.words.len() > 1 => name = Some(line.words[1..].join(" ")),
-                "direction" => {
-                    direction = Some(Vector3::from(
-                        self.numbers::<3>(&line, "three numbers of direction")?,
-                    ))
-                }
-                "length" => length = Some(self.numbers::<1>(&line, "a number of length")?[0]),
-                "axis" => {
-                    let angles = self.numbers::<3>(&line, "three numbers and an order of axis")?;
-                    axis = turned(
-                        self.axis_order(line.words.get(4), &line)?
-                            .into_iter()
-                            .zip(angles.map(|angle| self.angle(angle))),
-                    );
-                }
-                "dof" => freedoms = self.freedoms(&line)?,
-                "limits" => limits.extend(self.limit(&line.words[1..], &line)?),
-                _ if continues => limits.extend(self.limit(&line.words, &line)?),
-                "id" | "bodymass" | "cofmass" => {}
-                "end" => break,
-                _ => {
-                    return Err(self.unexpected(
-                        "name, direction, length, axis, dof, limits or end",
-                        Some(&line),
-                    ));
-                }
+            if continues {
+                bone.limits.extend(self.limit(&line.words, &line)?);
+            } else {
+                self.bone_field(&keyword, &line, &mut bone)?;
             }
         }
         let missing = |what: &str| {
-            self.cursor.unexpected(
-                what,
-                Some(Token {
-                    text: "a bone without it",
-                    line: begin,
-                }),
-            )
+            let found = Token {
+                text: "a bone without it",
+                line: begin,
+            };
+            self.cursor.unexpected(what, Some(found))
         };
-        let bone = RawBone {
-            name: name.ok_or_else(|| missing("a bone's name"))?,
-            direction: direction.ok_or_else(|| missing("a bone's direction"))?,
-            length: length.ok_or_else(|| missing("a bone's length"))?,
-            skeleton_from_bone: axis,
-            limits: if limits.len() == freedoms.len() {
-                limits
+        Ok(RawBone {
+            name: bone.name.ok_or_else(|| missing("a bone's name"))?,
+            direction: bone
+                .direction
+                .ok_or_else(|| missing("a bone's direction"))?,
+            length: bone.length.ok_or_else(|| missing("a bone's length"))?,
+            skeleton_from_bone: bone.axis,
+            limits: if bone.limits.len() == bone.freedoms.len() {
+                bone.limits
             } else {
                 Vec::new()
             },
-            freedoms,
+            freedoms: bone.freedoms,
             line: begin,
-        };
-        Ok(bone)
+        })
+    }
+
+    /// A line of a bone that begins with a keyword.
+    fn bone_field(
+        &self,
+        keyword: &str,
+        line: &Line<'_>,
+        bone: &mut BoneFields,
+    ) -> Result<(), MotionError> {
+        match keyword {
+            "name" if line.words.len() > 1 => bone.name = Some(line.words[1..].join(" ")),
+            "direction" => {
+                let direction = self.numbers::<3>(line, "three numbers of direction")?;
+                bone.direction = Some(Vector3::from(direction));
+            }
+            "length" => bone.length = Some(self.numbers::<1>(line, "a number of length")?[0]),
+            "axis" => {
+                let angles = self.numbers::<3>(line, "three numbers and an order of axis")?;
+                bone.axis = turned(
+                    self.axis_order(line.words.get(4), line)?
+                        .into_iter()
+                        .zip(angles.map(|angle| self.angle(angle))),
+                );
+            }
+            "dof" => bone.freedoms = self.freedoms(line)?,
+            "limits" => bone.limits.extend(self.limit(&line.words[1..], line)?),
+            "id" | "bodymass" | "cofmass" => {}
+            _ => {
+                let expected = "name, direction, length, axis, dof, limits or end";
+                return Err(self.unexpected(expected, Some(line)));
+            }
+        }
+        Ok(())
     }
 
     fn freedoms(&self, line: &Line<'_>) -> Result<Vec<usize>, MotionError> {
@@ -461,12 +401,12 @@ impl<'a> Parser<'a> {
                     } else {
                         Some(line.words[0])
                     };
-                    self.edges.extend(
+                    self.bones.edges.extend(
                         line.words[1..]
                             .iter()
                             .map(|&child| (child, parent, line.number)),
                     );
-                    if self.edges.len() > MAX_JOINTS {
+                    if self.bones.edges.len() > MAX_JOINTS {
                         let name = self.cursor.name().to_owned();
                         return Err(MotionError::Limit {
                             name,
@@ -478,74 +418,5 @@ impl<'a> Parser<'a> {
                 }
             }
         }
-    }
-
-    /// Brings the bones into an order with parents first. Each bone must hang on the root, once.
-    fn finish(mut self) -> Result<AsfSkeleton, MotionError> {
-        let index_of = |name: &str| {
-            self.raw
-                .iter()
-                .position(|bone| bone.name.eq_ignore_ascii_case(name))
-        };
-        let mut parents: Vec<Option<Option<usize>>> = vec![None; self.raw.len()];
-        for &(child, parent, line) in &self.edges {
-            let known = |name: &'a str| {
-                index_of(name).ok_or_else(|| {
-                    self.cursor
-                        .unexpected("a bone of :bonedata", Some(Token { text: name, line }))
-                })
-            };
-            let (child_index, parent) = (known(child)?, parent.map(known).transpose()?);
-            if parents[child_index].replace(parent).is_some() {
-                return Err(self
-                    .cursor
-                    .unexpected("a bone with one parent", Some(Token { text: child, line })));
-            }
-        }
-        let mut placed: Vec<Option<usize>> = vec![None; self.raw.len()];
-        let mut order = Vec::with_capacity(self.raw.len());
-        // Breadth first: level by level, so that a ring of bones ends the loop rather than keeping
-        // it.
-        loop {
-            let ready = |bone: &usize| match parents[*bone] {
-                Some(None) => placed[*bone].is_none(),
-                Some(Some(parent)) => placed[*bone].is_none() && placed[parent].is_some(),
-                None => false,
-            };
-            let level: Vec<usize> = (0..self.raw.len()).filter(ready).collect();
-            if level.is_empty() {
-                break;
-            }
-            for bone in level {
-                placed[bone] = Some(order.len());
-                order.push(bone);
-            }
-        }
-        if let Some(loose) = (0..self.raw.len()).find(|&bone| placed[bone].is_none()) {
-            let bone = &self.raw[loose];
-            return Err(self.cursor.unexpected(
-                "a bone that hangs on the root",
-                Some(Token {
-                    text: &bone.name,
-                    line: bone.line,
-                }),
-            ));
-        }
-        if order.is_empty() {
-            return Err(self.unexpected(":bonedata and :hierarchy with bones", None));
-        }
-        let bone = |&index: &usize| {
-            let raw = &self.raw[index];
-            AsfBone {
-                name: raw.name.clone(),
-                parent: parents[index].flatten().and_then(|parent| placed[parent]),
-                rest_span: raw.direction.try_normalize(1e-12).unwrap_or_default() * raw.length,
-                skeleton_from_bone: raw.skeleton_from_bone,
-                freedoms: raw.freedoms.clone(),
-                limits: raw.limits.clone(),
-            }
-        };
-        self.skeleton.bones = order.iter().map(bone).collect();
-        Ok(self.skeleton)
     }
 }

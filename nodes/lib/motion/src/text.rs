@@ -1,7 +1,16 @@
-//! Words and lines of a text, with the line they stand on.
+//! Words and lines of a text file, with the line they stand on: what BVH, ASF, AMC and TRC have in
+//! common.
 
 use crate::MotionError;
-use crate::bvh::MAX_VALUE;
+
+/// The largest size of any number in a file: a million kilometres in the smallest unit, and far
+/// more turns than any clip has.
+pub(crate) const MAX_VALUE: f64 = 1e9;
+
+/// The text of a file without the mark that some editors put before it.
+pub(crate) fn without_byte_order_mark(text: &str) -> &str {
+    text.strip_prefix('\u{feff}').unwrap_or(text)
+}
 
 /// Reads words and lines one after the other.
 pub(crate) struct Cursor<'a> {
