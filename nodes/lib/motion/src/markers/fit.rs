@@ -92,18 +92,29 @@ pub fn fit_markers(
         ..binding_report(bound, set)
     };
     let motion = SmplMotion {
+        betas: person.betas,
+        confidence: Some(confidence),
+        frames,
+        markers: Some(report.clone()),
+        ..without_frames(clip, body)
+    };
+    Ok((motion, report))
+}
+
+/// A motion of the clip's name and rate on the body, its frames to be filled in.
+fn without_frames(clip: &MarkerClip, body: &BodyModel) -> SmplMotion {
+    SmplMotion {
         name: clip.name.clone(),
         rate_hz: clip.rate_hz,
         gender: body.gender().unwrap_or(Gender::Neutral),
         shape_space: body.shape_space(),
-        betas: person.betas,
-        confidence: Some(confidence),
-        frames,
+        betas: Vec::new(),
+        frames: Vec::new(),
+        confidence: None,
         report: None,
         poses: None,
-        markers: Some(report.clone()),
-    };
-    Ok((motion, report))
+        markers: None,
+    }
 }
 
 /// Where a set has its markers in the frames of their triangles, m.
