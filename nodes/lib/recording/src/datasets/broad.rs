@@ -7,7 +7,7 @@ use std::path::Path;
 
 use cromosim_arrays::{Container, Entry, Limits};
 use cromosim_spatial::Stamp;
-use nalgebra::{Quaternion, Vector3};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::{DatasetRecording, PlacedImu};
 use crate::rigid::table::unit_quaternion;
@@ -82,35 +82,12 @@ pub fn parse_broad<R: Read + Seek>(reader: R, name: &str) -> Result<DatasetRecor
             format!("expected a rate in Hz, found {rate_hz}"),
         ));
     }
-    let mut of =
-        |key: &'static str, columns| rows(&file.at(key)?, columns).map(|values| (key, values));
-    let [acc, gyr, mag, pos] = [
-        of(keys.acc, 3)?,
-        of(keys.gyr, 3)?,
-        of(keys.mag, 3)?,
-        of(keys.pos, 3)?,
-    ];
-    let quat = of(keys.quat, 4)?;
-    let count = acc.1.len() / 3;
-    for (key, found) in [
-        (gyr.0, gyr.1.len() / 3),
-        (mag.0, mag.1.len() / 3),
-        (pos.0, pos.1.len() / 3),
-        (quat.0, quat.1.len() / 4),
-    ] {
-        if found != count {
-            return Err(content(
-                name,
-                key,
-                format!("{found} rows, but {} has {count}", keys.acc),
-            ));
-        }
-    }
+    let trial = Trial::read(&mut file, &keys, name)?;
     let movement = file
         .get("movement")?
         .map(|entry| flags(&entry))
         .transpose()?
-        .filter(|flags| flags.len() == count);
+        .filter(|flags| flags.len() == trial.acc.len());
     let mut recording = DatasetRecording {
         name: name.to_owned(),
         rate_hz,
@@ -124,46 +101,99 @@ pub fn parse_broad<R: Read + Seek>(reader: R, name: &str) -> Result<DatasetRecor
         frame: "world".to_owned(),
         ..PoseTrajectory::default()
     };
-    let vectors = |(_, values): (_, Vec<f64>)| {
-        values
-            .as_chunks::<3>()
-            .0
-            .iter()
-            .map(|value| Vector3::from(*value))
-            .collect::<Vec<_>>()
-    };
-    let (acc, gyr, mag, pos) = (vectors(acc), vectors(gyr), vectors(mag), vectors(pos));
-    for (index, [w, x, y, z]) in quat.1.as_chunks::<4>().0.iter().enumerate() {
-        let stamp = Stamp::from_seconds(index as f64 / rate_hz);
-        let finite = |vector: &Vector3<f64>| vector.iter().all(|value| value.is_finite());
-        if finite(&acc[index]) && finite(&gyr[index]) && finite(&mag[index]) {
-            imu.series.push(stamp, acc[index], gyr[index]);
-            imu.magnetic_field.push(mag[index]);
-        } else {
-            imu.rows_left_out += 1;
+    for row in 0..trial.acc.len() {
+        let stamp = Stamp::from_seconds(row as f64 / rate_hz);
+        match trial.reading(row) {
+            Some([acc, gyr, mag]) => {
+                imu.series.push(stamp, acc, gyr);
+                imu.magnetic_field.push(mag);
+            }
+            None => imu.rows_left_out += 1,
         }
-        // A lost body has NaN, whose length is none.
-        let quaternion = Quaternion::new(*w, *x, *y, *z);
-        if finite(&pos[index]) && quaternion.coords.iter().all(|value| value.is_finite()) {
-            let wrong = |length| {
-                content(
-                    name,
-                    keys.quat,
-                    format!("row {index} has length {length}, expected 1 within 0.01"),
-                )
-            };
-            optical.push(
-                stamp,
-                pos[index],
-                unit_quaternion(quaternion).map_err(wrong)?,
-            );
+        let pose = trial.pose(row).map_err(|length| {
+            let problem = format!("row {row} has length {length}, expected 1 within 0.01");
+            content(name, keys.quat, problem)
+        })?;
+        if let Some((position, rotation)) = pose {
+            optical.push(stamp, position, rotation);
         }
         if let Some(movement) = &movement {
-            recording.mark(stamp, if movement[index] { "movement" } else { "rest" });
+            recording.mark(stamp, if movement[row] { "movement" } else { "rest" });
         }
     }
     (recording.imus, recording.references) = (vec![imu], vec![("body".to_owned(), optical)]);
     Ok(recording)
+}
+
+/// The columns of a trial, one row a sample; NaN where something is missing.
+struct Trial {
+    acc: Vec<Vector3<f64>>,
+    gyr: Vec<Vector3<f64>>,
+    mag: Vec<Vector3<f64>>,
+    positions: Vec<Vector3<f64>>,
+    /// w first.
+    quaternions: Vec<[f64; 4]>,
+}
+
+impl Trial {
+    fn read<R: Read + Seek>(
+        file: &mut Container<R>,
+        keys: &Keys,
+        name: &str,
+    ) -> Result<Self, RigidError> {
+        let mut vectors = |key: &str| {
+            let values = rows(&file.at(key)?, 3)?;
+            let vectors = values.as_chunks::<3>().0.iter();
+            Ok::<_, RigidError>(
+                vectors
+                    .map(|value| Vector3::from(*value))
+                    .collect::<Vec<_>>(),
+            )
+        };
+        let (acc, gyr) = (vectors(keys.acc)?, vectors(keys.gyr)?);
+        let (mag, positions) = (vectors(keys.mag)?, vectors(keys.pos)?);
+        let quaternions = rows(&file.at(keys.quat)?, 4)?.as_chunks::<4>().0.to_vec();
+        for (key, found) in [
+            (keys.gyr, gyr.len()),
+            (keys.mag, mag.len()),
+            (keys.pos, positions.len()),
+            (keys.quat, quaternions.len()),
+        ] {
+            if found != acc.len() {
+                let problem = format!("{found} rows, but {} has {}", keys.acc, acc.len());
+                return Err(content(name, key, problem));
+            }
+        }
+        Ok(Self {
+            acc,
+            gyr,
+            mag,
+            positions,
+            quaternions,
+        })
+    }
+
+    /// Specific force, angular velocity and magnetic field of a row in which all are known.
+    fn reading(&self, row: usize) -> Option<[Vector3<f64>; 3]> {
+        let reading = [self.acc[row], self.gyr[row], self.mag[row]];
+        reading.iter().all(is_finite).then_some(reading)
+    }
+
+    /// The body's pose in a row, where it was seen; the quaternion's length where it is not 1.
+    fn pose(&self, row: usize) -> Result<Option<(Vector3<f64>, UnitQuaternion<f64>)>, f64> {
+        let [w, x, y, z] = self.quaternions[row];
+        // A lost body has NaN, which has no length.
+        let quaternion = Quaternion::new(w, x, y, z);
+        let seen = quaternion.coords.iter().all(|value| value.is_finite());
+        if !(seen && is_finite(&self.positions[row])) {
+            return Ok(None);
+        }
+        Ok(Some((self.positions[row], unit_quaternion(quaternion)?)))
+    }
+}
+
+fn is_finite(vector: &Vector3<f64>) -> bool {
+    vector.iter().all(|value| value.is_finite())
 }
 
 /// The numbers of an array of `columns` columns, row by row, NaN included.
@@ -173,7 +203,7 @@ fn rows(entry: &Entry, columns: usize) -> Result<Vec<f64>, RigidError> {
         .values)
 }
 
-/// Of a column, or of a list.
+/// Flags from a column or a list.
 fn flags(entry: &Entry) -> Result<Vec<bool>, RigidError> {
     let any = vec![None; entry.shape()?.len()];
     Ok(entry

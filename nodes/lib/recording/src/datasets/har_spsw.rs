@@ -93,64 +93,32 @@ pub fn parse_har_spsw<R: Read + Seek>(
     Ok(recording)
 }
 
-/// Adds one execution's readings, gives its activities.
+/// Adds one execution's readings to the IMU; returns its activities.
 fn read_device<R: Read + Seek>(
     npz: &mut NpzReader<R>,
     name: &str,
     prefix: &str,
     imu: &mut PlacedImu,
 ) -> Result<Vec<ActivitySpan>, RigidError> {
-    let key = |array: &str| format!("{prefix}{array}");
-    let vectors = |npz: &mut NpzReader<R>, array: &str| -> Result<Vec<Vector3<f64>>, RigidError> {
-        let values = npz
-            .at(&key(array))?
-            .floats(&[None, Some(3)], "(N, 3)")?
-            .values;
-        Ok(values
-            .as_chunks::<3>()
-            .0
-            .iter()
-            .map(|value| Vector3::from(*value))
-            .collect())
-    };
-    let (forces, rates) = (vectors(npz, "acc")?, vectors(npz, "gyr")?);
-    let times = npz.at(&key("t_ms"))?.integers(&[None], "(N)")?.values;
-    let labels = npz.at(&key("label"))?.texts()?;
-    for (array, found) in [
-        ("gyr", rates.len()),
-        ("t_ms", times.len()),
-        ("label", labels.len()),
-    ] {
-        if found != forces.len() {
-            let problem = format!("{found} rows, but {prefix}acc has {}", forces.len());
-            return Err(RigidError::Content {
-                name: name.to_owned(),
-                place: key(array),
-                problem,
-            });
-        }
-    }
+    let rows = Rows::read(npz, name, prefix)?;
     let mut spans: Vec<ActivitySpan> = Vec::new();
-    for (row, (milliseconds, label)) in times.iter().zip(labels).enumerate() {
+    for (row, (milliseconds, label)) in rows.times_ms.iter().zip(rows.labels).enumerate() {
         let Some(nanos) = milliseconds.checked_mul(1_000_000) else {
             let problem = format!("row {row} is {milliseconds}, expected milliseconds since 1970");
             return Err(RigidError::Content {
                 name: name.to_owned(),
-                place: key("t_ms"),
+                place: format!("{prefix}t_ms"),
                 problem,
             });
         };
         let stamp = Stamp::from_nanos(nanos);
-        if imu
-            .series
-            .stamps
-            .last()
-            .is_some_and(|previous| *previous >= stamp)
-        {
+        let last = imu.series.stamps.last();
+        if last.is_some_and(|previous| *previous >= stamp) {
             imu.rows_left_out += 1;
             continue;
         }
-        imu.series.push(stamp, forces[row], rates[row]);
+        imu.series
+            .push(stamp, rows.specific_force[row], rows.angular_velocity[row]);
         match spans.last_mut().filter(|span| span.activity == label) {
             Some(span) => span.end = stamp,
             None => spans.push(ActivitySpan {
@@ -161,4 +129,53 @@ fn read_device<R: Read + Seek>(
         }
     }
     Ok(spans)
+}
+
+/// One device's arrays of one execution, of equal length.
+struct Rows {
+    /// m/s2.
+    specific_force: Vec<Vector3<f64>>,
+    /// rad/s.
+    angular_velocity: Vec<Vector3<f64>>,
+    /// Milliseconds since 1970.
+    times_ms: Vec<i64>,
+    labels: Vec<String>,
+}
+
+impl Rows {
+    fn read<R: Read + Seek>(
+        npz: &mut NpzReader<R>,
+        name: &str,
+        prefix: &str,
+    ) -> Result<Self, RigidError> {
+        let key = |array: &str| format!("{prefix}{array}");
+        let mut vectors = |array: &str| -> Result<Vec<Vector3<f64>>, RigidError> {
+            let array = npz.at(&key(array))?.floats(&[None, Some(3)], "(N, 3)")?;
+            let vectors = array.values.as_chunks::<3>().0.iter();
+            Ok(vectors.map(|value| Vector3::from(*value)).collect())
+        };
+        let (specific_force, angular_velocity) = (vectors("acc")?, vectors("gyr")?);
+        let times_ms = npz.at(&key("t_ms"))?.integers(&[None], "(N)")?.values;
+        let labels = npz.at(&key("label"))?.texts()?;
+        for (array, found) in [
+            ("gyr", angular_velocity.len()),
+            ("t_ms", times_ms.len()),
+            ("label", labels.len()),
+        ] {
+            if found != specific_force.len() {
+                let expected = specific_force.len();
+                return Err(RigidError::Content {
+                    name: name.to_owned(),
+                    place: key(array),
+                    problem: format!("{found} rows, but {prefix}acc has {expected}"),
+                });
+            }
+        }
+        Ok(Self {
+            specific_force,
+            angular_velocity,
+            times_ms,
+            labels,
+        })
+    }
 }

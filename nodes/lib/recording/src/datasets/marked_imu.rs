@@ -59,19 +59,33 @@ pub fn parse_marked_imu<R: Read + Seek>(
         )),
     };
     let [imu_hz, mocap_hz] = [rate("fs_imu")?, rate("fs_mocap")?];
-    let mut rows = |key: &str| -> Result<Vec<Vector3<f64>>, RigidError> {
-        let values = file
-            .at(key)?
-            .floats_with_nan(&[None, Some(3)], "(N, 3)")?
-            .values;
-        Ok(values
-            .as_chunks::<3>()
-            .0
-            .iter()
-            .map(|value| Vector3::from(*value))
-            .collect())
-    };
-    let (acc, gyr) = (rows("acc")?, rows("gyr")?);
+    let imu = imu(&mut file, imu_hz, &content)?;
+    let (keys, markers) = markers(&mut file, &content)?;
+    let poses = poses(&markers, mocap_hz)
+        .ok_or_else(|| content(&keys[0], "no frame shows every marker".to_owned()))?;
+    let (imus, references) = (vec![imu], vec![("segment".to_owned(), poses)]);
+    Ok(DatasetRecording {
+        name: name.to_owned(),
+        rate_hz: imu_hz,
+        imus,
+        references,
+        activities: Vec::new(),
+    })
+}
+
+/// The rows (N, 3) of an array, NaN included.
+fn rows<R: Read + Seek>(file: &mut Container<R>, key: &str) -> Result<Vec<[f64; 3]>, RigidError> {
+    let array = file.at(key)?.floats_with_nan(&[None, Some(3)], "(N, 3)")?;
+    Ok(array.values.as_chunks::<3>().0.to_vec())
+}
+
+/// The readings; rows with NaN are left out and counted.
+fn imu<R: Read + Seek>(
+    file: &mut Container<R>,
+    rate_hz: f64,
+    content: &impl Fn(&str, String) -> RigidError,
+) -> Result<PlacedImu, RigidError> {
+    let (acc, gyr) = (rows(file, "acc")?, rows(file, "gyr")?);
     if acc.len() != gyr.len() {
         return Err(content(
             "gyr",
@@ -84,12 +98,24 @@ pub fn parse_marked_imu<R: Read + Seek>(
     };
     for (index, (acc, gyr)) in acc.iter().zip(&gyr).enumerate() {
         if acc.iter().chain(gyr).all(|value| value.is_finite()) {
+            let stamp = Stamp::from_seconds(index as f64 / rate_hz);
             imu.series
-                .push(Stamp::from_seconds(index as f64 / imu_hz), *acc, *gyr);
+                .push(stamp, Vector3::from(*acc), Vector3::from(*gyr));
         } else {
             imu.rows_left_out += 1;
         }
     }
+    Ok(imu)
+}
+
+/// A marker's positions, m; `None` in frames in which it was not seen.
+type Marker = Vec<Option<Vector3<f64>>>;
+
+/// The markers by their keys, sorted; all of the same number of frames.
+fn markers<R: Read + Seek>(
+    file: &mut Container<R>,
+    content: &impl Fn(&str, String) -> RigidError,
+) -> Result<(Vec<String>, Vec<Marker>), RigidError> {
     let mut keys: Vec<String> = file
         .keys()
         .into_iter()
@@ -102,51 +128,23 @@ pub fn parse_marked_imu<R: Read + Seek>(
             format!("{} markers, expected {LEAST} to {MOST}", keys.len()),
         ));
     }
-    let mut markers = Vec::with_capacity(keys.len());
+    let mut markers: Vec<Marker> = Vec::with_capacity(keys.len());
     for key in &keys {
-        let values = file
-            .at(key)?
-            .floats_with_nan(&[None, Some(3)], "(N, 3)")?
-            .values;
-        let seen = |value: &[f64; 3]| {
-            value
-                .iter()
-                .all(|value| value.is_finite())
-                .then(|| Vector3::from(*value))
+        let seen = |value: [f64; 3]| {
+            let all = value.iter().all(|value| value.is_finite());
+            all.then(|| Vector3::from(value))
         };
-        markers.push(
-            values
-                .as_chunks::<3>()
-                .0
-                .iter()
-                .map(seen)
-                .collect::<Vec<_>>(),
-        );
+        markers.push(rows(file, key)?.into_iter().map(seen).collect());
     }
-    if let Some(index) = markers
+    let other = markers
         .iter()
-        .position(|marker| marker.len() != markers[0].len())
-    {
-        return Err(content(
-            &keys[index],
-            format!(
-                "{} frames, but {} has {}",
-                markers[index].len(),
-                keys[0],
-                markers[0].len()
-            ),
-        ));
+        .position(|marker| marker.len() != markers[0].len());
+    if let Some(index) = other {
+        let (found, first) = (markers[index].len(), markers[0].len());
+        let problem = format!("{found} frames, but {} has {first}", keys[0]);
+        return Err(content(&keys[index], problem));
     }
-    let poses = poses(&markers, mocap_hz)
-        .ok_or_else(|| content(&keys[0], "no frame shows every marker".to_owned()))?;
-    let (imus, references) = (vec![imu], vec![("segment".to_owned(), poses)]);
-    Ok(DatasetRecording {
-        name: name.to_owned(),
-        rate_hz: imu_hz,
-        imus,
-        references,
-        activities: Vec::new(),
-    })
+    Ok((keys, markers))
 }
 
 /// The segment's poses in the frames that show enough of it; `None` where its shape is never seen

@@ -132,6 +132,21 @@ fn interpolated(readings: &[Reading], after: usize, stamp: Stamp) -> Option<Vect
     Some(earlier.lerp(later, (stamp.nanos - from.nanos) as f64 / gap as f64))
 }
 
+/// A member's bytes; what is wrong with it where it cannot be read or is too large.
+fn unpacked<R: Read + Seek>(archive: &mut ZipArchive<R>, member: &str) -> Result<Vec<u8>, String> {
+    let entry = archive.by_name(member).map_err(|error| error.to_string())?;
+    let mut bytes = Vec::new();
+    entry
+        .take(MAX_TABLE_BYTES + 1)
+        .read_to_end(&mut bytes)
+        .map_err(|error| error.to_string())?;
+    if bytes.len() as u64 > MAX_TABLE_BYTES {
+        return Err(format!("more than {MAX_TABLE_BYTES} bytes"));
+    }
+    Ok(bytes)
+}
+
+/// The archive's tables, one for each position on the body, in the order of positions.
 fn tables<R: Read + Seek>(reader: R, name: &str) -> Result<Vec<Table>, RigidError> {
     let problem = |place: &str, problem: String| RigidError::Content {
         name: name.to_owned(),
@@ -167,20 +182,7 @@ fn tables<R: Read + Seek>(reader: R, name: &str) -> Result<Vec<Table>, RigidErro
         {
             continue;
         }
-        let entry = archive
-            .by_name(&member)
-            .map_err(|error| problem(&member, error.to_string()))?;
-        let mut bytes = Vec::new();
-        entry
-            .take(MAX_TABLE_BYTES + 1)
-            .read_to_end(&mut bytes)
-            .map_err(|error| problem(&member, error.to_string()))?;
-        if bytes.len() as u64 > MAX_TABLE_BYTES {
-            return Err(problem(
-                &member,
-                format!("more than {MAX_TABLE_BYTES} bytes"),
-            ));
-        }
+        let bytes = unpacked(&mut archive, &member).map_err(|text| problem(&member, text))?;
         let file = stem.rsplit('/').next().unwrap_or_default();
         let activity = file.split('_').nth(1).unwrap_or_default().to_owned();
         let (readings, rows_left_out) = readings(&bytes, &format!("{name}/{member}"))?;
@@ -196,6 +198,7 @@ fn tables<R: Read + Seek>(reader: R, name: &str) -> Result<Vec<Table>, RigidErro
     Ok(tables)
 }
 
+/// A table's readings, and how many rows were left out for their stamps.
 fn readings(bytes: &[u8], name: &str) -> Result<(Vec<Reading>, usize), RigidError> {
     let mut readings: Vec<Reading> = Vec::new();
     let mut left_out = 0;

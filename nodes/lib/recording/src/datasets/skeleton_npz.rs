@@ -61,74 +61,10 @@ pub fn parse_skeleton_npz<R: Read + Seek>(
             format!("expected frames per second, found {rate_hz}"),
         ));
     }
-    let names = npz.at("joints")?.texts()?;
-    let count = names.len();
-    if !(1..=MAX_JOINTS).contains(&count) {
-        return Err(content(
-            "joints",
-            format!("{count} joints, expected 1 to {MAX_JOINTS}"),
-        ));
-    }
-    let parents = npz.at("parents")?.integers(&[Some(count)], "(J)")?.values;
-    let offsets = npz
-        .at("offsets")?
-        .floats(&[Some(count), Some(3)], "(J, 3)")?
-        .values;
-    let rotations = npz
-        .at("local_quat_wxyz")?
-        .floats(&[None, Some(count), Some(4)], "(N, J, 4)")?
-        .values;
-    let positions = npz
-        .at("pos")?
-        .floats(&[None, Some(count), Some(3)], "(N, J, 3)")?
-        .values;
-    let frames = rotations.len() / (4 * count);
-    if frames == 0 || positions.len() != frames * count * 3 {
-        return Err(content(
-            "pos",
-            format!(
-                "{} frames, local_quat_wxyz has {frames}",
-                positions.len() / (3 * count)
-            ),
-        ));
-    }
-    let mut joints = Vec::with_capacity(count);
-    for (index, (joint, parent)) in names.iter().zip(&parents).enumerate() {
-        let parent = if *parent < 0 {
-            None
-        } else {
-            usize::try_from(*parent)
-                .ok()
-                .filter(|parent| *parent < index)
-        };
-        if parent.is_none() && index > 0 {
-            return Err(content(
-                "parents",
-                format!(
-                    "joint {index} has parent {}, expected one of the joints before it",
-                    parents[index]
-                ),
-            ));
-        }
-        joints.push(joint_of(joint, parent, &offsets[3 * index..3 * index + 3]));
-    }
-    let mut values = Vec::with_capacity(frames * 3 * (count + 1));
-    for (frame, quaternions) in rotations.chunks_exact(4 * count).enumerate() {
-        let root = &positions[frame * count * 3..];
-        // Rx(-90 degrees): z up to y up.
-        values.extend([root[0], root[2], -root[1]]);
-        for (joint, [w, x, y, z]) in quaternions.as_chunks::<4>().0.iter().enumerate() {
-            let wrong = |length| {
-                content(
-                    "local_quat_wxyz",
-                    format!("frame {frame}, joint {joint} has length {length}, expected 1"),
-                )
-            };
-            values.extend(zxy_degrees(
-                &unit_quaternion(Quaternion::new(*w, *x, *y, *z)).map_err(wrong)?,
-            ));
-        }
-    }
+    let skeleton = Skeleton::read(&mut npz, &content)?;
+    let frames = skeleton.frames;
+    let joints = skeleton.joints(&content)?;
+    let values = skeleton.values(&content)?;
     let clip = BvhClip::from_parts(name, joints, rate_hz.recip(), values);
     let subject = npz.text("subject")?.unwrap_or_default();
     let atypical = npz.text("atypical")?.unwrap_or_default();
@@ -145,6 +81,112 @@ pub fn parse_skeleton_npz<R: Read + Seek>(
     })
 }
 
+/// The arrays of the skeleton and its motion.
+struct Skeleton {
+    names: Vec<String>,
+    /// Index of each joint's parent; negative for the root.
+    parents: Vec<i64>,
+    /// (J, 3), m.
+    offsets: Vec<f64>,
+    /// (N, J, 4), w first.
+    rotations: Vec<f64>,
+    /// (N, J, 3), m, z up.
+    positions: Vec<f64>,
+    frames: usize,
+}
+
+impl Skeleton {
+    fn read<R: Read + Seek>(
+        npz: &mut NpzReader<R>,
+        content: &impl Fn(&str, String) -> RigidError,
+    ) -> Result<Self, RigidError> {
+        let names = npz.at("joints")?.texts()?;
+        let count = names.len();
+        if !(1..=MAX_JOINTS).contains(&count) {
+            return Err(content(
+                "joints",
+                format!("{count} joints, expected 1 to {MAX_JOINTS}"),
+            ));
+        }
+        let parents = npz.at("parents")?.integers(&[Some(count)], "(J)")?.values;
+        let offsets = npz
+            .at("offsets")?
+            .floats(&[Some(count), Some(3)], "(J, 3)")?
+            .values;
+        let rotations = npz
+            .at("local_quat_wxyz")?
+            .floats(&[None, Some(count), Some(4)], "(N, J, 4)")?
+            .values;
+        let positions = npz
+            .at("pos")?
+            .floats(&[None, Some(count), Some(3)], "(N, J, 3)")?
+            .values;
+        let frames = rotations.len() / (4 * count);
+        if frames == 0 || positions.len() != frames * count * 3 {
+            let found = positions.len() / (3 * count);
+            let problem = format!("{found} frames, local_quat_wxyz has {frames}");
+            return Err(content("pos", problem));
+        }
+        Ok(Self {
+            names,
+            parents,
+            offsets,
+            rotations,
+            positions,
+            frames,
+        })
+    }
+
+    /// The joints, parents before children.
+    fn joints(
+        &self,
+        content: &impl Fn(&str, String) -> RigidError,
+    ) -> Result<Vec<BvhJoint>, RigidError> {
+        let mut joints = Vec::with_capacity(self.names.len());
+        for (index, (joint, parent)) in self.names.iter().zip(&self.parents).enumerate() {
+            let before = usize::try_from(*parent)
+                .ok()
+                .filter(|parent| *parent < index);
+            if before.is_none() && index > 0 {
+                let problem = format!(
+                    "joint {index} has parent {parent}, expected one of the joints before it"
+                );
+                return Err(content("parents", problem));
+            }
+            let offset = &self.offsets[3 * index..3 * index + 3];
+            joints.push(joint_of(joint, before, offset));
+        }
+        Ok(joints)
+    }
+
+    /// The channels of all frames: the root's position, then each joint's angles.
+    fn values(
+        &self,
+        content: &impl Fn(&str, String) -> RigidError,
+    ) -> Result<Vec<f64>, RigidError> {
+        let count = self.names.len();
+        let mut values = Vec::with_capacity(self.frames * 3 * (count + 1));
+        for (frame, quaternions) in self.rotations.chunks_exact(4 * count).enumerate() {
+            let root = &self.positions[frame * count * 3..];
+            // Rx(-90 degrees): z up to y up.
+            values.extend([root[0], root[2], -root[1]]);
+            for (joint, [w, x, y, z]) in quaternions.as_chunks::<4>().0.iter().enumerate() {
+                let wrong = |length| {
+                    content(
+                        "local_quat_wxyz",
+                        format!("frame {frame}, joint {joint} has length {length}, expected 1"),
+                    )
+                };
+                values.extend(zxy_degrees(
+                    &unit_quaternion(Quaternion::new(*w, *x, *y, *z)).map_err(wrong)?,
+                ));
+            }
+        }
+        Ok(values)
+    }
+}
+
+/// One label a frame, or none at all where the file has no labels.
 fn labels<R: Read + Seek>(
     npz: &mut NpzReader<R>,
     frames: usize,

@@ -167,40 +167,13 @@ pub fn parse_totalcapture_reference(
 ) -> Result<Vec<(String, PoseTrajectory)>, RigidError> {
     let mut position_rows = rows(text(positions, names[0])?, names[0], by_blanks);
     let mut orientation_rows = rows(text(orientations, names[1])?, names[1], by_blanks);
-    let head = position_rows.next().ok_or_else(|| RigidError::Empty {
-        name: names[0].to_owned(),
-    })?;
-    let other = orientation_rows.next().ok_or_else(|| RigidError::Empty {
-        name: names[1].to_owned(),
-    })?;
-    head.expect_columns(
-        |count| (1..=MAX_JOINTS).contains(&count),
-        "1 to 200 (the joints' names)",
-    )?;
-    if head.cells != other.cells {
-        let missing = format!("joints of {}", names[0]);
-        let found = other.cells.iter().map(|cell| (*cell).to_owned()).collect();
-        return Err(RigidError::Header {
-            name: names[1].to_owned(),
-            line: other.line,
-            missing,
-            found,
-        });
-    }
-    let count = head.cells.len();
-    let mut joints: Vec<(String, PoseTrajectory)> = head
-        .cells
-        .iter()
-        .map(|joint| {
-            (
-                (*joint).to_owned(),
-                PoseTrajectory {
-                    frame: "world".to_owned(),
-                    ..PoseTrajectory::default()
-                },
-            )
-        })
-        .collect();
+    let empty = |name: &str| RigidError::Empty {
+        name: name.to_owned(),
+    };
+    let head = position_rows.next().ok_or_else(|| empty(names[0]))?;
+    let other = orientation_rows.next().ok_or_else(|| empty(names[1]))?;
+    let mut joints = joints(&head, &other, names)?;
+    let count = joints.len();
     let up = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2);
     for (frame, (position, orientation)) in position_rows.zip(orientation_rows).enumerate() {
         position.expect_columns(
@@ -225,11 +198,39 @@ pub fn parse_totalcapture_reference(
         .iter()
         .all(|(_, trajectory)| trajectory.stamps.is_empty())
     {
-        return Err(RigidError::Empty {
-            name: names[0].to_owned(),
-        });
+        return Err(empty(names[0]));
     }
     Ok(joints)
+}
+
+/// The joints that both files name in their first line, each with a trajectory without poses.
+fn joints(
+    head: &Row<'_>,
+    other: &Row<'_>,
+    names: [&str; 2],
+) -> Result<Vec<(String, PoseTrajectory)>, RigidError> {
+    head.expect_columns(
+        |count| (1..=MAX_JOINTS).contains(&count),
+        "1 to 200 (the joints' names)",
+    )?;
+    if head.cells != other.cells {
+        let missing = format!("joints of {}", names[0]);
+        let found = other.cells.iter().map(|cell| (*cell).to_owned()).collect();
+        return Err(RigidError::Header {
+            name: names[1].to_owned(),
+            line: other.line,
+            missing,
+            found,
+        });
+    }
+    let trajectory = PoseTrajectory {
+        frame: "world".to_owned(),
+        ..PoseTrajectory::default()
+    };
+    let joints = head.cells.iter();
+    Ok(joints
+        .map(|joint| ((*joint).to_owned(), trajectory.clone()))
+        .collect())
 }
 
 /// Reads a calibration: a line with the number of sensors, then per sensor its name and a

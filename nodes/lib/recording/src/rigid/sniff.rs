@@ -1,5 +1,7 @@
 //! Which format a text file is, by its content.
 
+use super::imu_csv::{FORCES, RATES};
+
 /// The formats of rigid bodies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RigidFormat {
@@ -33,7 +35,21 @@ pub fn sniff_rigid(bytes: &[u8]) -> Option<RigidFormat> {
     if first.starts_with('#') && names(&["p_rs", "q_rs"]) {
         return Some(RigidFormat::EurocGroundTruth);
     }
-    let separators = first.contains([',', ';', '\t']);
+    if let Some(format) = by_header(first, &lower) {
+        return Some(format);
+    }
+    let row = start
+        .lines()
+        .map(str::trim)
+        .find(|line| !line.is_empty() && !line.starts_with('#'))?;
+    by_numbers(row)
+}
+
+/// A table whose header names its columns.
+fn by_header(first: &str, lower: &str) -> Option<RigidFormat> {
+    if !first.contains([',', ';', '\t']) {
+        return None;
+    }
     let cells: Vec<String> = lower
         .split([',', ';', '\t'])
         .map(|cell| {
@@ -44,53 +60,45 @@ pub fn sniff_rigid(bytes: &[u8]) -> Option<RigidFormat> {
                 .to_owned()
         })
         .collect();
-    let ends = |ending: &str| cells.iter().any(|cell| cell.ends_with(ending));
     let has = |names: &[&str]| {
         let is = |cell: &str, name: &str| {
             cell.replace(['.', '/'], "_")
                 .strip_suffix("_x")
                 .is_some_and(|cell| cell.ends_with(name))
         };
-        cells
-            .iter()
-            .any(|cell| names.iter().any(|name| is(cell, name)))
+        // Single letters name columns of many tables: they do not tell what a file is.
+        let names = || names.iter().filter(|name| name.len() > 1);
+        cells.iter().any(|cell| names().any(|name| is(cell, name)))
     };
-    // Single letters name columns of many tables: they do not tell what a file is.
-    let longer = |name: &&&str| name.len() > 1;
-    let names =
-        |names: &'static [&'static str]| names.iter().filter(longer).copied().collect::<Vec<_>>();
-    let placed = cells
+    let positions = cells
         .iter()
         .any(|cell| matches!(cell.as_str(), "x" | "px" | "tx"))
         || has(&["position", "pos"]);
-    if separators
-        && !placed
-        && has(&names(&super::imu_csv::RATES))
-        && has(&names(&super::imu_csv::FORCES))
-    {
+    if !positions && has(&RATES) && has(&FORCES) {
         return Some(RigidFormat::ImuCsv);
     }
-    let quaternion = ends("qw")
-        || ends("q_w")
-        || ends("orientation.w")
-        || ends("orientation_w")
-        || ends("quat_w")
-        || ends("quaternion_w");
-    if separators && quaternion && first.chars().any(char::is_alphabetic) {
-        return Some(RigidFormat::PoseCsv);
-    }
-    let row = start
-        .lines()
-        .map(str::trim)
-        .find(|line| !line.is_empty() && !line.starts_with('#'))?;
+    let endings = [
+        "qw",
+        "q_w",
+        "orientation.w",
+        "orientation_w",
+        "quat_w",
+        "quaternion_w",
+    ];
+    let quaternion = cells
+        .iter()
+        .any(|cell| endings.iter().any(|ending| cell.ends_with(ending)));
+    (quaternion && first.chars().any(char::is_alphabetic)).then_some(RigidFormat::PoseCsv)
+}
+
+/// A table without a header, by the number and kind of a row's columns.
+fn by_numbers(row: &str) -> Option<RigidFormat> {
     let numbers = |cells: &[&str]| cells.iter().all(|cell| cell.parse::<f64>().is_ok());
-    let (blanks, commas): (Vec<&str>, Vec<&str>) = (
-        row.split_ascii_whitespace().collect(),
-        row.split(',').map(str::trim).collect(),
-    );
+    let blanks: Vec<&str> = row.split_ascii_whitespace().collect();
     if blanks.len() == 8 && numbers(&blanks) {
         return Some(RigidFormat::Tum);
     }
+    let commas: Vec<&str> = row.split(',').map(str::trim).collect();
     let whole = commas
         .first()
         .is_some_and(|cell| cell.parse::<i64>().is_ok());
