@@ -12,7 +12,7 @@ node_config! {
         pub source_body: String = String::new(),
         /// Name of the world frame (z up).
         pub world_frame: String = "world".to_owned(),
-        /// Put before every frame but the world's, with a slash: `alice` makes `alice/pelvis`.
+        /// Prefix of every frame but the world's: `alice` makes `alice/pelvis`.
         pub prefix: String = String::new(),
         /// Origin of the source's frame in the world, m.
         pub source_position: [f64; 3] = [0.0; 3],
@@ -22,7 +22,7 @@ node_config! {
         pub smoothing_cutoff_hz: f64 = 0.0,
         /// How often /diagnostics is published, Hz; 0: never.
         pub diagnostics_rate_hz: f64 = 1.0,
-        /// The node is ready when `smpl/state` has so many subscriptions.
+        /// The node reports that it is ready once `smpl/state` has this many subscriptions.
         pub ready_subscriptions: i64 = 0,
     }
 }

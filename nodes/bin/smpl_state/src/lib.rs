@@ -23,7 +23,7 @@ const ABOUT: &str = "smpl_state: averages the shape, puts poses into the world, 
 /// Runs the node with these arguments until it is interrupted.
 ///
 /// # Errors
-/// What is wrong with the arguments or the body file; what DDS refuses.
+/// Wrong arguments, a body file that cannot be read, and errors of DDS.
 pub fn run(arguments: &[String]) -> anyhow::Result<()> {
     let Some(prepared) = prepare("smpl_state", ABOUT, arguments, |config: &Config| {
         logic(config).map(drop)
@@ -99,7 +99,7 @@ fn now(node: &Node) -> Time {
     Time::from_nanos(node.now().nanos)
 }
 
-/// A message that does not get out is worth a line, and no more: the next one may.
+/// A message that cannot be sent is worth a line in the log, no more: the next one may go out.
 fn report(sent: Result<(), RosError>) {
     if let Err(error) = sent {
         log::warn!("{error}");

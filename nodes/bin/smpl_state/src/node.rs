@@ -1,4 +1,4 @@
-//! From what a source says to the state of one body in the world, and its frames.
+//! From a source's poses to the state of one body in the world, and its frames.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use crate::config::Config;
 use crate::shape::PersonShape;
 use crate::smooth::Smoother;
 
-/// What one pose leads to.
+/// The messages that follow from one pose.
 pub struct Step {
     /// For `smpl/state`.
     pub state: SmplState,
@@ -27,13 +27,13 @@ pub struct Step {
 /// Why a pose was left out.
 #[derive(Debug, thiserror::Error)]
 pub enum Refusal {
-    /// The message is no body.
+    /// The message holds no valid body: wrong lengths, or numbers that are not finite.
     #[error(transparent)]
     Pose(#[from] NotABody),
-    /// The shape does not suit the body.
+    /// The betas do not fit the node's body.
     #[error(transparent)]
     Shape(#[from] BodyError),
-    /// No number that the message allows.
+    /// The confidence is outside 0 to 1.
     #[error("confidence is {0}; expected 0 to 1, or NaN where the source cannot say")]
     Confidence(f64),
 }
@@ -72,7 +72,7 @@ impl SmplStateNode {
     /// are for.
     ///
     /// # Errors
-    /// None that a sound model gives.
+    /// [`BodyError`] for a damaged model only.
     pub fn new(
         config: Config,
         model: Arc<BodyModel>,
@@ -96,7 +96,7 @@ impl SmplStateNode {
 
     /// The state and the frames that follow from one pose.
     pub fn step(&mut self, source: &SmplPose) -> Result<Step, Refusal> {
-        let result = self.state_of(source);
+        let result = self.state_after(source);
         match &result {
             Ok(_) => self.counts.poses += 1,
             Err(refusal) => {
@@ -107,7 +107,7 @@ impl SmplStateNode {
         result
     }
 
-    fn state_of(&mut self, source: &SmplPose) -> Result<Step, Refusal> {
+    fn state_after(&mut self, source: &SmplPose) -> Result<Step, Refusal> {
         let nanos = source.header.stamp.nanos();
         self.watch_time(nanos);
         let (root_position, local_rotations) = source.root_and_rotations()?;
@@ -116,7 +116,7 @@ impl SmplStateNode {
         }
         self.shape.take(source)?;
         let root_position = (self.world_from_source
-            * nalgebra::Point3::from(root_position * self.shape.metres()))
+            * nalgebra::Point3::from(root_position * self.shape.leg_ratio()))
         .coords;
         let mut body = BodyPose {
             root_position,
@@ -184,7 +184,7 @@ impl SmplStateNode {
         }
     }
 
-    /// For `/tf_static`: base_link beside the pelvis (REP-103), in axes of robots.
+    /// For `/tf_static`: base_link at the pelvis with the axes of REP-103.
     pub fn static_frames(&self, stamp: Time) -> TFMessage {
         let beside = Isometry3::from_parts(Translation3::identity(), pelvis_from_base_link());
         let edge = TransformStamped {

@@ -1,5 +1,5 @@
-//! The shape of a body does not change while it moves: betas are averaged over time, and fitted
-//! where they are another body's.
+//! The shape of a body does not change while it moves: betas are averaged over time. Where they
+//! belong to another body, this node's body is fitted to that person's bones.
 
 use std::sync::Arc;
 
@@ -20,8 +20,8 @@ pub struct ShapeAverage {
 }
 
 impl ShapeAverage {
-    /// Takes one estimate of finite numbers in; true where the betas in force have changed. An
-    /// empty estimate says nothing.
+    /// Takes in one estimate of finite numbers; true if the betas in force have changed. An empty
+    /// estimate changes nothing.
     pub fn add(&mut self, betas: &[f64]) -> bool {
         if betas.is_empty() {
             return false;
@@ -62,8 +62,8 @@ pub struct PersonShape {
     /// Whether the average is of the source body's betas.
     of_source: bool,
     shaped: ShapedBody,
-    /// Leg length on the node's body over that on the source's.
-    metres: f64,
+    /// Leg length of the node's body by that of the person on the source body; 1 without one.
+    leg_ratio: f64,
 }
 
 impl PersonShape {
@@ -79,15 +79,15 @@ impl PersonShape {
             average: ShapeAverage::default(),
             of_source: false,
             shaped,
-            metres: 1.0,
+            leg_ratio: 1.0,
         })
     }
 
-    /// Takes in what a pose says of the shape. Betas of the node's own body are averaged; others
+    /// Takes in what a pose says about the shape. Betas of the node's own body are averaged; others
     /// are averaged as those of the source body, and the node's is fitted to that person's bones.
     ///
     /// # Errors
-    /// Betas that are neither body's, too many, or no numbers: nothing has changed then.
+    /// Betas that fit neither body, are too many or are not finite; the shape is unchanged then.
     pub fn take(&mut self, source: &SmplPose) -> Result<(), BodyError> {
         let betas = &source.betas;
         let own = self
@@ -102,7 +102,7 @@ impl PersonShape {
         }
         let body = source_body.as_ref().unwrap_or(&self.model);
         if betas.len() > body.beta_count() || !betas.iter().all(|beta| beta.is_finite()) {
-            // Says what is wrong, before the average takes it in for good.
+            // Gives the error before the average takes the betas in for good.
             ShapedBody::new(body.clone(), betas)?;
         }
         if self.of_source != source_body.is_some() {
@@ -112,7 +112,7 @@ impl PersonShape {
         if !self.average.add(betas) {
             return Ok(());
         }
-        (self.shaped, self.metres) = match source_body {
+        (self.shaped, self.leg_ratio) = match source_body {
             None => (
                 ShapedBody::new(self.model.clone(), self.average.betas())?,
                 1.0,
@@ -122,6 +122,7 @@ impl PersonShape {
         Ok(())
     }
 
+    /// The node's body fitted to the person's bones, and the ratio of the legs.
     fn fitted(&self, source_body: Arc<BodyModel>) -> Result<(ShapedBody, f64), BodyError> {
         let person = ShapedBody::new(source_body, self.average.betas())?;
         let fit = self
@@ -133,8 +134,8 @@ impl PersonShape {
             person.model().id(),
             1e3 * fit.length_rms_m
         );
-        let metres = leg_length(shaped.joints_in_model()) / leg_length(person.joints_in_model());
-        Ok((shaped, metres))
+        let leg_ratio = leg_length(shaped.joints_in_model()) / leg_length(person.joints_in_model());
+        Ok((shaped, leg_ratio))
     }
 
     /// The body in its shape.
@@ -147,10 +148,10 @@ impl PersonShape {
         self.shaped.betas()
     }
 
-    /// What the source's positions are multiplied with, so that feet stay where they stand: 1, but
-    /// for a body that was fitted.
-    pub fn metres(&self) -> f64 {
-        self.metres
+    /// Factor on the source's positions, so that feet stay where they stand: 1 unless the body was
+    /// fitted to another one.
+    pub fn leg_ratio(&self) -> f64 {
+        self.leg_ratio
     }
 }
 

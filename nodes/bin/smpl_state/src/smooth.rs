@@ -10,7 +10,7 @@ pub struct Smoother {
 }
 
 impl Smoother {
-    /// `cutoff_hz` = 0 passes everything on as it is.
+    /// `cutoff_hz` = 0 turns smoothing off.
     pub fn new(cutoff_hz: f64) -> Self {
         Self {
             cutoff_hz,
@@ -18,12 +18,12 @@ impl Smoother {
         }
     }
 
-    /// Forgets the past.
+    /// Forgets the last pose, so that the next one passes unchanged.
     pub fn restart(&mut self) {
         self.last = None;
     }
 
-    /// The smoothed pose at `nanos`.
+    /// The smoothed pose at the time `nanos`, ns.
     pub fn smooth(&mut self, nanos: i64, mut body: BodyPose) -> BodyPose {
         if self.cutoff_hz == 0.0 {
             return body;

@@ -6,8 +6,8 @@
 //! else 16-bit integers to be multiplied by it; their bytes stand in the order of the processor
 //! that wrote them.
 //!
-//! The crate c3dio (0.8.0, the newest) is not used: it panics on damaged files; a file of fewer
-//! than 512 bytes is enough.
+//! The crate c3dio (0.8.0, the newest) is not used: it panics on damaged files; a first byte of 0,
+//! from which its parser subtracts 1 unchecked, is enough.
 
 mod layout;
 mod numbers;
