@@ -8,11 +8,11 @@ use anyhow::bail;
 use clap::Args;
 use cromosim_body::BodyModel;
 use cromosim_motion::{MotionOptions, PoseView, SmplMotion, open_poses, read_motion_for};
+use cromosim_recording::convert::{MotionFile, write_motion};
 use cromosim_video::{
     CameraAxes, CameraClip, CameraFolder, DepthEncoding, FolderLayout, ScaleSource, Trajectory,
     TrajectoryOptions, global_trajectory,
 };
-use cromosim_recording::convert::{MotionFile, write_motion};
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
 
 use crate::body;
