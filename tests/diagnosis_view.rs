@@ -11,7 +11,7 @@ use std::process::Command;
 
 use common::{skipped, text};
 use cromosim_gap::{
-    Cause, CoursePoint, Diagnosis, Evidence, Gap, Metrics, Place, PlacementDiagnosis, SCHEMA,
+    Cause, CoursePoint, Diagnosis, Evidence, Gap, GapLocation, Metrics, PlacementDiagnosis, SCHEMA,
     Spectra, Unexplained,
 };
 use cromosim_spatial::Stamp;
@@ -41,9 +41,9 @@ fn diagnosis() -> Diagnosis {
             },
             after,
         },
-        place: Place {
+        location: GapLocation {
             axes: BTreeMap::from([("accel_y".to_owned(), 0.8), ("gyro_z".to_owned(), 0.2)]),
-            ..Place::default()
+            ..GapLocation::default()
         },
         causes: vec![
             cause(

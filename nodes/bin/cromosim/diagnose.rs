@@ -74,12 +74,12 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         (Some(file), true) => (&config.without, format!("{}: without", file.display())),
         _ => (&arguments.without, "--without".to_owned()),
     };
-    let without = names
+    let excluded = names
         .iter()
         .map(|name| effect(name, &place))
         .collect::<anyhow::Result<_>>()?;
     let options = DiagnoseOptions {
-        without,
+        excluded,
         seed: arguments.seed.or(config.seed).unwrap_or(0),
     };
     check_folder(&arguments.out)?;

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::Path;
 
-use cromosim_gap::{AXES, Cause, Diagnosis, Evidence, PlacementDiagnosis};
+use cromosim_gap::{Cause, Diagnosis, Evidence, PlacementDiagnosis};
+use cromosim_imu::AXES;
 use cromosim_view::{GapCoursePoint, GapPlacement, GapSpectrum, write_gap};
 
 /// Writes the recording; placements without evidence have words alone.
@@ -59,7 +60,7 @@ fn gap_placement(name: &str, placement: &PlacementDiagnosis, evidence: &Evidence
 
 /// The spectra of the axis of a channel that has the largest share of the gap.
 fn spectrum(placement: &PlacementDiagnosis, evidence: &Evidence, first: usize) -> GapSpectrum {
-    let share = |axis: usize| placement.place.axes.get(AXES[axis]).copied().unwrap_or(0.0);
+    let share = |axis: usize| placement.location.axes.get(AXES[axis]).copied().unwrap_or(0.0);
     let axis = (first + 1..first + 3).fold(first, |best, axis| {
         if share(axis) > share(best) {
             axis

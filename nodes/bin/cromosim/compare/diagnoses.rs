@@ -224,7 +224,7 @@ mod tests {
         let placement = PlacementDiagnosis {
             verdict: String::new(),
             gap: Default::default(),
-            place: Default::default(),
+            location: Default::default(),
             causes,
             unidentifiable: Vec::new(),
             unexplained: Default::default(),

@@ -8,6 +8,9 @@ use serde_json::Value;
 /// The schema's name.
 pub const SCHEMA: &str = "cromosim/diagnosis/1";
 
+/// Name of the cause that stands for structure outside the library.
+pub const UNKNOWN: &str = "unknown";
+
 /// A recording's diagnosis.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Diagnosis {
@@ -26,7 +29,7 @@ pub struct PlacementDiagnosis {
     pub gap: Gap,
     /// Where the gap of the nominal simulation lies.
     #[serde(rename = "where")]
-    pub place: Place,
+    pub location: GapLocation,
     /// By share of the gap, the largest first.
     pub causes: Vec<Cause>,
     /// What this motion cannot tell.
@@ -65,7 +68,7 @@ pub struct Metrics {
 
 /// Shares of the whitened squared residual beyond the predicted noise; each list adds up to 1.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Place {
+pub struct GapLocation {
     /// `accel`, `gyro`.
     #[serde(default)]
     pub channels: BTreeMap<String, f64>,
@@ -128,5 +131,5 @@ pub struct Unexplained {
     pub share: f64,
     /// Where the rest lies.
     #[serde(rename = "where")]
-    pub place: Place,
+    pub location: GapLocation,
 }

@@ -6,14 +6,14 @@ use nalgebra::{DMatrix, DVector};
 
 /// Neighbours on each side that say something of a missing value.
 const REACH: usize = 24;
-/// How far from its edge a long hole is filled; beyond, nothing is known but the mean, zero.
+/// How far from its edge a long gap is filled; beyond, nothing is known but the mean, zero.
 const EDGE: usize = 48;
 
-/// Fills holes of a circular series by the values to be expected given their neighbours: `C_mn
+/// Fills gaps of a circular series by the values to be expected given their neighbours: `C_mn
 /// C_nn^-1 x_n`, with C the predicted covariance.
 ///
-/// A linear map of the series, so that a fit sees its own columns through the same holes. Anything
-/// simpler (a straight line) carries one noisy neighbour over the hole, which after whitening is a
+/// A linear map of the series, so that a fit sees its own columns through the same gaps. Anything
+/// simpler (a straight line) carries one noisy neighbour over the gap, which after whitening is a
 /// jump.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Filler {
@@ -45,15 +45,11 @@ impl Filler {
             }
             let end = (next..length).find(|&k| there[k]).unwrap_or(length);
             filler.variance[next..end].fill(covariance[0]);
-            let hole = next..end;
-            if hole.len() <= 2 * EDGE {
-                filler.add(
-                    hole.clone(),
-                    neighbours(there, &hole, true, true),
-                    covariance,
-                );
+            let gap = next..end;
+            if gap.len() <= 2 * EDGE {
+                filler.add(gap.clone(), neighbours(there, &gap, true, true), covariance);
             } else {
-                let (left, right) = (hole.start..hole.start + EDGE, hole.end - EDGE..hole.end);
+                let (left, right) = (gap.start..gap.start + EDGE, gap.end - EDGE..gap.end);
                 filler.add(
                     left.clone(),
                     neighbours(there, &left, true, false),
@@ -121,15 +117,15 @@ impl Filler {
 }
 
 /// The nearest entries that are there, on the sides asked for, circularly.
-fn neighbours(there: &[bool], hole: &Range<usize>, left: bool, right: bool) -> Vec<usize> {
+fn neighbours(there: &[bool], gap: &Range<usize>, left: bool, right: bool) -> Vec<usize> {
     let length = there.len();
     let mut found = Vec::new();
     // Not further than a few reaches: beyond, the series is another one.
-    let far = (4 * REACH).min(length - hole.len());
+    let far = (4 * REACH).min(length - gap.len());
     if left {
         found.extend(
             (1..=far)
-                .map(|step| (hole.start + length - step) % length)
+                .map(|step| (gap.start + length - step) % length)
                 .filter(|&k| there[k])
                 .take(REACH),
         );
@@ -137,7 +133,7 @@ fn neighbours(there: &[bool], hole: &Range<usize>, left: bool, right: bool) -> V
     if right {
         found.extend(
             (0..far)
-                .map(|step| (hole.end + step) % length)
+                .map(|step| (gap.end + step) % length)
                 .filter(|&k| there[k])
                 .take(REACH),
         );
@@ -152,7 +148,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_hole_in_a_slow_series_is_bridged_and_a_long_one_forgets() {
+    fn a_gap_in_a_slow_series_is_bridged_and_a_long_one_forgets() {
         let length = 1000;
         // Correlated over fifty entries.
         let covariance: Vec<f64> = (0..length)

@@ -1,36 +1,41 @@
 //! Joint fits of sets of effects on whitened residuals.
 
-use cromosim_imu::{Effect, EffectKind, EffectSet, Reading, Shape};
+use cromosim_imu::{Effect, EffectKind, EffectSet, ParameterFit, PerChannel, Reading};
 use cromosim_spatial::KinematicTrack;
 use nalgebra::DVector;
 
-use crate::gram::{Gram, Linear, dot};
-use crate::problem::{FOLDS, Prediction, Problem, axis_of, stage_of};
-use crate::whiten::{NoiseBasis, NoiseModel, Whitener};
+use crate::axes::{channel_of_axis, sum_over_channels, value_on_axis};
+use crate::gram::{Gram, Linear, channel_likelihood, dot};
+use crate::noise_model::{NoiseBasis, NoiseModel};
+use crate::policy::report::STANDARD_ERROR_FACTOR;
+use crate::policy::search::{CONVERGED_NATS, FIT_STEPS};
+use crate::prepared::{FOLDS, Prediction, PreparedPlacement};
+use crate::whiten::Whitener;
 
-/// Factor on the standard errors of the normal equations: the predicted noise is stationary, that
-/// of real motion is not. From withheld cases.
-const WIDENING: f64 = 1.12;
-/// Most steps of a fit.
-const STEPS: usize = 12;
+/// Part of a step below which a fit gives up halving it.
+const LEAST_PART: f64 = 1e-3;
+/// Factor on a step that did not help.
+const SHORTER: f64 = 0.3;
 
-/// A problem with one kinematic track and one model of the noise.
+/// A prepared placement with one kinematic track and one model of the noise.
 #[derive(Clone, Debug)]
-pub(crate) struct Context<'a> {
-    pub problem: &'a Problem,
+pub(crate) struct FitModel<'a> {
+    pub prepared: &'a PreparedPlacement,
     pub track: KinematicTrack,
     pub basis: NoiseBasis,
     pub noise: NoiseModel,
     pub whitener: Whitener,
+    /// Which part of time each entry of the sample grid belongs to.
     pub folds: Vec<usize>,
-    pub counts: Vec<[f64; 2]>,
+    /// Number of values compared, by part of time.
+    pub counts: Vec<PerChannel<f64>>,
 }
 
 /// A set of effects with fitted values.
 #[derive(Clone, Debug)]
 pub(crate) struct Fit {
     pub set: EffectSet,
-    /// The fitted values: effect and place among its values.
+    /// The fitted values: effect and index among its values.
     pub layout: Vec<(EffectKind, usize)>,
     pub prediction: Prediction,
     /// Whitened residual, flat.
@@ -40,90 +45,103 @@ pub(crate) struct Fit {
     pub linear: Linear,
 }
 
-/// Standard deviation of the weak prior of an effect's value: as large as such things get.
-pub(crate) fn prior_deviation(kind: EffectKind, index: usize) -> f64 {
-    use EffectKind as K;
-    match kind {
-        K::ReferenceTilt | K::ReferenceScale | K::AccelScale | K::GyroScale | K::LeverArm => 0.3,
-        K::MountRotation => 2.0,
-        K::MountSlip => 0.7,
-        K::SoftTissue => [20.0, 0.5][index.min(1)],
-        K::TimeOffset => 1.0,
-        K::ClockDrift => 3000.0,
-        K::AccelBias => 2.0,
-        K::GyroBias => 0.3,
-        K::AccelMisalignment | K::GyroMisalignment => 0.2,
-        K::AccelBiasDrift => 0.05,
-        K::GyroBiasDrift => 0.005,
-        K::LowPass => 50.0,
-        K::GyroGSensitivity => 0.02,
-        K::Vibration => [50.0, 5.0, 5.0, 5.0, 10.0][index.min(4)],
-        _ => 100.0,
+/// A value that a fit moves.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FreeValue {
+    /// Among all values of its effect.
+    pub index: usize,
+    pub lower: f64,
+    pub upper: f64,
+    pub fit: ParameterFit,
+}
+
+impl FreeValue {
+    /// 1 / variance of the weak prior.
+    pub fn prior_weight(&self) -> f64 {
+        self.fit.prior_deviation.powi(-2)
     }
 }
 
 /// Values of an effect that a fit moves.
-pub(crate) fn free_values(kind: EffectKind) -> Vec<usize> {
-    if !kind.spec().continuous {
-        return Vec::new();
-    }
-    let mut index = 0;
+pub(crate) fn free_values(kind: EffectKind) -> Vec<FreeValue> {
+    let mut first = 0;
     let mut free = Vec::new();
     for parameter in kind.spec().parameters {
-        if !matches!(parameter.shape, Shape::Time | Shape::Choice(_)) {
-            free.extend(index..index + parameter.shape.len());
-        }
-        index += parameter.shape.len();
+        let own = first..first + parameter.shape.count();
+        first = own.end;
+        free.extend(parameter.fit.into_iter().flat_map(|fit| {
+            own.clone().map(move |index| FreeValue {
+                index,
+                lower: parameter.lower,
+                upper: parameter.upper,
+                fit,
+            })
+        }));
     }
     free
 }
 
-/// Bounds and step of each value of an effect.
-fn limits(kind: EffectKind) -> Vec<(f64, f64, f64)> {
-    kind.spec()
-        .parameters
+/// 1 / variance of the weak prior of each free value.
+pub(crate) fn prior_weights(kind: EffectKind) -> Vec<f64> {
+    free_values(kind)
         .iter()
-        .flat_map(|p| std::iter::repeat_n((p.lower, p.upper, p.step), p.shape.len()))
+        .map(FreeValue::prior_weight)
         .collect()
 }
 
 /// A set with one value changed, kept within its bounds; none where the effect refuses it.
-pub(crate) fn changed(
-    set: &EffectSet,
-    kind: EffectKind,
-    changes: &[(usize, f64)],
-) -> Option<EffectSet> {
+fn changed(set: &EffectSet, kind: EffectKind, value: &FreeValue, change: f64) -> Option<EffectSet> {
     let effect = set.get(kind)?;
-    let bounds = limits(kind);
     let mut values = effect.values().to_vec();
-    for &(index, change) in changes {
-        let (lower, upper, _) = bounds[index];
-        values[index] = (values[index] + change).clamp(lower, upper);
-    }
+    values[value.index] = (values[value.index] + change).clamp(value.lower, value.upper);
     let mut next = set.clone();
     next.insert(effect.with_values(values).ok()?);
     Some(next)
 }
 
-impl<'a> Context<'a> {
+/// A set with a part of a step along several values; a change that an effect refuses is left out.
+pub(crate) fn stepped(
+    set: &EffectSet,
+    layout: &[(EffectKind, usize)],
+    step: &DVector<f64>,
+    part: f64,
+) -> EffectSet {
+    let mut next = set.clone();
+    for (&(kind, index), change) in layout.iter().zip(step.iter()) {
+        let value = free_values(kind).into_iter().find(|own| own.index == index);
+        if let Some(moved) = value.and_then(|value| changed(&next, kind, &value, part * change)) {
+            next = moved;
+        }
+    }
+    next
+}
+
+/// The free values of one effect, as a fit lists them.
+pub(crate) fn layout_of(kind: EffectKind) -> impl Iterator<Item = (EffectKind, usize)> {
+    free_values(kind)
+        .into_iter()
+        .map(move |value| (kind, value.index))
+}
+
+impl<'a> FitModel<'a> {
     pub fn new(
-        problem: &'a Problem,
+        prepared: &'a PreparedPlacement,
         track: KinematicTrack,
         basis: NoiseBasis,
         noise: NoiseModel,
     ) -> Self {
-        let whitener = Whitener::new(problem, &noise);
-        let folds: Vec<usize> = (0..problem.length)
-            .map(|place| problem.fold(place))
+        let whitener = Whitener::new(prepared, &noise);
+        let folds: Vec<usize> = (0..prepared.length)
+            .map(|entry| prepared.fold(entry))
             .collect();
-        let mut counts = vec![[0.0; 2]; FOLDS];
+        let mut counts = vec![PerChannel::<f64>::default(); FOLDS];
         for axis in 0..6 {
-            for (place, weight) in whitener.weight[axis].iter().enumerate() {
-                counts[folds[place]][axis / 3] += weight * weight;
+            for (entry, weight) in whitener.weight[axis].iter().enumerate() {
+                counts[folds[entry]][channel_of_axis(axis)] += weight * weight;
             }
         }
         Self {
-            problem,
+            prepared,
             track,
             basis,
             noise,
@@ -135,14 +153,14 @@ impl<'a> Context<'a> {
 
     /// Whitened measured less predicted.
     pub fn residual(&self, readings: &[Reading]) -> Vec<f64> {
-        self.whitener.apply(&self.problem.residual(readings))
+        self.whitener.apply(&self.prepared.residual(readings))
     }
 
     /// Columns of the free values of one effect of `set`, whose prediction is `base`.
     pub fn columns(&self, set: &EffectSet, base: &Prediction, kind: EffectKind) -> Vec<Vec<f64>> {
         free_values(kind)
-            .into_iter()
-            .map(|index| self.column(set, base, kind, index))
+            .iter()
+            .map(|value| self.column(set, base, kind, value))
             .collect()
     }
 
@@ -151,110 +169,131 @@ impl<'a> Context<'a> {
         set: &EffectSet,
         base: &Prediction,
         kind: EffectKind,
-        index: usize,
+        value: &FreeValue,
     ) -> Vec<f64> {
-        let (lower, upper, size) = limits(kind)[index];
-        let value = set.get(kind).map_or(0.0, |effect| effect.values()[index]);
-        // Away from a bound; a value of the order of its size moves by a fraction of itself.
-        let size = if (lower..=upper).contains(&(value + size)) {
-            size
+        let now = set
+            .get(kind)
+            .map_or(0.0, |effect| effect.values()[value.index]);
+        // Away from a bound.
+        let size = if (value.lower..=value.upper).contains(&(now + value.fit.step)) {
+            value.fit.step
         } else {
-            -size
+            -value.fit.step
         };
-        let Some(moved) = changed(set, kind, &[(index, size)]) else {
-            return vec![0.0; 6 * self.problem.length];
+        let Some(moved) = changed(set, kind, value, size) else {
+            return vec![0.0; 6 * self.prepared.length];
         };
-        let readings = self
-            .problem
-            .predict_from(&self.track, base, &moved, stage_of(kind));
-        let difference = self.problem.raster(|k, axis| {
-            (axis_of(&readings[k], axis) - axis_of(&base.readings[k], axis)) / size
+        let stage = kind.spec().stage;
+        let readings = self.prepared.predict_from(&self.track, base, &moved, stage);
+        let difference = self.prepared.on_sample_grid(|k, axis| {
+            (value_on_axis(&readings[k], axis) - value_on_axis(&base.readings[k], axis)) / size
         });
         self.whitener.apply(&difference)
     }
 
-    pub fn gram(&self, columns: &[&[f64]], residual: &[f64], prior: Vec<f64>) -> Gram {
+    fn gram(&self, columns: &[&[f64]], residual: &[f64], prior: Vec<f64>) -> Gram {
         Gram::new(
             columns,
             residual,
-            self.problem.length,
+            self.prepared.length,
             &self.folds,
             &self.counts,
             prior,
         )
     }
 
-    fn squares(&self, residual: &[f64]) -> [f64; 2] {
-        let half = 3 * self.problem.length;
-        [
-            dot(&residual[..half], &residual[..half]),
-            dot(&residual[half..], &residual[half..]),
-        ]
-    }
-
     fn cost(&self, residual: &[f64]) -> f64 {
-        let squares = self.squares(residual);
-        -(0..2)
-            .map(|c| crate::gram::channel_likelihood(self.whitener.count[c], squares[c]))
-            .sum::<f64>()
+        let half = 3 * self.prepared.length;
+        let (accelerometer, gyroscope) = residual.split_at(half);
+        let squares = PerChannel {
+            accelerometer: dot(accelerometer, accelerometer),
+            gyroscope: dot(gyroscope, gyroscope),
+        };
+        -sum_over_channels(|channel| {
+            channel_likelihood(self.whitener.count[channel], squares[channel])
+        })
     }
 
     /// Gauss-Newton steps with halving from the values in `set`.
     pub fn fit(&self, set: EffectSet) -> Fit {
-        self.fit_steps(set, STEPS)
+        self.fit_steps(set, FIT_STEPS)
     }
 
-    /// As [`Context::fit`], with another limit on the steps.
-    pub fn fit_steps(&self, mut set: EffectSet, steps: usize) -> Fit {
+    /// As [`FitModel::fit`], with another limit on the steps: with 0 the values stay.
+    pub fn fit_steps(&self, set: EffectSet, steps: usize) -> Fit {
         let layout: Vec<(EffectKind, usize)> = set
             .iter()
-            .flat_map(|effect| {
-                free_values(effect.kind())
-                    .into_iter()
-                    .map(|index| (effect.kind(), index))
-            })
+            .flat_map(|effect| layout_of(effect.kind()))
             .collect();
-        let mut prediction = self.problem.predict(&self.track, &set);
-        let mut residual = self.residual(&prediction.readings);
-        let mut cost = self.cost(&residual);
-        loop_steps(steps, |last| {
-            let columns: Vec<Vec<f64>> = layout
+        let mut now = self.evaluated(set);
+        let mut steps_left = steps;
+        loop {
+            let columns: Vec<Vec<f64>> = now
+                .set
                 .iter()
-                .map(|&(kind, index)| self.column(&set, &prediction, kind, index))
+                .flat_map(|effect| self.columns(&now.set, &now.prediction, effect.kind()))
                 .collect();
             let slices: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
-            let prior = layout
+            let prior = now
+                .set
                 .iter()
-                .map(|&(kind, index)| prior_deviation(kind, index).powi(-2))
+                .flat_map(|effect| prior_weights(effect.kind()))
                 .collect();
-            let linear = self.gram(&slices, &residual, prior).solve();
-            let finished = |set: &EffectSet, prediction: &Prediction, residual: &[f64]| Fit {
-                set: set.clone(),
-                layout: layout.clone(),
-                prediction: prediction.clone(),
-                residual: residual.to_vec(),
-                columns: columns.clone(),
-                linear: linear.clone(),
+            let linear = self.gram(&slices, &now.residual, prior).solve();
+            let is_last =
+                steps_left == 0 || layout.is_empty() || now.cost + linear.trained < CONVERGED_NATS;
+            let better = if is_last {
+                None
+            } else {
+                self.better(&now, &layout, &linear.step)
             };
-            let promised = cost + linear.trained;
-            if last || layout.is_empty() || promised < 0.1 {
-                return Some(finished(&set, &prediction, &residual));
-            }
-            let mut share = 1.0;
-            while share > 1e-3 {
-                let next = moved(&set, &layout, &linear.step, share);
-                let next_prediction = self.problem.predict(&self.track, &next);
-                let next_residual = self.residual(&next_prediction.readings);
-                let next_cost = self.cost(&next_residual);
-                if next_cost < cost {
-                    (set, prediction, residual, cost) =
-                        (next, next_prediction, next_residual, next_cost);
-                    return None;
+            match better {
+                Some(better) => {
+                    now = better;
+                    steps_left -= 1;
                 }
-                share *= 0.3;
+                None => {
+                    return Fit {
+                        set: now.set,
+                        layout,
+                        prediction: now.prediction,
+                        residual: now.residual,
+                        columns,
+                        linear,
+                    };
+                }
             }
-            Some(finished(&set, &prediction, &residual))
-        })
+        }
+    }
+
+    fn evaluated(&self, set: EffectSet) -> Evaluated {
+        let prediction = self.prepared.predict(&self.track, &set);
+        let residual = self.residual(&prediction.readings);
+        let cost = self.cost(&residual);
+        Evaluated {
+            set,
+            prediction,
+            residual,
+            cost,
+        }
+    }
+
+    /// The first of ever shorter parts of a step that lowers the cost.
+    fn better(
+        &self,
+        now: &Evaluated,
+        layout: &[(EffectKind, usize)],
+        step: &DVector<f64>,
+    ) -> Option<Evaluated> {
+        let mut part = 1.0;
+        while part > LEAST_PART {
+            let next = self.evaluated(stepped(&now.set, layout, step, part));
+            if next.cost < now.cost {
+                return Some(next);
+            }
+            part *= SHORTER;
+        }
+        None
     }
 
     /// How well columns beside those of a fit would do, in one linear step.
@@ -267,51 +306,35 @@ impl<'a> Context<'a> {
     ) -> Linear {
         let slices: Vec<&[f64]> = fit.columns.iter().chain(extra).map(Vec::as_slice).collect();
         let prior = fit
-            .layout
+            .set
             .iter()
-            .map(|&(kind, index)| prior_deviation(kind, index).powi(-2))
+            .flat_map(|effect| prior_weights(effect.kind()))
             .chain(extra_prior.iter().copied())
             .collect();
         self.gram(&slices, residual, prior).solve()
     }
 }
 
-/// Calls `step` until it has a result; it is told when it is the last time.
-fn loop_steps<T>(steps: usize, mut step: impl FnMut(bool) -> Option<T>) -> T {
-    let mut count = 0;
-    loop {
-        if let Some(result) = step(count >= steps) {
-            return result;
-        }
-        count += 1;
-    }
-}
-
-fn moved(
-    set: &EffectSet,
-    layout: &[(EffectKind, usize)],
-    step: &DVector<f64>,
-    share: f64,
-) -> EffectSet {
-    let mut next = set.clone();
-    for (position, &(kind, index)) in layout.iter().enumerate() {
-        if let Some(changed) = changed(&next, kind, &[(index, share * step[position])]) {
-            next = changed;
-        }
-    }
-    next
+/// A set with what it predicts and costs.
+struct Evaluated {
+    set: EffectSet,
+    prediction: Prediction,
+    /// Whitened, flat.
+    residual: Vec<f64>,
+    /// Negative log-likelihood, nats.
+    cost: f64,
 }
 
 impl Fit {
     /// Mean square of the whitened residual by channel, on data that each part of the fit did not
     /// see.
-    pub fn held_out_ratio(&self) -> [f64; 2] {
+    pub fn held_out_ratio(&self) -> PerChannel<f64> {
         self.linear.held_out_ratio
     }
 
     /// The set as it would be fitted without one part of time.
-    pub fn without_fold(&self, fold: usize) -> EffectSet {
-        moved(&self.set, &self.layout, &self.linear.fold_steps[fold], 1.0)
+    pub fn excluding_fold(&self, fold: usize) -> EffectSet {
+        stepped(&self.set, &self.layout, &self.linear.fold_steps[fold], 1.0)
     }
 
     /// Standard errors of an effect's values; 0 for those that are not fitted.
@@ -319,8 +342,8 @@ impl Fit {
         let mut errors = vec![0.0; effect.values().len()];
         for (position, &(kind, index)) in self.layout.iter().enumerate() {
             if kind == effect.kind() {
-                errors[index] =
-                    WIDENING * self.linear.covariance[(position, position)].max(0.0).sqrt();
+                let variance = self.linear.covariance[(position, position)].max(0.0);
+                errors[index] = STANDARD_ERROR_FACTOR * variance.sqrt();
             }
         }
         errors

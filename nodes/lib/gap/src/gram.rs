@@ -3,14 +3,22 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::problem::FOLDS;
+use cromosim_imu::{Channel, PerChannel};
 
-/// Inner products of columns (the last is the residual), `[channel][fold]`.
+use crate::axes::{channel_of_axis, sum_over_channels};
+use crate::prepared::FOLDS;
+
+/// Times that the channels' weights are taken from the residual of the step before.
+const REWEIGHTINGS: usize = 3;
+/// Relative change of these weights below which they have settled.
+const SETTLED: f64 = 0.01;
+
+/// Inner products of columns (the last is the residual), by fold.
 #[derive(Clone, Debug)]
 pub(crate) struct Gram {
-    parts: Vec<[DMatrix<f64>; 2]>,
-    /// Number of values, `[fold][channel]`.
-    counts: Vec<[f64; 2]>,
+    parts: Vec<PerChannel<DMatrix<f64>>>,
+    /// Number of values, by fold.
+    counts: Vec<PerChannel<f64>>,
     /// 1 / prior variance of each column's coefficient.
     prior: Vec<f64>,
 }
@@ -25,7 +33,7 @@ pub(crate) struct Linear {
     /// Log-likelihood of each part of time under the fit to the others, summed.
     pub held_out: f64,
     /// Held-out mean square of the whitened residual by channel.
-    pub held_out_ratio: [f64; 2],
+    pub held_out_ratio: PerChannel<f64>,
     /// Coefficients of the fit to all parts of time but one, for each.
     pub fold_steps: Vec<DVector<f64>>,
     /// Inverse of the normal matrix: covariance of the coefficients.
@@ -45,14 +53,14 @@ pub(crate) fn channel_likelihood(count: f64, squares: f64) -> f64 {
 }
 
 impl Gram {
-    /// Of columns over the flat whitened raster; `fold_of` a raster entry, `length` entries an
+    /// Of columns over the flat whitened sample grid; `fold_of` a sample grid entry, `length` entries an
     /// axis. `counts` as in the whitener, by fold.
     pub fn new(
         columns: &[&[f64]],
         residual: &[f64],
         length: usize,
         fold_of: &[usize],
-        counts: &[[f64; 2]],
+        counts: &[PerChannel<f64>],
         prior: Vec<f64>,
     ) -> Self {
         let size = columns.len() + 1;
@@ -61,7 +69,8 @@ impl Gram {
             .copied()
             .chain(std::iter::once(residual))
             .collect();
-        let mut parts = vec![[DMatrix::zeros(size, size), DMatrix::zeros(size, size)]; FOLDS];
+        let nothing = PerChannel::from_fn(|_| DMatrix::zeros(size, size));
+        let mut parts = vec![nothing; FOLDS];
         // Runs of one fold are contiguous: inner products over slices.
         let mut from = 0;
         while from < length {
@@ -71,7 +80,7 @@ impl Gram {
                 .unwrap_or(length);
             for axis in 0..6 {
                 let range = axis * length + from..axis * length + to;
-                let part = &mut parts[fold][axis / 3];
+                let part = &mut parts[fold][channel_of_axis(axis)];
                 for i in 0..size {
                     for j in 0..=i {
                         let (a, b) = (&all[i][range.clone()], &all[j][range.clone()]);
@@ -81,9 +90,9 @@ impl Gram {
             }
             from = to;
         }
-        for pair in &mut parts {
-            for part in pair {
-                part.fill_upper_triangle_with_lower_triangle();
+        for part in &mut parts {
+            for channel in Channel::ALL {
+                part[channel].fill_upper_triangle_with_lower_triangle();
             }
         }
         Self {
@@ -103,26 +112,22 @@ impl Gram {
         let total = self.sum(None);
         let count = self.count(None);
         let (step, ratio, covariance) = self.minimise(&total, &count);
-        let trained = (0..2)
-            .map(|c| channel_likelihood(count[c], ratio[c] * count[c]))
-            .sum::<f64>()
-            - self.prior_cost(&step);
-        let mut squares = [0.0; 2];
+        let trained = sum_over_channels(|channel| {
+            channel_likelihood(count[channel], ratio[channel] * count[channel])
+        }) - self.prior_cost(&step);
+        let mut squares = PerChannel::<f64>::default();
         let mut fold_steps = Vec::with_capacity(FOLDS);
         for (fold, part) in self.parts.iter().enumerate() {
             let (step, _, _) = self.minimise(&self.sum(Some(fold)), &self.count(Some(fold)));
-            for c in 0..2 {
-                squares[c] += left(&part[c], &step).max(0.0);
+            for channel in Channel::ALL {
+                squares[channel] += left(&part[channel], &step).max(0.0);
             }
             fold_steps.push(step);
         }
-        let held_out_ratio = [
-            squares[0] / count[0].max(1.0),
-            squares[1] / count[1].max(1.0),
-        ];
-        let held_out = (0..2)
-            .map(|c| channel_likelihood(count[c], squares[c]))
-            .sum();
+        let held_out_ratio =
+            PerChannel::from_fn(|channel| squares[channel] / count[channel].max(1.0));
+        let held_out =
+            sum_over_channels(|channel| channel_likelihood(count[channel], squares[channel]));
         Linear {
             step,
             trained,
@@ -141,51 +146,57 @@ impl Gram {
             .sum::<f64>()
     }
 
-    fn sum(&self, without: Option<usize>) -> [DMatrix<f64>; 2] {
+    /// Over all folds but one.
+    fn sum(&self, excluded: Option<usize>) -> PerChannel<DMatrix<f64>> {
         let size = self.size() + 1;
-        let mut total = [DMatrix::zeros(size, size), DMatrix::zeros(size, size)];
+        let mut total = PerChannel::from_fn(|_| DMatrix::zeros(size, size));
         for (_, part) in self
             .parts
             .iter()
             .enumerate()
-            .filter(|(fold, _)| Some(*fold) != without)
+            .filter(|(fold, _)| Some(*fold) != excluded)
         {
-            total[0] += &part[0];
-            total[1] += &part[1];
+            for channel in Channel::ALL {
+                total[channel] += &part[channel];
+            }
         }
         total
     }
 
-    fn count(&self, without: Option<usize>) -> [f64; 2] {
+    /// Number of values of all folds but one.
+    fn count(&self, excluded: Option<usize>) -> PerChannel<f64> {
         let kept = self
             .counts
             .iter()
             .enumerate()
-            .filter(|(fold, _)| Some(*fold) != without);
-        kept.fold([0.0; 2], |sum, (_, count)| {
-            [sum[0] + count[0], sum[1] + count[1]]
+            .filter(|(fold, _)| Some(*fold) != excluded);
+        kept.fold(PerChannel::default(), |sum, (_, count)| {
+            PerChannel::from_fn(|channel| sum[channel] + count[channel])
         })
     }
 
+    /// Coefficients, mean squares of the residual that they leave, and their covariance.
     fn minimise(
         &self,
-        total: &[DMatrix<f64>; 2],
-        count: &[f64; 2],
-    ) -> (DVector<f64>, [f64; 2], DMatrix<f64>) {
+        total: &PerChannel<DMatrix<f64>>,
+        count: &PerChannel<f64>,
+    ) -> (DVector<f64>, PerChannel<f64>, DMatrix<f64>) {
         let size = self.size();
-        let ratio_of = |step: &DVector<f64>| {
-            [0, 1].map(|c| left(&total[c], step).max(0.0) / count[c].max(1.0))
+        let ratio_after = |step: &DVector<f64>| {
+            PerChannel::from_fn(|channel| {
+                left(&total[channel], step).max(0.0) / count[channel].max(1.0)
+            })
         };
         let mut step = DVector::zeros(size);
-        let mut ratio = ratio_of(&step);
+        let mut ratio = ratio_after(&step);
         let mut covariance = DMatrix::zeros(size, size);
-        for _ in 0..3 {
+        for _ in 0..REWEIGHTINGS {
             let mut normal = DMatrix::zeros(size, size);
             let mut right = DVector::zeros(size);
-            for c in 0..2 {
-                let weight = ratio[c].max(1.0).recip();
-                normal += total[c].view((0, 0), (size, size)) * weight;
-                right += total[c].view((0, size), (size, 1)) * weight;
+            for channel in Channel::ALL {
+                let weight = ratio[channel].max(1.0).recip();
+                normal += total[channel].view((0, 0), (size, size)) * weight;
+                right += total[channel].view((0, size), (size, 1)) * weight;
             }
             for k in 0..size {
                 normal[(k, k)] += self.prior[k] + 1e-12 * normal[(k, k)];
@@ -195,8 +206,10 @@ impl Gram {
             };
             step = factor.solve(&right);
             covariance = factor.inverse();
-            let next = ratio_of(&step);
-            let settled = (0..2).all(|c| (next[c].max(1.0) / ratio[c].max(1.0) - 1.0).abs() < 0.01);
+            let next = ratio_after(&step);
+            let settled = Channel::ALL.into_iter().all(|channel| {
+                (next[channel].max(1.0) / ratio[channel].max(1.0) - 1.0).abs() < SETTLED
+            });
             ratio = next;
             if settled {
                 break;

@@ -1,36 +1,51 @@
 //! The gap between simulated and real IMUs: where it lies, which effect causes it, how far it
-//! shrinks once that effect is added.
+//! shrinks once that effect is added. README.md says how a diagnosis works, file by file.
 
-mod answer;
+mod axes;
+mod builder;
+mod coarse_alignment;
+mod confounding;
 mod diagnose;
 mod diagnosis;
+mod digital;
 mod error;
 mod evidence;
 mod fill;
+mod findings;
 mod fit;
 mod gram;
-mod gross;
 mod identify;
+mod lag;
+mod library;
+mod location;
 mod metrics;
 pub mod monitor;
-mod place;
+mod noise_model;
+mod noise_updates;
+mod plausibility;
+mod policy;
+mod prepared;
 mod probability;
-mod probes;
-mod problem;
 mod record;
 pub mod report;
+mod reportable;
+mod residual_regressions;
 mod screen;
 mod search;
 mod sensor_noise;
+mod shares;
+mod simulations;
 mod smoothing;
+mod trace;
 mod unknown;
 mod whiten;
+mod words;
 
 pub use diagnose::{DiagnoseOptions, PlacementAnswer, diagnose};
 pub use diagnosis::{
-    Cause, Diagnosis, Gap, Interval, Metrics, Place, PlacementDiagnosis, SCHEMA, Unexplained,
+    Cause, Diagnosis, Gap, GapLocation, Interval, Metrics, PlacementDiagnosis, SCHEMA, Unexplained,
     Unidentifiable,
 };
 pub use error::GapError;
-pub use evidence::{AXES, CoursePoint, Evidence, Spectra};
+pub use evidence::{CoursePoint, Evidence, Spectra};
 pub use record::{ImuSeries, PlacementRecord, PoseSeries};

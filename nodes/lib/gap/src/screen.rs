@@ -1,291 +1,236 @@
 //! Candidates beside a fit: one linear step for each, so that only the promising ones are fitted.
 
-use cromosim_imu::{Effect, EffectKind, EffectSet};
+use cromosim_imu::{Effect, EffectKind, EffectSet, FirstGuess, PerChannel, Search};
+use nalgebra::{Cholesky, DMatrix, Dyn, Matrix3, Vector3};
 
-use crate::fit::{Context, Fit, free_values, prior_deviation};
-use crate::gram::{Linear, dot};
+use crate::axes::channel_of_axis;
+use crate::fit::{Fit, FitModel, layout_of, prior_weights, stepped};
+use crate::gram::dot;
 
-/// Effects of the motion, the mount, the clock and the sensor that are fitted to residuals.
-pub(crate) const FITTED: [EffectKind; 19] = [
-    EffectKind::ReferenceTilt,
-    EffectKind::ReferenceScale,
-    EffectKind::MountRotation,
-    EffectKind::LeverArm,
-    EffectKind::MountSlip,
-    EffectKind::SoftTissue,
-    EffectKind::TimeOffset,
-    EffectKind::ClockDrift,
-    EffectKind::AccelBias,
-    EffectKind::GyroBias,
-    EffectKind::AccelScale,
-    EffectKind::GyroScale,
-    EffectKind::AccelMisalignment,
-    EffectKind::GyroMisalignment,
-    EffectKind::AccelBiasDrift,
-    EffectKind::GyroBiasDrift,
-    EffectKind::LowPass,
-    EffectKind::GyroGSensitivity,
-    EffectKind::Vibration,
-];
+/// Part of a recording at either end in which no change is looked for.
+const END_PART: usize = 8;
+/// Steps around the time of a change by which it is sharpened, in periods of the IMU.
+const SHARPENING_PERIODS: [f64; 3] = [8.0, 2.0, 0.5];
 
-/// Slowest vibration, Hz.
-const LEAST_VIBRATION_HZ: f64 = 4.0;
-
-/// A set to be fitted, with what one linear step promises of it.
+/// A set to be fitted, with what one linear step predicts of it.
 #[derive(Clone, Debug)]
 pub(crate) struct Candidate {
     pub set: EffectSet,
-    pub promise: f64,
+    /// Held-out log-likelihood after the step, nats.
+    pub predicted_gain: f64,
 }
 
-impl Context<'_> {
-    /// The best start of one effect beside `fit`: its set and the held-out log-likelihood after one
-    /// linear step.
-    pub fn screen(&self, fit: &Fit, kind: EffectKind) -> Option<Candidate> {
-        if kind == EffectKind::MountSlip {
-            return self.screen_slip(fit);
-        }
-        let starts = self.starts(fit, kind);
-        let candidates = starts.into_iter().filter_map(|values| {
-            let mut set = fit.set.clone();
-            set.insert(Effect::new(kind, values).ok()?);
-            let neutral = set.get(kind)?.values() == kind.spec().neutral();
-            let linear = if neutral {
-                let columns = self.columns(&set, &fit.prediction, kind);
-                self.extended(fit, &fit.residual, &columns, &prior(kind))
-            } else {
-                let prediction = self.problem.predict(&self.track, &set);
-                let columns = self.columns(&set, &prediction, kind);
-                self.extended(
-                    fit,
-                    &self.residual(&prediction.readings),
-                    &columns,
-                    &prior(kind),
-                )
-            };
-            Some(Candidate {
-                set: self.stepped(&set, fit, kind, &linear),
-                promise: linear.held_out,
-            })
-        });
-        candidates.max_by(|a, b| a.promise.total_cmp(&b.promise))
-    }
+/// The best start of one effect beside `fit`; none where it is not fitted, or cannot be started.
+pub(crate) fn screen(model: &FitModel, fit: &Fit, kind: EffectKind) -> Option<Candidate> {
+    let Search::Fitted(search) = kind.spec().search else {
+        return None;
+    };
+    let starts = match search.first_guess {
+        FirstGuess::Neutral => vec![Effect::neutral(kind)],
+        FirstGuess::FromResidual(guess) => guess(&model.prepared.view(&fit.prediction.readings))
+            .into_iter()
+            .filter_map(|values| Effect::new(kind, values).ok())
+            .collect(),
+        FirstGuess::ChangeOf(base) => vec![change_point(model, fit, kind, base)?],
+    };
+    starts
+        .into_iter()
+        .map(|start| candidate(model, fit, start))
+        .max_by(|a, b| a.predicted_gain.total_cmp(&b.predicted_gain))
+}
 
-    /// `set` after the linear step of the fit's own values and the candidate's.
-    fn stepped(&self, set: &EffectSet, fit: &Fit, kind: EffectKind, linear: &Linear) -> EffectSet {
-        let layout = fit
-            .layout
-            .iter()
-            .copied()
-            .chain(free_values(kind).into_iter().map(|index| (kind, index)));
-        let mut next = set.clone();
-        for ((kind, index), change) in layout.zip(linear.step.iter()) {
-            if let Some(changed) = crate::fit::changed(&next, kind, &[(index, *change)]) {
-                next = changed;
-            }
-        }
-        next
+/// One linear step of the fit's own values and those of one more effect, from where it starts.
+fn candidate(model: &FitModel, fit: &Fit, start: Effect) -> Candidate {
+    let kind = start.kind();
+    let is_neutral = start == Effect::neutral(kind);
+    let set = fit.set.clone().with(start);
+    let prior = prior_weights(kind);
+    let linear = if is_neutral {
+        let columns = model.columns(&set, &fit.prediction, kind);
+        model.extended(fit, &fit.residual, &columns, &prior)
+    } else {
+        let prediction = model.prepared.predict(&model.track, &set);
+        let columns = model.columns(&set, &prediction, kind);
+        let residual = model.residual(&prediction.readings);
+        model.extended(fit, &residual, &columns, &prior)
+    };
+    let layout: Vec<_> = fit.layout.iter().copied().chain(layout_of(kind)).collect();
+    Candidate {
+        set: stepped(&set, &layout, &linear.step, 1.0),
+        predicted_gain: linear.held_out,
     }
+}
 
-    fn starts(&self, fit: &Fit, kind: EffectKind) -> Vec<Vec<f64>> {
-        match kind {
-            // Without a gradient at their neutral values.
-            EffectKind::SoftTissue | EffectKind::LowPass | EffectKind::Vibration => {
-                (kind.spec().starts)(&self.problem.view(&self.basis, &fit.prediction.readings))
-            }
-            _ => vec![kind.spec().neutral()],
-        }
+/// The effect `kind` that changes the values of `base` at the time at which this helps most: its
+/// values are the time and the three values of the change. All times are tried, by sums of the
+/// columns of `base` from there on.
+fn change_point(model: &FitModel, fit: &Fit, kind: EffectKind, base: EffectKind) -> Option<Effect> {
+    let prepared = model.prepared;
+    let mut set = fit.set.clone();
+    if set.get(base).is_none() {
+        set.insert(Effect::neutral(base));
     }
+    let columns = model.columns(&set, &fit.prediction, base);
+    let best = ChangeSearch::new(fit, &columns, prepared.length)?.best()?;
+    let at = prepared
+        .epoch
+        .plus_seconds((best.entry as f64 - 0.5) / prepared.rate_hz);
+    let at_s = at.as_seconds() - fit.set.time_offset();
+    Effect::new(
+        kind,
+        vec![at_s, best.change.x, best.change.y, best.change.z],
+    )
+    .ok()
+}
 
-    /// The time after which turning the mount helps most: all times are tried, by sums of the mount
-    /// rotation's columns from there on.
-    fn screen_slip(&self, fit: &Fit) -> Option<Candidate> {
-        let problem = self.problem;
-        let mut set = fit.set.clone();
-        let kind = EffectKind::MountRotation;
-        if set.get(kind).is_none() {
-            set.insert(Effect::neutral(kind));
-        }
-        let columns = self.columns(&set, &fit.prediction, kind);
-        let length = problem.length;
+/// Sums over the sample grid from its end, with which a change at each entry is solved for in
+/// closed form: the change's own normal matrix less what the fit's values take up of it.
+struct ChangeSearch<'a> {
+    fit: &'a Fit,
+    columns: &'a [Vec<f64>],
+    length: usize,
+    /// Of each channel, 1 / its held-out mean square.
+    weight: PerChannel<f64>,
+    /// Of the fit's own normal matrix; none where it has no values.
+    own_factor: Option<Cholesky<f64, Dyn>>,
+}
+
+/// A change of three values.
+struct Change {
+    gain: f64,
+    entry: usize,
+    change: Vector3<f64>,
+}
+
+impl<'a> ChangeSearch<'a> {
+    fn new(fit: &'a Fit, columns: &'a [Vec<f64>], length: usize) -> Option<Self> {
+        let weight = channel_weights(fit);
         let size = fit.columns.len();
-        let ratio = fit.held_out_ratio();
-        let weight = [ratio[0].max(1.0).recip(), ratio[1].max(1.0).recip()];
-        let mut inner = nalgebra::DMatrix::zeros(size, size);
+        let mut own = DMatrix::zeros(size, size);
         for i in 0..size {
             for j in 0..=i {
-                inner[(i, j)] = weighted(&fit.columns[i], &fit.columns[j], weight);
-                inner[(j, i)] = inner[(i, j)];
+                own[(i, j)] = weighted(&fit.columns[i], &fit.columns[j], weight);
+                own[(j, i)] = own[(i, j)];
             }
-            inner[(i, i)] *= 1.0 + 1e-9;
+            own[(i, i)] *= 1.0 + 1e-9;
         }
-        let factor = if size > 0 {
-            Some(inner.cholesky()?)
+        let own_factor = if size > 0 {
+            Some(own.cholesky()?)
         } else {
             None
         };
-        // Sums over the raster from the end: C'C, C'e, C'J.
-        let mut own = nalgebra::Matrix3::<f64>::zeros();
-        let mut right = nalgebra::Vector3::<f64>::zeros();
-        let mut mixed = nalgebra::DMatrix::<f64>::zeros(size, 3);
-        let mut best = (0.0, 0, nalgebra::Vector3::zeros());
-        let margin = length / 8;
-        for place in (0..length).rev() {
-            for axis in 0..6 {
-                let at = axis * length + place;
-                let c = nalgebra::Vector3::new(columns[0][at], columns[1][at], columns[2][at])
-                    * weight[axis / 3];
-                let plain = nalgebra::Vector3::new(columns[0][at], columns[1][at], columns[2][at]);
-                own += c * plain.transpose();
-                right += c * fit.residual[at];
-                for i in 0..size {
-                    for j in 0..3 {
-                        mixed[(i, j)] += fit.columns[i][at] * c[j];
-                    }
-                }
-            }
-            if place < margin || place > length - margin {
-                continue;
-            }
-            let schur = match &factor {
-                Some(factor) => {
-                    own - nalgebra::Matrix3::from_iterator(
-                        (mixed.transpose() * factor.solve(&mixed)).iter().copied(),
-                    )
-                }
-                None => own,
-            };
-            if let Some(factor) = (schur + nalgebra::Matrix3::identity()).cholesky() {
-                let turn = factor.solve(&right);
-                let gain = turn.dot(&right);
-                if gain > best.0 {
-                    best = (gain, place, turn);
-                }
-            }
-        }
-        if best.0 <= 0.0 {
-            return None;
-        }
-        let at = problem
-            .epoch
-            .plus_seconds((best.1 as f64 - 0.5) / problem.rate_hz);
-        let lag_s = fit
-            .set
-            .get(EffectKind::TimeOffset)
-            .and_then(|effect| effect.values().first().copied())
-            .unwrap_or(0.0);
-        let mut with_slip = fit.set.clone();
-        crate::gross::insert(
-            &mut with_slip,
-            EffectKind::MountSlip,
-            vec![at.as_seconds() - lag_s, best.2.x, best.2.y, best.2.z],
-        );
-        let prediction = problem.predict(&self.track, &with_slip);
-        let own_columns = self.columns(&with_slip, &prediction, EffectKind::MountSlip);
-        let linear = self.extended(
+        Some(Self {
             fit,
-            &self.residual(&prediction.readings),
-            &own_columns,
-            &prior(EffectKind::MountSlip),
-        );
-        Some(Candidate {
-            set: self.stepped(&with_slip, fit, EffectKind::MountSlip, &linear),
-            promise: linear.held_out,
+            columns,
+            length,
+            weight,
+            own_factor,
         })
     }
 
-    /// The time of a slip to the sample: whichever of the times around leaves least.
-    pub fn sharpen_slip(&self, fit: Fit) -> Fit {
-        let Some(slip) = fit.set.get(EffectKind::MountSlip).cloned() else {
-            return fit;
-        };
-        let score = |at: f64| {
-            let mut set = fit.set.clone();
-            let mut values = slip.values().to_vec();
-            values[0] = at;
-            crate::gross::insert(&mut set, EffectKind::MountSlip, values);
-            let residual = self.residual(&self.problem.predict(&self.track, &set).readings);
-            let ratio = fit.held_out_ratio();
-            (
-                weighted(
-                    &residual,
-                    &residual,
-                    [ratio[0].max(1.0).recip(), ratio[1].max(1.0).recip()],
-                ),
-                set,
-            )
-        };
-        let period = 1.0 / self.problem.rate_hz;
-        let mut best = (score(slip.values()[0]).0, fit.set.clone(), slip.values()[0]);
-        for step in [8.0 * period, 2.0 * period, 0.5 * period] {
-            let centre = best.2;
-            for k in -4..=4 {
-                let at = centre + f64::from(k) * step;
-                let (squares, set) = score(at);
-                if squares < best.0 {
-                    best = (squares, set, at);
+    fn best(&self) -> Option<Change> {
+        let size = self.fit.columns.len();
+        // Sums from the end: C'C, C'e, J'C, with C the change's columns, e the residual and J the
+        // fit's own columns.
+        let mut square = Matrix3::<f64>::zeros();
+        let mut right = Vector3::<f64>::zeros();
+        let mut mixed = DMatrix::<f64>::zeros(size, 3);
+        let mut best: Option<Change> = None;
+        let margin = self.length / END_PART;
+        for entry in (0..self.length).rev() {
+            for axis in 0..6 {
+                let at = axis * self.length + entry;
+                let plain = Vector3::from_fn(|row, _| self.columns[row][at]);
+                let c = plain * self.weight[channel_of_axis(axis)];
+                square += c * plain.transpose();
+                right += c * self.fit.residual[at];
+                for i in 0..size {
+                    for j in 0..3 {
+                        mixed[(i, j)] += self.fit.columns[i][at] * c[j];
+                    }
+                }
+            }
+            if entry < margin || entry > self.length - margin {
+                continue;
+            }
+            let schur = match &self.own_factor {
+                Some(factor) => {
+                    let taken_up = mixed.transpose() * factor.solve(&mixed);
+                    square - Matrix3::from_iterator(taken_up.iter().copied())
+                }
+                None => square,
+            };
+            if let Some(factor) = (schur + Matrix3::identity()).cholesky() {
+                let change = factor.solve(&right);
+                let gain = change.dot(&right);
+                if gain > best.as_ref().map_or(0.0, |best| best.gain) {
+                    best = Some(Change {
+                        gain,
+                        entry,
+                        change,
+                    });
                 }
             }
         }
-        if best.1 == fit.set {
-            fit
-        } else {
-            self.fit(best.1)
-        }
+        best
     }
 }
 
-impl Context<'_> {
-    /// Whether a vibration in the set is more than motion that the reference does not resolve:
-    /// stronger than a tenth of the white noise, alone in the accelerometer, and one sinusoid that
-    /// takes most of the line away.
-    pub fn true_vibration(&self, fit: &Fit) -> bool {
-        let kind = EffectKind::Vibration;
-        let Some(vibration) = fit.set.get(kind) else {
-            return true;
-        };
-        let values = vibration.values();
-        let power: f64 = values[1..4]
-            .iter()
-            .map(|amplitude| 0.5 * amplitude * amplitude)
-            .sum();
-        // Slow lines are gait.
-        if power < 0.3 * self.basis.sigma[0].powi(2) || values[0] < LEAST_VIBRATION_HZ {
-            return false;
+/// The time of a change to the sample: whichever of the times around leaves least. Fits without
+/// one stay as they are.
+pub(crate) fn sharpen_change_point(model: &FitModel, fit: Fit) -> Fit {
+    let Some(change) = fit.set.iter().find(|effect| is_change(effect.kind())) else {
+        return fit;
+    };
+    let weight = channel_weights(&fit);
+    let squares_at = |at_s: f64| {
+        let mut values = change.values().to_vec();
+        values[0] = at_s;
+        let mut set = fit.set.clone();
+        if let Ok(effect) = change.with_values(values) {
+            set.insert(effect);
         }
-        let without = self.problem.predict(&self.track, &fit.set.without(kind));
-        let (before, after) = (
-            self.problem.residual(&without.readings),
-            self.problem.residual(&fit.prediction.readings),
-        );
-        let line = |series: &[Vec<f64>], channel: usize| {
-            let spectrum = self.problem.channel_spectrum(series, channel);
-            let around = spectrum
-                .median(values[0] - 4.0, values[0] + 4.0)
-                .unwrap_or(0.0)
-                .max(1e-30);
-            let band = spectrum.band(values[0] - 0.75, values[0] + 1.0);
-            (
-                band.iter().copied().fold(0.0, f64::max) / around,
-                band.iter().sum::<f64>() - around * band.len() as f64,
-            )
-        };
-        let (height, power_before) = line(&before, 0);
-        let (_, power_after) = line(&after, 0);
-        let (turning, _) = line(&after, 1);
-        height > 20.0 && turning < 8.0 && power_after < 0.3 * power_before
+        let prediction = model.prepared.predict(&model.track, &set);
+        let residual = model.residual(&prediction.readings);
+        (weighted(&residual, &residual, weight), set)
+    };
+    let period = 1.0 / model.prepared.rate_hz;
+    let start_s = change.values()[0];
+    let mut best = (squares_at(start_s).0, fit.set.clone(), start_s);
+    for step in SHARPENING_PERIODS.map(|periods| periods * period) {
+        let centre = best.2;
+        for k in -4..=4 {
+            let at_s = centre + f64::from(k) * step;
+            let (squares, set) = squares_at(at_s);
+            if squares < best.0 {
+                best = (squares, set, at_s);
+            }
+        }
+    }
+    if best.1 == fit.set {
+        fit
+    } else {
+        model.fit(best.1)
     }
 }
 
-fn prior(kind: EffectKind) -> Vec<f64> {
-    free_values(kind)
-        .into_iter()
-        .map(|index| prior_deviation(kind, index).powi(-2))
-        .collect()
+/// Whether the first of an effect's values is the time of a change.
+pub(crate) fn is_change(kind: EffectKind) -> bool {
+    matches!(
+        kind.spec().search,
+        Search::Fitted(search) if matches!(search.first_guess, FirstGuess::ChangeOf(_))
+    )
+}
+
+/// 1 / held-out mean square of each channel's whitened residual, at most 1.
+fn channel_weights(fit: &Fit) -> PerChannel<f64> {
+    let ratio = fit.held_out_ratio();
+    PerChannel::from_fn(|channel| ratio[channel].max(1.0).recip())
 }
 
 /// Inner product of flat whitened series, each channel with its weight.
-pub(crate) fn weighted(a: &[f64], b: &[f64], weight: [f64; 2]) -> f64 {
+fn weighted(a: &[f64], b: &[f64], weight: PerChannel<f64>) -> f64 {
     let half = a.len() / 2;
-    weight[0] * dot(&a[..half], &b[..half]) + weight[1] * dot(&a[half..], &b[half..])
+    weight.accelerometer * dot(&a[..half], &b[..half])
+        + weight.gyroscope * dot(&a[half..], &b[half..])
 }

@@ -1,97 +1,75 @@
-//! What a sensor adds by itself: white noise, clipping, rounding.
+//! The white noise of a sensor, as its readings and residuals show it.
 
-use cromosim_imu::EffectKind;
+use cromosim_imu::{Channel, PerChannel, ReadOff};
 
-use crate::DiagnoseOptions;
-use crate::gross::Digital;
-use crate::problem::Problem;
+use crate::axes::{axes_of_channel, value_on_axis};
+use crate::digital::Digital;
+use crate::library::Library;
+use crate::prepared::PreparedPlacement;
+
+/// Runs of five neighbours below which fourth differences say nothing.
+const LEAST_RUNS: usize = 300;
+/// `x0 - 4 x1 + 6 x2 - 4 x3 + x4` of white noise has this times its variance: 1 + 16 + 36 + 16 + 1.
+const FOURTH_DIFFERENCE_GAIN: f64 = 70.0;
+/// The median of a squared standard normal number.
+const MEDIAN_OF_SQUARE: f64 = 0.4549;
+/// Bands in the upper half of a spectrum, in units of the Nyquist frequency.
+const UPPER_BANDS: [(f64, f64); 4] = [(0.5, 0.62), (0.62, 0.74), (0.74, 0.86), (0.86, 0.97)];
 
 /// The declared noise in SI units. Whether a device in other units declares its covariances in them
 /// is nowhere said: what is nearer to the noise of the readings holds.
-pub(crate) fn declared_in_si(problem: &Problem, units: [f64; 2]) -> [Option<f64>; 2] {
-    let series = problem.raster(|k, axis| crate::problem::axis_of(&problem.measured[k], axis));
-    [0, 1].map(|c| {
-        let declared = problem.declared[c]?;
-        let found = fourth_differences(problem, &series, c)
+pub(crate) fn declared_in_si(
+    prepared: &PreparedPlacement,
+    units: PerChannel<f64>,
+) -> PerChannel<Option<f64>> {
+    let series = prepared.on_sample_grid(|k, axis| value_on_axis(&prepared.measured[k], axis));
+    PerChannel::from_fn(|channel| {
+        let declared = prepared.declared[channel]?;
+        let found = fourth_differences(prepared, &series, channel)
             .unwrap_or(0.0)
             .sqrt()
             .max(1e-12);
         let off = |sigma: f64| (sigma / found).ln().abs();
-        Some(if off(declared / units[c]) < off(declared) {
-            declared / units[c]
+        Some(if off(declared / units[channel]) < off(declared) {
+            declared / units[channel]
         } else {
             declared
         })
     })
 }
 
-/// What is denied to the library stays in the readings, to be found as something unknown.
-pub(crate) fn allowed_digital(
-    found: Digital,
-    channel: usize,
-    options: &DiagnoseOptions,
-) -> Digital {
-    let [saturation, quantization] = [
-        [EffectKind::AccelSaturation, EffectKind::AccelQuantization],
-        [EffectKind::GyroSaturation, EffectKind::GyroQuantization],
-    ][channel];
-    let allowed = |kind: EffectKind| !options.without.contains(&kind);
-    Digital {
-        limit: found.limit.filter(|_| allowed(saturation)),
-        lsb: found.lsb.filter(|_| allowed(quantization)),
-        denied: found.lsb.is_some() && !allowed(quantization),
-    }
-}
-
 /// White noise per sample that residuals are divided by: what is found, unless the cause of more
-/// than the declared is denied.
+/// than the declared is excluded.
 pub(crate) fn white_noise(
-    problem: &Problem,
-    found: [f64; 2],
-    digital: &[Digital; 2],
-    without: &[EffectKind],
-) -> [f64; 2] {
-    [EffectKind::AccelNoise, EffectKind::GyroNoise].map(|kind| {
-        let c = usize::from(kind == EffectKind::GyroNoise);
-        match problem.declared[c] {
-            None => found[c],
-            Some(declared) if without.contains(&kind) || digital[c].denied => declared,
-            Some(declared) => declared.max(found[c]),
+    prepared: &PreparedPlacement,
+    found: PerChannel<f64>,
+    digital: &PerChannel<Digital>,
+    library: &Library,
+) -> PerChannel<f64> {
+    PerChannel::from_fn(|channel| {
+        let may_exceed = library.allows_read_off(ReadOff::ExcessNoise(channel))
+            && !digital[channel].rounding_is_excluded;
+        match prepared.declared[channel] {
+            None => found[channel],
+            Some(declared) if may_exceed => declared.max(found[channel]),
+            Some(declared) => declared,
         }
     })
-}
-
-/// Clipped values tell only that the true one lies beyond.
-pub(crate) fn mask_clipped(problem: &mut Problem, channel: usize, digital: &Digital) {
-    let Some(limit) = digital.limit else { return };
-    for (k, reading) in problem.measured.iter().enumerate() {
-        for axis in 0..3 {
-            let value = if channel == 0 {
-                reading.specific_force[axis]
-            } else {
-                reading.angular_velocity[axis]
-            };
-            if value.abs() >= limit * (1.0 - 1e-9) {
-                problem.usable[k][3 * channel + axis] = false;
-            }
-        }
-    }
 }
 
 /// White noise per sample of each channel: the least of four bands in the upper half of the
 /// residual's spectrum and of fourth differences of neighbours; whatever else is there only adds to
 /// each.
-pub(crate) fn found_noise(problem: &Problem, residual: &[Vec<f64>]) -> [f64; 2] {
-    [0, 1].map(|channel| {
-        let spectrum = problem.channel_spectrum(residual, channel);
-        let nyquist_hz = problem.rate_hz / 2.0;
-        let bands = [(0.5, 0.62), (0.62, 0.74), (0.74, 0.86), (0.86, 0.97)];
-        let least = bands
+pub(crate) fn found_noise(prepared: &PreparedPlacement, residual: &[Vec<f64>]) -> PerChannel<f64> {
+    PerChannel::from_fn(|channel| {
+        let spectrum = prepared.channel_spectrum(residual, channel);
+        let nyquist_hz = prepared.rate_hz / 2.0;
+        let least = UPPER_BANDS
             .iter()
             .filter_map(|(a, b)| spectrum.median(a * nyquist_hz, b * nyquist_hz))
             .fold(f64::INFINITY, f64::min);
-        let variance = least * problem.rate_hz / 2.0;
-        fourth_differences(problem, residual, channel)
+        let variance = least * prepared.rate_hz / 2.0;
+        fourth_differences(prepared, residual, channel)
             .map_or(variance, |other| variance.min(other))
             .sqrt()
     })
@@ -99,40 +77,41 @@ pub(crate) fn found_noise(problem: &Problem, residual: &[Vec<f64>]) -> [f64; 2] 
 
 /// Whether the top of a channel's spectrum is level: motion that the reference does not resolve
 /// falls steeply there.
-pub(crate) fn is_white(problem: &Problem, residual: &[Vec<f64>]) -> [bool; 2] {
-    [0, 1].map(|channel| {
-        let spectrum = problem.channel_spectrum(residual, channel);
+pub(crate) fn is_white(prepared: &PreparedPlacement, residual: &[Vec<f64>]) -> PerChannel<bool> {
+    PerChannel::from_fn(|channel| {
+        let spectrum = prepared.channel_spectrum(residual, channel);
         let level = |from: f64, to: f64| {
             spectrum
-                .median(from * problem.rate_hz / 2.0, to * problem.rate_hz / 2.0)
+                .median(from * prepared.rate_hz / 2.0, to * prepared.rate_hz / 2.0)
                 .unwrap_or(0.0)
         };
         level(0.70, 0.83) < 1.5 * level(0.84, 0.97)
     })
 }
 
-/// Variance of white noise from `x0 - 4 x1 + 6 x2 - 4 x3 + x4` (variance 70) of five neighbours
-/// that are all there, by the median of its squares.
-pub(crate) fn fourth_differences(
-    problem: &Problem,
+/// Variance of white noise from `x0 - 4 x1 + 6 x2 - 4 x3 + x4` of five neighbours that are all
+/// there, by the median of its squares.
+fn fourth_differences(
+    prepared: &PreparedPlacement,
     residual: &[Vec<f64>],
-    channel: usize,
+    channel: Channel,
 ) -> Option<f64> {
     let mut squares = Vec::new();
-    for (axis, series) in residual.iter().enumerate().skip(3 * channel).take(3) {
-        for first in 0..problem.places.len().saturating_sub(4) {
-            let whole = problem.places[first + 4] == problem.places[first] + 4
-                && (first..first + 5).all(|k| problem.usable[k][axis]);
+    for axis in axes_of_channel(channel) {
+        let series = &residual[axis];
+        for first in 0..prepared.grid_index.len().saturating_sub(4) {
+            let whole = prepared.grid_index[first + 4] == prepared.grid_index[first] + 4
+                && (first..first + 5).all(|k| prepared.usable[k][axis]);
             if whole {
-                let x = &series[problem.places[first]..];
+                let x = &series[prepared.grid_index[first]..];
                 squares.push((x[0] - 4.0 * x[1] + 6.0 * x[2] - 4.0 * x[3] + x[4]).powi(2));
             }
         }
     }
-    if squares.len() < 300 {
+    if squares.len() < LEAST_RUNS {
         return None;
     }
     let middle = squares.len() / 2;
-    // The median of a squared standard normal number is 0.4549.
-    Some(*squares.select_nth_unstable_by(middle, f64::total_cmp).1 / (70.0 * 0.4549))
+    let median = *squares.select_nth_unstable_by(middle, f64::total_cmp).1;
+    Some(median / (FOURTH_DIFFERENCE_GAIN * MEDIAN_OF_SQUARE))
 }

@@ -64,9 +64,11 @@ mod test_motions;
 pub use channel::{AXES, Channel, PerChannel};
 pub use device::{Device, EMBEDDED_DEVICES};
 pub use effects::{
-    DeclaredNoise, Dropouts, Effect, EffectKind, EffectSet, EffectSpec, EffectsFile, GridTrace,
-    ParameterSpec, PlacementEffects, Reading, ResidualView, SensorModel, Shape, Stage,
-    StreamingEffects, lattice_spacing,
+    DeclaredNoise, Dependence, Dropouts, Effect, EffectKind, EffectSet, EffectSpec, EffectsFile,
+    FirstGuess, FittedSearch, GravityMode, GridTrace, Identifiability, Ordinary, ParameterFit,
+    ParameterSpec, PlacementEffects, ReadOff, ReadOffSearch, Reading, ResidualView, Rounding,
+    Search, SensorModel, Shape, SpectralLine, Stage, StreamingEffects, clipping_limit,
+    lattice_spacing, nearest_signed_permutation, strongest_line, unit_factors, white_noise_density,
 };
 pub use error::{EffectError, ImuError, PlacementProblem};
 pub use mount::{MountedSensor, MountedSensors, SensorPose};

@@ -9,8 +9,8 @@
 //! their gaps.
 
 use cromosim_imu::{
-    Effect, EffectKind, EffectSet, GridTrace, NoiseSource, Reading, ResidualView, SensorModel,
-    lattice_spacing, normal_pair,
+    Channel, Effect, EffectKind, EffectSet, GridTrace, NoiseSource, Reading, SensorModel,
+    lattice_spacing, normal_pair, white_noise_density,
 };
 use cromosim_spatial::Stamp;
 use nalgebra::Vector3;
@@ -248,33 +248,12 @@ fn rest(seconds: &[f64], values: &[[f64; 6]]) -> Option<Rest> {
     if scatter.sqrt() > REST_SCATTER {
         return None;
     }
-    let stamps: Vec<Stamp> = seconds
-        .iter()
-        .map(|seconds| Stamp::from_seconds(*seconds))
-        .collect();
-    let nothing = vec![Reading::default(); readings.len()];
     let rate_hz = (count - 1.0) / (seconds[seconds.len() - 1] - seconds[0]);
-    let epoch = stamps[0];
-    let view = ResidualView {
-        stamps: &stamps,
-        epoch,
-        rate_hz,
-        measured: &readings,
-        simulated: &nothing,
-        accel_sigma: 0.0,
-        gyro_sigma: 0.0,
-    };
-    let density = |kind: EffectKind| {
-        (kind.spec().starts)(&view)
-            .first()
-            .and_then(|values| values.first())
-            .copied()
-            .unwrap_or_default()
-    };
+    let density = |channel| white_noise_density(&readings, channel, rate_hz);
     Some(Rest {
         mean_rate,
-        accel_noise: density(EffectKind::AccelNoise),
-        gyro_noise: density(EffectKind::GyroNoise),
+        accel_noise: density(Channel::Accelerometer),
+        gyro_noise: density(Channel::Gyroscope),
     })
 }
 

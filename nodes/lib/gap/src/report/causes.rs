@@ -2,10 +2,11 @@
 
 use std::fmt::Write;
 
-use cromosim_charts::text::{escape, percent, significant};
+use cromosim_charts::text::{escape, percent};
 
+use super::markup::{bar, change};
 use super::text::{parameter, spec, summary};
-use crate::{Cause, Metrics, PlacementDiagnosis};
+use crate::diagnosis::{Cause, Metrics, PlacementDiagnosis};
 
 /// One row a cause, the largest share first.
 pub(super) fn write_causes(page: &mut String, placement: &PlacementDiagnosis) {
@@ -65,22 +66,4 @@ fn write_cause(page: &mut String, cause: &Cause, before: &Metrics) {
         change(before.accel_rmse, cause.after.accel_rmse),
         change(before.gyro_rmse, cause.after.gyro_rmse)
     );
-}
-
-fn change(before: f64, after: f64) -> String {
-    format!(
-        "{}<span class=\"to\">→</span>{}",
-        significant(before, 3),
-        significant(after, 3)
-    )
-}
-
-/// A bar as wide as a share.
-pub(super) fn bar(share: f64) -> String {
-    let width = if share.is_finite() {
-        100.0 * share.clamp(0.0, 1.0)
-    } else {
-        0.0
-    };
-    format!("<span class=\"bar\"><i style=\"width:{width:.1}%\"></i></span>")
 }

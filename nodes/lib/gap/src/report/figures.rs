@@ -1,10 +1,12 @@
 //! The pictures of one placement: curves of the worst seconds, the residual over time, spectra.
 
 use cromosim_charts::{Axis, Panel, Series};
+use cromosim_imu::AXES;
 use cromosim_spatial::Stamp;
 
 use super::text::axis_name;
-use crate::{AXES, CoursePoint, Evidence, PlacementDiagnosis};
+use crate::diagnosis::PlacementDiagnosis;
+use crate::evidence::{CoursePoint, Evidence};
 
 /// Shown of the curves, s.
 const WINDOW_S: f64 = 6.0;
@@ -275,7 +277,14 @@ pub(super) fn spectra(evidence: &Evidence, placement: &PlacementDiagnosis) -> Ve
 
 /// The axis of a channel with the largest share, or else with the largest residual density.
 fn worst_axis(evidence: &Evidence, placement: &PlacementDiagnosis, first: usize) -> usize {
-    let share = |axis: usize| placement.place.axes.get(AXES[axis]).copied().unwrap_or(0.0);
+    let share = |axis: usize| {
+        placement
+            .location
+            .axes
+            .get(AXES[axis])
+            .copied()
+            .unwrap_or(0.0)
+    };
     let power = |axis: usize| {
         evidence
             .spectra

@@ -7,8 +7,11 @@ use cromosim_charts::text::{escape, percent, significant, trimmed};
 use cromosim_charts::{document, write_panels};
 
 use super::figures::{self, Window};
-use super::{State, causes, place};
-use crate::{Evidence, Metrics, PlacementDiagnosis};
+use super::markup::change;
+use super::state::State;
+use super::{causes, location};
+use crate::diagnosis::{Metrics, PlacementDiagnosis, UNKNOWN};
+use crate::evidence::Evidence;
 
 /// The whole document.
 pub(super) fn page(
@@ -39,21 +42,13 @@ const NOTES: &str = "<section><h3 style=\"margin-top:0\">How to read this</h3><u
 <li><b>Probability</b>: that the cause is there. Of causes named with 90 %, nine in ten should be right.</li>\
 <li><b>±</b>: one standard error. Values within two of them from zero are dimmed.</li></ul></section>\n";
 
-fn change(before: f64, after: f64) -> String {
-    format!(
-        "{}<span class=\"to\">→</span>{}",
-        significant(before, 3),
-        significant(after, 3)
-    )
-}
-
 fn write_summary(page: &mut String, placements: &[(&String, &PlacementDiagnosis)]) {
     page.push_str(
         "<section><div class=\"scroll\"><table><thead><tr><th>Placement</th><th>State</th><th style=\"width:44%\">Verdict</th><th class=\"r\">Accelerometer<br>RMSE, m/s²</th>\
          <th class=\"r\">Gyroscope<br>RMSE, rad/s</th></tr></thead><tbody>\n",
     );
     for (number, (name, placement)) in placements.iter().enumerate() {
-        let (state, gap) = (State::of(placement), &placement.gap);
+        let (state, gap) = (State::new(placement), &placement.gap);
         let _ = writeln!(
             page,
             "<tr><td><a href=\"#placement-{number}\"><b>{}</b></a></td><td><span class=\"state {}\">{}</span></td><td>{}</td><td class=\"r\">{}</td><td class=\"r\">{}</td></tr>",
@@ -78,7 +73,7 @@ fn write_placement(
     placement: &PlacementDiagnosis,
     evidence: Option<&Evidence>,
 ) {
-    let state = State::of(placement);
+    let state = State::new(placement);
     let _ = write!(
         page,
         "<section id=\"placement-{number}\"><h2>{} <span class=\"state {}\">{}</span></h2>\n<p>{}</p>\n",
@@ -98,7 +93,7 @@ fn write_placement(
         page.push_str("<p class=\"note\">No curves are at hand for this placement.</p>\n");
     }
     page.push_str("<h3>Where the gap of the nominal simulation lies</h3>\n");
-    place::write_place(page, &placement.place);
+    location::write_location(page, &placement.location);
     write_rest(page, placement);
     write_unidentifiable(page, placement);
     write_metrics(page, &placement.gap.before, &placement.gap.after);
@@ -181,7 +176,7 @@ fn write_rest(page: &mut String, placement: &PlacementDiagnosis) {
     let unknown: f64 = placement
         .causes
         .iter()
-        .filter(|cause| cause.effect == "unknown")
+        .filter(|cause| cause.effect == UNKNOWN)
         .map(|cause| cause.gap_share)
         .sum();
     let verdict = if rest.significant {
@@ -195,7 +190,7 @@ fn write_rest(page: &mut String, placement: &PlacementDiagnosis) {
         percent(rest.share + unknown)
     );
     if rest.significant {
-        place::write_place(page, &rest.place);
+        location::write_location(page, &rest.location);
     }
 }
 

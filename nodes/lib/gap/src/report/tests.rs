@@ -6,9 +6,10 @@ use cromosim_spatial::Stamp;
 use serde_json::json;
 
 use super::*;
-use crate::{
-    Cause, CoursePoint, Gap, Interval, Metrics, Place, SCHEMA, Spectra, Unexplained, Unidentifiable,
+use crate::diagnosis::{
+    Cause, Gap, GapLocation, Interval, Metrics, SCHEMA, Unexplained, Unidentifiable,
 };
+use crate::evidence::{CoursePoint, Spectra};
 
 fn shares(entries: &[(&str, f64)]) -> BTreeMap<String, f64> {
     entries
@@ -49,7 +50,7 @@ fn cause(
 }
 
 fn placement(verdict: &str, causes: Vec<Cause>, unexplained: Unexplained) -> PlacementDiagnosis {
-    let place = Place {
+    let location = GapLocation {
         channels: shares(&[("accel", 0.97), ("gyro", 0.03)]),
         axes: shares(&[
             ("accel_x", 0.2),
@@ -105,7 +106,7 @@ fn placement(verdict: &str, causes: Vec<Cause>, unexplained: Unexplained) -> Pla
     PlacementDiagnosis {
         verdict: verdict.into(),
         gap,
-        place,
+        location,
         causes,
         unidentifiable,
         unexplained,
@@ -217,9 +218,9 @@ fn sample() -> (Diagnosis, BTreeMap<String, Evidence>) {
     let rest = Unexplained {
         significant: true,
         share: 0.0,
-        place: Place {
+        location: GapLocation {
             channels: shares(&[("accel", 1.0)]),
-            ..Place::default()
+            ..GapLocation::default()
         },
     };
     let placements = BTreeMap::from([
@@ -231,7 +232,7 @@ fn sample() -> (Diagnosis, BTreeMap<String, Evidence>) {
                 Unexplained {
                     significant: false,
                     share: 0.02,
-                    place: Place::default(),
+                    location: GapLocation::default(),
                 },
             ),
         ),

@@ -3,8 +3,10 @@
 use std::fmt::Write;
 
 use cromosim_charts::text::{decimals, escape, significant, trimmed};
-use cromosim_imu::effects::{EffectKind, EffectSpec};
+use cromosim_imu::{EffectKind, EffectSpec};
 use serde_json::Value;
+
+use crate::diagnosis::UNKNOWN;
 
 /// What the library knows of an effect; nothing of `unknown`.
 pub(super) fn spec(effect: &str) -> Option<&'static EffectSpec> {
@@ -14,7 +16,7 @@ pub(super) fn spec(effect: &str) -> Option<&'static EffectSpec> {
 /// What an effect is, in a sentence.
 pub(super) fn summary(effect: &str) -> &'static str {
     match effect {
-        "unknown" => "Structure in the residual that no named effect explains.",
+        UNKNOWN => "Structure in the residual that no named effect explains.",
         name => spec(name).map_or("", |spec| spec.summary),
     }
 }

@@ -59,17 +59,17 @@ pub fn shares_add_up(diagnosis: &PlacementDiagnosis) {
         1e-9,
         "causes and unexplained",
     );
-    let place = &diagnosis.place;
-    near(place.channels.values().sum(), 1.0, 1e-9, "channels");
-    near(place.axes.values().sum(), 1.0, 1e-9, "axes");
+    let location = &diagnosis.location;
+    near(location.channels.values().sum(), 1.0, 1e-9, "channels");
+    near(location.axes.values().sum(), 1.0, 1e-9, "axes");
     near(
-        place.bands_hz.iter().map(|band| band.share).sum(),
+        location.bands_hz.iter().map(|band| band.share).sum(),
         1.0,
         1e-9,
         "bands",
     );
     near(
-        place
+        location
             .intervals_s
             .iter()
             .map(|interval| interval.share)

@@ -2,8 +2,10 @@
 
 use nalgebra::Matrix3;
 
-use super::EffectKind;
-use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
+use super::search::Search;
+use super::spec::{EffectSpec, ParameterSpec, Shape, Stage};
+use super::{Effect, EffectKind};
+use crate::{Channel, EffectError};
 
 pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::AxisConvention,
@@ -18,17 +20,15 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         neutral: &[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
         lower: -1.0,
         upper: 1.0,
-        step: 1.0,
+        fit: None,
     }],
-    random: false,
-    continuous: false,
-    starts,
+    channels: &Channel::ALL,
+    search: Search::Choice,
 };
 
-/// The signed permutation M with the least `sum |m - M s|^2`.
-fn starts(view: &ResidualView) -> Vec<Vec<f64>> {
-    let sum: Matrix3<f64> = view.outer_products().sum();
-    // trace(M^T C) is greatest: for each order of the columns the signs of C's entries are best.
+/// The signed permutation next to a matrix: of all assignments of axes the one with the greatest
+/// sum of magnitudes, with the signs of its entries.
+pub fn nearest_signed_permutation(matrix: &Matrix3<f64>) -> Matrix3<f64> {
     const ORDERS: [[usize; 3]; 6] = [
         [0, 1, 2],
         [0, 2, 1],
@@ -38,21 +38,34 @@ fn starts(view: &ResidualView) -> Vec<Vec<f64>> {
         [2, 1, 0],
     ];
     let score = |order: &[usize; 3]| {
-        order
-            .iter()
-            .enumerate()
-            .map(|(row, column)| sum[(row, *column)].abs())
+        (0..3)
+            .map(|row| matrix[(row, order[row])].abs())
             .sum::<f64>()
     };
-    let order = ORDERS
+    let best = ORDERS
         .into_iter()
         .max_by(|a, b| score(a).total_cmp(&score(b)))
         .unwrap_or(ORDERS[0]);
-    let mut flat = vec![0.0; 9];
-    for (row, column) in order.into_iter().enumerate() {
-        flat[3 * row + column] = if sum[(row, column)] < 0.0 { -1.0 } else { 1.0 };
+    let mut permutation = Matrix3::zeros();
+    for (row, column) in best.into_iter().enumerate() {
+        permutation[(row, column)] = if matrix[(row, column)] < 0.0 {
+            -1.0
+        } else {
+            1.0
+        };
     }
-    vec![flat]
+    permutation
+}
+
+impl Effect {
+    /// A device with axes exchanged: `matrix` is device_from_sensor.
+    ///
+    /// # Errors
+    /// [`EffectError`] for what is no signed permutation.
+    pub fn axis_convention(matrix: &Matrix3<f64>) -> Result<Self, EffectError> {
+        let rows = matrix.transpose();
+        Self::new(EffectKind::AxisConvention, rows.as_slice().to_vec())
+    }
 }
 
 /// One 1 or -1 in each row and column, the rest 0.

@@ -1,7 +1,10 @@
 //! `accel_bias`, `gyro_bias`: constant errors.
 
 use super::EffectKind;
-use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
+use super::search::{
+    Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, Rounding, Search, always,
+};
+use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
 use crate::Channel;
 
 pub(super) static ACCEL: EffectSpec = EffectSpec {
@@ -17,11 +20,29 @@ pub(super) static ACCEL: EffectSpec = EffectSpec {
         neutral: &[0.0; 3],
         lower: -100.0,
         upper: 100.0,
-        step: 1e-5,
+        fit: Some(ParameterFit {
+            step: 1e-5,
+            prior_deviation: 2.0,
+        }),
     }],
-    random: false,
-    continuous: true,
-    starts: |view| starts(view, Channel::Accelerometer),
+    channels: &[Channel::Accelerometer],
+    search: Search::Fitted(FittedSearch {
+        first_guess: FirstGuess::Neutral,
+        is_plausible: always,
+        ordinary: Some(Ordinary::EachValue(5e-3)),
+        rounding: Some(Rounding::Offset),
+        is_calibration: true,
+        special_case_of: &[
+            Dependence::Time,
+            Dependence::Orientation,
+            Dependence::OwnReading,
+        ],
+        identifiability: Some(Identifiability {
+            relevant_size: 0.1,
+            values: 3,
+            would_tell: "turns of 60 degrees or more, or rest in several orientations",
+        }),
+    }),
 };
 
 pub(super) static GYRO: EffectSpec = EffectSpec {
@@ -37,13 +58,27 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
         neutral: &[0.0; 3],
         lower: -100.0,
         upper: 100.0,
-        step: 1e-6,
+        fit: Some(ParameterFit {
+            step: 1e-6,
+            prior_deviation: 0.3,
+        }),
     }],
-    random: false,
-    continuous: true,
-    starts: |view| starts(view, Channel::Gyroscope),
+    channels: &[Channel::Gyroscope],
+    search: Search::Fitted(FittedSearch {
+        first_guess: FirstGuess::Neutral,
+        is_plausible: always,
+        ordinary: Some(Ordinary::EachValue(4e-4)),
+        rounding: Some(Rounding::Offset),
+        is_calibration: true,
+        special_case_of: &[
+            Dependence::Time,
+            Dependence::Orientation,
+            Dependence::OwnReading,
+        ],
+        identifiability: Some(Identifiability {
+            relevant_size: 0.01,
+            values: 3,
+            would_tell: "any recording of some seconds",
+        }),
+    }),
 };
-
-fn starts(view: &ResidualView, channel: Channel) -> Vec<Vec<f64>> {
-    vec![view.mean_residual(channel).as_slice().to_vec()]
-}

@@ -1,7 +1,9 @@
 //! `accel_bias_drift`, `gyro_bias_drift`: biases that grow with time.
 
 use super::EffectKind;
-use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
+use super::search::{Dependence, FirstGuess, FittedSearch, Ordinary, Rounding, Search, always};
+use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+use crate::Channel;
 
 pub(super) static ACCEL: EffectSpec = EffectSpec {
     kind: EffectKind::AccelBiasDrift,
@@ -16,11 +18,21 @@ pub(super) static ACCEL: EffectSpec = EffectSpec {
         neutral: &[0.0; 3],
         lower: -10.0,
         upper: 10.0,
-        step: 1e-6,
+        fit: Some(ParameterFit {
+            step: 1e-6,
+            prior_deviation: 0.05,
+        }),
     }],
-    random: false,
-    continuous: true,
-    starts,
+    channels: &[Channel::Accelerometer],
+    search: Search::Fitted(FittedSearch {
+        first_guess: FirstGuess::Neutral,
+        is_plausible: always,
+        ordinary: Some(Ordinary::EachValue(2e-4)),
+        rounding: Some(Rounding::Ramp),
+        is_calibration: false,
+        special_case_of: &[Dependence::Time],
+        identifiability: None,
+    }),
 };
 
 pub(super) static GYRO: EffectSpec = EffectSpec {
@@ -36,13 +48,19 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
         neutral: &[0.0; 3],
         lower: -10.0,
         upper: 10.0,
-        step: 1e-7,
+        fit: Some(ParameterFit {
+            step: 1e-7,
+            prior_deviation: 0.005,
+        }),
     }],
-    random: false,
-    continuous: true,
-    starts,
+    channels: &[Channel::Gyroscope],
+    search: Search::Fitted(FittedSearch {
+        first_guess: FirstGuess::Neutral,
+        is_plausible: always,
+        ordinary: Some(Ordinary::EachValue(1.5e-5)),
+        rounding: Some(Rounding::Ramp),
+        is_calibration: false,
+        special_case_of: &[Dependence::Time],
+        identifiability: None,
+    }),
 };
-
-fn starts(_: &ResidualView) -> Vec<Vec<f64>> {
-    vec![vec![0.0; 3]]
-}

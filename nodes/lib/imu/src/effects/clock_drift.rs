@@ -2,7 +2,11 @@
 //! times.
 
 use super::EffectKind;
-use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
+use super::search::{
+    Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, Search, always,
+};
+use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+use crate::Channel;
 
 pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::ClockDrift,
@@ -17,16 +21,26 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         neutral: &[0.0],
         lower: -1e5,
         upper: 1e5,
-        step: 0.1,
+        fit: Some(ParameterFit {
+            step: 0.1,
+            prior_deviation: 3000.0,
+        }),
     }],
-    random: false,
-    continuous: true,
-    starts,
+    channels: &Channel::ALL,
+    search: Search::Fitted(FittedSearch {
+        first_guess: FirstGuess::Neutral,
+        is_plausible: always,
+        ordinary: Some(Ordinary::EachValue(30.0)),
+        rounding: None,
+        is_calibration: false,
+        special_case_of: &[Dependence::DelayOverTime],
+        identifiability: Some(Identifiability {
+            relevant_size: 200.0,
+            values: 1,
+            would_tell: "a recording of a minute or more with motion throughout",
+        }),
+    }),
 };
-
-fn starts(_: &ResidualView) -> Vec<Vec<f64>> {
-    vec![vec![0.0]]
-}
 
 /// Stamps and true times: `stamp = t0 + (t - t0) (1 + ppm 1e-6) + seconds`.
 #[derive(Clone, Copy, Debug, PartialEq)]

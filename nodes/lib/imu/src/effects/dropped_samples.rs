@@ -2,9 +2,10 @@
 
 use rand_chacha::ChaCha12Rng;
 
-use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage, median};
+use super::search::{ReadOff, ReadOffSearch, Search};
+use super::spec::{EffectSpec, ParameterSpec, Shape, Stage};
 use super::{Effect, EffectKind};
-use crate::noise;
+use crate::{Channel, noise};
 
 pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::DroppedSamples,
@@ -20,7 +21,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
             neutral: &[0.0],
             lower: 0.0,
             upper: 0.99,
-            step: 1e-4,
+            fit: None,
         },
         ParameterSpec {
             name: "mean_burst",
@@ -29,38 +30,15 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
             neutral: &[1.0],
             lower: 1.0,
             upper: 1e6,
-            step: 1e-2,
+            fit: None,
         },
     ],
-    random: true,
-    continuous: false,
-    starts,
+    channels: &Channel::ALL,
+    search: Search::ReadOff(ReadOffSearch {
+        from: ReadOff::MissingMessages,
+        probability: 0.98,
+    }),
 };
-
-/// Read off the gaps between stamps.
-fn starts(view: &ResidualView) -> Vec<Vec<f64>> {
-    let intervals: Vec<f64> = view
-        .stamps
-        .windows(2)
-        .map(|pair| pair[1] - pair[0])
-        .collect();
-    let usual = median(&mut intervals.clone());
-    if usual <= 0.0 {
-        return vec![SPEC.neutral()];
-    }
-    let missing = intervals
-        .iter()
-        .map(|interval| (interval / usual).round() - 1.0)
-        .filter(|lost| *lost > 0.0);
-    let (bursts, lost) = missing.fold((0.0, 0.0), |(bursts, sum), lost| (bursts + 1.0, sum + lost));
-    if bursts == 0.0 {
-        return vec![SPEC.neutral()];
-    }
-    vec![vec![
-        (lost / (lost + view.stamps.len() as f64)).min(0.99),
-        lost / bursts,
-    ]]
-}
 
 /// Which samples are lost: a chain of two states (Gilbert 1960). A burst goes on with probability 1
 /// - 1/mean_burst, and begins so often that the fraction comes out.

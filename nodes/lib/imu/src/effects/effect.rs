@@ -21,16 +21,16 @@ impl Effect {
     /// an `axis_convention` that is no signed permutation.
     pub fn new(kind: EffectKind, values: Vec<f64>) -> Result<Self, EffectError> {
         let (effect, spec) = (kind.name(), kind.spec());
-        if values.len() != spec.len() {
+        if values.len() != spec.value_count() {
             return Err(EffectError::Length {
                 effect,
-                expected: spec.len(),
+                expected: spec.value_count(),
                 found: values.len(),
             });
         }
         let mut rest = values.as_slice();
         for parameter in spec.parameters {
-            let (own, after) = rest.split_at(parameter.shape.len());
+            let (own, after) = rest.split_at(parameter.shape.count());
             rest = after;
             if let Some(&value) = own
                 .iter()
@@ -95,7 +95,7 @@ impl Effect {
     pub fn parameter(&self, name: &str) -> Option<&[f64]> {
         let mut first = 0;
         for parameter in self.kind.spec().parameters {
-            let length = parameter.shape.len();
+            let length = parameter.shape.count();
             if parameter.name == name {
                 return self.values.get(first..first + length);
             }

@@ -1,9 +1,7 @@
 //! Names, bounds, sets and the form in files.
 #![allow(clippy::unwrap_used)]
 
-use std::collections::BTreeSet;
-
-use super::{Effect, EffectKind, EffectSet, Shape, Stage};
+use super::{Effect, EffectKind, EffectSet, FirstGuess, Search, Shape, Stage};
 use crate::EffectError;
 
 /// The contract's table, in its order.
@@ -54,7 +52,7 @@ fn example(kind: EffectKind) -> Effect {
                 vec![0.0, 1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0]
             }
             Shape::Time => vec![1_700_000_000.25],
-            shape => (0..shape.len())
+            shape => (0..shape.count())
                 .map(|k| (0.11 + 0.07 * k as f64).max(parameter.lower))
                 .collect(),
         });
@@ -72,13 +70,16 @@ fn the_library_is_the_contracts_table() {
             (kind, Some(kind))
         );
         assert!(
-            spec.summary.ends_with('.') && spec.remedy.ends_with('.') && !spec.is_empty(),
+            spec.summary.ends_with('.') && spec.remedy.ends_with('.') && spec.value_count() > 0,
             "{kind}"
         );
         for parameter in spec.parameters {
-            assert_eq!(parameter.neutral.len(), parameter.shape.len(), "{kind}");
+            assert_eq!(parameter.neutral.len(), parameter.shape.count(), "{kind}");
             assert!(
-                parameter.step > 0.0 && parameter.lower < parameter.upper,
+                parameter.lower < parameter.upper
+                    && parameter
+                        .fit
+                        .is_none_or(|fit| fit.step > 0.0 && fit.prior_deviation > 0.0),
                 "{kind}"
             );
         }
@@ -91,20 +92,38 @@ fn the_library_is_the_contracts_table() {
             kind.name().starts_with("reference_")
         );
     }
-    let random: BTreeSet<&str> = EffectKind::ALL
-        .iter()
-        .filter(|kind| kind.spec().random)
-        .map(|kind| kind.name())
-        .collect();
-    assert_eq!(
-        random,
-        BTreeSet::from([
-            "accel_noise",
-            "dropped_samples",
-            "gyro_noise",
-            "reference_noise"
-        ])
-    );
+}
+
+#[test]
+fn what_the_search_reads_of_an_effect_fits_its_values() {
+    for kind in EffectKind::ALL {
+        let spec = kind.spec();
+        let free: usize = spec
+            .parameters
+            .iter()
+            .filter(|parameter| parameter.fit.is_some())
+            .map(|parameter| parameter.shape.count())
+            .sum();
+        assert!(!spec.channels.is_empty(), "{kind}");
+        match spec.search {
+            Search::Fitted(search) => {
+                assert!(free > 0, "{kind}");
+                if let Some(test) = search.identifiability {
+                    assert!((1..=spec.value_count()).contains(&test.values), "{kind}");
+                }
+                if let FirstGuess::ChangeOf(base) = search.first_guess {
+                    assert_eq!(spec.parameters[0].shape, Shape::Time, "{kind}");
+                    assert_eq!((spec.value_count(), base.spec().value_count()), (4, 3));
+                }
+            }
+            Search::Choice => assert_eq!(free, 0, "{kind}"),
+            Search::ReadOff(search) => {
+                assert_eq!(free, 0, "{kind}");
+                assert_eq!(EffectKind::read_off(search.from), Some(kind));
+                assert!((0.5..1.0).contains(&search.probability), "{kind}");
+            }
+        }
+    }
 }
 
 #[test]

@@ -1,7 +1,9 @@
 //! `gravity_convention`: what a device calls acceleration.
 
-use super::EffectKind;
-use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
+use super::search::Search;
+use super::spec::{EffectSpec, ParameterSpec, Shape, Stage};
+use super::{Effect, EffectKind};
+use crate::{Channel, EffectError};
 
 pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::GravityConvention,
@@ -17,18 +19,49 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         neutral: &[0.0],
         lower: 0.0,
         upper: 2.0,
-        step: 1.0,
+        fit: None,
     }],
-    random: false,
-    continuous: false,
-    starts,
+    channels: &[Channel::Accelerometer],
+    search: Search::Choice,
 };
 
-fn starts(_: &ResidualView) -> Vec<Vec<f64>> {
-    vec![vec![1.0], vec![2.0]]
+/// What a device makes of gravity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GravityMode {
+    /// Specific force, as the contract asks.
+    Kept,
+    /// Acceleration.
+    Removed,
+    /// Specific force with gravity's sign turned.
+    Negated,
 }
 
-/// c in `f = R^T (a - c g)`: 1 kept, 0 removed, -1 negated.
+impl GravityMode {
+    /// All of them, in the order of the parameter's words.
+    pub const ALL: [Self; 3] = [Self::Kept, Self::Removed, Self::Negated];
+
+    /// The parameter's value: the number of the word.
+    fn value(self) -> f64 {
+        self as u8 as f64
+    }
+
+    /// c in `f = R^T (a - c g)`.
+    pub fn factor(self) -> f64 {
+        gravity_factor(self.value())
+    }
+}
+
+/// c in `f = R^T (a - c g)` by the parameter's value: 1 kept, 0 removed, -1 negated.
 pub(super) fn gravity_factor(mode: f64) -> f64 {
     1.0 - mode
+}
+
+impl Effect {
+    /// A device that makes this of gravity.
+    ///
+    /// # Errors
+    /// None: every mode is within the bounds.
+    pub fn gravity_convention(mode: GravityMode) -> Result<Self, EffectError> {
+        Self::new(EffectKind::GravityConvention, vec![mode.value()])
+    }
 }

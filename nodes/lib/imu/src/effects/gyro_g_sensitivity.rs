@@ -1,7 +1,11 @@
 //! `gyro_g_sensitivity`: the gyroscope feels specific force, `w += G f`.
 
 use super::EffectKind;
-use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
+use super::search::{
+    Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, Search, always,
+};
+use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+use crate::Channel;
 
 pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::GyroGSensitivity,
@@ -16,13 +20,23 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         neutral: &[0.0; 9],
         lower: -10.0,
         upper: 10.0,
-        step: 1e-6,
+        fit: Some(ParameterFit {
+            step: 1e-6,
+            prior_deviation: 0.02,
+        }),
     }],
-    random: false,
-    continuous: true,
-    starts,
+    channels: &[Channel::Gyroscope],
+    search: Search::Fitted(FittedSearch {
+        first_guess: FirstGuess::Neutral,
+        is_plausible: always,
+        ordinary: Some(Ordinary::EachValue(5e-5)),
+        rounding: None,
+        is_calibration: false,
+        special_case_of: &[Dependence::Orientation],
+        identifiability: Some(Identifiability {
+            relevant_size: 0.002,
+            values: 9,
+            would_tell: "strong acceleration without rotation, on all axes",
+        }),
+    }),
 };
-
-fn starts(_: &ResidualView) -> Vec<Vec<f64>> {
-    vec![vec![0.0; 9]]
-}

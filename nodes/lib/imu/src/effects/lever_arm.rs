@@ -2,8 +2,10 @@
 
 use nalgebra::Vector3;
 
-use super::EffectKind;
-use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
+use super::search::{FirstGuess, FittedSearch, Identifiability, Ordinary, Search, always};
+use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+use super::{EffectKind, EffectSet};
+use crate::Channel;
 
 pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::LeverArm,
@@ -18,16 +20,26 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         neutral: &[0.0; 3],
         lower: -5.0,
         upper: 5.0,
-        step: 1e-5,
+        fit: Some(ParameterFit {
+            step: 1e-5,
+            prior_deviation: 0.3,
+        }),
     }],
-    random: false,
-    continuous: true,
-    starts,
+    channels: &[Channel::Accelerometer],
+    search: Search::Fitted(FittedSearch {
+        first_guess: FirstGuess::Neutral,
+        is_plausible: always,
+        ordinary: Some(Ordinary::EachValue(1e-3)),
+        rounding: None,
+        is_calibration: true,
+        special_case_of: &[],
+        identifiability: Some(Identifiability {
+            relevant_size: 0.02,
+            values: 3,
+            would_tell: "rotation about two axes with 2 rad/s or more",
+        }),
+    }),
 };
-
-fn starts(_: &ResidualView) -> Vec<Vec<f64>> {
-    vec![vec![0.0; 3]]
-}
 
 /// `alpha x l + w x (w x l)`, m/s2, all in segment axes.
 #[inline]
@@ -37,4 +49,12 @@ pub(super) fn acceleration(
     angular_acceleration: &Vector3<f64>,
 ) -> Vector3<f64> {
     angular_acceleration.cross(offset) + angular_velocity.cross(&angular_velocity.cross(offset))
+}
+
+impl EffectSet {
+    /// From the reference frame to the sensor, in segment axes, m; zero without the effect.
+    pub fn lever_arm(&self) -> Vector3<f64> {
+        self.get(EffectKind::LeverArm)
+            .map_or_else(Vector3::zeros, |effect| effect.vector(0))
+    }
 }

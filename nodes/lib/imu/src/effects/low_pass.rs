@@ -1,7 +1,10 @@
 //! `low_pass`: the device's own second-order Butterworth filter, on both channels.
 
-use super::EffectKind;
-use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
+use super::residual_view::ResidualView;
+use super::search::{Dependence, FirstGuess, FittedSearch, Search};
+use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+use super::{Effect, EffectKind, EffectSet};
+use crate::Channel;
 
 pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::LowPass,
@@ -16,11 +19,21 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         neutral: &[1e4],
         lower: 0.1,
         upper: 1e4,
-        step: 1e-3,
+        fit: Some(ParameterFit {
+            step: 1e-3,
+            prior_deviation: 50.0,
+        }),
     }],
-    random: false,
-    continuous: true,
-    starts,
+    channels: &Channel::ALL,
+    search: Search::Fitted(FittedSearch {
+        first_guess: FirstGuess::FromResidual(starts),
+        is_plausible: is_plausible,
+        ordinary: None,
+        rounding: None,
+        is_calibration: false,
+        special_case_of: &[Dependence::DelayOverTime],
+        identifiability: None,
+    }),
 };
 
 /// Damping ratio of the Butterworth filter: Q = 1/sqrt(2).
@@ -38,4 +51,23 @@ pub(super) fn response(cutoff_hz: f64, hz: f64) -> (f64, f64) {
     // 1 / (1 - r^2 + 2 i z r)
     let (real, imaginary) = (1.0 - ratio * ratio, 2.0 * DAMPING_RATIO * ratio);
     (real.hypot(imaginary).recip(), -imaginary.atan2(real))
+}
+
+/// Highest cutoff that counts, Hz: a filter above it passes all motion. Without a measurement on
+/// record.
+const HIGHEST_HZ: f64 = 45.0;
+/// Delay of slow motion times the cutoff: `sqrt(2) / (2 pi)`, the filter's group delay at 0 Hz.
+const DELAY_TIMES_CUTOFF: f64 = 0.225;
+/// Deviation from the filter's delay, as a part of it, up to which an offset of time undoes it.
+const UNDONE: f64 = 0.35;
+
+/// Not where an offset of time beside it takes back its delay: a filter's attenuation without its
+/// delay is the reference's own smoothing error.
+fn is_plausible(effect: &Effect, set: &EffectSet) -> bool {
+    let cutoff_hz = effect.scalar(0);
+    let delay = DELAY_TIMES_CUTOFF / cutoff_hz;
+    let is_undone = set.get(EffectKind::TimeOffset).is_some_and(|offset| {
+        (offset.scalar(0) + delay).abs() < UNDONE * DELAY_TIMES_CUTOFF / cutoff_hz
+    });
+    cutoff_hz <= HIGHEST_HZ && !is_undone
 }

@@ -3,7 +3,11 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::EffectKind;
-use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
+use super::search::{
+    Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, Search, always,
+};
+use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+use crate::Channel;
 
 pub(super) static ACCEL: EffectSpec = EffectSpec {
     kind: EffectKind::AccelMisalignment,
@@ -18,11 +22,25 @@ pub(super) static ACCEL: EffectSpec = EffectSpec {
         neutral: &[0.0; 3],
         lower: -1.0,
         upper: 1.0,
-        step: 1e-5,
+        fit: Some(ParameterFit {
+            step: 1e-5,
+            prior_deviation: 0.2,
+        }),
     }],
-    random: false,
-    continuous: true,
-    starts,
+    channels: &[Channel::Accelerometer],
+    search: Search::Fitted(FittedSearch {
+        first_guess: FirstGuess::Neutral,
+        is_plausible: always,
+        ordinary: Some(Ordinary::EachValue(3e-3)),
+        rounding: None,
+        is_calibration: false,
+        special_case_of: &[Dependence::MountOverTime, Dependence::OtherAxes],
+        identifiability: Some(Identifiability {
+            relevant_size: 0.03,
+            values: 3,
+            would_tell: "motion with 2 m/s2 or more on all axes, or rest in several orientations",
+        }),
+    }),
 };
 
 pub(super) static GYRO: EffectSpec = EffectSpec {
@@ -38,16 +56,26 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
         neutral: &[0.0; 3],
         lower: -1.0,
         upper: 1.0,
-        step: 1e-5,
+        fit: Some(ParameterFit {
+            step: 1e-5,
+            prior_deviation: 0.2,
+        }),
     }],
-    random: false,
-    continuous: true,
-    starts,
+    channels: &[Channel::Gyroscope],
+    search: Search::Fitted(FittedSearch {
+        first_guess: FirstGuess::Neutral,
+        is_plausible: always,
+        ordinary: Some(Ordinary::EachValue(3e-3)),
+        rounding: None,
+        is_calibration: false,
+        special_case_of: &[Dependence::MountOverTime, Dependence::OtherAxes],
+        identifiability: Some(Identifiability {
+            relevant_size: 0.03,
+            values: 3,
+            would_tell: "rotation with 1 rad/s or more about all axes",
+        }),
+    }),
 };
-
-fn starts(_: &ResidualView) -> Vec<Vec<f64>> {
-    vec![vec![0.0; 3]]
-}
 
 /// `I + upper` from the cross terms xy, xz, yz.
 pub(super) fn matrix(upper: &Vector3<f64>) -> Matrix3<f64> {

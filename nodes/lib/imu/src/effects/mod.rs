@@ -38,9 +38,11 @@ mod reference_noise;
 mod reference_scale;
 mod reference_smoothing;
 mod reference_tilt;
+mod residual_view;
 mod sampling;
 mod saturation;
 mod scale;
+mod search;
 mod serde_impl;
 mod soft_tissue;
 mod spec;
@@ -60,13 +62,24 @@ use std::fmt;
 
 use nalgebra::Vector3;
 
+pub use axis_convention::nearest_signed_permutation;
 pub use dropped_samples::Dropouts;
 pub use effect::{Effect, EffectSet};
 pub use file::{DeclaredNoise, EffectsFile, PlacementEffects};
+pub use gravity_convention::GravityMode;
 pub use model::{GridTrace, SensorModel};
+pub use noise::white_noise_density;
 pub use quantization::lattice_spacing;
-pub use spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
+pub use residual_view::ResidualView;
+pub use saturation::clipping_limit;
+pub use search::{
+    Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, ReadOff, ReadOffSearch,
+    Rounding, Search,
+};
+pub use spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
 pub use streaming::StreamingEffects;
+pub use units::unit_factors;
+pub use vibration::{SpectralLine, strongest_line};
 
 /// One reading of both channels, in the axes of its stage.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::clock_drift::Clock;
 use super::filter::SecondOrder;
-use super::vibration::Line;
+use super::vibration::SpectralLine;
 use super::{
     Effect, EffectKind, EffectSet, Reading, gravity_convention, lever_arm, low_pass, misalignment,
     mount_rotation, mount_slip, quantization, reference_tilt, sampling, saturation,
@@ -48,7 +48,7 @@ pub struct SensorModel {
     /// G.
     pub(super) coupling: Option<Matrix3<f64>>,
     pub(super) low_pass: Option<SecondOrder>,
-    pub(super) vibration: Option<Line>,
+    pub(super) vibration: Option<SpectralLine>,
     pub(super) clock: Clock,
     pub(super) accelerometer: Readout,
     pub(super) gyroscope: Readout,
@@ -155,7 +155,7 @@ impl SensorModel {
             low_pass: effects
                 .get(Kind::LowPass)
                 .and_then(|effect| filter(effect, low_pass::DAMPING_RATIO, false)),
-            vibration: effects.get(Kind::Vibration).map(Line::of),
+            vibration: effects.get(Kind::Vibration).and_then(Effect::spectral_line),
             clock: Clock {
                 offset: effects
                     .get(Kind::TimeOffset)

@@ -3,10 +3,14 @@
 use std::f64::consts::PI;
 
 use cromosim_spatial::so3;
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Vector3};
 
-use super::EffectKind;
-use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
+use super::search::{
+    Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, Search, always,
+};
+use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+use super::{Effect, EffectKind};
+use crate::{Channel, EffectError};
 
 pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::MountRotation,
@@ -21,30 +25,26 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         neutral: &[0.0; 3],
         lower: -PI,
         upper: PI,
-        step: 1e-5,
+        fit: Some(ParameterFit {
+            step: 1e-5,
+            prior_deviation: 2.0,
+        }),
     }],
-    random: false,
-    continuous: true,
-    starts,
+    channels: &Channel::ALL,
+    search: Search::Fitted(FittedSearch {
+        first_guess: FirstGuess::Neutral,
+        is_plausible: always,
+        ordinary: Some(Ordinary::EachValue(3e-3)),
+        rounding: None,
+        is_calibration: true,
+        special_case_of: &[Dependence::MountOverTime],
+        identifiability: Some(Identifiability {
+            relevant_size: 0.035,
+            values: 3,
+            would_tell: "turns of 30 degrees or more about two axes",
+        }),
+    }),
 };
-
-/// No rotation, and the best one of both channels' vectors.
-fn starts(view: &ResidualView) -> Vec<Vec<f64>> {
-    let best = so3::log(&best_rotation(&view.outer_products().sum()));
-    vec![vec![0.0; 3], best.as_slice().to_vec()]
-}
-
-/// R that makes `sum |m - R^T s|^2` least, from `C = sum m s^T` (Kabsch 1976): `trace(R C)` is
-/// greatest.
-pub(super) fn best_rotation(sum: &Matrix3<f64>) -> UnitQuaternion<f64> {
-    let svd = sum.transpose().svd(true, true);
-    let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else {
-        return UnitQuaternion::identity();
-    };
-    let sign = (u * v_t).determinant().signum();
-    let rotation = u * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, sign)) * v_t;
-    so3::rotation_from_matrix(&rotation, 1e-6).unwrap_or_else(|_| UnitQuaternion::identity())
-}
 
 /// `R_mount^T`, which turns segment axes into sensor axes; R_mount is segment_from_sensor.
 pub(super) fn sensor_from_segment(rotvec: &Vector3<f64>) -> Matrix3<f64> {
@@ -52,4 +52,14 @@ pub(super) fn sensor_from_segment(rotvec: &Vector3<f64>) -> Matrix3<f64> {
         .to_rotation_matrix()
         .into_inner()
         .transpose()
+}
+
+impl Effect {
+    /// A sensor turned by a rotation vector, rad: segment_from_sensor.
+    ///
+    /// # Errors
+    /// [`EffectError`] for one with an entry beyond pi.
+    pub fn mount_rotation(rotvec: &Vector3<f64>) -> Result<Self, EffectError> {
+        Self::new(EffectKind::MountRotation, rotvec.as_slice().to_vec())
+    }
 }

@@ -2,11 +2,14 @@
 
 use std::f64::consts::PI;
 
-use cromosim_spatial::{Stamp, so3};
-use nalgebra::Matrix3;
+use cromosim_spatial::Stamp;
 
-use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
-use super::{EffectKind, mount_rotation};
+use super::EffectKind;
+use super::search::{
+    Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, Search, always,
+};
+use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+use crate::Channel;
 
 pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::MountSlip,
@@ -22,7 +25,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
             neutral: &[0.0],
             lower: -1e10,
             upper: 1e10,
-            step: 1e-3,
+            fit: None,
         },
         ParameterSpec {
             name: "rotvec",
@@ -31,48 +34,27 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
             neutral: &[0.0; 3],
             lower: -PI,
             upper: PI,
-            step: 1e-5,
+            fit: Some(ParameterFit {
+                step: 1e-5,
+                prior_deviation: 0.7,
+            }),
         },
     ],
-    random: false,
-    continuous: true,
-    starts,
+    channels: &Channel::ALL,
+    search: Search::Fitted(FittedSearch {
+        first_guess: FirstGuess::ChangeOf(EffectKind::MountRotation),
+        is_plausible: always,
+        ordinary: Some(Ordinary::Change(5e-3)),
+        rounding: None,
+        is_calibration: false,
+        special_case_of: &[Dependence::MountOverTime],
+        identifiability: Some(Identifiability {
+            relevant_size: 0.05,
+            values: 4,
+            would_tell: "motion before and after the slip",
+        }),
+    }),
 };
-
-/// Candidate times of a slip.
-const CANDIDATES: usize = 400;
-
-/// The time that leaves the least residual when the readings after it are turned, with that turn.
-fn starts(view: &ResidualView) -> Vec<Vec<f64>> {
-    let products: Vec<Matrix3<f64>> = view.outer_products().collect();
-    let step = (products.len() / CANDIDATES).max(1);
-    let mut after = Matrix3::zeros();
-    let mut best = (
-        f64::NEG_INFINITY,
-        vec![view.epoch.as_seconds(), 0.0, 0.0, 0.0],
-    );
-    for (index, product) in products.iter().enumerate().rev() {
-        after += product;
-        if index % step != 0 || index * 20 < products.len() || index * 20 > products.len() * 19 {
-            continue;
-        }
-        let turn = mount_rotation::best_rotation(&after);
-        let gain = (turn.to_rotation_matrix().into_inner() * after).trace() - after.trace();
-        if gain > best.0 {
-            let rotvec = so3::log(&turn);
-            best = (
-                gain,
-                vec![
-                    view.stamps[index].as_seconds(),
-                    rotvec.x,
-                    rotvec.y,
-                    rotvec.z,
-                ],
-            );
-        }
-    }
-    vec![best.1]
-}
 
 /// Seconds from the epoch to the slip.
 pub(super) fn since(epoch: Stamp, at: f64) -> f64 {

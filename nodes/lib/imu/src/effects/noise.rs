@@ -1,8 +1,10 @@
 //! `accel_noise`, `gyro_noise`: white noise beyond the declared.
 
-use super::EffectKind;
-use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage, median};
-use crate::Channel;
+use super::residual_view::median;
+use super::search::{ReadOff, ReadOffSearch, Search};
+use super::spec::{EffectSpec, ParameterSpec, Shape, Stage};
+use super::{EffectKind, EffectSet};
+use crate::{Channel, Reading};
 
 pub(super) static ACCEL: EffectSpec = EffectSpec {
     kind: EffectKind::AccelNoise,
@@ -17,11 +19,13 @@ pub(super) static ACCEL: EffectSpec = EffectSpec {
         neutral: &[0.0],
         lower: 0.0,
         upper: 100.0,
-        step: 1e-6,
+        fit: None,
     }],
-    random: true,
-    continuous: true,
-    starts: |view| starts(view, Channel::Accelerometer),
+    channels: &[Channel::Accelerometer],
+    search: Search::ReadOff(ReadOffSearch {
+        from: ReadOff::ExcessNoise(Channel::Accelerometer),
+        probability: 0.95,
+    }),
 };
 
 pub(super) static GYRO: EffectSpec = EffectSpec {
@@ -37,24 +41,33 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
         neutral: &[0.0],
         lower: 0.0,
         upper: 100.0,
-        step: 1e-7,
+        fit: None,
     }],
-    random: true,
-    continuous: true,
-    starts: |view| starts(view, Channel::Gyroscope),
+    channels: &[Channel::Gyroscope],
+    search: Search::ReadOff(ReadOffSearch {
+        from: ReadOff::ExcessNoise(Channel::Gyroscope),
+        probability: 0.95,
+    }),
 };
 
-/// Variance of the third differences, by their median so that smooth model errors and outliers
-/// count little, less the declared.
-fn starts(view: &ResidualView, channel: Channel) -> Vec<Vec<f64>> {
-    let residual: Vec<_> = view.residual(channel).collect();
-    let third = |w: &[nalgebra::Vector3<f64>]| w[3] - w[2] * 3.0 + w[1] * 3.0 - w[0];
-    let mut differences: Vec<f64> = residual
+/// Density of the white noise of readings at rest, from the median of their third differences so
+/// that smooth motion and outliers count little: (m/s2)/sqrt(Hz) or (rad/s)/sqrt(Hz).
+pub fn white_noise_density(readings: &[Reading], channel: Channel, rate_hz: f64) -> f64 {
+    let third =
+        |w: &[Reading]| w[3][channel] - w[2][channel] * 3.0 + w[1][channel] * 3.0 - w[0][channel];
+    let mut differences: Vec<f64> = readings
         .windows(4)
         .flat_map(|w| <[f64; 3]>::from(third(w).abs()))
         .collect();
     // 1 + 9 + 9 + 1 = 20 variances; the median of |x| is 0.6745 sigma.
     let sigma = median(&mut differences) / 0.674_489_750_196_081_7 / 20f64.sqrt();
-    let beyond = (sigma.powi(2) - view.sigma(channel).powi(2)).max(0.0);
-    vec![vec![(beyond / view.rate_hz.max(1e-9)).sqrt()]]
+    (sigma.powi(2) / rate_hz.max(1e-9)).sqrt()
+}
+
+impl EffectSet {
+    /// Density of a channel's white noise beyond the declared; 0 without the effect.
+    pub fn noise_density(&self, channel: Channel) -> f64 {
+        self.get_read_off(ReadOff::ExcessNoise(channel))
+            .map_or(0.0, |effect| effect.scalar(0))
+    }
 }

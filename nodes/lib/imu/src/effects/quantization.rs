@@ -1,7 +1,8 @@
 //! `accel_quantization`, `gyro_quantization`: the resolution of a sensor.
 
-use super::EffectKind;
-use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
+use super::search::{ReadOff, ReadOffSearch, Search};
+use super::spec::{EffectSpec, ParameterSpec, Shape, Stage};
+use super::{EffectKind, EffectSet};
 use crate::Channel;
 
 pub(super) static ACCEL: EffectSpec = EffectSpec {
@@ -17,11 +18,13 @@ pub(super) static ACCEL: EffectSpec = EffectSpec {
         neutral: &[0.0],
         lower: 0.0,
         upper: 1e6,
-        step: 1e-6,
+        fit: None,
     }],
-    random: false,
-    continuous: false,
-    starts: |view| starts(view, Channel::Accelerometer),
+    channels: &[Channel::Accelerometer],
+    search: Search::ReadOff(ReadOffSearch {
+        from: ReadOff::Lattice(Channel::Accelerometer),
+        probability: 0.98,
+    }),
 };
 
 pub(super) static GYRO: EffectSpec = EffectSpec {
@@ -37,20 +40,14 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
         neutral: &[0.0],
         lower: 0.0,
         upper: 1e6,
-        step: 1e-7,
+        fit: None,
     }],
-    random: false,
-    continuous: false,
-    starts: |view| starts(view, Channel::Gyroscope),
+    channels: &[Channel::Gyroscope],
+    search: Search::ReadOff(ReadOffSearch {
+        from: ReadOff::Lattice(Channel::Gyroscope),
+        probability: 0.98,
+    }),
 };
-
-fn starts(view: &ResidualView, channel: Channel) -> Vec<Vec<f64>> {
-    let mut values: Vec<f64> = view
-        .pairs(channel)
-        .flat_map(|(m, _)| <[f64; 3]>::from(m))
-        .collect();
-    vec![vec![lattice_spacing(&mut values).unwrap_or(0.0)]]
-}
 
 /// Spacing of the lattice through zero that all values lie on, where there is one: the greatest
 /// common divisor of the sorted values' differences, found by Euclid's steps down to 1e-7 of the
@@ -98,5 +95,13 @@ pub(super) fn round(value: f64, lsb: f64) -> f64 {
         (value / lsb).round() * lsb
     } else {
         value
+    }
+}
+
+impl EffectSet {
+    /// Step of a channel's rounding, m/s2 or rad/s; 0 without the effect.
+    pub fn lsb(&self, channel: Channel) -> f64 {
+        self.get_read_off(ReadOff::Lattice(channel))
+            .map_or(0.0, |effect| effect.scalar(0))
     }
 }

@@ -4,7 +4,9 @@
 use std::f64::consts::PI;
 
 use super::EffectKind;
-use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
+use super::search::{ReadOff, ReadOffSearch, Search};
+use super::spec::{EffectSpec, ParameterSpec, Shape, Stage};
+use crate::Channel;
 
 pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::ReferenceNoise,
@@ -20,7 +22,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
             neutral: &[0.0],
             lower: 0.0,
             upper: 1.0,
-            step: 1e-5,
+            fit: None,
         },
         ParameterSpec {
             name: "rotation",
@@ -29,15 +31,12 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
             neutral: &[0.0],
             lower: 0.0,
             upper: PI,
-            step: 1e-5,
+            fit: None,
         },
     ],
-    random: true,
-    continuous: true,
-    starts,
+    channels: &Channel::ALL,
+    search: Search::ReadOff(ReadOffSearch {
+        from: ReadOff::ReferenceScatter,
+        probability: 0.95,
+    }),
 };
-
-/// A standard deviation of zero has no gradient.
-fn starts(_: &ResidualView) -> Vec<Vec<f64>> {
-    vec![vec![0.001, 0.005]]
-}

@@ -1,7 +1,14 @@
 //! `reference_scale`: positions of the reference in wrong units of length.
 
-use super::EffectKind;
-use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
+use super::search::{FirstGuess, FittedSearch, Identifiability, Ordinary, Search};
+use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+use super::{Effect, EffectKind, EffectSet};
+use crate::Channel;
+
+/// Distance from 1 that every reference has.
+const ORDINARY: f64 = 6e-3;
+/// Factors beyond these are units, or gravity left out, but no scale.
+const SCALES: std::ops::RangeInclusive<f64> = 0.5..=2.0;
 
 pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::ReferenceScale,
@@ -16,13 +23,28 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         neutral: &[1.0],
         lower: 0.01,
         upper: 100.0,
-        step: 1e-5,
+        fit: Some(ParameterFit {
+            step: 1e-5,
+            prior_deviation: 0.3,
+        }),
     }],
-    random: false,
-    continuous: true,
-    starts,
+    channels: &[Channel::Accelerometer],
+    search: Search::Fitted(FittedSearch {
+        first_guess: FirstGuess::Neutral,
+        is_plausible: is_plausible,
+        ordinary: Some(Ordinary::EachValue(ORDINARY)),
+        rounding: None,
+        is_calibration: false,
+        special_case_of: &[],
+        identifiability: Some(Identifiability {
+            relevant_size: 0.03,
+            values: 1,
+            would_tell: "motion with accelerations of 2 m/s2 or more",
+        }),
+    }),
 };
 
-fn starts(_: &ResidualView) -> Vec<Vec<f64>> {
-    vec![vec![1.0]]
+fn is_plausible(effect: &Effect, _: &EffectSet) -> bool {
+    let factor = effect.scalar(0);
+    SCALES.contains(&factor) && (factor - 1.0).abs() > ORDINARY
 }

@@ -2,7 +2,9 @@
 //! simulation brings back.
 
 use super::EffectKind;
-use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
+use super::search::{ReadOff, ReadOffSearch, Search};
+use super::spec::{EffectSpec, ParameterSpec, Shape, Stage};
+use crate::Channel;
 
 pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::ReferenceSmoothing,
@@ -17,13 +19,11 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         neutral: &[1e4],
         lower: 0.1,
         upper: 1e4,
-        step: 1e-3,
+        fit: None,
     }],
-    random: false,
-    continuous: true,
-    starts,
+    channels: &Channel::ALL,
+    search: Search::ReadOff(ReadOffSearch {
+        from: ReadOff::ReferenceSpectrum,
+        probability: 0.9,
+    }),
 };
-
-fn starts(_: &ResidualView) -> Vec<Vec<f64>> {
-    [4.0, 8.0, 16.0].map(|cutoff_hz| vec![cutoff_hz]).to_vec()
-}

@@ -6,8 +6,9 @@ use cromosim_spatial::so3;
 use nalgebra::Vector3;
 
 use super::EffectKind;
-use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
-use crate::GRAVITY_IN_WORLD;
+use super::search::{FirstGuess, FittedSearch, Identifiability, Ordinary, Search, always};
+use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+use crate::{Channel, GRAVITY_IN_WORLD};
 
 pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::ReferenceTilt,
@@ -22,16 +23,26 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         neutral: &[0.0; 3],
         lower: -PI,
         upper: PI,
-        step: 1e-5,
+        fit: Some(ParameterFit {
+            step: 1e-5,
+            prior_deviation: 0.3,
+        }),
     }],
-    random: false,
-    continuous: true,
-    starts,
+    channels: &[Channel::Accelerometer],
+    search: Search::Fitted(FittedSearch {
+        first_guess: FirstGuess::Neutral,
+        is_plausible: always,
+        ordinary: Some(Ordinary::EachValue(2e-3)),
+        rounding: None,
+        is_calibration: false,
+        special_case_of: &[],
+        identifiability: Some(Identifiability {
+            relevant_size: 0.035,
+            values: 2,
+            would_tell: "turns of 60 degrees or more about two axes, so that tilt and mount differ",
+        }),
+    }),
 };
-
-fn starts(_: &ResidualView) -> Vec<Vec<f64>> {
-    vec![vec![0.0; 3]]
-}
 
 /// Gravity in the reported world, m/s2: `T g`, with T reported world from true world.
 pub(super) fn gravity(rotvec: &Vector3<f64>) -> Vector3<f64> {

@@ -1,7 +1,8 @@
 //! `accel_saturation`, `gyro_saturation`: the range of a sensor.
 
 use super::EffectKind;
-use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
+use super::search::{ReadOff, ReadOffSearch, Search};
+use super::spec::{EffectSpec, ParameterSpec, Shape, Stage};
 use crate::Channel;
 
 pub(super) static ACCEL: EffectSpec = EffectSpec {
@@ -17,11 +18,13 @@ pub(super) static ACCEL: EffectSpec = EffectSpec {
         neutral: &[1e9],
         lower: 1e-9,
         upper: 1e9,
-        step: 1e-3,
+        fit: None,
     }],
-    random: false,
-    continuous: false,
-    starts: |view| starts(view, Channel::Accelerometer),
+    channels: &[Channel::Accelerometer],
+    search: Search::ReadOff(ReadOffSearch {
+        from: ReadOff::ClippedReadings(Channel::Accelerometer),
+        probability: 0.98,
+    }),
 };
 
 pub(super) static GYRO: EffectSpec = EffectSpec {
@@ -37,35 +40,57 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
         neutral: &[1e9],
         lower: 1e-9,
         upper: 1e9,
-        step: 1e-3,
+        fit: None,
     }],
-    random: false,
-    continuous: false,
-    starts: |view| starts(view, Channel::Gyroscope),
+    channels: &[Channel::Gyroscope],
+    search: Search::ReadOff(ReadOffSearch {
+        from: ReadOff::ClippedReadings(Channel::Gyroscope),
+        probability: 0.98,
+    }),
 };
 
-/// Readings at the limit that make it one.
-const LEAST_REPEATS: usize = 3;
+/// Values at the largest magnitude that make it a limit.
+const LEAST_REPEATS: usize = 4;
+/// The same of values on a lattice, whose tail thins out from step to step.
+const LEAST_REPEATS_ON_LATTICE: usize = 12;
+/// Values at the limit, in units of those one step of the lattice below.
+const MORE_THAN_BELOW: usize = 3;
+/// Separate times at the limit, as a slow peak dwells on one step of a lattice.
+const LEAST_EPISODES: usize = 3;
+/// Values without the limit that separate two times at it: twenty readings.
+const EPISODE_GAP: usize = 60;
 
-/// The largest magnitude on any axis, where it repeats and the simulation mostly reads as much or
-/// more there.
-fn starts(view: &ResidualView, channel: Channel) -> Vec<Vec<f64>> {
-    let values = || {
-        view.pairs(channel)
-            .flat_map(|(m, s)| (0..3).map(move |axis| (m[axis], s[axis])))
-    };
-    let limit = values().map(|(m, _)| m.abs()).fold(0.0, f64::max);
-    let at_limit = || values().filter(|(m, _)| m.abs() >= limit * (1.0 - 1e-9));
-    let repeats = at_limit().count();
-    let beyond = at_limit()
-        .filter(|(m, s)| s * m.signum() >= 0.9 * limit)
+/// The value at which the readings of a channel clip; none where they do not. `values` are those of
+/// all axes, reading after reading; `lsb` is the lattice that they lie on, where there is one.
+pub fn clipping_limit(values: &[f64], lsb: Option<f64>) -> Option<f64> {
+    let largest = values
+        .iter()
+        .fold(0.0_f64, |most, value| most.max(value.abs()));
+    let below = lsb.map_or(0, |lsb| {
+        values
+            .iter()
+            .filter(|value| (value.abs() - largest + lsb).abs() < 0.5 * lsb)
+            .count()
+    });
+    let clipped: Vec<usize> = values
+        .iter()
+        .enumerate()
+        .filter(|(_, value)| value.abs() >= largest * (1.0 - 1e-9))
+        .map(|(at, _)| at)
+        .collect();
+    let repeats = clipped.len();
+    let episodes = 1 + clipped
+        .windows(2)
+        .filter(|pair| pair[1] > pair[0] + EPISODE_GAP)
         .count();
-    let found = limit > 0.0 && repeats >= LEAST_REPEATS && 2 * beyond >= repeats;
-    vec![vec![if found {
-        limit
+    let piles_up = if lsb.is_some() {
+        repeats >= LEAST_REPEATS_ON_LATTICE
+            && repeats > MORE_THAN_BELOW * below
+            && episodes >= LEAST_EPISODES
     } else {
-        ACCEL.parameters[0].neutral[0]
-    }]]
+        repeats >= LEAST_REPEATS
+    };
+    (piles_up && largest > 0.0).then_some(largest)
 }
 
 /// Clips one value at +-limit.

@@ -1,7 +1,12 @@
 //! `accel_scale`, `gyro_scale`: gain of each axis.
 
-use super::EffectKind;
-use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
+use super::search::{Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, Search};
+use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+use super::{Effect, EffectKind, EffectSet};
+use crate::Channel;
+
+/// Gains beyond these are units, or gravity left out, but no scale.
+const GAINS: std::ops::RangeInclusive<f64> = 0.5..=2.0;
 
 pub(super) static ACCEL: EffectSpec = EffectSpec {
     kind: EffectKind::AccelScale,
@@ -16,11 +21,25 @@ pub(super) static ACCEL: EffectSpec = EffectSpec {
         neutral: &[1.0; 3],
         lower: 0.01,
         upper: 100.0,
-        step: 1e-5,
+        fit: Some(ParameterFit {
+            step: 1e-5,
+            prior_deviation: 0.3,
+        }),
     }],
-    random: false,
-    continuous: true,
-    starts,
+    channels: &[Channel::Accelerometer],
+    search: Search::Fitted(FittedSearch {
+        first_guess: FirstGuess::Neutral,
+        is_plausible: is_plausible,
+        ordinary: Some(Ordinary::EachValue(2e-3)),
+        rounding: None,
+        is_calibration: false,
+        special_case_of: &[Dependence::GainOverTime, Dependence::OwnReading],
+        identifiability: Some(Identifiability {
+            relevant_size: 0.03,
+            values: 3,
+            would_tell: "motion with 2 m/s2 or more on all axes, or rest with each axis up and down",
+        }),
+    }),
 };
 
 pub(super) static GYRO: EffectSpec = EffectSpec {
@@ -36,13 +55,27 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
         neutral: &[1.0; 3],
         lower: 0.01,
         upper: 100.0,
-        step: 1e-5,
+        fit: Some(ParameterFit {
+            step: 1e-5,
+            prior_deviation: 0.3,
+        }),
     }],
-    random: false,
-    continuous: true,
-    starts,
+    channels: &[Channel::Gyroscope],
+    search: Search::Fitted(FittedSearch {
+        first_guess: FirstGuess::Neutral,
+        is_plausible: is_plausible,
+        ordinary: Some(Ordinary::EachValue(2e-3)),
+        rounding: None,
+        is_calibration: false,
+        special_case_of: &[Dependence::GainOverTime, Dependence::OwnReading],
+        identifiability: Some(Identifiability {
+            relevant_size: 0.03,
+            values: 3,
+            would_tell: "rotation with 1 rad/s or more about all axes",
+        }),
+    }),
 };
 
-fn starts(_: &ResidualView) -> Vec<Vec<f64>> {
-    vec![vec![1.0; 3]]
+fn is_plausible(effect: &Effect, _: &EffectSet) -> bool {
+    effect.values().iter().all(|gain| GAINS.contains(gain))
 }

@@ -209,7 +209,7 @@ fn parse(name: &str, fields: &[(String, Raw)]) -> Result<Effect, EffectError> {
             expected,
         });
     }
-    let mut values = Vec::with_capacity(spec.len());
+    let mut values = Vec::with_capacity(spec.value_count());
     for parameter in spec.parameters {
         let mut given = fields.iter().filter(|(field, _)| field == parameter.name);
         let (Some((field, raw)), None) = (given.next(), given.next()) else {

@@ -1,8 +1,11 @@
 //! `time_offset`: the IMU's stamps are late by a constant.
 
-use super::EffectKind;
-use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
-use crate::Channel;
+use super::search::{
+    Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, Search, always,
+};
+use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+use super::{Effect, EffectKind, EffectSet};
+use crate::{Channel, EffectError};
 
 pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::TimeOffset,
@@ -17,43 +20,41 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         neutral: &[0.0],
         lower: -10.0,
         upper: 10.0,
-        step: 1e-5,
+        fit: Some(ParameterFit {
+            step: 1e-5,
+            prior_deviation: 1.0,
+        }),
     }],
-    random: false,
-    continuous: true,
-    starts,
+    channels: &Channel::ALL,
+    search: Search::Fitted(FittedSearch {
+        first_guess: FirstGuess::Neutral,
+        is_plausible: always,
+        ordinary: Some(Ordinary::EachValue(2e-3)),
+        rounding: None,
+        is_calibration: true,
+        special_case_of: &[Dependence::DelayOverTime],
+        identifiability: Some(Identifiability {
+            relevant_size: 0.01,
+            values: 1,
+            would_tell: "motion with changing angular velocity, 1 rad/s or more",
+        }),
+    }),
 };
 
-/// Farthest shift that is looked at, s.
-const REACH: f64 = 1.0;
-
-/// No offset, and the shift at which the measured angular velocity's magnitude follows the
-/// simulated one best.
-fn starts(view: &ResidualView) -> Vec<Vec<f64>> {
-    let (measured, simulated): (Vec<f64>, Vec<f64>) = view
-        .pairs(Channel::Gyroscope)
-        .map(|(m, s)| (m.norm(), s.norm()))
-        .unzip();
-    let reach = ((REACH * view.rate_hz) as usize).min(measured.len() / 4);
-    let correlation = |shift: isize| {
-        let middle = reach..measured.len() - reach;
-        let pairs = middle.map(|k| (measured[k], simulated[(k as isize - shift) as usize]));
-        let (n, m, s, mm, ss, ms) = pairs.fold(
-            (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-            |(n, a, b, aa, bb, ab), (m, s)| {
-                (n + 1.0, a + m, b + s, aa + m * m, bb + s * s, ab + m * s)
-            },
-        );
-        (ms - m * s / n) / ((mm - m * m / n) * (ss - s * s / n)).sqrt()
-    };
-    let reach = reach as isize;
-    let best = (-reach..=reach)
-        .map(|shift| (correlation(shift), shift))
-        .filter(|(r, _)| r.is_finite())
-        .max_by(|a, b| a.0.total_cmp(&b.0));
-    let mut starts = vec![vec![0.0]];
-    if let Some((_, shift)) = best.filter(|(_, shift)| *shift != 0) {
-        starts.push(vec![shift as f64 / view.rate_hz]);
+impl Effect {
+    /// Stamps late by so many seconds.
+    ///
+    /// # Errors
+    /// [`EffectError`] for an offset out of bounds.
+    pub fn time_offset(seconds: f64) -> Result<Self, EffectError> {
+        Self::new(EffectKind::TimeOffset, vec![seconds])
     }
-    starts
+}
+
+impl EffectSet {
+    /// How late the stamps are, s; 0 without the effect.
+    pub fn time_offset(&self) -> f64 {
+        self.get(EffectKind::TimeOffset)
+            .map_or(0.0, |effect| effect.scalar(0))
+    }
 }

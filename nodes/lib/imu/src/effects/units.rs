@@ -1,8 +1,9 @@
 //! `accel_units`, `gyro_units`: units of a driver.
 
-use super::EffectKind;
-use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage};
-use crate::Channel;
+use super::search::{ReadOff, ReadOffSearch, Search};
+use super::spec::{EffectSpec, ParameterSpec, Shape, Stage};
+use super::{EffectKind, EffectSet};
+use crate::{Channel, STANDARD_GRAVITY};
 
 pub(super) static ACCEL: EffectSpec = EffectSpec {
     kind: EffectKind::AccelUnits,
@@ -17,11 +18,13 @@ pub(super) static ACCEL: EffectSpec = EffectSpec {
         neutral: &[1.0],
         lower: 1e-9,
         upper: 1e9,
-        step: 1e-6,
+        fit: None,
     }],
-    random: false,
-    continuous: false,
-    starts: |view| starts(view, Channel::Accelerometer, &ACCEL_FACTORS),
+    channels: &[Channel::Accelerometer],
+    search: Search::ReadOff(ReadOffSearch {
+        from: ReadOff::UnitFactor(Channel::Accelerometer),
+        probability: 0.98,
+    }),
 };
 
 pub(super) static GYRO: EffectSpec = EffectSpec {
@@ -37,59 +40,51 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
         neutral: &[1.0],
         lower: 1e-9,
         upper: 1e9,
-        step: 1e-6,
+        fit: None,
     }],
-    random: false,
-    continuous: false,
-    starts: |view| starts(view, Channel::Gyroscope, &GYRO_FACTORS),
+    channels: &[Channel::Gyroscope],
+    search: Search::ReadOff(ReadOffSearch {
+        from: ReadOff::UnitFactor(Channel::Gyroscope),
+        probability: 0.98,
+    }),
 };
 
-const G: f64 = crate::STANDARD_GRAVITY;
-const DEGREES: f64 = 180.0 / std::f64::consts::PI;
-
-/// m/s2, g, mg, cm/s2, ft/s2, mm/s2, km/s2 and 1e6.
+/// Factors that units of the accelerometer bring: m/s2, g, mg, cm/s2, mm/s2, ft/s2, and the inverse
+/// mistakes of g and cm/s2.
 const ACCEL_FACTORS: [f64; 8] = [
     1.0,
-    1.0 / G,
-    1000.0 / G,
+    1.0 / STANDARD_GRAVITY,
+    1000.0 / STANDARD_GRAVITY,
     100.0,
-    1.0 / 0.3048,
     1000.0,
-    1e-3,
-    1e6,
+    3.280_839_895,
+    STANDARD_GRAVITY,
+    0.01,
 ];
-/// rad/s, deg/s, mdeg/s, rpm, mrad/s, krad/s, revolutions/s and 1e6.
-const GYRO_FACTORS: [f64; 8] = [
+/// Factors that units of the gyroscope bring: rad/s, deg/s, mdeg/s, mrad/s, revolutions per minute
+/// and per second, and the inverse mistake of deg/s.
+const GYRO_FACTORS: [f64; 7] = [
     1.0,
-    DEGREES,
-    1000.0 * DEGREES,
-    DEGREES / 6.0,
+    57.295_779_513_082_32,
+    57_295.779_513_082_32,
     1000.0,
-    1e-3,
-    DEGREES / 360.0,
-    1e6,
+    9.549_296_585_513_72,
+    0.159_154_943_091_895_35,
+    0.017_453_292_519_943_295,
 ];
 
-/// The known factors nearest to the slope of measured on simulated magnitudes, the best first:
-/// within a factor of 1.3, as scales, biases and offsets of time move the slope; a known one and
-/// its inverse alike.
-fn starts(view: &ResidualView, channel: Channel, factors: &[f64]) -> Vec<Vec<f64>> {
-    let products = view
-        .pairs(channel)
-        .map(|(m, s)| (m.norm() * s.norm(), s.norm_squared()));
-    let (cross, square) = products.fold((0.0, 0.0), |(a, b), (cross, square)| {
-        (a + cross, b + square)
-    });
-    let slope = cross / square;
-    let distance = |factor: f64| (slope / factor).ln().abs();
-    let both = factors.iter().flat_map(|factor| [*factor, factor.recip()]);
-    let mut near: Vec<f64> = both
-        .filter(|factor| distance(*factor) < 1.3f64.ln())
-        .collect();
-    near.sort_by(|a, b| distance(*a).total_cmp(&distance(*b)));
-    near.dedup();
-    if near.is_empty() {
-        near.push(1.0);
+/// Known factors of a channel's units, 1 first.
+pub fn unit_factors(channel: Channel) -> &'static [f64] {
+    match channel {
+        Channel::Accelerometer => &ACCEL_FACTORS,
+        Channel::Gyroscope => &GYRO_FACTORS,
     }
-    near.into_iter().map(|factor| vec![factor]).collect()
+}
+
+impl EffectSet {
+    /// Factor of a channel's units; 1 without the effect.
+    pub fn unit_factor(&self, channel: Channel) -> f64 {
+        self.get_read_off(ReadOff::UnitFactor(channel))
+            .map_or(1.0, |effect| effect.scalar(0))
+    }
 }

@@ -5,7 +5,9 @@ use std::f64::consts::{PI, TAU};
 use cromosim_spatial::{Complex64, FourierPair};
 use nalgebra::{Matrix3x2, Vector3};
 
-use super::spec::{EffectSpec, ParameterSpec, ResidualView, Shape, Stage, median};
+use super::residual_view::{ResidualView, median};
+use super::search::{FirstGuess, FittedSearch, Search, always};
+use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
 use super::{Effect, EffectKind};
 use crate::Channel;
 
@@ -23,7 +25,10 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
             neutral: &[10.0],
             lower: 0.01,
             upper: 1e5,
-            step: 1e-5,
+            fit: Some(ParameterFit {
+                step: 1e-5,
+                prior_deviation: 50.0,
+            }),
         },
         ParameterSpec {
             name: "amplitude",
@@ -32,7 +37,10 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
             neutral: &[0.0; 3],
             lower: -1e3,
             upper: 1e3,
-            step: 1e-4,
+            fit: Some(ParameterFit {
+                step: 1e-4,
+                prior_deviation: 5.0,
+            }),
         },
         ParameterSpec {
             name: "phase",
@@ -41,24 +49,38 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
             neutral: &[0.0],
             lower: -TAU,
             upper: TAU,
-            step: 1e-4,
+            fit: Some(ParameterFit {
+                step: 1e-4,
+                prior_deviation: 10.0,
+            }),
         },
     ],
-    random: false,
-    continuous: true,
-    starts,
+    channels: &[Channel::Accelerometer],
+    search: Search::Fitted(FittedSearch {
+        first_guess: FirstGuess::FromResidual(starts),
+        is_plausible: always,
+        ordinary: None,
+        rounding: None,
+        is_calibration: false,
+        special_case_of: &[],
+        identifiability: None,
+    }),
 };
 
 /// `amplitude sin(2 pi hz (t - t0) + phase)`, parsed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Line {
+pub struct SpectralLine {
+    /// Frequency, Hz.
     pub hz: f64,
+    /// Of each sensor axis, m/s2.
     pub amplitude: Vector3<f64>,
+    /// At t0, rad.
     pub phase: f64,
 }
 
-impl Line {
-    pub(super) fn of(effect: &Effect) -> Self {
+impl SpectralLine {
+    /// Of a vibration's values.
+    pub(super) fn from_effect(effect: &Effect) -> Self {
         Self {
             hz: effect.scalar(0),
             amplitude: effect.vector(1),
@@ -72,6 +94,14 @@ impl Line {
         self.amplitude * (TAU * self.hz * seconds + self.phase).sin()
     }
 
+    /// Mean square of the specific force, summed over the axes, m2/s4.
+    pub fn power(&self) -> f64 {
+        self.amplitude
+            .iter()
+            .map(|amplitude| 0.5 * amplitude * amplitude)
+            .sum()
+    }
+
     /// What a filter of this gain and phase leaves of it.
     pub(super) fn filtered(self, (gain, phase): (f64, f64)) -> Self {
         Self {
@@ -82,44 +112,53 @@ impl Line {
     }
 }
 
+/// Readings below which no line is looked for.
+const LEAST_READINGS: usize = 64;
 /// Least frequency that is looked at, Hz: below it the residual of motion lives.
 const LEAST_HZ: f64 = 2.0;
 
-/// The residual's line that stands out most over its surroundings, with amplitudes and phase by
-/// least squares in absolute time.
+impl Effect {
+    /// The line of a vibration; none of any other effect.
+    pub fn spectral_line(&self) -> Option<SpectralLine> {
+        (self.kind() == EffectKind::Vibration).then(|| SpectralLine::from_effect(self))
+    }
+}
+
+/// The strongest line of the residual; the neutral values where there is none.
 fn starts(view: &ResidualView) -> Vec<Vec<f64>> {
-    let neutral = vec![SPEC.neutral()];
+    let values = strongest_line(view).map(|line| {
+        let [x, y, z] = line.amplitude.into();
+        vec![line.hz, x, y, z, line.phase]
+    });
+    vec![values.unwrap_or_else(|| SPEC.neutral())]
+}
+
+/// The line of the accelerometer's residual that stands out most over its surroundings, with
+/// amplitudes and phase by least squares in absolute time.
+pub fn strongest_line(view: &ResidualView) -> Option<SpectralLine> {
     let residual: Vec<Vector3<f64>> = view.residual(Channel::Accelerometer).collect();
-    if residual.len() < 64 || view.rate_hz.is_nan() || view.rate_hz <= 0.0 {
-        return neutral;
+    if residual.len() < LEAST_READINGS || view.rate_hz.is_nan() || view.rate_hz <= 0.0 {
+        return None;
     }
     let seconds: Vec<f64> = view
         .stamps
         .iter()
         .map(|stamp| *stamp - view.epoch)
         .collect();
-    let mean = view.mean_residual(Channel::Accelerometer);
-    let Some((coarse, width)) = coarse_line(&seconds, &residual, &mean, view.rate_hz) else {
-        return neutral;
-    };
+    let mean = residual.iter().sum::<Vector3<f64>>() / residual.len() as f64;
+    let (coarse, width) = coarse_line(&seconds, &residual, &mean, view.rate_hz)?;
     let power = |hz: f64| fit(&seconds, &residual, &mean, hz).norm_squared();
     let hz = refined(power, coarse, width);
-    let coefficients = fit(&seconds, &residual, &mean, hz);
-    let svd = coefficients.svd(true, true);
-    let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else {
-        return neutral;
-    };
+    let svd = fit(&seconds, &residual, &mean, hz).svd(true, true);
+    let (u, v_t) = (svd.u?, svd.v_t?);
     let (strongest, sigma) = svd.singular_values.argmax();
     // S = A cos(phase), C = A sin(phase), as A sin(x + phase) = S sin x + C cos x.
-    let amplitude = u.column(strongest) * sigma;
     let phase = v_t[(strongest, 1)].atan2(v_t[(strongest, 0)]);
-    vec![vec![
+    Some(SpectralLine {
         hz,
-        amplitude[0],
-        amplitude[1],
-        amplitude[2],
-        phase.clamp(-PI, PI),
-    ]]
+        amplitude: u.column(strongest) * sigma,
+        phase: phase.clamp(-PI, PI),
+    })
 }
 
 /// Coefficients of sine and cosine for each axis, by least squares.

@@ -1,21 +1,25 @@
 //! Where a residual lies: by channel, axis, frequency and time.
 
-use std::collections::BTreeMap;
-
+use cromosim_imu::{AXES, Channel};
 use cromosim_spatial::{Spectrum, welch};
 
-use crate::problem::Problem;
+use crate::axes::axes_of_channel;
+use crate::diagnosis::{GapLocation, Interval};
+use crate::prepared::PreparedPlacement;
 use crate::whiten::Whitener;
-use crate::{AXES, Interval, Place};
 
 /// Edges of the frequency bands, Hz; the last ends at Nyquist.
-pub(crate) const BANDS_HZ: [f64; 8] = [0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
-/// Intervals of time.
+const BANDS_HZ: [f64; 8] = [0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
+/// Parts of equal length that a recording is cut into.
 const INTERVALS: usize = 12;
 
 /// Shares of a whitened residual (flat, as [`Whitener::apply`] gives it) beyond unit variance.
-pub(crate) fn place(white: &[f64], problem: &Problem, whitener: &Whitener) -> Place {
-    let length = problem.length;
+pub(crate) fn locate(
+    white: &[f64],
+    prepared: &PreparedPlacement,
+    whitener: &Whitener,
+) -> GapLocation {
+    let length = prepared.length;
     let squares = |axis: usize, from: usize, to: usize| -> f64 {
         let range = axis * length + from..axis * length + to;
         let weights: f64 = whitener.weight[axis][from..to]
@@ -28,10 +32,8 @@ pub(crate) fn place(white: &[f64], problem: &Problem, whitener: &Whitener) -> Pl
         .map(|axis| squares(axis, 0, length).max(0.0))
         .collect();
     let axis_shares = shares(&axes);
-    let channels = [
-        axis_shares[..3].iter().sum::<f64>(),
-        axis_shares[3..].iter().sum::<f64>(),
-    ];
+    let channel_share =
+        |channel: Channel| axis_shares[axes_of_channel(channel)].iter().sum::<f64>();
     let intervals: Vec<(f64, f64, f64)> = (0..INTERVALS)
         .map(|k| (k * length / INTERVALS, (k + 1) * length / INTERVALS))
         .map(|(from, to)| {
@@ -40,14 +42,14 @@ pub(crate) fn place(white: &[f64], problem: &Problem, whitener: &Whitener) -> Pl
                 .sum::<f64>()
                 .max(0.0);
             (
-                from as f64 / problem.rate_hz,
-                to as f64 / problem.rate_hz,
+                from as f64 / prepared.rate_hz,
+                to as f64 / prepared.rate_hz,
                 sum,
             )
         })
         .collect();
-    let total = spectrum_of(white, problem, 0..6);
-    let nyquist_hz = problem.rate_hz / 2.0;
+    let total = summed_spectrum(white, prepared, 0..6);
+    let nyquist_hz = prepared.rate_hz / 2.0;
     let bands: Vec<(f64, f64, f64)> = bands(nyquist_hz)
         .into_iter()
         .map(|(from, to)| {
@@ -59,11 +61,11 @@ pub(crate) fn place(white: &[f64], problem: &Problem, whitener: &Whitener) -> Pl
             (from, to, excess.max(0.0))
         })
         .collect();
-    Place {
-        channels: BTreeMap::from([
-            ("accel".to_owned(), channels[0]),
-            ("gyro".to_owned(), channels[1]),
-        ]),
+    GapLocation {
+        channels: Channel::ALL
+            .into_iter()
+            .map(|channel| (channel.prefix().to_owned(), channel_share(channel)))
+            .collect(),
         axes: AXES
             .iter()
             .zip(&axis_shares)
@@ -85,19 +87,19 @@ pub(crate) fn bands(nyquist_hz: f64) -> Vec<(f64, f64)> {
 }
 
 /// Sum over axes of the spectra of a flat whitened residual: 2 / rate each where it is white.
-pub(crate) fn spectrum_of(
+pub(crate) fn summed_spectrum(
     white: &[f64],
-    problem: &Problem,
+    prepared: &PreparedPlacement,
     axes: std::ops::Range<usize>,
 ) -> Spectrum {
-    let window = ((4.0 * problem.rate_hz) as usize)
-        .min(problem.length / 2)
+    let window = ((4.0 * prepared.rate_hz) as usize)
+        .min(prepared.length / 2)
         .max(8);
     let mut total = Spectrum::default();
     for axis in axes {
         let spectrum = welch(
-            &white[axis * problem.length..(axis + 1) * problem.length],
-            problem.rate_hz,
+            &white[axis * prepared.length..(axis + 1) * prepared.length],
+            prepared.rate_hz,
             window,
         );
         if total.density.is_empty() {

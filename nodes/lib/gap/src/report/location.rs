@@ -4,19 +4,19 @@ use std::fmt::Write;
 
 use cromosim_charts::text::{decimals, escape, percent};
 
-use super::causes::bar;
+use super::markup::bar;
 use super::text::axis_name;
-use crate::{Interval, Place};
+use crate::diagnosis::{GapLocation, Interval};
 
 /// Intervals of time beyond these are left out, the smallest shares first.
 const MOST_INTERVALS: usize = 8;
 
 /// Four groups; those without entries are left out.
-pub(super) fn write_place(page: &mut String, place: &Place) {
-    if place.channels.is_empty()
-        && place.axes.is_empty()
-        && place.bands_hz.is_empty()
-        && place.intervals_s.is_empty()
+pub(super) fn write_location(page: &mut String, location: &GapLocation) {
+    if location.channels.is_empty()
+        && location.axes.is_empty()
+        && location.bands_hz.is_empty()
+        && location.intervals_s.is_empty()
     {
         page.push_str(
             "<p class=\"note\">Nothing to tell: the residual is as small as the noise.</p>\n",
@@ -30,10 +30,14 @@ pub(super) fn write_place(page: &mut String, place: &Place) {
             .map(|(name, share)| (escape(&axis_name(name)), *share))
             .collect::<Vec<_>>()
     };
-    write_group(page, "By channel", &named(&place.channels));
-    write_group(page, "By axis", &named(&place.axes));
-    write_group(page, "By frequency", &ranges(&place.bands_hz, "Hz"));
-    write_group(page, "By time", &ranges(&largest(&place.intervals_s), "s"));
+    write_group(page, "By channel", &named(&location.channels));
+    write_group(page, "By axis", &named(&location.axes));
+    write_group(page, "By frequency", &ranges(&location.bands_hz, "Hz"));
+    write_group(
+        page,
+        "By time",
+        &ranges(&largest(&location.intervals_s), "s"),
+    );
     page.push_str("</div>\n");
 }
 

@@ -1,4 +1,4 @@
-//! Effects that the library is denied: their gap is `unknown`.
+//! Effects that the library is excluded: their gap is `unknown`.
 #![allow(clippy::unwrap_used)]
 
 mod support;
@@ -10,9 +10,9 @@ use support::Scene;
 use support::judge::{names, shares_add_up};
 
 /// Without the effect the gap holds structure that nothing explains.
-fn denied(kind: K, values: &[f64]) -> PlacementAnswer {
+fn excluded(kind: K, values: &[f64]) -> PlacementAnswer {
     let options = DiagnoseOptions {
-        without: vec![kind],
+        excluded: vec![kind],
         ..DiagnoseOptions::default()
     };
     let answer = diagnose(
@@ -32,8 +32,8 @@ fn denied(kind: K, values: &[f64]) -> PlacementAnswer {
 }
 
 /// And nothing else is said with it.
-fn denied_alone(kind: K, values: &[f64]) {
-    let answer = denied(kind, values);
+fn excluded_alone(kind: K, values: &[f64]) {
+    let answer = excluded(kind, values);
     let diagnosis = &answer.diagnosis;
     assert_eq!(names(diagnosis), ["unknown"], "{}", diagnosis.verdict);
     assert!(
@@ -58,18 +58,18 @@ fn denied_alone(kind: K, values: &[f64]) {
     }
 }
 
-macro_rules! denied {
+macro_rules! excluded {
     ($($name:ident: $kind:ident $values:expr;)*) => {
         $(#[test]
         fn $name() {
-            denied_alone(K::$kind, &$values);
+            excluded_alone(K::$kind, &$values);
         })*
     };
 }
 
 // Not here, because another effect says the same: time_offset (a low-pass of that delay),
 // gyro_quantization (white noise).
-denied! {
+excluded! {
     mount_rotation: MountRotation [0.2, -0.15, 0.3];
     lever_arm: LeverArm [0.05, 0.02, -0.06];
     dropped_samples: DroppedSamples [0.06, 3.0];
@@ -87,25 +87,25 @@ denied! {
 // Of these other effects explain a part.
 #[test]
 fn clock_drift() {
-    denied(K::ClockDrift, &[400.0]);
+    excluded(K::ClockDrift, &[400.0]);
 }
 
 #[test]
 fn reference_tilt() {
-    denied(K::ReferenceTilt, &[0.04, -0.05, 0.0]);
+    excluded(K::ReferenceTilt, &[0.04, -0.05, 0.0]);
 }
 
 #[test]
 fn low_pass() {
-    denied(K::LowPass, &[8.0]);
+    excluded(K::LowPass, &[8.0]);
 }
 
 #[test]
 fn soft_tissue() {
-    denied(K::SoftTissue, &[7.0, 0.3]);
+    excluded(K::SoftTissue, &[7.0, 0.3]);
 }
 
 #[test]
 fn reference_scale() {
-    denied(K::ReferenceScale, &[1.1]);
+    excluded(K::ReferenceScale, &[1.1]);
 }

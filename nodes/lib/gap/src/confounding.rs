@@ -1,0 +1,113 @@
+//! Which fitted effects only pass for something unknown.
+
+use cromosim_imu::{Channel, Dependence, EffectKind, EffectSet, Search};
+
+use crate::findings::Findings;
+use crate::policy::confounded::{
+    CHANGES_OVER_TIME, MAIN_PART, NEARLY_ALL, OWN_GAIN, REGRESSIONS, STRONG_PART,
+};
+use crate::residual_regressions::{ResidualRegression, with_regressions};
+use crate::search::score;
+use crate::trace::trace;
+
+/// The fitted effects that are confounded with what the strongest regressions describe, and the
+/// special cases of these. `strong` are those of `all` that tell, the strongest first.
+pub(crate) fn confounded_effects(
+    findings: &Findings,
+    strong: &[&ResidualRegression],
+    all: &[ResidualRegression],
+) -> Vec<EffectKind> {
+    let (mut confounded, sound) = judged_members(findings, strong);
+    let most = strong.first().map_or(0.0, |regression| regression.gain);
+    for regression in strong.iter().filter(|regression| {
+        regression.gain > STRONG_PART * most && changes_over_time(regression, all)
+    }) {
+        confounded.extend(special_cases(regression).filter(|kind| !sound.contains(kind)));
+    }
+    confounded
+}
+
+/// Whether an effect is one that every sensor has to be calibrated for.
+pub(crate) fn is_calibration(kind: EffectKind) -> bool {
+    matches!(kind.spec().search, Search::Fitted(search) if search.is_calibration)
+}
+
+/// Whether a family over time says more than the same without time.
+fn changes_over_time(regression: &ResidualRegression, all: &[ResidualRegression]) -> bool {
+    let steady = match regression.dependence {
+        Dependence::DelayOverTime => Dependence::RateOfChange,
+        Dependence::MountOverTime => Dependence::OtherAxes,
+        _ => return true,
+    };
+    let other = all
+        .iter()
+        .find(|other| other.channel == regression.channel && other.dependence == steady);
+    other.is_none_or(|other| regression.gain > CHANGES_OVER_TIME * other.gain)
+}
+
+/// Effects that are special cases of what the residual depends on: they say no more than it does.
+fn special_cases(regression: &ResidualRegression) -> impl Iterator<Item = EffectKind> + use<> {
+    let (dependence, channel) = (regression.dependence, regression.channel);
+    EffectKind::ALL
+        .into_iter()
+        .filter(move |kind| match kind.spec().search {
+            Search::Fitted(search) => {
+                search.special_case_of.contains(&dependence)
+                    && kind.spec().channels.contains(&channel)
+            }
+            Search::Choice | Search::ReadOff(_) => false,
+        })
+}
+
+/// Fitted effects which beside the strongest regressions gain less than a tenth of what they gain
+/// without them; and calibrations that explain nearly all that the regressions in their place
+/// would.
+fn judged_members(
+    findings: &Findings,
+    strong: &[&ResidualRegression],
+) -> (Vec<EffectKind>, Vec<EffectKind>) {
+    let (model, fit) = (&findings.model, &findings.scored.fit);
+    let chosen: Vec<&Vec<Vec<f64>>> = Channel::ALL
+        .into_iter()
+        .flat_map(|channel| {
+            strong
+                .iter()
+                .filter(move |regression| {
+                    regression.channel == channel
+                        && regression.dependence != Dependence::RateOfChange
+                })
+                .take(REGRESSIONS)
+        })
+        .map(|regression| &regression.columns)
+        .collect();
+    let (mut confounded, mut sound) = (Vec::new(), Vec::new());
+    if chosen.is_empty() {
+        return (confounded, sound);
+    }
+    let together = with_regressions(findings, fit, &chosen).held_out;
+    let nominal = score(model, EffectSet::new());
+    let explained = together - nominal.fit.linear.held_out;
+    for kind in fit.set.iter().map(|effect| effect.kind()) {
+        let smaller = score(model, fit.set.without(kind));
+        let instead = with_regressions(findings, &smaller.fit, &chosen).held_out;
+        let alone = fit.linear.held_out - smaller.fit.linear.held_out;
+        let gain_of_regressions = instead - smaller.fit.linear.held_out;
+        trace(|| {
+            eprintln!(
+                "   member {} alone {alone:.0}, regressions instead {gain_of_regressions:.0}, beside {:.0} of {explained:.0}",
+                kind.name(),
+                together - instead
+            )
+        });
+        if findings.is_mostly_explained
+            && is_calibration(kind)
+            && alone > NEARLY_ALL * gain_of_regressions
+        {
+            sound.push(kind);
+        } else if alone < MAIN_PART * explained && together - instead < OWN_GAIN * alone {
+            // What explains much of the gap by itself does not pass for what little is left.
+            confounded.push(kind);
+        }
+    }
+    (confounded, sound)
+}

@@ -1,0 +1,92 @@
+//! The model of a placement's noise, made from the residual of the best simulation so far.
+
+use cromosim_imu::{EffectSet, PerChannel, ReadOff, Reading, strongest_line};
+use cromosim_spatial::{KinematicTrack, PoseNoise};
+
+use crate::digital::Digital;
+use crate::fit::FitModel;
+use crate::library::Library;
+use crate::noise_model::{NoiseBasis, NoiseModel, ReferenceShare};
+use crate::policy::report::ORDINARY_REFERENCE_NOISE;
+use crate::policy::vibration::LEAST_POWER;
+use crate::prepared::PreparedPlacement;
+use crate::search::ScoredEffectSet;
+use crate::sensor_noise::{found_noise, white_noise};
+
+/// The model of the nominal simulation, with what is certain from the start.
+pub(crate) fn first_model<'a>(
+    prepared: &'a PreparedPlacement,
+    track: KinematicTrack,
+    start: &EffectSet,
+    digital: &PerChannel<Digital>,
+    units: PerChannel<f64>,
+    library: &Library,
+) -> FitModel<'a> {
+    let readings = prepared.predict(&track, start).readings;
+    let residual = prepared.residual(&readings);
+    let sigma = white_noise(prepared, found_noise(prepared, &residual), digital, library);
+    let mut basis = NoiseBasis::new(prepared.estimate.clone(), sigma);
+    basis.rate_squared = track
+        .angular_velocity_in_segment
+        .iter()
+        .map(|rate| rate.norm_squared())
+        .sum::<f64>()
+        / track.len() as f64;
+    basis.force_squared = readings
+        .iter()
+        .map(|reading| reading.specific_force.norm_squared())
+        .sum::<f64>()
+        / readings.len() as f64;
+    if !library.allows_read_off(ReadOff::ReferenceScatter) {
+        basis.reference_share = ordinary_share(prepared.estimate.noise());
+    }
+    basis.line_hz = suspicious_line(prepared, &basis, &readings);
+    basis.steps = PerChannel::from_fn(|channel| {
+        digital[channel]
+            .lsb
+            .map_or(0.0, |lsb| lsb / units[channel] / sigma[channel].max(1e-12))
+    });
+    let noise = NoiseModel::new(prepared, &basis, &residual);
+    FitModel::new(prepared, track, basis, noise)
+}
+
+/// The model with the noise that the residual of a fitted set shows, and with its lever arm.
+pub(crate) fn with_updated_noise<'a>(
+    model: &FitModel<'a>,
+    scored: &ScoredEffectSet,
+    digital: &PerChannel<Digital>,
+    library: &Library,
+) -> FitModel<'a> {
+    let prepared = model.prepared;
+    let readings = &scored.fit.prediction.readings;
+    let set = &scored.fit.set;
+    let mut basis = model.basis.clone();
+    basis.lever_arm_m = set.lever_arm().norm();
+    basis.line_hz = match set.iter().find_map(|effect| effect.spectral_line()) {
+        Some(line) => Some(line.hz),
+        None => suspicious_line(prepared, &basis, readings),
+    };
+    let residual = prepared.residual(readings);
+    basis.sigma = white_noise(prepared, found_noise(prepared, &residual), digital, library);
+    let noise = NoiseModel::new(prepared, &basis, &residual);
+    FitModel::new(prepared, model.track.clone(), basis, noise)
+}
+
+/// Shares of a reference's noise densities that an ordinary reference has.
+pub(crate) fn ordinary_share(found: PoseNoise) -> ReferenceShare {
+    let share = |ordinary: f64, found: f64| (ordinary / found.max(1e-12)).powi(2).min(1.0);
+    ReferenceShare {
+        position: share(ORDINARY_REFERENCE_NOISE.position, found.position),
+        rotation: share(ORDINARY_REFERENCE_NOISE.rotation, found.rotation),
+    }
+}
+
+/// Frequency of the strongest line of the accelerometer's residual where it may be a vibration, Hz.
+fn suspicious_line(
+    prepared: &PreparedPlacement,
+    basis: &NoiseBasis,
+    simulated: &[Reading],
+) -> Option<f64> {
+    let line = strongest_line(&prepared.view(simulated))?;
+    (line.power() > LEAST_POWER * basis.sigma.accelerometer.powi(2)).then_some(line.hz)
+}

@@ -1,0 +1,71 @@
+//! Whether fitted effects look like what they are named after.
+
+use cromosim_imu::{Channel, EffectSet, Search};
+use cromosim_spatial::Spectrum;
+
+use crate::fit::{Fit, FitModel};
+use crate::policy::vibration::{
+    ABOVE_HZ, BELOW_HZ, LEAST_HEIGHT, LEAST_HZ, LEAST_POWER, MOST_LEFT, MOST_TURNING,
+    SURROUNDINGS_HZ,
+};
+
+/// Whether the fitted values are what such effects have: a filter that passes all motion, or a
+/// tissue stiffer than any, are no causes but the reference's own smoothing error in their disguise.
+pub(crate) fn is_plausible(set: &EffectSet) -> bool {
+    set.iter().all(|effect| match effect.kind().spec().search {
+        Search::Fitted(search) => (search.is_plausible)(effect, set),
+        Search::Choice | Search::ReadOff(_) => true,
+    })
+}
+
+/// Whether a vibration in the set is more than motion that the reference does not resolve: strong
+/// against the white noise, faster than gait, alone in the accelerometer, and one sinusoid that
+/// takes most of the line away.
+pub(crate) fn is_true_vibration(model: &FitModel, fit: &Fit) -> bool {
+    let Some((kind, line)) = fit
+        .set
+        .iter()
+        .find_map(|effect| Some((effect.kind(), effect.spectral_line()?)))
+    else {
+        return true;
+    };
+    let sigma = model.basis.sigma.accelerometer;
+    if line.power() < LEAST_POWER * sigma.powi(2) || line.hz < LEAST_HZ {
+        return false;
+    }
+    let prepared = model.prepared;
+    let excluded = prepared.predict(&model.track, &fit.set.without(kind));
+    let before = prepared.residual(&excluded.readings);
+    let after = prepared.residual(&fit.prediction.readings);
+    let line_of = |series: &[Vec<f64>], channel: Channel| {
+        LineInSpectrum::at(&prepared.channel_spectrum(series, channel), line.hz)
+    };
+    let before = line_of(&before, Channel::Accelerometer);
+    let left = line_of(&after, Channel::Accelerometer);
+    let turning = line_of(&after, Channel::Gyroscope);
+    before.height > LEAST_HEIGHT
+        && turning.height < MOST_TURNING
+        && left.power < MOST_LEFT * before.power
+}
+
+/// A line of a spectrum against its surroundings.
+struct LineInSpectrum {
+    /// Of its peak over the median of the surroundings.
+    height: f64,
+    /// Beyond the surroundings, summed over its bins.
+    power: f64,
+}
+
+impl LineInSpectrum {
+    fn at(spectrum: &Spectrum, hz: f64) -> Self {
+        let around = spectrum
+            .median(hz - SURROUNDINGS_HZ, hz + SURROUNDINGS_HZ)
+            .unwrap_or(0.0)
+            .max(1e-30);
+        let band = spectrum.band(hz - BELOW_HZ, hz + ABOVE_HZ);
+        Self {
+            height: band.iter().copied().fold(0.0, f64::max) / around,
+            power: band.iter().sum::<f64>() - around * band.len() as f64,
+        }
+    }
+}

@@ -1,0 +1,198 @@
+//! The numbers that decide what a diagnosis says, by what they decide.
+//!
+//! What belongs to one effect alone (its bounds, its prior, what is ordinary of it) stands in its
+//! specification, in `cromosim_imu::effects`. Sources: *withheld* are the cases of `tests/withheld`,
+//! whose generator shares no code with the suite; *placements without effect* are a hundred of its
+//! placements to which nothing was done. Where no source is named, none is on record: the number
+//! was set by hand, and a change has to be shown on the withheld cases.
+
+/// The size of the search for the smallest set of effects.
+pub(crate) mod search {
+    /// Sets that are followed at once.
+    pub const BEAM: usize = 2;
+    /// Candidates of each set that are fitted.
+    pub const REFITS: usize = 3;
+    /// Rivals of each member that are fitted when members are exchanged.
+    pub const RIVALS: usize = 2;
+    /// Times that members are exchanged at most.
+    pub const EXCHANGES: usize = 3;
+    /// Most effects that the first search adds, before the noise is known.
+    pub const MOST_AT_FIRST: usize = 2;
+    /// Most effects that each later search adds.
+    pub const MOST: usize = 5;
+    /// Searches after the first, each with the noise that the one before leaves.
+    pub const ROUNDS: usize = 3;
+    /// Most Gauss-Newton steps of a fit.
+    pub const FIT_STEPS: usize = 12;
+    /// Gain of the last step, nats, below which a fit has converged.
+    pub const CONVERGED_NATS: f64 = 0.1;
+    /// One linear step says little of a large turn or delay: a candidate that promises this part of
+    /// the best one's gain is still worth a fit.
+    pub const PART_OF_BEST_PREDICTION: f64 = 0.3;
+    /// And so is one within so many nats of the best.
+    pub const NEAR_BEST_NATS: f64 = 20.0;
+    /// And none that loses more than this, nats.
+    pub const MOST_LOSS_NATS: f64 = 10.0;
+}
+
+/// What an effect has to gain to be taken up. All gains are of the held-out log-likelihood, nats.
+pub(crate) mod price {
+    /// Of each effect.
+    pub const EFFECT_NATS: f64 = 12.0;
+    /// And of each of its fitted values.
+    pub const VALUE_NATS: f64 = 2.0;
+    /// And of a choice in place of values: one of 48 axis conventions, one of 3 gravities (ln 48 is
+    /// 3.9).
+    pub const CHOICE_NATS: f64 = 4.0;
+    /// As a share of what is still to be explained: what is left of a gap that no effect fits is
+    /// nibbled at by all.
+    pub const LEAST_SHARE: f64 = 0.02;
+    /// Steps of quantisation, in units of the white noise, that double all prices.
+    pub const DOUBLING_STEPS: f64 = 3.0;
+    /// Factor on all prices beside a smoothing of the reference that is undone.
+    pub const UNDONE_SMOOTHING_FACTOR: f64 = 5.0;
+}
+
+/// When a smoothing of the reference is looked for, and when it is believed.
+pub(crate) mod smoothing {
+    /// Held-out mean square of a whitened residual from which on it is looked for.
+    pub const SUSPICIOUS: f64 = 1.3;
+    /// What undoing it has to gain, nats.
+    pub const LEAST_GAIN_NATS: f64 = 30.0;
+    /// And as a share of what is still to be explained.
+    pub const LEAST_SHARE: f64 = 0.05;
+    /// Effects that may be added beside it when it is judged.
+    pub const BESIDE: usize = 2;
+    /// Ratio of the residuals' root mean squares (undone to plain) that one channel has to fall
+    /// below.
+    pub const CLOSER: f64 = 0.95;
+    /// And that neither channel may exceed.
+    pub const NOT_FARTHER: f64 = 1.05;
+}
+
+/// When a vibration is more than motion that the reference does not resolve.
+pub(crate) mod vibration {
+    /// Its power over the three axes, in units of the white noise's variance per axis.
+    pub const LEAST_POWER: f64 = 0.3;
+    /// Slower lines are gait, Hz.
+    pub const LEAST_HZ: f64 = 4.0;
+    /// Half the width of the surroundings that a line is compared with, Hz.
+    pub const SURROUNDINGS_HZ: f64 = 4.0;
+    /// The line itself reaches from this below its frequency, Hz.
+    pub const BELOW_HZ: f64 = 0.75;
+    /// To this above it, Hz.
+    pub const ABOVE_HZ: f64 = 1.0;
+    /// Least height of the line in the accelerometer, over the median of its surroundings.
+    pub const LEAST_HEIGHT: f64 = 20.0;
+    /// Most height that stays in the gyroscope: a turning segment shows there too.
+    pub const MOST_TURNING: f64 = 8.0;
+    /// Most of the line's power that one sinusoid may leave.
+    pub const MOST_LEFT: f64 = 0.3;
+}
+
+/// What is reported as a cause.
+pub(crate) mod report {
+    use cromosim_spatial::PoseNoise;
+
+    /// Noise per sample and axis from which on the reference's noise is a cause: m, rad. From the
+    /// contract: 1 mm or 0.25 degrees.
+    pub const REFERENCE_NOISE: PoseNoise = PoseNoise {
+        position: 1e-3,
+        rotation: 0.25 * std::f64::consts::PI / 180.0,
+    };
+    /// What the reference's noise ordinarily is at most: m, rad. From the contract: 0.3 mm and 0.1
+    /// degrees.
+    pub const ORDINARY_REFERENCE_NOISE: PoseNoise = PoseNoise {
+        position: 3e-4,
+        rotation: 0.1 * std::f64::consts::PI / 180.0,
+    };
+    /// Factor on what is ordinary of every effect beside a reference of [`REFERENCE_NOISE`]: what
+    /// is fitted to it is that much poorer.
+    pub const ORDINARY_BESIDE_REFERENCE_NOISE: f64 = 15.0;
+    /// The same beside a smoothing of the reference that is undone.
+    pub const ORDINARY_BESIDE_SMOOTHING: f64 = 8.0;
+    /// Variance of the white noise beyond the declared, in units of the declared, from which on it
+    /// is a cause.
+    pub const EXCESS_NOISE: f64 = 1.0;
+    /// The same where something else is broad enough to pass for noise: beside a smoothed
+    /// reference, or [`MANY_MISSING`] messages.
+    pub const DOUBTFUL_EXCESS_NOISE: f64 = 20.0;
+    /// Fraction of missing messages that makes white noise doubtful.
+    pub const MANY_MISSING: f64 = 0.02;
+    /// Uncertainty of the variance that rounding adds, as a part of it.
+    pub const ROUNDING_UNCERTAINTY: f64 = 0.2;
+    /// Steps of quantisation in units of the white noise from which on they are a cause.
+    pub const STEP: f64 = 1.0;
+    /// Steps of quantisation in units of the white noise from which on a residual holds rounding
+    /// rather than noise.
+    pub const COARSE_STEPS: f64 = 3.0;
+    /// Part of the gap's excess over noise (in log-likelihood) below which the unexplained rest is
+    /// the smaller part.
+    pub const MOSTLY_EXPLAINED: f64 = 0.5;
+    /// Factor on the standard errors of the normal equations: the predicted noise is stationary,
+    /// that of real motion is not. From withheld cases.
+    pub const STANDARD_ERROR_FACTOR: f64 = 1.12;
+}
+
+/// When a residual holds structure that no named effect explains.
+pub(crate) mod unknown {
+    /// Mean square of a whitened residual in a band from which on it is structure. Without any
+    /// effect none of a hundred placements reached 3.
+    pub const BAND: f64 = 12.0;
+    /// Held-out gain of a regression, nats, likewise; without any effect none reached 0.
+    pub const REGRESSION_NATS: f64 = 200.0;
+    /// Loudest two seconds against the median ones, where outliers are many.
+    pub const BURST: f64 = 5.0;
+    /// Share of values beyond five standard deviations that is many.
+    pub const OUTLIERS: f64 = 0.003;
+    /// Share of repeated readings, and of missing messages where these may not be named.
+    pub const FROZEN: f64 = 0.002;
+    /// Scatter of the stamps' intervals, in units of their median.
+    pub const JITTER: f64 = 0.05;
+    /// Factor on [`BAND`], [`REGRESSION_NATS`] and [`BURST`] beside a smoothing of the reference
+    /// that is undone: its shape is only guessed, which leaves much that is none of its own.
+    pub const UNDONE_SMOOTHING_FACTOR: f64 = 20.0;
+    /// Share of the residual from which on an axis is said to hold it.
+    pub const AXIS_SHARE: f64 = 0.1;
+    /// Share of the residual from which on a band is said to hold it.
+    pub const BAND_SHARE: f64 = 0.1;
+    /// Share of the residual, in units of an even spread, from which on an interval is said to hold
+    /// it.
+    pub const INTERVAL_SHARE: f64 = 1.5;
+}
+
+/// When a fitted effect only passes for something unknown.
+pub(crate) mod confounded {
+    /// Regressions of each channel that effects are judged beside; more only cost time.
+    pub const REGRESSIONS: usize = 2;
+    /// Part of all that is explained from which on an effect stands by itself.
+    pub const MAIN_PART: f64 = 0.3;
+    /// Part of the strongest regression's gain from which on another counts.
+    pub const STRONG_PART: f64 = 0.3;
+    /// Part of its gain that an effect keeps beside what the residual depends on, if it is more
+    /// than that in disguise.
+    pub const OWN_GAIN: f64 = 0.1;
+    /// Part of what regressions in its place would gain that a calibration has to gain, if it is to
+    /// stand beside them.
+    pub const NEARLY_ALL: f64 = 0.7;
+    /// Factor by which a regression over time has to gain more than the same without time.
+    pub const CHANGES_OVER_TIME: f64 = 1.5;
+}
+
+/// How sure a cause is.
+pub(crate) mod probability {
+    /// Of the fitted effects that were certain by their margin, so many were right on withheld
+    /// cases: what no model of the library describes passes for one of its effects now and then,
+    /// whatever the margin.
+    pub const MOST: f64 = 0.95;
+    /// Margin that is worth as much as the prior odds, nats.
+    pub const MARGIN_NATS: f64 = 2.0;
+    /// Of a fitted effect that was taken up last, beside something unknown, and so has no margin.
+    pub const WITHOUT_MARGIN: f64 = 0.98;
+    /// Most of `unknown`.
+    pub const MOST_UNKNOWN: f64 = 0.97;
+    /// Gain that is worth as much as the prior odds of `unknown`, nats.
+    pub const UNKNOWN_GAIN_NATS: f64 = 20.0;
+    /// A unit of a band's mean square counts as so many nats of gain.
+    pub const NATS_PER_BAND: f64 = 10.0;
+}

@@ -1,0 +1,402 @@
+//! One placement, made ready to be compared: sample grid, masks, units.
+
+use cromosim_imu::{
+    AXES, Channel, EffectSet, GridTrace, PerChannel, Reading, ResidualView, SensorModel, Stage,
+};
+use cromosim_spatial::{KinematicTrack, PoseEstimate, Spectrum, Stamp, welch};
+
+use crate::axes::{axes_of_channel, value_on_axis};
+use crate::error::GapError;
+use crate::record::PlacementRecord;
+
+/// Common time of IMU and reference below which nothing is said, s.
+const LEAST_OVERLAP_S: f64 = 4.0;
+/// Finite readings below which nothing is said.
+const LEAST_MESSAGES: usize = 50;
+/// Most entries of a sample grid: stamps that span more are taken for broken (55 hours at 100 Hz).
+const MOST_ENTRIES: usize = 20_000_000;
+/// What is left out at the reference's ends, s.
+const END_S: f64 = 1.0;
+/// What is left out on either side of a gap in the reference, s.
+const GAP_S: f64 = 0.35;
+/// And beyond it, as a part of the gap (of its first two seconds): a long gap is filled worse, and
+/// its errors reach further.
+const GAP_PART: f64 = 0.3;
+/// Length of the blocks of time that are held out together, s.
+const BLOCK_S: f64 = 4.0;
+/// Number of parts that are held out in turn.
+pub(crate) const FOLDS: usize = 5;
+/// Length of the windows of residual spectra, s.
+const WINDOW_S: f64 = 4.0;
+
+/// One placement with everything that does not change while effects are tried.
+#[derive(Clone, Debug)]
+pub(crate) struct PreparedPlacement {
+    pub name: String,
+    /// t0: stamp of the first IMU message.
+    pub epoch: Stamp,
+    pub stamps: Vec<Stamp>,
+    /// Readings in SI, units factors taken out.
+    pub measured: Vec<Reading>,
+    pub rate_hz: f64,
+    /// Entry of each message on the uniform sample grid of the IMU's clock.
+    pub grid_index: Vec<usize>,
+    /// Entries of the sample grid.
+    pub length: usize,
+    /// Of each message and axis: whether it is compared.
+    pub usable: Vec<[bool; 6]>,
+    /// White noise per sample that the device declares.
+    pub declared: PerChannel<Option<f64>>,
+    pub estimate: PoseEstimate,
+    pub missing: MissingMessages,
+}
+
+/// Entries of the sample grid without a message.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct MissingMessages {
+    /// Of all entries.
+    pub fraction: f64,
+    /// Mean length of a gap, messages; 0 without any.
+    pub mean_burst: f64,
+}
+
+/// A prediction with its stages kept, so that a change of one effect repeats only what comes after
+/// it.
+#[derive(Clone, Debug)]
+pub(crate) struct Prediction {
+    segment: GridTrace,
+    tissue: GridTrace,
+    sensor: GridTrace,
+    read: Vec<Reading>,
+    pub readings: Vec<Reading>,
+}
+
+/// The uniform grid under the stamps of an IMU.
+struct SampleGrid {
+    index: Vec<usize>,
+    length: usize,
+    /// Median interval, s.
+    period_s: f64,
+}
+
+impl SampleGrid {
+    /// Follows the stamps step by step: a drifting or jittering clock does not run off it.
+    fn under(stamps: &[Stamp]) -> Self {
+        let mut intervals: Vec<f64> = stamps.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        intervals.sort_unstable_by(f64::total_cmp);
+        let period_s = intervals[intervals.len() / 2];
+        let mut index = vec![0];
+        for pair in stamps.windows(2) {
+            let step = ((pair[1] - pair[0]) / period_s).round().max(1.0) as usize;
+            index.push(index[index.len() - 1] + step);
+        }
+        let length = index[index.len() - 1] + 1;
+        Self {
+            index,
+            length,
+            period_s,
+        }
+    }
+
+    fn missing(&self) -> MissingMessages {
+        let gaps = self
+            .index
+            .windows(2)
+            .filter(|pair| pair[1] > pair[0] + 1)
+            .count();
+        let missing = self.length - self.index.len();
+        MissingMessages {
+            fraction: missing as f64 / self.length as f64,
+            mean_burst: if gaps > 0 {
+                missing as f64 / gaps as f64
+            } else {
+                0.0
+            },
+        }
+    }
+}
+
+impl PreparedPlacement {
+    /// Sorts the readings, lays the sample grid, and fits the reference's trajectory.
+    pub fn new(record: &PlacementRecord) -> Result<Self, GapError> {
+        let name = record.name.clone();
+        let (stamps, measured) = in_order(record)?;
+        let reference = &record.reference;
+        let estimate = PoseEstimate::fit(
+            &reference.stamps,
+            &reference.positions,
+            &reference.rotations,
+        )
+        .map_err(|source| GapError::Reference {
+            placement: name.clone(),
+            source,
+        })?;
+        let grid = SampleGrid::under(&stamps);
+        if grid.length > MOST_ENTRIES {
+            return Err(GapError::NoOverlap {
+                placement: name,
+                overlap_s: 0.0,
+                imu_s: grid.length as f64 * grid.period_s,
+                needed_s: LEAST_OVERLAP_S,
+            });
+        }
+        let prepared = Self {
+            name,
+            epoch: stamps[0],
+            rate_hz: (grid.length - 1) as f64 / (stamps[stamps.len() - 1] - stamps[0]),
+            usable: vec![[true; 6]; stamps.len()],
+            missing: grid.missing(),
+            length: grid.length,
+            grid_index: grid.index,
+            stamps,
+            measured,
+            declared: PerChannel::from_fn(|channel| record.imu.declared[channel.index()]),
+            estimate,
+        };
+        prepared.refuse_stuck_axes()?;
+        Ok(prepared)
+    }
+
+    /// Leaves out what the reference does not cover when the IMU's stamps are late by `lag_s`, and
+    /// what is next to its gaps.
+    pub fn cover(&mut self, lag_s: f64) -> Result<(), GapError> {
+        let (start, end) = (
+            self.estimate.start().plus_seconds(lag_s),
+            self.estimate.end().plus_seconds(lag_s),
+        );
+        let gaps: Vec<(Stamp, Stamp)> = self
+            .estimate
+            .gaps()
+            .iter()
+            .map(|(from, to)| {
+                let margin = GAP_S + GAP_PART * (*to - *from).min(2.0);
+                (
+                    from.plus_seconds(lag_s - margin),
+                    to.plus_seconds(lag_s + margin),
+                )
+            })
+            .collect();
+        let mut next = 0;
+        let mut covered = 0;
+        for (k, stamp) in self.stamps.iter().enumerate() {
+            while next < gaps.len() && gaps[next].1 < *stamp {
+                next += 1;
+            }
+            let in_gap = gaps.get(next).is_some_and(|gap| gap.0 <= *stamp);
+            let inside = *stamp - start >= END_S && end - *stamp >= END_S && !in_gap;
+            covered += usize::from(inside);
+            if !inside {
+                self.usable[k] = [false; 6];
+            }
+        }
+        let overlap_s = covered as f64 / self.rate_hz;
+        if overlap_s < LEAST_OVERLAP_S {
+            let imu_s = self.length as f64 / self.rate_hz;
+            return Err(GapError::NoOverlap {
+                placement: self.name.clone(),
+                overlap_s,
+                imu_s,
+                needed_s: LEAST_OVERLAP_S,
+            });
+        }
+        Ok(())
+    }
+
+    /// Refuses channels that never change.
+    fn refuse_stuck_axes(&self) -> Result<(), GapError> {
+        let constant = |axis: usize| {
+            self.measured.iter().all(|reading| {
+                value_on_axis(reading, axis) == value_on_axis(&self.measured[0], axis)
+            })
+        };
+        let stuck: Vec<&str> = (0..6)
+            .filter(|&axis| constant(axis))
+            .map(|axis| AXES[axis])
+            .collect();
+        if stuck.is_empty() {
+            Ok(())
+        } else {
+            Err(GapError::Stuck {
+                placement: self.name.clone(),
+                axes: stuck.join(", "),
+            })
+        }
+    }
+
+    /// Kinematics of an estimate of the reference.
+    pub fn track(&self, estimate: &PoseEstimate) -> KinematicTrack {
+        estimate.track_for(self.rate_hz)
+    }
+
+    /// Runs the model without its digital stage: what clips, rounds and rescales is dealt with on
+    /// the measured side.
+    pub fn predict(&self, track: &KinematicTrack, set: &EffectSet) -> Prediction {
+        let model = SensorModel::new(set, self.epoch);
+        let segment = model.segment(track);
+        let tissue = model.tissue(segment.clone());
+        let sensor = model.sensor(tissue.clone());
+        let read = model.read(&sensor, &self.stamps);
+        let mut readings = read.clone();
+        model.linear(&mut readings, &self.stamps);
+        Prediction {
+            segment,
+            tissue,
+            sensor,
+            read,
+            readings,
+        }
+    }
+
+    /// The readings under `set`, which differs from the set of `base` in effects of `stage` alone.
+    pub fn predict_from(
+        &self,
+        track: &KinematicTrack,
+        base: &Prediction,
+        set: &EffectSet,
+        stage: Stage,
+    ) -> Vec<Reading> {
+        let model = SensorModel::new(set, self.epoch);
+        let mut readings = if stage <= Stage::Segment {
+            model.read(
+                &model.sensor(model.tissue(model.segment(track))),
+                &self.stamps,
+            )
+        } else if stage == Stage::Tissue {
+            model.read(
+                &model.sensor(model.tissue(base.segment.clone())),
+                &self.stamps,
+            )
+        } else if stage == Stage::Sensor {
+            model.read(&model.sensor(base.tissue.clone()), &self.stamps)
+        } else if stage == Stage::Timing {
+            model.read(&base.sensor, &self.stamps)
+        } else {
+            base.read.clone()
+        };
+        model.linear(&mut readings, &self.stamps);
+        readings
+    }
+
+    /// Which part of time an entry of the sample grid belongs to.
+    pub fn fold(&self, entry: usize) -> usize {
+        (entry as f64 / (BLOCK_S * self.rate_hz)) as usize % FOLDS
+    }
+
+    /// What the effects' first guesses look at.
+    pub fn view<'a>(&'a self, simulated: &'a [Reading]) -> ResidualView<'a> {
+        ResidualView {
+            stamps: &self.stamps,
+            epoch: self.epoch,
+            rate_hz: self.rate_hz,
+            measured: &self.measured,
+            simulated,
+        }
+    }
+
+    /// Values (by message and axis) on the sample grid, one series for each axis, with straight
+    /// lines over what is not compared.
+    pub fn on_sample_grid(&self, value: impl Fn(usize, usize) -> f64) -> Vec<Vec<f64>> {
+        (0..6)
+            .map(|axis| {
+                let mut series = vec![0.0; self.length];
+                let mut usable = vec![false; self.length];
+                for (k, &entry) in self.grid_index.iter().enumerate() {
+                    if self.usable[k][axis] {
+                        series[entry] = value(k, axis);
+                        usable[entry] = true;
+                    }
+                }
+                bridge(&mut series, &usable);
+                series
+            })
+            .collect()
+    }
+
+    /// Measured less predicted, on the sample grid.
+    pub fn residual(&self, predicted: &[Reading]) -> Vec<Vec<f64>> {
+        self.on_sample_grid(|k, axis| {
+            value_on_axis(&self.measured[k], axis) - value_on_axis(&predicted[k], axis)
+        })
+    }
+
+    /// The Welch spectrum of one channel of series on the sample grid, mean over its three axes.
+    pub fn channel_spectrum(&self, series: &[Vec<f64>], channel: Channel) -> Spectrum {
+        let window = ((WINDOW_S * self.rate_hz) as usize)
+            .min(self.length / 2)
+            .max(16);
+        let mut sum = Spectrum::default();
+        for values in &series[axes_of_channel(channel)] {
+            let spectrum = welch(values, self.rate_hz, window);
+            if sum.density.is_empty() {
+                sum = Spectrum {
+                    density: vec![0.0; spectrum.density.len()],
+                    ..spectrum
+                };
+            }
+            sum.density
+                .iter_mut()
+                .zip(&spectrum.density)
+                .for_each(|(total, value)| *total += value / 3.0);
+        }
+        sum
+    }
+}
+
+/// Straight lines over entries without a usable value, held at the ends; all 0 without any.
+fn bridge(series: &mut [f64], usable: &[bool]) {
+    let mut last: Option<usize> = None;
+    for k in 0..series.len() {
+        if !usable[k] {
+            continue;
+        }
+        match last {
+            None => {
+                let value = series[k];
+                series[..k].fill(value);
+            }
+            Some(before) if k > before + 1 => {
+                let (from, to) = (series[before], series[k]);
+                for (step, value) in series[before + 1..k].iter_mut().enumerate() {
+                    *value = from + (to - from) * (step + 1) as f64 / (k - before) as f64;
+                }
+            }
+            _ => {}
+        }
+        last = Some(k);
+    }
+    match last {
+        Some(before) => {
+            let value = series[before];
+            series[before + 1..].fill(value);
+        }
+        None => series.fill(0.0),
+    }
+}
+
+/// Finite readings in the order of time, none of them twice.
+fn in_order(record: &PlacementRecord) -> Result<(Vec<Stamp>, Vec<Reading>), GapError> {
+    let placement = record.name.clone();
+    let finite = |reading: &Reading| (0..6).all(|axis| value_on_axis(reading, axis).is_finite());
+    let mut pairs: Vec<(Stamp, Reading)> = record
+        .imu
+        .stamps
+        .iter()
+        .copied()
+        .zip(record.imu.readings.iter().copied())
+        .collect();
+    let all = pairs.len();
+    pairs.retain(|(_, reading)| finite(reading));
+    if pairs.is_empty() && all > 0 {
+        return Err(GapError::NotFinite { placement });
+    }
+    pairs.sort_by_key(|(stamp, _)| *stamp);
+    pairs.dedup_by_key(|(stamp, _)| *stamp);
+    if pairs.len() < LEAST_MESSAGES {
+        return Err(GapError::TooFewMessages {
+            placement,
+            messages: pairs.len(),
+            needed: LEAST_MESSAGES,
+        });
+    }
+    Ok(pairs.into_iter().unzip())
+}

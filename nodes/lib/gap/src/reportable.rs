@@ -1,0 +1,186 @@
+//! Which effects are reported as causes: fitted ones beyond what is ordinary, and those that are
+//! read off the readings, the stamps and the reference.
+
+use cromosim_imu::{
+    Channel, Effect, EffectKind, EffectSet, Ordinary, PerChannel, ReadOff, Rounding, Search,
+};
+
+use crate::digital::Digital;
+use crate::fit::FitModel;
+use crate::library::Library;
+use crate::policy::report::{
+    COARSE_STEPS, DOUBTFUL_EXCESS_NOISE, EXCESS_NOISE, MANY_MISSING,
+    ORDINARY_BESIDE_REFERENCE_NOISE, ORDINARY_BESIDE_SMOOTHING, REFERENCE_NOISE,
+    ROUNDING_UNCERTAINTY, STEP,
+};
+
+/// What readings and residual show without a fit.
+pub(crate) struct Observations<'a> {
+    pub digital: &'a PerChannel<Digital>,
+    /// Factors of the device's units.
+    pub units: PerChannel<f64>,
+    /// White noise per sample of the residual, in SI units.
+    pub found_noise: PerChannel<f64>,
+    /// Whether the top of the residual's spectrum is level.
+    pub is_white: PerChannel<bool>,
+}
+
+/// The causes: fitted effects beyond what is ordinary, and those that are read off.
+pub(crate) fn reportable_effects(
+    model: &FitModel,
+    fitted: &EffectSet,
+    observations: &Observations,
+    library: &Library,
+) -> EffectSet {
+    let mut set = EffectSet::new();
+    for effect in fitted {
+        if !is_ordinary(effect, ordinary_factor(model)) && !is_rounding(effect, model) {
+            set.insert(effect.clone());
+        }
+    }
+    for kind in EffectKind::ALL {
+        let Search::ReadOff(search) = kind.spec().search else {
+            continue;
+        };
+        let values = read_off(model, observations, search.from).filter(|_| library.allows(kind));
+        if let Some(effect) = values.and_then(|values| Effect::new(kind, values).ok()) {
+            set.insert(effect);
+        }
+    }
+    set
+}
+
+/// Whether the reference scatters so much that this is a cause.
+fn is_reference_noisy(model: &FitModel) -> bool {
+    let noise = model.prepared.estimate.noise();
+    noise.position >= REFERENCE_NOISE.position || noise.rotation >= REFERENCE_NOISE.rotation
+}
+
+/// Factor on what is ordinary: what is fitted to a poor reference is that much poorer.
+fn ordinary_factor(model: &FitModel) -> f64 {
+    if is_reference_noisy(model) {
+        ORDINARY_BESIDE_REFERENCE_NOISE
+    } else if model.basis.undone_hz.is_some() {
+        ORDINARY_BESIDE_SMOOTHING
+    } else {
+        1.0
+    }
+}
+
+/// Whether an effect is no larger than what every recording has, times a factor.
+pub(crate) fn is_ordinary(effect: &Effect, factor: f64) -> bool {
+    let Search::Fitted(search) = effect.kind().spec().search else {
+        return false;
+    };
+    match search.ordinary {
+        None => false,
+        Some(Ordinary::EachValue(ordinary)) => {
+            let neutral = effect.kind().spec().neutral();
+            let size = effect
+                .values()
+                .iter()
+                .zip(&neutral)
+                .map(|(value, neutral)| (value - neutral).abs())
+                .fold(0.0, f64::max);
+            size < factor * ordinary
+        }
+        Some(Ordinary::Change(ordinary)) => {
+            let squares: f64 = effect.values()[1..].iter().map(|value| value * value).sum();
+            squares.sqrt() < factor * ordinary
+        }
+    }
+}
+
+/// Whether an offset or ramp stays below half a step of a coarse rounding: slow motion dwells on
+/// one side of a step.
+fn is_rounding(effect: &Effect, model: &FitModel) -> bool {
+    let spec = effect.kind().spec();
+    let Search::Fitted(search) = spec.search else {
+        return false;
+    };
+    let size = effect
+        .values()
+        .iter()
+        .map(|value| value.abs())
+        .fold(0.0, f64::max);
+    let seconds = model.prepared.length as f64 / model.prepared.rate_hz;
+    let offset = match search.rounding {
+        None => return false,
+        Some(Rounding::Offset) => size,
+        Some(Rounding::Ramp) => size * seconds,
+    };
+    spec.channels
+        .iter()
+        .any(|channel| offset < 0.5 * coarse_step(model, *channel))
+}
+
+/// Step of a coarse rounding in SI units; 0 where the rounding is none or fine.
+fn coarse_step(model: &FitModel, channel: Channel) -> f64 {
+    let steps = model.basis.steps[channel];
+    if steps > COARSE_STEPS {
+        steps * model.basis.sigma[channel]
+    } else {
+        0.0
+    }
+}
+
+/// Values of an effect that is read off; none where it is not there.
+fn read_off(model: &FitModel, observations: &Observations, from: ReadOff) -> Option<Vec<f64>> {
+    let prepared = model.prepared;
+    let declared =
+        |channel: Channel| prepared.declared[channel].unwrap_or(observations.found_noise[channel]);
+    match from {
+        ReadOff::ClippedReadings(channel) => {
+            let limit = observations.digital[channel].limit?;
+            Some(vec![limit / observations.units[channel]])
+        }
+        ReadOff::Lattice(channel) => {
+            let step = observations.step(channel);
+            (step > STEP * declared(channel) && step > 0.0).then(|| vec![step])
+        }
+        ReadOff::ExcessNoise(channel) => {
+            let density = excess_noise(model, observations, channel)?;
+            Some(vec![density])
+        }
+        ReadOff::UnitFactor(channel) => {
+            let factor = observations.units[channel];
+            (factor != 1.0).then(|| vec![factor])
+        }
+        ReadOff::MissingMessages => {
+            let missing = prepared.missing;
+            (missing.fraction > 0.0).then(|| vec![missing.fraction, missing.mean_burst.max(1.0)])
+        }
+        ReadOff::ReferenceScatter => {
+            let noise = prepared.estimate.noise();
+            is_reference_noisy(model).then(|| vec![noise.position, noise.rotation])
+        }
+        ReadOff::ReferenceSpectrum => model.basis.undone_hz.map(|cutoff_hz| vec![cutoff_hz]),
+    }
+}
+
+/// Density of the white noise beyond the declared, where it is a cause.
+fn excess_noise(model: &FitModel, observations: &Observations, channel: Channel) -> Option<f64> {
+    let prepared = model.prepared;
+    let declared = prepared.declared[channel]?;
+    let step = observations.step(channel);
+    // Rounding adds step^2 / 12 of noise of its own.
+    let beyond = observations.found_noise[channel].powi(2) - step * step / 12.0 - declared.powi(2);
+    // What a smoothed reference lacks is broad enough to pass for noise.
+    let is_doubtful = model.basis.undone_hz.is_some() || prepared.missing.fraction > MANY_MISSING;
+    let factor = if is_doubtful {
+        DOUBTFUL_EXCESS_NOISE
+    } else {
+        EXCESS_NOISE
+    };
+    let needed = factor * declared.powi(2) + ROUNDING_UNCERTAINTY * step * step / 12.0;
+    (observations.is_white[channel] && beyond > needed).then(|| (beyond / prepared.rate_hz).sqrt())
+}
+
+impl Observations<'_> {
+    /// Step of the rounding, in SI units; 0 without.
+    fn step(&self, channel: Channel) -> f64 {
+        self.digital[channel]
+            .lsb
+            .map_or(0.0, |lsb| lsb / self.units[channel])
+    }
+}

@@ -1,0 +1,204 @@
+//! Simulations of a placement under sets of effects, and how far each lies from the readings.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::rc::Rc;
+use std::sync::Arc;
+
+use cromosim_imu::{Channel, EffectKind, EffectSet, PerChannel, ReadOff, Reading, SensorModel};
+use cromosim_spatial::KinematicTrack;
+use rand::SeedableRng;
+use rand_chacha::ChaCha12Rng;
+
+use crate::axes::{channel_of_axis, sum_over_channels, value_on_axis};
+use crate::diagnosis::Metrics;
+use crate::findings::Findings;
+use crate::metrics::Comparison;
+use crate::noise_model::NoiseModel;
+use crate::noise_updates::ordinary_share;
+use crate::prepared::{FOLDS, PreparedPlacement};
+use crate::whiten::Whitener;
+
+/// Simulations of one placement, with all covered readings compared, clipped ones as well.
+pub(crate) struct Simulations<'a> {
+    findings: &'a Findings<'a>,
+    pub comparison: Comparison<'a>,
+    /// The placement with clipped readings compared as well.
+    pub whole: PreparedPlacement,
+    /// The track of the poses as they are, where the analysis undoes a smoothing.
+    plain: Option<KinematicTrack>,
+    /// Of the fit, at every covered reading.
+    residual: Vec<Vec<f64>>,
+    /// By the effects that change the predicted noise.
+    whiteners: RefCell<BTreeMap<Vec<EffectKind>, Rc<Whitener>>>,
+    /// Factors of the device's units.
+    units: PerChannel<f64>,
+    /// Seed of the simulated noise.
+    seed: u64,
+}
+
+impl<'a> Simulations<'a> {
+    /// `raw` are the readings in the device's units, `covered` the axes of each to be compared.
+    pub fn new(
+        findings: &'a Findings<'a>,
+        raw: &'a [Reading],
+        covered: &'a [[bool; 6]],
+        seed: u64,
+    ) -> Self {
+        let prepared = findings.model.prepared;
+        let whole = PreparedPlacement {
+            usable: covered.to_vec(),
+            ..prepared.clone()
+        };
+        let undone_hz = findings.model.basis.undone_hz;
+        Self {
+            findings,
+            comparison: Comparison {
+                prepared,
+                measured: raw,
+                covered,
+            },
+            plain: undone_hz.map(|_| whole.track(&whole.estimate)),
+            residual: whole.residual(&findings.scored.fit.prediction.readings),
+            whiteners: RefCell::default(),
+            units: PerChannel::from_fn(|channel| findings.reportable.unit_factor(channel)),
+            seed,
+            whole,
+        }
+    }
+
+    /// The readings in the device's units under a set of effects, without noise.
+    pub fn simulate(&self, set: &EffectSet) -> Vec<Reading> {
+        let track = match &self.plain {
+            Some(plain) if set.get_read_off(ReadOff::ReferenceSpectrum).is_none() => plain,
+            _ => &self.findings.model.track,
+        };
+        let mut readings = self.whole.predict(track, set).readings;
+        SensorModel::new(set, self.whole.epoch).digital(&mut readings);
+        readings
+    }
+
+    /// For the noise that is predicted under those effects of `set` that change it.
+    pub fn whitener(&self, set: &EffectSet) -> Rc<Whitener> {
+        let kinds: Vec<EffectKind> = set
+            .iter()
+            .map(|effect| effect.kind())
+            .filter(|kind| kind.changes_predicted_noise())
+            .collect();
+        Rc::clone(
+            self.whiteners
+                .borrow_mut()
+                .entry(kinds)
+                .or_insert_with(|| Rc::new(self.new_whitener(set))),
+        )
+    }
+
+    fn new_whitener(&self, set: &EffectSet) -> Whitener {
+        let mut basis = self.findings.model.basis.clone();
+        for channel in Channel::ALL {
+            // Rounding adds step^2 / 12 of noise of its own.
+            let variance = self.white_variance(set, channel) + set.lsb(channel).powi(2) / 12.0;
+            basis.sigma[channel] = variance.sqrt();
+        }
+        let scatter = ReadOff::ReferenceScatter;
+        let reportable = &self.findings.reportable;
+        if reportable.get_read_off(scatter).is_some() && set.get_read_off(scatter).is_none() {
+            basis.reference_share = ordinary_share(self.whole.estimate.noise());
+        }
+        if set.get_read_off(ReadOff::ReferenceSpectrum).is_none() {
+            basis.undone_hz = None;
+            basis.estimate = Arc::new(self.whole.estimate.clone());
+        }
+        Whitener::new(
+            &self.whole,
+            &NoiseModel::new(&self.whole, &basis, &self.residual),
+        )
+    }
+
+    /// Variance per sample of the declared white noise and that of a set, in SI units.
+    fn white_variance(&self, set: &EffectSet, channel: Channel) -> f64 {
+        self.findings.declared_sigma(channel).powi(2)
+            + set.noise_density(channel).powi(2) * self.whole.rate_hz
+    }
+
+    /// Whitened measured less simulated, in SI units.
+    pub fn whitened(&self, whitener: &Whitener, simulated: &[Reading]) -> Vec<f64> {
+        let measured = self.comparison.measured;
+        whitener.apply(&self.whole.on_sample_grid(|k, axis| {
+            (value_on_axis(&measured[k], axis) - value_on_axis(&simulated[k], axis))
+                / self.units[channel_of_axis(axis)]
+        }))
+    }
+
+    /// Sum of the squares of [`Simulations::whitened`].
+    pub fn squares(&self, whitener: &Whitener, simulated: &[Reading]) -> f64 {
+        self.whitened(whitener, simulated)
+            .iter()
+            .map(|e| e * e)
+            .sum()
+    }
+
+    /// Log-likelihood of the readings under a set, nats, less the constant of the normal density.
+    pub fn likelihood(&self, whitener: &Whitener, simulated: &[Reading]) -> f64 {
+        let volume =
+            sum_over_channels(|channel| whitener.count[channel] * whitener.log_scale[channel]);
+        -0.5 * self.squares(whitener, simulated) - volume
+    }
+
+    fn nll_per_sample(&self, set: &EffectSet, simulated: &[Reading]) -> f64 {
+        let whitener = self.whitener(set);
+        let samples = (whitener.count.accelerometer + whitener.count.gyroscope) / 6.0;
+        let units: f64 = 3.0 * sum_over_channels(|channel| self.units[channel].ln());
+        -self.likelihood(&whitener, simulated) / samples.max(1.0)
+            + 3.0 * std::f64::consts::TAU.ln()
+            + units
+    }
+
+    /// Distances of the readings from a simulation without noise under a set of effects.
+    pub fn metrics(&self, set: &EffectSet, simulated: &[Reading]) -> Metrics {
+        let noisy = self.noisy(set, simulated);
+        self.comparison
+            .metrics(simulated, &noisy, self.nll_per_sample(set, simulated))
+    }
+
+    /// With white noise, in the device's units.
+    fn noisy(&self, set: &EffectSet, simulated: &[Reading]) -> Vec<Reading> {
+        let mut random = ChaCha12Rng::seed_from_u64(self.seed);
+        let sigma = PerChannel::from_fn(|channel| {
+            self.units[channel] * self.white_variance(set, channel).sqrt()
+        });
+        simulated
+            .iter()
+            .map(|reading| {
+                let mut noisy = *reading;
+                for axis in 0..3 {
+                    let [a, b] = cromosim_imu::normal_pair(&mut random);
+                    noisy.specific_force[axis] += sigma.accelerometer * a;
+                    noisy.angular_velocity[axis] += sigma.gyroscope * b;
+                }
+                noisy
+            })
+            .collect()
+    }
+
+    /// The metrics that another recording of the device should show: every part of time is
+    /// simulated with values fitted to the others. `after` is simulated with all values.
+    pub fn cross_validated_metrics(&self, after: &[Reading]) -> Metrics {
+        let mut held_out = after.to_vec();
+        for fold in 0..FOLDS {
+            let mut set = self.findings.reportable.clone();
+            for effect in self.findings.scored.fit.excluding_fold(fold).iter() {
+                if set.contains(effect.kind()) {
+                    set.insert(effect.clone());
+                }
+            }
+            let readings = self.simulate(&set);
+            for (k, &entry) in self.whole.grid_index.iter().enumerate() {
+                if self.whole.fold(entry) == fold {
+                    held_out[k] = readings[k];
+                }
+            }
+        }
+        self.metrics(&self.findings.reportable, &held_out)
+    }
+}

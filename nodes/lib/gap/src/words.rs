@@ -1,0 +1,142 @@
+//! Causes and verdict in the words of diagnosis.json.
+
+use std::collections::BTreeMap;
+
+use cromosim_imu::{EffectKind, Shape};
+use serde_json::{Value, json};
+
+use crate::diagnosis::{Cause, Interval, Metrics, UNKNOWN};
+use crate::findings::Unknown;
+use crate::policy::unknown::{BAND_SHARE, INTERVAL_SHARE};
+
+/// Values by the names of their parameters, in the form of diagnosis.json.
+pub(crate) fn described(kind: EffectKind, values: &[f64]) -> BTreeMap<String, Value> {
+    let mut named = BTreeMap::new();
+    let mut first = 0;
+    for parameter in kind.spec().parameters {
+        let own = &values[first..first + parameter.shape.count()];
+        first += parameter.shape.count();
+        let value = match parameter.shape {
+            Shape::Scalar | Shape::Time => json!(own[0]),
+            Shape::Vector3 => json!(own),
+            Shape::Matrix3 => json!(own.chunks(3).collect::<Vec<_>>()),
+            Shape::Choice(words) => json!(words.get(own[0] as usize).copied().unwrap_or_default()),
+        };
+        named.insert(parameter.name.to_owned(), value);
+    }
+    named
+}
+
+/// Standard errors in the form of [`described`]; an instant is known to half a sample. Empty where
+/// nothing was fitted.
+pub(crate) fn described_errors(
+    kind: EffectKind,
+    errors: &[f64],
+    rate_hz: f64,
+) -> BTreeMap<String, Value> {
+    let times = kind
+        .spec()
+        .parameters
+        .iter()
+        .filter(|parameter| parameter.shape == Shape::Time)
+        .map(|parameter| (parameter.name.to_owned(), json!(0.5 / rate_hz)));
+    let mut named = if errors.iter().any(|error| *error > 0.0) {
+        described(kind, errors)
+    } else {
+        BTreeMap::new()
+    };
+    named.extend(times);
+    named
+}
+
+/// The cause that stands for structure outside the library.
+pub(crate) fn unknown_cause(unknown: &Unknown, gap_share: f64, after: Metrics) -> Cause {
+    let parameters = BTreeMap::from([
+        ("channel".to_owned(), json!(unknown.channel)),
+        ("axes".to_owned(), json!(unknown.axes)),
+        (
+            "band_hz".to_owned(),
+            json!(band(&unknown.location.bands_hz)),
+        ),
+        (
+            "intervals_s".to_owned(),
+            json!(intervals(&unknown.location.intervals_s)),
+        ),
+        ("depends_on".to_owned(), json!(unknown.depends_on)),
+    ]);
+    Cause {
+        effect: UNKNOWN.to_owned(),
+        probability: unknown.probability,
+        parameters,
+        standard_errors: BTreeMap::new(),
+        gap_share,
+        after,
+    }
+}
+
+/// From the first band with a share worth naming to the last, Hz.
+fn band(bands: &[Interval]) -> [f64; 2] {
+    let mut bands = bands.iter().filter(|band| band.share > BAND_SHARE);
+    match (bands.next(), bands.next_back()) {
+        (Some(first), Some(last)) => [first.from, last.to],
+        (Some(only), None) => [only.from, only.to],
+        _ => [0.0, 0.0],
+    }
+}
+
+/// The intervals with more than their due of an even spread, joined where they touch; all of the
+/// time where there is none.
+fn intervals(all: &[Interval]) -> Vec<[f64; 2]> {
+    let even = 1.0 / all.len().max(1) as f64;
+    let mut joined: Vec<[f64; 2]> = Vec::new();
+    for interval in all
+        .iter()
+        .filter(|interval| interval.share > INTERVAL_SHARE * even)
+    {
+        match joined.last_mut() {
+            Some(last) if (last[1] - interval.from).abs() < 1e-9 => last[1] = interval.to,
+            _ => joined.push([interval.from, interval.to]),
+        }
+    }
+    if joined.is_empty() {
+        let ends = all.first().zip(all.last());
+        joined.extend(ends.map(|(first, last)| [first.from, last.to]));
+    }
+    joined
+}
+
+/// One sentence for people.
+pub(crate) fn verdict(causes: &[Cause], before: &Metrics, after: &Metrics) -> String {
+    let Some(first) = causes.first() else {
+        return format!(
+            "No cause: the residual ({:.3} m/s2, {:.4} rad/s) is what the sensor's noise and the reference's own error leave.",
+            before.accel_rmse, before.gyro_rmse
+        );
+    };
+    let percent = |share: f64| (100.0 * share).round();
+    let share = |cause: &Cause| {
+        if cause.gap_share < 0.005 {
+            "below 1 %".to_owned()
+        } else {
+            format!("{} %", percent(cause.gap_share))
+        }
+    };
+    let first_words = if first.effect == UNKNOWN {
+        "Something outside the library (unknown)"
+    } else {
+        &first.effect
+    };
+    let mut text = format!("{first_words} explains {} of the gap", share(first));
+    for cause in &causes[1..] {
+        let words = if cause.effect == UNKNOWN {
+            "something outside the library (unknown)"
+        } else {
+            &cause.effect
+        };
+        text += &format!(", {words} {}", share(cause));
+    }
+    format!(
+        "{text}; the accelerometer's falls from {:.3} to {:.3} m/s2, the gyroscope's from {:.4} to {:.4} rad/s.",
+        before.accel_rmse, after.accel_rmse, before.gyro_rmse, after.gyro_rmse
+    )
+}
