@@ -60,7 +60,14 @@ fn gap_placement(name: &str, placement: &PlacementDiagnosis, evidence: &Evidence
 
 /// The spectra of the axis of a channel that has the largest share of the gap.
 fn spectrum(placement: &PlacementDiagnosis, evidence: &Evidence, first: usize) -> GapSpectrum {
-    let share = |axis: usize| placement.location.axes.get(AXES[axis]).copied().unwrap_or(0.0);
+    let share = |axis: usize| {
+        placement
+            .location
+            .axes
+            .get(AXES[axis])
+            .copied()
+            .unwrap_or(0.0)
+    };
     let axis = (first + 1..first + 3).fold(first, |best, axis| {
         if share(axis) > share(best) {
             axis
