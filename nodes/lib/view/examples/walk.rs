@@ -2,8 +2,7 @@
 //! as the viewer shows it.
 //!
 //! `cargo run -p cromosim_view --example walk -- OUT.rrd` writes a file; with `live` instead of a
-//! file it goes, in real time, to the viewer that listens on 127.0.0.1:9876, with `serve` to
-//! whoever connects.
+//! file it goes, in real time, to the viewer that listens on 127.0.0.1:9876.
 
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -21,14 +20,10 @@ const RATE_HZ: f64 = 100.0;
 fn main() -> anyhow::Result<()> {
     let target = std::env::args()
         .nth(1)
-        .context("usage: walk (OUT.rrd | live | serve) [full17]")?;
+        .context("usage: walk (OUT.rrd | live) [full17]")?;
     let address = Destination::LOCAL_VIEWER;
     let destination = match target.as_str() {
         "live" => Destination::Connect { address },
-        "serve" => Destination::Serve {
-            address,
-            history_bytes: 512 << 20,
-        },
         path => Destination::File {
             path: PathBuf::from(path),
         },

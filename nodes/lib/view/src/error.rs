@@ -26,14 +26,6 @@ pub enum ViewError {
         /// Why the connection failed.
         source: std::io::Error,
     },
-    /// The address to serve at cannot be bound.
-    #[error("{address}: cannot serve the recording ({source}); choose another port")]
-    Bind {
-        /// The address.
-        address: SocketAddr,
-        /// Why it cannot be bound.
-        source: std::io::Error,
-    },
     /// Recorded data did not reach its destination: the disk is full, or the viewer went away.
     #[error(
         "{destination}: recorded data was lost ({reason}); what was written before is kept; check the free space, or whether the viewer still runs"

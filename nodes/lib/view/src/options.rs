@@ -1,7 +1,7 @@
 //! Where a recording goes and what it looks like.
 
 use std::fmt;
-use std::net::{Ipv4Addr, SocketAddr};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 
 use cromosim_spatial::Stamp;
@@ -21,22 +21,11 @@ pub enum Destination {
         /// Where it listens.
         address: SocketAddr,
     },
-    /// A gRPC server in this process, for viewers that connect with `rerun --connect`; late ones
-    /// get the history.
-    Serve {
-        /// Where to listen.
-        address: SocketAddr,
-        /// Bytes of history to keep for late viewers; static data is always kept.
-        history_bytes: u64,
-    },
 }
 
 impl Destination {
     /// Where a viewer started by `rerun` listens on this machine: 127.0.0.1:9876.
-    pub const LOCAL_VIEWER: SocketAddr = SocketAddr::new(
-        std::net::IpAddr::V4(Ipv4Addr::LOCALHOST),
-        re_sdk::DEFAULT_SERVER_PORT,
-    );
+    pub const LOCAL_VIEWER: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 9876);
 
     /// Whether a viewer shows the data as it comes.
     pub fn is_live(&self) -> bool {
@@ -48,9 +37,7 @@ impl fmt::Display for Destination {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::File { path } => write!(formatter, "{}", path.display()),
-            Self::Connect { address } | Self::Serve { address, .. } => {
-                write!(formatter, "rerun+http://{address}/proxy")
-            }
+            Self::Connect { address } => write!(formatter, "rerun+http://{address}/proxy"),
         }
     }
 }

@@ -60,8 +60,7 @@ impl Recording {
     /// Opens the destinations, writes what does not change and the layout.
     ///
     /// # Errors
-    /// Where a file cannot be created, no viewer answers, a port is taken, or an option is out of
-    /// range.
+    /// Where a file cannot be created, no viewer answers, or an option is out of range.
     pub fn open(
         destinations: &[Destination],
         options: RecordingOptions,

@@ -1,12 +1,11 @@
 //! Destinations become sinks of the Rerun SDK, checked before anything is logged.
 
-use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::net::{SocketAddr, TcpStream};
 use std::time::Duration;
 
-use re_sdk::grpc_server::GrpcServerSink;
 use re_sdk::log::ChunkBatcherConfig;
 use re_sdk::sink::{FileSink, GrpcSink, LogSink};
-use re_sdk::{MemoryLimit, RecordingStream, RecordingStreamBuilder, ServerOptions};
+use re_sdk::{RecordingStream, RecordingStreamBuilder};
 
 use crate::{Destination, ViewError};
 
@@ -59,10 +58,6 @@ fn sink(destination: &Destination) -> Result<Box<dyn LogSink>, ViewError> {
             }),
         },
         Destination::Connect { address } => connect(*address),
-        Destination::Serve {
-            address,
-            history_bytes,
-        } => serve(*address, *history_bytes),
     }
 }
 
@@ -75,20 +70,4 @@ fn connect(address: SocketAddr) -> Result<Box<dyn LogSink>, ViewError> {
         .parse()
         .map_err(|error| ViewError::Sdk(Box::new(error)))?;
     Ok(Box::new(GrpcSink::new(uri)))
-}
-
-/// The SDK's server only logs that its port is taken, so we try first.
-fn serve(address: SocketAddr, history_bytes: u64) -> Result<Box<dyn LogSink>, ViewError> {
-    TcpListener::bind(address).map_err(|source| ViewError::Bind { address, source })?;
-    let options = ServerOptions {
-        memory_limit: MemoryLimit::from_bytes(history_bytes),
-        ..ServerOptions::default()
-    };
-    let ip = match address {
-        SocketAddr::V4(v4) => v4.ip().to_string(),
-        SocketAddr::V6(v6) => format!("[{}]", v6.ip()),
-    };
-    let sink = GrpcServerSink::new(&ip, address.port(), options)
-        .map_err(|error| ViewError::Sdk(Box::new(error)))?;
-    Ok(Box::new(sink))
 }
