@@ -14,7 +14,7 @@ use crate::files::names;
 /// A file that the tests of the library read, too.
 fn sample(name: &str) -> String {
     let folder = if name.ends_with(".mat") {
-        "nodes/lib/motion/tests/data"
+        "nodes/lib/recording/tests/data"
     } else {
         "tests/fuzz/samples/datasets"
     };

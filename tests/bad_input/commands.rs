@@ -1,0 +1,238 @@
+//! Motion files, settings and modes of the offline commands.
+
+use std::fs;
+
+use crate::common::TINY_BVH;
+use crate::refuses;
+
+#[test]
+fn motion_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let truncated = &TINY_BVH[..TINY_BVH.len() - 30];
+    let cases = [
+        (
+            "truncated.bvh",
+            truncated.to_owned(),
+            vec!["truncated.bvh", "line"],
+        ),
+        (
+            "cut_header.bvh",
+            TINY_BVH[..120].to_owned(),
+            vec!["cut_header.bvh", "line"],
+        ),
+        (
+            "nan.bvh",
+            TINY_BVH.replace("0 90 0 0 0 0 0 0 0\n0", "0 90 0 nan 0 0 0 0 0\n0"),
+            vec!["nan.bvh", "line 19"],
+        ),
+        (
+            "channels.bvh",
+            TINY_BVH.replace("0 90 0 0 0 0 0 0 0\n0", "0 90 0 0 0 0 0 0\n0"),
+            vec!["channels.bvh", "line 19", "9", "8"],
+        ),
+        (
+            "no_frames.bvh",
+            TINY_BVH.replace("Frames: 2", "Frames: 0"),
+            vec!["no_frames.bvh", "line 17"],
+        ),
+        (
+            "backwards.bvh",
+            TINY_BVH.replace("Frame Time: 0.01", "Frame Time: -0.01"),
+            vec!["backwards.bvh", "line 18"],
+        ),
+        ("no_body.bvh", TINY_BVH.to_owned(), vec!["no_body.bvh"]),
+        ("text.bvh", "what is this".to_owned(), vec!["text.bvh"]),
+        ("empty.bvh", String::new(), vec!["empty.bvh"]),
+    ];
+    for (name, content, _) in &cases {
+        fs::write(folder.path().join(name), content).unwrap();
+    }
+    for (name, _, expected) in &cases {
+        refuses(
+            folder.path(),
+            &["simulate", name, "--out", "out.mcap"],
+            expected,
+        );
+        refuses(folder.path(), &["inspect", name], expected);
+        refuses(
+            folder.path(),
+            &[
+                "node",
+                "replay",
+                "--check-config",
+                "--ros-args",
+                "-p",
+                &format!("motion:={name}"),
+            ],
+            expected,
+        );
+    }
+    refuses(
+        folder.path(),
+        &["simulate", "missing.bvh", "--out", "out.mcap"],
+        &["missing.bvh"],
+    );
+    refuses(
+        folder.path(),
+        &["demo", "--motion", "nan.bvh"],
+        &["nan.bvh", "line 19"],
+    );
+    fs::create_dir(folder.path().join("folder.bvh")).unwrap();
+    refuses(
+        folder.path(),
+        &["simulate", "folder.bvh", "--out", "out.mcap"],
+        &["folder.bvh"],
+    );
+}
+
+#[test]
+fn placements_and_settings() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |fields: &str| {
+        format!("schema: cromosim/placements/1\nplacements:\n  wrist: {{{fields}}}\n")
+    };
+    let cases = [
+        (
+            "site.yaml",
+            file("site: left_toe_ring, rate_hz: 100"),
+            vec!["left_toe_ring", "wrist"],
+        ),
+        (
+            "mount.yaml",
+            file(
+                "site: left_watch, rate_hz: 100, mount: {matrix: [[1, 0, 0], [0, 1, 0], [0, 0, 2]]}",
+            ),
+            vec!["mount.yaml", "wrist", "mount"],
+        ),
+        (
+            "rate.yaml",
+            file("site: left_watch, rate_hz: -5"),
+            vec!["rate.yaml", "wrist", "rate_hz"],
+        ),
+        (
+            "unknown.yaml",
+            file("site: left_watch, rate_hz: 100, colour: red"),
+            vec!["unknown.yaml", "wrist", "colour"],
+        ),
+        (
+            "none.yaml",
+            "schema: cromosim/placements/1\nplacements: {}\n".to_owned(),
+            vec!["none.yaml", "placements"],
+        ),
+        ("yaml.yaml", "placements: [".to_owned(), vec!["yaml.yaml"]),
+    ];
+    for (name, content, expected) in &cases {
+        fs::write(folder.path().join(name), content).unwrap();
+        refuses(
+            folder.path(),
+            &["simulate", "--placements", name, "--out", "out.mcap"],
+            expected,
+        );
+        refuses(
+            folder.path(),
+            &[
+                "node",
+                "virtual_imu",
+                "--check-config",
+                "--ros-args",
+                "-p",
+                &format!("placements:={name}"),
+            ],
+            expected,
+        );
+    }
+    refuses(
+        folder.path(),
+        &["simulate", "--rate", "-5", "--out", "out.mcap"],
+        &["--rate", "-5"],
+    );
+    refuses(
+        folder.path(),
+        &["simulate", "--rate", "1e9", "--out", "out.mcap"],
+        &["--rate", "100000"],
+    );
+    refuses(
+        folder.path(),
+        &["simulate", "--scheme", "guess", "--out", "out.mcap"],
+        &["guess", "spline"],
+    );
+    refuses(
+        folder.path(),
+        &["simulate", "--body", "nobody.npz", "--out", "out.mcap"],
+        &["nobody.npz"],
+    );
+    refuses(
+        folder.path(),
+        &["simulate", "--out", "missing/out.mcap"],
+        &["missing"],
+    );
+}
+
+#[test]
+fn options_of_another_mode_of_simulate() {
+    let folder = tempfile::tempdir().unwrap();
+    let reference = ["simulate", "--reference", "r.mcap", "--out", "out.mcap"];
+    let rigid = [
+        "simulate", "--rigid", "r.tum", "--rate", "100", "--out", "out.mcap",
+    ];
+    let of_motions: [&[&str]; 15] = [
+        &["--placements", "p.yaml"],
+        &["--csv", "csv"],
+        &["--pose-error-correlation", "1"],
+        &["--up-axis", "z"],
+        &["--unit", "0.01"],
+        &["--start", "1"],
+        &["--duration", "1"],
+        &["--skeleton", "s.asf"],
+        &["--motion-rate", "60"],
+        &["--marker-set", "plug_in_gait"],
+        &["--subject", "anna"],
+        &["--placements-as-given"],
+        &["--person", "1"],
+        &["--shape", "mean"],
+        &["--source-body", "b.npz"],
+    ];
+    for option in of_motions {
+        for (mode, name) in [(&reference[..], "--reference"), (&rigid[..], "--rigid")] {
+            refuses(
+                folder.path(),
+                &[mode, option].concat(),
+                &[option[0], "goes with motion files", name],
+            );
+        }
+    }
+    let motions = ["simulate", "--out", "out.mcap"];
+    let cases: [(&[&str], &[&str], &str); 10] = [
+        (&motions, &["--placement", "wrist"], "not with motion files"),
+        (&motions, &["--device", "d.yaml"], "not with motion files"),
+        (&motions, &["--effects", "e.yaml"], "not with motion files"),
+        (
+            &reference,
+            &["--placement", "wrist"],
+            "not with --reference",
+        ),
+        (&reference, &["--device", "d.yaml"], "not with --reference"),
+        (&reference, &["--learned", "video"], "not with --reference"),
+        (&reference, &["--mapping", "m.yaml"], "not with --reference"),
+        (&reference, &["--rigid", "r.tum"], "give one of them"),
+        (&rigid, &["--body", "b.npz"], "not with --rigid"),
+        (&rigid, &["walk.bvh"], "--rigid"),
+    ];
+    for (mode, option, expected) in cases {
+        refuses(
+            folder.path(),
+            &[mode, option].concat(),
+            &[option[0], expected],
+        );
+    }
+    refuses(
+        folder.path(),
+        &["simulate", "--rigid", "r.tum", "--out", "out.mcap"],
+        &["--rate"],
+    );
+    refuses(
+        folder.path(),
+        &[&rigid[..], &["--device", "d.yaml", "--effects", "e.yaml"]].concat(),
+        &["--device", "--effects"],
+    );
+}
