@@ -7,9 +7,9 @@ use anyhow::{Context, bail};
 use cromosim_bag::{BagOptions, BagReader, BagSummary, BagWriter, Compression};
 use cromosim_body::BodyModel;
 use cromosim_imu::{
-    Covariances, DeclaredNoise, Device, Dropouts, EffectKind, EffectSet, EffectsFile, ImuSample,
-    NoiseSource, Placement, PlacementEffects, Reading, Scheme, SensorFrame, SensorModel,
-    SensorTrajectory, simulate_kinematics,
+    DeclaredNoise, Device, EffectKind, EffectSet, EffectsFile, ImuOptions, Placement,
+    PlacementEffects, RecordedMotion, Scheme, SensorFrame, SensorTrajectory, measure_recording,
+    simulate_kinematics, track_in_sensor_axes,
 };
 use cromosim_learned::{LearnedSimulator, MappingFile, SiteMotion};
 use cromosim_msgs::geometry_msgs::PoseStamped;
@@ -18,12 +18,11 @@ use cromosim_msgs::std_msgs::Header;
 use cromosim_recording::rigid::{RigidContent, parse_rigid};
 use cromosim_recording::{RecordedPlacement, read_placements, read_whole};
 use cromosim_spatial::{KinematicTrack, PoseEstimate, Stamp, uniform_stamps};
-use cromosim_virtual_imu::imu_message;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use crate::progress::{self, Interrupt};
-use crate::simulate::read_mapping;
+use crate::simulate::{boxed, read_mapping};
 use crate::simulate_arguments::Arguments;
 
 /// How the placements of a recording are simulated.
@@ -374,7 +373,7 @@ fn resimulate(
     how: &How,
     arguments: &Arguments,
 ) -> anyhow::Result<Vec<Imu>> {
-    let (name, (start, end), seed) = (&placement.name, placement.span(), arguments.seed);
+    let (name, (start, end)) = (&placement.name, placement.span());
     let stamps = match (placement.measured.as_slice(), arguments.rate) {
         ([], Some(rate_hz)) => uniform_stamps(start, end, rate_hz)?,
         ([], None) => bail!(
@@ -391,57 +390,25 @@ fn resimulate(
         declared_noise: declared(placement, rate_hz),
         effects: EffectSet::new(),
     };
-    let PlacementEffects {
-        epoch,
-        declared_noise,
-        effects,
-    } = how.effects.placements.get(name).unwrap_or(&nominal);
-    let model = SensorModel::new(effects, *epoch);
-    let track = track(placement, how, rate_hz, effects).with_context(|| name.clone())?;
-    let mut readings = model.read(&model.sensor(model.tissue(model.segment(&track))), &stamps);
-    model.linear(&mut readings, &stamps);
-    let mut dropouts = None;
-    if !arguments.no_noise {
-        let beyond = model.noise_density();
-        let densities = (
-            declared_noise.accel_density.hypot(beyond.0),
-            declared_noise.gyro_density.hypot(beyond.1),
-        );
-        let mut noise = NoiseSource::white(densities, 0.0, rate_hz, seed, name)?;
-        for reading in &mut readings {
-            let drawn = noise.draw();
-            reading.specific_force += drawn.specific_force;
-            reading.angular_velocity += drawn.angular_velocity;
-        }
-        // A recording's own stamps have its losses in them.
-        if placement.measured.is_empty() {
-            dropouts = Dropouts::new(effects.get(EffectKind::DroppedSamples), seed, name);
-        }
-    }
-    model.digital(&mut readings);
-    if let Some(mapping) = how.mapping.placements.get(name) {
-        readings
-            .iter_mut()
-            .for_each(|reading| *reading = mapping.apply(reading));
-    }
-    let device = Device::white(declared_noise.accel_density, declared_noise.gyro_density);
-    let covariances = Covariances::of(&device, rate_hz).without_orientation();
-    let frame_id = placement.measured.first().map_or_else(
-        || format!("{name}_imu"),
-        |message| message.header.frame_id.clone(),
-    );
-    let message = |(stamp, reading): (&Stamp, &Reading)| {
-        let world_from_sensor = UnitQuaternion::identity();
-        let sample = ImuSample {
-            stamp: *stamp,
-            world_from_sensor,
-            specific_force: reading.specific_force,
-            angular_velocity: reading.angular_velocity,
-        };
-        let lost = dropouts.as_mut().is_some_and(Dropouts::next_is_lost);
-        (!lost).then(|| imu_message(&sample, &frame_id, &covariances, false))
+    let effects = how.effects.placements.get(name).unwrap_or(&nominal);
+    let track = track(placement, how, rate_hz, &effects.effects).with_context(|| name.clone())?;
+    let motion = RecordedMotion {
+        track: &track,
+        stamps: &stamps,
+        stamps_are_recorded: !placement.measured.is_empty(),
     };
-    Ok(stamps.iter().zip(&readings).filter_map(message).collect())
+    let options = ImuOptions {
+        rate_hz,
+        seed: arguments.seed,
+        name: name.clone(),
+        noise: !arguments.no_noise,
+        frame_id: placement.measured.first().map_or_else(
+            || format!("{name}_imu"),
+            |message| message.header.frame_id.clone(),
+        ),
+        mapping: boxed(&how.mapping, name),
+    };
+    Ok(measure_recording(motion, effects, options)?)
 }
 
 /// The reference's motion as the diagnosis estimates it, or by a scheme, at least at 200 Hz and
@@ -488,45 +455,12 @@ fn differentiated(
     let (start, seconds) = (trajectory.start(), trajectory.end() - trajectory.start());
     // A whole number of intervals, so that the grid ends where the reference does.
     let rate_hz = (seconds * least_rate_hz).ceil().max(1.0) / seconds;
-    let mut motion = simulate_kinematics(
-        trajectory,
-        scheme,
-        &uniform_stamps(start, trajectory.end(), rate_hz)?,
-    )?;
+    let grid = uniform_stamps(start, trajectory.end(), rate_hz)?;
+    let mut motion = simulate_kinematics(trajectory, scheme, &grid)?;
     if let Some(networks) = networks {
         motion = networks.correct(&SiteMotion::rigid(trajectory, scheme)?, &motion)?;
     }
-    let mut track = KinematicTrack {
-        start,
-        rate_hz,
-        ..KinematicTrack::default()
-    };
-    for (k, sample) in motion.iter().enumerate() {
-        let world_from_segment = sample.world_from_sensor.rotation;
-        let in_segment =
-            |vector: &Vector3<f64>| world_from_segment.inverse_transform_vector(vector);
-        let difference = || {
-            let (before, after) = (
-                &motion[k.saturating_sub(1)],
-                &motion[(k + 1).min(motion.len() - 1)],
-            );
-            (after.angular_velocity_in_world - before.angular_velocity_in_world)
-                / (after.stamp - before.stamp).max(1e-9)
-        };
-        track.world_from_segment.push(world_from_segment);
-        track
-            .acceleration_in_segment
-            .push(in_segment(&sample.acceleration_in_world));
-        track
-            .angular_velocity_in_segment
-            .push(in_segment(&sample.angular_velocity_in_world));
-        track.angular_acceleration_in_segment.push(in_segment(
-            &sample
-                .angular_acceleration_in_world
-                .unwrap_or_else(difference),
-        ));
-    }
-    Ok(track)
+    Ok(track_in_sensor_axes(&motion, rate_hz))
 }
 
 /// The white noise that the messages declare, none where it is unknown: density = sigma /

@@ -10,8 +10,8 @@ use anyhow::{Context, bail};
 use cromosim_bag::{BagOptions, BagWriter, Compression};
 use cromosim_body::{BodyModel, ShapedBody};
 use cromosim_imu::{
-    Covariances, Device, MountedSensor, MountedSensors, PlacementSet, PoseStd, Reading, Scheme,
-    SensorTrajectory, StreamingEffects, simulate_kinematics_on,
+    Device, ImuOptions, MountedSensor, MountedSensors, PlacementSet, PoseStd, ReadingMapping,
+    Scheme, SensorTrajectory, VirtualImu, measure_all, simulate_kinematics_on,
 };
 use cromosim_learned::{LearnedSimulator, MappingFile, Patch, SiteMotion};
 use cromosim_motion::{MotionOptions, SmplMotion, embedded_walk, read_motion_for, read_people};
@@ -19,7 +19,6 @@ use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_msgs::std_msgs::Header;
 use cromosim_recording::FIRST_STAMP;
 use cromosim_spatial::{PoseTimes, uniform_stamps};
-use cromosim_virtual_imu::imu_message;
 use indicatif::ProgressBar;
 use rayon::prelude::*;
 
@@ -193,7 +192,7 @@ impl Setup {
         let confidences = motion.confidence.as_deref().unwrap_or_default();
         let stds: Vec<PoseStd> = confidences
             .iter()
-            .map(|&confidence| PoseStd::of_confidence(confidence, self.pose_error_correlation_s))
+            .map(|&confidence| PoseStd::from_confidence(confidence, self.pose_error_correlation_s))
             .collect();
         let trajectories: Vec<SensorTrajectory> = sites
             .trajectories(stamps, &motion.frames)?
@@ -228,56 +227,29 @@ impl Setup {
         let (placement, device) = (&self.placements.placements()[index], &self.devices[index]);
         let (name, rate_hz) = (placement.name(), placement.rate_hz());
         let output = uniform_stamps(trajectory.start(), trajectory.end(), rate_hz)?;
-        // Several people's devices err each on its own, as those of nodes with a prefix do.
-        let effects = StreamingEffects::new(device, rate_hz, self.seed, &person.frame(name))?;
-        let mut effects = if self.noise {
-            effects
-        } else {
-            effects.without_noise()
+        let options = ImuOptions {
+            rate_hz,
+            seed: self.seed,
+            // Several people's devices err each on its own, as those of nodes with a prefix do.
+            name: person.frame(name),
+            noise: self.noise,
+            frame_id: person.frame(&format!("{name}_imu")),
+            mapping: boxed(&self.mapping, name),
         };
-        let covariances = Covariances::of(device, rate_hz);
-        let frame_id = person.frame(&format!("{name}_imu"));
-        let (mut raw, mut full) = (
-            Vec::with_capacity(output.len()),
-            Vec::with_capacity(output.len()),
-        );
-        let mut kinematics =
-            simulate_kinematics_on(times, trajectory, placement.scheme(), &output)?;
-        if let Some(networks) = &self.learned {
-            let patch = Patch::new(shaped, mounted.site())?;
-            let points: Vec<_> = person
-                .motion
-                .frames
-                .iter()
-                .map(|pose| patch.points(pose))
-                .collect();
-            kinematics = networks.correct(
-                &SiteMotion::new(trajectory, placement.scheme(), &points)?,
-                &kinematics,
-            )?;
-        }
-        let mapping = self.mapping.placements.get(name);
-        for kinematic in kinematics {
-            let Some(mut sample) = effects.step(&kinematic) else {
-                continue;
-            };
-            if let Some(mapping) = mapping {
-                let mapped = mapping.apply(&Reading {
-                    specific_force: sample.specific_force,
-                    angular_velocity: sample.angular_velocity,
-                });
-                (sample.specific_force, sample.angular_velocity) =
-                    (mapped.specific_force, mapped.angular_velocity);
+        let mut imu = [VirtualImu::new(device, options)?];
+        let motion = simulate_kinematics_on(times, trajectory, placement.scheme(), &output)?;
+        let mut correction = match &self.learned {
+            Some(networks) => {
+                let patch = Patch::new(shaped, mounted.site())?;
+                let poses = person.motion.frames.iter();
+                let points: Vec<_> = poses.map(|pose| patch.points(pose)).collect();
+                let seen = SiteMotion::new(trajectory, placement.scheme(), &points)?;
+                Some(networks.correction(seen))
             }
-            let covariances = covariances.with_motion(&kinematic.variance, &sample);
-            raw.push(imu_message(
-                &sample,
-                &frame_id,
-                &covariances.without_orientation(),
-                false,
-            ));
-            full.push(imu_message(&sample, &frame_id, &covariances, true));
-        }
+            None => None,
+        };
+        let messages = measure_all(&mut imu, vec![motion], correction.as_mut())?;
+        let messages = messages.into_iter().map(|(_, messages)| messages);
         let reference = trajectory.frames().iter().map(|frame| PoseStamped {
             header: Header::new(frame.stamp.nanos, "world"),
             pose: frame.world_from_sensor.into(),
@@ -285,8 +257,7 @@ impl Setup {
         Ok(Simulated {
             name: name.to_owned(),
             reference: reference.collect(),
-            raw,
-            full,
+            messages: messages.collect(),
         })
     }
 
@@ -333,6 +304,12 @@ fn names(placements: &PlacementSet) -> Vec<&str> {
         .iter()
         .map(cromosim_imu::Placement::name)
         .collect()
+}
+
+/// The mapping of a placement, where there is one.
+pub fn boxed(mapping: &MappingFile, placement: &str) -> Option<Box<dyn ReadingMapping>> {
+    let mapping = mapping.placements.get(placement)?;
+    Some(Box::new(mapping.clone()))
 }
 
 /// A mapping of these placements at least in part.

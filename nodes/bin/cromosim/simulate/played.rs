@@ -5,10 +5,10 @@ use std::path::Path;
 
 use anyhow::Context;
 use cromosim_bag::{BagReader, BagWriter, write_imu_csv};
+use cromosim_imu::ImuMessages;
 use cromosim_motion::{Person, SmplMotion};
 use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_msgs::geometry_msgs::PoseStamped;
-use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_recording::{MessageHeader, smpl_state, stamp_of_frame};
 use cromosim_spatial::Stamp;
 
@@ -28,8 +28,7 @@ pub(super) struct Played {
 pub(super) struct Simulated {
     pub name: String,
     pub reference: Vec<PoseStamped>,
-    pub raw: Vec<Imu>,
-    pub full: Vec<Imu>,
+    pub messages: Vec<ImuMessages>,
 }
 
 impl Played {
@@ -99,7 +98,7 @@ pub(super) fn write_in_order_of_time(
     enum What<'a> {
         State(&'a Played, usize),
         Reference(&'a str, &'a PoseStamped),
-        Sample(&'a [String; 2], [&'a Imu; 2]),
+        Sample(&'a [String; 2], &'a ImuMessages),
     }
     let topics: Vec<Vec<(String, [String; 2])>> = people
         .iter()
@@ -128,12 +127,11 @@ pub(super) fn write_in_order_of_time(
                     What::Reference(reference, message),
                 )
             }));
-            let both = placement.raw.iter().zip(&placement.full);
-            schedule.extend(both.map(|(raw, full)| {
+            schedule.extend(placement.messages.iter().map(|messages| {
                 (
-                    raw.header.stamp.nanos(),
+                    messages.data_raw.header.stamp.nanos(),
                     number,
-                    What::Sample(samples, [raw, full]),
+                    What::Sample(samples, messages),
                 )
             }));
         }
@@ -147,9 +145,9 @@ pub(super) fn write_in_order_of_time(
                 bag.write(&states[number], stamp, &person.state(frame))?
             }
             What::Reference(topic, message) => bag.write(topic, stamp, message)?,
-            What::Sample([raw_topic, full_topic], [raw, full]) => {
-                bag.write(raw_topic, stamp, raw)?;
-                bag.write(full_topic, stamp, full)?;
+            What::Sample([raw_topic, full_topic], messages) => {
+                bag.write(raw_topic, stamp, &messages.data_raw)?;
+                bag.write(full_topic, stamp, &messages.data)?;
             }
         }
     }

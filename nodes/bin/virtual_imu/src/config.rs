@@ -15,7 +15,8 @@ node_config! {
         pub rate_hz: f64 = 0.0,
         /// Rate of the states, Hz; 0: found out from the first ones. It sets the schemes' delay.
         pub state_rate_hz: f64 = 0.0,
-        /// Add the device's noise and other effects.
+        /// Add the random part of the device's errors: white noise and lost samples. Without it
+        /// biases and all other effects stay.
         pub noise: bool = true,
         /// Seed of the noise and of lost samples.
         pub seed: i64 = 0,

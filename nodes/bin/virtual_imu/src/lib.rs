@@ -21,14 +21,14 @@ use cromosim_msgs::tf2_msgs::TFMessage;
 use cromosim_ros::{Durability, Node, Publisher, Qos, RosError, prepare};
 
 pub use config::Config;
-pub use node::{ImuMessages, Refusal, Step, VirtualImuNode, imu_message};
+pub use node::{Refusal, Step, VirtualImuNode};
 
 const ABOUT: &str = "virtual_imu: what IMUs on the body would measure, one sensor_msgs/Imu publisher for each placement";
 
 /// What the node publishes.
 struct Publishers {
-    raw: Vec<Publisher<Imu>>,
-    full: Vec<Publisher<Imu>>,
+    data_raw: Vec<Publisher<Imu>>,
+    data: Vec<Publisher<Imu>>,
     references: Vec<Publisher<PoseStamped>>,
     frames: Publisher<TFMessage>,
     diagnostics: Publisher<DiagnosticArray>,
@@ -84,8 +84,8 @@ impl Publishers {
             data: placements.to_yaml(),
         })?;
         Ok(Self {
-            raw: imu("data_raw")?,
-            full: imu("data")?,
+            data_raw: imu("data_raw")?,
+            data: imu("data")?,
             references: referenced.iter().map(reference).collect::<Result<_, _>>()?,
             frames: node.publisher("/tf", Qos::tf())?,
             diagnostics: node.publisher("/diagnostics", Qos::reliable())?,
@@ -97,11 +97,11 @@ impl Publishers {
     fn publish(&self, step: &Step) {
         // What most stacks listen to goes first, and what nobody listens to stays here: each
         // message costs the later ones some 30 us.
-        for reading in &step.readings {
-            publish_if_heard(&self.raw[reading.placement], &reading.data_raw);
+        for (placement, reading) in &step.readings {
+            publish_if_heard(&self.data_raw[*placement], &reading.data_raw);
         }
-        for reading in &step.readings {
-            publish_if_heard(&self.full[reading.placement], &reading.data);
+        for (placement, reading) in &step.readings {
+            publish_if_heard(&self.data[*placement], &reading.data);
         }
         if !step.frames.transforms.is_empty() {
             report(self.frames.publish(&step.frames));
@@ -137,7 +137,7 @@ pub fn run(arguments: &[String]) -> anyhow::Result<()> {
     let states = node.subscription::<SmplState>("smpl/state", Qos::reliable().depth(100))?;
     let publishers = Publishers::new(&node, &logic, &config, &placements)?;
     let watched: Vec<_> = publishers
-        .raw
+        .data_raw
         .iter()
         .map(|publisher| &**publisher)
         .collect();

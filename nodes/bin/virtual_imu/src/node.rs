@@ -5,44 +5,30 @@ use std::sync::Arc;
 
 use cromosim_body::{BodyError, BodyModel, BodyPose, Joint, ShapedBody};
 use cromosim_imu::{
-    Covariances, Device, Follow, ImuError, ImuSample, MountedSensors, Placement, PlacementSet,
-    PoseStd, StreamOptions, StreamingEffects, StreamingImu,
+    Device, Follow, ImuError, ImuMessages, ImuOptions, MountedSensors, Placement, PlacementSet,
+    PoseStd, ReadingMapping, StreamOptions, StreamingImu, VirtualImu, measure_all,
 };
-use cromosim_learned::{
-    LearnedError, LearnedSimulator, LivePlacements, MappingFile, PlacementMapping,
-};
+use cromosim_learned::{LearnedError, LearnedSimulator, LivePlacements, MappingFile};
 use cromosim_msgs::NotABody;
 use cromosim_msgs::builtin_interfaces::Time;
 use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use cromosim_msgs::geometry_msgs::{PoseStamped, TransformStamped};
-use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_msgs::std_msgs::Header;
 use cromosim_msgs::tf2_msgs::TFMessage;
 use cromosim_spatial::Stamp;
-use nalgebra::{Isometry3, UnitQuaternion};
+use nalgebra::Isometry3;
 
 use crate::config::Config;
 
 /// States that are looked at before the rate of the states is known.
 const RATE_STATES: usize = 13;
 
-/// One sample of one placement, in both forms of REP-145.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ImuMessages {
-    /// Number of the placement.
-    pub placement: usize,
-    /// For `imu/NAME/data_raw`: without orientation.
-    pub data_raw: Imu,
-    /// For `imu/NAME/data`: with orientation.
-    pub data: Imu,
-}
-
 /// What one state leads to.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Step {
-    /// The samples that it released.
-    pub readings: Vec<ImuMessages>,
+    /// The samples that it released, each with its placement's number.
+    pub readings: Vec<(usize, ImuMessages)>,
     /// For `/tf`: the frames of sensors that follow the skin.
     pub frames: TFMessage,
     /// For `reference/NAME`, in the order of the placements.
@@ -77,23 +63,15 @@ pub enum Refusal {
     },
 }
 
-/// One placement's way from frames to messages.
-struct PlacementStream {
-    stream: Option<StreamingImu>,
-    /// The device's errors, where they are wanted.
-    effects: Option<StreamingEffects>,
-    covariances: Covariances,
-    frame_id: String,
-    mapping: Option<PlacementMapping>,
-}
-
 /// The node: a function of the states so far.
 pub struct VirtualImuNode {
     config: Config,
     model: Arc<BodyModel>,
     placements: Vec<Placement>,
     devices: Vec<Device>,
-    channels: Vec<PlacementStream>,
+    /// Of the placements; none before the rate of the states is known.
+    streams: Vec<StreamingImu>,
+    imus: Vec<VirtualImu>,
     betas: Vec<f64>,
     shaped: ShapedBody,
     sensors: MountedSensors,
@@ -169,7 +147,8 @@ impl VirtualImuNode {
             model,
             placements,
             devices,
-            channels: Vec::new(),
+            streams: Vec::new(),
+            imus: Vec::new(),
             betas: Vec::new(),
             shaped,
             sensors,
@@ -181,38 +160,26 @@ impl VirtualImuNode {
             networks_delay: 0.0,
             mapping,
         };
-        node.channels = node.fresh_channels()?;
+        node.imus = node.fresh_imus()?;
         node.live = node.fresh_networks()?;
         Ok(node)
     }
 
-    fn fresh_channels(&self) -> Result<Vec<PlacementStream>, Refusal> {
-        let channel = |(placement, device): (&Placement, &Device)| {
-            let rate_hz = placement.rate_hz();
-            let seed = self.config.seed as u64;
-            // Several bodies' devices err each on its own.
-            let name = self.config.frame(placement.name());
-            let effects = if self.config.noise {
-                Some(StreamingEffects::new(device, rate_hz, seed, &name)?)
-            } else {
-                None
-            };
-            let covariances = Covariances::of(device, rate_hz);
-            let frame_id = self.config.frame(&format!("{}_imu", placement.name()));
+    fn fresh_imus(&self) -> Result<Vec<VirtualImu>, ImuError> {
+        let imu = |(placement, device): (&Placement, &Device)| {
             let mapping = self.mapping.placements.get(placement.name()).cloned();
-            Ok(PlacementStream {
-                stream: None,
-                effects,
-                covariances,
-                frame_id,
-                mapping,
-            })
+            let options = ImuOptions {
+                rate_hz: placement.rate_hz(),
+                seed: self.config.seed as u64,
+                // Several bodies' devices err each on its own.
+                name: self.config.frame(placement.name()),
+                noise: self.config.noise,
+                frame_id: self.config.frame(&format!("{}_imu", placement.name())),
+                mapping: mapping.map(|mapping| Box::new(mapping) as Box<dyn ReadingMapping>),
+            };
+            VirtualImu::new(device, options)
         };
-        self.placements
-            .iter()
-            .zip(&self.devices)
-            .map(channel)
-            .collect()
+        self.placements.iter().zip(&self.devices).map(imu).collect()
     }
 
     fn fresh_networks(&self) -> Result<Option<LivePlacements>, LearnedError> {
@@ -229,7 +196,7 @@ impl VirtualImuNode {
             .transpose()
     }
 
-    /// The placements, in the order of [`ImuMessages::placement`].
+    /// The placements; their order numbers [`Step::readings`].
     pub fn placements(&self) -> &[Placement] {
         &self.placements
     }
@@ -238,9 +205,8 @@ impl VirtualImuNode {
     /// known.
     pub fn delays_seconds(&self) -> Vec<Option<f64>> {
         let delay = |stream: &StreamingImu| stream.delay_seconds().max(self.networks_delay);
-        self.channels
-            .iter()
-            .map(|channel| channel.stream.as_ref().map(delay))
+        (0..self.placements.len())
+            .map(|placement| self.streams.get(placement).map(delay))
             .collect()
     }
 
@@ -254,7 +220,7 @@ impl VirtualImuNode {
             Ok(step) => {
                 self.counts.states += 1;
                 self.counts.readings += step.readings.len() as u64;
-                let without = |reading: &&ImuMessages| {
+                let without = |(_, reading): &&(usize, ImuMessages)| {
                     reading.data_raw.linear_acceleration_covariance[0] < 0.0
                 };
                 self.counts.without_estimate += step.readings.iter().filter(without).count() as u64;
@@ -287,10 +253,10 @@ impl VirtualImuNode {
             self.live = self.fresh_networks()?;
         }
         let pose_std =
-            PoseStd::of_confidence(state.confidence, self.config.pose_error_correlation_s);
+            PoseStd::from_confidence(state.confidence, self.config.pose_error_correlation_s);
         let mut step = self.frames_of(state, &body);
         self.last = Some(stamp);
-        if self.channels.iter().all(|channel| channel.stream.is_some()) {
+        if !self.streams.is_empty() {
             self.push((stamp, &body, pose_std), &mut step.readings)?;
             return Ok(step);
         }
@@ -315,7 +281,7 @@ impl VirtualImuNode {
         } else {
             0.0
         };
-        for (channel, placement) in self.channels.iter_mut().zip(&self.placements) {
+        for placement in &self.placements {
             let options = StreamOptions {
                 longest_gap: self.config.gap_seconds,
                 ..StreamOptions::resampled(state_rate_hz, placement.rate_hz())
@@ -328,7 +294,7 @@ impl VirtualImuNode {
                 placement.scheme(),
                 placement.rate_hz()
             );
-            channel.stream = Some(stream);
+            self.streams.push(stream);
         }
         Ok(())
     }
@@ -336,52 +302,19 @@ impl VirtualImuNode {
     fn push(
         &mut self,
         (stamp, body, pose_std): (Stamp, &BodyPose, PoseStd),
-        readings: &mut Vec<ImuMessages>,
+        readings: &mut Vec<(usize, ImuMessages)>,
     ) -> Result<(), Refusal> {
-        let mut released = Vec::with_capacity(self.channels.len());
-        let frames = self.sensors.poses(body);
-        for (channel, frame) in self.channels.iter_mut().zip(&frames) {
-            let stream = channel.stream.as_mut();
-            released.push(stream.map_or_else(
-                || Ok(Vec::new()),
-                |stream| stream.push_kinematics(frame.at(stamp).with_pose_std(pose_std)),
-            )?);
-        }
+        let poses = self.sensors.poses(body);
+        let motions = self
+            .streams
+            .iter_mut()
+            .zip(&poses)
+            .map(|(stream, pose)| stream.push_kinematics(pose.at(stamp).with_pose_std(pose_std)))
+            .collect::<Result<Vec<_>, _>>()?;
         if let Some(live) = &mut self.live {
-            live.push(stamp, body, &frames);
-            live.correct(&mut released)?;
+            live.push(stamp, body, &poses);
         }
-        for (placement, (channel, motions)) in self.channels.iter_mut().zip(released).enumerate() {
-            for motion in motions {
-                let sample = channel
-                    .effects
-                    .as_mut()
-                    .map_or_else(|| Some(motion.imu()), |effects| effects.step(&motion));
-                // None: the device loses it.
-                let Some(mut sample) = sample else { continue };
-                if let Some(mapping) = &channel.mapping {
-                    let mapped = mapping.apply(&cromosim_imu::Reading {
-                        specific_force: sample.specific_force,
-                        angular_velocity: sample.angular_velocity,
-                    });
-                    (sample.specific_force, sample.angular_velocity) =
-                        (mapped.specific_force, mapped.angular_velocity);
-                }
-                let covariances = channel.covariances.with_motion(&motion.variance, &sample);
-                let data_raw = imu_message(
-                    &sample,
-                    &channel.frame_id,
-                    &covariances.without_orientation(),
-                    false,
-                );
-                let data = imu_message(&sample, &channel.frame_id, &covariances, true);
-                readings.push(ImuMessages {
-                    placement,
-                    data_raw,
-                    data,
-                });
-            }
-        }
+        readings.extend(measure_all(&mut self.imus, motions, self.live.as_mut())?);
         Ok(())
     }
 
@@ -390,10 +323,8 @@ impl VirtualImuNode {
         if self.last.is_some_and(|last| stamp < last) {
             self.counts.restarts += 1;
             self.early.clear();
-            for channel in &mut self.channels {
-                channel.stream.iter_mut().for_each(StreamingImu::reset);
-                channel.effects.iter_mut().for_each(StreamingEffects::reset);
-            }
+            self.streams.iter_mut().for_each(StreamingImu::reset);
+            self.imus.iter_mut().for_each(VirtualImu::reset);
             self.live.iter_mut().for_each(LivePlacements::reset);
         }
     }
@@ -516,29 +447,6 @@ impl VirtualImuNode {
             },
             status: vec![status],
         }
-    }
-}
-
-/// The message of a sample; the orientation is left at identity where it is not reported.
-pub fn imu_message(
-    sample: &ImuSample,
-    frame_id: &str,
-    covariances: &Covariances,
-    oriented: bool,
-) -> Imu {
-    let orientation = if oriented {
-        sample.world_from_sensor
-    } else {
-        UnitQuaternion::identity()
-    };
-    Imu {
-        header: Header::new(sample.stamp.nanos, frame_id),
-        orientation: orientation.into(),
-        orientation_covariance: covariances.orientation,
-        angular_velocity: sample.angular_velocity.into(),
-        angular_velocity_covariance: covariances.angular_velocity,
-        linear_acceleration: sample.specific_force.into(),
-        linear_acceleration_covariance: covariances.linear_acceleration,
     }
 }
 

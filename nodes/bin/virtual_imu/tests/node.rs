@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use cromosim_body::BodyModel;
-use cromosim_imu::PlacementSet;
+use cromosim_imu::{ImuMessages, PlacementSet};
 use cromosim_motion::{SmplMotion, embedded_walk};
 use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_msgs::std_msgs::Header;
-use cromosim_virtual_imu::{Config, ImuMessages, VirtualImuNode};
+use cromosim_virtual_imu::{Config, VirtualImuNode};
 use nalgebra::{UnitQuaternion, Vector3};
 
 const START: i64 = 1_700_000_000_000_000_000;
@@ -22,6 +22,15 @@ fn node(config: Config) -> VirtualImuNode {
         Path::new("."),
     )
     .unwrap()
+}
+
+/// The demo's placements with sensors that err in nothing.
+fn error_free(config: Config) -> VirtualImuNode {
+    let names = PlacementSet::demo()
+        .to_yaml()
+        .replace("consumer_mems", "ideal");
+    let placements = PlacementSet::parse(&names, "ideal.yaml").unwrap();
+    VirtualImuNode::new(config, BodyModel::embedded(), &placements, Path::new(".")).unwrap()
 }
 
 fn quiet() -> Config {
@@ -45,7 +54,7 @@ fn state(motion: &SmplMotion, frame: usize, nanos: i64) -> SmplState {
 }
 
 /// The readings of the walk's frames, whose stamps begin at `start`.
-fn walk(node: &mut VirtualImuNode, motion: &SmplMotion, start: i64) -> Vec<ImuMessages> {
+fn walk(node: &mut VirtualImuNode, motion: &SmplMotion, start: i64) -> Vec<(usize, ImuMessages)> {
     let step = |frame| {
         node.step(&state(motion, frame, start + frame as i64 * 10_000_000))
             .unwrap()
@@ -59,7 +68,7 @@ fn a_body_at_rest_reads_gravity_upwards_and_no_rate() {
     let mut standing = embedded_walk();
     let first = standing.frames[0].clone();
     standing.frames.fill(first);
-    for reading in walk(&mut node(quiet()), &standing, START) {
+    for (_, reading) in walk(&mut error_free(quiet()), &standing, START) {
         let world_from_sensor: UnitQuaternion<f64> = reading.data.orientation.try_into().unwrap();
         let force = world_from_sensor * Vector3::from(reading.data.linear_acceleration);
         assert!(
@@ -83,18 +92,18 @@ fn every_sample_comes_out_once_with_the_stated_delay() {
     let mut stamps = vec![Vec::new(); node.placements().len()];
     for frame in 0..motion.frames.len() {
         let now = START + frame as i64 * 10_000_000;
-        for reading in node.step(&state(&motion, frame, now)).unwrap().readings {
+        for (placement, reading) in node.step(&state(&motion, frame, now)).unwrap().readings {
             let stamp = reading.data.header.stamp.nanos();
             // The first states wait until their rate is known.
             if frame > 20 {
-                let delay = node.delays_seconds()[reading.placement].unwrap();
+                let delay = node.delays_seconds()[placement].unwrap();
                 assert!(
                     ((now - stamp) as f64 * 1e-9 - delay).abs() < 2e-3,
                     "stated {delay} s, found {} ns",
                     now - stamp
                 );
             }
-            stamps[reading.placement].push(stamp);
+            stamps[placement].push(stamp);
         }
     }
     for stamps in stamps {
@@ -119,11 +128,11 @@ fn a_source_that_starts_over_starts_the_schemes_over() {
     assert!(
         again
             .iter()
-            .all(|reading| reading.data.header.stamp.nanos() < START)
+            .all(|(_, reading)| reading.data.header.stamp.nanos() < START)
     );
     let largest = again
         .iter()
-        .map(|reading| Vector3::from(reading.data.linear_acceleration).norm())
+        .map(|(_, reading)| Vector3::from(reading.data.linear_acceleration).norm())
         .fold(0.0, f64::max);
     assert!(
         largest < 60.0,
@@ -184,7 +193,8 @@ fn with_confidence(config: Config, confidence: f64) -> Vec<ImuMessages> {
             confidence,
             ..state(&motion, frame, START + frame as i64 * 10_000_000)
         };
-        node.step(&state).unwrap().readings
+        let readings = node.step(&state).unwrap().readings;
+        readings.into_iter().map(|(_, reading)| reading)
     };
     (0..motion.frames.len()).flat_map(step).collect()
 }
@@ -248,7 +258,7 @@ fn at_confidence_0_there_is_no_estimate() {
             confidence,
             ..state(&motion, frame, START + frame as i64 * 10_000_000)
         };
-        for reading in node.step(&state).unwrap().readings {
+        for (_, reading) in node.step(&state).unwrap().readings {
             let covariances = [
                 reading.data_raw.linear_acceleration_covariance,
                 reading.data_raw.angular_velocity_covariance,
@@ -311,22 +321,22 @@ fn two_people_have_errors_of_their_own() {
     };
     let (one, other) = (run("person_1"), run("person_2"));
     assert_eq!(
-        one[0].data_raw.header.frame_id,
+        one[0].1.data_raw.header.frame_id,
         format!(
             "person_1/{}_imu",
-            node(quiet()).placements()[one[0].placement].name()
+            node(quiet()).placements()[one[0].0].name()
         )
     );
     assert!(
         one.iter()
             .zip(&other)
-            .all(|(one, other)| one.data_raw.linear_acceleration
+            .all(|((_, one), (_, other))| one.data_raw.linear_acceleration
                 != other.data_raw.linear_acceleration)
     );
 }
 
 /// A node with one placement, whose device has these effects.
-fn with_device(name: &str, effects: &str) -> Result<VirtualImuNode, String> {
+fn with_device(name: &str, effects: &str, config: Config) -> Result<VirtualImuNode, String> {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
     let text = format!(
         "schema: cromosim/device/1\ndeclared_noise: {{accel_density: 0.0, gyro_density: 0.0}}\neffects:\n{effects}"
@@ -336,13 +346,8 @@ fn with_device(name: &str, effects: &str) -> Result<VirtualImuNode, String> {
         "schema: cromosim/placements/1\nplacements:\n  wrist: {{site: left_watch, rate_hz: 100, device: {name}}}\n"
     );
     let placements = PlacementSet::parse(&placements, "placements.yaml").unwrap();
-    VirtualImuNode::new(
-        Config::default(),
-        BodyModel::embedded(),
-        &placements,
-        folder,
-    )
-    .map_err(|refusal| refusal.to_string())
+    VirtualImuNode::new(config, BodyModel::embedded(), &placements, folder)
+        .map_err(|refusal| refusal.to_string())
 }
 
 #[test]
@@ -352,6 +357,7 @@ fn a_devices_effects_act_live() {
         &mut with_device(
             "ideal.yaml",
             "- {effect: accel_bias, bias: [0.0, 0.0, 0.0]}",
+            Config::default(),
         )
         .unwrap(),
         &motion,
@@ -360,12 +366,12 @@ fn a_devices_effects_act_live() {
     let effects = "- {effect: time_offset, seconds: 0.25}\n- {effect: clock_drift, ppm: 1000}\n- {effect: gyro_units, factor: 1000}\n\
                    - {effect: mount_rotation, rotvec: [0.0, 0.0, 1.5707963267948966]}\n";
     let changed = walk(
-        &mut with_device("changed.yaml", effects).unwrap(),
+        &mut with_device("changed.yaml", effects, Config::default()).unwrap(),
         &motion,
         START,
     );
     assert_eq!(ideal.len(), changed.len());
-    for (ideal, changed) in ideal.iter().zip(&changed) {
+    for ((_, ideal), (_, changed)) in ideal.iter().zip(&changed) {
         let since = ideal.data_raw.header.stamp.nanos() - START;
         assert_eq!(
             changed.data_raw.header.stamp.nanos() - START,
@@ -384,6 +390,7 @@ fn a_devices_effects_act_live() {
         &mut with_device(
             "lossy.yaml",
             "- {effect: dropped_samples, fraction: 0.3, mean_burst: 5}",
+            Config::default(),
         )
         .unwrap(),
         &motion,
@@ -393,10 +400,32 @@ fn a_devices_effects_act_live() {
 }
 
 #[test]
+fn without_noise_the_deterministic_effects_stay_and_nothing_is_lost() {
+    let motion = embedded_walk();
+    let run = |name: &str, effects: &str| {
+        let mut node = with_device(name, effects, quiet()).unwrap();
+        walk(&mut node, &motion, START)
+    };
+    let ideal = run("plain.yaml", "- {effect: accel_noise, density: 0.1}");
+    let biased = run(
+        "biased.yaml",
+        "- {effect: accel_bias, bias: [0.5, 0.0, -0.25]}\n- {effect: accel_noise, density: 0.1}\n\
+         - {effect: dropped_samples, fraction: 0.3, mean_burst: 5}",
+    );
+    assert_eq!(ideal.len(), biased.len());
+    for ((_, ideal), (_, biased)) in ideal.iter().zip(&biased) {
+        let force = |imu: &ImuMessages| Vector3::from(imu.data_raw.linear_acceleration);
+        let difference = force(biased) - force(ideal);
+        assert!((difference - Vector3::new(0.5, 0.0, -0.25)).norm() < 1e-12);
+    }
+}
+
+#[test]
 fn effects_of_a_reference_are_none_of_a_live_device() {
     let refusal = with_device(
         "tilted.yaml",
         "- {effect: reference_tilt, rotvec: [0.01, 0.0, 0.0]}",
+        Config::default(),
     )
     .err()
     .unwrap();
@@ -447,11 +476,7 @@ fn networks_correct_what_the_scheme_says_before_the_device() {
     constant_networks(folder.path(), [0.1, 0.0, 0.0], [0.0, 0.5, 0.0]);
     let motion = embedded_walk();
     let read = |learned: String| {
-        let mut node = node(Config {
-            noise: false,
-            learned,
-            ..Config::default()
-        });
+        let mut node = error_free(Config { learned, ..quiet() });
         let states = (0..200).map(|frame| state(&motion, frame, START + frame as i64 * 10_000_000));
         states
             .flat_map(|state| node.step(&state).unwrap().readings)
@@ -462,7 +487,7 @@ fn networks_correct_what_the_scheme_says_before_the_device() {
         read(folder.path().display().to_string()),
     );
     assert_eq!(plain.len(), learned.len());
-    for (before, after) in plain.iter().zip(&learned) {
+    for ((_, before), (_, after)) in plain.iter().zip(&learned) {
         let difference = |a: cromosim_msgs::geometry_msgs::Vector3,
                           b: cromosim_msgs::geometry_msgs::Vector3| {
             (Vector3::from(a) - Vector3::from(b)).norm()

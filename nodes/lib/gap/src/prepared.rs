@@ -1,7 +1,7 @@
 //! One placement, made ready to be compared: sample grid, masks, units.
 
 use cromosim_imu::{
-    AXES, Channel, EffectSet, GridTrace, PerChannel, Reading, ResidualView, SensorModel, Stage,
+    AXES, Channel, EffectSet, PerChannel, Reading, ResidualView, SensorModel, Stage, StagedReadings,
 };
 use cromosim_spatial::{KinematicTrack, PoseEstimate, Spectrum, Stamp, welch};
 
@@ -62,14 +62,7 @@ pub(crate) struct MissingMessages {
 
 /// A prediction with its stages kept, so that a change of one effect repeats only what comes after
 /// it.
-#[derive(Clone, Debug)]
-pub(crate) struct Prediction {
-    segment: GridTrace,
-    tissue: GridTrace,
-    sensor: GridTrace,
-    read: Vec<Reading>,
-    pub readings: Vec<Reading>,
-}
+pub(crate) type Prediction = StagedReadings;
 
 /// The uniform grid under the stamps of an IMU.
 struct SampleGrid {
@@ -232,19 +225,7 @@ impl PreparedPlacement {
     /// the measured side.
     pub fn predict(&self, track: &KinematicTrack, set: &EffectSet) -> Prediction {
         let model = SensorModel::new(set, self.epoch);
-        let segment = model.segment(track);
-        let tissue = model.tissue(segment.clone());
-        let sensor = model.sensor(tissue.clone());
-        let read = model.read(&sensor, &self.stamps);
-        let mut readings = read.clone();
-        model.linear(&mut readings, &self.stamps);
-        Prediction {
-            segment,
-            tissue,
-            sensor,
-            read,
-            readings,
-        }
+        Prediction::new(&model, track, &self.stamps)
     }
 
     /// The readings under `set`, which differs from the set of `base` in effects of `stage` alone.
@@ -256,25 +237,7 @@ impl PreparedPlacement {
         stage: Stage,
     ) -> Vec<Reading> {
         let model = SensorModel::new(set, self.epoch);
-        let mut readings = if stage <= Stage::Segment {
-            model.read(
-                &model.sensor(model.tissue(model.segment(track))),
-                &self.stamps,
-            )
-        } else if stage == Stage::Tissue {
-            model.read(
-                &model.sensor(model.tissue(base.segment.clone())),
-                &self.stamps,
-            )
-        } else if stage == Stage::Sensor {
-            model.read(&model.sensor(base.tissue.clone()), &self.stamps)
-        } else if stage == Stage::Timing {
-            model.read(&base.sensor, &self.stamps)
-        } else {
-            base.read.clone()
-        };
-        model.linear(&mut readings, &self.stamps);
-        readings
+        base.repeated_from(stage, &model, track, &self.stamps)
     }
 
     /// Which part of time an entry of the sample grid belongs to.

@@ -73,9 +73,7 @@ impl<'a> Simulations<'a> {
             Some(plain) if set.get_read_off(ReadOff::ReferenceSpectrum).is_none() => plain,
             _ => &self.findings.model.track,
         };
-        let mut readings = self.whole.predict(track, set).readings;
-        SensorModel::new(set, self.whole.epoch).digital(&mut readings);
-        readings
+        SensorModel::new(set, self.whole.epoch).run(track, &self.whole.stamps)
     }
 
     /// For the noise that is predicted under those effects of `set` that change it.

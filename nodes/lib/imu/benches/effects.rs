@@ -3,7 +3,7 @@
 #![allow(missing_docs)]
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use cromosim_imu::{Effect, EffectKind, EffectSet, SensorModel};
+use cromosim_imu::{Effect, EffectKind, EffectSet, SensorModel, Stage, StagedReadings};
 use cromosim_spatial::{KinematicTrack, Stamp, so3};
 use nalgebra::Vector3;
 
@@ -63,12 +63,12 @@ fn effects(criterion: &mut Criterion) {
     criterion.bench_function("fourteen effects", |bencher| {
         bencher.iter(|| model.run(&track, &stamps))
     });
-    criterion.bench_function("fourteen effects: segment", |bencher| {
-        bencher.iter(|| model.segment(&track))
+    criterion.bench_function("fourteen effects: every stage kept", |bencher| {
+        bencher.iter(|| StagedReadings::new(&model, &track, &stamps))
     });
-    let trace = model.sensor(model.tissue(model.segment(&track)));
-    criterion.bench_function("fourteen effects: read", |bencher| {
-        bencher.iter(|| model.read(&trace, &stamps))
+    let staged = StagedReadings::new(&model, &track, &stamps);
+    criterion.bench_function("fourteen effects: again from the timing on", |bencher| {
+        bencher.iter(|| staged.repeated_from(Stage::Timing, &model, &track, &stamps))
     });
 }
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use crate::{EffectSet, ImuError, Stage};
+use crate::{DeclaredNoise, EffectSet, ImuError, Stage};
 
 const SCHEMA: &str = "cromosim/device/1";
 
@@ -190,6 +190,14 @@ impl Device {
     /// White noise of the gyroscope, (rad/s)/sqrt(Hz).
     pub fn gyro_density(&self) -> f64 {
         self.gyro_density
+    }
+
+    /// Both densities.
+    pub fn declared_noise(&self) -> DeclaredNoise {
+        DeclaredNoise {
+            accel_density: self.accel_density,
+            gyro_density: self.gyro_density,
+        }
     }
 
     /// Standard deviation of the reported orientation about each axis, rad; 0 where it is exact and

@@ -57,6 +57,7 @@ mod stream;
 mod stream_spline;
 mod trajectory;
 mod uncertainty;
+mod virtual_imu;
 
 #[cfg(test)]
 mod test_motions;
@@ -65,19 +66,26 @@ pub use channel::{AXES, Channel, PerChannel};
 pub use device::{Device, EMBEDDED_DEVICES};
 pub use effects::{
     DeclaredNoise, Dependence, Dropouts, Effect, EffectKind, EffectSet, EffectSpec, EffectsFile,
-    FirstGuess, FittedSearch, GravityMode, GridTrace, Identifiability, Ordinary, ParameterFit,
-    ParameterSpec, PlacementEffects, ReadOff, ReadOffSearch, Reading, ResidualView, Rounding,
-    Search, SensorModel, Shape, SpectralLine, Stage, StreamingEffects, clipping_limit,
-    lattice_spacing, nearest_signed_permutation, strongest_line, unit_factors, white_noise_density,
+    FirstGuess, FittedSearch, GravityMode, GridTrace, Identifiability, MeasurementInput, Ordinary,
+    ParameterFit, ParameterSpec, PlacementEffects, ReadOff, ReadOffSearch, Reading, ResidualView,
+    Rounding, Search, SensorModel, Shape, SpectralLine, Stage, StagedReadings, StreamingEffects,
+    clipping_limit, lattice_spacing, nearest_signed_permutation, strongest_line, unit_factors,
+    white_noise_density,
 };
 pub use error::{EffectError, ImuError, PlacementProblem};
 pub use mount::{MountedSensor, MountedSensors, SensorPose};
 pub use noise::{Covariances, NoiseSource, normal_pair};
 pub use placement::{Follow, MAX_RATE_HZ, Placement, SiteChoice};
 pub use placement_file::PlacementSet;
-pub use sample::{GRAVITY_IN_WORLD, ImuSample, KinematicSample, STANDARD_GRAVITY};
+pub use sample::{
+    GRAVITY_IN_WORLD, ImuSample, KinematicSample, STANDARD_GRAVITY, track_in_sensor_axes,
+};
 pub use schemes::Scheme;
 pub use simulate::{simulate, simulate_kinematics, simulate_kinematics_on};
 pub use stream::{StreamOptions, StreamingImu};
 pub use trajectory::{SensorFrame, SensorTrajectory};
 pub use uncertainty::{PoseStd, SampleVariance};
+pub use virtual_imu::{
+    ImuMessages, ImuOptions, MotionCorrection, ReadingMapping, RecordedMotion, VirtualImu,
+    measure_all, measure_recording,
+};

@@ -5,7 +5,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 
-use crate::{Device, ImuError, ImuSample, Reading};
+use crate::{DeclaredNoise, Device, ImuError, Reading};
 
 /// Covariances of a sensor_msgs/Imu, row-major 3x3, as REP-145 reads them: all zero is unknown, -1
 /// first is "not reported".
@@ -20,10 +20,10 @@ pub struct Covariances {
 }
 
 impl Covariances {
-    /// Of a device read at a rate: variance of the white noise per sample, density^2 rate, on the
-    /// diagonals; a device without noise has unknown (zero) covariances. The orientation is
+    /// Those of a device read at a rate: variance of the white noise per sample, density^2 rate, on
+    /// the diagonals; a device without noise has unknown (zero) covariances. The orientation is
     /// reported (`data`).
-    pub fn of(device: &Device, rate_hz: f64) -> Self {
+    pub fn for_device(device: &Device, rate_hz: f64) -> Self {
         Self {
             orientation: diagonal(device.orientation_stddev().powi(2)),
             angular_velocity: diagonal(device.gyro_density().powi(2) * rate_hz),
@@ -67,33 +67,13 @@ struct WhiteNoise {
 }
 
 impl NoiseSource {
-    /// The source of one placement: the device's declared white noise.
+    /// The source of one placement's readings at a rate, and of errors of its orientation with this
+    /// standard deviation, rad. `placement` is the name that the numbers depend on.
     ///
     /// # Errors
     /// [`ImuError::Trajectory`] for a rate that is not positive.
-    pub fn new(
-        device: &Device,
-        rate_hz: f64,
-        seed: u64,
-        placement: &str,
-    ) -> Result<Self, ImuError> {
-        let densities = (device.accel_density(), device.gyro_density());
-        Self::white(
-            densities,
-            device.orientation_stddev(),
-            rate_hz,
-            seed,
-            placement,
-        )
-    }
-
-    /// The source of densities, (m/s2)/sqrt(Hz) and (rad/s)/sqrt(Hz), and of the orientation's
-    /// standard deviation, rad.
-    ///
-    /// # Errors
-    /// As [`NoiseSource::new`].
     pub fn white(
-        densities: (f64, f64),
+        noise: &DeclaredNoise,
         orientation_stddev: f64,
         rate_hz: f64,
         seed: u64,
@@ -108,24 +88,18 @@ impl NoiseSource {
             random: stream(seed, placement, number),
         };
         Ok(Self {
-            accelerometer: channel(0, densities.0 * root),
-            gyroscope: channel(1, densities.1 * root),
+            accelerometer: channel(0, noise.accel_density * root),
+            gyroscope: channel(1, noise.gyro_density * root),
             orientation: channel(2, orientation_stddev),
         })
     }
 
-    /// The reading with this noise; one call a sample, in order of time. The orientation's noise is
-    /// a small turn in sensor axes.
-    pub fn apply(&mut self, ideal: &ImuSample) -> ImuSample {
-        let Reading {
-            specific_force,
-            angular_velocity,
-        } = self.draw();
-        ImuSample {
-            stamp: ideal.stamp,
-            world_from_sensor: ideal.world_from_sensor * self.draw_turn(),
-            specific_force: ideal.specific_force + specific_force,
-            angular_velocity: ideal.angular_velocity + angular_velocity,
+    /// Adds the noise of the next readings, in order of time.
+    pub fn add_to(&mut self, readings: &mut [Reading]) {
+        for reading in readings {
+            let drawn = self.draw();
+            reading.specific_force += drawn.specific_force;
+            reading.angular_velocity += drawn.angular_velocity;
         }
     }
 
@@ -152,6 +126,9 @@ impl WhiteNoise {
 }
 
 /// Two independent standard normal numbers (Box and Muller 1958).
+///
+/// Written out rather than taken from `rand_distr`, whose ziggurat draws other numbers from the same
+/// stream: with it every seed would give other bytes than it did before.
 pub fn normal_pair(random: &mut ChaCha12Rng) -> [f64; 2] {
     let radius = (-2.0 * uniform(random).ln()).sqrt();
     let (sine, cosine) = (std::f64::consts::TAU * uniform(random)).sin_cos();

@@ -3,7 +3,7 @@ use cromosim_spatial::Stamp;
 use nalgebra::UnitQuaternion;
 
 use super::*;
-use crate::EMBEDDED_DEVICES;
+use crate::{EMBEDDED_DEVICES, ImuSample};
 
 const YAML: &str = "schema: cromosim/device/1\ndeclared_noise: {accel_density: 0.002, gyro_density: 0.0003, orientation_stddev: 0.01}\n\
                     effects:\n- {effect: accel_bias, bias: [0.1, 0.2, 0.3]}\n- {effect: gyro_bias, bias: [-0.01, 0.0, 0.02]}\n";
@@ -23,8 +23,22 @@ fn still(k: i64) -> ImuSample {
 }
 
 fn noisy(device: &Device, seed: u64, name: &str, count: i64) -> Vec<ImuSample> {
-    let mut source = NoiseSource::new(device, 100.0, seed, name).unwrap();
-    (0..count).map(|k| source.apply(&still(k))).collect()
+    let mut source = source(device, 100.0, seed, name).unwrap();
+    let noisy = |k| {
+        let (still, drawn) = (still(k), source.draw());
+        ImuSample {
+            stamp: still.stamp,
+            world_from_sensor: still.world_from_sensor * source.draw_turn(),
+            specific_force: still.specific_force + drawn.specific_force,
+            angular_velocity: still.angular_velocity + drawn.angular_velocity,
+        }
+    };
+    (0..count).map(noisy).collect()
+}
+
+fn source(device: &Device, rate_hz: f64, seed: u64, name: &str) -> Result<NoiseSource, ImuError> {
+    let (noise, orientation_stddev) = (device.declared_noise(), device.orientation_stddev());
+    NoiseSource::white(&noise, orientation_stddev, rate_hz, seed, name)
 }
 
 #[test]
@@ -107,7 +121,7 @@ fn a_device_without_error_changes_nothing() {
 
 #[test]
 fn covariances_follow_rep_145() {
-    let covariances = Covariances::of(&device(), 100.0);
+    let covariances = Covariances::for_device(&device(), 100.0);
     assert!(
         (covariances.linear_acceleration[4] - 4e-4).abs() < 1e-15
             && covariances.linear_acceleration[1] == 0.0
@@ -120,7 +134,7 @@ fn covariances_follow_rep_145() {
         [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
     );
     assert_eq!(raw.linear_acceleration, covariances.linear_acceleration);
-    let unknown = Covariances::of(&Device::ideal(), 100.0);
+    let unknown = Covariances::for_device(&Device::ideal(), 100.0);
     assert_eq!(
         (unknown.orientation, unknown.linear_acceleration),
         ([0.0; 9], [0.0; 9])
@@ -167,5 +181,5 @@ fn shipped_devices_are_sound_and_bad_ones_refused() {
         Device::resolve(None, std::path::Path::new("")).unwrap(),
         Device::ideal()
     );
-    assert!(NoiseSource::new(&device(), 0.0, 1, "x").is_err());
+    assert!(source(&device(), 0.0, 1, "x").is_err());
 }

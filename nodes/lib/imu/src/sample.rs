@@ -1,6 +1,6 @@
 //! What a sensor reads, and the motion behind it.
 
-use cromosim_spatial::Stamp;
+use cromosim_spatial::{KinematicTrack, Stamp};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use crate::SampleVariance;
@@ -55,4 +55,39 @@ impl KinematicSample {
             angular_velocity: sensor_from_world * self.angular_velocity_in_world,
         }
     }
+}
+
+/// A motion on a grid of `rate_hz`, in the sensor's own axes: what a
+/// [`crate::SensorModel`] starts from. Where a sample has no angular acceleration, the difference of
+/// its neighbours' angular velocities stands for it.
+pub fn track_in_sensor_axes(motion: &[KinematicSample], rate_hz: f64) -> KinematicTrack {
+    let mut track = KinematicTrack {
+        start: motion.first().map(|first| first.stamp).unwrap_or_default(),
+        rate_hz,
+        ..KinematicTrack::default()
+    };
+    for (k, sample) in motion.iter().enumerate() {
+        let world_from_sensor = sample.world_from_sensor.rotation;
+        let in_sensor = |vector: &Vector3<f64>| world_from_sensor.inverse_transform_vector(vector);
+        let difference = || {
+            let before = &motion[k.saturating_sub(1)];
+            let after = &motion[(k + 1).min(motion.len() - 1)];
+            (after.angular_velocity_in_world - before.angular_velocity_in_world)
+                / (after.stamp - before.stamp).max(1e-9)
+        };
+        let angular_acceleration_in_world = sample
+            .angular_acceleration_in_world
+            .unwrap_or_else(difference);
+        track.world_from_segment.push(world_from_sensor);
+        track
+            .acceleration_in_segment
+            .push(in_sensor(&sample.acceleration_in_world));
+        track
+            .angular_velocity_in_segment
+            .push(in_sensor(&sample.angular_velocity_in_world));
+        track
+            .angular_acceleration_in_segment
+            .push(in_sensor(&angular_acceleration_in_world));
+    }
+    track
 }

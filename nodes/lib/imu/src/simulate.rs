@@ -3,6 +3,7 @@
 use cromosim_spatial::{PoseTimes, Stamp, derivative_weights, so3};
 use nalgebra::{Isometry3, Vector3};
 
+use crate::schemes::StencilScheme;
 use crate::schemes::spline::{self, SplineVariance};
 use crate::uncertainty::{FrameWeights, any_error};
 use crate::{
@@ -39,17 +40,15 @@ pub fn simulate_kinematics(
     scheme: Scheme,
     output: &[Stamp],
 ) -> Result<Vec<KinematicSample>, ImuError> {
-    match scheme {
-        Scheme::Spline => {
-            let stamps: Vec<_> = trajectory
-                .frames()
-                .iter()
-                .map(|frame| frame.stamp)
-                .collect();
-            simulate_kinematics_on(&PoseTimes::new(&stamps)?, trajectory, scheme, output)
-        }
-        _ => Ok(by_differences(trajectory, scheme, output)),
+    if let Some(stencil) = scheme.stencil() {
+        return Ok(by_differences(trajectory, stencil, output));
     }
+    let stamps: Vec<_> = trajectory
+        .frames()
+        .iter()
+        .map(|frame| frame.stamp)
+        .collect();
+    by_spline(&PoseTimes::new(&stamps)?, trajectory, output)
 }
 
 /// As [`simulate_kinematics`], with the spline equations of the trajectory's stamps, which all
@@ -63,9 +62,17 @@ pub fn simulate_kinematics_on(
     scheme: Scheme,
     output: &[Stamp],
 ) -> Result<Vec<KinematicSample>, ImuError> {
-    if scheme != Scheme::Spline {
-        return Ok(by_differences(trajectory, scheme, output));
+    match scheme.stencil() {
+        Some(stencil) => Ok(by_differences(trajectory, stencil, output)),
+        None => by_spline(times, trajectory, output),
     }
+}
+
+fn by_spline(
+    times: &PoseTimes,
+    trajectory: &SensorTrajectory,
+    output: &[Stamp],
+) -> Result<Vec<KinematicSample>, ImuError> {
     let fitted = spline::fit(times, trajectory.frames())?;
     let errors = SplineVariance::new(times, &fitted, trajectory.frames())?;
     let sample = |&stamp: &Stamp| {
@@ -85,7 +92,7 @@ pub fn simulate_kinematics_on(
 
 fn by_differences(
     trajectory: &SensorTrajectory,
-    scheme: Scheme,
+    scheme: StencilScheme,
     output: &[Stamp],
 ) -> Vec<KinematicSample> {
     let frames = trajectory.frames();
@@ -105,7 +112,7 @@ fn by_differences(
 
 /// What errors of the frames leave in a stencil's sample.
 pub(crate) fn stencil_variance(
-    scheme: Scheme,
+    scheme: StencilScheme,
     frames: &[SensorFrame],
     stamp: Stamp,
 ) -> SampleVariance {
@@ -113,14 +120,14 @@ pub(crate) fn stencil_variance(
     let after = frames.partition_point(|frame| frame.stamp < stamp);
     let near = &frames[after.saturating_sub(8)..(after + 8).min(frames.len())];
     if any_error(near) {
-        FrameWeights::of_stencil(scheme, frames, stamp).variance(frames)
+        FrameWeights::by_stencil(scheme, frames, stamp).variance(frames)
     } else {
         SampleVariance::default()
     }
 }
 
-/// The estimate of a scheme with a stencil at one of its frames.
-pub(crate) fn at_frame(scheme: Scheme, frames: &[SensorFrame], k: usize) -> KinematicSample {
+/// A scheme's estimate at a frame.
+pub(crate) fn at_frame(scheme: StencilScheme, frames: &[SensorFrame], k: usize) -> KinematicSample {
     let (acceleration, angular_velocity) = scheme.at_frame(frames, k);
     KinematicSample {
         stamp: frames[k].stamp,

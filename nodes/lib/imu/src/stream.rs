@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use cromosim_spatial::{SpatialError, Stamp};
 
+use crate::schemes::StencilScheme;
 use crate::simulate::{at_frame, between_frames, stencil_variance};
 use crate::stream_spline::{FixedLag, LAG_FRAMES};
 use crate::{ImuError, ImuSample, KinematicSample, Scheme, SensorFrame};
@@ -13,9 +14,8 @@ use crate::{ImuError, ImuSample, KinematicSample, Scheme, SensorFrame};
 pub struct StreamOptions {
     /// Nominal rate of the frames, Hz: it sets the delay.
     pub input_rate_hz: f64,
-    /// Rate of the samples, Hz, on a grid that starts at the first frame; `None` gives a sample for
-    /// every frame, at its stamp.
-    pub output_rate_hz: Option<f64>,
+    /// Rate of the samples, Hz, on a grid that starts at the first frame.
+    pub output_rate_hz: f64,
     /// A pause longer than this (s) between frames ends the series; another begins, and no sample
     /// is made up in between.
     pub longest_gap: f64,
@@ -26,16 +26,7 @@ impl StreamOptions {
     pub fn resampled(input_rate_hz: f64, output_rate_hz: f64) -> Self {
         Self {
             input_rate_hz,
-            output_rate_hz: Some(output_rate_hz),
-            longest_gap: 0.5,
-        }
-    }
-
-    /// A sample for every frame.
-    pub fn at_frames(input_rate_hz: f64) -> Self {
-        Self {
-            input_rate_hz,
-            output_rate_hz: None,
+            output_rate_hz,
             longest_gap: 0.5,
         }
     }
@@ -44,8 +35,8 @@ impl StreamOptions {
 /// A scheme over a sliding window. The same frames give the same samples; a sample comes out with
 /// the first frame that is [`StreamingImu::delay_seconds`] later than it.
 ///
-/// Delay, in frames at the nominal rate: 2 for Richardson and 1 for the other stencils, 2 more
-/// where the output has its own rate (cubic interpolation); 10 for the spline, which is fitted to
+/// Delay, in frames at the nominal rate: 4 for Richardson and 3 for the other stencils (2 of them for
+/// the cubic between estimates); 10 for the spline, which is fitted to
 /// the last 43 frames and smoothed as the last 128 frames ask for. Away from the start, stencils
 /// read exactly what [`crate::simulate`] reads; the spline comes close.
 #[derive(Clone, Debug)]
@@ -73,19 +64,17 @@ impl StreamingImu {
     /// # Errors
     /// [`ImuError::Trajectory`] for rates that are not positive.
     pub fn new(scheme: Scheme, options: StreamOptions) -> Result<Self, ImuError> {
-        let rates = [Some(options.input_rate_hz), options.output_rate_hz];
+        let rates = [options.input_rate_hz, options.output_rate_hz];
         if let Some(rate_hz) = rates
             .into_iter()
-            .flatten()
             .find(|rate| !(*rate > 0.0 && rate.is_finite()))
         {
             return Err(SpatialError::BadRate { rate_hz }.into());
         }
-        let frames = match (scheme.reach(), options.output_rate_hz) {
-            (Some(reach), None) => reach,
-            (Some(reach), Some(_)) => reach + 2,
-            (None, _) => LAG_FRAMES,
-        };
+        // Two more than the stencil needs: the cubic between its estimates.
+        let frames = scheme
+            .stencil()
+            .map_or(LAG_FRAMES, |stencil| stencil.reach() + 2);
         let delay = frames as f64 / options.input_rate_hz;
         let (window, pending) = (Vec::with_capacity(2 * KEPT_FRAMES), VecDeque::new());
         Ok(Self {
@@ -200,10 +189,7 @@ impl StreamingImu {
     /// Notes the samples that fall after the last frame and up to `now`; within a series, so not
     /// into a gap.
     fn note_pending(&mut self, now: Stamp) {
-        let Some(rate_hz) = self.options.output_rate_hz else {
-            self.pending.push_back(now);
-            return;
-        };
+        let rate_hz = self.options.output_rate_hz;
         let (first, mut number) = self.grid.unwrap_or((now, 0));
         let stamp = |number: i64| first.plus_seconds(number as f64 / rate_hz);
         if self.window.is_empty() {
@@ -232,31 +218,31 @@ impl StreamingImu {
             return Ok(());
         }
         let due: Vec<Stamp> = self.pending.drain(..count).collect();
-        if self.scheme == Scheme::Spline {
+        let Some(stencil) = self.scheme.stencil() else {
             return self.fixed_lag.sample(&self.window, &due, released);
-        }
+        };
         for stamp in due {
-            let variance = stencil_variance(self.scheme, &self.window, stamp);
+            let variance = stencil_variance(stencil, &self.window, stamp);
             released.push(KinematicSample {
                 variance,
-                ..self.by_stencil(stamp)
+                ..self.by_stencil(stencil, stamp)
             });
         }
         Ok(())
     }
 
-    fn by_stencil(&self, stamp: Stamp) -> KinematicSample {
+    fn by_stencil(&self, stencil: StencilScheme, stamp: Stamp) -> KinematicSample {
         let after = self
             .window
             .partition_point(|frame| frame.stamp < stamp)
             .min(self.window.len() - 1);
         if self.window[after].stamp == stamp {
-            return at_frame(self.scheme, &self.window, after);
+            return at_frame(stencil, &self.window, after);
         }
         let width = self.window.len().min(4);
         let start = after.saturating_sub(2).min(self.window.len() - width);
         let around: Vec<_> = (start..start + width)
-            .map(|k| at_frame(self.scheme, &self.window, k))
+            .map(|k| at_frame(stencil, &self.window, k))
             .collect();
         between_frames(&around, stamp)
     }

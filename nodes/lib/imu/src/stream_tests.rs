@@ -39,13 +39,11 @@ fn samples_are_those_of_the_grid_and_come_after_the_stated_delay() {
     for scheme in Scheme::ALL {
         for options in [
             StreamOptions::resampled(120.0, 100.0),
-            StreamOptions::at_frames(120.0),
+            StreamOptions::resampled(120.0, 120.0),
         ] {
             let released = run(scheme, options, &frames);
-            let expected = match options.output_rate_hz {
-                Some(rate_hz) => uniform_stamps(START, frames[360].stamp, rate_hz).unwrap(),
-                None => frames.iter().map(|frame| frame.stamp).collect(),
-            };
+            let expected =
+                uniform_stamps(START, frames[360].stamp, options.output_rate_hz).unwrap();
             assert_eq!(
                 released
                     .iter()
@@ -81,7 +79,7 @@ fn stencils_read_live_what_they_read_offline() {
         Scheme::SecondDifference,
     ] {
         for options in [
-            StreamOptions::at_frames(100.0),
+            StreamOptions::resampled(100.0, 100.0),
             StreamOptions::resampled(100.0, 77.0),
         ] {
             let live = run(scheme, options, &frames);
@@ -118,10 +116,14 @@ fn the_live_spline_comes_close_to_the_offline_one() {
         (exact.clone(), "exact", 1.3, 1.3),
         (jittered(&exact), "jittered", 5.0, 1.5),
     ] {
-        let live: Vec<_> = run(Scheme::Spline, StreamOptions::at_frames(100.0), &frames)
-            .into_iter()
-            .map(|(sample, _)| sample)
-            .collect();
+        let live: Vec<_> = run(
+            Scheme::Spline,
+            StreamOptions::resampled(100.0, 100.0),
+            &frames,
+        )
+        .into_iter()
+        .map(|(sample, _)| sample)
+        .collect();
         let trajectory = SensorTrajectory::new(frames.clone()).unwrap();
         // After the first searches for weights, and before the end.
         let settled = &live[400..1950];
@@ -182,7 +184,8 @@ fn a_pause_begins_a_new_series_on_the_same_grid() {
 #[test]
 fn frames_out_of_order_or_broken_are_refused_and_left_out() {
     let frames = frames(wrist, 100.0, 1.0);
-    let mut stream = StreamingImu::new(Scheme::Spline, StreamOptions::at_frames(100.0)).unwrap();
+    let mut stream =
+        StreamingImu::new(Scheme::Spline, StreamOptions::resampled(100.0, 100.0)).unwrap();
     stream.push(frames[5]).unwrap();
     assert!(matches!(
         stream.push(frames[5]),

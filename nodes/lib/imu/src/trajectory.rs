@@ -103,15 +103,6 @@ impl SensorTrajectory {
     pub fn end(&self) -> Stamp {
         self.frames[self.frames.len() - 1].stamp
     }
-
-    /// Pairs of stamps with more than `seconds` and nothing in between. Schemes bridge gaps
-    /// smoothly, but what they say there is a guess.
-    pub fn gaps(&self, seconds: f64) -> Vec<(Stamp, Stamp)> {
-        let stamps = self.frames.windows(2).map(|w| (w[0].stamp, w[1].stamp));
-        stamps
-            .filter(|(before, after)| *after - *before > seconds)
-            .collect()
-    }
 }
 
 /// Seconds since the first frame.
@@ -142,15 +133,6 @@ mod tests {
                 .unwrap_err()
                 .to_string()
                 .contains("sample 1: pose is not finite")
-        );
-    }
-
-    #[test]
-    fn gaps_are_found() {
-        let trajectory = SensorTrajectory::new([0.0, 0.1, 0.9, 1.0].map(frame).to_vec()).unwrap();
-        assert_eq!(
-            trajectory.gaps(0.2),
-            [(Stamp::from_seconds(0.1), Stamp::from_seconds(0.9))]
         );
     }
 }

@@ -5,8 +5,8 @@ use cromosim_spatial::{
 };
 use nalgebra::{Matrix3, Vector3};
 
-use crate::schemes::stencil_range;
-use crate::{Covariances, ImuSample, Scheme, SensorFrame};
+use crate::schemes::{StencilScheme, stencil_range};
+use crate::{Covariances, ImuSample, SensorFrame};
 
 /// Standard deviations of a frame's error, along and about each axis. Errors of frames dt apart
 /// have the correlation `exp(-(dt / correlation_s)^2 / 2)`; none at all with 0, the worst case for
@@ -29,9 +29,9 @@ impl PoseStd {
         correlation_s: 0.0,
     };
 
-    /// Of a message's confidence: `s = 0.1 m sqrt(1 / c - 1)` and `s / 0.5 m` in rad. NaN says
+    /// That of a message's confidence: `s = 0.1 m sqrt(1 / c - 1)` and `s / 0.5 m` in rad. NaN says
     /// nothing of errors, 0 that nothing is known.
-    pub fn of_confidence(confidence: f64, correlation_s: f64) -> Self {
+    pub fn from_confidence(confidence: f64, correlation_s: f64) -> Self {
         let position_m = if confidence.is_nan() {
             0.0
         } else {
@@ -72,9 +72,9 @@ pub(crate) struct FrameWeights {
 }
 
 impl FrameWeights {
-    /// Of a scheme with a stencil, at any stamp: its own weights at a frame, in between those of
-    /// the four estimates around it.
-    pub(crate) fn of_stencil(scheme: Scheme, frames: &[SensorFrame], stamp: Stamp) -> Self {
+    /// Those of a stencil at any stamp: its own weights at a frame, in between those of the four
+    /// estimates around it.
+    pub(crate) fn by_stencil(scheme: StencilScheme, frames: &[SensorFrame], stamp: Stamp) -> Self {
         let after = frames
             .partition_point(|frame| frame.stamp < stamp)
             .min(frames.len() - 1);
@@ -113,8 +113,8 @@ impl FrameWeights {
         Self { first, rows }
     }
 
-    fn at_frame(scheme: Scheme, frames: &[SensorFrame], k: usize) -> Self {
-        let range = stencil_range(frames.len(), k, scheme.reach().unwrap_or(1));
+    fn at_frame(scheme: StencilScheme, frames: &[SensorFrame], k: usize) -> Self {
+        let range = stencil_range(frames.len(), k, scheme.reach());
         let mut seconds = [0.0; cromosim_spatial::MAX_STENCIL];
         for (seconds, frame) in seconds.iter_mut().zip(&frames[range.clone()]) {
             *seconds = frame.stamp - frames[k].stamp;
@@ -136,7 +136,7 @@ impl FrameWeights {
     /// Of a spline whose position and rotation have their own smoothing. The quaternion moves by
     /// half the turn, and the angular velocity is twice its derivative, so that the weights are
     /// those of the channels.
-    pub(crate) fn of_spline(position: &Influence, rotation: &Influence, seconds: f64) -> Self {
+    pub(crate) fn by_spline(position: &Influence, rotation: &Influence, seconds: f64) -> Self {
         let (places, turns) = (position.at(seconds), rotation.at(seconds));
         let first = places.first.min(turns.first);
         let end = (places.first + places.rows.len()).max(turns.first + turns.rows.len());

@@ -7,7 +7,7 @@ use rand_chacha::ChaCha12Rng;
 use super::*;
 use crate::test_motions::{START, frames, wrist};
 use crate::{
-    Device, KinematicSample, SensorTrajectory, StreamOptions, StreamingImu, normal_pair,
+    Device, KinematicSample, Scheme, SensorTrajectory, StreamOptions, StreamingImu, normal_pair,
     simulate_kinematics,
 };
 
@@ -163,7 +163,10 @@ fn gains_are_those_of_the_stencils() {
             correlation_s: 0.0,
         },
     );
-    let at = |scheme| FrameWeights::of_stencil(scheme, &frames, frames[4].stamp).variance(&frames);
+    let at = |scheme: Scheme| {
+        FrameWeights::by_stencil(scheme.stencil().unwrap(), &frames, frames[4].stamp)
+            .variance(&frames)
+    };
     let cases = [
         // (1, -2, 1) / h2 and (-1, 0, 1) / 2h; (-1, 16, -30, 16, -1) / 12 h2 and (1, -8, 0, 8, -1)
         // / 12 h.
@@ -200,7 +203,8 @@ fn errors_that_hold_leave_less() {
         .collect();
     for scheme in [Scheme::Richardson, Scheme::SecondDifference] {
         let variance =
-            FrameWeights::of_stencil(scheme, &frames, frames[50].stamp).variance(&frames);
+            FrameWeights::by_stencil(scheme.stencil().unwrap(), &frames, frames[50].stamp)
+                .variance(&frames);
         assert!(
             (variance.acceleration / (3.0 * std.powi(2) / tau.powi(4)) - 1.0).abs() < 0.01,
             "{scheme}: {variance:?}"
@@ -226,7 +230,7 @@ fn errors_that_hold_leave_less() {
 
 #[test]
 fn poses_that_are_not_known_spoil_the_samples_that_rest_on_them() {
-    let unknown = PoseStd::of_confidence(0.0, 0.0);
+    let unknown = PoseStd::from_confidence(0.0, 0.0);
     assert!(unknown.position_m.is_infinite() && unknown.rotation_rad.is_infinite());
     let mut frames = frames(wrist, 100.0, 0.6);
     frames[30].pose_std = unknown;
@@ -255,12 +259,12 @@ fn poses_that_are_not_known_spoil_the_samples_that_rest_on_them() {
             );
         }
     }
-    let exact = PoseStd::of_confidence(1.0, 0.0);
+    let exact = PoseStd::from_confidence(1.0, 0.0);
     assert_eq!(
-        (exact, PoseStd::of_confidence(f64::NAN, 0.0)),
+        (exact, PoseStd::from_confidence(f64::NAN, 0.0)),
         (PoseStd::NONE, PoseStd::NONE)
     );
-    let half = PoseStd::of_confidence(0.5, 0.0);
+    let half = PoseStd::from_confidence(0.5, 0.0);
     assert!((half.position_m - 0.1).abs() < 1e-12 && (half.rotation_rad - 0.2).abs() < 1e-12);
 }
 
@@ -293,7 +297,8 @@ fn live_samples_state_what_offline_ones_do() {
             "{live:?} {offline:?}"
         );
     }
-    let mut spline = StreamingImu::new(Scheme::Spline, StreamOptions::at_frames(100.0)).unwrap();
+    let mut spline =
+        StreamingImu::new(Scheme::Spline, StreamOptions::resampled(100.0, 100.0)).unwrap();
     let live: Vec<KinematicSample> = exact
         .iter()
         .flat_map(|frame| spline.push_kinematics(*frame).unwrap())
@@ -330,7 +335,7 @@ fn the_messages_covariance_is_that_of_the_readings() {
         &[exact[4].stamp],
     )
     .unwrap()[0];
-    let device = Covariances::of(&Device::white(0.003, 0.0002), 100.0);
+    let device = Covariances::for_device(&Device::white(0.003, 0.0002), 100.0);
     let stated = device.with_motion(&still.variance, &still.imu());
     let mut random = ChaCha12Rng::seed_from_u64(3);
     let runs = 4000;

@@ -2,11 +2,10 @@
 //! motion.
 
 use cromosim_imu::{
-    DeclaredNoise, Effect, EffectKind, EffectSet, KinematicSample, NoiseSource, Reading,
-    SensorModel, normal_pair,
+    DeclaredNoise, Effect, EffectKind, EffectSet, KinematicSample, MeasurementInput, NoiseSource,
+    Reading, SensorModel, normal_pair, track_in_sensor_axes,
 };
-use cromosim_spatial::{KinematicTrack, Stamp};
-use nalgebra::Vector3;
+use cromosim_spatial::Stamp;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 use serde::{Deserialize, Serialize};
@@ -169,61 +168,18 @@ impl DrawnDevice {
         rate_hz: f64,
         stamps: &[Stamp],
     ) -> Result<Vec<Reading>, LearnedError> {
-        let track = track(kinematics, rate_hz);
+        let track = track_in_sensor_axes(kinematics, rate_hz);
         let epoch = stamps.first().copied().unwrap_or_default();
         let model = SensorModel::new(&self.effects, epoch);
-        let trace = model.sensor(model.tissue(model.segment(&track)));
-        let mut readings = model.read(&trace, stamps);
-        model.linear(&mut readings, stamps);
         let seconds = stamps.last().map_or(0.0, |last| *last - epoch);
         let imu_rate_hz = stamps.len().saturating_sub(1) as f64 / seconds;
-        let densities = (self.noise.accel_density, self.noise.gyro_density);
-        let mut noise = NoiseSource::white(densities, 0.0, imu_rate_hz, self.seed, "drawn")?;
-        for reading in &mut readings {
-            let added = noise.draw();
-            reading.specific_force += added.specific_force;
-            reading.angular_velocity += added.angular_velocity;
-        }
-        model.digital(&mut readings);
-        Ok(readings)
-    }
-}
-
-/// The same motion in the sensor's own axes.
-fn track(kinematics: &[KinematicSample], rate_hz: f64) -> KinematicTrack {
-    let own = |of: &dyn Fn(&KinematicSample) -> Vector3<f64>| -> Vec<Vector3<f64>> {
-        kinematics
-            .iter()
-            .map(|sample| sample.world_from_sensor.rotation.inverse() * of(sample))
-            .collect()
-    };
-    let last = kinematics.len().saturating_sub(1);
-    // Schemes without it: the central difference, in world axes.
-    let differences: Vec<Vector3<f64>> = (0..kinematics.len())
-        .map(|k| {
-            let (from, to) = (k.saturating_sub(1), (k + 1).min(last));
-            let seconds = (to - from).max(1) as f64 / rate_hz;
-            let change = (kinematics[to].angular_velocity_in_world
-                - kinematics[from].angular_velocity_in_world)
-                / seconds;
-            kinematics[k].world_from_sensor.rotation.inverse()
-                * kinematics[k]
-                    .angular_acceleration_in_world
-                    .unwrap_or(change)
-        })
-        .collect();
-    KinematicTrack {
-        start: kinematics
-            .first()
-            .map_or_else(Stamp::default, |sample| sample.stamp),
-        rate_hz,
-        world_from_segment: kinematics
-            .iter()
-            .map(|sample| sample.world_from_sensor.rotation)
-            .collect(),
-        acceleration_in_segment: own(&|sample| sample.acceleration_in_world),
-        angular_velocity_in_segment: own(&|sample| sample.angular_velocity_in_world),
-        angular_acceleration_in_segment: differences,
+        let densities = model.total_noise(&self.noise);
+        let mut noise = NoiseSource::white(&densities, 0.0, imu_rate_hz, self.seed, "drawn")?;
+        Ok(
+            model.measure(MeasurementInput::Motion(&track), stamps, |readings| {
+                noise.add_to(readings);
+            }),
+        )
     }
 }
 
@@ -232,7 +188,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use cromosim_imu::{Scheme, SensorFrame, SensorTrajectory, simulate_kinematics};
     use cromosim_spatial::uniform_stamps;
-    use nalgebra::Isometry3;
+    use nalgebra::{Isometry3, Vector3};
 
     use super::*;
 

@@ -3,7 +3,9 @@
 use std::collections::VecDeque;
 
 use cromosim_body::{BodyPose, ShapedBody, VertexSubset};
-use cromosim_imu::{KinematicSample, MountedSensor, Placement, Scheme, SensorPose};
+use cromosim_imu::{
+    KinematicSample, MotionCorrection, MountedSensor, Placement, Scheme, SensorPose,
+};
 use cromosim_spatial::Stamp;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
@@ -116,13 +118,28 @@ impl LivePlacements {
             .push(stamp, self.positions.as_chunks::<PATCH_POINTS>().0, frames);
     }
 
+    /// Forgets everything: a series ends here, and another begins.
+    pub fn reset(&mut self) {
+        self.frames = Frames::new(self.frames.placements);
+        self.ended = None;
+        self.waiting.iter_mut().for_each(VecDeque::clear);
+        for group in &mut self.groups {
+            group.recent.fill_with(Recent::default);
+            group.networks.iter_mut().for_each(StreamingBatch::reset);
+        }
+    }
+}
+
+impl MotionCorrection for LivePlacements {
+    type Error = LearnedError;
+
     /// Takes samples of the placements' schemes, (placements, samples in order), and puts in their
     /// place those that can be corrected now, these or earlier ones, with what the networks say
     /// added.
     ///
     /// # Errors
     /// As [`StreamingBatch::step`].
-    pub fn correct(&mut self, released: &mut [Vec<KinematicSample>]) -> Result<(), LearnedError> {
+    fn correct(&mut self, released: &mut [Vec<KinematicSample>]) -> Result<(), LearnedError> {
         let Self {
             frames,
             ended,
@@ -146,17 +163,6 @@ impl LivePlacements {
         correct_those((groups, waiting), frames, released, |sample| {
             frames.reach(sample.stamp)
         })
-    }
-
-    /// Forgets everything: a series ends here, and another begins.
-    pub fn reset(&mut self) {
-        self.frames = Frames::new(self.frames.placements);
-        self.ended = None;
-        self.waiting.iter_mut().for_each(VecDeque::clear);
-        for group in &mut self.groups {
-            group.recent.fill_with(Recent::default);
-            group.networks.iter_mut().for_each(StreamingBatch::reset);
-        }
     }
 }
 

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::Path;
 
-use cromosim_imu::Reading;
+use cromosim_imu::{Reading, ReadingMapping};
 use serde::Deserialize;
 
 use crate::LearnedError;
@@ -165,6 +165,12 @@ impl PlacementMapping {
             specific_force: [mapped[0], mapped[1], mapped[2]].into(),
             angular_velocity: [mapped[3], mapped[4], mapped[5]].into(),
         }
+    }
+}
+
+impl ReadingMapping for PlacementMapping {
+    fn map(&self, reading: &Reading) -> Reading {
+        self.apply(reading)
     }
 }
 

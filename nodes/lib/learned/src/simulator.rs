@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use cromosim_imu::KinematicSample;
+use cromosim_imu::{KinematicSample, MotionCorrection};
 use cromosim_spatial::{Stamp, derivative_weights};
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -211,6 +211,14 @@ impl LearnedSimulator {
         Ok(analytic.iter().map(corrected).collect())
     }
 
+    /// The correction of one placement's whole motion, as a step of its simulation.
+    pub fn correction(&self, motion: SiteMotion) -> WholeMotionCorrection<'_> {
+        WholeMotionCorrection {
+            networks: self,
+            motion,
+        }
+    }
+
     /// The network's own output, SI units.
     fn predict(
         &self,
@@ -245,6 +253,24 @@ impl LearnedSimulator {
             .into_iter()
             .map(|value| Vector3::from(value) * scale)
             .collect())
+    }
+}
+
+/// What networks change in the samples of one placement, whose whole motion they see.
+#[derive(Clone, Debug)]
+pub struct WholeMotionCorrection<'a> {
+    networks: &'a LearnedSimulator,
+    motion: SiteMotion,
+}
+
+impl MotionCorrection for WholeMotionCorrection<'_> {
+    type Error = LearnedError;
+
+    fn correct(&mut self, motions: &mut [Vec<KinematicSample>]) -> Result<(), LearnedError> {
+        for samples in motions {
+            *samples = self.networks.correct(&self.motion, samples)?;
+        }
+        Ok(())
     }
 }
 

@@ -9,8 +9,8 @@
 //! their gaps.
 
 use cromosim_imu::{
-    Channel, Effect, EffectKind, EffectSet, GridTrace, NoiseSource, Reading, SensorModel,
-    lattice_spacing, normal_pair, white_noise_density,
+    Channel, DeclaredNoise, Effect, EffectKind, EffectSet, GridTrace, MeasurementInput,
+    NoiseSource, Reading, SensorModel, lattice_spacing, normal_pair, white_noise_density,
 };
 use cromosim_spatial::Stamp;
 use nalgebra::Vector3;
@@ -120,25 +120,25 @@ impl DeviceEstimate {
             &mut random,
         );
         let model = SensorModel::new(&effects, Stamp::default());
-        let mut readings = model.read(ideal, &stamps);
-        model.linear(&mut readings, &stamps);
+        let declared = DeclaredNoise {
+            accel_density: self.accel_noise,
+            gyro_density: self.gyro_noise,
+        };
+        let mut noise = None;
         if self.interval > 0.0 {
-            let mut noise = NoiseSource::white(
-                (self.accel_noise, self.gyro_noise),
+            let rate_hz = self.interval.recip();
+            noise = Some(NoiseSource::white(
+                &declared,
                 0.0,
-                self.interval.recip(),
+                rate_hz,
                 seed,
                 "estimated",
-            )?;
-            for reading in &mut readings {
-                let added = noise.draw();
-                *reading = Reading {
-                    specific_force: reading.specific_force + added.specific_force,
-                    angular_velocity: reading.angular_velocity + added.angular_velocity,
-                };
-            }
+            )?);
         }
-        model.digital(&mut readings);
+        let input = MeasurementInput::IdealReadings(ideal);
+        let readings = model.measure(input, &stamps, |readings| {
+            noise.iter_mut().for_each(|noise| noise.add_to(readings));
+        });
         let mut series = DeviceReadings::default();
         stamps
             .iter()
@@ -271,7 +271,11 @@ mod tests {
     /// A device of known noise and bias that rests, turns, and rests; every twentieth interval is
     /// three times as long.
     fn recorded(seed: u64) -> DeviceReadings {
-        let mut noise = NoiseSource::white((0.003, 0.0004), 0.0, 100.0, seed, "test").unwrap();
+        let known = DeclaredNoise {
+            accel_density: 0.003,
+            gyro_density: 0.0004,
+        };
+        let mut noise = NoiseSource::white(&known, 0.0, 100.0, seed, "test").unwrap();
         let (mut series, mut seconds) = (DeviceReadings::default(), 0.0_f64);
         for k in 0..3000 {
             let added = noise.draw();

@@ -9,7 +9,10 @@ use std::f64::consts::{PI, SQRT_2};
 use std::ops::Range;
 
 use cromosim_gap::{ImuSeries, PlacementRecord, PoseSeries};
-use cromosim_imu::{Dropouts, Effect, EffectKind, EffectSet, Reading, SensorModel, normal_pair};
+use cromosim_imu::{
+    DeclaredNoise, Dropouts, Effect, EffectKind, EffectSet, MeasurementInput, Reading, SensorModel,
+    normal_pair,
+};
 use cromosim_spatial::{Stamp, so3};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use rand::SeedableRng;
@@ -170,19 +173,18 @@ impl Scene {
         let track = self
             .motion
             .track(self.start, -MARGIN_S, self.seconds + MARGIN_S, GRID_HZ);
-        let mut readings = model.read(&model.sensor(model.tissue(model.segment(&track))), &stamps);
-        model.linear(&mut readings, &stamps);
-        let beyond = model.noise_density();
+        let beyond = model.total_noise(&DeclaredNoise::default());
         let sigma = [
-            SIGMA[0].hypot(beyond.0 * IMU_HZ.sqrt()),
-            SIGMA[1].hypot(beyond.1 * IMU_HZ.sqrt()),
+            SIGMA[0].hypot(beyond.accel_density * IMU_HZ.sqrt()),
+            SIGMA[1].hypot(beyond.gyro_density * IMU_HZ.sqrt()),
         ];
         let mut random = ChaCha12Rng::seed_from_u64(self.seed ^ 0xdece);
-        for reading in &mut readings {
-            reading.specific_force += normal_vector(&mut random) * sigma[0];
-            reading.angular_velocity += normal_vector(&mut random) * sigma[1];
-        }
-        model.digital(&mut readings);
+        let readings = model.measure(MeasurementInput::Motion(&track), &stamps, |readings| {
+            for reading in readings {
+                reading.specific_force += normal_vector(&mut random) * sigma[0];
+                reading.angular_velocity += normal_vector(&mut random) * sigma[1];
+            }
+        });
         let mut dropouts = Dropouts::new(self.effects.get(K::DroppedSamples), self.seed, "wrist");
         let there = |_: &(Stamp, Reading)| !dropouts.as_mut().is_some_and(Dropouts::next_is_lost);
         let (stamps, readings) = stamps.into_iter().zip(readings).filter(there).unzip();

@@ -2,19 +2,22 @@
 //! effect.
 //!
 //! With R, a, w the orientation, acceleration and angular velocity of the reference frame at the
-//! true time t, and the epoch t0:
+//! true time t, and the epoch t0, the stages ([`Stage`]) are, in the order of [`Stage::ORDER`]:
 //! ```text
-//! 1  f = R^T (a + alpha x l + w x (w x l) - g)                      lever_arm; reference_tilt, reference_scale, gravity_convention
-//! 2  f <- H f                                                       soft_tissue
-//! 3  f, w <- M R_mount^T f, M R_mount^T w                           mount_rotation, mount_slip, axis_convention
-//! 4  f += amplitude sin(2 pi hz (t - t0) + phase)                   vibration
-//! 5  w += G f                                                       gyro_g_sensitivity
-//! 6  second-order Butterworth, both channels                        low_pass
-//! 7  x <- diag(scale) (I + upper) x + bias + rate (t - t0)          scale, misalignment, bias, bias_drift
-//! 8  white noise, clip, round, times factor                         noise, saturation, quantization, units
-//! 9  stamp = t0 + (t - t0) (1 + ppm 1e-6) + seconds; samples drop   clock_drift, time_offset, dropped_samples
+//! Segment  f = R^T (a + alpha x l + w x (w x l) - g)                 lever_arm; reference_tilt, reference_scale, gravity_convention
+//! Tissue   f <- H f                                                  soft_tissue
+//! Sensor   f, w <- M R_mount^T f, M R_mount^T w                      mount_rotation, mount_slip, axis_convention
+//!          f += amplitude sin(2 pi hz (t - t0) + phase)              vibration
+//!          w += G f                                                  gyro_g_sensitivity
+//!          second-order Butterworth, both channels                   low_pass
+//! Timing   stamp = t0 + (t - t0) (1 + ppm 1e-6) + seconds            clock_drift, time_offset; dropped_samples
+//! Linear   x <- diag(scale) (I + upper) x + bias + rate (t - t0)     scale, misalignment, bias, bias_drift
+//! Digital  white noise, clip, round, times factor                    noise, saturation, quantization, units
 //! ```
 //! [`SensorModel`] runs them over a whole recording, [`crate::StreamingEffects`] over live samples.
+//! A recording adds the vibration with the timing, in closed form and as the low-pass leaves it, so
+//! that a fit of its parameters repeats nothing on the grid; its effect therefore has
+//! [`Stage::Timing`].
 
 mod axis_convention;
 mod bias;
@@ -34,6 +37,7 @@ mod mount_rotation;
 mod mount_slip;
 mod noise;
 mod quantization;
+mod readout;
 mod reference_noise;
 mod reference_scale;
 mod reference_smoothing;
@@ -46,6 +50,7 @@ mod search;
 mod serde_impl;
 mod soft_tissue;
 mod spec;
+mod stages;
 mod streaming;
 mod time_offset;
 mod units;
@@ -77,6 +82,7 @@ pub use search::{
     Rounding, Search,
 };
 pub use spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+pub use stages::{MeasurementInput, StagedReadings};
 pub use streaming::StreamingEffects;
 pub use units::unit_factors;
 pub use vibration::{SpectralLine, strongest_line};

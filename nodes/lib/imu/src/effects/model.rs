@@ -7,12 +7,13 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::clock_drift::Clock;
 use super::filter::SecondOrder;
+use super::readout::Readout;
 use super::vibration::SpectralLine;
 use super::{
-    Effect, EffectKind, EffectSet, Reading, gravity_convention, lever_arm, low_pass, misalignment,
-    mount_rotation, mount_slip, quantization, reference_tilt, sampling, saturation,
+    DeclaredNoise, Effect, EffectKind, EffectSet, Reading, gravity_convention, lever_arm, low_pass,
+    mount_rotation, mount_slip, reference_tilt, sampling,
 };
-use crate::GRAVITY_IN_WORLD;
+use crate::{Channel, GRAVITY_IN_WORLD};
 
 /// Both channels on a uniform grid of true time.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -27,12 +28,9 @@ pub struct GridTrace {
     pub angular_velocity: Vec<Vector3<f64>>,
 }
 
-/// The deterministic part of an [`EffectSet`], ready to run; the stages in the order of the
-/// measurement model, see [`crate::effects`].
-///
-/// ```text
-/// segment -> tissue -> sensor -> read -> linear -> (white noise) -> digital
-/// ```
+/// The deterministic part of an [`EffectSet`], ready to run: what each [`super::Stage`] of the
+/// measurement model does to a recording. [`super::Stage::ORDER`] says in which order, and
+/// [`SensorModel::measure`] and [`super::StagedReadings`] follow it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SensorModel {
     pub(super) epoch: Stamp,
@@ -54,70 +52,12 @@ pub struct SensorModel {
     pub(super) gyroscope: Readout,
 }
 
-/// The last two stages of one channel: linear errors, and those of its converter and driver.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Readout {
-    /// `diag(scale) (I + upper)`.
-    matrix: Option<Matrix3<f64>>,
-    bias: Vector3<f64>,
-    drift: Vector3<f64>,
-    density: f64,
-    limit: f64,
-    lsb: f64,
-    factor: f64,
-}
-
-impl Readout {
-    fn new(
-        effects: &EffectSet,
-        [bias, scale, misaligned, noise, drift, limit, lsb, factor]: [EffectKind; 8],
-    ) -> Self {
-        let scalar = |kind: EffectKind| {
-            effects
-                .get(kind)
-                .map_or(kind.spec().parameters[0].neutral[0], |effect| {
-                    effect.scalar(0)
-                })
-        };
-        let vector = |kind| effects.get(kind).map(|effect| effect.vector(0));
-        let gains = vector(scale).map(|scale| Matrix3::from_diagonal(&scale));
-        let cross = vector(misaligned).map(|upper| misalignment::matrix(&upper));
-        let matrix = match (gains, cross) {
-            (Some(gains), Some(cross)) => Some(gains * cross),
-            (gains, cross) => gains.or(cross),
-        };
-        let [density, limit, lsb, factor] = [noise, limit, lsb, factor].map(scalar);
-        Self {
-            matrix,
-            bias: vector(bias).unwrap_or_default(),
-            drift: vector(drift).unwrap_or_default(),
-            density,
-            limit,
-            lsb,
-            factor,
-        }
-    }
-
-    /// 7.
-    #[inline]
-    pub(super) fn linear(&self, value: &Vector3<f64>, seconds: f64) -> Vector3<f64> {
-        self.matrix.map_or(*value, |matrix| matrix * value) + self.bias + self.drift * seconds
-    }
-
-    /// 8, after the noise.
-    #[inline]
-    pub(super) fn digital(&self, value: &Vector3<f64>) -> Vector3<f64> {
-        value.map(|value| {
-            quantization::round(saturation::clip(value, self.limit), self.lsb) * self.factor
-        })
-    }
-}
-
 impl SensorModel {
     /// Parses effects once; what depends on time is anchored at the epoch.
     pub fn new(effects: &EffectSet, epoch: Stamp) -> Self {
         use EffectKind as Kind;
         let vector = |kind, index| effects.get(kind).map(|effect| effect.vector(index));
+        let scalar = |kind| effects.get(kind).map(|effect| effect.scalar(0));
         let mount = vector(Kind::MountRotation, 0)
             .map(|rotvec| mount_rotation::sensor_from_segment(&rotvec));
         let axes = effects.get(Kind::AxisConvention).map(Effect::matrix);
@@ -134,17 +74,13 @@ impl SensorModel {
                 axes.unwrap_or_else(Matrix3::identity) * turned,
             )
         };
-        let mode = effects
-            .get(Kind::GravityConvention)
-            .map_or(0.0, |effect| effect.scalar(0));
+        let mode = scalar(Kind::GravityConvention).unwrap_or(0.0);
         let gravity = vector(Kind::ReferenceTilt, 0)
             .map_or(GRAVITY_IN_WORLD, |rotvec| reference_tilt::gravity(&rotvec));
         Self {
             epoch,
             gravity: gravity * gravity_convention::gravity_factor(mode),
-            inverse_scale: effects
-                .get(Kind::ReferenceScale)
-                .map_or(1.0, |effect| effect.scalar(0).recip()),
+            inverse_scale: scalar(Kind::ReferenceScale).map_or(1.0, f64::recip),
             lever_arm: vector(Kind::LeverArm, 0),
             tissue: effects
                 .get(Kind::SoftTissue)
@@ -157,46 +93,18 @@ impl SensorModel {
                 .and_then(|effect| filter(effect, low_pass::DAMPING_RATIO, false)),
             vibration: effects.get(Kind::Vibration).and_then(Effect::spectral_line),
             clock: Clock {
-                offset: effects
-                    .get(Kind::TimeOffset)
-                    .map_or(0.0, |effect| effect.scalar(0)),
-                ppm: effects
-                    .get(Kind::ClockDrift)
-                    .map_or(0.0, |effect| effect.scalar(0)),
+                offset: scalar(Kind::TimeOffset).unwrap_or(0.0),
+                ppm: scalar(Kind::ClockDrift).unwrap_or(0.0),
             },
-            accelerometer: Readout::new(
-                effects,
-                [
-                    Kind::AccelBias,
-                    Kind::AccelScale,
-                    Kind::AccelMisalignment,
-                    Kind::AccelNoise,
-                    Kind::AccelBiasDrift,
-                    Kind::AccelSaturation,
-                    Kind::AccelQuantization,
-                    Kind::AccelUnits,
-                ],
-            ),
-            gyroscope: Readout::new(
-                effects,
-                [
-                    Kind::GyroBias,
-                    Kind::GyroScale,
-                    Kind::GyroMisalignment,
-                    Kind::GyroNoise,
-                    Kind::GyroBiasDrift,
-                    Kind::GyroSaturation,
-                    Kind::GyroQuantization,
-                    Kind::GyroUnits,
-                ],
-            ),
+            accelerometer: Readout::new(effects, Channel::Accelerometer),
+            gyroscope: Readout::new(effects, Channel::Gyroscope),
         }
     }
 
-    /// Specific force of the segment at the lever arm, with tilt and scale of the reference undone
-    /// (1); segment axes: `f = a / s + alpha x l + w x (w x l) - c R^T T g`, c = 1, 0 (removed) or
+    /// [`super::Stage::Segment`]: specific force of the segment at the lever arm, with tilt and scale
+    /// of the reference undone; segment axes: `f = a / s + alpha x l + w x (w x l) - c R^T T g`, c = 1, 0 (removed) or
     /// -1 (negated).
-    pub fn segment(&self, track: &KinematicTrack) -> GridTrace {
+    pub(super) fn segment(&self, track: &KinematicTrack) -> GridTrace {
         let motion = track
             .acceleration_in_segment
             .iter()
@@ -225,20 +133,21 @@ impl SensorModel {
         }
     }
 
-    /// Soft tissue under the sensor (2): on the specific force alone.
-    pub fn tissue(&self, mut trace: GridTrace) -> GridTrace {
+    /// [`super::Stage::Tissue`]: soft tissue under the sensor, on the specific force alone.
+    pub(super) fn tissue(&self, mut trace: GridTrace) -> GridTrace {
         if let Some(filter) = &self.tissue {
             filter.apply(&mut trace.specific_force, trace.rate_hz);
         }
         trace
     }
 
-    /// Mount and axes (3), coupling (5) and low-pass (6), without the vibration; sensor axes.
+    /// [`super::Stage::Sensor`]: mount, axes, coupling and low-pass, without the vibration; sensor
+    /// axes.
     ///
-    /// Where the mount slips, the axes stay the segment's and [`SensorModel::read`] turns and
+    /// Where the mount slips, the axes stay the segment's and [`SensorModel::sample`] turns and
     /// couples each reading: all of these are linear and constant but for the slip, so their order
     /// does not matter but for what the low-pass remembers across it.
-    pub fn sensor(&self, mut trace: GridTrace) -> GridTrace {
+    pub(super) fn sensor(&self, mut trace: GridTrace) -> GridTrace {
         if self.slip.is_none() && (self.sensor_from_segment.is_some() || self.coupling.is_some()) {
             for (specific_force, angular_velocity) in trace
                 .specific_force
@@ -263,7 +172,7 @@ impl SensorModel {
         trace
     }
 
-    /// 3 and 5.
+    /// A reading in sensor axes, with the coupling.
     #[inline]
     pub(super) fn turned(
         &self,
@@ -286,9 +195,10 @@ impl SensorModel {
         }
     }
 
-    /// Readings at the true times of the stamps (9), with the vibration (4) in closed form; `trace`
-    /// is that of [`SensorModel::sensor`]. Before and after the grid its ends are held.
-    pub fn read(&self, trace: &GridTrace, stamps: &[Stamp]) -> Vec<Reading> {
+    /// [`super::Stage::Timing`]: readings at the true times of the stamps, with the vibration in
+    /// closed form; `trace` is that of [`SensorModel::sensor`]. Before and after the grid its ends
+    /// are held.
+    pub(super) fn sample(&self, trace: &GridTrace, stamps: &[Stamp]) -> Vec<Reading> {
         let start = trace.start - self.epoch;
         let vibration = self.vibration.map(|line| match &self.low_pass {
             Some(filter) => line.filtered(low_pass::response(filter.natural_hz, line.hz)),
@@ -328,35 +238,37 @@ impl SensorModel {
         stamps.iter().map(read).collect()
     }
 
-    /// Scale, misalignment, bias and drift (7).
-    pub fn linear(&self, readings: &mut [Reading], stamps: &[Stamp]) {
+    /// [`super::Stage::Linear`]: scale, misalignment, bias and drift.
+    pub(super) fn linear(&self, readings: &mut [Reading], stamps: &[Stamp]) {
         for (reading, stamp) in readings.iter_mut().zip(stamps) {
             let seconds = self.clock.true_seconds(*stamp - self.epoch);
-            reading.specific_force = self.accelerometer.linear(&reading.specific_force, seconds);
-            reading.angular_velocity = self.gyroscope.linear(&reading.angular_velocity, seconds);
+            *reading = self.linear_reading(reading, seconds);
         }
     }
 
-    /// White noise beyond the declared, (m/s2)/sqrt(Hz) and (rad/s)/sqrt(Hz); variances add.
-    pub fn noise_density(&self) -> (f64, f64) {
-        (self.accelerometer.density, self.gyroscope.density)
+    /// The same for one reading, true seconds since the epoch.
+    #[inline]
+    pub(super) fn linear_reading(&self, reading: &Reading, seconds: f64) -> Reading {
+        Reading {
+            specific_force: self.accelerometer.linear(&reading.specific_force, seconds),
+            angular_velocity: self.gyroscope.linear(&reading.angular_velocity, seconds),
+        }
     }
 
-    /// Saturation, quantisation and units (8, after the noise).
-    pub fn digital(&self, readings: &mut [Reading]) {
+    /// White noise of the readings: the declared and what effects add to it; variances add.
+    pub fn total_noise(&self, declared: &DeclaredNoise) -> DeclaredNoise {
+        DeclaredNoise {
+            accel_density: declared.accel_density.hypot(self.accelerometer.density),
+            gyro_density: declared.gyro_density.hypot(self.gyroscope.density),
+        }
+    }
+
+    /// [`super::Stage::Digital`]: saturation, quantisation and units, after the noise.
+    pub(super) fn digital(&self, readings: &mut [Reading]) {
         for reading in readings {
             reading.specific_force = self.accelerometer.digital(&reading.specific_force);
             reading.angular_velocity = self.gyroscope.digital(&reading.angular_velocity);
         }
-    }
-
-    /// All stages without noise.
-    pub fn run(&self, track: &KinematicTrack, stamps: &[Stamp]) -> Vec<Reading> {
-        let trace = self.sensor(self.tissue(self.segment(track)));
-        let mut readings = self.read(&trace, stamps);
-        self.linear(&mut readings, stamps);
-        self.digital(&mut readings);
-        readings
     }
 }
 

@@ -94,7 +94,10 @@ fn neutral_effects_change_nothing() {
     let nominal = run(&[], &track, &stamps);
     for kind in EffectKind::ALL {
         let model = SensorModel::new(&EffectSet::new().with(Effect::neutral(kind)), START);
-        assert_eq!(model.noise_density(), (0.0, 0.0));
+        assert_eq!(
+            model.total_noise(&super::DeclaredNoise::default()),
+            super::DeclaredNoise::default()
+        );
         close(&model.run(&track, &stamps), |k| nominal[k], 1e-12);
     }
     let held = (&nominal[0], &nominal[nominal.len() - 1]);
@@ -246,8 +249,8 @@ fn each_reading_is_scaled_shifted_and_made_digital_as_by_hand() {
         &set(&[(Kind::AccelNoise, &[0.02]), (Kind::GyroNoise, &[0.003])]),
         START,
     )
-    .noise_density();
-    assert_eq!(density, (0.02, 0.003));
+    .total_noise(&super::DeclaredNoise::default());
+    assert_eq!((density.accel_density, density.gyro_density), (0.02, 0.003));
 }
 
 #[test]

@@ -4,23 +4,23 @@ use super::EffectKind;
 use super::search::Search;
 use crate::Channel;
 
-/// Where in the measurement an effect acts; effects of a stage leave the results of the stages
-/// before it as they are.
+/// Where in the measurement an effect acts, see [`crate::effects`] for the equations; effects of a
+/// stage leave the results of the stages before it as they are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Stage {
-    /// In the reference, not in the device.
+    /// In the reference, not in the device: undone before the others run.
     Reference,
-    /// Specific force of the rigid segment, on the grid (1).
+    /// Specific force of the rigid segment, on the motion's grid.
     Segment,
-    /// Soft tissue, on the grid (2).
+    /// Soft tissue under the sensor, on the grid.
     Tissue,
-    /// Mount, axes, coupling and low-pass, on the grid (3, 5, 6).
+    /// Mount, axes, coupling and low-pass, on the grid.
     Sensor,
-    /// Clock, and the vibration in closed form, while sampling (9, 4).
+    /// The device's clock, and the vibration in closed form: from the grid to the stamps.
     Timing,
-    /// Scale, misalignment, bias and drift of each reading (7).
+    /// Scale, misalignment, bias and drift of each reading.
     Linear,
-    /// Noise, saturation, quantisation and units (8).
+    /// Noise, saturation, quantisation and units.
     Digital,
 }
 

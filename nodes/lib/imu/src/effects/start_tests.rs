@@ -6,13 +6,17 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::model_tests::{START, set, track};
 use super::{
-    Effect, EffectKind as Kind, EffectSet, FirstGuess, Reading, ResidualView, Search, SensorModel,
-    clipping_limit, lattice_spacing, nearest_signed_permutation, white_noise_density,
+    DeclaredNoise, Effect, EffectKind as Kind, EffectSet, FirstGuess, MeasurementInput, Reading,
+    ResidualView, Search, SensorModel, clipping_limit, lattice_spacing, nearest_signed_permutation,
+    white_noise_density,
 };
 use crate::{Channel, NoiseSource};
 
 const RATE_HZ: f64 = 100.0;
-const NOISE: (f64, f64) = (0.002, 0.0003);
+const NOISE: DeclaredNoise = DeclaredNoise {
+    accel_density: 0.002,
+    gyro_density: 0.0003,
+};
 
 struct Case {
     stamps: Vec<Stamp>,
@@ -26,23 +30,10 @@ fn case(effects: &[(Kind, &[f64])]) -> Case {
     let stamps = uniform_stamps(START, START.plus_seconds(39.0), RATE_HZ).unwrap();
     let simulated = SensorModel::new(&EffectSet::new(), START).run(&track, &stamps);
     let model = SensorModel::new(&set(effects), START);
-    let mut measured = model.read(&model.sensor(model.tissue(model.segment(&track))), &stamps);
-    model.linear(&mut measured, &stamps);
-    let beyond = model.noise_density();
-    let mut noise = NoiseSource::white(
-        (NOISE.0.hypot(beyond.0), NOISE.1.hypot(beyond.1)),
-        0.0,
-        RATE_HZ,
-        7,
-        "wrist",
-    )
-    .unwrap();
-    for reading in &mut measured {
-        let drawn = noise.draw();
-        reading.specific_force += drawn.specific_force;
-        reading.angular_velocity += drawn.angular_velocity;
-    }
-    model.digital(&mut measured);
+    let mut noise =
+        NoiseSource::white(&model.total_noise(&NOISE), 0.0, RATE_HZ, 7, "wrist").unwrap();
+    let input = MeasurementInput::Motion(&track);
+    let measured = model.measure(input, &stamps, |readings| noise.add_to(readings));
     Case {
         stamps,
         measured,

@@ -5,8 +5,8 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use super::dropped_samples::Dropouts;
 use super::filter::Streamed;
-use super::{EffectKind, Reading, SensorModel, lever_arm};
-use crate::{Device, ImuError, ImuSample, KinematicSample, NoiseSource};
+use super::{EffectKind, Reading, SensorModel, Stage, lever_arm};
+use crate::{Channel, Device, ImuError, ImuSample, KinematicSample, NoiseSource, PerChannel};
 
 /// A device's effects and white noise on samples as they come; the stages of [`SensorModel`],
 /// sample by sample.
@@ -23,7 +23,7 @@ pub struct StreamingEffects {
     noise: Option<NoiseSource>,
     dropouts: Option<Dropouts>,
     tissue: Option<Streamed>,
-    low_pass: Option<[Streamed; 2]>,
+    low_pass: Option<PerChannel<Streamed>>,
     /// Stamp and angular velocity (segment axes) of the sample before.
     previous: Option<(Stamp, Vector3<f64>)>,
 }
@@ -41,16 +41,12 @@ impl StreamingEffects {
         placement: &str,
     ) -> Result<Self, ImuError> {
         let model = SensorModel::new(device.effects(), Stamp::default());
-        let beyond = model.noise_density();
-        let densities = (
-            device.accel_density().hypot(beyond.0),
-            device.gyro_density().hypot(beyond.1),
-        );
+        let noise = model.total_noise(&device.declared_noise());
         Ok(Self {
             device: device.clone(),
             rate_hz,
             noise: Some(NoiseSource::white(
-                densities,
+                &noise,
                 device.orientation_stddev(),
                 rate_hz,
                 seed,
@@ -64,7 +60,7 @@ impl StreamingEffects {
             tissue: model.tissue.map(Streamed::new),
             low_pass: model
                 .low_pass
-                .map(|filter| [filter, filter].map(Streamed::new)),
+                .map(|filter| PerChannel::from_fn(|_| Streamed::new(filter))),
             model: None,
             previous: None,
         })
@@ -90,10 +86,12 @@ impl StreamingEffects {
     /// Filters begin anew.
     fn forget(&mut self) {
         self.previous = None;
-        self.tissue
-            .iter_mut()
-            .chain(self.low_pass.iter_mut().flatten())
-            .for_each(Streamed::reset);
+        self.tissue.iter_mut().for_each(Streamed::reset);
+        if let Some(filters) = &mut self.low_pass {
+            Channel::ALL
+                .into_iter()
+                .for_each(|channel| filters[channel].reset());
+        }
     }
 
     /// The device's reading of a sample, by the device's own clock; none where it is lost. One call
@@ -115,16 +113,57 @@ impl StreamingEffects {
         if !(0.0..=10.0 / self.rate_hz).contains(&interval) {
             self.forget();
         }
-        let mut segment = self.segment(model, sample);
-        if let Some(filter) = &mut self.tissue {
-            segment.specific_force = filter.push(segment.specific_force, interval);
-        }
         let sensor_from_segment = model
             .slip
             .filter(|(at, _)| seconds >= *at)
             .map(|(_, after)| after)
             .or(model.sensor_from_segment);
-        let mut reading = model.turned(sensor_from_segment.as_ref(), &segment);
+        let mut reading = Reading::default();
+        let mut stamp = sample.stamp;
+        let mut world_from_sensor =
+            sample.world_from_sensor.rotation * orientation(sensor_from_segment.as_ref());
+        for stage in Stage::ORDER {
+            match stage {
+                Stage::Reference => {}
+                Stage::Segment => reading = self.segment(model, sample),
+                Stage::Tissue => {
+                    if let Some(filter) = &mut self.tissue {
+                        reading.specific_force = filter.push(reading.specific_force, interval);
+                    }
+                }
+                Stage::Sensor => {
+                    reading = model.turned(sensor_from_segment.as_ref(), &reading);
+                    self.shake_and_filter(model, &mut reading, seconds, interval);
+                }
+                Stage::Timing => {
+                    stamp = model.epoch.plus_seconds(model.clock.stamp_seconds(seconds));
+                }
+                Stage::Linear => reading = model.linear_reading(&reading, seconds),
+                Stage::Digital => {
+                    if let Some(noise) = &mut self.noise {
+                        noise.add_to(std::slice::from_mut(&mut reading));
+                        world_from_sensor *= noise.draw_turn();
+                    }
+                    model.digital(std::slice::from_mut(&mut reading));
+                }
+            }
+        }
+        ImuSample {
+            stamp,
+            world_from_sensor,
+            specific_force: reading.specific_force,
+            angular_velocity: reading.angular_velocity,
+        }
+    }
+
+    /// The vibration, with what the gyroscope feels of it, and the low-pass.
+    fn shake_and_filter(
+        &mut self,
+        model: &SensorModel,
+        reading: &mut Reading,
+        seconds: f64,
+        interval: f64,
+    ) {
         if let Some(line) = &model.vibration {
             let specific_force = line.at(seconds);
             reading.specific_force += specific_force;
@@ -132,38 +171,14 @@ impl StreamingEffects {
                 .coupling
                 .map_or_else(Vector3::zeros, |coupling| coupling * specific_force);
         }
-        if let Some([specific_force, angular_velocity]) = &mut self.low_pass {
-            reading = Reading {
-                specific_force: specific_force.push(reading.specific_force, interval),
-                angular_velocity: angular_velocity.push(reading.angular_velocity, interval),
-            };
-        }
-        let mut world_from_sensor =
-            sample.world_from_sensor.rotation * orientation(sensor_from_segment.as_ref());
-        reading = Reading {
-            specific_force: model.accelerometer.linear(&reading.specific_force, seconds),
-            angular_velocity: model.gyroscope.linear(&reading.angular_velocity, seconds),
-        };
-        if let Some(noise) = &mut self.noise {
-            let Reading {
-                specific_force,
-                angular_velocity,
-            } = noise.draw();
-            reading = Reading {
-                specific_force: reading.specific_force + specific_force,
-                angular_velocity: reading.angular_velocity + angular_velocity,
-            };
-            world_from_sensor *= noise.draw_turn();
-        }
-        ImuSample {
-            stamp: model.epoch.plus_seconds(model.clock.stamp_seconds(seconds)),
-            world_from_sensor,
-            specific_force: model.accelerometer.digital(&reading.specific_force),
-            angular_velocity: model.gyroscope.digital(&reading.angular_velocity),
+        if let Some(filters) = &mut self.low_pass {
+            for channel in Channel::ALL {
+                reading[channel] = filters[channel].push(reading[channel], interval);
+            }
         }
     }
 
-    /// 1, in segment axes.
+    /// [`Stage::Segment`]; in segment axes.
     fn segment(&mut self, model: &SensorModel, sample: &KinematicSample) -> Reading {
         let segment_from_world = sample.world_from_sensor.rotation.inverse();
         let angular_velocity = segment_from_world * sample.angular_velocity_in_world;

@@ -57,26 +57,50 @@ impl Scheme {
         }
     }
 
-    /// Frames that an estimate needs after (and before) its own; `None` for the spline, which has
-    /// no stencil.
-    pub(crate) fn reach(self) -> Option<usize> {
+    /// The scheme as one that estimates at a frame from its neighbours; `None` for the spline, which
+    /// is fitted to all frames and has no estimate of a single one.
+    pub(crate) fn stencil(self) -> Option<StencilScheme> {
         match self {
-            Self::Richardson => Some(2),
-            Self::NormalTracking | Self::Triangle | Self::SecondDifference => Some(1),
+            Self::Richardson => Some(StencilScheme::Richardson),
+            Self::NormalTracking => Some(StencilScheme::NormalTracking),
+            Self::Triangle => Some(StencilScheme::Triangle),
+            Self::SecondDifference => Some(StencilScheme::SecondDifference),
             Self::Spline => None,
         }
     }
+}
 
-    /// Acceleration and angular velocity (world axes) at frame `k` of `frames` by the scheme's
-    /// stencil; at the ends the stencil is one-sided and has one frame more. For schemes with a
-    /// reach.
+/// A scheme that estimates at a frame from the frames around it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum StencilScheme {
+    /// [`Scheme::Richardson`].
+    Richardson,
+    /// [`Scheme::NormalTracking`].
+    NormalTracking,
+    /// [`Scheme::Triangle`].
+    Triangle,
+    /// [`Scheme::SecondDifference`].
+    SecondDifference,
+}
+
+impl StencilScheme {
+    /// Frames that an estimate needs after its own frame, and as many before it.
+    pub(crate) fn reach(self) -> usize {
+        match self {
+            Self::Richardson => 2,
+            Self::NormalTracking | Self::Triangle | Self::SecondDifference => 1,
+        }
+    }
+
+    /// Acceleration and angular velocity (world axes) at frame `k` of `frames`; at the ends the
+    /// stencil is one-sided and has one frame more.
     pub(crate) fn at_frame(self, frames: &[SensorFrame], k: usize) -> (Vector3<f64>, Vector3<f64>) {
-        let stencil = Stencil::new(frames, k, self.reach().unwrap_or(1));
+        let stencil = Stencil::new(frames, k, self.reach());
         let angular_velocity = match self {
             Self::NormalTracking => normal_tracking::angular_velocity(&stencil),
             Self::Triangle => triangle::angular_velocity(&stencil),
             Self::SecondDifference => second_difference::angular_velocity(&stencil),
-            Self::Richardson | Self::Spline => richardson::angular_velocity(&stencil),
+            Self::Richardson => richardson::angular_velocity(&stencil),
         };
         (stencil.acceleration(), angular_velocity)
     }

@@ -64,6 +64,6 @@ impl<'a> SplineVariance<'a> {
     /// At a stamp within the frames.
     pub(crate) fn at(&self, stamp: Stamp) -> SampleVariance {
         let seconds = stamp - self.frames[0].stamp;
-        FrameWeights::of_spline(&self.position, &self.rotation, seconds).variance(self.frames)
+        FrameWeights::by_spline(&self.position, &self.rotation, seconds).variance(self.frames)
     }
 }

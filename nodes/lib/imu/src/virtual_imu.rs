@@ -1,0 +1,236 @@
+//! The one way from a placement's motion to its messages.
+//!
+//! ```text
+//! motion -> correction (networks) -> measurement (effects, noise, losses) -> mapping -> covariances -> messages
+//! ```
+//! Live and offline share all of it: [`VirtualImu::measure`] takes samples as they come,
+//! [`measure_recording`] a whole motion at given stamps; both end in the same messages.
+
+use cromosim_msgs::sensor_msgs::Imu;
+use cromosim_msgs::std_msgs::Header;
+use cromosim_spatial::{KinematicTrack, Stamp};
+use nalgebra::UnitQuaternion;
+
+use crate::{
+    Covariances, Device, Dropouts, EffectKind, ImuError, ImuSample, KinematicSample,
+    MeasurementInput, NoiseSource, PlacementEffects, Reading, SampleVariance, SensorModel,
+    StreamingEffects,
+};
+
+/// Changes a motion before it is measured: the place of learned networks.
+pub trait MotionCorrection {
+    /// Why it cannot.
+    type Error;
+
+    /// Takes the samples that each placement's scheme released, in order, and leaves those that are
+    /// corrected by now, these or earlier ones.
+    ///
+    /// # Errors
+    /// What the correction cannot work with.
+    fn correct(&mut self, motions: &mut [Vec<KinematicSample>]) -> Result<(), Self::Error>;
+}
+
+/// Changes readings after they are measured: the place of a distribution mapping.
+pub trait ReadingMapping: Send + Sync {
+    /// What stands in the messages instead of `reading`.
+    fn map(&self, reading: &Reading) -> Reading;
+}
+
+/// How a placement's IMU runs, whatever its motion comes from.
+pub struct ImuOptions {
+    /// Samples per second, Hz; noise per sample and its covariance follow from it.
+    pub rate_hz: f64,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// The name that the random numbers depend on: the placement's, after the body's where there
+    /// are several.
+    pub name: String,
+    /// The random part of the errors: white noise and lost samples. Without it biases and all other
+    /// effects stay.
+    pub noise: bool,
+    /// `header.frame_id` of the messages.
+    pub frame_id: String,
+    /// Applied last to the readings.
+    pub mapping: Option<Box<dyn ReadingMapping>>,
+}
+
+/// One sample in both forms of REP-145.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImuMessages {
+    /// For `imu/NAME/data_raw`: without orientation.
+    pub data_raw: Imu,
+    /// For `imu/NAME/data`: with orientation.
+    pub data: Imu,
+}
+
+/// The last steps: from a reading to messages.
+struct Output {
+    mapping: Option<Box<dyn ReadingMapping>>,
+    covariances: Covariances,
+    frame_id: String,
+}
+
+/// One placement's IMU: samples of its motion go in, in order of time, messages come out.
+pub struct VirtualImu {
+    effects: StreamingEffects,
+    output: Output,
+}
+
+impl VirtualImu {
+    /// The IMU of a device. Its effects are anchored at the first sample.
+    ///
+    /// # Errors
+    /// [`ImuError::Trajectory`] for a rate that is not positive.
+    pub fn new(device: &Device, options: ImuOptions) -> Result<Self, ImuError> {
+        let effects = StreamingEffects::new(device, options.rate_hz, options.seed, &options.name)?;
+        Ok(Self {
+            effects: if options.noise {
+                effects
+            } else {
+                effects.without_noise()
+            },
+            output: Output {
+                covariances: Covariances::for_device(device, options.rate_hz),
+                mapping: options.mapping,
+                frame_id: options.frame_id,
+            },
+        })
+    }
+
+    /// The messages of a sample; `None` where the device loses it.
+    pub fn measure(&mut self, motion: &KinematicSample) -> Option<ImuMessages> {
+        let sample = self.effects.step(motion)?;
+        Some(self.output.messages(sample, &motion.variance))
+    }
+
+    /// Begins anew with the next sample, see [`StreamingEffects::reset`].
+    pub fn reset(&mut self) {
+        self.effects.reset();
+    }
+}
+
+/// The messages that the samples of several placements lead to, each with its placement's number:
+/// first the correction, where there is one, then every sample through its placement's IMU.
+///
+/// # Errors
+/// Those of the correction.
+pub fn measure_all<C: MotionCorrection + ?Sized>(
+    imus: &mut [VirtualImu],
+    mut motions: Vec<Vec<KinematicSample>>,
+    correction: Option<&mut C>,
+) -> Result<Vec<(usize, ImuMessages)>, C::Error> {
+    if let Some(correction) = correction {
+        correction.correct(&mut motions)?;
+    }
+    let mut messages = Vec::new();
+    for (placement, (imu, motions)) in imus.iter_mut().zip(&motions).enumerate() {
+        let measured = motions.iter().filter_map(|motion| imu.measure(motion));
+        messages.extend(measured.map(|own| (placement, own)));
+    }
+    Ok(messages)
+}
+
+/// What [`measure_recording`] measures.
+#[derive(Clone, Copy, Debug)]
+pub struct RecordedMotion<'a> {
+    /// The motion of the reference frame.
+    pub track: &'a KinematicTrack,
+    /// When the IMU reads, by its own clock.
+    pub stamps: &'a [Stamp],
+    /// Whether the stamps are those of a recording, which has its losses in them already.
+    pub stamps_are_recorded: bool,
+}
+
+/// The messages (`data_raw`) of a whole motion at given stamps, with effects as a diagnosis states
+/// them. Unlike [`VirtualImu`] it filters on the motion's own grid and knows what comes after a
+/// sample.
+///
+/// # Errors
+/// [`ImuError::Trajectory`] for a rate that is not positive.
+pub fn measure_recording(
+    motion: RecordedMotion<'_>,
+    effects: &PlacementEffects,
+    options: ImuOptions,
+) -> Result<Vec<Imu>, ImuError> {
+    let ImuOptions {
+        rate_hz,
+        seed,
+        name,
+        noise,
+        frame_id,
+        mapping,
+    } = options;
+    let declared = effects.declared_noise;
+    let model = SensorModel::new(&effects.effects, effects.epoch);
+    let mut source = NoiseSource::white(&model.total_noise(&declared), 0.0, rate_hz, seed, &name)?;
+    let input = MeasurementInput::Motion(motion.track);
+    let readings = model.measure(input, motion.stamps, |readings| {
+        if noise {
+            source.add_to(readings);
+        }
+    });
+    let losses = effects.effects.get(EffectKind::DroppedSamples);
+    let mut dropouts = (noise && !motion.stamps_are_recorded)
+        .then(|| Dropouts::new(losses, seed, &name))
+        .flatten();
+    let device = Device::white(declared.accel_density, declared.gyro_density);
+    let output = Output {
+        mapping,
+        covariances: Covariances::for_device(&device, rate_hz),
+        frame_id,
+    };
+    let message = |(stamp, reading): (&Stamp, &Reading)| {
+        let lost = dropouts.as_mut().is_some_and(Dropouts::next_is_lost);
+        let sample = ImuSample {
+            stamp: *stamp,
+            world_from_sensor: UnitQuaternion::identity(),
+            specific_force: reading.specific_force,
+            angular_velocity: reading.angular_velocity,
+        };
+        let exact = SampleVariance::default();
+        (!lost).then(|| output.messages(sample, &exact).data_raw)
+    };
+    Ok(motion
+        .stamps
+        .iter()
+        .zip(&readings)
+        .filter_map(message)
+        .collect())
+}
+
+impl Output {
+    fn messages(&self, mut sample: ImuSample, variance: &SampleVariance) -> ImuMessages {
+        if let Some(mapping) = &self.mapping {
+            let mapped = mapping.map(&Reading {
+                specific_force: sample.specific_force,
+                angular_velocity: sample.angular_velocity,
+            });
+            (sample.specific_force, sample.angular_velocity) =
+                (mapped.specific_force, mapped.angular_velocity);
+        }
+        let covariances = self.covariances.with_motion(variance, &sample);
+        let raw = covariances.without_orientation();
+        let none = UnitQuaternion::identity();
+        ImuMessages {
+            data_raw: self.message(&sample, none, &raw),
+            data: self.message(&sample, sample.world_from_sensor, &covariances),
+        }
+    }
+
+    fn message(
+        &self,
+        sample: &ImuSample,
+        orientation: UnitQuaternion<f64>,
+        covariances: &Covariances,
+    ) -> Imu {
+        Imu {
+            header: Header::new(sample.stamp.nanos, &self.frame_id),
+            orientation: orientation.into(),
+            orientation_covariance: covariances.orientation,
+            angular_velocity: sample.angular_velocity.into(),
+            angular_velocity_covariance: covariances.angular_velocity,
+            linear_acceleration: sample.specific_force.into(),
+            linear_acceleration_covariance: covariances.linear_acceleration,
+        }
+    }
+}
