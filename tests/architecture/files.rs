@@ -76,9 +76,7 @@ const STILL_CIRCULAR: &[&str] = &[
     "nodes/lib/gap/",
     "nodes/lib/imu/",
     "nodes/lib/learned/",
-    "nodes/lib/motion/",
     "nodes/lib/recording/",
-    "nodes/lib/video/",
     "nodes/bin/cromosim/",
 ];
 
@@ -201,9 +199,7 @@ const STILL_LONG: &[&str] = &[
     "nodes/lib/gap/",
     "nodes/lib/imu/",
     "nodes/lib/learned/",
-    "nodes/lib/motion/",
     "nodes/lib/recording/",
-    "nodes/lib/video/",
     "nodes/bin/cromosim/",
     "nodes/bin/virtual_imu/",
 ];
@@ -241,7 +237,4 @@ fn files_are_read_in_a_sitting() {
 }
 
 /// Files that are not divided yet.
-const STILL_LONG_FILES: &[&str] = &[
-    "nodes/lib/recording/tests/datasets.rs",
-    "nodes/lib/motion/tests/poses.rs",
-];
+const STILL_LONG_FILES: &[&str] = &[];
