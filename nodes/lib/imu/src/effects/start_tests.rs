@@ -102,7 +102,11 @@ fn what_is_read_off_is_not_found_where_it_is_not() {
 #[test]
 fn noise_is_estimated() {
     let still = |density: f64| -> Vec<Reading> {
-        let mut noise = NoiseSource::white((density, 0.1 * density), 0.0, RATE_HZ, 7, "wrist");
+        let declared = DeclaredNoise {
+            accel_density: density,
+            gyro_density: 0.1 * density,
+        };
+        let mut noise = NoiseSource::white(&declared, 0.0, RATE_HZ, 7, "wrist");
         let noise = noise.as_mut().unwrap();
         (0..4000).map(|_| noise.draw()).collect()
     };
