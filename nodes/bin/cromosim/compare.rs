@@ -1,9 +1,6 @@
 //! `cromosim compare A B`: what differs between two diagnoses, or between the IMUs of two
 //! recordings.
 
-mod diagnoses;
-mod recordings;
-
 use std::fs::{self, File};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -12,6 +9,7 @@ use anyhow::{Context, bail, ensure};
 use clap::Args;
 use cromosim_bag::BagReader;
 use cromosim_gap::{Diagnosis, SCHEMA};
+use cromosim_recording::compare::{compare_diagnoses, compare_recordings};
 
 /// Say what differs between two diagnoses, or between the IMUs of two recordings
 #[derive(Args)]
@@ -45,8 +43,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let (a, b) = (open(&arguments.a)?, open(&arguments.b)?);
     println!("A  {}\nB  {}", arguments.a.display(), arguments.b.display());
     let found = match (&a, &b) {
-        (Side::Diagnosis(a), Side::Diagnosis(b)) => diagnoses::compare(a, b)?,
-        (Side::Recording(a), Side::Recording(b)) => recordings::compare(a, b)?,
+        (Side::Diagnosis(a), Side::Diagnosis(b)) => compare_diagnoses(a, b)?,
+        (Side::Recording(a), Side::Recording(b)) => compare_recordings(a, b)?,
         _ => {
             bail!(
                 "{} is {} and {} is {}; two of a kind can be compared",
@@ -57,9 +55,10 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
             )
         }
     };
+    print!("{}", found.text);
     if let Some(path) = &arguments.out {
         let text =
-            serde_json::to_string_pretty(&found).context("what was found is no JSON")? + "\n";
+            serde_json::to_string_pretty(&found.json).context("what was found is no JSON")? + "\n";
         fs::write(path, text).with_context(|| format!("{}: cannot be written", path.display()))?;
     }
     Ok(())
@@ -98,26 +97,4 @@ fn read_diagnosis(path: &Path) -> anyhow::Result<Side> {
         diagnosis.schema
     );
     Ok(Side::Diagnosis(diagnosis))
-}
-
-/// A number with so many significant digits; `-` for none.
-fn significant(value: f64, digits: i32) -> String {
-    if !value.is_finite() {
-        return "-".to_owned();
-    }
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    let exponent = value.abs().log10().floor() as i32;
-    if !(-5..=6).contains(&exponent) {
-        return format!("{value:.*e}", digits.max(1) as usize - 1);
-    }
-    format!("{value:.*}", (digits - 1 - exponent).max(0) as usize)
-}
-
-/// `x, y, z` of one side that the other lacks, as a line; nothing for none.
-fn print_only(side: &str, names: &[&str]) {
-    if !names.is_empty() {
-        println!("\nonly in {side}: {}", names.join(", "));
-    }
 }

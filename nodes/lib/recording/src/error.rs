@@ -89,6 +89,16 @@ pub enum RecordingError {
         /// Identifier of the body that the bag names.
         body: String,
     },
+    /// Two sides of a comparison that share nothing.
+    #[error("{what} in common: A has {a}; B has {b}")]
+    NothingInCommon {
+        /// Which sides, and what they lack.
+        what: &'static str,
+        /// Names that A has.
+        a: String,
+        /// Names that B has.
+        b: String,
+    },
     /// A file that is there already.
     #[error("{}: exists already; --force replaces it", path.display())]
     Exists {

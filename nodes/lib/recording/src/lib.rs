@@ -9,7 +9,7 @@
 //!   under the topics that every command and node knows: `/reference/NAME`, `/imu/NAME/data_raw`,
 //!   `/imu/NAME/data`. [`write_as_bag`] does so for a file of any of these kinds.
 //! - [`convert`](mod@convert) reads any file and writes any format; [`inspect`](mod@inspect) says
-//!   what is in a file.
+//!   what is in a file; [`compare`](mod@compare) says how two recordings or diagnoses differ.
 //! - [`smpl_pose`] and [`smpl_state`] fill a message from a motion's frame.
 //!
 //! Nothing here needs a ROS node: offline commands, training and evaluation read recordings by
@@ -17,6 +17,7 @@
 
 mod bag_file;
 mod body;
+pub mod compare;
 pub mod convert;
 pub mod datasets;
 mod error;

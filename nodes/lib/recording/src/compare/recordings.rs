@@ -3,7 +3,6 @@
 
 use std::collections::BTreeMap;
 
-use anyhow::bail;
 use cromosim_bag::BagReader;
 use cromosim_gap::monitor::{ImuReading, MonitorOptions, Pace, assess, noise_floors, pace};
 use cromosim_msgs::RosMessage;
@@ -11,7 +10,8 @@ use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_spatial::{Spectrum, Stamp, welch};
 use serde_json::{Value, json};
 
-use super::{print_only, significant};
+use super::text::{line, only_in, significant};
+use super::{Comparison, RecordingError};
 
 /// Length of a stretch that is looked at for rest, s.
 const REST_S: f64 = 1.0;
@@ -33,25 +33,33 @@ struct Series {
     rest: Option<([f64; 6], f64)>,
 }
 
-/// Prints the differences and gives them as JSON.
-pub(super) fn compare(a: &BagReader, b: &BagReader) -> anyhow::Result<Value> {
+/// What differs between the IMUs (`/imu/NAME/data_raw`) of two recordings: rates, losses, noise,
+/// readings at rest, spectra (dB), distributions (Wasserstein-1); where they overlap in time also the
+/// lag of A behind B and what is left of their difference.
+///
+/// # Errors
+/// Where they have no IMU in common, or a bag cannot be read.
+pub fn compare_recordings(a: &BagReader, b: &BagReader) -> Result<Comparison, RecordingError> {
+    let mut text = String::new();
+    let text = &mut text;
     let (topics_a, topics_b) = (topics(a), topics(b));
     let mut placements = serde_json::Map::new();
     for (name, topic) in &topics_a {
         let Some(other) = topics_b.get(name) else {
             continue;
         };
-        println!("\n{name}");
+        line!(text, "\n{name}");
         let (one, other) = (Series::read(a, topic)?, Series::read(b, other)?);
         if one.readings.len() < 2 || other.readings.len() < 2 {
-            println!(
+            line!(
+                text,
                 "  too few messages: A has {}, B has {}",
                 one.readings.len(),
                 other.readings.len()
             );
             continue;
         }
-        placements.insert(name.clone(), compare_series(&one, &other));
+        placements.insert(name.clone(), compare_series(text, &one, &other));
     }
     let lacking =
         |one: &BTreeMap<String, String>, other: &BTreeMap<String, String>| -> Vec<String> {
@@ -69,17 +77,26 @@ pub(super) fn compare(a: &BagReader, b: &BagReader) -> anyhow::Result<Value> {
                 topics.keys().cloned().collect::<Vec<_>>().join(", ")
             }
         };
-        bail!(
-            "the recordings have no IMU (/imu/NAME/data_raw) in common: A has {}; B has {}",
-            names(&topics_a),
-            names(&topics_b)
-        );
+        return Err(RecordingError::NothingInCommon {
+            what: "the recordings have no IMU (/imu/NAME/data_raw)",
+            a: names(&topics_a),
+            b: names(&topics_b),
+        });
     }
-    print_only("A", &only_a.iter().map(String::as_str).collect::<Vec<_>>());
-    print_only("B", &only_b.iter().map(String::as_str).collect::<Vec<_>>());
-    Ok(
-        json!({"kind": "recordings", "placements": placements, "only_in_a": only_a, "only_in_b": only_b}),
-    )
+    only_in(
+        text,
+        "A",
+        &only_a.iter().map(String::as_str).collect::<Vec<_>>(),
+    );
+    only_in(
+        text,
+        "B",
+        &only_b.iter().map(String::as_str).collect::<Vec<_>>(),
+    );
+    Ok(Comparison {
+        text: std::mem::take(text),
+        json: json!({"kind": "recordings", "placements": placements, "only_in_a": only_a, "only_in_b": only_b}),
+    })
 }
 
 /// Topics of IMUs by placement: `.../NAME/data_raw`, below `/imu` before others of the same name.
@@ -103,7 +120,7 @@ fn topics(reader: &BagReader) -> BTreeMap<String, String> {
 }
 
 impl Series {
-    fn read(reader: &BagReader, topic: &str) -> anyhow::Result<Self> {
+    fn read(reader: &BagReader, topic: &str) -> Result<Self, RecordingError> {
         let reading = |(_, imu): (Stamp, Imu)| {
             let (force, rate) = (imu.linear_acceleration, imu.angular_velocity);
             ImuReading {
@@ -165,12 +182,17 @@ fn rest(readings: &[ImuReading], rate_hz: f64, floors: [f64; 2]) -> Option<([f64
     (count > 0).then(|| (sum.map(|sum| sum / count as f64), count as f64 / rate_hz))
 }
 
-fn compare_series(a: &Series, b: &Series) -> Value {
-    println!("  {:26}{:>14}{:>14}{:>16}", "", "A", "B", "difference");
-    let row = |what: &str, one: String, other: String, difference: String| {
-        println!("  {what:26}{one:>14}{other:>14}{difference:>16}")
-    };
+fn compare_series(text: &mut String, a: &Series, b: &Series) -> Value {
+    line!(
+        text,
+        "  {:26}{:>14}{:>14}{:>16}",
+        "",
+        "A",
+        "B",
+        "difference"
+    );
     row(
+        text,
         "messages",
         a.readings.len().to_string(),
         b.readings.len().to_string(),
@@ -178,12 +200,14 @@ fn compare_series(a: &Series, b: &Series) -> Value {
     );
     let (rate_a, rate_b) = (a.pace.rate_hz, b.pace.rate_hz);
     row(
+        text,
         "rate, Hz",
         format!("{rate_a:.2}"),
         format!("{rate_b:.2}"),
         format!("{:+.2}", rate_b - rate_a),
     );
     row(
+        text,
         "dropped",
         a.pace.dropped.to_string(),
         b.pace.dropped.to_string(),
@@ -192,22 +216,27 @@ fn compare_series(a: &Series, b: &Series) -> Value {
     for (channel, (name, unit)) in CHANNELS.into_iter().enumerate() {
         let (one, other) = (a.floors[channel], b.floors[channel]);
         row(
+            text,
             &format!("{name} noise, {unit}"),
             significant(one, 3),
             significant(other, 3),
             format!("x {}", significant(other / one, 3)),
         );
     }
-    print_rest(a, b);
+    describe_rest(text, a, b);
     let mut channels = serde_json::Map::new();
-    println!(
+    line!(
+        text,
         "  {:26}{:>14}{:>30}",
-        "", "spectra, dB", "distributions (Wasserstein-1)"
+        "",
+        "spectra, dB",
+        "distributions (Wasserstein-1)"
     );
     for (channel, (name, unit)) in CHANNELS.into_iter().enumerate() {
         let (spectra_db, wasserstein) =
             (spectral_distance(a, b, channel), wasserstein(a, b, channel));
-        println!(
+        line!(
+            text,
             "  {:26}{:>14}{:>30}",
             format!("{name}, apart by"),
             significant(spectra_db, 3),
@@ -218,7 +247,7 @@ fn compare_series(a: &Series, b: &Series) -> Value {
             json!({"log_spectral_distance_db": spectra_db, "wasserstein": wasserstein}),
         );
     }
-    json!({"a": described(a), "b": described(b), "channels": channels, "overlap": overlap(a, b)})
+    json!({"a": described(a), "b": described(b), "channels": channels, "overlap": overlap(text, a, b)})
 }
 
 fn described(series: &Series) -> Value {
@@ -229,14 +258,24 @@ fn described(series: &Series) -> Value {
     })
 }
 
-fn print_rest(a: &Series, b: &Series) {
+fn row(text: &mut String, what: &str, one: String, other: String, difference: String) {
+    line!(text, "  {what:26}{one:>14}{other:>14}{difference:>16}");
+}
+
+fn describe_rest(text: &mut String, a: &Series, b: &Series) {
     let seconds = |series: &Series| {
         series.rest.map_or_else(
             || "none".to_owned(),
             |(_, seconds)| format!("{seconds:.0} s"),
         )
     };
-    println!("  {:26}{:>14}{:>14}", "at rest for", seconds(a), seconds(b));
+    line!(
+        text,
+        "  {:26}{:>14}{:>14}",
+        "at rest for",
+        seconds(a),
+        seconds(b)
+    );
     let (Some((one, _)), Some((other, _))) = (a.rest, b.rest) else {
         return;
     };
@@ -247,12 +286,16 @@ fn print_rest(a: &Series, b: &Series) {
             .sum::<f64>()
             .sqrt()
     };
-    let line = |what: &str, one: f64, other: f64| {
-        println!("  {what:26}{one:>14.5}{other:>14.5}{:>+16.5}", other - one)
+    let mut numbers = |what: &str, one: f64, other: f64| {
+        line!(
+            text,
+            "  {what:26}{one:>14.5}{other:>14.5}{:>+16.5}",
+            other - one
+        )
     };
-    line("  accel, norm, m/s2", norm(one), norm(other));
+    numbers("  accel, norm, m/s2", norm(one), norm(other));
     for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-        line(
+        numbers(
             &format!("  gyro {name}, rad/s"),
             one[axis + 3],
             other[axis + 3],
@@ -310,13 +353,16 @@ fn wasserstein(a: &Series, b: &Series, channel: usize) -> f64 {
 
 /// Lag of A behind B by the correlation of |w|, and what is left of the difference once it is taken
 /// out; null without common stamps.
-fn overlap(a: &Series, b: &Series) -> Value {
+fn overlap(text: &mut String, a: &Series, b: &Series) -> Value {
     let options = MonitorOptions {
         largest_lag_s: 1.0,
         ..MonitorOptions::default()
     };
     let Some(plain) = assess(&a.readings, &b.readings, &options) else {
-        println!("  they have no stamps in common: no lag, no difference sample by sample");
+        line!(
+            text,
+            "  they have no stamps in common: no lag, no difference sample by sample"
+        );
         return Value::Null;
     };
     let lag = plain.lag_s.unwrap_or(0.0);
@@ -336,19 +382,21 @@ fn overlap(a: &Series, b: &Series) -> Value {
             significant(gyro, 3)
         )
     };
-    println!(
+    line!(
+        text,
         "  common stamps: {} of A; RMSE of the difference {}",
         plain.compared,
         rmse(plain.accel_rmse, plain.gyro_rmse)
     );
     match plain.lag_s {
-        Some(lag) => println!(
+        Some(lag) => line!(
+            text,
             "  A is {:.1} ms {} B by the correlation of |w|; RMSE after that {}",
             1e3 * lag.abs(),
             if lag >= 0.0 { "behind" } else { "ahead of" },
             rmse(left.accel_rmse, left.gyro_rmse)
         ),
-        None => println!("  too little rotation to tell a lag"),
+        None => line!(text, "  too little rotation to tell a lag"),
     }
     json!({
         "compared": plain.compared, "accel_rmse": plain.accel_rmse, "gyro_rmse": plain.gyro_rmse, "lag_s": plain.lag_s,
@@ -394,7 +442,7 @@ mod tests {
     #[test]
     fn the_same_motion_late_is_a_lag_and_no_difference() {
         let (a, b) = (series(100.0, 0.05, 2.0, 0.0), series(125.0, 0.0, 2.0, 0.0));
-        let found = compare_series(&a, &b);
+        let found = compare_series(&mut String::new(), &a, &b);
         assert!(
             (found["overlap"]["lag_s"].as_f64().unwrap() - 0.05).abs() < 1e-3,
             "{found}"
@@ -413,7 +461,11 @@ mod tests {
 
     #[test]
     fn twice_the_motion_is_6_db_and_a_wider_distribution() {
-        let found = compare_series(&series(100.0, 0.0, 2.0, 3.0), &series(100.0, 0.0, 4.0, 3.0));
+        let found = compare_series(
+            &mut String::new(),
+            &series(100.0, 0.0, 2.0, 3.0),
+            &series(100.0, 0.0, 4.0, 3.0),
+        );
         let gyro = &found["channels"]["gyro"];
         assert!(
             (gyro["log_spectral_distance_db"].as_f64().unwrap() - 6.02).abs() < 0.1,
@@ -427,6 +479,7 @@ mod tests {
     #[test]
     fn recordings_of_other_times_are_still_compared() {
         let found = compare_series(
+            &mut String::new(),
             &series(100.0, 0.0, 2.0, 0.0),
             &series(100.0, 0.0, 2.0, 1000.0),
         );

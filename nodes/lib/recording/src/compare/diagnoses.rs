@@ -1,26 +1,32 @@
 //! Two diagnoses: which causes went, came, changed, and how far the gap has moved.
 
-use anyhow::bail;
 use cromosim_gap::{Cause, Diagnosis, Metrics, PlacementDiagnosis};
 use serde_json::{Value, json};
 
-use super::{print_only, significant};
+use super::text::{line, only_in, significant};
+use super::{Comparison, RecordingError};
 
 /// A parameter that moved by more standard errors than these has changed.
 const CHANGED: f64 = 3.0;
 
-/// Prints the differences and gives them as JSON.
-pub(super) fn compare(a: &Diagnosis, b: &Diagnosis) -> anyhow::Result<Value> {
+/// What differs between two diagnoses: for each placement the gaps, and which causes went, came or
+/// changed by more than three standard errors.
+///
+/// # Errors
+/// [`RecordingError::NothingInCommon`] where no placement is in both.
+pub fn compare_diagnoses(a: &Diagnosis, b: &Diagnosis) -> Result<Comparison, RecordingError> {
+    let mut text = String::new();
+    let text = &mut text;
     let mut placements = serde_json::Map::new();
     for (name, one) in &a.placements {
         let Some(other) = b.placements.get(name) else {
             continue;
         };
-        println!("\n{name}");
-        print_gap(one, other);
+        line!(text, "\n{name}");
+        describe_gap(text, one, other);
         placements.insert(
             name.clone(),
-            json!({"gap": gap(one, other), "causes": causes(one, other)}),
+            json!({"gap": gap(one, other), "causes": causes(text, one, other)}),
         );
     }
     if placements.is_empty() {
@@ -32,11 +38,11 @@ pub(super) fn compare(a: &Diagnosis, b: &Diagnosis) -> anyhow::Result<Value> {
                 .collect::<Vec<_>>()
                 .join(", ")
         };
-        bail!(
-            "the diagnoses have no placement in common: A has {}; B has {}",
-            names(a),
-            names(b)
-        );
+        return Err(RecordingError::NothingInCommon {
+            what: "the diagnoses have no placement",
+            a: names(a),
+            b: names(b),
+        });
     }
     let lacking = |one: &Diagnosis, other: &Diagnosis| -> Vec<String> {
         one.placements
@@ -46,17 +52,29 @@ pub(super) fn compare(a: &Diagnosis, b: &Diagnosis) -> anyhow::Result<Value> {
             .collect()
     };
     let (only_a, only_b) = (lacking(a, b), lacking(b, a));
-    print_only("A", &only_a.iter().map(String::as_str).collect::<Vec<_>>());
-    print_only("B", &only_b.iter().map(String::as_str).collect::<Vec<_>>());
-    Ok(
-        json!({"kind": "diagnoses", "placements": placements, "only_in_a": only_a, "only_in_b": only_b}),
-    )
+    only_in(
+        text,
+        "A",
+        &only_a.iter().map(String::as_str).collect::<Vec<_>>(),
+    );
+    only_in(
+        text,
+        "B",
+        &only_b.iter().map(String::as_str).collect::<Vec<_>>(),
+    );
+    Ok(Comparison {
+        text: std::mem::take(text),
+        json: json!({"kind": "diagnoses", "placements": placements, "only_in_a": only_a, "only_in_b": only_b}),
+    })
 }
 
-fn print_gap(a: &PlacementDiagnosis, b: &PlacementDiagnosis) {
-    println!(
+fn describe_gap(text: &mut String, a: &PlacementDiagnosis, b: &PlacementDiagnosis) {
+    line!(
+        text,
         "  {:18}{:>22}{:>22}",
-        "RMSE of the gap", "accel, m/s2", "gyro, rad/s"
+        "RMSE of the gap",
+        "accel, m/s2",
+        "gyro, rad/s"
     );
     for (side, placement) in [("A", a), ("B", b)] {
         let gap = &placement.gap;
@@ -71,7 +89,8 @@ fn print_gap(a: &PlacementDiagnosis, b: &PlacementDiagnosis) {
             change(|metrics| metrics.accel_rmse),
             change(|metrics| metrics.gyro_rmse),
         );
-        println!(
+        line!(
+            text,
             "  {:18}{accel:>22}{gyro:>22}",
             format!("{side} before -> after")
         );
@@ -83,7 +102,7 @@ fn gap(a: &PlacementDiagnosis, b: &PlacementDiagnosis) -> Value {
     json!({"a": both(a), "b": both(b)})
 }
 
-fn causes(a: &PlacementDiagnosis, b: &PlacementDiagnosis) -> Vec<Value> {
+fn causes(text: &mut String, a: &PlacementDiagnosis, b: &PlacementDiagnosis) -> Vec<Value> {
     let find = |placement: &PlacementDiagnosis, effect: &str| {
         placement
             .causes
@@ -94,7 +113,7 @@ fn causes(a: &PlacementDiagnosis, b: &PlacementDiagnosis) -> Vec<Value> {
     let mut found = Vec::new();
     for cause in &a.causes {
         let Some(now) = find(b, &cause.effect) else {
-            println!("  gone     {}", described(cause));
+            line!(text, "  gone     {}", described(cause));
             found.push(json!({"effect": cause.effect, "change": "gone", "a": cause}));
             continue;
         };
@@ -108,12 +127,13 @@ fn causes(a: &PlacementDiagnosis, b: &PlacementDiagnosis) -> Vec<Value> {
             format!(", by {errors:.1} standard errors")
         });
         match change {
-            "changed" => println!(
+            "changed" => line!(
+                text,
                 "  changed  {}\n        -> {}{by}",
                 described(cause),
                 described(&now)
             ),
-            _ => println!("  same     {}{by}", described(&now)),
+            _ => line!(text, "  same     {}{by}", described(&now)),
         }
         found.push(json!({"effect": cause.effect, "change": change, "standard_errors_moved": moved, "a": cause, "b": now}));
     }
@@ -122,11 +142,11 @@ fn causes(a: &PlacementDiagnosis, b: &PlacementDiagnosis) -> Vec<Value> {
         .iter()
         .filter(|cause| find(a, &cause.effect).is_none())
     {
-        println!("  new      {}", described(cause));
+        line!(text, "  new      {}", described(cause));
         found.push(json!({"effect": cause.effect, "change": "new", "b": cause}));
     }
     if a.causes.is_empty() && b.causes.is_empty() {
-        println!("  no causes in either");
+        line!(text, "  no causes in either");
     }
     found
 }
@@ -247,7 +267,7 @@ mod tests {
             cause("soft_tissue", 0.001),
             cause("low_pass", 0.0),
         ]);
-        let found = compare(&a, &b).unwrap();
+        let found = compare_diagnoses(&a, &b).unwrap().json;
         let causes = found["placements"]["wrist"]["causes"].as_array().unwrap();
         let changes: Vec<(&str, &str)> = causes
             .iter()
@@ -276,7 +296,7 @@ mod tests {
         let mut other = b.clone();
         other.placements = BTreeMap::from([("head".to_owned(), b.placements["wrist"].clone())]);
         assert!(
-            compare(&a, &other)
+            compare_diagnoses(&a, &other)
                 .unwrap_err()
                 .to_string()
                 .contains("A has wrist; B has head")
