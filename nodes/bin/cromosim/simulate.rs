@@ -10,14 +10,14 @@ use anyhow::{Context, bail};
 use cromosim_bag::{BagOptions, BagWriter, Compression};
 use cromosim_body::{BodyModel, ShapedBody};
 use cromosim_imu::{
-    Device, ImuOptions, MountedSensor, MountedSensors, PlacementSet, PoseStd, ReadingMapping,
-    Scheme, SensorTrajectory, VirtualImu, measure_all, simulate_kinematics_on,
+    Device, ImuOptions, MountedSensor, MountedSensors, PlacementSet, PoseStd, Scheme,
+    SensorTrajectory, VirtualImu, measure_all, simulate_kinematics_on,
 };
 use cromosim_learned::{LearnedSimulator, MappingFile, Patch, SiteMotion};
 use cromosim_motion::{MotionOptions, SmplMotion, embedded_walk, read_motion_for, read_people};
 use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_msgs::std_msgs::Header;
-use cromosim_recording::FIRST_STAMP;
+use cromosim_recording::{FIRST_STAMP, reading_mapping};
 use cromosim_spatial::{PoseTimes, uniform_stamps};
 use indicatif::ProgressBar;
 use rayon::prelude::*;
@@ -234,7 +234,7 @@ impl Setup {
             name: person.frame(name),
             noise: self.noise,
             frame_id: person.frame(&format!("{name}_imu")),
-            mapping: boxed(&self.mapping, name),
+            mapping: reading_mapping(&self.mapping, name),
         };
         let mut imu = [VirtualImu::new(device, options)?];
         let motion = simulate_kinematics_on(times, trajectory, placement.scheme(), &output)?;
@@ -304,12 +304,6 @@ fn names(placements: &PlacementSet) -> Vec<&str> {
         .iter()
         .map(cromosim_imu::Placement::name)
         .collect()
-}
-
-/// The mapping of a placement, where there is one.
-pub fn boxed(mapping: &MappingFile, placement: &str) -> Option<Box<dyn ReadingMapping>> {
-    let mapping = mapping.placements.get(placement)?;
-    Some(Box::new(mapping.clone()))
 }
 
 /// A mapping of these placements at least in part.

@@ -4,9 +4,11 @@ use std::path::PathBuf;
 
 use cromosim_bag::BagError;
 use cromosim_body::BodyError;
-use cromosim_imu::ImuError;
+use cromosim_imu::{EffectError, ImuError, Scheme};
+use cromosim_learned::LearnedError;
 use cromosim_motion::MotionError;
 use cromosim_msgs::{NotABody, NotARotation};
+use cromosim_spatial::SpatialError;
 
 use crate::rigid::RigidError;
 
@@ -88,6 +90,28 @@ pub enum RecordingError {
         path: PathBuf,
         /// Identifier of the body that the bag names.
         body: String,
+    },
+    /// A placement whose samples have no stamps.
+    #[error(
+        "{placement}: the recording has no /imu/{placement}/data_raw to take the stamps from; give --rate HZ"
+    )]
+    NoStamps {
+        /// Its name.
+        placement: String,
+    },
+    /// A reference that is too short or too irregular for the estimate of its motion.
+    #[error(
+        "the reference's motion cannot be estimated (--scheme spline does with two poses): {source}"
+    )]
+    NotEstimated {
+        /// What is wrong with its poses.
+        source: SpatialError,
+    },
+    /// A scheme together with a smoothing that only the estimate can undo.
+    #[error("--scheme {scheme} cannot undo reference_smoothing; leave --scheme out")]
+    CannotUndo {
+        /// The scheme.
+        scheme: Scheme,
     },
     /// Two sides of a comparison that share nothing.
     #[error("{what} in common: A has {a}; B has {b}")]
@@ -224,6 +248,15 @@ pub enum RecordingError {
     /// A placement, or its kinematics.
     #[error(transparent)]
     Imu(#[from] ImuError),
+    /// Effects that cannot be used.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
+    /// Networks or a mapping that cannot be used.
+    #[error(transparent)]
+    Learned(#[from] LearnedError),
+    /// Stamps that cannot be used.
+    #[error(transparent)]
+    Spatial(#[from] SpatialError),
     /// A motion file.
     #[error(transparent)]
     Motion(#[from] MotionError),

@@ -10,6 +10,7 @@
 //!   `/imu/NAME/data`. [`write_as_bag`] does so for a file of any of these kinds.
 //! - [`convert`](mod@convert) reads any file and writes any format; [`inspect`](mod@inspect) says
 //!   what is in a file; [`compare`](mod@compare) says how two recordings or diagnoses differ.
+//! - [`Resimulation`] gives the messages of its IMUs again, from the reference motion.
 //! - [`smpl_pose`] and [`smpl_state`] fill a message from a motion's frame.
 //!
 //! Nothing here needs a ROS node: offline commands, training and evaluation read recordings by
@@ -25,6 +26,7 @@ mod file;
 pub mod inspect;
 mod messages;
 mod placement;
+mod resimulation;
 pub mod rigid;
 mod trace;
 
@@ -35,6 +37,9 @@ pub use error::RecordingError;
 pub use file::{read_head, read_whole};
 pub use messages::{FIRST_STAMP, MessageHeader, smpl_pose, smpl_state, stamp_of_frame};
 pub use placement::{RecordedPlacement, read_placements, read_poses};
+pub use resimulation::{
+    Resimulation, outside_reference, read_effects, reading_mapping, with_stamps, write_resimulated,
+};
 pub use trace::{
     PlacementTrace, activities_csv, first_stamp, seconds_to_first_stamp, write_traces,
 };

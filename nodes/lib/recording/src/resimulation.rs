@@ -1,0 +1,306 @@
+//! The IMUs of a recording again, from its reference motion.
+
+use std::path::Path;
+
+use cromosim_bag::BagWriter;
+use cromosim_imu::{
+    DeclaredNoise, EffectKind, EffectSet, EffectsFile, ImuOptions, PlacementEffects,
+    ReadingMapping, RecordedMotion, Scheme, SensorTrajectory, measure_recording,
+    simulate_kinematics, track_in_sensor_axes,
+};
+use cromosim_learned::{LearnedSimulator, MappingFile, SiteMotion};
+use cromosim_msgs::geometry_msgs::PoseStamped;
+use cromosim_msgs::sensor_msgs::Imu;
+use cromosim_msgs::std_msgs::Header;
+use cromosim_spatial::{KinematicTrack, PoseEstimate, Stamp, uniform_stamps};
+
+use crate::{RecordedPlacement, RecordingError};
+
+/// How the IMUs of a recording are simulated again.
+#[derive(Default)]
+pub struct Resimulation {
+    /// The derivative scheme; none: the estimate of the motion that a diagnosis uses.
+    pub scheme: Option<Scheme>,
+    /// What errs at each placement; those that it does not name stay nominal.
+    pub effects: EffectsFile,
+    /// Networks that correct the kinematics; they need a scheme.
+    pub learned: Option<LearnedSimulator>,
+    /// Maps readings last, at the placements that it names.
+    pub mapping: MappingFile,
+    /// Messages per second where none were measured, Hz.
+    pub rate_hz: Option<f64>,
+    /// Of the noise.
+    pub seed: u64,
+    /// Whether the random part of the errors is there.
+    pub noise: bool,
+}
+
+/// The mapping of a placement, where there is one.
+pub fn reading_mapping(mapping: &MappingFile, placement: &str) -> Option<Box<dyn ReadingMapping>> {
+    let mapping = mapping.placements.get(placement)?;
+    Some(Box::new(mapping.clone()))
+}
+
+/// The placements whose samples have stamps, from messages or by a rate, and the names of the
+/// others; all where none has any.
+pub fn with_stamps(
+    recorded: Vec<RecordedPlacement>,
+    rate_hz: Option<f64>,
+) -> (Vec<RecordedPlacement>, Vec<String>) {
+    if rate_hz.is_some()
+        || recorded
+            .iter()
+            .all(|placement| placement.measured.is_empty())
+    {
+        return (recorded, Vec::new());
+    }
+    let (with, without): (Vec<_>, Vec<_>) = recorded
+        .into_iter()
+        .partition(|placement| !placement.measured.is_empty());
+    (
+        with,
+        without
+            .into_iter()
+            .map(|placement| placement.name)
+            .collect(),
+    )
+}
+
+/// The effects file; what it names must be there, while placements that it does not name stay
+/// nominal.
+///
+/// # Errors
+/// A file that cannot be read, or that names a placement which is not there.
+pub fn read_effects(
+    file: &Path,
+    recorded: &[RecordedPlacement],
+) -> Result<EffectsFile, RecordingError> {
+    let effects = EffectsFile::read(file)?;
+    let names: Vec<&str> = recorded
+        .iter()
+        .map(|placement| placement.name.as_str())
+        .collect();
+    if let Some(name) = effects
+        .placements
+        .keys()
+        .find(|name| !names.contains(&name.as_str()))
+    {
+        return Err(RecordingError::Unsuitable {
+            path: file.to_owned(),
+            problem: format!(
+                "placement `{name}`: the recording has no such placement; it has {}",
+                names.join(", ")
+            ),
+        });
+    }
+    Ok(effects)
+}
+
+impl Resimulation {
+    /// One Imu for each measured message, with its stamp; where nothing was measured, at the rate.
+    ///
+    /// # Errors
+    /// Without stamps and rate, and where the reference's motion cannot be estimated.
+    pub fn messages(&self, placement: &RecordedPlacement) -> Result<Vec<Imu>, RecordingError> {
+        let name = &placement.name;
+        let stamps = self.stamps(placement)?;
+        let rate_hz = mean_rate(&stamps);
+        let nominal = PlacementEffects {
+            epoch: stamps[0],
+            declared_noise: declared(placement, rate_hz),
+            effects: EffectSet::new(),
+        };
+        let effects = self.effects.placements.get(name).unwrap_or(&nominal);
+        let track = self
+            .track(placement, rate_hz, &effects.effects)
+            .map_err(|error| error.at(name.clone()))?;
+        let motion = RecordedMotion {
+            track: &track,
+            stamps: &stamps,
+            stamps_are_recorded: !placement.measured.is_empty(),
+        };
+        let options = ImuOptions {
+            rate_hz,
+            seed: self.seed,
+            name: name.clone(),
+            noise: self.noise,
+            frame_id: placement.measured.first().map_or_else(
+                || format!("{name}_imu"),
+                |message| message.header.frame_id.clone(),
+            ),
+            mapping: reading_mapping(&self.mapping, name),
+        };
+        Ok(measure_recording(motion, effects, options)?)
+    }
+
+    fn stamps(&self, placement: &RecordedPlacement) -> Result<Vec<Stamp>, RecordingError> {
+        let (start, end) = placement.span();
+        match (placement.measured.as_slice(), self.rate_hz) {
+            ([], Some(rate_hz)) => Ok(uniform_stamps(start, end, rate_hz)?),
+            ([], None) => Err(RecordingError::NoStamps {
+                placement: placement.name.clone(),
+            }),
+            (measured, _) => Ok(measured
+                .iter()
+                .map(|message| Stamp::from_nanos(message.header.stamp.nanos()))
+                .collect()),
+        }
+    }
+
+    /// The reference's motion as the diagnosis estimates it, or by a scheme, at least at 200 Hz and
+    /// twice the IMU's rate.
+    fn track(
+        &self,
+        placement: &RecordedPlacement,
+        imu_rate_hz: f64,
+        effects: &EffectSet,
+    ) -> Result<KinematicTrack, RecordingError> {
+        let undone_hz = effects
+            .get(EffectKind::ReferenceSmoothing)
+            .and_then(|smoothing| smoothing.values().first().copied());
+        let rate_hz = (2.0 * imu_rate_hz).max(200.0);
+        let Some(scheme) = self.scheme else {
+            let poses = placement.poses();
+            let estimate = PoseEstimate::fit(&poses.stamps, &poses.positions, &poses.rotations)
+                .map_err(|source| RecordingError::NotEstimated { source })?;
+            return Ok(undone_hz
+                .map(|cutoff_hz| estimate.undoing(cutoff_hz))
+                .unwrap_or(estimate)
+                .track_for(imu_rate_hz));
+        };
+        if undone_hz.is_some() {
+            return Err(RecordingError::CannotUndo { scheme });
+        }
+        let trajectory = placement.trajectory()?;
+        differentiated(&trajectory, scheme, rate_hz, self.learned.as_ref())
+    }
+}
+
+/// The motion by a scheme and what networks add to it, on a grid from the first frame to the last.
+fn differentiated(
+    trajectory: &SensorTrajectory,
+    scheme: Scheme,
+    least_rate_hz: f64,
+    networks: Option<&LearnedSimulator>,
+) -> Result<KinematicTrack, RecordingError> {
+    let (start, seconds) = (trajectory.start(), trajectory.end() - trajectory.start());
+    // A whole number of intervals, so that the grid ends where the reference does.
+    let rate_hz = (seconds * least_rate_hz).ceil().max(1.0) / seconds;
+    let grid = uniform_stamps(start, trajectory.end(), rate_hz)?;
+    let mut motion = simulate_kinematics(trajectory, scheme, &grid)?;
+    if let Some(networks) = networks {
+        motion = networks.correct(&SiteMotion::rigid(trajectory, scheme)?, &motion)?;
+    }
+    Ok(track_in_sensor_axes(&motion, rate_hz))
+}
+
+/// The white noise that the messages declare, none where it is unknown: density = sigma /
+/// sqrt(rate).
+fn declared(placement: &RecordedPlacement, rate_hz: f64) -> DeclaredNoise {
+    let [accel_density, gyro_density] = placement
+        .declared()
+        .map(|sigma| sigma.unwrap_or(0.0) / rate_hz.sqrt());
+    DeclaredNoise {
+        accel_density,
+        gyro_density,
+    }
+}
+
+/// Mean rate of stamps in Hz, losses counted by how many medians of the intervals they span: the
+/// rate that a diagnosis of them goes by.
+fn mean_rate(stamps: &[Stamp]) -> f64 {
+    let mut stamps = stamps.to_vec();
+    stamps.sort();
+    stamps.dedup();
+    let intervals: Vec<f64> = stamps.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let mut sorted = intervals.clone();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let Some(median) = sorted.get(sorted.len() / 2) else {
+        return 1.0;
+    };
+    let steps: f64 = intervals
+        .iter()
+        .map(|interval| (interval / median).round().max(1.0))
+        .sum();
+    steps / (stamps[stamps.len() - 1] - stamps[0])
+}
+
+/// What a user should know of samples that the reference does not cover.
+pub fn outside_reference(placement: &RecordedPlacement) -> Option<String> {
+    let (start, end) = placement.span();
+    let covered =
+        |message: &&Imu| (start..=end).contains(&Stamp::from_nanos(message.header.stamp.nanos()));
+    let missing = placement.measured.len() - placement.measured.iter().filter(covered).count();
+    (missing > 0).then(|| {
+        format!("{missing} messages lie outside the reference; they hold what its ends read")
+    })
+}
+
+/// Writes the messages in order of time, with the references where they are wanted,
+/// under `/imu/NAME/data_raw` and `/reference/NAME`.
+///
+/// # Errors
+/// Of `check`, which is called before each message, and of the bag.
+pub fn write_resimulated<E: From<RecordingError>>(
+    bag: &mut BagWriter,
+    recorded: &[RecordedPlacement],
+    simulated: &[Vec<Imu>],
+    with_references: bool,
+    check: impl Fn() -> Result<(), E>,
+) -> Result<(), E> {
+    let topics: Vec<[String; 2]> = recorded
+        .iter()
+        .map(|placement| ["imu", "reference"].map(|kind| topic(kind, &placement.name)))
+        .collect();
+    for (nanos, is_sample, number, index) in in_order_of_time(recorded, simulated, with_references)
+    {
+        check()?;
+        let stamp = Stamp::from_nanos(nanos);
+        let [samples, references] = &topics[number];
+        let written = if is_sample {
+            bag.write(samples, stamp, &simulated[number][index])
+        } else {
+            let pose = recorded[number].frames[index].world_from_sensor.into();
+            let header = Header::new(nanos, "world");
+            bag.write(references, stamp, &PoseStamped { header, pose })
+        };
+        written.map_err(RecordingError::from)?;
+    }
+    Ok(())
+}
+
+fn topic(kind: &str, name: &str) -> String {
+    match kind {
+        "imu" => format!("/imu/{name}/data_raw"),
+        _ => format!("/{kind}/{name}"),
+    }
+}
+
+/// Nanoseconds, whether it is a sample, placement and index of each message; of one time, references
+/// first.
+fn in_order_of_time(
+    recorded: &[RecordedPlacement],
+    simulated: &[Vec<Imu>],
+    with_references: bool,
+) -> Vec<(i64, bool, usize, usize)> {
+    let mut order = Vec::new();
+    for (number, placement) in recorded.iter().enumerate() {
+        if with_references {
+            order.extend(
+                placement
+                    .frames
+                    .iter()
+                    .enumerate()
+                    .map(|(index, frame)| (frame.stamp.nanos, false, number, index)),
+            );
+        }
+        order.extend(
+            simulated[number]
+                .iter()
+                .enumerate()
+                .map(|(index, message)| (message.header.stamp.nanos(), true, number, index)),
+        );
+    }
+    order.sort_by_key(|(nanos, is_sample, ..)| (*nanos, *is_sample));
+    order
+}
