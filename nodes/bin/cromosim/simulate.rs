@@ -17,7 +17,9 @@ use cromosim_learned::{LearnedSimulator, MappingFile, Patch, SiteMotion};
 use cromosim_motion::{MotionOptions, SmplMotion, embedded_walk, read_motion_for, read_people};
 use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_msgs::std_msgs::Header;
-use cromosim_recording::{FIRST_STAMP, reading_mapping};
+use cromosim_recording::{
+    FIRST_STAMP, PlayedPerson, SimulatedPlacement, reading_mapping, write_people, write_people_csv,
+};
 use cromosim_spatial::{PoseTimes, uniform_stamps};
 use indicatif::ProgressBar;
 use rayon::prelude::*;
@@ -25,10 +27,6 @@ use rayon::prelude::*;
 use crate::progress::Interrupt;
 use crate::simulate_arguments::Arguments;
 use crate::{body, progress};
-
-mod played;
-
-use played::{Played, Simulated, write_csv, write_in_order_of_time};
 
 /// What is the same for all motions of a call.
 struct Setup {
@@ -156,14 +154,14 @@ impl Setup {
         })
     }
 
-    fn read(&self, path: Option<&PathBuf>) -> anyhow::Result<Vec<Played>> {
+    fn read(&self, path: Option<&PathBuf>) -> anyhow::Result<Vec<PlayedPerson>> {
         let several = self.motion.asks_for_several();
         Ok(match path {
             Some(path) if several => read_people(path, &self.model, &self.motion)?
                 .into_iter()
-                .map(Played::of_several)
+                .map(PlayedPerson::of_several)
                 .collect(),
-            Some(path) => vec![Played::alone(read_motion_for(
+            Some(path) => vec![PlayedPerson::alone(read_motion_for(
                 path,
                 &self.model,
                 &self.motion,
@@ -171,15 +169,19 @@ impl Setup {
             None if several => {
                 bail!("--person: the embedded walk has one person; name a motion file")
             }
-            None => vec![Played::alone(
+            None => vec![PlayedPerson::alone(
                 embedded_walk().slice(self.motion.start_s, self.motion.duration_s)?,
             )],
         })
     }
 
     /// All placements of a person, each on whatever core is free.
-    fn simulate(&self, person: &Played, bar: &ProgressBar) -> anyhow::Result<Vec<Simulated>> {
-        let Played { motion, stamps, .. } = person;
+    fn simulate(
+        &self,
+        person: &PlayedPerson,
+        bar: &ProgressBar,
+    ) -> anyhow::Result<Vec<SimulatedPlacement>> {
+        let PlayedPerson { motion, stamps, .. } = person;
         let shaped = ShapedBody::new(self.model.clone(), &motion.betas)?;
         let sites = MountedSensors::new(&shaped, self.placements.placements())?;
         if motion.frames.len() < 2 {
@@ -218,12 +220,12 @@ impl Setup {
 
     fn simulate_placement(
         &self,
-        person: &Played,
+        person: &PlayedPerson,
         (shaped, mounted): (&ShapedBody, &MountedSensor),
         index: usize,
         trajectory: &SensorTrajectory,
         times: &PoseTimes,
-    ) -> anyhow::Result<Simulated> {
+    ) -> anyhow::Result<SimulatedPlacement> {
         let (placement, device) = (&self.placements.placements()[index], &self.devices[index]);
         let (name, rate_hz) = (placement.name(), placement.rate_hz());
         let output = uniform_stamps(trajectory.start(), trajectory.end(), rate_hz)?;
@@ -254,7 +256,7 @@ impl Setup {
             header: Header::new(frame.stamp.nanos, "world"),
             pose: frame.world_from_sensor.into(),
         });
-        Ok(Simulated {
+        Ok(SimulatedPlacement {
             name: name.to_owned(),
             reference: reference.collect(),
             messages: messages.collect(),
@@ -329,7 +331,7 @@ pub fn read_mapping(path: Option<&Path>, placements: &[&str]) -> anyhow::Result<
 
 fn simulate_one(
     setup: &Setup,
-    people: &[Played],
+    people: &[PlayedPerson],
     out: &Path,
     bar: &ProgressBar,
 ) -> anyhow::Result<String> {
@@ -353,11 +355,11 @@ fn simulate_one(
         FIRST_STAMP,
         setup.placements.to_yaml().as_bytes(),
     )?;
-    write_in_order_of_time(&mut bag, people, &simulated, &setup.interrupt)?;
+    write_people(&mut bag, people, &simulated, || setup.interrupt.check())?;
     let summary = bag.finish()?;
     if let Some(folder) = &setup.csv {
         for (person, simulated) in people.iter().zip(&simulated) {
-            write_csv(out, folder, person, simulated)?;
+            write_people_csv(out, folder, person, simulated)?;
         }
     }
     let last = people

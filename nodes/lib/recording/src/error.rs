@@ -129,6 +129,14 @@ pub enum RecordingError {
         /// The file.
         path: PathBuf,
     },
+    /// The operating system refuses a folder.
+    #[error("{}: cannot be made: {source}", path.display())]
+    Make {
+        /// The folder.
+        path: PathBuf,
+        /// The reason.
+        source: std::io::Error,
+    },
     /// The operating system refuses to write.
     #[error("{}: cannot be written: {source}", path.display())]
     Write {

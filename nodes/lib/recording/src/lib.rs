@@ -11,6 +11,7 @@
 //! - [`convert`](mod@convert) reads any file and writes any format; [`inspect`](mod@inspect) says
 //!   what is in a file; [`compare`](mod@compare) says how two recordings or diagnoses differ.
 //! - [`Resimulation`] gives the messages of its IMUs again, from the reference motion.
+//! - [`PlayedPerson`] and [`SimulatedPlacement`] are what a simulation of a motion file writes.
 //! - [`smpl_pose`] and [`smpl_state`] fill a message from a motion's frame.
 //!
 //! Nothing here needs a ROS node: offline commands, training and evaluation read recordings by
@@ -26,6 +27,7 @@ mod file;
 pub mod inspect;
 mod messages;
 mod placement;
+mod played;
 mod resimulation;
 pub mod rigid;
 mod trace;
@@ -37,6 +39,7 @@ pub use error::RecordingError;
 pub use file::{read_head, read_whole};
 pub use messages::{FIRST_STAMP, MessageHeader, smpl_pose, smpl_state, stamp_of_frame};
 pub use placement::{RecordedPlacement, read_placements, read_poses};
+pub use played::{PlayedPerson, SimulatedPlacement, write_people, write_people_csv};
 pub use resimulation::{
     Resimulation, outside_reference, read_effects, reading_mapping, with_stamps, write_resimulated,
 };

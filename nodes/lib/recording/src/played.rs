@@ -3,35 +3,38 @@
 use std::fs;
 use std::path::Path;
 
-use anyhow::Context;
 use cromosim_bag::{BagReader, BagWriter, write_imu_csv};
 use cromosim_imu::ImuMessages;
 use cromosim_motion::{Person, SmplMotion};
 use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_msgs::geometry_msgs::PoseStamped;
-use cromosim_recording::{MessageHeader, smpl_state, stamp_of_frame};
 use cromosim_spatial::Stamp;
 
-use crate::progress::Interrupt;
+use crate::{MessageHeader, RecordingError, smpl_state, stamp_of_frame};
 
 /// One person of a motion file.
-pub(super) struct Played {
+pub struct PlayedPerson {
+    /// What the person does.
     pub motion: SmplMotion,
     /// Before topics (`/person_7`) and frames; empty for a file's only or chosen person.
     pub label: String,
+    /// As the states' `body_id`.
     pub body_id: String,
     /// Of the motion's frames.
     pub stamps: Vec<Stamp>,
 }
 
 /// One placement's results.
-pub(super) struct Simulated {
+pub struct SimulatedPlacement {
+    /// The placement's name.
     pub name: String,
+    /// `world_from_sensor` at each of the motion's frames.
     pub reference: Vec<PoseStamped>,
+    /// Each sample, in the two forms of REP-145.
     pub messages: Vec<ImuMessages>,
 }
 
-impl Played {
+impl PlayedPerson {
     /// A file's only person, or the chosen one.
     pub fn alone(motion: SmplMotion) -> Self {
         Self {
@@ -88,18 +91,24 @@ fn stamps(motion: &SmplMotion, begins_s: f64) -> Vec<Stamp> {
         .collect()
 }
 
-/// Messages of one time: of each person the state first, then each placement's.
-pub(super) fn write_in_order_of_time(
+/// A message that is to be written, with its topics.
+enum Scheduled<'a> {
+    State(&'a PlayedPerson, usize),
+    Reference(&'a str, &'a PoseStamped),
+    Sample(&'a [String; 2], &'a ImuMessages),
+}
+
+/// Writes the messages in order of time; of one time each person's state first, then each
+/// placement's.
+///
+/// # Errors
+/// Of `check`, which is called before each message, and of the bag.
+pub fn write_people<E: From<RecordingError>>(
     bag: &mut BagWriter,
-    people: &[Played],
-    simulated: &[Vec<Simulated>],
-    interrupt: &Interrupt,
-) -> anyhow::Result<()> {
-    enum What<'a> {
-        State(&'a Played, usize),
-        Reference(&'a str, &'a PoseStamped),
-        Sample(&'a [String; 2], &'a ImuMessages),
-    }
+    people: &[PlayedPerson],
+    simulated: &[Vec<SimulatedPlacement>],
+    check: impl Fn() -> Result<(), E>,
+) -> Result<(), E> {
     let topics: Vec<Vec<(String, [String; 2])>> = people
         .iter()
         .zip(simulated)
@@ -109,14 +118,14 @@ pub(super) fn write_in_order_of_time(
         .iter()
         .map(|person| person.topic("smpl/state"))
         .collect();
-    let mut schedule: Vec<(i64, usize, What)> = Vec::new();
+    let mut schedule: Vec<(i64, usize, Scheduled)> = Vec::new();
     for (number, (person, simulated)) in people.iter().zip(simulated).enumerate() {
         schedule.extend(
             person
                 .stamps
                 .iter()
                 .enumerate()
-                .map(|(frame, stamp)| (stamp.nanos, number, What::State(person, frame))),
+                .map(|(frame, stamp)| (stamp.nanos, number, Scheduled::State(person, frame))),
         );
         for (placement, (reference, samples)) in simulated.iter().zip(&topics[number]) {
             let references = placement.reference.iter();
@@ -124,55 +133,68 @@ pub(super) fn write_in_order_of_time(
                 (
                     message.header.stamp.nanos(),
                     number,
-                    What::Reference(reference, message),
+                    Scheduled::Reference(reference, message),
                 )
             }));
             schedule.extend(placement.messages.iter().map(|messages| {
                 (
                     messages.data_raw.header.stamp.nanos(),
                     number,
-                    What::Sample(samples, messages),
+                    Scheduled::Sample(samples, messages),
                 )
             }));
         }
     }
     schedule.sort_by_key(|(nanos, ..)| *nanos);
-    for (nanos, number, what) in schedule {
-        let stamp = Stamp::from_nanos(nanos);
-        interrupt.check()?;
-        match what {
-            What::State(person, frame) => {
-                bag.write(&states[number], stamp, &person.state(frame))?
-            }
-            What::Reference(topic, message) => bag.write(topic, stamp, message)?,
-            What::Sample([raw_topic, full_topic], messages) => {
-                bag.write(raw_topic, stamp, &messages.data_raw)?;
-                bag.write(full_topic, stamp, &messages.data)?;
-            }
+    for (nanos, number, message) in schedule {
+        check()?;
+        write_one(bag, &states[number], Stamp::from_nanos(nanos), message)?;
+    }
+    Ok(())
+}
+
+fn write_one(
+    bag: &mut BagWriter,
+    states: &str,
+    stamp: Stamp,
+    message: Scheduled<'_>,
+) -> Result<(), RecordingError> {
+    match message {
+        Scheduled::State(person, frame) => bag.write(states, stamp, &person.state(frame))?,
+        Scheduled::Reference(topic, message) => bag.write(topic, stamp, message)?,
+        Scheduled::Sample([raw_topic, full_topic], messages) => {
+            bag.write(raw_topic, stamp, &messages.data_raw)?;
+            bag.write(full_topic, stamp, &messages.data)?;
         }
     }
     Ok(())
 }
 
 /// Of each placement: of its reference; of `data_raw` and `data`.
-fn topics(person: &Played, simulated: &[Simulated]) -> Vec<(String, [String; 2])> {
-    let of = |placement: &Simulated| {
+fn topics(person: &PlayedPerson, simulated: &[SimulatedPlacement]) -> Vec<(String, [String; 2])> {
+    let both = |placement: &SimulatedPlacement| {
         let name = &placement.name;
         let imu = ["data_raw", "data"].map(|ending| person.topic(&format!("imu/{name}/{ending}")));
         (person.topic(&format!("reference/{name}")), imu)
     };
-    simulated.iter().map(of).collect()
+    simulated.iter().map(both).collect()
 }
 
 /// DIR/NAME_PLACEMENT.csv with the samples of `data`; of several people
-/// NAME_person_ID_PLACEMENT.csv.
-pub(super) fn write_csv(
+/// NAME_person_ID_PLACEMENT.csv. They are read back from the bag.
+///
+/// # Errors
+/// Where the folder or a file cannot be written, or the bag cannot be read.
+pub fn write_people_csv(
     bag: &Path,
     folder: &Path,
-    person: &Played,
-    simulated: &[Simulated],
-) -> anyhow::Result<()> {
-    fs::create_dir_all(folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
+    person: &PlayedPerson,
+    simulated: &[SimulatedPlacement],
+) -> Result<(), RecordingError> {
+    fs::create_dir_all(folder).map_err(|source| RecordingError::Make {
+        path: folder.to_owned(),
+        source,
+    })?;
     let reader = BagReader::open(bag)?;
     let stem = bag.file_stem().unwrap_or_default().to_string_lossy();
     let label = if person.label.is_empty() {
@@ -182,8 +204,10 @@ pub(super) fn write_csv(
     };
     for placement in simulated {
         let path = folder.join(format!("{stem}{label}_{}.csv", placement.name));
-        let file = fs::File::create(&path)
-            .with_context(|| format!("{}: cannot be written", path.display()))?;
+        let file = fs::File::create(&path).map_err(|source| RecordingError::Write {
+            path: path.clone(),
+            source,
+        })?;
         let topic = person.topic(&format!("imu/{}/data", placement.name));
         write_imu_csv(&reader, &topic, std::io::BufWriter::new(file), &path)?;
     }
