@@ -101,11 +101,14 @@ fn string(text: &[char], mut at: usize) -> usize {
     at + 1
 }
 
+/// Where the characters from a place on stop to be of a kind.
+type WhileFrom<'a> = &'a dyn Fn(usize, &dyn Fn(char) -> bool) -> usize;
+
 /// `r"..."`, `br#"..."#`, or a word: `r#type`, `break`.
 fn raw_string_or_word(
     text: &[char],
     at: usize,
-    while_from: &dyn Fn(usize, &dyn Fn(char) -> bool) -> usize,
+    while_from: WhileFrom<'_>,
 ) -> (usize, Option<Kind>) {
     let hashes_begin = at + if text[at] == 'r' { 1 } else { 2 };
     let hashes_end = while_from(hashes_begin, &|c| c == '#');

@@ -268,10 +268,17 @@ pub enum EvaluationError {
     Dataset(#[from] RigidError),
     /// A recording that cannot be read.
     #[error(transparent)]
-    Recording(#[from] RecordingError),
+    Recording(Box<RecordingError>),
     /// Stamps or splines that make no sense.
     #[error(transparent)]
     Spatial(#[from] SpatialError),
+}
+
+// Boxed, so that results stay small.
+impl From<RecordingError> for EvaluationError {
+    fn from(error: RecordingError) -> Self {
+        Self::Recording(Box::new(error))
+    }
 }
 
 /// Says where an error happened.

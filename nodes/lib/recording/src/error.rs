@@ -258,10 +258,10 @@ pub enum RecordingError {
     Imu(#[from] ImuError),
     /// Effects that cannot be used.
     #[error(transparent)]
-    Effect(#[from] EffectError),
+    Effect(Box<EffectError>),
     /// Networks or a mapping that cannot be used.
     #[error(transparent)]
-    Learned(#[from] LearnedError),
+    Learned(Box<LearnedError>),
     /// Stamps that cannot be used.
     #[error(transparent)]
     Spatial(#[from] SpatialError),
@@ -274,6 +274,19 @@ pub enum RecordingError {
     /// A message that holds no pose of a body.
     #[error(transparent)]
     Message(#[from] NotABody),
+}
+
+// Boxed, so that results stay small.
+impl From<EffectError> for RecordingError {
+    fn from(error: EffectError) -> Self {
+        Self::Effect(Box::new(error))
+    }
+}
+
+impl From<LearnedError> for RecordingError {
+    fn from(error: LearnedError) -> Self {
+        Self::Learned(Box::new(error))
+    }
 }
 
 impl RecordingError {

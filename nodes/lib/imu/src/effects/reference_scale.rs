@@ -31,7 +31,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
     channels: &[Channel::Accelerometer],
     search: Search::Fitted(FittedSearch {
         first_guess: FirstGuess::Neutral,
-        is_plausible: is_plausible,
+        is_plausible,
         ordinary: Some(Ordinary::EachValue(ORDINARY)),
         rounding: None,
         is_calibration: false,

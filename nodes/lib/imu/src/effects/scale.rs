@@ -29,7 +29,7 @@ pub(super) static ACCEL: EffectSpec = EffectSpec {
     channels: &[Channel::Accelerometer],
     search: Search::Fitted(FittedSearch {
         first_guess: FirstGuess::Neutral,
-        is_plausible: is_plausible,
+        is_plausible,
         ordinary: Some(Ordinary::EachValue(2e-3)),
         rounding: None,
         is_calibration: false,
@@ -63,7 +63,7 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
     channels: &[Channel::Gyroscope],
     search: Search::Fitted(FittedSearch {
         first_guess: FirstGuess::Neutral,
-        is_plausible: is_plausible,
+        is_plausible,
         ordinary: Some(Ordinary::EachValue(2e-3)),
         rounding: None,
         is_calibration: false,

@@ -41,7 +41,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
     channels: &[Channel::Accelerometer],
     search: Search::Fitted(FittedSearch {
         first_guess: FirstGuess::FromResidual(starts),
-        is_plausible: is_plausible,
+        is_plausible,
         ordinary: None,
         rounding: None,
         is_calibration: false,

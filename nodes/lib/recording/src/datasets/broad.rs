@@ -125,6 +125,9 @@ pub fn parse_broad<R: Read + Seek>(reader: R, name: &str) -> Result<DatasetRecor
     Ok(recording)
 }
 
+/// Where a body is, m, and how it is turned.
+type BodyPose = (Vector3<f64>, UnitQuaternion<f64>);
+
 /// The columns of a trial, one row a sample; NaN where something is missing.
 struct Trial {
     acc: Vec<Vector3<f64>>,
@@ -180,7 +183,7 @@ impl Trial {
     }
 
     /// The body's pose in a row, where it was seen; the quaternion's length where it is not 1.
-    fn pose(&self, row: usize) -> Result<Option<(Vector3<f64>, UnitQuaternion<f64>)>, f64> {
+    fn pose(&self, row: usize) -> Result<Option<BodyPose>, f64> {
         let [w, x, y, z] = self.quaternions[row];
         // A lost body has NaN, which has no length.
         let quaternion = Quaternion::new(w, x, y, z);
