@@ -121,27 +121,7 @@ impl VirtualImuNode {
         } else {
             Some(LearnedSimulator::find(Path::new(&config.learned))?)
         };
-        let mapping = if config.mapping.is_empty() {
-            MappingFile::default()
-        } else {
-            MappingFile::read(Path::new(&config.mapping))?
-        };
-        if !config.mapping.is_empty()
-            && !placements
-                .iter()
-                .any(|placement| mapping.placements.contains_key(placement.name()))
-        {
-            let known = mapping
-                .placements
-                .keys()
-                .cloned()
-                .collect::<Vec<_>>()
-                .join(", ");
-            return Err(Refusal::Unmapped {
-                file: config.mapping,
-                known,
-            });
-        }
+        let mapping = read_mapping(&config.mapping, &placements)?;
         let mut node = Self {
             config,
             model,
@@ -448,6 +428,23 @@ impl VirtualImuNode {
             status: vec![status],
         }
     }
+}
+
+/// A mapping of these placements at least in part; that of no file changes nothing.
+fn read_mapping(file: &str, placements: &[Placement]) -> Result<MappingFile, Refusal> {
+    if file.is_empty() {
+        return Ok(MappingFile::default());
+    }
+    let mapping = MappingFile::read(Path::new(file))?;
+    let maps = |placement: &Placement| mapping.placements.contains_key(placement.name());
+    if placements.iter().any(maps) {
+        return Ok(mapping);
+    }
+    let known: Vec<&str> = mapping.placements.keys().map(String::as_str).collect();
+    Err(Refusal::Unmapped {
+        file: file.to_owned(),
+        known: known.join(", "),
+    })
 }
 
 /// Rate of states by the median of their intervals, Hz.

@@ -83,7 +83,8 @@ impl Placement {
         &self.site
     }
 
-    /// site_from_sensor: R_SB of the paper turns sensor axes into site axes.
+    /// The mount, `site_from_sensor`: R_SB of the paper turns sensor axes into site axes. On a body
+    /// of one shape it becomes [`crate::MountedSensor::segment_from_sensor`].
     pub fn mount(&self) -> UnitQuaternion<f64> {
         self.mount
     }
