@@ -178,10 +178,7 @@ fn programs() -> Vec<String> {
 }
 
 /// Files whose shared code is not in a library yet.
-const NOT_MOVED_YET: &[&str] = &[
-    "nodes/bin/cromosim/reference.rs",
-    "nodes/bin/cromosim/simulate.rs",
-];
+const NOT_MOVED_YET: &[&str] = &[];
 
 #[test]
 fn anyhow_and_rerun_stay_out_of_libraries() {

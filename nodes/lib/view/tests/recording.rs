@@ -8,7 +8,7 @@ use std::net::TcpListener;
 use std::path::Path;
 
 use cromosim_spatial::Stamp;
-use cromosim_view::{Destination, Recording, RecordingOptions, TimeAxis, ViewError};
+use cromosim_view::{Destination, Recording, RecordingOptions, TimeAxis};
 use nalgebra::{Isometry3, Vector3};
 use re_sdk::StoreKind;
 use re_sdk::external::re_log_encoding::DecoderApp;
