@@ -1,10 +1,8 @@
-//! The two channels of an IMU.
+//! The two channels of an IMU, and a reading of both.
 
 use std::ops::{Index, IndexMut};
 
 use nalgebra::Vector3;
-
-use crate::Reading;
 
 /// One of the two vectors that an IMU reads; each has three axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -91,6 +89,15 @@ impl<T> IndexMut<Channel> for PerChannel<T> {
             Channel::Gyroscope => &mut self.gyroscope,
         }
     }
+}
+
+/// One reading of both channels, in the axes of its stage.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Reading {
+    /// Specific force, m/s2.
+    pub specific_force: Vector3<f64>,
+    /// Angular velocity, rad/s.
+    pub angular_velocity: Vector3<f64>,
 }
 
 impl Index<Channel> for Reading {

@@ -50,6 +50,8 @@ mod mount;
 mod noise;
 mod placement;
 mod placement_file;
+mod pose_error;
+mod random;
 mod sample;
 mod schemes;
 mod simulate;
@@ -62,21 +64,23 @@ mod virtual_imu;
 #[cfg(test)]
 mod test_motions;
 
-pub use channel::{AXES, Channel, PerChannel};
+pub use channel::{AXES, Channel, PerChannel, Reading};
 pub use device::{Device, EMBEDDED_DEVICES};
 pub use effects::{
     DeclaredNoise, Dependence, Dropouts, Effect, EffectKind, EffectSet, EffectSpec, EffectsFile,
     FirstGuess, FittedSearch, GravityMode, GridTrace, Identifiability, MeasurementInput, Ordinary,
-    ParameterFit, ParameterSpec, PlacementEffects, ReadOff, ReadOffSearch, Reading, ResidualView,
-    Rounding, Search, SensorModel, Shape, SpectralLine, Stage, StagedReadings, StreamingEffects,
+    ParameterFit, ParameterSpec, PlacementEffects, ReadOff, ReadOffSearch, ResidualView, Rounding,
+    Search, SensorModel, Shape, SpectralLine, Stage, StagedReadings, StreamingEffects,
     clipping_limit, lattice_spacing, nearest_signed_permutation, strongest_line, unit_factors,
     white_noise_density,
 };
 pub use error::{EffectError, ImuError, PlacementProblem};
 pub use mount::{MountedSensor, MountedSensors, SensorPose};
-pub use noise::{Covariances, NoiseSource, normal_pair};
+pub use noise::{Covariances, NoiseSource};
 pub use placement::{Follow, MAX_RATE_HZ, Placement, SiteChoice};
 pub use placement_file::PlacementSet;
+pub use pose_error::{PoseStd, SampleVariance};
+pub use random::normal_pair;
 pub use sample::{
     GRAVITY_IN_WORLD, ImuSample, KinematicSample, STANDARD_GRAVITY, track_in_sensor_axes,
 };
@@ -84,7 +88,6 @@ pub use schemes::Scheme;
 pub use simulate::{simulate, simulate_kinematics, simulate_kinematics_on};
 pub use stream::{StreamOptions, StreamingImu};
 pub use trajectory::{SensorFrame, SensorTrajectory};
-pub use uncertainty::{PoseStd, SampleVariance};
 pub use virtual_imu::{
     ImuMessages, ImuOptions, MotionCorrection, ReadingMapping, RecordedMotion, VirtualImu,
     measure_all, measure_recording,

@@ -64,12 +64,25 @@ impl Effect {
     /// [`EffectError`] for what is no signed permutation.
     pub fn axis_convention(matrix: &Matrix3<f64>) -> Result<Self, EffectError> {
         let rows = matrix.transpose();
-        Self::new(EffectKind::AxisConvention, rows.as_slice().to_vec())
+        effect(rows.as_slice().to_vec())
     }
 }
 
+/// The effect of a matrix, row by row, that has to be a signed permutation.
+pub(super) fn effect(values: Vec<f64>) -> Result<Effect, EffectError> {
+    let effect = SPEC.effect(values)?;
+    if !is_signed_permutation(&effect.matrix()) {
+        return Err(EffectError::Malformed {
+            effect: SPEC.name,
+            field: "matrix".to_owned(),
+            expected: "a signed permutation: one 1 or -1 in each row and column",
+        });
+    }
+    Ok(effect)
+}
+
 /// One 1 or -1 in each row and column, the rest 0.
-pub(super) fn is_signed_permutation(matrix: &Matrix3<f64>) -> bool {
+fn is_signed_permutation(matrix: &Matrix3<f64>) -> bool {
     let entries = matrix.iter().all(|entry| [-1.0, 0.0, 1.0].contains(entry));
     entries && matrix.transpose() * matrix == Matrix3::identity()
 }

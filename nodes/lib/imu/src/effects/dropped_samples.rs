@@ -5,7 +5,7 @@ use rand_chacha::ChaCha12Rng;
 use super::search::{ReadOff, ReadOffSearch, Search};
 use super::spec::{EffectSpec, ParameterSpec, Shape, Stage};
 use super::{Effect, EffectKind};
-use crate::{Channel, noise};
+use crate::{Channel, random};
 
 pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::DroppedSamples,
@@ -61,13 +61,13 @@ impl Dropouts {
             begins,
             ends,
             lost: false,
-            random: noise::stream(seed, placement, noise::DROPOUT_CHANNEL),
+            random: random::stream(seed, placement, random::DROPOUT_CHANNEL),
         })
     }
 
     /// Whether the next sample is lost.
     pub fn next_is_lost(&mut self) -> bool {
-        let chance = noise::uniform(&mut self.random);
+        let chance = random::uniform(&mut self.random);
         self.lost = if self.lost {
             chance >= self.ends
         } else {

@@ -2,9 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::spec::Shape;
-use super::{EffectKind, axis_convention};
-use crate::EffectError;
+use super::EffectKind;
 
 /// One effect with values for its parameters; valid from its making on.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,63 +12,9 @@ pub struct Effect {
 }
 
 impl Effect {
-    /// An effect with flat values, matrices row by row, in the order of its parameters.
-    ///
-    /// # Errors
-    /// [`EffectError`] for a wrong number of values, values that are not finite or out of bounds,
-    /// an `axis_convention` that is no signed permutation.
-    pub fn new(kind: EffectKind, values: Vec<f64>) -> Result<Self, EffectError> {
-        let (effect, spec) = (kind.name(), kind.spec());
-        if values.len() != spec.value_count() {
-            return Err(EffectError::Length {
-                effect,
-                expected: spec.value_count(),
-                found: values.len(),
-            });
-        }
-        let mut rest = values.as_slice();
-        for parameter in spec.parameters {
-            let (own, after) = rest.split_at(parameter.shape.count());
-            rest = after;
-            if let Some(&value) = own
-                .iter()
-                .find(|value| !(parameter.lower..=parameter.upper).contains(*value))
-            {
-                let (field, lower, upper) = (parameter.name, parameter.lower, parameter.upper);
-                return Err(EffectError::OutOfRange {
-                    effect,
-                    field,
-                    value,
-                    lower,
-                    upper,
-                });
-            }
-            if matches!(parameter.shape, Shape::Choice(_)) && own[0].fract() != 0.0 {
-                return Err(EffectError::Malformed {
-                    effect,
-                    field: parameter.name.to_owned(),
-                    expected: "the number of a choice",
-                });
-            }
-        }
-        if kind == EffectKind::AxisConvention
-            && !axis_convention::is_signed_permutation(&Matrix3::from_row_slice(&values))
-        {
-            return Err(EffectError::Malformed {
-                effect,
-                field: "matrix".to_owned(),
-                expected: "a signed permutation: one 1 or -1 in each row and column",
-            });
-        }
-        Ok(Self { kind, values })
-    }
-
-    /// The effect with values that change nothing.
-    pub fn neutral(kind: EffectKind) -> Self {
-        Self {
-            kind,
-            values: kind.spec().neutral(),
-        }
+    /// Of values that the kind's [`super::EffectSpec`] has checked.
+    pub(super) fn from_checked(kind: EffectKind, values: Vec<f64>) -> Self {
+        Self { kind, values }
     }
 
     /// Which effect.
@@ -81,27 +25,6 @@ impl Effect {
     /// All values, matrices row by row, in the order of the parameters.
     pub fn values(&self) -> &[f64] {
         &self.values
-    }
-
-    /// The same effect with other values.
-    ///
-    /// # Errors
-    /// As [`Effect::new`].
-    pub fn with_values(&self, values: Vec<f64>) -> Result<Self, EffectError> {
-        Self::new(self.kind, values)
-    }
-
-    /// The values of one parameter.
-    pub fn parameter(&self, name: &str) -> Option<&[f64]> {
-        let mut first = 0;
-        for parameter in self.kind.spec().parameters {
-            let length = parameter.shape.count();
-            if parameter.name == name {
-                return self.values.get(first..first + length);
-            }
-            first += length;
-        }
-        None
     }
 
     /// The value at a place among all values; 0 beyond them.
@@ -207,21 +130,5 @@ impl<'a> IntoIterator for &'a EffectSet {
 
     fn into_iter(self) -> Self::IntoIter {
         self.iter()
-    }
-}
-
-impl TryFrom<Vec<Effect>> for EffectSet {
-    type Error = EffectError;
-
-    /// Refuses a second effect of one kind.
-    fn try_from(effects: Vec<Effect>) -> Result<Self, EffectError> {
-        let mut set = Self::default();
-        for effect in effects {
-            let name = effect.kind.name();
-            if set.insert(effect).is_some() {
-                return Err(EffectError::Repeated { effect: name });
-            }
-        }
-        Ok(set)
     }
 }

@@ -62,6 +62,6 @@ impl Effect {
     /// # Errors
     /// None: every mode is within the bounds.
     pub fn gravity_convention(mode: GravityMode) -> Result<Self, EffectError> {
-        Self::new(EffectKind::GravityConvention, vec![mode.value()])
+        SPEC.effect(vec![mode.value()])
     }
 }

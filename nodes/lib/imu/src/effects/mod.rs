@@ -22,6 +22,7 @@
 mod axis_convention;
 mod bias;
 mod bias_drift;
+mod catalogue;
 mod clock_drift;
 mod dropped_samples;
 mod effect;
@@ -29,6 +30,7 @@ mod file;
 mod filter;
 mod gravity_convention;
 mod gyro_g_sensitivity;
+mod kind;
 mod lever_arm;
 mod low_pass;
 mod misalignment;
@@ -63,15 +65,13 @@ mod model_tests;
 #[cfg(test)]
 mod start_tests;
 
-use std::fmt;
-
-use nalgebra::Vector3;
-
+pub use crate::channel::Reading;
 pub use axis_convention::nearest_signed_permutation;
 pub use dropped_samples::Dropouts;
 pub use effect::{Effect, EffectSet};
 pub use file::{DeclaredNoise, EffectsFile, PlacementEffects};
 pub use gravity_convention::GravityMode;
+pub use kind::EffectKind;
 pub use model::{GridTrace, SensorModel};
 pub use noise::white_noise_density;
 pub use quantization::lattice_spacing;
@@ -86,119 +86,3 @@ pub use stages::{MeasurementInput, StagedReadings};
 pub use streaming::StreamingEffects;
 pub use units::unit_factors;
 pub use vibration::{SpectralLine, strongest_line};
-
-/// One reading of both channels, in the axes of its stage.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Reading {
-    /// Specific force, m/s2.
-    pub specific_force: Vector3<f64>,
-    /// Angular velocity, rad/s.
-    pub angular_velocity: Vector3<f64>,
-}
-
-macro_rules! kinds {
-    ($($(#[$doc:meta])* $kind:ident => $spec:path,)*) => {
-        /// The effects that the library names.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-        pub enum EffectKind {
-            $($(#[$doc])* $kind,)*
-        }
-
-        impl EffectKind {
-            /// All of them, in order.
-            pub const ALL: [Self; [$(Self::$kind),*].len()] = [$(Self::$kind),*];
-
-            /// What the library knows about it.
-            pub fn spec(self) -> &'static EffectSpec {
-                match self {
-                    $(Self::$kind => &$spec,)*
-                }
-            }
-        }
-    };
-}
-
-kinds! {
-    /// Scatter of the reference.
-    ReferenceNoise => reference_noise::SPEC,
-    /// A reference that was low-passed.
-    ReferenceSmoothing => reference_smoothing::SPEC,
-    /// A world of the reference that is not level.
-    ReferenceTilt => reference_tilt::SPEC,
-    /// A reference in wrong units of length.
-    ReferenceScale => reference_scale::SPEC,
-    /// A sensor turned on its segment.
-    MountRotation => mount_rotation::SPEC,
-    /// A sensor beside the reference frame.
-    LeverArm => lever_arm::SPEC,
-    /// A mount that turns once.
-    MountSlip => mount_slip::SPEC,
-    /// A sensor on soft tissue.
-    SoftTissue => soft_tissue::SPEC,
-    /// Stamps late by a constant.
-    TimeOffset => time_offset::SPEC,
-    /// A clock of another rate.
-    ClockDrift => clock_drift::SPEC,
-    /// Messages lost.
-    DroppedSamples => dropped_samples::SPEC,
-    /// Constant error of the specific force.
-    AccelBias => bias::ACCEL,
-    /// Constant error of the angular velocity.
-    GyroBias => bias::GYRO,
-    /// Gain of the accelerometer's axes.
-    AccelScale => scale::ACCEL,
-    /// Gain of the gyroscope's axes.
-    GyroScale => scale::GYRO,
-    /// Accelerometer axes that are not orthogonal.
-    AccelMisalignment => misalignment::ACCEL,
-    /// Gyroscope axes that are not orthogonal.
-    GyroMisalignment => misalignment::GYRO,
-    /// White noise of the accelerometer beyond the declared.
-    AccelNoise => noise::ACCEL,
-    /// White noise of the gyroscope beyond the declared.
-    GyroNoise => noise::GYRO,
-    /// Accelerometer bias that grows with time.
-    AccelBiasDrift => bias_drift::ACCEL,
-    /// Gyroscope bias that grows with time.
-    GyroBiasDrift => bias_drift::GYRO,
-    /// Range of the accelerometer.
-    AccelSaturation => saturation::ACCEL,
-    /// Range of the gyroscope.
-    GyroSaturation => saturation::GYRO,
-    /// Resolution of the accelerometer.
-    AccelQuantization => quantization::ACCEL,
-    /// Resolution of the gyroscope.
-    GyroQuantization => quantization::GYRO,
-    /// The device's own low-pass.
-    LowPass => low_pass::SPEC,
-    /// Gyroscope that feels specific force.
-    GyroGSensitivity => gyro_g_sensitivity::SPEC,
-    /// A vibration at the sensor.
-    Vibration => vibration::SPEC,
-    /// Axes named otherwise.
-    AxisConvention => axis_convention::SPEC,
-    /// Accelerometer in other units.
-    AccelUnits => units::ACCEL,
-    /// Gyroscope in other units.
-    GyroUnits => units::GYRO,
-    /// Gravity left out or negated.
-    GravityConvention => gravity_convention::SPEC,
-}
-
-impl EffectKind {
-    /// Name in files.
-    pub fn name(self) -> &'static str {
-        self.spec().name
-    }
-
-    /// The effect of a name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.name() == name)
-    }
-}
-
-impl fmt::Display for EffectKind {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(self.name())
-    }
-}

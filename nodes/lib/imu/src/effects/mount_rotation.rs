@@ -60,6 +60,6 @@ impl Effect {
     /// # Errors
     /// [`EffectError`] for one with an entry beyond pi.
     pub fn mount_rotation(rotvec: &Vector3<f64>) -> Result<Self, EffectError> {
-        Self::new(EffectKind::MountRotation, rotvec.as_slice().to_vec())
+        SPEC.effect(rotvec.as_slice().to_vec())
     }
 }

@@ -4,7 +4,13 @@ use super::residual_view::median;
 use super::search::{ReadOff, ReadOffSearch, Search};
 use super::spec::{EffectSpec, ParameterSpec, Shape, Stage};
 use super::{EffectKind, EffectSet};
-use crate::{Channel, Reading};
+use crate::{Channel, PerChannel, Reading};
+
+/// The effect of each channel.
+const KINDS: PerChannel<EffectKind> = PerChannel {
+    accelerometer: EffectKind::AccelNoise,
+    gyroscope: EffectKind::GyroNoise,
+};
 
 pub(super) static ACCEL: EffectSpec = EffectSpec {
     kind: EffectKind::AccelNoise,
@@ -67,7 +73,7 @@ pub fn white_noise_density(readings: &[Reading], channel: Channel, rate_hz: f64)
 impl EffectSet {
     /// Density of a channel's white noise beyond the declared; 0 without the effect.
     pub fn noise_density(&self, channel: Channel) -> f64 {
-        self.get_read_off(ReadOff::ExcessNoise(channel))
+        self.get(KINDS[channel])
             .map_or(0.0, |effect| effect.scalar(0))
     }
 }

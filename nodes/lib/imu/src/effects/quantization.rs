@@ -3,7 +3,13 @@
 use super::search::{ReadOff, ReadOffSearch, Search};
 use super::spec::{EffectSpec, ParameterSpec, Shape, Stage};
 use super::{EffectKind, EffectSet};
-use crate::Channel;
+use crate::{Channel, PerChannel};
+
+/// The effect of each channel.
+const KINDS: PerChannel<EffectKind> = PerChannel {
+    accelerometer: EffectKind::AccelQuantization,
+    gyroscope: EffectKind::GyroQuantization,
+};
 
 pub(super) static ACCEL: EffectSpec = EffectSpec {
     kind: EffectKind::AccelQuantization,
@@ -101,7 +107,7 @@ pub(super) fn round(value: f64, lsb: f64) -> f64 {
 impl EffectSet {
     /// Step of a channel's rounding, m/s2 or rad/s; 0 without the effect.
     pub fn lsb(&self, channel: Channel) -> f64 {
-        self.get_read_off(ReadOff::Lattice(channel))
+        self.get(KINDS[channel])
             .map_or(0.0, |effect| effect.scalar(0))
     }
 }

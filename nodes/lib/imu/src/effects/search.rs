@@ -149,53 +149,6 @@ pub enum ReadOff {
     ReferenceSpectrum,
 }
 
-impl EffectKind {
-    /// The effect that is read off in this way.
-    pub fn read_off(from: ReadOff) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.is_read_off(from))
-    }
-
-    /// Whether it is read off in this way.
-    pub fn is_read_off(self, from: ReadOff) -> bool {
-        matches!(self.spec().search, Search::ReadOff(search) if search.from == from)
-    }
-
-    /// Whether it rounds the readings.
-    pub fn rounds(self) -> bool {
-        matches!(
-            self.spec().search,
-            Search::ReadOff(ReadOffSearch {
-                from: ReadOff::Lattice(_),
-                ..
-            })
-        )
-    }
-
-    /// Whether a residual has other noise where it is known: noise of the sensor, rounding, and what
-    /// makes the reference's own error larger.
-    pub fn changes_predicted_noise(self) -> bool {
-        let Search::ReadOff(search) = self.spec().search else {
-            return false;
-        };
-        match search.from {
-            ReadOff::Lattice(_)
-            | ReadOff::ExcessNoise(_)
-            | ReadOff::ReferenceScatter
-            | ReadOff::ReferenceSpectrum => true,
-            ReadOff::ClippedReadings(_) | ReadOff::UnitFactor(_) | ReadOff::MissingMessages => {
-                false
-            }
-        }
-    }
-}
-
-impl EffectSet {
-    /// The effect that is read off in this way.
-    pub fn get_read_off(&self, from: ReadOff) -> Option<&Effect> {
-        EffectKind::read_off(from).and_then(|kind| self.get(kind))
-    }
-}
-
 /// For [`FittedSearch::is_plausible`]: all values within the bounds are.
 pub(super) fn always(_: &Effect, _: &EffectSet) -> bool {
     true

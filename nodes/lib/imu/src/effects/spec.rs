@@ -1,8 +1,8 @@
 //! What the library knows about each effect.
 
-use super::EffectKind;
 use super::search::Search;
-use crate::Channel;
+use super::{Effect, EffectKind};
+use crate::{Channel, EffectError};
 
 /// Where in the measurement an effect acts, see [`crate::effects`] for the equations; effects of a
 /// stage leave the results of the stages before it as they are.
@@ -114,5 +114,55 @@ impl EffectSpec {
             .iter()
             .flat_map(|parameter| parameter.neutral.iter().copied())
             .collect()
+    }
+
+    /// The effect with flat values, matrices row by row.
+    ///
+    /// # Errors
+    /// [`EffectError`] for a wrong number of values, and values that are not finite or out of
+    /// bounds.
+    pub(super) fn effect(&self, values: Vec<f64>) -> Result<Effect, EffectError> {
+        let effect = self.name;
+        if values.len() != self.value_count() {
+            return Err(EffectError::Length {
+                effect,
+                expected: self.value_count(),
+                found: values.len(),
+            });
+        }
+        let mut rest = values.as_slice();
+        for parameter in self.parameters {
+            let (own, after) = rest.split_at(parameter.shape.count());
+            rest = after;
+            parameter.check(effect, own)?;
+        }
+        Ok(Effect::from_checked(self.kind, values))
+    }
+}
+
+impl ParameterSpec {
+    /// Whether its values are within the bounds, and a choice's is the number of a word.
+    fn check(&self, effect: &'static str, values: &[f64]) -> Result<(), EffectError> {
+        let (field, lower, upper) = (self.name, self.lower, self.upper);
+        if let Some(&value) = values
+            .iter()
+            .find(|value| !(lower..=upper).contains(*value))
+        {
+            return Err(EffectError::OutOfRange {
+                effect,
+                field,
+                value,
+                lower,
+                upper,
+            });
+        }
+        if matches!(self.shape, Shape::Choice(_)) && values[0].fract() != 0.0 {
+            return Err(EffectError::Malformed {
+                effect,
+                field: field.to_owned(),
+                expected: "the number of a choice",
+            });
+        }
+        Ok(())
     }
 }

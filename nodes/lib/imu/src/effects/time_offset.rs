@@ -47,7 +47,7 @@ impl Effect {
     /// # Errors
     /// [`EffectError`] for an offset out of bounds.
     pub fn time_offset(seconds: f64) -> Result<Self, EffectError> {
-        Self::new(EffectKind::TimeOffset, vec![seconds])
+        SPEC.effect(vec![seconds])
     }
 }
 

@@ -3,7 +3,13 @@
 use super::search::{ReadOff, ReadOffSearch, Search};
 use super::spec::{EffectSpec, ParameterSpec, Shape, Stage};
 use super::{EffectKind, EffectSet};
-use crate::{Channel, STANDARD_GRAVITY};
+use crate::{Channel, PerChannel, STANDARD_GRAVITY};
+
+/// The effect of each channel.
+const KINDS: PerChannel<EffectKind> = PerChannel {
+    accelerometer: EffectKind::AccelUnits,
+    gyroscope: EffectKind::GyroUnits,
+};
 
 pub(super) static ACCEL: EffectSpec = EffectSpec {
     kind: EffectKind::AccelUnits,
@@ -84,7 +90,7 @@ pub fn unit_factors(channel: Channel) -> &'static [f64] {
 impl EffectSet {
     /// Factor of a channel's units; 1 without the effect.
     pub fn unit_factor(&self, channel: Channel) -> f64 {
-        self.get_read_off(ReadOff::UnitFactor(channel))
+        self.get(KINDS[channel])
             .map_or(1.0, |effect| effect.scalar(0))
     }
 }

@@ -1,19 +1,19 @@
 //! Ways to differentiate a sensor's frames, one file each.
 
 use std::fmt;
-use std::ops::Range;
 use std::str::FromStr;
 
-use cromosim_spatial::derivative_weights;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+use self::stencil::Stencil;
 use crate::{ImuError, SensorFrame};
 
 mod normal_tracking;
 mod richardson;
 mod second_difference;
 pub(crate) mod spline;
+pub(crate) mod stencil;
 mod triangle;
 
 /// A way to get acceleration and angular velocity from frames; h is the frames' interval.
@@ -122,56 +122,5 @@ impl FromStr for Scheme {
             .ok_or_else(|| ImuError::UnknownScheme {
                 name: name.to_owned(),
             })
-    }
-}
-
-/// The frames that an estimate at frame `k` of `count` takes.
-pub(crate) fn stencil_range(count: usize, k: usize, reach: usize) -> Range<usize> {
-    // A one-sided second derivative needs one frame more to have the same order of error.
-    let inside = k >= reach && k + reach < count;
-    let width = (2 * reach + if inside { 1 } else { 2 }).min(count);
-    let start = k.saturating_sub(reach).min(count - width);
-    start..start + width
-}
-
-/// The frames around one frame, with the weights of their differences.
-pub(crate) struct Stencil<'a> {
-    frames: &'a [SensorFrame],
-    centre: &'a SensorFrame,
-    weights: [[f64; cromosim_spatial::MAX_STENCIL]; 3],
-}
-
-impl<'a> Stencil<'a> {
-    fn new(frames: &'a [SensorFrame], k: usize, reach: usize) -> Self {
-        let range = stencil_range(frames.len(), k, reach);
-        let (centre, width) = (&frames[k], range.len());
-        let frames = &frames[range];
-        let mut seconds = [0.0; cromosim_spatial::MAX_STENCIL];
-        for (seconds, frame) in seconds.iter_mut().zip(frames) {
-            *seconds = frame.stamp - centre.stamp;
-        }
-        Self {
-            frames,
-            centre,
-            weights: derivative_weights(&seconds[..width], 0.0),
-        }
-    }
-
-    /// `sum_j w_j x_j` with the weights of a derivative of the given order.
-    fn sum(&self, order: usize, of: impl Fn(&SensorFrame) -> Vector3<f64>) -> Vector3<f64> {
-        self.frames
-            .iter()
-            .zip(self.weights[order])
-            .map(|(frame, weight)| of(frame) * weight)
-            .sum()
-    }
-
-    /// Second derivative of the position. Differences from the centre, so that rounding does not
-    /// grow with the distance from the origin.
-    fn acceleration(&self) -> Vector3<f64> {
-        let centre = self.centre.world_from_sensor.translation.vector;
-        self.sum(2, |frame| {
-            frame.world_from_sensor.translation.vector - centre
-        })
     }
 }

@@ -6,7 +6,7 @@
 
 use nalgebra::Vector3;
 
-use super::Stencil;
+use super::stencil::Stencil;
 
 /// `w = n x n'`, n' by central differences.
 pub(super) fn angular_velocity(stencil: &Stencil<'_>) -> Vector3<f64> {

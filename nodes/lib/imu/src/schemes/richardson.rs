@@ -8,7 +8,7 @@
 use cromosim_spatial::so3;
 use nalgebra::Vector3;
 
-use super::Stencil;
+use super::stencil::Stencil;
 
 /// First derivative of `log(R(t) R(t_k)^-1)`: it is the angular velocity at t_k, since the
 /// logarithm's Jacobian is the identity there.

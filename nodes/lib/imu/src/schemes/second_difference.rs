@@ -6,7 +6,7 @@
 use cromosim_spatial::so3;
 use nalgebra::Vector3;
 
-use super::Stencil;
+use super::stencil::Stencil;
 
 /// `w = (log(R[1] R[0]^-1) - log(R[-1] R[0]^-1)) / 2h`.
 pub(super) fn angular_velocity(stencil: &Stencil<'_>) -> Vector3<f64> {

@@ -6,7 +6,7 @@
 use cromosim_spatial::so3;
 use nalgebra::{Matrix3, Vector3};
 
-use super::Stencil;
+use super::stencil::Stencil;
 
 /// `hat(w) = R' R^T` by central differences of the rotation matrix.
 pub(super) fn angular_velocity(stencil: &Stencil<'_>) -> Vector3<f64> {
