@@ -76,7 +76,6 @@ const STILL_CIRCULAR: &[&str] = &[
     "nodes/lib/gap/",
     "nodes/lib/learned/",
     "nodes/lib/recording/",
-    "nodes/bin/cromosim/",
 ];
 
 /// A crate in a folder of its own, from its files' names and texts.
@@ -197,8 +196,6 @@ const STILL_LONG: &[&str] = &[
     "nodes/lib/gap/",
     "nodes/lib/learned/",
     "nodes/lib/recording/",
-    "nodes/bin/cromosim/",
-    "nodes/bin/virtual_imu/",
 ];
 
 #[test]

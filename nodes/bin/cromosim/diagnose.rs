@@ -70,34 +70,13 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .map(Config::read)
         .transpose()?
         .unwrap_or_default();
-    let (names, place) = match (&arguments.config, arguments.without.is_empty()) {
-        (Some(file), true) => (&config.without, format!("{}: without", file.display())),
-        _ => (&arguments.without, "--without".to_owned()),
-    };
-    let excluded = names
-        .iter()
-        .map(|name| effect(name, &place))
-        .collect::<anyhow::Result<_>>()?;
-    let options = DiagnoseOptions {
-        excluded,
-        seed: arguments.seed.or(config.seed).unwrap_or(0),
-    };
+    let options = options(arguments, &config)?;
     check_folder(&arguments.out)?;
     let reader = BagReader::open(&arguments.recording)?;
     let body = arguments.body.as_deref().map(BodyModel::read).transpose()?;
     let (recorded, mut notes, mut failures) = select(&reader, body.as_ref(), &config.placements)?;
 
-    // Until the files are written a signal may end the process as it likes: there is nothing to
-    // clear away.
-    let bar = progress::bar(recorded.len() as u64, "diagnosing, placements");
-    let diagnose = |placement: &RecordedPlacement| {
-        let answer = cromosim_gap::diagnose(&placement.record(), &options)
-            .map_err(|error| error.to_string());
-        bar.inc(1);
-        answer
-    };
-    let results: Vec<_> = recorded.par_iter().map(diagnose).collect();
-    bar.finish_and_clear();
+    let results = diagnose_all(&recorded, &options);
     let mut answers = BTreeMap::new();
     for (placement, result) in recorded.iter().zip(results) {
         match result {
@@ -123,17 +102,43 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let (diagnosis, effects, evidence) = split(answers);
     write(arguments, &diagnosis, &effects, &evidence)?;
     print(&diagnosis);
-    let folder = arguments.out.display();
-    if cfg!(feature = "view") {
-        println!("\n{folder}: {}", FILES.join(", "));
-    } else {
-        println!(
-            "\n{folder}: {}; {} is left out, as this cromosim was built without its feature `view`",
-            FILES[..3].join(", "),
-            FILES[3]
-        );
-    }
+    print_files(&arguments.out);
     Ok(())
+}
+
+/// What is taken out of the library, and the seed: the command line wins over the file.
+fn options(arguments: &Arguments, config: &Config) -> anyhow::Result<DiagnoseOptions> {
+    let (names, place) = match (&arguments.config, arguments.without.is_empty()) {
+        (Some(file), true) => (&config.without, format!("{}: without", file.display())),
+        _ => (&arguments.without, "--without".to_owned()),
+    };
+    let excluded = names
+        .iter()
+        .map(|name| effect(name, &place))
+        .collect::<anyhow::Result<_>>()?;
+    Ok(DiagnoseOptions {
+        excluded,
+        seed: arguments.seed.or(config.seed).unwrap_or(0),
+    })
+}
+
+/// Each placement on whatever core is free.
+fn diagnose_all(
+    recorded: &[RecordedPlacement],
+    options: &DiagnoseOptions,
+) -> Vec<Result<PlacementAnswer, String>> {
+    // Until the files are written a signal may end the process as it likes: there is nothing to
+    // clear away.
+    let bar = progress::bar(recorded.len() as u64, "diagnosing, placements");
+    let diagnose = |placement: &RecordedPlacement| {
+        let answer =
+            cromosim_gap::diagnose(&placement.record(), options).map_err(|error| error.to_string());
+        bar.inc(1);
+        answer
+    };
+    let results = recorded.par_iter().map(diagnose).collect();
+    bar.finish_and_clear();
+    results
 }
 
 /// The placements to diagnose, what a user should know of the others, and which cannot be read.
@@ -350,6 +355,20 @@ fn write(
         drop(fs::remove_file(folder.join(FILES[3])));
     }
     Ok(())
+}
+
+/// Which files were written.
+fn print_files(folder: &Path) {
+    let folder = folder.display();
+    if cfg!(feature = "view") {
+        println!("\n{folder}: {}", FILES.join(", "));
+    } else {
+        println!(
+            "\n{folder}: {}; {} is left out, as this cromosim was built without its feature `view`",
+            FILES[..3].join(", "),
+            FILES[3]
+        );
+    }
 }
 
 /// What was found, for people.

@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::{Context, bail};
 use cromosim_bag::{BagOptions, BagReader, BagSummary, BagWriter, Compression};
 use cromosim_body::BodyModel;
-use cromosim_imu::{DeclaredNoise, Device, Placement, PlacementEffects, Scheme, SensorFrame};
+use cromosim_imu::{Device, EffectsFile, Placement, PlacementEffects, Scheme, SensorFrame};
 use cromosim_learned::LearnedSimulator;
 use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_recording::rigid::{RigidContent, parse_rigid};
@@ -32,24 +32,14 @@ pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
             arguments.out.display()
         );
     }
-    let scheme: Option<Scheme> = arguments
-        .scheme
-        .as_deref()
-        .map(str::parse)
-        .transpose()
-        .context("--scheme")?;
+    let scheme = given_scheme(arguments)?;
     let reader = BagReader::open(recording)?;
     let body = arguments.body.as_deref().map(BodyModel::read).transpose()?;
     let recorded = read_placements(&reader, body.as_ref())?
         .into_iter()
         .map(|(_, placement)| placement)
         .collect::<Result<Vec<_>, _>>()?;
-    let effects = arguments
-        .effects
-        .as_deref()
-        .map(|file| read_effects(file, &recorded))
-        .transpose()?
-        .unwrap_or_default();
+    let effects = given_effects(arguments, &recorded)?;
     let (recorded, without_stamps) = with_stamps(recorded, arguments.rate);
     let how = Resimulation {
         scheme,
@@ -71,77 +61,24 @@ pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
         recorded.len(),
         recording.display()
     );
-    for placement in &recorded {
-        for line in placement
-            .notes
-            .iter()
-            .cloned()
-            .chain(outside_reference(placement))
-        {
-            println!("  {}: {line}", placement.name);
-        }
-    }
-    if !without_stamps.is_empty() {
-        println!(
-            "  {}: no messages on /imu/NAME/data_raw to take the stamps from; left out (--rate HZ takes them in)",
-            without_stamps.join(", ")
-        );
-    }
+    print_notes(&recorded, &without_stamps);
     Ok(())
 }
 
 /// Runs `simulate --rigid TRAJECTORY`: the trajectory is the reference of one placement.
 pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()> {
-    let scheme: Option<Scheme> = arguments
-        .scheme
-        .as_deref()
-        .map(str::parse)
-        .transpose()
-        .context("--scheme")?;
+    let scheme = given_scheme(arguments)?;
     let name = arguments.placement.as_deref().unwrap_or("body");
     if let Err((_, problem)) = Placement::at_site(name, "left_watch", 1.0) {
         bail!("--placement {name}: {problem}");
     }
-    let Some(RigidContent::Poses(poses)) =
-        parse_rigid(&read_whole(trajectory)?, &trajectory.display().to_string())?
-    else {
-        bail!(
-            "{}: not a trajectory of a rigid body: expected TUM, EuRoC ground truth or a table of poses with a header",
-            trajectory.display()
-        );
-    };
-    let poses = poses.trajectory;
-    let frame = |((stamp, position), rotation): ((&Stamp, &Vector3<f64>), &UnitQuaternion<f64>)| {
-        SensorFrame::new(*stamp, Isometry3::from_parts((*position).into(), *rotation))
-    };
-    let frames = poses
-        .stamps
-        .iter()
-        .zip(&poses.positions)
-        .zip(&poses.rotations)
-        .map(frame)
-        .collect();
-    let recorded = vec![RecordedPlacement {
-        name: name.to_owned(),
-        frames,
-        measured: Vec::new(),
-        notes: Vec::new(),
-    }];
-    let mut effects = arguments
-        .effects
-        .as_deref()
-        .map(|file| read_effects(file, &recorded))
-        .transpose()?
-        .unwrap_or_default();
+    let recorded = [rigid_placement(trajectory, name)?];
+    let mut effects = given_effects(arguments, &recorded)?;
     if let Some(device) = &arguments.device {
         let device = Device::resolve(Some(device), Path::new("."))?;
-        let declared_noise = DeclaredNoise {
-            accel_density: device.accel_density(),
-            gyro_density: device.gyro_density(),
-        };
         let of_device = PlacementEffects {
             epoch: recorded[0].span().0,
-            declared_noise,
+            declared_noise: device.declared_noise(),
             effects: device.effects().clone(),
         };
         effects.placements.insert(name.to_owned(), of_device);
@@ -176,6 +113,78 @@ pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()>
         trajectory.display()
     );
     Ok(())
+}
+
+/// The scheme of `--scheme`.
+fn given_scheme(arguments: &Arguments) -> anyhow::Result<Option<Scheme>> {
+    arguments
+        .scheme
+        .as_deref()
+        .map(str::parse)
+        .transpose()
+        .context("--scheme")
+}
+
+/// The effects of `--effects`; none without.
+fn given_effects(
+    arguments: &Arguments,
+    recorded: &[RecordedPlacement],
+) -> anyhow::Result<EffectsFile> {
+    let effects = arguments
+        .effects
+        .as_deref()
+        .map(|file| read_effects(file, recorded))
+        .transpose()?;
+    Ok(effects.unwrap_or_default())
+}
+
+/// What a user should know of the placements, and which of them were left out.
+fn print_notes(recorded: &[RecordedPlacement], without_stamps: &[String]) {
+    for placement in recorded {
+        for line in placement
+            .notes
+            .iter()
+            .cloned()
+            .chain(outside_reference(placement))
+        {
+            println!("  {}: {line}", placement.name);
+        }
+    }
+    if !without_stamps.is_empty() {
+        println!(
+            "  {}: no messages on /imu/NAME/data_raw to take the stamps from; left out (--rate HZ takes them in)",
+            without_stamps.join(", ")
+        );
+    }
+}
+
+/// A trajectory as the reference of one placement.
+fn rigid_placement(trajectory: &Path, name: &str) -> anyhow::Result<RecordedPlacement> {
+    let Some(RigidContent::Poses(poses)) =
+        parse_rigid(&read_whole(trajectory)?, &trajectory.display().to_string())?
+    else {
+        bail!(
+            "{}: not a trajectory of a rigid body: expected TUM, EuRoC ground truth or a table of poses with a header",
+            trajectory.display()
+        );
+    };
+    let poses = poses.trajectory;
+    let frame = |((stamp, position), rotation): ((&Stamp, &Vector3<f64>), &UnitQuaternion<f64>)| {
+        SensorFrame::new(*stamp, Isometry3::from_parts((*position).into(), *rotation))
+    };
+    let frames = poses
+        .stamps
+        .iter()
+        .zip(&poses.positions)
+        .zip(&poses.rotations)
+        .map(frame)
+        .collect();
+    Ok(RecordedPlacement {
+        name: name.to_owned(),
+        frames,
+        measured: Vec::new(),
+        notes: Vec::new(),
+    })
 }
 
 /// Each placement on whatever core is free.

@@ -3,11 +3,12 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use cromosim_evaluation::{
     DataFolder, Learnt, TrainingConfig, TrainingRun, data_summary, split_pairs, training_pairs,
 };
+use cromosim_learned::train::Engine;
 use cromosim_learned::{Network, Quantity};
 
 use crate::body;
@@ -72,9 +73,22 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         validation: &validation,
     };
     run.keep_configuration(&arguments.config)?;
+    let networks = learn(&run, engine.as_mut(), &terminal)?;
+    let scores = run.finish(networks)?;
+    println!("{}: weights and card.md", arguments.out.display());
+    print!("{scores}");
+    Ok(())
+}
+
+/// The accelerometer's and the gyroscope's network.
+fn learn(
+    run: &TrainingRun,
+    engine: &mut dyn Engine,
+    terminal: &Terminal,
+) -> anyhow::Result<[Network; 2]> {
     let mut networks = Vec::new();
     for quantity in Quantity::BOTH {
-        match run.learn(engine.as_mut(), quantity, &terminal)? {
+        match run.learn(engine, quantity, terminal)? {
             Learnt::Network {
                 network,
                 steps,
@@ -93,11 +107,5 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
             ),
         }
     }
-    let Ok(networks) = <[Network; 2]>::try_from(networks) else {
-        bail!("expected two networks")
-    };
-    let scores = run.finish(networks)?;
-    println!("{}: weights and card.md", arguments.out.display());
-    print!("{scores}");
-    Ok(())
+    <[Network; 2]>::try_from(networks).map_err(|_| anyhow!("expected two networks"))
 }

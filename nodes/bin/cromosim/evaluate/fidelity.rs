@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use cromosim_evaluation::{DataFolder, FidelityOptions, Protocol, evaluate_fidelity};
 
-use super::{data_folder, refuse_existing};
+use super::folders::{data_folder, refuse_existing};
 use crate::body;
 use crate::progress::Terminal;
 

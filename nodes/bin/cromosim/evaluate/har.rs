@@ -7,7 +7,7 @@ use clap::Args;
 use cromosim_evaluation::{Activities, ActivityOptions, evaluate_activities};
 use cromosim_learned::LearnedSimulator;
 
-use super::{data_folder, refuse_existing};
+use super::folders::{data_folder, refuse_existing};
 use crate::body;
 use crate::progress::Terminal;
 
