@@ -87,36 +87,14 @@ impl DeviceRanges {
     pub fn draw(&self, seed: u64) -> Result<DrawnDevice, LearnedError> {
         use EffectKind as Kind;
         let mut random = ChaCha12Rng::seed_from_u64(seed);
-        let vector = |random: &mut ChaCha12Rng, sigma: f64| -> Vec<f64> {
-            let [x, y] = normal_pair(random);
-            let [z, _] = normal_pair(random);
-            [x, y, z]
-                .map(|value| (value * sigma).clamp(-3.0 * sigma, 3.0 * sigma))
-                .to_vec()
-        };
-        let uniform = |random: &mut ChaCha12Rng, [low, high]: [f64; 2]| {
-            low + (high - low) * random.random::<f64>()
-        };
         let mut drawn: Vec<(Kind, Vec<f64>)> = vec![
             (Kind::MountRotation, vector(&mut random, self.mount)),
             (Kind::LeverArm, vector(&mut random, self.lever_arm)),
             (Kind::TimeOffset, vec![uniform(&mut random, self.late)]),
             (Kind::AccelBias, vector(&mut random, self.accel_bias)),
             (Kind::GyroBias, vector(&mut random, self.gyro_bias)),
-            (
-                Kind::AccelScale,
-                vector(&mut random, self.scale)
-                    .iter()
-                    .map(|value| 1.0 + value)
-                    .collect(),
-            ),
-            (
-                Kind::GyroScale,
-                vector(&mut random, self.scale)
-                    .iter()
-                    .map(|value| 1.0 + value)
-                    .collect(),
-            ),
+            (Kind::AccelScale, gains(&mut random, self.scale)),
+            (Kind::GyroScale, gains(&mut random, self.scale)),
             (
                 Kind::AccelMisalignment,
                 vector(&mut random, self.misalignment),
@@ -149,6 +127,25 @@ impl DeviceRanges {
             seed,
         })
     }
+}
+
+/// Three independent normal numbers, cut off at three standard deviations.
+fn vector(random: &mut ChaCha12Rng, sigma: f64) -> Vec<f64> {
+    let [x, y] = normal_pair(random);
+    let [z, _] = normal_pair(random);
+    [x, y, z]
+        .map(|value| (value * sigma).clamp(-3.0 * sigma, 3.0 * sigma))
+        .to_vec()
+}
+
+/// Three such numbers around 1.
+fn gains(random: &mut ChaCha12Rng, sigma: f64) -> Vec<f64> {
+    let deviations = vector(random, sigma);
+    deviations.iter().map(|deviation| 1.0 + deviation).collect()
+}
+
+fn uniform(random: &mut ChaCha12Rng, [low, high]: [f64; 2]) -> f64 {
+    low + (high - low) * random.random::<f64>()
 }
 
 impl DrawnDevice {

@@ -16,21 +16,21 @@ pub enum LearnedError {
         "{name}: neither a folder with networks nor a model that comes with the suite ({known})"
     )]
     UnknownModel {
-        /// What was asked for.
+        /// The name or folder that was given.
         name: String,
-        /// Those there are.
+        /// Names of the models that come with the suite.
         known: String,
     },
     /// A number of a network's shape is out of range.
     #[error("network shape: {field} is {found}, it may be {least} to {most}")]
     Shape {
-        /// Which number.
+        /// Field of the shape, as in files.
         field: &'static str,
-        /// What it is.
+        /// The value given.
         found: usize,
-        /// The least it may be.
+        /// Least value that is allowed.
         least: usize,
-        /// The most it may be.
+        /// Greatest value that is allowed.
         most: usize,
     },
     /// The shape as a whole is too large.
@@ -38,9 +38,9 @@ pub enum LearnedError {
         "network shape: {found} parameters, at most {most} are supported: choose fewer channels, hidden units or layers"
     )]
     TooLarge {
-        /// How many there would be.
+        /// Parameters that the shape has.
         found: u64,
-        /// How many there may be.
+        /// Parameters that are allowed.
         most: u64,
     },
     /// An input's length does not fit.
@@ -48,15 +48,15 @@ pub enum LearnedError {
         "network input: {found} numbers, {batch} sequences x {steps} steps x {inputs} inputs are {expected}"
     )]
     Input {
-        /// How many there are.
+        /// Numbers that were given.
         found: usize,
-        /// Sequences.
+        /// Sequences of the batch.
         batch: usize,
-        /// Steps.
+        /// Steps of each sequence.
         steps: usize,
-        /// Width of a step.
+        /// Numbers of a step: the shape's `inputs`.
         inputs: usize,
-        /// How many there have to be.
+        /// Product of the three.
         expected: usize,
     },
     /// A network that knows the future cannot run step by step.
@@ -69,7 +69,7 @@ pub enum LearnedError {
     Read {
         /// The file.
         path: PathBuf,
-        /// The reason.
+        /// What the system says.
         source: io::Error,
     },
     /// A file cannot be written.
@@ -77,7 +77,7 @@ pub enum LearnedError {
     Write {
         /// The file.
         path: PathBuf,
-        /// The reason.
+        /// What the system says.
         source: io::Error,
     },
     /// A file is larger than any network of ours.
@@ -85,9 +85,9 @@ pub enum LearnedError {
     FileTooLarge {
         /// The file.
         path: PathBuf,
-        /// Its size.
+        /// Its size, bytes.
         found: u64,
-        /// The most it may be.
+        /// The largest size that is read, bytes.
         most: u64,
     },
     /// The file is not sound.
@@ -95,7 +95,7 @@ pub enum LearnedError {
     Unsound {
         /// The file.
         path: PathBuf,
-        /// The reason.
+        /// What the reader found.
         reason: String,
     },
     /// The header lacks the network's shape, or it cannot be read.
@@ -103,9 +103,9 @@ pub enum LearnedError {
     Metadata {
         /// The file.
         path: PathBuf,
-        /// The key.
+        /// Key of the entry that is missing or not readable.
         key: &'static str,
-        /// The reason.
+        /// What the reader found.
         reason: String,
     },
     /// A tensor is missing.
@@ -113,9 +113,9 @@ pub enum LearnedError {
     TensorMissing {
         /// The file.
         path: PathBuf,
-        /// Which.
+        /// Name of the tensor.
         tensor: String,
-        /// Those that are there.
+        /// Names of the tensors in the file.
         known: String,
     },
     /// A tensor that the network does not have.
@@ -123,7 +123,7 @@ pub enum LearnedError {
     TensorUnknown {
         /// The file.
         path: PathBuf,
-        /// Which.
+        /// Name of the tensor.
         tensor: String,
     },
     /// A tensor's shape or type does not fit.
@@ -131,13 +131,13 @@ pub enum LearnedError {
     Tensor {
         /// The file.
         path: PathBuf,
-        /// Which.
+        /// Name of the tensor.
         tensor: String,
-        /// The shape it has to have.
+        /// The network's shape of it, slowest axis first.
         expected: Vec<usize>,
-        /// The shape it has.
+        /// The file's shape of it.
         found: Vec<usize>,
-        /// The type it has.
+        /// The file's type of it, as safetensors names types.
         found_type: String,
     },
     /// A weight that is not a number.
@@ -145,11 +145,11 @@ pub enum LearnedError {
     NotFinite {
         /// The file.
         path: PathBuf,
-        /// Which tensor.
+        /// Name of the tensor.
         tensor: String,
-        /// Which element.
+        /// Place among its numbers, from 0 on.
         index: usize,
-        /// What it is.
+        /// NaN or an infinity.
         value: f32,
     },
     /// A file that is not YAML, or has wrong or unknown fields.
@@ -177,15 +177,15 @@ pub enum LearnedError {
         file: String,
         /// The placement's name.
         placement: String,
-        /// accel_x to gyro_z.
+        /// Axis of the reading: accel_x to gyro_z.
         channel: &'static str,
-        /// What is wrong.
+        /// What its knots lack.
         problem: &'static str,
     },
     /// Too little to fit something to.
     #[error("{what}: {found} samples, at least {needed} are needed")]
     TooFew {
-        /// What is fitted.
+        /// What is to be fitted.
         what: String,
         /// Samples that are there.
         found: usize,
@@ -197,9 +197,9 @@ pub enum LearnedError {
         "body `{body}`: fewer than three triangles without common corners around triangle {triangle}"
     )]
     NoPatch {
-        /// The body.
+        /// Name of the body model.
         body: String,
-        /// The site's triangle.
+        /// Number of the site's triangle.
         triangle: u32,
     },
     /// A placement that is read at another rate than the networks know.
@@ -215,9 +215,9 @@ pub enum LearnedError {
     /// A network that cannot be what it is used for.
     #[error("{network} network: {problem}")]
     WrongNetwork {
-        /// acceleration or angular_velocity.
+        /// `acceleration` or `angular_velocity`.
         network: &'static str,
-        /// What is wrong.
+        /// Why it cannot be used so.
         problem: String,
     },
     /// A site or pose that the body does not have.
@@ -235,17 +235,17 @@ pub enum LearnedError {
     /// A batch is not sound.
     #[error("batch {number}: {reason}")]
     Batch {
-        /// Its number.
+        /// Number of the batch.
         number: u64,
-        /// The reason.
+        /// Which of its lengths or values does not fit.
         reason: String,
     },
     /// An option of the training is out of range.
     #[error("training options: {field}: {reason}")]
     Options {
-        /// Which.
+        /// Field of the options, as in files.
         field: &'static str,
-        /// The reason.
+        /// What is allowed.
         reason: String,
     },
     /// The loss is no number any more.
@@ -255,9 +255,9 @@ pub enum LearnedError {
     Diverged {
         /// Steps taken before.
         step: u64,
-        /// The loss.
+        /// Loss of the step's batch.
         loss: f64,
-        /// The gradient's length.
+        /// Length of its gradient; NaN in a validation.
         gradient_norm: f64,
     },
     /// A checkpoint was written by another training.
@@ -265,17 +265,17 @@ pub enum LearnedError {
     OtherTraining {
         /// The file.
         path: PathBuf,
-        /// What differs.
+        /// The first field of shape or options that differs.
         field: String,
-        /// There.
+        /// The checkpoint's value.
         in_file: String,
-        /// Here.
+        /// The value that is asked for.
         wished: String,
     },
     /// Burn failed.
     #[error("burn: {reason}")]
     Burn {
-        /// What it says.
+        /// Burn's own message.
         reason: String,
     },
 }

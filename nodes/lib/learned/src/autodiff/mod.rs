@@ -11,7 +11,7 @@ use ::burn::tensor::{Device, Tensor, TensorData};
 
 use crate::train::{Batch, Engine, Loss, weighted_loss};
 use crate::{LearnedError, Network};
-use model::Model;
+use model::{Model, numbers};
 
 /// Burn, on a device of its.
 #[derive(Debug, Clone)]
@@ -67,15 +67,6 @@ impl BurnEngine {
         );
         Tensor::from_data(data, device)
     }
-}
-
-fn numbers<const D: usize>(tensor: Tensor<D>) -> Result<Vec<f32>, LearnedError> {
-    let failed = |reason: String| LearnedError::Burn { reason };
-    let data = tensor
-        .try_into_data()
-        .map_err(|error| failed(format!("{error:?}")))?;
-    data.try_into_vec::<f32>()
-        .map_err(|error| failed(format!("{error:?}")))
 }
 
 impl Engine for BurnEngine {

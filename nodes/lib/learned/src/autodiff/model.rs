@@ -5,7 +5,7 @@ use ::burn::tensor::module::conv1d;
 use ::burn::tensor::ops::ConvOptions;
 use ::burn::tensor::{Device, Gradients, Tensor, TensorData};
 
-use super::{fused, numbers};
+use super::fused;
 use crate::shape::{Direction, LstmPlace};
 use crate::{LearnedError, Network, NetworkShape};
 
@@ -183,4 +183,14 @@ fn composed(input: &Tensor<3>, layer: &Layer) -> Tensor<3> {
     };
     let directions = layer.recurrent.dims()[0] / (4 * hidden);
     Tensor::cat((0..directions).map(direction).collect(), 2)
+}
+
+/// The values of a tensor, in its order.
+pub(super) fn numbers<const D: usize>(tensor: Tensor<D>) -> Result<Vec<f32>, LearnedError> {
+    let failed = |reason: String| LearnedError::Burn { reason };
+    let data = tensor
+        .try_into_data()
+        .map_err(|error| failed(format!("{error:?}")))?;
+    data.try_into_vec::<f32>()
+        .map_err(|error| failed(format!("{error:?}")))
 }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::adam::Adam;
 use super::options::TrainOptions;
-use super::training::{Best, Training};
+use super::state::{Best, Training};
 use crate::tensors::{self, Named, TensorFile};
 use crate::{LearnedError, Network, NetworkShape};
 

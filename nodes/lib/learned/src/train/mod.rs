@@ -7,6 +7,7 @@ mod checkpoint;
 mod engine;
 mod loss;
 mod options;
+mod state;
 mod training;
 
 pub use batch::{Batch, Batches};
@@ -15,4 +16,5 @@ pub use loss::Loss;
 #[cfg(feature = "burn")]
 pub(crate) use loss::weighted_loss;
 pub use options::{Schedule, TrainOptions};
-pub use training::{Best, Data, Hooks, Progress, Stop, Training};
+pub use state::{Best, Training};
+pub use training::{Data, Hooks, Progress, Stop};
