@@ -4,8 +4,8 @@
 mod common;
 
 use cromosim_recording::rigid::{
-    EurocGroundTruth, ImuSeries, PoseTrajectory, RigidFormat, parse_euroc_ground_truth,
-    parse_euroc_imu, parse_imu_csv, parse_pose_csv, parse_tum, sniff_rigid,
+    EurocGroundTruth, ImuSeries, PoseTrajectory, RigidError, RigidFormat, parse_euroc_ground_truth,
+    parse_euroc_imu, parse_imu_csv, parse_pose_csv, parse_rigid, parse_tum, sniff_rigid,
     write_euroc_ground_truth, write_euroc_imu, write_imu_csv, write_pose_csv, write_tum,
 };
 use cromosim_spatial::Stamp;
@@ -213,27 +213,86 @@ fn bad_rows_get_a_verdict_with_line_and_column() {
     assert!(truth.contains("line 2: expected 8"), "{truth}");
 }
 
+fn assert_sound_times(stamps: &[Stamp], lists: &[&[Vector3<f64>]]) {
+    assert!(stamps.windows(2).all(|pair| pair[0] < pair[1]));
+    for list in lists {
+        assert_eq!(list.len(), stamps.len());
+        assert!(list.iter().flatten().all(|value| value.is_finite()));
+    }
+}
+
+fn assert_sound_poses(poses: &PoseTrajectory) {
+    assert_sound_times(&poses.stamps, &[&poses.positions]);
+    assert_eq!(poses.rotations.len(), poses.stamps.len());
+    let is_unit = |rotation: &UnitQuaternion<f64>| (rotation.norm() - 1.0).abs() < 1e-9;
+    assert!(poses.rotations.iter().all(is_unit));
+}
+
+fn assert_sound_readings(series: &ImuSeries) {
+    assert_sound_times(
+        &series.stamps,
+        &[&series.specific_force, &series.angular_velocity],
+    );
+}
+
+fn assert_sound_truth(truth: &EurocGroundTruth) {
+    assert_sound_poses(&truth.trajectory);
+    for list in [
+        &truth.velocities,
+        &truth.gyroscope_biases,
+        &truth.accelerometer_biases,
+    ] {
+        if !list.is_empty() {
+            assert_sound_times(&truth.trajectory.stamps, &[list]);
+        }
+    }
+}
+
+/// Whether the file was taken; what was taken is sound, and what was not is refused by name.
+fn taken<T>(read: Result<T, RigidError>, assert_sound: fn(&T)) -> bool {
+    match read {
+        Ok(content) => {
+            assert_sound(&content);
+            true
+        }
+        Err(error) => {
+            assert!(error.to_string().starts_with("x"), "{error}");
+            false
+        }
+    }
+}
+
 #[test]
-fn damage_never_panics() {
-    let parse_all = |bytes: &[u8]| {
-        let _ = (
-            parse_tum(bytes, "x").is_ok(),
-            parse_pose_csv(bytes, "x").is_ok(),
-            parse_euroc_imu(bytes, "x").is_ok(),
-        );
-        let _ = (
-            parse_euroc_ground_truth(bytes, "x").is_ok(),
-            sniff_rigid(bytes),
-        );
+fn damaged_files_are_refused_by_name_or_hold_sound_values() {
+    let take = |bytes: &[u8]| {
+        let unknown = sniff_rigid(bytes).is_none();
+        assert!(parse_rigid(bytes, "x").is_ok_and(|read| read.is_none()) == unknown);
+        [
+            taken(parse_tum(bytes, "x"), assert_sound_poses),
+            taken(parse_pose_csv(bytes, "x"), assert_sound_poses),
+            taken(parse_euroc_imu(bytes, "x"), assert_sound_readings),
+            taken(parse_euroc_ground_truth(bytes, "x"), assert_sound_truth),
+        ]
     };
-    let cut = |text: String| text.into_bytes()[..2000].to_vec();
-    for sample in [
+    // Whole lines, as half of one is damage already.
+    let cut = |text: String| {
+        let end = text[..2000].rfind('\n').unwrap();
+        text.as_bytes()[..=end].to_vec()
+    };
+    let samples = [
         cut(write_tum(&trajectory("map"))),
         cut(write_pose_csv(&trajectory("map"))),
         cut(write_euroc_imu(&imu())),
         cut(write_euroc_ground_truth(&ground_truth())),
-    ] {
-        common::damaged(&sample, 400, parse_all);
+    ];
+    for (own, sample) in samples.iter().enumerate() {
+        let mut counts = [0; 2];
+        common::damaged(sample, 400, |bytes| {
+            counts[usize::from(take(bytes)[own])] += 1;
+        });
+        println!("{own}: {counts:?}");
+        let [refused, taken] = counts;
+        assert!(refused > 100 && taken > 10, "{own}: {counts:?}");
     }
 }
 

@@ -183,6 +183,13 @@ fn rest(readings: &[ImuReading], rate_hz: f64, floors: [f64; 2]) -> Option<([f64
 }
 
 fn compare_series(text: &mut String, a: &Series, b: &Series) -> Value {
+    describe_pace_and_noise(text, a, b);
+    describe_rest(text, a, b);
+    let channels = compare_channels(text, a, b);
+    json!({"a": described(a), "b": described(b), "channels": channels, "overlap": overlap(text, a, b)})
+}
+
+fn describe_pace_and_noise(text: &mut String, a: &Series, b: &Series) {
     line!(
         text,
         "  {:26}{:>14}{:>14}{:>16}",
@@ -223,7 +230,10 @@ fn compare_series(text: &mut String, a: &Series, b: &Series) -> Value {
             format!("x {}", significant(other / one, 3)),
         );
     }
-    describe_rest(text, a, b);
+}
+
+/// How far spectra and distributions lie apart.
+fn compare_channels(text: &mut String, a: &Series, b: &Series) -> serde_json::Map<String, Value> {
     let mut channels = serde_json::Map::new();
     line!(
         text,
@@ -247,7 +257,7 @@ fn compare_series(text: &mut String, a: &Series, b: &Series) -> Value {
             json!({"log_spectral_distance_db": spectra_db, "wasserstein": wasserstein}),
         );
     }
-    json!({"a": described(a), "b": described(b), "channels": channels, "overlap": overlap(text, a, b)})
+    channels
 }
 
 fn described(series: &Series) -> Value {

@@ -1,4 +1,4 @@
-//! What a file holds.
+//! What a file holds, and what of it was read.
 
 use cromosim_motion::SmplMotion;
 
@@ -39,6 +39,24 @@ impl Content {
                 let imus = recording.imus.iter();
                 imus.map(|imu| imu.series.stamps.len()).sum()
             }
+        }
+    }
+}
+
+/// What was read.
+#[derive(Clone, Debug)]
+pub struct Read {
+    /// What the file holds.
+    pub content: Content,
+    /// What was left out or changed, a line each.
+    pub notes: Vec<String>,
+}
+
+impl From<Content> for Read {
+    fn from(content: Content) -> Self {
+        Self {
+            content,
+            notes: Vec::new(),
         }
     }
 }

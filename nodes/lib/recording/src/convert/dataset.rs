@@ -25,6 +25,20 @@ pub(super) fn chosen(
         )));
     }
     cut(path, &mut recording, options)?;
+    choose_placements(&mut recording, target, options).map_err(unsuitable)?;
+    let left_out = recording.imus.iter().filter(|imu| imu.rows_left_out > 0);
+    let notes = left_out.map(|imu| note_left_out(path, imu)).collect();
+    let content = held_by(target, recording).map_err(unsuitable)?;
+    Ok(Read { content, notes })
+}
+
+/// Keeps the placement that is asked for, under the name that is given; `Err` says what does not
+/// fit.
+fn choose_placements(
+    recording: &mut DatasetRecording,
+    target: Target,
+    options: &ReadOptions,
+) -> Result<(), String> {
     let known = recording
         .imus
         .iter()
@@ -34,35 +48,38 @@ pub(super) fn chosen(
     if let Some(placement) = &options.placement {
         recording.imus.retain(|imu| imu.placement == *placement);
         if recording.imus.is_empty() {
-            return Err(unsuitable(format!(
+            return Err(format!(
                 "--placement {placement}: no such placement; there are {known}"
-            )));
+            ));
         }
     }
     if target != Target::Bag && recording.imus.len() != 1 {
-        return Err(unsuitable(format!(
+        return Err(format!(
             "several placements; give --placement, one of {known}"
-        )));
+        ));
     }
     if let Some(name) = &options.name {
         if recording.imus.len() != 1 {
-            return Err(unsuitable(format!(
+            return Err(format!(
                 "--name {name} is for one placement; give --placement, one of {known}"
-            )));
+            ));
         }
-        rename(&mut recording, name);
+        rename(recording, name);
     }
-    let left_out = recording.imus.iter().filter(|imu| imu.rows_left_out > 0);
-    let notes = left_out.map(|imu| note_left_out(path, imu)).collect();
-    let content = match target {
+    Ok(())
+}
+
+/// What the target holds of the recording; `Err` says what is missing.
+fn held_by(target: Target, mut recording: DatasetRecording) -> Result<Content, String> {
+    Ok(match target {
         Target::Bag => Content::Recording(Box::new(recording)),
         Target::Tum => {
             let placement = recording.imus[0].placement.clone();
             let mut references = recording.references.into_iter();
             let Some((_, trajectory)) = references.find(|(name, _)| *name == placement) else {
-                return Err(unsuitable(format!(
+                return Err(format!(
                     "the recording has no reference of {placement}, and a TUM trajectory holds no readings"
-                )));
+                ));
             };
             Content::Poses(EurocGroundTruth {
                 trajectory,
@@ -70,8 +87,7 @@ pub(super) fn chosen(
             })
         }
         _ => Content::Imu(recording.imus.swap_remove(0).series),
-    };
-    Ok(Read { content, notes })
+    })
 }
 
 /// The part of the recording from `start_s` on, `duration_s` long.

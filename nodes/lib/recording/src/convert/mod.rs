@@ -5,6 +5,7 @@
 
 mod bag_topic;
 mod content;
+mod conversion;
 mod dataset;
 mod follow;
 mod frame_tree;
@@ -14,46 +15,19 @@ mod read;
 mod target;
 mod write;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use cromosim_body::BodyModel;
 
 use crate::RecordingError;
 use crate::rigid::{EurocGroundTruth, ImuSeries, RigidContent, parse_rigid};
 
-pub use content::Content;
+pub use content::{Content, Read};
+pub use conversion::{Conversion, Converted};
 pub use options::{Followed, ReadOptions};
-pub use read::{Read, read_content};
+pub use read::read_content;
 pub use target::Target;
 pub use write::{MotionFile, write_file, write_motion};
-
-/// What becomes what.
-#[derive(Clone, Debug)]
-pub struct Conversion {
-    /// The file or bag that is read.
-    pub input: PathBuf,
-    /// The file that is written.
-    pub out: PathBuf,
-    /// Its format.
-    pub target: Target,
-    /// How the input is read.
-    pub options: ReadOptions,
-    /// The IMU series (EuRoC, CSV) that was measured along a trajectory, for a bag.
-    pub imu: Option<PathBuf>,
-    /// Replaces `out` where it exists.
-    pub replace: bool,
-}
-
-/// What a conversion wrote.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Converted {
-    /// Whether the rows are frames of a motion.
-    pub is_motion: bool,
-    /// Frames or rows.
-    pub count: usize,
-    /// What was left out or changed, a line each.
-    pub notes: Vec<String>,
-}
 
 /// Reads the input and writes it in the target's form. `out` takes its name when it is complete.
 ///

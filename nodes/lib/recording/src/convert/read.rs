@@ -5,28 +5,10 @@ use std::path::Path;
 use cromosim_body::BodyModel;
 use cromosim_motion::{MotionFormat, read_motion_for};
 
-use super::{Content, ReadOptions, Target, bag_topic, dataset};
+use super::{Content, Read, ReadOptions, Target, bag_topic, dataset};
 use crate::datasets::open_dataset;
 use crate::rigid::{RigidContent, parse_rigid, sniff_rigid};
 use crate::{MCAP_MAGIC, RecordingError, read_head, read_whole};
-
-/// What was read.
-#[derive(Clone, Debug)]
-pub struct Read {
-    /// What the file holds.
-    pub content: Content,
-    /// What was left out or changed, a line each.
-    pub notes: Vec<String>,
-}
-
-impl From<Content> for Read {
-    fn from(content: Content) -> Self {
-        Self {
-            content,
-            notes: Vec::new(),
-        }
-    }
-}
 
 /// Reads whatever the file is; of a bag and of a data set what `target` can hold.
 ///
