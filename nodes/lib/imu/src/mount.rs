@@ -114,7 +114,8 @@ impl MountedSensor {
         self.site.joint
     }
 
-    /// The sensor's frame in its segment's at rest; all the time where it follows the segment.
+    /// The mount: maps points (m) in the sensor's frame to the segment's, whose origin is its joint; in
+    /// the rest pose, and all the time where the sensor follows the segment.
     pub fn segment_from_sensor(&self) -> Isometry3<f64> {
         self.segment_from_sensor
     }
