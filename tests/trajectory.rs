@@ -23,7 +23,7 @@ use cromosim_motion::{MotionOptions, SmplMotion, embedded_walk, read_motion, wri
 use cromosim_msgs::cromosim_msgs::SmplPose;
 use cromosim_ros::testing::{environment, in_private_network, network};
 use cromosim_ros::{Node, NodeOptions, Parameters, Qos, RosArgs};
-use cromosim_video::{DepthEncoding, standing_height, write_openpose, write_raw_depth};
+use cromosim_video::standing_height;
 use nalgebra::{UnitQuaternion, Vector3};
 use shot::Shot;
 
@@ -36,7 +36,7 @@ fn write_files(shot: &Shot, walk: &SmplMotion, folder: &Path) {
         if let Some(depth) = depth {
             fs::write(
                 path(format!("frame_{frame:06}.raw")),
-                write_raw_depth(depth, DepthEncoding::Disparity),
+                shot::disparity_file(depth),
             )
             .unwrap();
         }
@@ -62,7 +62,7 @@ fn write_files(shot: &Shot, walk: &SmplMotion, folder: &Path) {
         let people: Vec<_> = shot.clip.keypoints[frame].into_iter().collect();
         fs::write(
             path(format!("clip_{frame:012}_keypoints.json")),
-            write_openpose(&people),
+            shot::keypoint_file(&people),
         )
         .unwrap();
     }

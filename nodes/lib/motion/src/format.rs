@@ -65,9 +65,4 @@ impl MotionFormat {
             Self::Trc => "TRC",
         }
     }
-
-    /// Whether it holds markers rather than a skeleton.
-    pub const fn has_markers(self) -> bool {
-        matches!(self, Self::C3d | Self::Trc)
-    }
 }

@@ -264,21 +264,6 @@ pub fn parse_depth(
     }
 }
 
-/// Writes a map in Robust CVD's raw form: the inverse of [`parse_raw_depth`].
-pub fn write_raw_depth(map: &DepthMap, encoding: DepthEncoding) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(RAW_HEADER + 4 * map.depths.len());
-    for value in [map.height as i32, map.width as i32, CV_32FC1] {
-        bytes.extend(value.to_le_bytes());
-    }
-    bytes.extend(4_u64.to_le_bytes());
-    bytes.extend(
-        map.depths
-            .iter()
-            .flat_map(|&depth| decoded(depth, encoding).to_le_bytes()),
-    );
-    bytes
-}
-
 fn decoded(value: f32, encoding: DepthEncoding) -> f32 {
     match encoding {
         DepthEncoding::Depth => value,

@@ -1,18 +1,29 @@
 use super::*;
 
+#[path = "../tests/shot/files.rs"]
+mod files;
+
 fn sample() -> DepthMap {
     DepthMap::new(3, 2, vec![1.0, 2.0, 4.0, 0.0, f32::NAN, 0.5]).unwrap()
+}
+
+fn raw(map: &DepthMap, encoding: DepthEncoding) -> Vec<u8> {
+    let encoded = |depth: &f32| match encoding {
+        DepthEncoding::Depth => *depth,
+        DepthEncoding::Disparity => files::disparity(*depth),
+    };
+    files::raw_depth(map.width(), map.height(), map.depths().iter().map(encoded))
 }
 
 #[test]
 fn raw_maps_come_back_in_either_encoding() {
     for encoding in [DepthEncoding::Depth, DepthEncoding::Disparity] {
-        let bytes = write_raw_depth(&sample(), encoding);
+        let bytes = raw(&sample(), encoding);
         assert_eq!(bytes.len(), 20 + 24);
         assert_eq!(parse_depth(&bytes, encoding, "a.raw").unwrap(), sample());
     }
     let disparities = parse_raw_depth(
-        &write_raw_depth(&sample(), DepthEncoding::Depth),
+        &raw(&sample(), DepthEncoding::Depth),
         DepthEncoding::Disparity,
         "a.raw",
     )
@@ -31,7 +42,7 @@ fn raw_maps_come_back_in_either_encoding() {
 
 #[test]
 fn damaged_raw_maps_are_refused_by_name_and_byte() {
-    let bytes = write_raw_depth(&sample(), DepthEncoding::Depth);
+    let bytes = raw(&sample(), DepthEncoding::Depth);
     let message = |bytes: &[u8]| {
         parse_raw_depth(bytes, DepthEncoding::Depth, "a.raw")
             .unwrap_err()

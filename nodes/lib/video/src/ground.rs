@@ -3,19 +3,6 @@
 use cromosim_body::{BodyError, BodyPose, ShapedBody, VertexSubset};
 use nalgebra::{Matrix2, Matrix3, UnitQuaternion, Vector2, Vector3};
 
-/// How the up direction is found.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Gravity {
-    /// Up, in the reconstruction's world; of any length.
-    Given(Vector3<f64>),
-    /// The first camera was held level: up is its image's upward direction.
-    FirstCamera,
-    /// The plane that the lowest points of the feet lie in over time; the way the cameras are held
-    /// on average (within some 10 degrees) and the trunk (within some 5) decide what the feet do
-    /// not tell: the tilt about the line of a straight walk. For level floors.
-    Floor,
-}
-
 /// How far from level people hold a camera, rad.
 const CAMERA_TILT_STD: f64 = 0.17;
 /// How far a foot's lowest point is from the floor, as placed by depth and pose, m.

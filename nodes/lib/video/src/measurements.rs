@@ -8,9 +8,7 @@ use crate::filter::Measurement;
 use crate::observe::{ObservedBody, RootObservation, measure, observe};
 use crate::options::TrajectoryOptions;
 use crate::pinhole::Camera;
-use crate::scale::{
-    ScaleEstimate, ScaleSource, combined_scale, scale_of_frame, scale_of_object, standing_height,
-};
+use crate::scale::{ScaleEstimate, ScaleSource, combined_scale, scale_of_frame, standing_height};
 use crate::surface::PelvisSkin;
 
 /// Fewer measured frames make no track.
@@ -36,19 +34,8 @@ pub(crate) fn measure_frames(
         size,
     };
     let mut observations: Vec<Option<RootObservation>> = Vec::with_capacity(clip.poses.len());
-    let mut scales_of_objects = Vec::new();
     for frame in 0..clip.poses.len() {
         let map = depths.depth(frame)?;
-        if let (ScaleSource::Object(objects), Some(map), Some(camera)) =
-            (&options.scale, &map, &clip.cameras[frame])
-        {
-            let camera = camera.resized(clip.keypoint_image_px);
-            let here = objects.iter().filter(|object| object.frame == frame);
-            scales_of_objects.extend(
-                here.filter_map(|object| scale_of_object(object, map, &camera))
-                    .map(|scale| (scale, 1.0)),
-            );
-        }
         observations.push(map.and_then(|map| observe(clip, frame, &map, &mut body, options)));
     }
     let found = observations.iter().flatten().count();
@@ -61,7 +48,7 @@ pub(crate) fn measure_frames(
             needed: LEAST_MEASUREMENTS,
         });
     }
-    let scale = scale(clip, &observations, &scales_of_objects, options)?;
+    let scale = scale(clip, &observations, options)?;
     let measured = observations
         .iter()
         .zip(&clip.cameras)
@@ -77,11 +64,10 @@ pub(crate) fn measure_frames(
     Ok((scale, measured.collect()))
 }
 
-/// The scale from the source that the options name; `scales_of_objects` are scales with weights.
+/// The scale from the source that the options name.
 fn scale(
     clip: &CameraClip,
     observations: &[Option<RootObservation>],
-    scales_of_objects: &[(f64, f64)],
     options: &TrajectoryOptions,
 ) -> Result<ScaleEstimate, VideoError> {
     let problem = |problem: &str| VideoError::Scale {
@@ -94,8 +80,6 @@ fn scale(
             relative_std: 0.0,
             observations: 0,
         }),
-        ScaleSource::Object(_) => combined_scale(scales_of_objects, 1)
-            .ok_or_else(|| problem("no depth is known at the ends of the known lengths")),
         ScaleSource::BodyHeight(_) => {
             let each = scales_by_body_height(clip, observations);
             let block = (SCALE_BLOCK_S * clip.rate_hz).round().max(1.0) as usize;

@@ -77,19 +77,6 @@ fn keypoints(values: &[f64], person: usize, name: &str) -> Result<PersonKeypoint
     Ok(points)
 }
 
-/// Writes people as OpenPose does: the inverse of [`parse_openpose`].
-pub fn write_openpose(people: &[PersonKeypoints]) -> String {
-    let person = |points: &PersonKeypoints| {
-        let numbers: Vec<f64> = points
-            .iter()
-            .flat_map(|point| [point.u, point.v, point.confidence])
-            .collect();
-        serde_json::json!({ "person_id": [-1], "pose_keypoints_2d": numbers })
-    };
-    serde_json::json!({ "version": 1.3, "people": people.iter().map(person).collect::<Vec<_>>() })
-        .to_string()
-}
-
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
@@ -103,7 +90,10 @@ mod tests {
             v: 540.3,
             confidence: 0.87,
         };
-        let text = write_openpose(&[person, [Keypoint::default(); BODY_25_COUNT]]);
+        let numbers = person.map(|point| [point.u, point.v, point.confidence]);
+        let people = [numbers.as_flattened(), &[0.0; 3 * BODY_25_COUNT]]
+            .map(|numbers| serde_json::json!({"person_id": [-1], "pose_keypoints_2d": numbers}));
+        let text = serde_json::json!({"version": 1.3, "people": people}).to_string();
         let people = parse_openpose(text.as_bytes(), "a.json").unwrap();
         assert_eq!((people.len(), people[0]), (2, person));
         assert_eq!(

@@ -2,7 +2,6 @@
 
 use crate::clip::CameraClip;
 use crate::error::VideoError;
-use crate::ground::Gravity;
 use crate::scale::ScaleSource;
 
 /// Whether the root moves.
@@ -23,8 +22,6 @@ pub struct TrajectoryOptions {
     pub trajectory: Trajectory,
     /// Metres per unit of depth maps and cameras.
     pub scale: ScaleSource,
-    /// Which way is up.
-    pub gravity: Gravity,
     /// Keypoints below it are not there, 0 to 1.
     pub least_confidence: f64,
     /// Standard deviation of a keypoint of confidence 1 in an image of 1080 rows, px; a factor on
@@ -39,13 +36,12 @@ pub struct TrajectoryOptions {
 }
 
 impl TrajectoryOptions {
-    /// With this scale; up from the floor; keypoints from confidence 0.3 on, 5 px; depth 2 % from
+    /// With this scale; keypoints from confidence 0.3 on, 5 px; depth 2 % from
     /// frame to frame, 5 % slowly.
     pub fn new(scale: ScaleSource) -> Self {
         Self {
             trajectory: Trajectory::Depth,
             scale,
-            gravity: Gravity::Floor,
             least_confidence: 0.3,
             keypoint_std_px: 5.0,
             depth_std: 0.02,
@@ -67,13 +63,6 @@ impl TrajectoryOptions {
         let size = match &self.scale {
             ScaleSource::Given(scale) => ("scale", *scale),
             ScaleSource::BodyHeight(height) => ("body height", *height),
-            ScaleSource::Object(objects) => (
-                "object length",
-                objects
-                    .iter()
-                    .map(|object| object.length_m)
-                    .fold(1.0, f64::min),
-            ),
         };
         if !positive(size.1) {
             return Err(clip.value(size.0.to_owned(), size.1, "a finite number above 0"));
@@ -86,14 +75,6 @@ impl TrajectoryOptions {
                 return Err(clip.value(what.to_owned(), value, "0 to below 1"));
             }
         }
-        match self.gravity {
-            Gravity::Given(up) if !(up.norm() > 1e-9 && up.norm().is_finite()) => {
-                Err(VideoError::Gravity {
-                    name: clip.name.clone(),
-                    problem: format!("({}, {}, {}) is no direction", up.x, up.y, up.z),
-                })
-            }
-            _ => Ok(()),
-        }
+        Ok(())
     }
 }

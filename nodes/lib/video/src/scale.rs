@@ -3,7 +3,7 @@
 use cromosim_body::{BodyPose, Joint, ShapedBody};
 use nalgebra::{Matrix3, Vector2, Vector3};
 
-use crate::{Camera, DepthMap, PersonKeypoints};
+use crate::{Camera, PersonKeypoints};
 
 /// Where the scale comes from.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,21 +13,6 @@ pub enum ScaleSource {
     /// The person's standing height, m: the estimated pose at this size says how far away the
     /// person is.
     BodyHeight(f64),
-    /// The length of something that stands still or moves along, seen in one frame or several.
-    Object(Vec<ObjectLength>),
-}
-
-/// A known length between two pixels of one frame; keypoints' image.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ObjectLength {
-    /// 0-based.
-    pub frame: usize,
-    /// One end, px.
-    pub from: Vector2<f64>,
-    /// The other end, px.
-    pub to: Vector2<f64>,
-    /// Distance of the two, m.
-    pub length_m: f64,
 }
 
 /// The scale and how sure it is.
@@ -37,7 +22,7 @@ pub struct ScaleEstimate {
     pub metres_per_unit: f64,
     /// Its standard deviation by itself: 0.02 is 2 %. 0 where it was given.
     pub relative_std: f64,
-    /// How many frames or lengths it rests on; 0 where it was given.
+    /// How many frames it rests on; 0 where it was given.
     pub observations: usize,
 }
 
@@ -263,31 +248,6 @@ fn weighted_median(values: &[(f64, f64)]) -> Option<f64> {
         .map(|(value, _)| *value)
 }
 
-/// Metres per unit from one known length: `s = L / |d_1 K^-1 (u_1, v_1, 1) - d_2 K^-1 (u_2, v_2,
-/// 1)|`, each depth the median of the 5 x 5 pixels around its end. `None` where the map knows
-/// nothing there.
-pub fn scale_of_object(object: &ObjectLength, map: &DepthMap, camera: &Camera) -> Option<f64> {
-    let end =
-        |pixel: Vector2<f64>| Some(camera.back_project(pixel, median_around(map, camera, pixel)?));
-    let length = (end(object.from)? - end(object.to)?).norm();
-    Some(object.length_m / length).filter(|scale| scale.is_finite() && *scale > 0.0)
-}
-
-fn median_around(map: &DepthMap, camera: &Camera, pixel: Vector2<f64>) -> Option<f64> {
-    let centre = pixel
-        .component_div(&camera.image_px)
-        .component_mul(&Vector2::new(map.width() as f64, map.height() as f64));
-    let index = |value: f64, step: i64| usize::try_from(value.floor() as i64 + step).ok();
-    let mut depths = Vec::new();
-    for (row, column) in (-2..=2).flat_map(|row| (-2..=2).map(move |column| (row, column))) {
-        if let (Some(row), Some(column)) = (index(centre.y, row), index(centre.x, column)) {
-            depths.extend(map.at(column, row));
-        }
-    }
-    depths.sort_by(f64::total_cmp);
-    depths.get(depths.len() / 2).copied()
-}
-
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
@@ -342,21 +302,6 @@ mod tests {
             "{}",
             standing_height(&shaped)
         );
-    }
-
-    #[test]
-    fn a_known_length_gives_the_scale() {
-        // A plane at 2 units; 300 px are 0.4 units, and were 0.6 m.
-        let map = DepthMap::new(384, 216, vec![2.0; 384 * 216]).unwrap();
-        let object = ObjectLength {
-            frame: 0,
-            from: Vector2::new(800.0, 500.0),
-            to: Vector2::new(1100.0, 500.0),
-            length_m: 0.6,
-        };
-        assert!((scale_of_object(&object, &map, &camera()).unwrap() - 1.5).abs() < 1e-9);
-        let unknown = DepthMap::new(2, 2, vec![0.0; 4]).unwrap();
-        assert_eq!(scale_of_object(&object, &unknown, &camera()), None);
     }
 
     #[test]

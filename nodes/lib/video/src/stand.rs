@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 use crate::clip::CameraClip;
 use crate::error::VideoError;
 use crate::filter::RootState;
-use crate::ground::{Gravity, Soles, UpHints, floor_height, floor_normal, upright};
+use crate::ground::{Soles, UpHints, floor_height, floor_normal, upright};
 use crate::options::TrajectoryOptions;
 use crate::pinhole::Camera;
 use crate::source_poses::SourcePoses;
@@ -115,17 +115,13 @@ pub(crate) fn stand_up(
         .ok_or_else(no_frames)?
         .world_from_camera
         .rotation;
-    let up = match options.gravity {
-        Gravity::Given(up) => up.normalize(),
-        Gravity::FirstCamera => first_camera * -Vector3::y(),
-        Gravity::Floor => source.floor_normal(
-            shaped,
-            &soles,
-            &poses,
-            clip.rate_hz,
-            options.depth_scale_std,
-        ),
-    };
+    let up = source.floor_normal(
+        shaped,
+        &soles,
+        &poses,
+        clip.rate_hz,
+        options.depth_scale_std,
+    );
     let turn = upright(&up, &(first_camera * Vector3::z()));
     let mut poses: Vec<BodyPose> = poses.into_iter().map(|pose| turned(pose, &turn)).collect();
     let (shift, floor_rms_m) = set_on_floor(&mut poses, &soles).ok_or_else(no_frames)?;

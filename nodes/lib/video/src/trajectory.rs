@@ -10,11 +10,9 @@ use nalgebra::{Isometry3, Vector3};
 use crate::clip::{CameraClip, DepthProvider, average_betas};
 use crate::error::VideoError;
 use crate::filter::{FilterNoise, GATE, Gate, Measurement, RootState, kalman_filter};
-use crate::ground::Gravity;
 use crate::learn::learn_noise;
 use crate::measurements::measure_frames;
 use crate::options::{Trajectory, TrajectoryOptions};
-use crate::pinhole::Camera;
 use crate::report::TrajectoryReport;
 use crate::scale::ScaleEstimate;
 use crate::source_poses::source_poses;
@@ -78,7 +76,8 @@ pub fn global_trajectory(
         Trajectory::None => None,
         Trajectory::Depth => {
             let (scale, measured) = measure_frames(clip, depths, &shaped, options)?;
-            let up = roughly_up(options, &poses.cameras);
+            // All that is known of up before the track.
+            let up = mean_up(&poses.cameras);
             Some(DepthTrack::new(scale, measured, clip.rate_hz.recip(), &up))
         }
     };
@@ -162,14 +161,6 @@ impl DepthTrack {
                 smoothed,
             },
         }
-    }
-}
-
-/// Up as far as it is known before the track: as given, or as the cameras are held on average.
-fn roughly_up(options: &TrajectoryOptions, cameras: &[Camera]) -> Vector3<f64> {
-    match options.gravity {
-        Gravity::Given(up) => up,
-        _ => mean_up(cameras),
     }
 }
 

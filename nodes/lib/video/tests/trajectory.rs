@@ -12,9 +12,8 @@ use cromosim_motion::{MotionOptions, SmplMotion, embedded_walk, read_motion};
 use cromosim_spatial::{confidence_of_std, std_of_confidence};
 use cromosim_video::{
     CameraAxes, CameraClip, CameraFolder, DepthEncoding, DepthMap, FolderLayout, GlobalTrajectory,
-    Gravity, ObjectLength, ScaleSource, Trajectory, TrajectoryOptions, VideoError,
-    global_trajectory, parse_camera, parse_depth, parse_openpose, standing_height, write_openpose,
-    write_raw_depth,
+    ScaleSource, Trajectory, TrajectoryOptions, VideoError, global_trajectory, parse_camera,
+    parse_depth, parse_openpose, standing_height,
 };
 use nalgebra::{Isometry3, Vector3};
 use shot::{Errors, RATE_HZ, Shot};
@@ -250,27 +249,29 @@ fn the_pose_stands_in_the_world_and_in_place_where_asked() {
         ..shot::PUBLISHED
     };
     let shot = shot::shoot(&walk, &errors, 0.6, 3);
-    let up = shot.source_from_world.rotation * Vector3::z();
-    let given = TrajectoryOptions {
-        gravity: Gravity::Given(up * 3.0),
-        ..options(&walk)
-    };
-    let solved = solve(&shot, &given).unwrap();
+    let solved = solve(&shot, &options(&walk)).unwrap();
     let lite = solve(
         &shot,
         &TrajectoryOptions {
             trajectory: Trajectory::None,
-            ..given
+            ..options(&walk)
         },
     )
     .unwrap();
-    assert!(solved_up(&shot, &solved).angle(&Vector3::z()) < 1e-9);
-    // Orientations against the truth differ by one yaw only.
-    for motion in [&solved.motion, &lite.motion] {
-        let yaw = motion.frames[0].local_rotations[0] * shot.truth[0].local_rotations[0].inverse();
-        assert!(yaw.axis().is_none_or(|axis| axis.z.abs() > 1.0 - 1e-6));
+    // Orientations against the truth differ by one turn only, which keeps up within what the floor,
+    // or without a track the cameras and the trunk, tell.
+    for (solved, most_deg) in [(&solved, 2.0), (&lite, 10.0)] {
+        let motion = &solved.motion;
+        let turn = motion.frames[0].local_rotations[0] * shot.truth[0].local_rotations[0].inverse();
+        let up = solved_up(&shot, solved);
+        println!(
+            "up is off by {:.2} degrees",
+            up.angle(&Vector3::z()).to_degrees()
+        );
+        assert!(up.angle(&Vector3::z()) < f64::to_radians(most_deg));
+        assert!((turn * Vector3::z()).angle(&up) < 1e-6);
         for (own, truth) in motion.frames.iter().zip(&shot.truth) {
-            assert!((yaw * truth.local_rotations[0]).angle_to(&own.local_rotations[0]) < 1e-6);
+            assert!((turn * truth.local_rotations[0]).angle_to(&own.local_rotations[0]) < 1e-6);
             assert!(own.local_rotations[5].angle_to(&truth.local_rotations[5]) < 1e-9);
         }
     }
@@ -298,37 +299,6 @@ fn the_pose_stands_in_the_world_and_in_place_where_asked() {
 }
 
 #[test]
-fn a_known_length_on_the_floor_gives_the_scale() {
-    let walk = embedded_walk().slice(2.0, Some(1.0)).unwrap();
-    let shot = shot::shoot(&walk, &shot::NONE, 0.6, 1);
-    let place = shot.truth[0].root_position;
-    let pixel = |frame: usize, point: Vector3<f64>| {
-        let camera = &shot.true_cameras[frame];
-        camera
-            .project(&(camera.world_from_camera.inverse() * nalgebra::Point3::from(point)).coords)
-            .unwrap()
-    };
-    // Two marks on the floor beside the person, 1.2 m apart, seen in three frames.
-    let ends = [
-        Vector3::new(place.x + 0.9, place.y - 0.6, 0.0),
-        Vector3::new(place.x + 0.9, place.y + 0.6, 0.0),
-    ];
-    let object = |frame| ObjectLength {
-        frame,
-        from: pixel(frame, ends[0]),
-        to: pixel(frame, ends[1]),
-        length_m: 1.2,
-    };
-    let options = TrajectoryOptions {
-        scale: ScaleSource::Object([0, 7, 20].map(object).to_vec()),
-        ..options(&walk)
-    };
-    let scale = solve(&shot, &options).unwrap().report.scale.unwrap();
-    println!("scale by an object: {scale:?}");
-    assert!((scale.metres_per_unit * 0.6 - 1.0).abs() < 0.02 && scale.observations == 3);
-}
-
-#[test]
 fn the_same_shot_gives_the_same_bits() {
     let walk = embedded_walk().slice(2.0, Some(1.5)).unwrap();
     let shot = shot::shoot(&walk, &shot::PUBLISHED, 0.6, 4);
@@ -346,18 +316,6 @@ fn what_is_missing_is_said() {
     assert!(
         message(&shot, &TrajectoryOptions::new(ScaleSource::Given(-1.0))).contains("scale is -1")
     );
-    assert!(
-        message(
-            &shot,
-            &TrajectoryOptions::new(ScaleSource::Object(Vec::new()))
-        )
-        .contains("no scale")
-    );
-    let down = TrajectoryOptions {
-        gravity: Gravity::Given(Vector3::zeros()),
-        ..options(&walk)
-    };
-    assert!(message(&shot, &down).contains("no up direction"));
     shot.depths.iter_mut().skip(5).for_each(|map| *map = None);
     assert!(
         message(&shot, &options(&walk)).contains("5 of 31 frames"),
@@ -375,10 +333,7 @@ fn a_folder_of_files_gives_what_the_shot_gave() {
     let folder = tempfile::tempdir().unwrap();
     for frame in 0..shot.clip.poses.len() {
         let path = |name: String| folder.path().join(name);
-        let depth = write_raw_depth(
-            shot.depths[frame].as_ref().unwrap(),
-            DepthEncoding::Disparity,
-        );
+        let depth = shot::disparity_file(shot.depths[frame].as_ref().unwrap());
         std::fs::write(path(format!("frame_{frame:06}.raw")), depth).unwrap();
         let camera = shot.clip.cameras[frame].unwrap();
         let matrix = camera.world_from_camera.to_homogeneous().transpose();
@@ -395,7 +350,7 @@ fn a_folder_of_files_gives_what_the_shot_gave() {
         let people: Vec<_> = shot.clip.keypoints[frame].into_iter().collect();
         std::fs::write(
             path(format!("clip_{frame:012}_keypoints.json")),
-            write_openpose(&people),
+            shot::keypoint_file(&people),
         )
         .unwrap();
     }
@@ -458,36 +413,65 @@ fn a_folder_of_files_gives_what_the_shot_gave() {
     );
 }
 
+/// Counts a damaged file as refused (by name) or taken; what was taken is sound.
+fn count<T: std::fmt::Debug>(
+    counts: &mut [usize; 2],
+    read: Result<T, VideoError>,
+    is_sound: impl Fn(&T) -> bool,
+) {
+    match read {
+        Ok(content) => {
+            assert!(is_sound(&content), "{content:?}");
+            counts[1] += 1;
+        }
+        Err(error) => {
+            assert!(error.to_string().starts_with("x"), "{error}");
+            counts[0] += 1;
+        }
+    }
+}
+
 #[test]
-fn damaged_files_never_panic() {
+fn damaged_files_are_refused_by_name_or_hold_sound_values() {
     let walk = embedded_walk().slice(2.0, Some(0.1)).unwrap();
     let shot = shot::shoot(&walk, &shot::NONE, 1.0, 1);
-    let small = DepthMap::new(
-        40,
-        30,
-        shot.depths[0].as_ref().unwrap().depths()[..1200].to_vec(),
-    )
-    .unwrap();
-    common::damaged(
-        &write_raw_depth(&small, DepthEncoding::Depth),
-        500,
-        |bytes| drop(parse_depth(bytes, DepthEncoding::Disparity, "x")),
-    );
+    let [mut of_depth, mut of_keypoints, mut of_camera] = [[0; 2]; 3];
+    let depths = shot.depths[0].as_ref().unwrap().depths()[..1200].to_vec();
+    let small = DepthMap::new(40, 30, depths).unwrap();
+    common::damaged(&shot::disparity_file(&small), 500, |bytes| {
+        let read = parse_depth(bytes, DepthEncoding::Disparity, "x");
+        count(&mut of_depth, read, |map| {
+            let sound = |depth: &f32| *depth >= 0.0 && depth.is_finite();
+            map.depths().len() == map.width() * map.height() && map.depths().iter().all(sound)
+        });
+    });
     let people: Vec<_> = shot.clip.keypoints[0].into_iter().collect();
-    common::damaged(write_openpose(&people).as_bytes(), 500, |bytes| {
-        drop(parse_openpose(bytes, "x"))
+    common::damaged(shot::keypoint_file(&people).as_bytes(), 500, |bytes| {
+        count(&mut of_keypoints, parse_openpose(bytes, "x"), |people| {
+            people.iter().flatten().all(|point| {
+                point.u.abs().max(point.v.abs()) < 1e6 && (0.0..=1.0).contains(&point.confidence)
+            })
+        });
     });
     let mut npz = NpzWriter::new(std::io::Cursor::new(Vec::new()));
     npz.floats("intrinsics", &[2], &[300.0, 300.0]).unwrap();
-    npz.floats(
-        "extrinsics",
-        &[4, 4],
-        nalgebra::Matrix4::<f64>::identity().as_slice(),
-    )
-    .unwrap();
+    let identity = nalgebra::Matrix4::<f64>::identity();
+    npz.floats("extrinsics", &[4, 4], identity.as_slice())
+        .unwrap();
     let size = nalgebra::Vector2::new(40.0, 30.0);
     let bytes = npz.finish().unwrap().into_inner();
     common::damaged(&bytes, 500, |bytes| {
-        drop(parse_camera(bytes, size, CameraAxes::OpenGl, "x"))
+        let read = parse_camera(bytes, size, CameraAxes::OpenGl, "x");
+        count(&mut of_camera, read, |camera| {
+            let position = camera.world_from_camera.translation.vector;
+            camera.focal_px.min() > 0.0
+                && camera.image_px == size
+                && position.iter().all(|value| value.is_finite())
+                && (camera.world_from_camera.rotation.norm() - 1.0).abs() < 1e-9
+        });
     });
+    println!("refused, taken: {of_depth:?} {of_keypoints:?} {of_camera:?}");
+    for [refused, taken] in [of_depth, of_keypoints, of_camera] {
+        assert!(refused > 50 && taken >= 5);
+    }
 }

@@ -66,17 +66,6 @@ impl MarkerClip {
             .map(|label| own(label.as_str()))
             .collect())
     }
-
-    /// Share of points that were not seen, in [0, 1].
-    pub fn missing_share(&self) -> f64 {
-        let missing = self
-            .frames
-            .iter()
-            .flatten()
-            .filter(|point| point.is_none())
-            .count();
-        missing as f64 / self.frames.iter().map(Vec::len).sum::<usize>().max(1) as f64
-    }
 }
 
 /// Subject and label.

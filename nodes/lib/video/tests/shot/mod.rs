@@ -1,6 +1,8 @@
 //! A shot that the test makes itself: a known motion before a moving camera, as keypoints, depth
 //! maps, cameras and in-place poses with errors of published size.
 
+pub mod files;
+
 use cromosim_body::{BodyModel, BodyPose, Gender, Joint, ShapedBody};
 use cromosim_motion::SmplMotion;
 use cromosim_video::{BODY_25_COUNT, Camera, CameraClip, DepthMap, Keypoint, PersonKeypoints};
@@ -80,7 +82,6 @@ pub struct Shot {
     pub truth: Vec<BodyPose>,
     /// The reconstruction's world, before its wrong scale, from the motion's.
     pub source_from_world: Isometry3<f64>,
-    pub true_cameras: Vec<Camera>,
     /// Mean distance of the estimator's joints from the true ones, root at root, m: with and
     /// without the root's orientation.
     pub pose_error_m: [f64; 2],
@@ -198,7 +199,6 @@ pub fn shoot(motion: &SmplMotion, errors: &Errors, scale: f64, seed: u64) -> Sho
         depths,
         truth,
         source_from_world,
-        true_cameras,
         pose_error_m,
     }
 }
@@ -492,4 +492,20 @@ fn background(camera: &Camera) -> Vec<f64> {
             floor.min(wall).min(60.0)
         })
         .collect()
+}
+
+/// A depth map as Robust CVD writes it: disparities.
+pub fn disparity_file(map: &DepthMap) -> Vec<u8> {
+    let disparities = map.depths().iter().map(|depth| files::disparity(*depth));
+    files::raw_depth(map.width(), map.height(), disparities)
+}
+
+/// People of a frame as OpenPose writes them.
+pub fn keypoint_file(people: &[PersonKeypoints]) -> String {
+    let person = |points: &PersonKeypoints| {
+        let numbers = points.map(|point| [point.u, point.v, point.confidence]);
+        serde_json::json!({ "person_id": [-1], "pose_keypoints_2d": numbers.as_flattened() })
+    };
+    serde_json::json!({ "version": 1.3, "people": people.iter().map(person).collect::<Vec<_>>() })
+        .to_string()
 }
