@@ -69,11 +69,7 @@ pub fn diagnose(
         mask_clipped(&mut prepared, channel, &digital[channel]);
     }
     let units = allowed_units(&alignment, &library);
-    for reading in &mut prepared.measured {
-        reading.specific_force /= units.accelerometer;
-        reading.angular_velocity /= units.gyroscope;
-    }
-    prepared.declared = declared_in_si(&prepared, units);
+    bring_to_si(&mut prepared, units);
     trace(|| {
         eprintln!(
             "{}: {alignment:?} {digital:?} {:?}",
@@ -97,21 +93,36 @@ pub fn diagnose(
     trace(|| eprintln!("{}: {:?}", prepared.name, names(&findings.reportable)));
     let (diagnosis, evidence) =
         DiagnosisBuilder::new(&findings, &raw, &covered, options.seed).build();
-    let density = |sigma: f64| sigma / prepared.rate_hz.sqrt();
-    let declared = PerChannel::from_fn(|channel| findings.declared_sigma(channel));
-    let effects = PlacementEffects {
-        epoch: prepared.epoch,
-        declared_noise: DeclaredNoise {
-            accel_density: density(declared.accelerometer),
-            gyro_density: density(declared.gyroscope),
-        },
-        effects: findings.reportable.clone(),
-    };
+    let effects = simulated_effects(&findings);
     Ok(PlacementAnswer {
         diagnosis,
         effects,
         evidence,
     })
+}
+
+/// Takes the factors of the device's units out of the readings and of what is declared for them.
+fn bring_to_si(prepared: &mut PreparedPlacement, units: PerChannel<f64>) {
+    for reading in &mut prepared.measured {
+        reading.specific_force /= units.accelerometer;
+        reading.angular_velocity /= units.gyroscope;
+    }
+    prepared.declared = declared_in_si(prepared, units);
+}
+
+/// What a simulation of the device takes: the named effects and the declared noise, where none is
+/// declared the one that was found.
+fn simulated_effects(findings: &Findings) -> PlacementEffects {
+    let prepared = findings.model.prepared;
+    let density = |channel| findings.declared_sigma(channel) / prepared.rate_hz.sqrt();
+    PlacementEffects {
+        epoch: prepared.epoch,
+        declared_noise: DeclaredNoise {
+            accel_density: density(Channel::Accelerometer),
+            gyro_density: density(Channel::Gyroscope),
+        },
+        effects: findings.reportable.clone(),
+    }
 }
 
 /// Factors of the units that the library may name; 1 where it may not.

@@ -1,5 +1,7 @@
 //! Where a residual lies: by channel, axis, frequency and time.
 
+use std::ops::Range;
+
 use cromosim_imu::{AXES, Channel};
 use cromosim_spatial::{Spectrum, welch};
 
@@ -20,16 +22,8 @@ pub(crate) fn locate(
     whitener: &Whitener,
 ) -> GapLocation {
     let length = prepared.length;
-    let squares = |axis: usize, from: usize, to: usize| -> f64 {
-        let range = axis * length + from..axis * length + to;
-        let weights: f64 = whitener.weight[axis][from..to]
-            .iter()
-            .map(|weight| weight * weight)
-            .sum();
-        white[range].iter().map(|e| e * e).sum::<f64>() - weights
-    };
     let axes: Vec<f64> = (0..6)
-        .map(|axis| squares(axis, 0, length).max(0.0))
+        .map(|axis| excess(white, whitener, axis, 0..length).max(0.0))
         .collect();
     let axis_shares = shares(&axes);
     let channel_share =
@@ -37,28 +31,11 @@ pub(crate) fn locate(
     let intervals: Vec<(f64, f64, f64)> = (0..INTERVALS)
         .map(|k| (k * length / INTERVALS, (k + 1) * length / INTERVALS))
         .map(|(from, to)| {
-            let sum = (0..6)
-                .map(|axis| squares(axis, from, to))
-                .sum::<f64>()
-                .max(0.0);
-            (
-                from as f64 / prepared.rate_hz,
-                to as f64 / prepared.rate_hz,
-                sum,
-            )
-        })
-        .collect();
-    let total = summed_spectrum(white, prepared, 0..6);
-    let nyquist_hz = prepared.rate_hz / 2.0;
-    let bands: Vec<(f64, f64, f64)> = bands(nyquist_hz)
-        .into_iter()
-        .map(|(from, to)| {
-            let excess: f64 = total
-                .band(from, to)
-                .iter()
-                .map(|density| density - 6.0 / nyquist_hz)
+            let sum: f64 = (0..6)
+                .map(|axis| excess(white, whitener, axis, from..to))
                 .sum();
-            (from, to, excess.max(0.0))
+            let seconds = |entry: usize| entry as f64 / prepared.rate_hz;
+            (seconds(from), seconds(to), sum.max(0.0))
         })
         .collect();
     GapLocation {
@@ -71,9 +48,40 @@ pub(crate) fn locate(
             .zip(&axis_shares)
             .map(|(name, share)| ((*name).to_owned(), *share))
             .collect(),
-        bands_hz: as_intervals(&bands),
+        bands_hz: as_intervals(&band_excesses(white, prepared)),
         intervals_s: as_intervals(&intervals),
     }
+}
+
+/// Sum of the squares of an axis' whitened residual beyond unit variance, over entries of the sample
+/// grid.
+fn excess(white: &[f64], whitener: &Whitener, axis: usize, entries: Range<usize>) -> f64 {
+    let weight = &whitener.weight[axis];
+    let first = axis * weight.len();
+    let weights: f64 = weight[entries.clone()]
+        .iter()
+        .map(|weight| weight * weight)
+        .sum();
+    let own = &white[first + entries.start..first + entries.end];
+    own.iter().map(|e| e * e).sum::<f64>() - weights
+}
+
+/// Each band, Hz, and the density of the whitened residual beyond that of white noise in it, summed
+/// over axes.
+fn band_excesses(white: &[f64], prepared: &PreparedPlacement) -> Vec<(f64, f64, f64)> {
+    let total = summed_spectrum(white, prepared, 0..6);
+    let nyquist_hz = prepared.rate_hz / 2.0;
+    bands(nyquist_hz)
+        .into_iter()
+        .map(|(from, to)| {
+            let excess: f64 = total
+                .band(from, to)
+                .iter()
+                .map(|density| density - 6.0 / nyquist_hz)
+                .sum();
+            (from, to, excess.max(0.0))
+        })
+        .collect()
 }
 
 /// The bands below Nyquist.
@@ -90,7 +98,7 @@ pub(crate) fn bands(nyquist_hz: f64) -> Vec<(f64, f64)> {
 pub(crate) fn summed_spectrum(
     white: &[f64],
     prepared: &PreparedPlacement,
-    axes: std::ops::Range<usize>,
+    axes: Range<usize>,
 ) -> Spectrum {
     let window = ((4.0 * prepared.rate_hz) as usize)
         .min(prepared.length / 2)
