@@ -3,7 +3,7 @@
 use cromosim_spatial::SpatialError;
 use thiserror::Error;
 
-/// Errors of this crate. Each names the placement.
+/// Why a placement cannot be diagnosed. Each message names the placement.
 #[derive(Debug, Error)]
 pub enum GapError {
     /// Nothing to compare with.
@@ -11,11 +11,11 @@ pub enum GapError {
         "placement {placement}: the IMU has {messages} usable messages, at least {needed} are needed"
     )]
     TooFewMessages {
-        /// Name.
+        /// Name of the placement.
         placement: String,
-        /// How many there are.
+        /// Messages with finite readings and a stamp of their own.
         messages: usize,
-        /// How many it takes.
+        /// Messages that a diagnosis takes at least.
         needed: usize,
     },
     /// Reference and IMU do not meet in time.
@@ -23,19 +23,19 @@ pub enum GapError {
         "placement {placement}: only {overlap_s:.2} s of the IMU's {imu_s:.2} s lie within the reference; at least {needed_s} s are needed: check that both were recorded together and by one clock"
     )]
     NoOverlap {
-        /// Name.
+        /// Name of the placement.
         placement: String,
-        /// Common time, s.
+        /// Time of the IMU's messages that the reference covers, s.
         overlap_s: f64,
-        /// The IMU's length, s.
+        /// From the IMU's first message to its last, s.
         imu_s: f64,
-        /// What it takes, s.
+        /// Covered time that a diagnosis takes at least, s.
         needed_s: f64,
     },
     /// Readings that are not numbers.
     #[error("placement {placement}: all readings are NaN or infinite")]
     NotFinite {
-        /// Name.
+        /// Name of the placement.
         placement: String,
     },
     /// A channel that never changes.
@@ -43,17 +43,17 @@ pub enum GapError {
         "placement {placement}: {axes} never change; the sensor is stuck or not connected, nothing can be diagnosed"
     )]
     Stuck {
-        /// Name.
+        /// Name of the placement.
         placement: String,
-        /// Which axes.
+        /// Names of the axes, with commas.
         axes: String,
     },
     /// The reference's poses cannot be used.
     #[error("placement {placement}, reference: {source}")]
     Reference {
-        /// Name.
+        /// Name of the placement.
         placement: String,
-        /// Why.
+        /// What the fit of its trajectory refused.
         source: SpatialError,
     },
 }

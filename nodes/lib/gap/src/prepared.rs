@@ -7,6 +7,7 @@ use cromosim_spatial::{KinematicTrack, PoseEstimate, Spectrum, Stamp, welch};
 
 use crate::axes::{axes_of_channel, value_on_axis};
 use crate::error::GapError;
+use crate::period::median_period;
 use crate::record::PlacementRecord;
 
 /// Common time of IMU and reference below which nothing is said, s.
@@ -73,22 +74,21 @@ struct SampleGrid {
 }
 
 impl SampleGrid {
-    /// Follows the stamps step by step: a drifting or jittering clock does not run off it.
-    fn under(stamps: &[Stamp]) -> Self {
-        let mut intervals: Vec<f64> = stamps.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        intervals.sort_unstable_by(f64::total_cmp);
-        let period_s = intervals[intervals.len() / 2];
+    /// Follows the stamps, which increase, step by step: a drifting or jittering clock does not run
+    /// off it. None for fewer than two stamps.
+    fn under(stamps: &[Stamp]) -> Option<Self> {
+        let period_s = median_period(stamps.iter().copied())?;
         let mut index = vec![0];
         for pair in stamps.windows(2) {
             let step = ((pair[1] - pair[0]) / period_s).round().max(1.0) as usize;
             index.push(index[index.len() - 1] + step);
         }
         let length = index[index.len() - 1] + 1;
-        Self {
+        Some(Self {
             index,
             length,
             period_s,
-        }
+        })
     }
 
     fn missing(&self) -> MissingMessages {
@@ -124,7 +124,11 @@ impl PreparedPlacement {
             placement: name.clone(),
             source,
         })?;
-        let grid = SampleGrid::under(&stamps);
+        let grid = SampleGrid::under(&stamps).ok_or_else(|| GapError::TooFewMessages {
+            placement: name.clone(),
+            messages: stamps.len(),
+            needed: LEAST_MESSAGES,
+        })?;
         if grid.length > MOST_ENTRIES {
             return Err(GapError::NoOverlap {
                 placement: name,
@@ -143,7 +147,7 @@ impl PreparedPlacement {
             grid_index: grid.index,
             stamps,
             measured,
-            declared: PerChannel::from_fn(|channel| record.imu.declared[channel.index()]),
+            declared: record.imu.declared,
             estimate,
         };
         prepared.refuse_stuck_axes()?;

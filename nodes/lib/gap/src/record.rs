@@ -1,39 +1,40 @@
 //! What is diagnosed: the poses and the readings of one placement.
 
-use cromosim_imu::Reading;
+use cromosim_imu::{PerChannel, Reading};
 use cromosim_spatial::Stamp;
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// One placement of a recording.
 #[derive(Clone, Debug, Default)]
 pub struct PlacementRecord {
-    /// Name.
+    /// Name, as in the topics `/imu/NAME/data_raw`.
     pub name: String,
     /// Where the segment's mount frame was.
     pub reference: PoseSeries,
     /// What the IMU read.
-    pub imu: ImuSeries,
+    pub imu: MeasuredImu,
 }
 
-/// Poses in the world (z up), in the order of time.
+/// Poses of a segment's mount frame in the world (z up), in the order of time; all lists have the same
+/// length.
 #[derive(Clone, Debug, Default)]
 pub struct PoseSeries {
-    /// When.
+    /// By the reference's clock.
     pub stamps: Vec<Stamp>,
-    /// m.
+    /// Origin of the frame in the world, m.
     pub positions: Vec<Vector3<f64>>,
-    /// world_from_segment.
+    /// `world_from_segment`.
     pub rotations: Vec<UnitQuaternion<f64>>,
 }
 
-/// Readings in the order of their messages.
+/// What a real IMU sent, in the order of its messages; both lists have the same length.
 #[derive(Clone, Debug, Default)]
-pub struct ImuSeries {
+pub struct MeasuredImu {
     /// By the IMU's clock.
     pub stamps: Vec<Stamp>,
     /// Specific force [m/s2] and angular velocity [rad/s], in the device's units.
     pub readings: Vec<Reading>,
-    /// Declared standard deviation of the white noise per sample: accelerometer, gyroscope; none
-    /// where the covariance is zero.
-    pub declared: [Option<f64>; 2],
+    /// Declared standard deviation of the white noise per sample, m/s2 and rad/s or the device's
+    /// units; none where the covariance does not tell.
+    pub declared: PerChannel<Option<f64>>,
 }

@@ -4,15 +4,14 @@ use cromosim_imu::{Channel, PerChannel, ReadOff};
 
 use crate::axes::{axes_of_channel, value_on_axis};
 use crate::digital::Digital;
+use crate::fourth_differences::{
+    ROUNDED_MEDIAN_OF_SQUARE, fourth_difference, white_noise_variance,
+};
 use crate::library::Library;
 use crate::prepared::PreparedPlacement;
 
 /// Runs of five neighbours below which fourth differences say nothing.
 const LEAST_RUNS: usize = 300;
-/// `x0 - 4 x1 + 6 x2 - 4 x3 + x4` of white noise has this times its variance: 1 + 16 + 36 + 16 + 1.
-const FOURTH_DIFFERENCE_GAIN: f64 = 70.0;
-/// The median of a squared standard normal number.
-const MEDIAN_OF_SQUARE: f64 = 0.4549;
 /// Bands in the upper half of a spectrum, in units of the Nyquist frequency.
 const UPPER_BANDS: [(f64, f64); 4] = [(0.5, 0.62), (0.62, 0.74), (0.74, 0.86), (0.86, 0.97)];
 
@@ -89,14 +88,14 @@ pub(crate) fn is_white(prepared: &PreparedPlacement, residual: &[Vec<f64>]) -> P
     })
 }
 
-/// Variance of white noise from `x0 - 4 x1 + 6 x2 - 4 x3 + x4` of five neighbours that are all
-/// there, by the median of its squares.
+/// Variance of white noise from fourth differences of five neighbours that are all there; none where
+/// there are too few.
 fn fourth_differences(
     prepared: &PreparedPlacement,
     residual: &[Vec<f64>],
     channel: Channel,
 ) -> Option<f64> {
-    let mut squares = Vec::new();
+    let mut differences = Vec::new();
     for axis in axes_of_channel(channel) {
         let series = &residual[axis];
         for first in 0..prepared.grid_index.len().saturating_sub(4) {
@@ -104,14 +103,12 @@ fn fourth_differences(
                 && (first..first + 5).all(|k| prepared.usable[k][axis]);
             if whole {
                 let x = &series[prepared.grid_index[first]..];
-                squares.push((x[0] - 4.0 * x[1] + 6.0 * x[2] - 4.0 * x[3] + x[4]).powi(2));
+                differences.push(fourth_difference([x[0], x[1], x[2], x[3], x[4]]));
             }
         }
     }
-    if squares.len() < LEAST_RUNS {
+    if differences.len() < LEAST_RUNS {
         return None;
     }
-    let middle = squares.len() / 2;
-    let median = *squares.select_nth_unstable_by(middle, f64::total_cmp).1;
-    Some(median / (FOURTH_DIFFERENCE_GAIN * MEDIAN_OF_SQUARE))
+    white_noise_variance(&mut differences, ROUNDED_MEDIAN_OF_SQUARE)
 }

@@ -96,7 +96,8 @@ fn gravity_negated() {
 #[test]
 fn accel_units_declared_in_them() {
     let mut scene = Scene::new(42).with(K::AccelUnits, &[1000.0 / STANDARD_GRAVITY]);
-    scene.declared[0] = scene.declared[0].map(|sigma| sigma * 1000.0 / STANDARD_GRAVITY);
+    let declared = &mut scene.declared.accelerometer;
+    *declared = declared.map(|sigma| sigma * 1000.0 / STANDARD_GRAVITY);
     followed(&scene, [0.1, KEPT]);
 }
 

@@ -4,7 +4,7 @@
 mod support;
 
 use cromosim_gap::{DiagnoseOptions, GapError, PlacementRecord, diagnose};
-use cromosim_imu::{EffectKind as K, EffectSet};
+use cromosim_imu::{EffectKind as K, EffectSet, PerChannel};
 use cromosim_spatial::Stamp;
 use nalgebra::Vector3;
 use support::judge::{answer, cause, names, names_exactly, near, shares_add_up, values_are};
@@ -58,7 +58,7 @@ fn no_effect_has_no_cause() {
 #[test]
 fn undeclared_noise_counts_as_declared() {
     let mut scene = Scene::new(4);
-    scene.declared = [None; 2];
+    scene.declared = PerChannel::default();
     assert_eq!(names(&answer(&scene.record()).diagnosis), [""; 0]);
     // Even where it is large.
     let loud = scene

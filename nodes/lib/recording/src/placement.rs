@@ -4,8 +4,10 @@ use std::sync::Arc;
 
 use cromosim_bag::BagReader;
 use cromosim_body::{BodyModel, BodyPose, ShapedBody};
-use cromosim_gap::{ImuSeries, PlacementRecord, PoseSeries};
-use cromosim_imu::{MountedSensors, PlacementSet, Reading, SensorFrame, SensorTrajectory};
+use cromosim_gap::{MeasuredImu, PlacementRecord, PoseSeries};
+use cromosim_imu::{
+    Channel, MountedSensors, PerChannel, PlacementSet, Reading, SensorFrame, SensorTrajectory,
+};
 use cromosim_msgs::RosMessage;
 use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_msgs::geometry_msgs::PoseStamped;
@@ -250,17 +252,17 @@ impl RecordedPlacement {
         )
     }
 
-    /// Standard deviation per sample and axis that the first message declares: accelerometer
-    /// (m/s2), gyroscope (rad/s); none where it is unknown.
-    pub fn declared(&self) -> [Option<f64>; 2] {
+    /// Standard deviation per sample and axis that the first message declares, m/s2 and rad/s; none
+    /// where it is unknown.
+    pub fn declared(&self) -> PerChannel<Option<f64>> {
         let Some(first) = self.measured.first() else {
-            return [None, None];
+            return PerChannel::default();
         };
-        [
-            first.linear_acceleration_covariance,
-            first.angular_velocity_covariance,
-        ]
-        .map(|covariance| {
+        PerChannel::from_fn(|channel| {
+            let covariance = match channel {
+                Channel::Accelerometer => first.linear_acceleration_covariance,
+                Channel::Gyroscope => first.angular_velocity_covariance,
+            };
             let sigma = ((covariance[0] + covariance[4] + covariance[8]) / 3.0).sqrt();
             // REP-145: a first entry of -1 says that there is no such value; all zero says that it
             // is not known.
@@ -283,7 +285,7 @@ impl RecordedPlacement {
         PlacementRecord {
             name: self.name.clone(),
             reference: self.poses(),
-            imu: ImuSeries {
+            imu: MeasuredImu {
                 stamps: self.measured_stamps().collect(),
                 readings: self.measured.iter().map(reading).collect(),
                 declared: self.declared(),

@@ -197,12 +197,11 @@ fn differentiated(
 /// The white noise that the messages declare, none where it is unknown: density = sigma /
 /// sqrt(rate).
 fn declared(placement: &RecordedPlacement, rate_hz: f64) -> DeclaredNoise {
-    let [accel_density, gyro_density] = placement
-        .declared()
-        .map(|sigma| sigma.unwrap_or(0.0) / rate_hz.sqrt());
+    let declared = placement.declared();
+    let density = |sigma: Option<f64>| sigma.unwrap_or(0.0) / rate_hz.sqrt();
     DeclaredNoise {
-        accel_density,
-        gyro_density,
+        accel_density: density(declared.accelerometer),
+        gyro_density: density(declared.gyroscope),
     }
 }
 

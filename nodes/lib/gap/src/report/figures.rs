@@ -7,9 +7,14 @@ use cromosim_spatial::Stamp;
 use super::text::axis_name;
 use crate::diagnosis::PlacementDiagnosis;
 use crate::evidence::{CoursePoint, Evidence};
+use crate::period::median_period;
 
 /// Shown of the curves, s.
 const WINDOW_S: f64 = 6.0;
+/// Drawn of the curves beyond that at either end, s: lines run to the edges.
+const EDGE_S: f64 = 0.05;
+/// An interval of more periods than this breaks a line.
+const LONGEST_PERIODS: f64 = 3.0;
 /// Frequencies of a drawn spectrum: more fall together.
 const BINS_PER_DECADE: f64 = 45.0;
 /// Width of a panel in its own units; two stand side by side.
@@ -60,62 +65,32 @@ pub(super) fn curves(evidence: &Evidence, window: Window) -> Vec<Panel> {
     let Some(&first) = evidence.stamps.first() else {
         return Vec::new();
     };
-    let seconds = |stamp: &Stamp| *stamp - first;
-    let inside: Vec<usize> = (0..evidence.stamps.len())
-        .filter(|&index| {
-            let time = seconds(&evidence.stamps[index]);
-            time >= window.from - 0.05 && time <= window.to + 0.05
-        })
-        .collect();
-    let period = median_step(evidence);
+    let curves = Curves::inside(evidence, first, window);
     let panel = |axis: usize| {
-        let line = |values: &[[f64; 6]]| -> Vec<(f64, f64)> {
-            let mut points = Vec::with_capacity(inside.len());
-            let mut last: Option<f64> = None;
-            for &index in &inside {
-                let time = seconds(&evidence.stamps[index]);
-                if last.is_some_and(|last| time - last > 3.0 * period) {
-                    points.push((f64::NAN, f64::NAN));
-                }
-                last = Some(time);
-                points.push((
-                    time,
-                    values.get(index).map_or(f64::NAN, |value| value[axis]),
-                ));
-            }
-            points
-        };
-        let series = vec![
-            Series {
-                class: "measured",
-                points: line(&evidence.measured),
-            },
-            Series {
-                class: "before",
-                points: line(&evidence.before),
-            },
-            Series {
-                class: "after",
-                points: line(&evidence.after),
-            },
-        ];
+        let series = [
+            ("measured", &evidence.measured),
+            ("before", &evidence.before),
+            ("after", &evidence.after),
+        ]
+        .map(|(class, values)| Series {
+            class,
+            points: curves.line(values, axis),
+        });
+        let values: Vec<f64> = series
+            .iter()
+            .flat_map(|series| series.points.iter().map(|point| point.1))
+            .collect();
         Panel {
             title: axis_name(AXES[axis]),
             width: WIDTH,
             height: if axis % 3 == 2 { 166.0 } else { 154.0 },
             x: Axis::exact(window.from, window.to),
-            y: Axis::linear(
-                series
-                    .iter()
-                    .flat_map(|series| series.points.iter().map(|point| point.1))
-                    .collect::<Vec<_>>()
-                    .into_iter(),
-            ),
+            y: Axis::linear(values.into_iter()),
             x_label: "time since the first IMU message, s".to_owned(),
             y_label: unit(axis).to_owned(),
             shades: left_out(evidence, first, window),
             level: None,
-            series,
+            series: series.into(),
         }
     };
     (0..3)
@@ -123,22 +98,51 @@ pub(super) fn curves(evidence: &Evidence, window: Window) -> Vec<Panel> {
         .collect()
 }
 
-fn unit(axis: usize) -> &'static str {
-    if axis < 3 { "m/s²" } else { "rad/s" }
+/// The readings that curves are drawn through.
+struct Curves {
+    /// Number of each reading, and its time since the first one, s.
+    readings: Vec<(usize, f64)>,
+    /// A longer interval breaks a line, s.
+    longest_s: f64,
 }
 
-fn median_step(evidence: &Evidence) -> f64 {
-    let mut steps: Vec<f64> = evidence
-        .stamps
-        .windows(2)
-        .map(|pair| pair[1] - pair[0])
-        .collect();
-    steps.sort_unstable_by(f64::total_cmp);
-    steps
-        .get(steps.len() / 2)
-        .copied()
-        .unwrap_or(0.01)
-        .max(1e-6)
+impl Curves {
+    /// The readings of a window, and some beside it, so that lines run to its edges.
+    fn inside(evidence: &Evidence, first: Stamp, window: Window) -> Self {
+        let readings = evidence
+            .stamps
+            .iter()
+            .map(|stamp| *stamp - first)
+            .enumerate()
+            .filter(|(_, time)| (window.from - EDGE_S..=window.to + EDGE_S).contains(time))
+            .collect();
+        let period = median_period(evidence.stamps.iter().copied());
+        Self {
+            readings,
+            longest_s: period.map_or(f64::INFINITY, |period| LONGEST_PERIODS * period),
+        }
+    }
+
+    /// One axis of values by reading, interrupted where readings are missing.
+    fn line(&self, values: &[[f64; 6]], axis: usize) -> Vec<(f64, f64)> {
+        let mut points = Vec::with_capacity(self.readings.len());
+        let mut last: Option<f64> = None;
+        for &(index, time) in &self.readings {
+            if last.is_some_and(|last| time - last > self.longest_s) {
+                points.push((f64::NAN, f64::NAN));
+            }
+            last = Some(time);
+            points.push((
+                time,
+                values.get(index).map_or(f64::NAN, |value| value[axis]),
+            ));
+        }
+        points
+    }
+}
+
+fn unit(axis: usize) -> &'static str {
+    if axis < 3 { "m/s²" } else { "rad/s" }
 }
 
 /// Stretches that were not compared, from the first reading left out to the last.

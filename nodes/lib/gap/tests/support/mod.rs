@@ -8,10 +8,10 @@ pub mod motion;
 use std::f64::consts::{PI, SQRT_2};
 use std::ops::Range;
 
-use cromosim_gap::{ImuSeries, PlacementRecord, PoseSeries};
+use cromosim_gap::{MeasuredImu, PlacementRecord, PoseSeries};
 use cromosim_imu::{
-    DeclaredNoise, Dropouts, Effect, EffectKind, EffectSet, MeasurementInput, Reading, SensorModel,
-    normal_pair,
+    DeclaredNoise, Dropouts, Effect, EffectKind, EffectSet, MeasurementInput, PerChannel, Reading,
+    SensorModel, normal_pair,
 };
 use cromosim_spatial::{Stamp, so3};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -45,7 +45,7 @@ pub struct Scene {
     pub start: Stamp,
     /// What depends on time is anchored here: the start of the device's first recording.
     pub epoch: Stamp,
-    pub declared: [Option<f64>; 2],
+    pub declared: PerChannel<Option<f64>>,
     /// Seconds of the recording in which the reference is lost.
     pub lost: Vec<Range<f64>>,
 }
@@ -53,7 +53,7 @@ pub struct Scene {
 impl Scene {
     /// A minute of random motion without any effect.
     pub fn new(seed: u64) -> Self {
-        let (start, declared) = (TODAY, SIGMA.map(Some));
+        let start = TODAY;
         Self {
             motion: Motion::random(seed),
             effects: EffectSet::new(),
@@ -61,7 +61,10 @@ impl Scene {
             seconds: 60.0,
             start,
             epoch: start,
-            declared,
+            declared: PerChannel {
+                accelerometer: Some(SIGMA[0]),
+                gyroscope: Some(SIGMA[1]),
+            },
             lost: Vec::new(),
         }
     }
@@ -155,7 +158,7 @@ impl Scene {
 
     /// The device's part of the effects on the exact kinematics, then noise, then what is digital,
     /// then losses.
-    fn imu(&self) -> ImuSeries {
+    fn imu(&self) -> MeasuredImu {
         use EffectKind as K;
         let mut device = self.effects.clone();
         for kind in [
@@ -188,7 +191,7 @@ impl Scene {
         let mut dropouts = Dropouts::new(self.effects.get(K::DroppedSamples), self.seed, "wrist");
         let there = |_: &(Stamp, Reading)| !dropouts.as_mut().is_some_and(Dropouts::next_is_lost);
         let (stamps, readings) = stamps.into_iter().zip(readings).filter(there).unzip();
-        ImuSeries {
+        MeasuredImu {
             stamps,
             readings,
             declared: self.declared,
