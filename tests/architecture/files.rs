@@ -63,16 +63,10 @@ fn circles_of(root: &Path) -> Vec<String> {
 fn no_file_needs_another_that_needs_it() {
     let mut found = Vec::new();
     for file in crate_roots() {
-        let still = STILL_CIRCULAR.iter().any(|folder| file.starts_with(folder));
-        if !still {
-            found.extend(circles_of(&root().join(file)));
-        }
+        found.extend(circles_of(&root().join(file)));
     }
     assert!(found.is_empty(), "{}", found.join("\n"));
 }
-
-/// Crates whose circles are not opened yet.
-const STILL_CIRCULAR: &[&str] = &["nodes/lib/gap/"];
 
 /// A crate in a folder of its own, from its files' names and texts.
 fn write_crate(name: &str, files: &[(&str, &str)]) -> std::path::PathBuf {
@@ -173,8 +167,7 @@ fn functions_fit_on_a_screen() {
     for file in production_files() {
         let text = fs::read_to_string(root().join(&file)).unwrap();
         for function in functions(&without_tests(tokens(&text))) {
-            let still = STILL_LONG.iter().any(|folder| file.starts_with(folder));
-            if function.lines > LONGEST_FUNCTION && !still {
+            if function.lines > LONGEST_FUNCTION {
                 let (line, name, lines) = (function.line, function.name, function.lines);
                 long.push(format!("{file}:{line} {name}: {lines} lines"));
             }
@@ -186,9 +179,6 @@ fn functions_fit_on_a_screen() {
         long.join("\n")
     );
 }
-
-/// Crates whose long functions are not divided yet.
-const STILL_LONG: &[&str] = &["nodes/lib/gap/"];
 
 #[test]
 fn functions_are_measured_from_their_name_to_their_end() {

@@ -2,7 +2,10 @@
 
 use std::collections::VecDeque;
 
-use cromosim_gap::monitor::{Assessment, ImuReading, MonitorOptions, NONE, Pace, assess, pace};
+use cromosim_gap::monitor::{
+    Assessment, FirstCause, ImuReading, MonitorOptions, Pace, assess, pace,
+};
+use cromosim_imu::PerChannel;
 use cromosim_msgs::builtin_interfaces::Time;
 use cromosim_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use cromosim_msgs::sensor_msgs::Imu;
@@ -84,7 +87,7 @@ struct Placement {
     name: String,
     measured: Stream,
     simulated: Stream,
-    declared_sigmas: [Option<f64>; 2],
+    declared_sigmas: PerChannel<Option<f64>>,
 }
 
 /// The node: a function of the messages so far.
@@ -100,7 +103,7 @@ impl GapMonitorNode {
             name: name.clone(),
             measured: Stream::default(),
             simulated: Stream::default(),
-            declared_sigmas: [None; 2],
+            declared_sigmas: PerChannel::default(),
         };
         Self {
             placements: config.placements.iter().map(placement).collect(),
@@ -114,18 +117,17 @@ impl GapMonitorNode {
         let Some(placement) = self.placements.get_mut(placement) else {
             return;
         };
-        let (force, rate) = (imu.linear_acceleration, imu.angular_velocity);
-        let values = [force.x, force.y, force.z, rate.x, rate.y, rate.z];
+        let (f, w) = (imu.linear_acceleration, imu.angular_velocity);
         let reading = ImuReading {
             stamp: Stamp::from_nanos(imu.header.stamp.nanos()),
-            values,
+            values: [f.x, f.y, f.z, w.x, w.y, w.z],
         };
         let stream = match source {
             Source::Measured => {
-                placement.declared_sigmas = [
-                    sigma(&imu.linear_acceleration_covariance),
-                    sigma(&imu.angular_velocity_covariance),
-                ];
+                placement.declared_sigmas = PerChannel {
+                    accelerometer: sigma(&imu.linear_acceleration_covariance),
+                    gyroscope: sigma(&imu.angular_velocity_covariance),
+                };
                 &mut placement.measured
             }
             Source::Simulated => &mut placement.simulated,
@@ -184,7 +186,10 @@ impl Placement {
         );
         let options = MonitorOptions {
             declared_sigmas: self.declared_sigmas,
-            least_sigmas: [config.accel_floor, config.gyro_floor],
+            least_sigmas: PerChannel {
+                accelerometer: config.accel_floor,
+                gyroscope: config.gyro_floor,
+            },
             ..MonitorOptions::default()
         };
         let assessment = assess(measured, simulated, &options);
@@ -230,14 +235,14 @@ impl Placement {
             return (DiagnosticStatus::WARN, self.nothing_in_common(config));
         };
         let (accel, gyro) = (found.accel_rmse, found.gyro_rmse);
-        if found.first_cause == NONE {
+        if found.first_cause == FirstCause::None {
             return (
                 DiagnosticStatus::OK,
                 format!("no gap beyond the noise ({accel:.2} m/s2, {gyro:.3} rad/s)"),
             );
         }
         // The channel that stands out more over its noise says how large the gap is.
-        let size = if found.whitened[0] >= found.whitened[1] {
+        let size = if found.whitened.accelerometer >= found.whitened.gyroscope {
             format!("{accel:.2} m/s2")
         } else {
             format!("{gyro:.3} rad/s")
@@ -296,7 +301,7 @@ impl Placement {
                 of(&|found| format!("{:.5}", found.accel_rmse)),
             ),
             ("gyro_rmse", of(&|found| format!("{:.6}", found.gyro_rmse))),
-            ("first_cause", of(&|found| found.first_cause.to_owned())),
+            ("first_cause", of(&|found| found.first_cause.to_string())),
             (
                 "first_cause_share",
                 of(&|found| format!("{:.3}", found.first_cause_share)),

@@ -158,7 +158,7 @@ fn gyro_axes(rows: &[(&Reading, usize)], track: &KinematicTrack) -> (Option<Matr
 }
 
 /// The known factor of a unit that a scale is, else 1.
-fn known_factor(scale: f64, channel: Channel) -> f64 {
+pub(crate) fn known_factor(scale: f64, channel: Channel) -> f64 {
     unit_factors(channel)
         .iter()
         .copied()

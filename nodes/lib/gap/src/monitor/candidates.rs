@@ -1,351 +1,243 @@
 //! The effects that the monitor tries, and what each explains.
 
+use cromosim_imu::{
+    Channel, EffectKind, GravityMode, PerChannel, ReadOff, STANDARD_GRAVITY,
+    nearest_signed_permutation,
+};
 use nalgebra::{Matrix3, Vector3};
 
-use super::pairs::Pairs;
-use super::{ImuReading, columns};
+use super::columns;
+use super::lag::Lag;
+use super::scene::Scene;
+use crate::coarse_alignment::known_factor;
 
-/// Standard gravity, m/s2.
-const GRAVITY: f64 = 9.80665;
+/// Effects of one channel that have columns.
+const BIAS: PerChannel<EffectKind> = PerChannel {
+    accelerometer: EffectKind::AccelBias,
+    gyroscope: EffectKind::GyroBias,
+};
+const SCALE: PerChannel<EffectKind> = PerChannel {
+    accelerometer: EffectKind::AccelScale,
+    gyroscope: EffectKind::GyroScale,
+};
+const MISALIGNMENT: PerChannel<EffectKind> = PerChannel {
+    accelerometer: EffectKind::AccelMisalignment,
+    gyroscope: EffectKind::GyroMisalignment,
+};
+
 /// How fast the estimate of the vertical forgets accelerations, s.
 const VERTICAL_TIME_S: f64 = 1.0;
+/// Distance (Frobenius norm) of a turn from a signed permutation below which it is one.
+const NEAR_AXES: f64 = 0.25;
+/// Smallest over largest singular value below which the third direction of a turn is a guess.
+const LEAST_LIKENESS: f64 = 1e-4;
+/// A slope on the vertical this close to that of a convention is that convention.
+const SLOPE_TOLERANCE: f64 = 0.15;
 /// Readings at the very same limit before it counts as one.
 const LEAST_CLIPPED: usize = 5;
-/// Units other than SI that accelerometers come in (g, mg, milli) and gyroscopes (degrees, milli).
-const FACTORS: [&[f64]; 2] = [
-    &[1.0 / GRAVITY, 1000.0 / GRAVITY, 1e3, 1e-3],
-    &[57.295_779_513, 57_295.779_513, 1e3, 1e-3],
-];
-/// A slope this close to a known factor, relatively, is that factor.
-const FACTOR_TOLERANCE: f64 = 0.1;
-
-/// What a window offers to the candidates.
-pub(super) struct Scene<'a> {
-    pub measured: &'a [ImuReading],
-    pub simulated: &'a [ImuReading],
-    pub pairs: &'a Pairs,
-    /// Whitening, m/s2 and rad/s.
-    pub sigmas: [f64; 2],
-    /// White noise found in the measured stream.
-    pub found: [f64; 2],
-    /// White noise declared for it.
-    pub declared: [f64; 2],
-    pub largest_lag_s: f64,
-}
-
-/// How late the measured stamps are.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Lag {
-    pub seconds: f64,
-    /// Whitened squared residual once it is taken out, for as many pairs as there are without.
-    pub rest: f64,
-}
 
 /// One effect tried alone.
-pub(super) struct Tried {
-    pub effect: &'static str,
+pub(super) struct Candidate {
+    pub effect: EffectKind,
     /// Of the whitened squared residual.
     pub reduction: f64,
-    pub parameters: usize,
 }
 
-fn tried(effect: &'static str, parameters: usize, reduction: f64) -> Tried {
-    Tried {
-        effect,
-        reduction,
-        parameters,
-    }
+fn candidate(effect: EffectKind, reduction: f64) -> Candidate {
+    Candidate { effect, reduction }
 }
 
-impl Scene<'_> {
-    fn whitened(&self, pairs: &Pairs) -> f64 {
-        let sums = pairs.squared_residuals();
-        sums[0] / self.sigmas[0].powi(2) + sums[1] / self.sigmas[1].powi(2)
-    }
-
-    /// Everything that can be tried on this window.
-    pub(super) fn reductions(&self, lag: Option<Lag>) -> Vec<Tried> {
-        let (pairs, sigmas) = (self.pairs, self.sigmas);
-        let at = |index: usize| &pairs.simulated[index];
-        let names = [
-            ["accel_bias", "accel_scale", "accel_misalignment"],
-            ["gyro_bias", "gyro_scale", "gyro_misalignment"],
-        ];
-        let mut all = Vec::new();
-        for (channel, [bias, scale, misalignment]) in names.into_iter().enumerate() {
-            all.push(tried(
-                bias,
-                3,
-                columns::explained(pairs, sigmas, |_| columns::bias(channel)),
-            ));
-            all.push(tried(
-                scale,
-                3,
-                columns::explained(pairs, sigmas, |index| columns::scale(at(index), channel)),
-            ));
-            all.push(tried(
-                misalignment,
-                3,
-                columns::explained(pairs, sigmas, |index| {
-                    columns::misalignment(at(index), channel)
-                }),
-            ));
-        }
-        let lever =
-            |index: usize| columns::lever_arm(&at(index)[1], &pairs.simulated_slope(index)[1]);
-        all.push(tried(
-            "lever_arm",
-            3,
-            columns::explained(pairs, sigmas, lever),
-        ));
-        all.push(tried(
-            "gyro_g_sensitivity",
-            9,
-            columns::explained(pairs, sigmas, |index| columns::g_sensitivity(&at(index)[0])),
-        ));
-        let total = self.whitened(pairs);
-        all.extend(lag.map(|lag| tried("time_offset", 1, total - lag.rest)));
-        all.extend(self.rotations(total));
-        all.extend((0..2).filter_map(|channel| self.units(channel)));
-        all.extend((0..2).filter_map(|channel| self.saturation(channel)));
-        all.extend((0..2).filter_map(|channel| self.noise(channel)));
-        all.extend(self.gravity());
-        all
-    }
-
-    /// The lag that leaves the least, from that of the rates' norms and from none; none where the
-    /// sensor hardly turns.
-    pub(super) fn lag(&self) -> Option<Lag> {
-        let correlated = self.correlated_lag()?;
-        let steps = [0.0, correlated]
-            .into_iter()
-            .filter_map(|start| self.lag_step(start));
-        steps.min_by(|one, other| one.rest.total_cmp(&other.rest))
-    }
-
-    /// The lag with the greatest correlation of |w|, refined by a parabola: it does not mind how
-    /// the sensor is mounted.
-    fn correlated_lag(&self) -> Option<f64> {
-        let pairs = self.pairs;
-        let series = |values: &[[Vector3<f64>; 2]]| {
-            let norms: Vec<f64> = values.iter().map(|both| both[1].norm()).collect();
-            let mean = norms.iter().sum::<f64>() / norms.len() as f64;
-            norms
+/// Everything that can be tried on a window.
+pub(super) fn candidates(scene: &Scene, lag: Option<Lag>) -> Vec<Candidate> {
+    let total = scene.whitened(scene.pairs);
+    let mut all = with_columns(scene);
+    all.extend(lag.map(|lag| candidate(EffectKind::TimeOffset, total - lag.rest)));
+    all.extend(turns(scene, total));
+    for of_channel in [units, saturation, noise] {
+        all.extend(
+            Channel::ALL
                 .into_iter()
-                .map(|norm| norm - mean)
-                .collect::<Vec<f64>>()
-        };
-        let (measured, simulated) = (series(&pairs.measured), series(&pairs.simulated));
-        let power = |series: &[f64]| {
-            series.iter().map(|value| value * value).sum::<f64>() / series.len() as f64
-        };
-        if power(&simulated) < (5.0 * self.sigmas[1]).powi(2)
-            || power(&measured) < (5.0 * self.sigmas[1]).powi(2)
-        {
-            return None;
-        }
-        let most = ((self.largest_lag_s / pairs.period) as usize).min(pairs.len() / 3) as isize;
-        let correlation = |lag: isize| {
-            let (first, last) = (lag.max(0), pairs.len() as isize + lag.min(0));
-            let (mut product, mut one, mut other) = (0.0, 0.0, 0.0);
-            for index in first..last {
-                let (m, s) = (measured[index as usize], simulated[(index - lag) as usize]);
-                (product, one, other) = (product + m * s, one + m * m, other + s * s);
-            }
-            product / (one * other).sqrt().max(f64::MIN_POSITIVE)
-        };
-        let values: Vec<f64> = (-most..=most).map(correlation).collect();
-        let best =
-            (0..values.len()).max_by(|&one, &other| values[one].total_cmp(&values[other]))?;
-        let shift = match (
-            best.checked_sub(1).and_then(|left| values.get(left)),
-            values.get(best + 1),
-        ) {
-            (Some(left), Some(right)) if left + right < 2.0 * values[best] => {
-                0.5 * (left - right) / (left + right - 2.0 * values[best])
-            }
-            _ => 0.0,
-        };
-        Some((best as f64 - most as f64 + shift) * pairs.period)
-    }
-
-    /// One Gauss-Newton step on the lag, and what it really leaves.
-    fn lag_step(&self, start: f64) -> Option<Lag> {
-        let here = Pairs::at_lag(self.measured, self.simulated, start)?;
-        let (mut slope_power, mut product) = (0.0, 0.0);
-        for index in 0..here.len() {
-            let (columns, residual) = (
-                columns::delay(&here.simulated_slope(index)),
-                here.residual(index),
-            );
-            for channel in 0..2 {
-                let weight = self.sigmas[channel].powi(-2);
-                slope_power += weight * columns[channel].norm_squared();
-                product += weight * columns[channel].dot(&residual[channel]);
-            }
-        }
-        // A step beyond two periods is outside of what the slope tells.
-        let step = if slope_power > 0.0 {
-            (product / slope_power).clamp(-2.0 * here.period, 2.0 * here.period)
-        } else {
-            0.0
-        };
-        let rest = |pairs: &Pairs| {
-            self.whitened(pairs) * self.pairs.len() as f64 / pairs.len().max(1) as f64
-        };
-        let there = Pairs::at_lag(self.measured, self.simulated, start + step)?;
-        let enough = |pairs: &Pairs| pairs.len() * 2 > self.pairs.len();
-        let candidates = [(start, &here), (start + step, &there)]
-            .into_iter()
-            .filter(|(_, pairs)| enough(pairs));
-        candidates
-            .map(|(seconds, pairs)| Lag {
-                seconds,
-                rest: rest(pairs),
-            })
-            .min_by(|one, other| one.rest.total_cmp(&other.rest))
-    }
-
-    /// The orthogonal matrix that turns simulated into measured best (Kabsch 1976), and the signed
-    /// permutation next to it.
-    fn rotations(&self, total: f64) -> Vec<Tried> {
-        let (mut products, mut power) = (Matrix3::zeros(), 0.0);
-        for (measured, simulated) in self.pairs.measured.iter().zip(&self.pairs.simulated) {
-            for channel in 0..2 {
-                let weight = self.sigmas[channel].powi(-2);
-                products += measured[channel] * simulated[channel].transpose() * weight;
-                power +=
-                    weight * (measured[channel].norm_squared() + simulated[channel].norm_squared());
-            }
-        }
-        let svd = products.svd(true, true);
-        let (Some(u), Some(v)) = (svd.u, svd.v_t) else {
-            return Vec::new();
-        };
-        let rest = |turn: &Matrix3<f64>| power - 2.0 * turn.component_mul(&products).sum();
-        let flip = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, (u * v).determinant().signum()));
-        let mut all = vec![tried("mount_rotation", 3, total - rest(&(u * flip * v)))];
-        let permutation = (u * v).map(f64::round);
-        let is_permutation =
-            (permutation * permutation.transpose() - Matrix3::identity()).norm() < 1e-9;
-        let is_near = (permutation - u * v).norm() < 0.25;
-        // Without motion about all axes the third direction is a guess.
-        let is_told = svd.singular_values.min() > 1e-4 * svd.singular_values.max();
-        if is_permutation && is_near && is_told && permutation != Matrix3::identity() {
-            all.push(tried("axis_convention", 1, total - rest(&permutation)));
-        }
-        all
-    }
-
-    /// A slope of measured on simulated that is a known factor.
-    fn units(&self, channel: usize) -> Option<Tried> {
-        let both = self
-            .pairs
-            .measured
-            .iter()
-            .zip(&self.pairs.simulated)
-            .map(|(m, s)| (m[channel], s[channel]));
-        let (product, power) = both.clone().fold((0.0, 0.0), |(product, power), (m, s)| {
-            (product + m.dot(&s), power + s.norm_squared())
-        });
-        let slope = product / power.max(f64::MIN_POSITIVE);
-        let close = |factor: &&f64| (slope / **factor - 1.0).abs() < FACTOR_TOLERANCE;
-        let factor = *FACTORS[channel].iter().find(close)?;
-        let reduction: f64 = both
-            .map(|(m, s)| (m - s).norm_squared() - (m - s * factor).norm_squared())
-            .sum();
-        Some(tried(
-            ["accel_units", "gyro_units"][channel],
-            1,
-            reduction / self.sigmas[channel].powi(2),
-        ))
-    }
-
-    /// Readings that stand at one limit while the simulation goes beyond.
-    fn saturation(&self, channel: usize) -> Option<Tried> {
-        let limit = self
-            .pairs
-            .measured
-            .iter()
-            .map(|both| both[channel].amax())
-            .fold(0.0, f64::max);
-        let (mut clipped, mut reduction) = (0, 0.0);
-        for (measured, simulated) in self.pairs.measured.iter().zip(&self.pairs.simulated) {
-            for axis in 0..3 {
-                let (m, s) = (measured[channel][axis], simulated[channel][axis]);
-                if m.abs() >= limit * (1.0 - 1e-6) && s * m.signum() > limit {
-                    clipped += 1;
-                    reduction += (m - s).powi(2) / self.sigmas[channel].powi(2);
-                }
-            }
-        }
-        (clipped >= LEAST_CLIPPED).then(|| {
-            tried(
-                ["accel_saturation", "gyro_saturation"][channel],
-                1,
-                reduction,
-            )
-        })
-    }
-
-    /// White noise beyond the declared; fourth differences see nothing but noise, so nothing else
-    /// can explain it.
-    fn noise(&self, channel: usize) -> Option<Tried> {
-        let excess = self.found[channel].powi(2) - self.declared[channel].powi(2);
-        let reduction = 3.0 * self.pairs.len() as f64 * excess / self.sigmas[channel].powi(2);
-        (excess > 0.0).then(|| tried(["accel_noise", "gyro_noise"][channel], 1, reduction))
-    }
-
-    /// Gravity left out of the measured readings, or of the other sign: the residual follows the
-    /// vertical with a slope of -1 or -2.
-    fn gravity(&self) -> Option<Tried> {
-        let up = self.vertical();
-        let forces = |index: usize| self.pairs.residual(index)[0];
-        let product: f64 = up
-            .iter()
-            .enumerate()
-            .map(|(index, up)| forces(index).dot(up))
-            .sum();
-        let power: f64 = up.iter().map(Vector3::norm_squared).sum();
-        let slope = product / power.max(f64::MIN_POSITIVE);
-        let factor = [-1.0, -2.0]
-            .into_iter()
-            .find(|factor| (slope - factor).abs() < 0.15)?;
-        let change = |(index, up): (usize, &Vector3<f64>)| {
-            forces(index).norm_squared() - (forces(index) - up * factor).norm_squared()
-        };
-        let reduction: f64 = up.iter().enumerate().map(change).sum();
-        Some(tried(
-            "gravity_convention",
-            1,
-            reduction / self.sigmas[0].powi(2),
-        ))
-    }
-
-    /// Gravity's reaction in sensor axes, m/s2: the simulated force, carried along by the simulated
-    /// rate and averaged over a second, in both directions of time.
-    fn vertical(&self) -> Vec<Vector3<f64>> {
-        let pass = |order: &mut dyn Iterator<Item = usize>| {
-            let mut up = vec![Vector3::zeros(); self.pairs.len()];
-            let mut last: Option<usize> = None;
-            for index in order {
-                let [force, rate] = self.pairs.simulated[index];
-                up[index] = last.map_or(force, |last| {
-                    let step = self.pairs.seconds[index] - self.pairs.seconds[last];
-                    let carried = up[last] - rate.cross(&up[last]) * step;
-                    carried + (force - carried) * (step.abs() / VERTICAL_TIME_S).min(1.0)
-                });
-                last = Some(index);
-            }
-            up
-        };
-        let (forwards, backwards) = (
-            pass(&mut (0..self.pairs.len())),
-            pass(&mut (0..self.pairs.len()).rev()),
+                .filter_map(|channel| of_channel(scene, channel)),
         );
-        let mean = |(one, other): (Vector3<f64>, Vector3<f64>)| {
-            (one + other).try_normalize(1e-9).unwrap_or_default() * GRAVITY
-        };
-        forwards.into_iter().zip(backwards).map(mean).collect()
     }
+    all.extend(gravity(scene));
+    all
+}
+
+/// The effects that are linear in their values.
+fn with_columns(scene: &Scene) -> Vec<Candidate> {
+    let (pairs, sigmas) = (scene.pairs, scene.sigmas);
+    let at = |index: usize| &pairs.simulated[index];
+    let mut all = Vec::new();
+    for channel in Channel::ALL {
+        let bias = columns::explained(pairs, sigmas, |_| columns::bias(channel));
+        let scale = columns::explained(pairs, sigmas, |index| columns::scale(at(index), channel));
+        let misalignment = columns::explained(pairs, sigmas, |index| {
+            columns::misalignment(at(index), channel)
+        });
+        all.extend([
+            candidate(BIAS[channel], bias),
+            candidate(SCALE[channel], scale),
+            candidate(MISALIGNMENT[channel], misalignment),
+        ]);
+    }
+    let lever_arm = columns::explained(pairs, sigmas, |index| {
+        let angular_acceleration = pairs.simulated_slope(index).gyroscope;
+        columns::lever_arm(&at(index).angular_velocity, &angular_acceleration)
+    });
+    let g_sensitivity = columns::explained(pairs, sigmas, |index| {
+        columns::g_sensitivity(&at(index).specific_force)
+    });
+    all.extend([
+        candidate(EffectKind::LeverArm, lever_arm),
+        candidate(EffectKind::GyroGSensitivity, g_sensitivity),
+    ]);
+    all
+}
+
+/// The rotation that turns simulated into measured best (Kabsch 1976), and the signed permutation
+/// next to the orthogonal matrix that does.
+fn turns(scene: &Scene, total: f64) -> Vec<Candidate> {
+    let (mut products, mut power) = (Matrix3::zeros(), 0.0);
+    for (measured, simulated) in scene.pairs.measured.iter().zip(&scene.pairs.simulated) {
+        for channel in Channel::ALL {
+            let (m, s) = (measured[channel], simulated[channel]);
+            let weight = scene.sigmas[channel].powi(-2);
+            products += m * s.transpose() * weight;
+            power += weight * (m.norm_squared() + s.norm_squared());
+        }
+    }
+    let svd = products.svd(true, true);
+    let (Some(u), Some(v)) = (svd.u, svd.v_t) else {
+        return Vec::new();
+    };
+    let rest = |turn: &Matrix3<f64>| power - 2.0 * turn.component_mul(&products).sum();
+    let flip = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, (u * v).determinant().signum()));
+    let mut all = vec![candidate(
+        EffectKind::MountRotation,
+        total - rest(&(u * flip * v)),
+    )];
+    let permutation = nearest_signed_permutation(&(u * v));
+    let is_near = (permutation - u * v).norm() < NEAR_AXES;
+    // Without motion about all axes the third direction is a guess.
+    let is_told = svd.singular_values.min() > LEAST_LIKENESS * svd.singular_values.max();
+    if is_near && is_told && permutation != Matrix3::identity() {
+        all.push(candidate(
+            EffectKind::AxisConvention,
+            total - rest(&permutation),
+        ));
+    }
+    all
+}
+
+/// A slope of measured on simulated that is a known factor.
+fn units(scene: &Scene, channel: Channel) -> Option<Candidate> {
+    let both = scene
+        .pairs
+        .measured
+        .iter()
+        .zip(&scene.pairs.simulated)
+        .map(|(m, s)| (m[channel], s[channel]));
+    let (product, power) = both.clone().fold((0.0, 0.0), |(product, power), (m, s)| {
+        (product + m.dot(&s), power + s.norm_squared())
+    });
+    let slope = product / power.max(f64::MIN_POSITIVE);
+    let factor = known_factor(slope, channel);
+    if factor == 1.0 {
+        return None;
+    }
+    let reduction: f64 = both
+        .map(|(m, s)| (m - s).norm_squared() - (m - s * factor).norm_squared())
+        .sum();
+    Some(candidate(
+        EffectKind::read_off(ReadOff::UnitFactor(channel))?,
+        reduction / scene.sigmas[channel].powi(2),
+    ))
+}
+
+/// Readings that stand at one limit while the simulation goes beyond.
+fn saturation(scene: &Scene, channel: Channel) -> Option<Candidate> {
+    let pairs = scene.pairs;
+    let limit = pairs
+        .measured
+        .iter()
+        .map(|reading| reading[channel].amax())
+        .fold(0.0, f64::max);
+    let (mut clipped, mut reduction) = (0, 0.0);
+    for (measured, simulated) in pairs.measured.iter().zip(&pairs.simulated) {
+        for axis in 0..3 {
+            let (m, s) = (measured[channel][axis], simulated[channel][axis]);
+            if m.abs() >= limit * (1.0 - 1e-6) && s * m.signum() > limit {
+                clipped += 1;
+                reduction += (m - s).powi(2) / scene.sigmas[channel].powi(2);
+            }
+        }
+    }
+    let effect = EffectKind::read_off(ReadOff::ClippedReadings(channel))?;
+    (clipped >= LEAST_CLIPPED).then(|| candidate(effect, reduction))
+}
+
+/// White noise beyond the declared; fourth differences see nothing but noise, so nothing else can
+/// explain it.
+fn noise(scene: &Scene, channel: Channel) -> Option<Candidate> {
+    let excess = scene.found[channel].powi(2) - scene.declared[channel].powi(2);
+    let reduction = 3.0 * scene.pairs.len() as f64 * excess / scene.sigmas[channel].powi(2);
+    let effect = EffectKind::read_off(ReadOff::ExcessNoise(channel))?;
+    (excess > 0.0).then(|| candidate(effect, reduction))
+}
+
+/// Gravity left out of the measured readings, or of the other sign: the residual follows the
+/// vertical with a slope of -1 or -2.
+fn gravity(scene: &Scene) -> Option<Candidate> {
+    let up = vertical(scene);
+    let residual = |index: usize| scene.pairs.residual(index).accelerometer;
+    let product: f64 = up
+        .iter()
+        .enumerate()
+        .map(|(index, up)| residual(index).dot(up))
+        .sum();
+    let power: f64 = up.iter().map(Vector3::norm_squared).sum();
+    let slope = product / power.max(f64::MIN_POSITIVE);
+    let factor = GravityMode::ALL
+        .into_iter()
+        .filter(|mode| *mode != GravityMode::Kept)
+        .map(|mode| mode.factor() - GravityMode::Kept.factor())
+        .find(|factor| (slope - factor).abs() < SLOPE_TOLERANCE)?;
+    let change = |(index, up): (usize, &Vector3<f64>)| {
+        residual(index).norm_squared() - (residual(index) - up * factor).norm_squared()
+    };
+    let reduction: f64 = up.iter().enumerate().map(change).sum();
+    Some(candidate(
+        EffectKind::GravityConvention,
+        reduction / scene.sigmas.accelerometer.powi(2),
+    ))
+}
+
+/// Gravity's reaction in sensor axes, m/s2: the simulated specific force, carried along by the
+/// simulated angular velocity and averaged over a second, in both directions of time.
+fn vertical(scene: &Scene) -> Vec<Vector3<f64>> {
+    let pairs = scene.pairs;
+    let pass = |order: &mut dyn Iterator<Item = usize>| {
+        let mut up = vec![Vector3::zeros(); pairs.len()];
+        let mut last: Option<usize> = None;
+        for index in order {
+            let reading = &pairs.simulated[index];
+            up[index] = last.map_or(reading.specific_force, |last| {
+                let step = pairs.seconds[index] - pairs.seconds[last];
+                let carried = up[last] - reading.angular_velocity.cross(&up[last]) * step;
+                let weight = (step.abs() / VERTICAL_TIME_S).min(1.0);
+                carried + (reading.specific_force - carried) * weight
+            });
+            last = Some(index);
+        }
+        up
+    };
+    let (forwards, backwards) = (
+        pass(&mut (0..pairs.len())),
+        pass(&mut (0..pairs.len()).rev()),
+    );
+    let mean = |(one, other): (Vector3<f64>, Vector3<f64>)| {
+        (one + other).try_normalize(1e-9).unwrap_or_default() * STANDARD_GRAVITY
+    };
+    forwards.into_iter().zip(backwards).map(mean).collect()
 }

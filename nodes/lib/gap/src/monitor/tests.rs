@@ -1,6 +1,7 @@
 #![allow(clippy::unwrap_used)]
 //! Inject each effect into made-up motion; the monitor must name it.
 
+use cromosim_imu::{EffectKind, PerChannel};
 use cromosim_spatial::Stamp;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
@@ -13,14 +14,14 @@ type Read = Box<dyn Fn(f64) -> (Vector3<f64>, Vector3<f64>)>;
 
 /// A body-worn sensor's motion in sensor axes: specific force, angular velocity and acceleration,
 /// and gravity's reaction.
-struct Moment {
-    force: Vector3<f64>,
-    rate: Vector3<f64>,
-    alpha: Vector3<f64>,
-    up: Vector3<f64>,
+pub(super) struct Moment {
+    pub specific_force: Vector3<f64>,
+    pub angular_velocity: Vector3<f64>,
+    pub angular_acceleration: Vector3<f64>,
+    pub up: Vector3<f64>,
 }
 
-fn rotation(t: f64) -> Rotation3<f64> {
+pub(super) fn rotation(t: f64) -> Rotation3<f64> {
     Rotation3::from_euler_angles(
         0.7 * (2.1 * t).sin(),
         0.5 * (1.7 * t + 0.4).sin() + 0.2,
@@ -28,12 +29,12 @@ fn rotation(t: f64) -> Rotation3<f64> {
     )
 }
 
-fn rate(t: f64) -> Vector3<f64> {
+fn angular_velocity(t: f64) -> Vector3<f64> {
     let step = 1e-4;
     (rotation(t - step).inverse() * rotation(t + step)).scaled_axis() / (2.0 * step)
 }
 
-fn moment(t: f64) -> Moment {
+pub(super) fn moment(t: f64) -> Moment {
     let acceleration = Vector3::new(
         3.0 * (6.1 * t).sin(),
         2.5 * (7.3 * t + 0.3).cos(),
@@ -41,11 +42,10 @@ fn moment(t: f64) -> Moment {
     );
     let to_sensor = rotation(t).inverse();
     let up = to_sensor * Vector3::new(0.0, 0.0, 9.80665);
-    let alpha = (rate(t + 1e-3) - rate(t - 1e-3)) / 2e-3;
     Moment {
-        force: to_sensor * acceleration + up,
-        rate: rate(t),
-        alpha,
+        specific_force: to_sensor * acceleration + up,
+        angular_velocity: angular_velocity(t),
+        angular_acceleration: (angular_velocity(t + 1e-3) - angular_velocity(t - 1e-3)) / 2e-3,
         up,
     }
 }
@@ -70,8 +70,8 @@ fn stream(
 ) -> Vec<ImuReading> {
     let reading = |k: u64| {
         let t = 0.0034 + k as f64 / rate_hz;
-        let (force, rate) = read(t);
-        let clean = [force.x, force.y, force.z, rate.x, rate.y, rate.z];
+        let (f, w) = read(t);
+        let clean = [f.x, f.y, f.z, w.x, w.y, w.z];
         let values = std::array::from_fn(|axis| {
             clean[axis] + noise[axis / 3] * normal(seed * 1_000_000 + k * 6 + axis as u64)
         });
@@ -84,12 +84,17 @@ fn stream(
 }
 
 fn simulated() -> Vec<ImuReading> {
-    stream(120.0, [0.0; 2], 1, |t| (moment(t).force, moment(t).rate))
+    stream(120.0, [0.0; 2], 1, |t| {
+        (moment(t).specific_force, moment(t).angular_velocity)
+    })
 }
 
 fn options() -> MonitorOptions {
     MonitorOptions {
-        declared_sigmas: SIGMAS.map(Some),
+        declared_sigmas: PerChannel {
+            accelerometer: Some(SIGMAS[0]),
+            gyroscope: Some(SIGMAS[1]),
+        },
         ..MonitorOptions::default()
     }
 }
@@ -104,10 +109,10 @@ fn named(read: impl Fn(f64) -> (Vector3<f64>, Vector3<f64>)) -> Assessment {
 
 #[test]
 fn no_gap_is_none() {
-    let found = named(|t| (moment(t).force, moment(t).rate));
+    let found = named(|t| (moment(t).specific_force, moment(t).angular_velocity));
     assert_eq!(
         (found.first_cause, found.first_cause_share),
-        (NONE, 0.0),
+        (FirstCause::None, 0.0),
         "{found:?}"
     );
     assert!((found.accel_rmse / (3.0_f64.sqrt() * SIGMAS[0]) - 1.0).abs() < 0.1);
@@ -117,12 +122,14 @@ fn no_gap_is_none() {
 
 #[test]
 fn noise_of_the_simulation_is_no_gap() {
-    let measured = stream(100.0, SIGMAS, 2, |t| (moment(t).force, moment(t).rate));
+    let measured = stream(100.0, SIGMAS, 2, |t| {
+        (moment(t).specific_force, moment(t).angular_velocity)
+    });
     let noisy = stream(120.0, [0.05, 0.005], 3, |t| {
-        (moment(t).force, moment(t).rate)
+        (moment(t).specific_force, moment(t).angular_velocity)
     });
     let found = assess(&measured, &noisy, &options()).unwrap();
-    assert_eq!(found.first_cause, NONE, "{found:?}");
+    assert_eq!(found.first_cause, FirstCause::None, "{found:?}");
 }
 
 #[test]
@@ -141,26 +148,36 @@ fn each_effect_is_named_where_it_is_injected() {
     let cases: Vec<(&str, Read)> = vec![
         (
             "accel_bias",
-            of(|m| (m.force + Vector3::new(0.2, -0.1, 0.15), m.rate)),
+            of(|m| {
+                (
+                    m.specific_force + Vector3::new(0.2, -0.1, 0.15),
+                    m.angular_velocity,
+                )
+            }),
         ),
         (
             "gyro_bias",
-            of(|m| (m.force, m.rate + Vector3::new(0.01, -0.02, 0.015))),
+            of(|m| {
+                (
+                    m.specific_force,
+                    m.angular_velocity + Vector3::new(0.01, -0.02, 0.015),
+                )
+            }),
         ),
         (
             "accel_scale",
-            Box::new(move |t| (scale * moment(t).force, moment(t).rate)),
+            Box::new(move |t| (scale * moment(t).specific_force, moment(t).angular_velocity)),
         ),
         (
             "gyro_scale",
-            Box::new(move |t| (moment(t).force, scale * moment(t).rate)),
+            Box::new(move |t| (moment(t).specific_force, scale * moment(t).angular_velocity)),
         ),
         (
             "accel_misalignment",
             Box::new(move |t| {
                 (
-                    (Matrix3::identity() + upper) * moment(t).force,
-                    moment(t).rate,
+                    (Matrix3::identity() + upper) * moment(t).specific_force,
+                    moment(t).angular_velocity,
                 )
             }),
         ),
@@ -168,18 +185,28 @@ fn each_effect_is_named_where_it_is_injected() {
             "gyro_misalignment",
             Box::new(move |t| {
                 (
-                    moment(t).force,
-                    (Matrix3::identity() + upper) * moment(t).rate,
+                    moment(t).specific_force,
+                    (Matrix3::identity() + upper) * moment(t).angular_velocity,
                 )
             }),
         ),
         (
             "mount_rotation",
-            Box::new(move |t| (turn * moment(t).force, turn * moment(t).rate)),
+            Box::new(move |t| {
+                (
+                    turn * moment(t).specific_force,
+                    turn * moment(t).angular_velocity,
+                )
+            }),
         ),
         (
             "axis_convention",
-            Box::new(move |t| (axes * moment(t).force, axes * moment(t).rate)),
+            Box::new(move |t| {
+                (
+                    axes * moment(t).specific_force,
+                    axes * moment(t).angular_velocity,
+                )
+            }),
         ),
         ("time_offset", of_time(0.021)),
         ("time_offset", of_time(-0.15)),
@@ -188,21 +215,47 @@ fn each_effect_is_named_where_it_is_injected() {
             Box::new(move |t| {
                 let m = moment(t);
                 (
-                    m.force + m.alpha.cross(&lever) + m.rate.cross(&m.rate.cross(&lever)),
-                    m.rate,
+                    m.specific_force
+                        + m.angular_acceleration.cross(&lever)
+                        + m.angular_velocity.cross(&m.angular_velocity.cross(&lever)),
+                    m.angular_velocity,
                 )
             }),
         ),
         (
             "gyro_g_sensitivity",
-            Box::new(move |t| (moment(t).force, moment(t).rate + coupling * moment(t).force)),
+            Box::new(move |t| {
+                (
+                    moment(t).specific_force,
+                    moment(t).angular_velocity + coupling * moment(t).specific_force,
+                )
+            }),
         ),
-        ("gravity_convention", of(|m| (m.force - m.up, m.rate))),
-        ("gravity_convention", of(|m| (m.force - m.up * 2.0, m.rate))),
-        ("accel_units", of(|m| (m.force / 9.80665, m.rate))),
-        ("gyro_units", of(|m| (m.force, m.rate.map(f64::to_degrees)))),
-        ("accel_noise", of(|m| (m.force, m.rate))),
-        ("gyro_noise", of(|m| (m.force, m.rate))),
+        (
+            "gravity_convention",
+            of(|m| (m.specific_force - m.up, m.angular_velocity)),
+        ),
+        (
+            "gravity_convention",
+            of(|m| (m.specific_force - m.up * 2.0, m.angular_velocity)),
+        ),
+        (
+            "accel_units",
+            of(|m| (m.specific_force / 9.80665, m.angular_velocity)),
+        ),
+        (
+            "gyro_units",
+            of(|m| (m.specific_force, m.angular_velocity.map(f64::to_degrees))),
+        ),
+        (
+            "accel_units",
+            of(|m| (m.specific_force * 100.0, m.angular_velocity)),
+        ),
+        (
+            "accel_noise",
+            of(|m| (m.specific_force, m.angular_velocity)),
+        ),
+        ("gyro_noise", of(|m| (m.specific_force, m.angular_velocity))),
     ];
     for (effect, read) in cases {
         let noise = match effect {
@@ -211,13 +264,18 @@ fn each_effect_is_named_where_it_is_injected() {
             _ => SIGMAS,
         };
         let found = assess_measured(&stream(100.0, noise, 2, read));
-        assert_eq!(found.first_cause, effect, "{found:?}");
+        assert_eq!(found.first_cause.to_string(), effect, "{found:?}");
         assert!(found.first_cause_share > 0.9, "{effect}: {found:?}");
     }
 }
 
 fn of_time(late: f64) -> Read {
-    Box::new(move |t| (moment(t - late).force, moment(t - late).rate))
+    Box::new(move |t| {
+        (
+            moment(t - late).specific_force,
+            moment(t - late).angular_velocity,
+        )
+    })
 }
 
 #[test]
@@ -233,19 +291,27 @@ fn the_lag_is_that_of_the_stamps() {
 
 #[test]
 fn clipped_readings_are_saturation() {
-    let mut measured = stream(100.0, SIGMAS, 2, |t| (moment(t).force, moment(t).rate));
+    let mut measured = stream(100.0, SIGMAS, 2, |t| {
+        (moment(t).specific_force, moment(t).angular_velocity)
+    });
     for reading in &mut measured {
         reading.values[..3]
             .iter_mut()
             .for_each(|value| *value = value.clamp(-11.0, 11.0));
     }
     let found = assess_measured(&measured);
-    assert_eq!(found.first_cause, "accel_saturation", "{found:?}");
+    assert_eq!(
+        found.first_cause,
+        FirstCause::Effect(EffectKind::AccelSaturation),
+        "{found:?}"
+    );
 }
 
 #[test]
 fn lost_messages_are_counted_and_named_where_nothing_else_is_wrong() {
-    let mut measured = stream(100.0, SIGMAS, 2, |t| (moment(t).force, moment(t).rate));
+    let mut measured = stream(100.0, SIGMAS, 2, |t| {
+        (moment(t).specific_force, moment(t).angular_velocity)
+    });
     let mut number = 0;
     measured.retain(|_| {
         number += 1;
@@ -254,7 +320,7 @@ fn lost_messages_are_counted_and_named_where_nothing_else_is_wrong() {
     let found = assess_measured(&measured);
     assert_eq!(
         (found.first_cause, pace(&measured).dropped),
-        ("dropped_samples", 49),
+        (FirstCause::Effect(EffectKind::DroppedSamples), 49),
         "{found:?}"
     );
     assert!((pace(&measured).rate_hz - 100.0).abs() < 0.1);
@@ -265,16 +331,18 @@ fn what_no_effect_explains_is_unknown() {
     // A frequency that nothing in the motion has.
     let found = named(|t| {
         (
-            moment(t).force + Vector3::new(1.5, 1.0, -1.0) * (60.0 * t).sin(),
-            moment(t).rate,
+            moment(t).specific_force + Vector3::new(1.5, 1.0, -1.0) * (60.0 * t).sin(),
+            moment(t).angular_velocity,
         )
     });
-    assert_eq!(found.first_cause, UNKNOWN, "{found:?}");
+    assert_eq!(found.first_cause, FirstCause::Unknown, "{found:?}");
 }
 
 #[test]
 fn streams_without_common_stamps_say_nothing() {
-    let measured = stream(100.0, SIGMAS, 2, |t| (moment(t).force, moment(t).rate));
+    let measured = stream(100.0, SIGMAS, 2, |t| {
+        (moment(t).specific_force, moment(t).angular_velocity)
+    });
     let mut late = simulated();
     late.iter_mut()
         .for_each(|reading| reading.stamp = reading.stamp.plus_seconds(60.0));
@@ -284,12 +352,14 @@ fn streams_without_common_stamps_say_nothing() {
 }
 
 #[test]
-fn a_hole_in_the_simulation_is_not_interpolated_over() {
-    let measured = stream(100.0, SIGMAS, 2, |t| (moment(t).force, moment(t).rate));
-    let mut holed = simulated();
-    holed.drain(300..600);
-    let found = assess(&measured, &holed, &options()).unwrap();
-    assert_eq!(found.first_cause, NONE);
+fn a_gap_in_the_simulation_is_not_interpolated_over() {
+    let measured = stream(100.0, SIGMAS, 2, |t| {
+        (moment(t).specific_force, moment(t).angular_velocity)
+    });
+    let mut interrupted = simulated();
+    interrupted.drain(300..600);
+    let found = assess(&measured, &interrupted, &options()).unwrap();
+    assert_eq!(found.first_cause, FirstCause::None);
     assert!((745..=752).contains(&found.compared), "{found:?}");
 }
 
@@ -302,5 +372,5 @@ fn a_still_sensor_has_no_lag() {
         &options(),
     )
     .unwrap();
-    assert_eq!((found.first_cause, found.lag_s), (NONE, None));
+    assert_eq!((found.first_cause, found.lag_s), (FirstCause::None, None));
 }

@@ -2,9 +2,11 @@
 //! they overlap in time.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use cromosim_bag::BagReader;
 use cromosim_gap::monitor::{ImuReading, MonitorOptions, Pace, assess, noise_floors, pace};
+use cromosim_imu::{Channel, PerChannel};
 use cromosim_msgs::RosMessage;
 use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_spatial::{Spectrum, Stamp, welch};
@@ -17,18 +19,20 @@ use super::{Comparison, RecordingError};
 const REST_S: f64 = 1.0;
 /// At rest, both channels scatter by less than three times their noise, or than this, m/s2 and
 /// rad/s.
-const REST_SCATTER: [f64; 2] = [0.05, 0.01];
+const REST_SCATTER: PerChannel<f64> = PerChannel {
+    accelerometer: 0.05,
+    gyroscope: 0.01,
+};
 /// Window of a spectrum, s.
 const SPECTRUM_S: f64 = 4.0;
 /// Points at which spectra and distributions are compared.
 const POINTS: usize = 1000;
-const CHANNELS: [(&str, &str); 2] = [("accel", "m/s2"), ("gyro", "rad/s")];
 
 /// What is said of one IMU of one recording.
 struct Series {
     readings: Vec<ImuReading>,
     pace: Pace,
-    floors: [f64; 2],
+    floors: PerChannel<f64>,
     /// Mean of all readings in stretches of rest, and how many seconds of these there are.
     rest: Option<([f64; 6], f64)>,
 }
@@ -122,10 +126,10 @@ fn topics(reader: &BagReader) -> BTreeMap<String, String> {
 impl Series {
     fn read(reader: &BagReader, topic: &str) -> Result<Self, RecordingError> {
         let reading = |(_, imu): (Stamp, Imu)| {
-            let (force, rate) = (imu.linear_acceleration, imu.angular_velocity);
+            let (f, w) = (imu.linear_acceleration, imu.angular_velocity);
             ImuReading {
                 stamp: Stamp::from_nanos(imu.header.stamp.nanos()),
-                values: [force.x, force.y, force.z, rate.x, rate.y, rate.z],
+                values: [f.x, f.y, f.z, w.x, w.y, w.z],
             }
         };
         let mut readings: Vec<ImuReading> = reader
@@ -155,7 +159,7 @@ impl Series {
 }
 
 /// Mean of the readings in stretches of a second in which nothing moves.
-fn rest(readings: &[ImuReading], rate_hz: f64, floors: [f64; 2]) -> Option<([f64; 6], f64)> {
+fn rest(readings: &[ImuReading], rate_hz: f64, floors: PerChannel<f64>) -> Option<([f64; 6], f64)> {
     let length = ((REST_S * rate_hz) as usize).max(5);
     let (mut sum, mut count) = ([0.0; 6], 0usize);
     for stretch in readings.chunks_exact(length) {
@@ -174,7 +178,11 @@ fn rest(readings: &[ImuReading], rate_hz: f64, floors: [f64; 2]) -> Option<([f64
                 / length as f64)
                 .sqrt()
         };
-        if (0..6).all(|axis| scatter(axis) < (3.0 * floors[axis / 3]).max(REST_SCATTER[axis / 3])) {
+        let limit = |axis: usize| {
+            let channel = Channel::ALL[axis / 3];
+            (3.0 * floors[channel]).max(REST_SCATTER[channel])
+        };
+        if (0..6).all(|axis| scatter(axis) < limit(axis)) {
             (0..6).for_each(|axis| sum[axis] += mean[axis] * length as f64);
             count += length;
         }
@@ -220,7 +228,8 @@ fn describe_pace_and_noise(text: &mut String, a: &Series, b: &Series) {
         b.pace.dropped.to_string(),
         String::new(),
     );
-    for (channel, (name, unit)) in CHANNELS.into_iter().enumerate() {
+    for channel in Channel::ALL {
+        let (name, unit) = (channel.prefix(), channel.unit());
         let (one, other) = (a.floors[channel], b.floors[channel]);
         row(
             text,
@@ -242,7 +251,8 @@ fn compare_channels(text: &mut String, a: &Series, b: &Series) -> serde_json::Ma
         "spectra, dB",
         "distributions (Wasserstein-1)"
     );
-    for (channel, (name, unit)) in CHANNELS.into_iter().enumerate() {
+    for channel in Channel::ALL {
+        let (name, unit) = (channel.prefix(), channel.unit());
         let (spectra_db, wasserstein) =
             (spectral_distance(a, b, channel), wasserstein(a, b, channel));
         line!(
@@ -264,7 +274,7 @@ fn described(series: &Series) -> Value {
     let rest = series.rest.map(|(mean, seconds)| json!({"seconds": seconds, "accel_mean": mean[..3], "gyro_mean": mean[3..]}));
     json!({
         "messages": series.readings.len(), "rate_hz": series.pace.rate_hz, "dropped": series.pace.dropped,
-        "accel_noise": series.floors[0], "gyro_noise": series.floors[1], "rest": rest,
+        "accel_noise": series.floors.accelerometer, "gyro_noise": series.floors.gyroscope, "rest": rest,
     })
 }
 
@@ -313,9 +323,15 @@ fn describe_rest(text: &mut String, a: &Series, b: &Series) {
     }
 }
 
+/// Numbers of a channel's axes among the six values of a reading.
+fn axes(channel: Channel) -> Range<usize> {
+    let first = 3 * channel.index();
+    first..first + 3
+}
+
 /// Root mean square over frequency, up to the lower Nyquist frequency, and over axes, of the
 /// difference of Welch spectra, dB.
-fn spectral_distance(a: &Series, b: &Series, channel: usize) -> f64 {
+fn spectral_distance(a: &Series, b: &Series, channel: Channel) -> f64 {
     let highest = 0.45 * a.pace.rate_hz.min(b.pace.rate_hz);
     let spectrum = |series: &Series, axis: usize| -> Spectrum {
         welch(
@@ -325,7 +341,7 @@ fn spectral_distance(a: &Series, b: &Series, channel: usize) -> f64 {
         )
     };
     let mut sum = 0.0;
-    for axis in 3 * channel..3 * channel + 3 {
+    for axis in axes(channel) {
         let (one, other) = (spectrum(a, axis), spectrum(b, axis));
         let lowest = one.spacing_hz.max(other.spacing_hz);
         for k in 0..POINTS {
@@ -338,7 +354,7 @@ fn spectral_distance(a: &Series, b: &Series, channel: usize) -> f64 {
 }
 
 /// Mean over axes of the area between the two distributions, by their quantiles.
-fn wasserstein(a: &Series, b: &Series, channel: usize) -> f64 {
+fn wasserstein(a: &Series, b: &Series, channel: Channel) -> f64 {
     let quantiles = |series: &Series, axis: usize| -> Vec<f64> {
         let mut values = series.axis(axis);
         values.sort_unstable_by(f64::total_cmp);
@@ -358,7 +374,7 @@ fn wasserstein(a: &Series, b: &Series, channel: usize) -> f64 {
             .sum::<f64>()
             / POINTS as f64
     };
-    (3 * channel..3 * channel + 3).map(distance).sum::<f64>() / 3.0
+    axes(channel).map(distance).sum::<f64>() / 3.0
 }
 
 /// Lag of A behind B by the correlation of |w|, and what is left of the difference once it is taken
@@ -483,7 +499,7 @@ mod tests {
         );
         assert!(gyro["wasserstein"].as_f64().unwrap() > 0.2);
         let same = series(100.0, 0.0, 2.0, 3.0);
-        assert_eq!(wasserstein(&same, &same, 0), 0.0);
+        assert_eq!(wasserstein(&same, &same, Channel::Accelerometer), 0.0);
     }
 
     #[test]
