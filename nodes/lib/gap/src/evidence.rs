@@ -32,7 +32,7 @@ pub struct Evidence {
     pub course: Vec<CoursePoint>,
 }
 
-/// One-sided densities on common frequencies, (unit)^2/Hz, each [frequency][axis].
+/// One-sided densities on common frequencies, (unit)^2/Hz, each `[frequency][axis]`.
 #[derive(Clone, Debug, Default)]
 pub struct Spectra {
     /// Hz.

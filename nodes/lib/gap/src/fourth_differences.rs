@@ -3,8 +3,8 @@
 
 /// `x0 - 4 x1 + 6 x2 - 4 x3 + x4` of white noise has this times its variance: 1 + 16 + 36 + 16 + 1.
 const GAIN: f64 = 70.0;
-/// Median of the square of a standard normal number.
-pub(crate) const MEDIAN_OF_SQUARE: f64 = 0.454_936_423;
+/// Median of the square of a standard normal number: the square of its third quartile.
+pub(crate) const MEDIAN_OF_SQUARE: f64 = 0.674_489_75 * 0.674_489_75;
 /// The same as a diagnosis has always had it: more digits would change the seventh of its results,
 /// and nothing that it says.
 pub(crate) const ROUNDED_MEDIAN_OF_SQUARE: f64 = 0.4549;

@@ -133,7 +133,7 @@ fn dropped_samples() {
         .windows(2)
         .map(|pair| ((pair[1] - pair[0]) * IMU_HZ).round() - 1.0)
         .collect();
-    let (lost, holes) = (
+    let (lost, gaps) = (
         steps.iter().sum::<f64>(),
         steps.iter().filter(|lost| **lost > 0.0).count() as f64,
     );
@@ -147,7 +147,7 @@ fn dropped_samples() {
     );
     near(
         parameters["mean_burst"].as_f64().unwrap(),
-        lost / holes,
+        lost / gaps,
         1e-9,
         "mean burst",
     );

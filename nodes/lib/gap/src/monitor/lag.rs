@@ -1,7 +1,6 @@
 //! How late the measured stamps are.
 
-use cromosim_imu::Channel;
-use cromosim_imu::Reading;
+use cromosim_imu::{Channel, Reading};
 
 use super::columns;
 use super::pairs::Pairs;
