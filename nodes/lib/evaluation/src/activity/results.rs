@@ -209,7 +209,7 @@ pub struct ChosenVariant {
 /// Everything that an evaluation found.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ActivityResults {
-    /// Format and its version, [`SCHEMA`].
+    /// Format and its version, `SCHEMA`.
     pub schema: &'static str,
     /// Sizes and numbers.
     pub settings: Settings,
