@@ -7,7 +7,7 @@ use crate::Joint;
 /// A point of the skin: it follows its triangle through every shape and pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Site {
-    /// Index into [`BodyModel::faces`].
+    /// Index into [`crate::BodyModel::faces`].
     pub triangle: u32,
     /// Weights of the triangle's corners: in [0, 1], sum 1.
     pub barycentrics: [f64; 3],

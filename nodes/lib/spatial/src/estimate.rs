@@ -68,7 +68,7 @@ pub struct PoseEstimate {
 }
 
 impl PoseEstimate {
-    /// Learns from poses in the order of time: `stamps`, positions [m], rotations
+    /// Learns from poses in the order of time: `stamps`, positions (m), rotations
     /// (world_from_segment).
     ///
     /// # Errors

@@ -29,7 +29,7 @@ pub struct Measurement {
     pub covariance_of_depth: Matrix3<f64>,
 }
 
-/// What the filter has to know; learnt by [`crate::learn::learn_noise`].
+/// What the filter has to know; learnt by `learn_noise`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FilterNoise {
     /// Up or down, in the measurements' world; of length 1. Some degrees off do no harm.

@@ -15,7 +15,7 @@ pub enum Trajectory {
     None,
 }
 
-/// Settings of [`global_trajectory`].
+/// Settings of [`crate::global_trajectory`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrajectoryOptions {
     /// Whether the root moves.

@@ -1,8 +1,8 @@
 //! Products of matrices.
 //!
-//! The right factor is packed once into panels of [`PANEL`] columns and kept, as the weights of a
+//! The right factor is packed once into panels of `PANEL` columns and kept, as the weights of a
 //! recurrent layer are used at every step. Each element of the product is a sum over blocks of
-//! [`BLOCK`] terms, in order; within a block the terms are added one by one, fused. That order
+//! `BLOCK` terms, in order; within a block the terms are added one by one, fused. That order
 //! holds for every vector width and every cut of the rows.
 
 use pulp::{Arch, Simd, WithSimd};
@@ -83,7 +83,7 @@ impl<'a> View<'a> {
     }
 }
 
-/// The right factor of products, in panels: (panels, rows, [`PANEL`]), the last panel filled up
+/// The right factor of products, in panels: (panels, rows, `PANEL`), the last panel filled up
 /// with zeros.
 #[derive(Debug, Clone, Default)]
 pub struct PackedMatrix {
@@ -287,7 +287,7 @@ pub fn fill_rows(rows: &mut [f32], row: &[f32]) {
         .for_each(|into| into.copy_from_slice(row));
 }
 
-/// sum += all rows, in blocks of [`BLOCK`] as products sum.
+/// sum += all rows, in blocks of `BLOCK` as products sum.
 pub fn add_rows(sum: &mut [f32], rows: &[f32]) {
     let mut partial = vec![0.0; sum.len()];
     for block in rows.chunks(BLOCK * sum.len()) {

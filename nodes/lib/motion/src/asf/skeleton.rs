@@ -33,7 +33,7 @@ pub struct AsfBone {
 /// A parsed ASF file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AsfSkeleton {
-    /// The name given to [`parse_asf`].
+    /// The name given to `parse_asf`.
     pub name: String,
     /// `length` of `:units`: CMU's files have 0.45, their unit is an inch divided by it.
     pub length_unit: f64,
