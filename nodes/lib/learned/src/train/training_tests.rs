@@ -3,10 +3,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::*;
 use crate::Direction;
+use crate::NetworkShape;
 use crate::kernels::testing::values;
 use crate::train::TrainOptions;
 use crate::train::{Batch, KernelEngine, Loss, Schedule};
-use crate::NetworkShape;
 
 fn shape() -> NetworkShape {
     NetworkShape {
