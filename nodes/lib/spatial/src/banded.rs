@@ -6,7 +6,7 @@ use crate::SpatialError;
 pub(crate) const BANDWIDTH: usize = 5;
 
 /// A symmetric band matrix by rows: `rows[i][k]` is entry (i, i - k).
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Banded {
     pub(crate) rows: Vec<[f64; BANDWIDTH + 1]>,
 }
@@ -16,6 +16,31 @@ impl Banded {
         Self {
             rows: vec![[0.0; BANDWIDTH + 1]; size],
         }
+    }
+
+    /// Adds `weight * row row^T`, the row's entries standing at `first` and after it.
+    pub(crate) fn add_outer_product(
+        &mut self,
+        first: usize,
+        row: &[f64; BANDWIDTH + 1],
+        weight: f64,
+    ) {
+        for i in 0..=BANDWIDTH {
+            for j in 0..=i {
+                self.rows[first + i][i - j] += weight * row[i] * row[j];
+            }
+        }
+    }
+
+    /// `row^T M row`, the row's entries standing at `first` and after it.
+    pub(crate) fn quadratic_form(&self, first: usize, row: &[f64; BANDWIDTH + 1]) -> f64 {
+        let mut sum = 0.0;
+        for i in 0..=BANDWIDTH {
+            let entries = &self.rows[first + i];
+            let beside: f64 = (0..i).map(|j| row[j] * entries[i - j]).sum();
+            sum += row[i] * (row[i] * entries[0] + 2.0 * beside);
+        }
+        sum
     }
 }
 
@@ -35,18 +60,34 @@ impl Factor {
         weight: f64,
         right: &Banded,
     ) -> Result<(), SpatialError> {
+        self.factor_rows(left.rows.len(), |i| {
+            std::array::from_fn(|k| left.rows[i][k] + weight * right.rows[i][k])
+        })
+    }
+
+    /// Factors a matrix in O(N), reusing this factor's memory.
+    pub(crate) fn factor(&mut self, matrix: &Banded) -> Result<(), SpatialError> {
+        self.factor_rows(matrix.rows.len(), |i| matrix.rows[i])
+    }
+
+    fn factor_rows(
+        &mut self,
+        size: usize,
+        matrix_row: impl Fn(usize) -> [f64; BANDWIDTH + 1],
+    ) -> Result<(), SpatialError> {
         self.rows.clear();
-        self.rows.reserve(left.rows.len());
+        self.rows.reserve(size);
         let (mut log_determinant, mut product) = (0.0, 1.0_f64);
-        for (i, (a, b)) in left.rows.iter().zip(&right.rows).enumerate() {
+        for i in 0..size {
             // `scaled[k]` is L(i, i - k) D(i - k): computed from the far column to the near one.
             let reach = BANDWIDTH.min(i);
+            let given = matrix_row(i);
             let mut scaled = [0.0; BANDWIDTH + 1];
             let mut row = [0.0; BANDWIDTH + 1];
-            let mut diagonal = a[0] + weight * b[0];
+            let mut diagonal = given[0];
             for k in (1..=reach).rev() {
                 let other = &self.rows[i - k];
-                let mut entry = a[k] + weight * b[k];
+                let mut entry = given[k];
                 for n in k + 1..=reach {
                     entry -= scaled[n] * other[n - k];
                 }
@@ -67,6 +108,30 @@ impl Factor {
         }
         self.log_determinant = log_determinant + product.ln();
         Ok(())
+    }
+
+    /// The entries of `M^-1` within the band, in O(N) (Takahashi, Fagan and Chin 1973): from `Z =
+    /// D^-1 L^-1 + (1 - L^T) Z`, the last row first.
+    pub(crate) fn inverse_band(&self, inverse: &mut Banded) {
+        let size = self.rows.len();
+        inverse.rows.clear();
+        inverse.rows.resize(size, [0.0; BANDWIDTH + 1]);
+        for i in (0..size).rev() {
+            let below = BANDWIDTH.min(size - 1 - i);
+            let mut column = [0.0; BANDWIDTH + 1];
+            for (j, entry) in column.iter_mut().enumerate().take(below + 1).skip(1) {
+                for k in 1..=below {
+                    let (row, back) = (i + j.max(k), j.abs_diff(k));
+                    *entry -= self.rows[i + k][k] * inverse.rows[row][back];
+                }
+            }
+            let mut diagonal = self.rows[i][0];
+            for (k, entry) in column.iter().enumerate().take(below + 1).skip(1) {
+                diagonal -= self.rows[i + k][k] * entry;
+                inverse.rows[i + k][k] = *entry;
+            }
+            inverse.rows[i][0] = diagonal;
+        }
     }
 
     /// Natural logarithm of the determinant.
@@ -196,6 +261,35 @@ mod tests {
             let product = &dense * DMatrix::from_iterator(size, 1, x.iter().map(|v| v[c]));
             assert!((0..size).all(|i| (product[i] - given[i][c]).abs() < 1e-12));
         }
+    }
+
+    #[test]
+    fn the_inverse_within_the_band_is_that_of_dense_matrices() {
+        let size = 17;
+        let (mut banded, mut dense) = (Banded::zeros(size), DMatrix::zeros(size, size));
+        for i in 0..size {
+            for k in 0..=BANDWIDTH.min(i) {
+                let value = ((i * 5 + k * 3) % 7) as f64 / 7.0 + if k == 0 { 6.0 } else { 0.0 };
+                banded.rows[i][k] = value;
+                dense[(i, i - k)] = value;
+                dense[(i - k, i)] = value;
+            }
+        }
+        let (mut factor, mut found) = (Factor::default(), Banded::default());
+        factor.factor(&banded).unwrap();
+        factor.inverse_band(&mut found);
+        let inverse = dense.try_inverse().unwrap();
+        for i in 0..size {
+            for k in 0..=BANDWIDTH.min(i) {
+                assert!((found.rows[i][k] - inverse[(i, i - k)]).abs() < 1e-14);
+            }
+        }
+        let row = [0.3, -1.0, 2.0, 0.5, -0.7, 1.1];
+        let expected: f64 = (0..6)
+            .flat_map(|i| (0..6).map(move |j| (i, j)))
+            .map(|(i, j)| row[i] * row[j] * inverse[(4 + i, 4 + j)])
+            .sum();
+        assert!((found.quadratic_form(4, &row) - expected).abs() < 1e-14);
     }
 
     #[test]

@@ -16,6 +16,9 @@ pub(crate) const PENALTY_ORDER: usize = 5;
 /// (measured: the error of a smoothed acceleration there falls by a third).
 const EASED_INTERVALS: f64 = 40.0;
 
+/// Up to this local weight a spline passes all that there is.
+const NOTHING_TO_SMOOTH: f64 = 1e-6;
+
 /// From these weights on a solution is refined once, and once more: at a weight of 10^k about k of
 /// the sixteen digits of `B^T B` drown in the sum. The two weights have no source.
 const REFINED_ONCE: f64 = 1e2;
@@ -34,17 +37,41 @@ pub(crate) struct SplineEquations {
     /// N - 2) on.
     collocation: Vec<[f64; ORDER]>,
     ends: [EndDerivative; 4],
-    /// Fifth derivative over each knot interval, times the root of its share in the penalty: `|rows
-    /// c|^2 = c^T P c`.
+    /// Fifth derivative over each knot interval, times the root of the interval's length and of its
+    /// ease: `|rows c|^2 = c^T P c` for a uniform weight of one.
     penalty_rows: Vec<[f64; ORDER]>,
+    /// What a uniform weight is multiplied with over each interval, see [`EASED_INTERVALS`]; local
+    /// weights are divided by it.
+    eased: Vec<f64>,
+    /// `B^T B` of the samples alone, and with the derivatives at the ends.
     gram: Banded,
+    gram_with_ends: Banded,
     penalty: Banded,
+}
+
+/// What the penalty weighs.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum PenaltyWeights<'a> {
+    /// The same everywhere, eased off at the ends.
+    Uniform(f64),
+    /// One for each knot interval.
+    Local(&'a [f64]),
+}
+
+impl PenaltyWeights<'_> {
+    fn largest(self) -> f64 {
+        match self {
+            Self::Uniform(weight) => weight,
+            Self::Local(weights) => weights.iter().copied().fold(0.0, f64::max),
+        }
+    }
 }
 
 /// Memory that solving reuses.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Scratch<const C: usize> {
     pub(crate) factor: Factor,
+    matrix: Banded,
     pub(crate) coefficients: Vec<[f64; C]>,
     pub(crate) correction: Vec<[f64; C]>,
 }
@@ -61,16 +88,18 @@ impl SplineEquations {
             .collect();
         let mut gram = Banded::zeros(basis.count());
         for (k, row) in collocation.iter().enumerate() {
-            add_outer_product(&mut gram, k.min(last_interval), row, 1.0);
+            gram.add_outer_product(k.min(last_interval), row, 1.0);
         }
         let ends = end_derivatives(&basis, times);
+        let mut gram_with_ends = gram.clone();
         for end in &ends {
-            add_outer_product(&mut gram, end.first, &end.row, end.weight);
+            gram_with_ends.add_outer_product(end.first, &end.row, end.weight);
         }
-        let penalty_rows = penalty_rows(&basis);
+        let eased = eased(basis.interval_count());
+        let penalty_rows = penalty_rows(&basis, &eased);
         let mut penalty = Banded::zeros(basis.count());
         for (first, row) in penalty_rows.iter().enumerate() {
-            add_outer_product(&mut penalty, first, row, 1.0);
+            penalty.add_outer_product(first, row, 1.0);
         }
         Self {
             basis,
@@ -80,7 +109,9 @@ impl SplineEquations {
             collocation,
             ends,
             penalty_rows,
+            eased,
             gram,
+            gram_with_ends,
             penalty,
         }
     }
@@ -106,25 +137,79 @@ impl SplineEquations {
         }
     }
 
-    /// Minimises `|y - B c|^2 + weight c^T P c`; the coefficients come in `scratch`.
+    /// Number of knot intervals.
+    pub(crate) fn interval_count(&self) -> usize {
+        self.penalty_rows.len()
+    }
+
+    fn weight_over(&self, interval: usize, weights: PenaltyWeights) -> f64 {
+        match weights {
+            PenaltyWeights::Uniform(weight) => weight,
+            PenaltyWeights::Local(weights) => weights[interval] / self.eased[interval],
+        }
+    }
+
+    /// What the derivative at an end counts. They are made of the samples that count already, which
+    /// does no harm where there is nothing to smooth; where weights are local, and stand for what is
+    /// known, they count no more than there.
+    fn end_weight(&self, end: &EndDerivative, weights: PenaltyWeights) -> f64 {
+        match weights {
+            PenaltyWeights::Uniform(_) => end.weight,
+            PenaltyWeights::Local(weights) => {
+                end.weight / (1.0 + weights[end.first] / NOTHING_TO_SMOOTH)
+            }
+        }
+    }
+
+    /// Factors `B^T B + P` into the scratch.
+    fn factor_into<const C: usize>(
+        &self,
+        weights: PenaltyWeights,
+        scratch: &mut Scratch<C>,
+    ) -> Result<(), SpatialError> {
+        match weights {
+            PenaltyWeights::Uniform(weight) => {
+                scratch
+                    .factor
+                    .factor_sum(&self.gram_with_ends, weight, &self.penalty)
+            }
+            PenaltyWeights::Local(_) => {
+                scratch.matrix.rows.clone_from(&self.gram.rows);
+                for end in &self.ends {
+                    let weight = self.end_weight(end, weights);
+                    scratch
+                        .matrix
+                        .add_outer_product(end.first, &end.row, weight);
+                }
+                for (first, row) in self.penalty_rows.iter().enumerate() {
+                    let weight = self.weight_over(first, weights);
+                    scratch.matrix.add_outer_product(first, row, weight);
+                }
+                scratch.factor.factor(&scratch.matrix)
+            }
+        }
+    }
+
+    /// Minimises `|y - B c|^2 + c^T P c`, P the penalty with its weights; the coefficients come in
+    /// `scratch`.
     ///
-    /// A large weight drowns B in the sum `B^T B + weight P`: solutions are then refined with the
+    /// A large weight drowns B in the sum `B^T B + P`: solutions are then refined with the
     /// residual of the least-squares problem itself, in which B and P are apart, to an error that
     /// grows with the root of the weight only.
     pub(crate) fn solve<const C: usize>(
         &self,
         values: &[[f64; C]],
-        weight: f64,
+        weights: PenaltyWeights,
         scratch: &mut Scratch<C>,
     ) -> Result<(), SpatialError> {
-        scratch
-            .factor
-            .factor_sum(&self.gram, weight, &self.penalty)?;
+        self.factor_into(weights, scratch)?;
         scratch.coefficients.clear();
         scratch.coefficients.resize(self.basis.count(), [0.0; C]);
-        let refinements = usize::from(weight >= REFINED_ONCE) + usize::from(weight > REFINED_TWICE);
+        let largest = weights.largest();
+        let refinements =
+            usize::from(largest >= REFINED_ONCE) + usize::from(largest > REFINED_TWICE);
         for _ in 0..=refinements {
-            self.residual(values, weight, scratch);
+            self.residual(values, weights, scratch);
             scratch.factor.solve(&mut scratch.correction);
             for (coefficient, correction) in
                 scratch.coefficients.iter_mut().zip(&scratch.correction)
@@ -137,11 +222,11 @@ impl SplineEquations {
         Ok(())
     }
 
-    /// `B^T B + weight P`, factored.
-    pub(crate) fn factor(&self, weight: f64) -> Result<Factor, SpatialError> {
-        let mut factor = Factor::default();
-        factor.factor_sum(&self.gram, weight, &self.penalty)?;
-        Ok(factor)
+    /// `B^T B + P`, factored.
+    pub(crate) fn factor(&self, weights: PenaltyWeights) -> Result<Factor, SpatialError> {
+        let mut scratch = Scratch::<1>::default();
+        self.factor_into(weights, &mut scratch)?;
+        Ok(scratch.factor)
     }
 
     /// What the samples are multiplied with in `x^T B^T y`, the derivatives at the ends included,
@@ -149,6 +234,7 @@ impl SplineEquations {
     /// sample.
     pub(crate) fn transposed<const C: usize>(
         &self,
+        weights: PenaltyWeights,
         start: usize,
         x: &[[f64; C]],
     ) -> (usize, Vec<[f64; C]>) {
@@ -183,7 +269,8 @@ impl SplineEquations {
             .map(|k| dot(k.min(last_interval), &self.collocation[k]))
             .collect();
         for end in reached {
-            let weighted = dot(end.first, &end.row).map(|d| d * end.weight);
+            let weight = self.end_weight(end, weights);
+            let weighted = dot(end.first, &end.row).map(|d| d * weight);
             for (row, w) in rows[end.start - low..].iter_mut().zip(end.stencil) {
                 (0..C).for_each(|c| row[c] += w * weighted[c]);
             }
@@ -191,12 +278,12 @@ impl SplineEquations {
         (low, rows)
     }
 
-    /// `B^T (y - B c) - weight P c` of the coefficients in `scratch`, into its correction; returns
-    /// `|y - B c|^2 + weight c^T P c`, over all channels, summed from the residuals themselves.
+    /// `B^T (y - B c) - P c` of the coefficients in `scratch`, into its correction; returns
+    /// `|y - B c|^2 + c^T P c`, over all channels, summed from the residuals themselves.
     pub(crate) fn residual<const C: usize>(
         &self,
         values: &[[f64; C]],
-        weight: f64,
+        weights: PenaltyWeights,
         scratch: &mut Scratch<C>,
     ) -> f64 {
         let Scratch {
@@ -224,7 +311,7 @@ impl SplineEquations {
                 &coefficients[end.first..],
                 &end.row,
                 &target,
-                end.weight,
+                self.end_weight(end, weights),
                 &mut correction[end.first..],
             );
         }
@@ -233,7 +320,7 @@ impl SplineEquations {
                 &coefficients[first..],
                 row,
                 &[0.0; C],
-                weight,
+                self.weight_over(first, weights),
                 &mut correction[first..],
             );
         }
@@ -267,6 +354,38 @@ impl SplineEquations {
             .enumerate()
             .map(square)
             .sum()
+    }
+
+    /// Fifth derivative over a knot interval, times the root of its length: mean square over the
+    /// channels, and what `inverse`, the band of `(B^T B + P)^-1`, makes of it.
+    pub(crate) fn drive_over<const C: usize>(
+        &self,
+        interval: usize,
+        coefficients: &[[f64; C]],
+        inverse: &Banded,
+    ) -> (f64, f64) {
+        let (row, ease) = (&self.penalty_rows[interval], self.eased[interval]);
+        let fifth = combined(&coefficients[interval..], row);
+        (
+            mean_square(&fifth) / ease,
+            inverse.quadratic_form(interval, row) / ease,
+        )
+    }
+
+    /// Distance of a sample from the spline: mean square over the channels, and what `inverse` makes
+    /// of the spline's value there.
+    pub(crate) fn residual_at<const C: usize>(
+        &self,
+        sample: usize,
+        value: &[f64; C],
+        coefficients: &[[f64; C]],
+        inverse: &Banded,
+    ) -> (f64, f64) {
+        let first = sample.min(self.basis.interval_count() - 1);
+        let row = &self.collocation[sample];
+        let estimate = combined(&coefficients[first..], row);
+        let residual: [f64; C] = std::array::from_fn(|c| value[c] - estimate[c]);
+        (mean_square(&residual), inverse.quadratic_form(first, row))
     }
 
     /// First function and the basis' values and derivatives, per s and s^2, at a time moved into
@@ -309,8 +428,9 @@ impl SplineEquations {
         weight: f64,
         scratch: &mut Scratch<C>,
     ) -> Result<f64, SpatialError> {
-        self.solve(values, weight, scratch)?;
-        let square = self.residual(values, weight, scratch);
+        let weights = PenaltyWeights::Uniform(weight);
+        self.solve(values, weights, scratch)?;
+        let square = self.residual(values, weights, scratch);
         let free = self.free_count() as f64;
         // A series at rest leaves nothing: any weight is right for it, and the logarithm must stay
         // finite.
@@ -345,23 +465,34 @@ fn add_residual<const C: usize>(
     (0..C).map(|c| residual[c] * weighted[c]).sum()
 }
 
-fn add_outer_product(matrix: &mut Banded, first: usize, row: &[f64; ORDER], weight: f64) {
-    for i in 0..ORDER {
-        for j in 0..=i {
-            matrix.rows[first + i][i - j] += weight * row[i] * row[j];
-        }
-    }
+fn combined<const C: usize>(coefficients: &[[f64; C]], row: &[f64; ORDER]) -> [f64; C] {
+    coefficients
+        .iter()
+        .zip(row)
+        .fold([0.0; C], |sum, (coefficient, b)| {
+            std::array::from_fn(|c| sum[c] + b * coefficient[c])
+        })
+}
+
+fn mean_square<const C: usize>(values: &[f64; C]) -> f64 {
+    values.iter().map(|value| value * value).sum::<f64>() / C as f64
 }
 
 /// The fifth derivatives are constant between knots.
-fn penalty_rows(basis: &Basis) -> Vec<[f64; ORDER]> {
+fn penalty_rows(basis: &Basis, eased: &[f64]) -> Vec<[f64; ORDER]> {
     let row = |first: usize| {
         let (start, end) = basis.interval(first);
-        let from_end = first.min(basis.interval_count() - 1 - first) as f64 + 0.5;
-        let share = (end - start) * (from_end / EASED_INTERVALS).min(1.0);
         basis
             .derivatives(first, 0.5 * (start + end), PENALTY_ORDER)
-            .map(|d| d * share.sqrt())
+            .map(|d| d * ((end - start) * eased[first]).sqrt())
     };
     (0..basis.interval_count()).map(row).collect()
+}
+
+fn eased(interval_count: usize) -> Vec<f64> {
+    let share = |first: usize| {
+        let from_end = first.min(interval_count - 1 - first) as f64 + 0.5;
+        (from_end / EASED_INTERVALS).min(1.0)
+    };
+    (0..interval_count).map(share).collect()
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use crate::SpatialError;
 use crate::banded::Factor;
 use crate::basis::ORDER;
+use crate::spline::SplineWeight;
 use crate::system::SplineSystem;
 
 /// Weights of samples in what a spline says at one time.
@@ -27,6 +28,7 @@ pub struct SampleWeights {
 #[derive(Clone, Debug)]
 pub struct Influence {
     system: Arc<SplineSystem>,
+    weight: SplineWeight,
     factor: Factor,
 }
 
@@ -35,10 +37,11 @@ impl Influence {
     ///
     /// # Errors
     /// [`SpatialError::Singular`] where the equations cannot be solved.
-    pub fn new(system: &Arc<SplineSystem>, weight: f64) -> Result<Self, SpatialError> {
+    pub fn new(system: &Arc<SplineSystem>, weight: &SplineWeight) -> Result<Self, SpatialError> {
         Ok(Self {
             system: system.clone(),
-            factor: system.equations.factor(weight)?,
+            weight: weight.clone(),
+            factor: system.equations.factor(weight.of_penalty())?,
         })
     }
 
@@ -47,7 +50,10 @@ impl Influence {
         let (first, values) = self.system.equations.basis_at(seconds);
         let right: [[f64; 3]; ORDER] = std::array::from_fn(|j| values.map(|row| row[j]));
         let (start, solution) = self.factor.solve_near(first, &right);
-        let (first, rows) = self.system.equations.transposed(start, &solution);
+        let (first, rows) =
+            self.system
+                .equations
+                .transposed(self.weight.of_penalty(), start, &solution);
         SampleWeights { first, rows }
     }
 }
@@ -65,7 +71,7 @@ mod tests {
             .collect();
         let system = Arc::new(SplineSystem::new(&seconds).unwrap());
         for weight in [1e-8, 1.0, 1e4] {
-            let influence = Influence::new(&system, weight).unwrap();
+            let influence = Influence::new(&system, &SplineWeight::Uniform(weight)).unwrap();
             for time in [0.0, 0.003, 0.21, 0.4449, 0.7, 0.893, 0.894] {
                 let weights = influence.at(time);
                 for moved in 0..seconds.len() {
@@ -96,7 +102,9 @@ mod tests {
     fn the_cost_is_the_smoothings_width() {
         let seconds: Vec<f64> = (0..5000).map(|k| 0.01 * f64::from(k)).collect();
         let system = Arc::new(SplineSystem::new(&seconds).unwrap());
-        let weights = Influence::new(&system, 10.0).unwrap().at(25.0);
+        let weights = Influence::new(&system, &SplineWeight::Uniform(10.0))
+            .unwrap()
+            .at(25.0);
         assert!(
             weights.rows.len() < 300,
             "{} of 5000 samples",

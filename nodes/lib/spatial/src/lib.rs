@@ -27,6 +27,7 @@
 //! # }
 //! ```
 
+mod adaptive;
 mod banded;
 mod basis;
 mod confidence;
@@ -64,11 +65,12 @@ pub use estimate::{PoseEstimate, PoseNoise};
 pub use grid::{check_times, relative_seconds, uniform_stamps};
 pub use influence::{Influence, SampleWeights};
 pub use pose_spline::{
-    Motion, PoseSmoothing, PoseSpline, PoseTimes, position_channels, rotation_channels,
+    Motion, MotionVariance, PoseAdaptation, PoseSmoothing, PoseSpline, PoseTimes,
+    position_channels, rotation_channels,
 };
 pub use rustfft::num_complex::Complex64;
 pub use spectrum::{FourierPair, Spectrum, welch};
-pub use spline::{Smoothing, SmoothingSpline};
+pub use spline::{Smoothing, SmoothingSpline, SplineWeight};
 pub use stamp::Stamp;
 pub use system::SplineSystem;
 pub use track::KinematicTrack;

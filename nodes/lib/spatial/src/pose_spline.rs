@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
+use crate::adaptive::Adaptation;
 use crate::grid::relative_seconds;
 use crate::{Derivative, Smoothing, SmoothingSpline, SpatialError, SplineSystem, Stamp, so3};
 
@@ -33,6 +34,14 @@ pub struct PoseSmoothing {
     pub rotation: Smoothing,
 }
 
+impl PoseSmoothing {
+    /// Each as much as the poses around each time ask for.
+    pub const ADAPTIVE: Self = Self {
+        position: Smoothing::Adaptive,
+        rotation: Smoothing::Adaptive,
+    };
+}
+
 impl Default for PoseSmoothing {
     /// As much as the samples ask for, so that acceleration and angular velocity err least.
     fn default() -> Self {
@@ -41,6 +50,28 @@ impl Default for PoseSmoothing {
             rotation: Smoothing::AutomaticFor(Derivative::First),
         }
     }
+}
+
+/// Variances along or about each axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotionVariance {
+    /// (m/s2)2.
+    pub acceleration: f64,
+    /// (rad/s)2.
+    pub angular_velocity: f64,
+    /// rad2.
+    pub orientation: f64,
+}
+
+/// Variance of a rotation vector per axis over the mean of a quaternion's four components: `q = (1, v
+/// / 2)` for a small v, so that their sum is 3 / 4 of the former.
+const ROTVEC_PER_QUATERNION: f64 = 16.0 / 3.0;
+
+/// What [`PoseSpline::fit_following`] has learnt of the poses so far.
+#[derive(Clone, Debug, Default)]
+pub struct PoseAdaptation {
+    position: Option<Adaptation>,
+    rotation: Option<Adaptation>,
 }
 
 /// The spline equations for a series of stamps; made once and shared by every series of poses on
@@ -109,6 +140,41 @@ impl PoseSpline {
             times: times.clone(),
             position,
             rotation,
+        })
+    }
+
+    /// As [`PoseSpline::fit_on`] with [`PoseSmoothing::ADAPTIVE`], over a window of poses that moves
+    /// on: what was learnt of a pose goes on with it, so that a move costs a fraction of a fit.
+    /// `dropped` poses have left the window at its front since the last call.
+    ///
+    /// # Errors
+    /// As [`SmoothingSpline::fit`].
+    pub fn fit_following(
+        times: &PoseTimes,
+        world_from_body: &[Isometry3<f64>],
+        adaptation: &mut PoseAdaptation,
+        dropped: usize,
+    ) -> Result<Self, SpatialError> {
+        let positions = position_channels(world_from_body);
+        let rotations = rotation_channels(world_from_body);
+        let PoseAdaptation { position, rotation } = adaptation;
+        Ok(Self {
+            times: times.clone(),
+            position: SmoothingSpline::fit_following(&times.system, &positions, position, dropped)?,
+            rotation: SmoothingSpline::fit_following(&times.system, &rotations, rotation, dropped)?,
+        })
+    }
+
+    /// How far the motion at a stamp may be off, given the noise that was learnt of the poses; none
+    /// but for [`Smoothing::Adaptive`] of both.
+    pub fn variance(&self, stamp: Stamp) -> Option<MotionVariance> {
+        let seconds = stamp - self.times.origin;
+        let [_, _, acceleration] = self.position.variance(seconds)?;
+        let [rotation, turning, _] = self.rotation.variance(seconds)?;
+        Some(MotionVariance {
+            acceleration,
+            angular_velocity: ROTVEC_PER_QUATERNION * turning,
+            orientation: ROTVEC_PER_QUATERNION * rotation,
         })
     }
 

@@ -3,9 +3,11 @@
 use std::sync::Arc;
 
 use crate::SpatialError;
+use crate::adaptive::{Adaptation, FEWEST_ADAPTIVE};
+use crate::banded::Banded;
 use crate::basis::BasisValues;
 use crate::derivative::Derivative;
-use crate::equations::Scratch;
+use crate::equations::{PenaltyWeights, Scratch};
 use crate::system::{SplineSystem, centred};
 use crate::weight_search::LOWEST_LOG_WEIGHT;
 
@@ -19,6 +21,9 @@ pub enum Smoothing {
     /// The same, for the sake of a derivative: near the weight of the greatest likelihood that with
     /// the least error of this derivative, found by comparing the halves of the samples.
     AutomaticFor(Derivative),
+    /// As much as the samples around each time ask for: much at rest, little in a burst. The noise
+    /// is learnt from all of them.
+    Adaptive,
     /// Not at all: the spline passes through the samples (up to 1e-8 of the fifth derivative's
     /// penalty, which steadies gaps).
     Interpolate,
@@ -33,20 +38,34 @@ pub enum Smoothing {
     ResidualStd(f64),
 }
 
+/// The weight of a spline's penalty, for times counted in median sample intervals; no unit.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SplineWeight {
+    /// The same at all times.
+    Uniform(f64),
+    /// One for each interval between samples.
+    Local(Vec<f64>),
+}
+
+impl SplineWeight {
+    pub(crate) fn of_penalty(&self) -> PenaltyWeights<'_> {
+        match self {
+            Self::Uniform(weight) => PenaltyWeights::Uniform(*weight),
+            Self::Local(weights) => PenaltyWeights::Local(weights),
+        }
+    }
+}
+
 impl Smoothing {
-    /// The weight for samples on these times.
-    ///
-    /// # Errors
-    /// [`SpatialError::BadRate`], [`SpatialError::BadWeight`] or [`SpatialError::BadDistance`] for
-    /// numbers that are negative or not finite, zero cutoffs too.
-    pub fn weight<const C: usize>(
+    /// The one weight for samples on these times; not for [`Smoothing::Adaptive`], which has many.
+    fn uniform_weight<const C: usize>(
         self,
         system: &SplineSystem,
         values: &[[f64; C]],
     ) -> Result<f64, SpatialError> {
         let lowest = 10f64.powf(LOWEST_LOG_WEIGHT);
         match self {
-            Self::Automatic => system.search(values, None),
+            Self::Automatic | Self::Adaptive => system.search(values, None),
             Self::AutomaticFor(derivative) => system.search(values, Some(derivative)),
             Self::Interpolate => Ok(lowest),
             Self::CutoffHz(rate_hz) if !(rate_hz > 0.0 && rate_hz.is_finite()) => {
@@ -67,13 +86,23 @@ impl Smoothing {
     }
 }
 
-/// A quintic spline through or near samples of C channels, which share one smoothing weight (so
-/// that turning the axes turns the result).
+/// How far a spline's estimate may be off.
+#[derive(Clone, Debug)]
+struct Uncertainty {
+    /// Band of `(B^T B + P)^-1`.
+    inverse: Banded,
+    /// Variance of each sample's noise, unit^2.
+    noise: Vec<f64>,
+}
+
+/// A quintic spline through or near samples of C channels, which share one smoothing (so that
+/// turning the axes turns the result).
 #[derive(Clone, Debug)]
 pub struct SmoothingSpline<const C: usize> {
     system: Arc<SplineSystem>,
     coefficients: Vec<[f64; C]>,
-    weight: f64,
+    weight: SplineWeight,
+    uncertainty: Option<Arc<Uncertainty>>,
 }
 
 impl<const C: usize> SmoothingSpline<C> {
@@ -100,20 +129,84 @@ impl<const C: usize> SmoothingSpline<C> {
         smoothing: Smoothing,
     ) -> Result<Self, SpatialError> {
         system.equations.check(values)?;
-        let weight = smoothing.weight(system, values)?;
-        let mut scratch = Scratch::default();
         let (first, centred) = centred(values);
-        system.equations.solve(&centred, weight, &mut scratch)?;
-        // The basis functions sum to one, so a constant may go onto the coefficients.
+        if smoothing == Smoothing::Adaptive && values.len() >= FEWEST_ADAPTIVE {
+            let adaptation = Adaptation::learn(&system.equations, &centred)?;
+            return Self::solved(
+                system,
+                (first, &centred),
+                SplineWeight::Local(adaptation.weights()),
+                Some(adaptation.noise()),
+            );
+        }
+        let weight = smoothing.uniform_weight(system, values)?;
+        Self::solved(
+            system,
+            (first, &centred),
+            SplineWeight::Uniform(weight),
+            None,
+        )
+    }
+
+    /// As [`SmoothingSpline::fit_on`] with [`Smoothing::Adaptive`], for a window that has moved by
+    /// `dropped` samples since `adaptation` was learnt; made where there is none.
+    pub(crate) fn fit_following(
+        system: &Arc<SplineSystem>,
+        values: &[[f64; C]],
+        adaptation: &mut Option<Adaptation>,
+        dropped: usize,
+    ) -> Result<Self, SpatialError> {
+        if values.len() < FEWEST_ADAPTIVE {
+            *adaptation = None;
+            return Self::fit_on(system, values, Smoothing::Adaptive);
+        }
+        system.equations.check(values)?;
+        let (first, centred) = centred(values);
+        let learnt = match adaptation {
+            Some(adaptation) => {
+                adaptation.follow(&system.equations, &centred, dropped)?;
+                adaptation
+            }
+            None => adaptation.insert(Adaptation::learn(&system.equations, &centred)?),
+        };
+        Self::solved(
+            system,
+            (first, &centred),
+            SplineWeight::Local(learnt.weights()),
+            Some(learnt.noise()),
+        )
+    }
+
+    /// The spline of this weight; the basis functions sum to one, so that the constant that was
+    /// taken off may go onto the coefficients.
+    fn solved(
+        system: &Arc<SplineSystem>,
+        (constant, values): ([f64; C], &[[f64; C]]),
+        weight: SplineWeight,
+        noise: Option<&[f64]>,
+    ) -> Result<Self, SpatialError> {
+        let mut scratch = Scratch::default();
+        system
+            .equations
+            .solve(values, weight.of_penalty(), &mut scratch)?;
         for coefficient in &mut scratch.coefficients {
             for c in 0..C {
-                coefficient[c] += first[c];
+                coefficient[c] += constant[c];
             }
         }
+        let uncertainty = noise.map(|noise| {
+            let mut inverse = Banded::default();
+            scratch.factor.inverse_band(&mut inverse);
+            Arc::new(Uncertainty {
+                inverse,
+                noise: noise.to_vec(),
+            })
+        });
         Ok(Self {
             system: system.clone(),
             coefficients: scratch.coefficients,
             weight,
+            uncertainty,
         })
     }
 
@@ -140,14 +233,42 @@ impl<const C: usize> SmoothingSpline<C> {
         result
     }
 
-    /// The penalty's weight, for times counted in median sample intervals.
-    pub fn weight(&self) -> f64 {
-        self.weight
+    /// Variance, mean over the channels, of value, first and second derivative (per s, per s^2) at a
+    /// time: `r b^T (B^T B + P)^-1 b`, r the variance of the samples' noise, b the basis there. None
+    /// but for [`Smoothing::Adaptive`]: the others do not tell noise from motion.
+    pub fn variance(&self, seconds: f64) -> Option<[f64; 3]> {
+        let uncertainty = self.uncertainty.as_ref()?;
+        let (first, values) = self.system.equations.basis_at(seconds);
+        let noise = (uncertainty.noise[first] * uncertainty.noise[first + 1]).sqrt();
+        Some(values.map(|row| noise * uncertainty.inverse.quadratic_form(first, &row)))
     }
 
-    /// Frequency at which the smoothing's response is one half, Hz.
-    pub fn cutoff_hz(&self) -> f64 {
-        self.system.equations.cutoff_of_weight(self.weight)
+    /// Standard deviation of the samples' noise around a time, in their unit, under the same
+    /// condition.
+    pub fn noise_std(&self, seconds: f64) -> Option<f64> {
+        let noise = &self.uncertainty.as_ref()?.noise;
+        Some(noise[self.system.equations.basis_at(seconds).0].sqrt())
+    }
+
+    /// The penalty's weight.
+    pub fn weight(&self) -> &SplineWeight {
+        &self.weight
+    }
+
+    /// Frequency at which the smoothing's response is one half at a time, Hz.
+    pub fn cutoff_hz(&self, seconds: f64) -> f64 {
+        let weight = match &self.weight {
+            SplineWeight::Uniform(weight) => *weight,
+            SplineWeight::Local(weights) => {
+                weights[self
+                    .system
+                    .equations
+                    .basis_at(seconds)
+                    .0
+                    .min(weights.len() - 1)]
+            }
+        };
+        self.system.equations.cutoff_of_weight(weight)
     }
 }
 

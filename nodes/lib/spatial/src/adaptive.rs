@@ -1,0 +1,274 @@
+//! Smoothing that follows the motion: how much is learnt around each time.
+
+use crate::SpatialError;
+use crate::banded::Banded;
+use crate::equations::{PenaltyWeights, Scratch, SplineEquations};
+use crate::weight_search::LOWEST_LOG_WEIGHT;
+
+/// Time over which neighbours share one drive, standard deviation, s: shorter, a burst's own noise
+/// decides; longer, a burst's start is smoothed away. Least error of the acceleration among 0.05,
+/// 0.1, 0.15 and 0.25 s on the motions of `tests/bursts` with other seeds.
+const SHARED_DRIVE_S: f64 = 0.1;
+/// The same of the noise, which changes more slowly: markers come and go. With 0.5 s, or one noise
+/// for all times, a clip's ends change its middle: of cuts of 3 s from recorded walks and dances, one
+/// in twenty differed by 15 and 70 % from the same seconds of the whole, half a second from its
+/// ends (5 % with this; same errors on bursts).
+const SHARED_NOISE_S: f64 = 0.15;
+/// The same in intervals at least: fewer say too little.
+const LEAST_SHARED_INTERVALS: f64 = 5.0;
+/// Cutoff of the motion that is expected where the samples say nothing, Hz, and what this counts
+/// beside them, in intervals: bodies at rest sway, and those that move have most of their motion
+/// below 6 Hz. Without it stretches at rest are taken for dead still, and the first samples of the
+/// next burst lie far outside of what the estimate states (squared error over variance 45 rather
+/// than 1, same motions).
+const EXPECTED_CUTOFF_HZ: f64 = 6.0;
+const EXPECTED_COUNT: f64 = 0.01;
+/// Cutoff from which the search starts, Hz. From below, bursts are first taken for noise and some
+/// stay it: from 6 Hz the error of 48 motions' accelerations was 1.4 times that from 12 or 18 Hz.
+const FIRST_CUTOFF_HZ: f64 = 12.0;
+/// Steps towards the greatest likelihood. More change the error by less than a hundredth, and carry
+/// what a clip's ends say farther inwards.
+const STEPS: usize = 8;
+/// Steps that are taken whole; those that follow go half the way, so that they do not swing.
+const WHOLE_STEPS: usize = 2;
+/// With fewer samples noise and motion cannot be told apart; live, the first sample is due with the
+/// eleventh frame.
+pub(crate) const FEWEST_ADAPTIVE: usize = 8;
+/// Steps at each move of a window, live: a frame is seen some ten times before it is due.
+const STEPS_A_FRAME: usize = 2;
+/// Least part of an observation that decides about the noise or the drive, against division by
+/// nothing.
+const LEAST_FREE: f64 = 1e-7;
+/// Least standard deviation of the noise, as a part of the samples' range: rounding; and at all.
+const LEAST_NOISE: f64 = 1e-11;
+const LEAST_NOISE_AT_ALL: f64 = 1e-15;
+/// Largest weight, a cutoff of a sixtieth of the samples' rate: where weights differ from interval to
+/// interval, larger ones leave too few of the sixteen digits.
+const LARGEST_WEIGHT: f64 = 1e10;
+/// The variance of a fourth difference of white noise over that of the noise: 1 + 16 + 36 + 16 + 1.
+const FOURTH_DIFFERENCE_GAIN: f64 = 70.0;
+/// Median of the square of a standard normal variable.
+const MEDIAN_OF_SQUARE: f64 = 0.454_936;
+
+/// What is learnt of a series: how strongly the motion is driven around each time, and how large
+/// the noise is there.
+///
+/// Model: the samples are `y = f + n`, n white of variance r(t), and the fifth derivative of f is
+/// white noise of density s(t); with one r and s for all times f is the smoothing spline of weight r
+/// / s (Wahba 1978). All channels share both. One step is a step of expectation and maximisation in
+/// MacKay's form: with f the spline under the present r and s, and V its variance,
+/// ```text
+/// s(t) = sum_k K(t - t_k) |f5_k|^2      / sum_k K(t - t_k) (1 - V(f5_k) / s_k)        f5_k the fifth derivative over interval k
+/// r(t) = sum_k K(t - t_k) |y_k - f_k|^2 / sum_k K(t - t_k) (1 - V(f_k) / r_k)
+/// ```
+/// K is a symmetric kernel, so that what is learnt at t depends on the samples near t alone: the
+/// same seconds of a longer series give the same estimate.
+#[derive(Clone, Debug)]
+pub(crate) struct Adaptation {
+    /// Density of the fifth derivative over each knot interval, unit^2 per interval^9.
+    drive: Vec<f64>,
+    /// Variance of each sample's noise, unit^2.
+    noise: Vec<f64>,
+    least_noise: f64,
+    steps: usize,
+}
+
+impl Adaptation {
+    /// The start: noise as fourth differences show it, and one motion at all times.
+    fn start<const C: usize>(equations: &SplineEquations, values: &[[f64; C]]) -> Self {
+        let least_noise = (LEAST_NOISE * range(values))
+            .max(LEAST_NOISE_AT_ALL)
+            .powi(2);
+        let noise = fourth_difference_variance(values).max(least_noise);
+        let drive = noise / equations.weight_of_cutoff(FIRST_CUTOFF_HZ);
+        Self {
+            drive: vec![drive; equations.interval_count()],
+            noise: vec![noise; values.len()],
+            least_noise,
+            steps: 0,
+        }
+    }
+
+    /// Learns from a whole series.
+    pub(crate) fn learn<const C: usize>(
+        equations: &SplineEquations,
+        values: &[[f64; C]],
+    ) -> Result<Self, SpatialError> {
+        let mut adaptation = Self::start(equations, values);
+        let (mut scratch, mut inverse) = (Scratch::default(), Banded::default());
+        for _ in 0..STEPS {
+            adaptation.step(equations, values, &mut scratch, &mut inverse)?;
+        }
+        Ok(adaptation)
+    }
+
+    /// Learns on over a window that has moved: `dropped` samples have left it at its front, others
+    /// have come at its end. One that has nothing in common with the last starts anew.
+    pub(crate) fn follow<const C: usize>(
+        &mut self,
+        equations: &SplineEquations,
+        values: &[[f64; C]],
+        dropped: usize,
+    ) -> Result<(), SpatialError> {
+        let kept = self.noise.len().saturating_sub(dropped);
+        if kept < 2 || kept > values.len() {
+            *self = Self::learn(equations, values)?;
+            return Ok(());
+        }
+        self.noise.drain(..dropped);
+        self.drive.drain(..dropped);
+        let (noise, drive) = (self.noise[kept - 1], self.drive[kept - 2]);
+        self.noise.resize(values.len(), noise);
+        self.drive.resize(values.len() - 1, drive);
+        let (mut scratch, mut inverse) = (Scratch::default(), Banded::default());
+        for _ in 0..STEPS_A_FRAME {
+            self.step(equations, values, &mut scratch, &mut inverse)?;
+        }
+        Ok(())
+    }
+
+    /// Variance of each sample's noise, unit^2.
+    pub(crate) fn noise(&self) -> &[f64] {
+        &self.noise
+    }
+
+    /// The penalty's weight over each knot interval: the noise changes so little over a spline's
+    /// width that its quotient with the drive may stand for both.
+    pub(crate) fn weights(&self) -> Vec<f64> {
+        let lowest = 10f64.powf(LOWEST_LOG_WEIGHT);
+        self.drive
+            .iter()
+            .enumerate()
+            .map(|(k, drive)| (self.noise_over(k) / drive).clamp(lowest, LARGEST_WEIGHT))
+            .collect()
+    }
+
+    /// Variance of the noise over a knot interval.
+    fn noise_over(&self, interval: usize) -> f64 {
+        (self.noise[interval] * self.noise[interval + 1]).sqrt()
+    }
+
+    /// One step towards the greatest likelihood.
+    fn step<const C: usize>(
+        &mut self,
+        equations: &SplineEquations,
+        values: &[[f64; C]],
+        scratch: &mut Scratch<C>,
+        inverse: &mut Banded,
+    ) -> Result<(), SpatialError> {
+        let weights = self.weights();
+        equations.solve(values, PenaltyWeights::Local(&weights), scratch)?;
+        scratch.factor.inverse_band(inverse);
+        let free = |share: f64| (1.0 - share).max(LEAST_FREE);
+        let expected = 1.0 / equations.weight_of_cutoff(EXPECTED_CUTOFF_HZ);
+        let mut drives = Sums::default();
+        for (k, weight) in weights.iter().enumerate() {
+            let (square, variance) = equations.drive_over(k, &scratch.coefficients, inverse);
+            drives
+                .squares
+                .push(square + EXPECTED_COUNT * expected * self.noise_over(k));
+            drives.counts.push(free(weight * variance) + EXPECTED_COUNT);
+        }
+        let mut residuals = Sums::default();
+        for (k, value) in values.iter().enumerate() {
+            let (square, variance) =
+                equations.residual_at(k, value, &scratch.coefficients, inverse);
+            residuals.squares.push(square);
+            residuals.counts.push(free(variance));
+        }
+        let whole = self.steps < WHOLE_STEPS;
+        let found = drives.local_means(SHARED_DRIVE_S / equations.interval);
+        for (drive, found) in self.drive.iter_mut().zip(found) {
+            *drive = if whole {
+                found
+            } else {
+                (*drive * found).sqrt()
+            };
+        }
+        let found = residuals.local_means(SHARED_NOISE_S / equations.interval);
+        for (noise, found) in self.noise.iter_mut().zip(found) {
+            *noise = found.max(self.least_noise);
+        }
+        self.steps += 1;
+        Ok(())
+    }
+}
+
+/// Sums of squares, and of what each counts.
+#[derive(Default)]
+struct Sums {
+    squares: Vec<f64>,
+    counts: Vec<f64>,
+}
+
+impl Sums {
+    /// Means around each entry, by a kernel of this standard deviation.
+    fn local_means(mut self, intervals: f64) -> impl Iterator<Item = f64> {
+        let kernel = Kernel::new(intervals.max(LEAST_SHARED_INTERVALS));
+        kernel.smooth(&mut self.squares);
+        kernel.smooth(&mut self.counts);
+        self.squares
+            .into_iter()
+            .zip(self.counts)
+            .map(|(square, count)| (square / count).max(f64::MIN_POSITIVE))
+    }
+}
+
+/// Largest distance of a sample from the first, over all channels.
+fn range<const C: usize>(values: &[[f64; C]]) -> f64 {
+    values
+        .iter()
+        .flatten()
+        .fold(0.0, |most, v| v.abs().max(most))
+}
+
+/// Variance of white noise from the median of the squared fourth differences, over all channels.
+fn fourth_difference_variance<const C: usize>(values: &[[f64; C]]) -> f64 {
+    let mut squares: Vec<f64> = values
+        .windows(5)
+        .flat_map(|run| {
+            (0..C).map(|c| {
+                let ends = run[0][c] + run[4][c] - 4.0 * (run[1][c] + run[3][c]);
+                (ends + 6.0 * run[2][c]).powi(2)
+            })
+        })
+        .collect();
+    if squares.is_empty() {
+        return 0.0;
+    }
+    let middle = squares.len() / 2;
+    let median = *squares.select_nth_unstable_by(middle, f64::total_cmp).1;
+    median / (MEDIAN_OF_SQUARE * FOURTH_DIFFERENCE_GAIN)
+}
+
+/// `a^|k|` convolved with itself, a so chosen that the standard deviation is as wanted: two
+/// recursions each way.
+struct Kernel {
+    decay: f64,
+}
+
+impl Kernel {
+    /// Of this standard deviation, in entries. One pass has the variance `2 a / (1 - a)^2`.
+    fn new(std: f64) -> Self {
+        let variance = 0.5 * std * std;
+        let decay = (1.0 + variance - (1.0 + 2.0 * variance).sqrt()) / variance;
+        Self { decay }
+    }
+
+    /// Weighted sums in place; a quotient of two of them is a weighted mean.
+    fn smooth(&self, values: &mut [f64]) {
+        for _ in 0..2 {
+            let given = values.to_vec();
+            let mut sum = 0.0;
+            for (value, own) in values.iter_mut().zip(&given) {
+                sum = sum * self.decay + own;
+                *value = sum;
+            }
+            let mut sum = 0.0;
+            for (value, own) in values.iter_mut().zip(&given).rev() {
+                *value += sum;
+                sum = (sum + own) * self.decay;
+            }
+        }
+    }
+}
