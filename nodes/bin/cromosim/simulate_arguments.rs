@@ -45,8 +45,8 @@ pub struct Arguments {
     /// Sensor placements (YAML) rather than left_wrist, right_ankle, pelvis, sternum and head
     #[arg(long, value_name = "FILE", help_heading = MOTIONS)]
     pub placements: Option<PathBuf>,
-    /// Derivative scheme for every placement: spline, richardson, triangle, normal_tracking or
-    /// second_difference. With --reference the default is the estimate that a diagnosis uses
+    /// Derivative scheme for every placement: spline, adaptive_spline, richardson, triangle,
+    /// normal_tracking or second_difference. With --reference the default is the estimate that a diagnosis uses
     #[arg(long, value_name = "NAME")]
     pub scheme: Option<String>,
     /// Messages per second rather than the placements' own rate, Hz

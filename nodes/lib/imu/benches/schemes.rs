@@ -86,9 +86,16 @@ fn offline(criterion: &mut Criterion) {
 
 fn live(criterion: &mut Criterion) {
     let (_, _, _, trajectories) = trajectories(&PlacementSet::full17());
+    for scheme in [Scheme::Spline, Scheme::AdaptiveSpline] {
+        live_scheme(criterion, scheme, &trajectories);
+    }
+}
+
+fn live_scheme(criterion: &mut Criterion, scheme: Scheme, trajectories: &[SensorTrajectory]) {
     // One second: a time of 100 ms is a tenth of a core.
-    criterion.bench_function("live spline, 17 placements, 1 s at 100 Hz", |bencher| {
-        let stream = StreamingImu::new(Scheme::Spline, StreamOptions::resampled(RATE_HZ, RATE_HZ))
+    let name = format!("live {scheme}, 17 placements, 1 s at 100 Hz");
+    criterion.bench_function(&name, |bencher| {
+        let stream = StreamingImu::new(scheme, StreamOptions::resampled(RATE_HZ, RATE_HZ))
             .expect("positive rates");
         let mut warm: Vec<_> = trajectories
             .iter()

@@ -56,6 +56,7 @@ mod sample;
 mod schemes;
 mod simulate;
 mod stream;
+mod stream_adaptive;
 mod stream_spline;
 mod trajectory;
 mod uncertainty;

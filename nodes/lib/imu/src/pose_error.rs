@@ -50,3 +50,14 @@ pub struct SampleVariance {
     /// Of the sensor's orientation, rad2.
     pub orientation: f64,
 }
+
+impl SampleVariance {
+    /// The larger of each: two statements about the same errors.
+    pub(crate) fn larger(self, other: Self) -> Self {
+        Self {
+            acceleration: self.acceleration.max(other.acceleration),
+            angular_velocity: self.angular_velocity.max(other.angular_velocity),
+            orientation: self.orientation.max(other.orientation),
+        }
+    }
+}

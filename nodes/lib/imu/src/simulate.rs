@@ -1,6 +1,6 @@
 //! Whole trajectories at once.
 
-use cromosim_spatial::{PoseTimes, Stamp, derivative_weights, so3};
+use cromosim_spatial::{PoseSmoothing, PoseTimes, Stamp, derivative_weights, so3};
 use nalgebra::{Isometry3, Vector3};
 
 use crate::schemes::StencilScheme;
@@ -48,7 +48,7 @@ pub fn simulate_kinematics(
         .iter()
         .map(|frame| frame.stamp)
         .collect();
-    by_spline(&PoseTimes::new(&stamps)?, trajectory, output)
+    by_spline(&PoseTimes::new(&stamps)?, trajectory, scheme, output)
 }
 
 /// As [`simulate_kinematics`], with the spline equations of the trajectory's stamps, which all
@@ -64,27 +64,30 @@ pub fn simulate_kinematics_on(
 ) -> Result<Vec<KinematicSample>, ImuError> {
     match scheme.stencil() {
         Some(stencil) => Ok(by_differences(trajectory, stencil, output)),
-        None => by_spline(times, trajectory, output),
+        None => by_spline(times, trajectory, scheme, output),
     }
 }
 
 fn by_spline(
     times: &PoseTimes,
     trajectory: &SensorTrajectory,
+    scheme: Scheme,
     output: &[Stamp],
 ) -> Result<Vec<KinematicSample>, ImuError> {
-    let fitted = spline::fit(times, trajectory.frames())?;
+    let smoothing = match scheme {
+        Scheme::AdaptiveSpline => PoseSmoothing::ADAPTIVE,
+        _ => PoseSmoothing::default(),
+    };
+    let fitted = spline::fit(times, trajectory.frames(), smoothing)?;
     let errors = SplineVariance::new(times, &fitted, trajectory.frames())?;
     let sample = |&stamp: &Stamp| {
         let held = stamp.clamp(trajectory.start(), trajectory.end());
-        let variance = errors
-            .as_ref()
-            .map(|errors| errors.at(held))
-            .unwrap_or_default();
+        let known = errors.as_ref().map(|errors| errors.at(held));
+        let sample = spline::sample(&fitted, held);
         KinematicSample {
             stamp,
-            variance,
-            ..spline::sample(&fitted, held)
+            variance: sample.variance.larger(known.unwrap_or_default()),
+            ..sample
         }
     };
     Ok(output.iter().map(sample).collect())

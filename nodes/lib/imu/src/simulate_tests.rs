@@ -29,9 +29,11 @@ fn exact_frames_give_what_was_asked_for() {
     let (force, turn) = wrist_errors(Scheme::Richardson, 100.0);
     println!("richardson: {force:.6} m/s2, {turn:.7} rad/s");
     assert!(force < 0.002 && turn < 0.0005);
-    let (force, turn) = wrist_errors(Scheme::Spline, 100.0);
-    println!("spline: {force:.6} m/s2, {turn:.7} rad/s");
-    assert!(force < 0.0005 && turn < 0.0001);
+    for scheme in [Scheme::Spline, Scheme::AdaptiveSpline] {
+        let (force, turn) = wrist_errors(scheme, 100.0);
+        println!("{scheme}: {force:.6} m/s2, {turn:.7} rad/s");
+        assert!(force < 0.0005 && turn < 0.0001, "{scheme}");
+    }
     for scheme in [
         Scheme::Triangle,
         Scheme::SecondDifference,
@@ -58,6 +60,7 @@ fn schemes_converge_at_their_orders() {
         (Scheme::Richardson, 4.0, 4.0),
         (Scheme::Triangle, 2.0, 2.0),
         (Scheme::Spline, 4.0, 5.0),
+        (Scheme::AdaptiveSpline, 4.0, 5.0),
         (Scheme::SecondDifference, 2.0, 2.0),
     ];
     for (scheme, force_order, turn_order) in orders {
@@ -101,7 +104,7 @@ fn normal_tracking_converges_but_is_blind_about_the_normal() {
 }
 
 #[test]
-fn the_spline_withstands_jitter_ten_times_better_than_richardson() {
+fn the_splines_withstand_jitter_ten_times_better_than_richardson() {
     let frames = jittered(trajectory(wrist, 100.0, 60.0).frames());
     let trajectory = SensorTrajectory::new(frames).unwrap();
     let of = |scheme| {
@@ -110,9 +113,15 @@ fn the_spline_withstands_jitter_ten_times_better_than_richardson() {
             wrist,
         )
     };
-    let (richardson, spline) = (of(Scheme::Richardson), of(Scheme::Spline));
-    println!("1 mm, 0.5 degrees: richardson {richardson:.4?}, spline {spline:.4?}");
-    assert!(spline.0 * 10.0 < richardson.0 && spline.1 * 10.0 < richardson.1);
+    let richardson = of(Scheme::Richardson);
+    for scheme in [Scheme::Spline, Scheme::AdaptiveSpline] {
+        let spline = of(scheme);
+        println!("1 mm, 0.5 degrees: richardson {richardson:.4?}, {scheme} {spline:.4?}");
+        assert!(
+            spline.0 * 10.0 < richardson.0 && spline.1 * 10.0 < richardson.1,
+            "{scheme}"
+        );
+    }
 }
 
 #[test]
@@ -141,6 +150,7 @@ fn a_spin_with_a_lever_arm_reads_its_centripetal_force() {
     for (scheme, force_limit, turn_limit) in [
         (Scheme::Richardson, 1e-4, 1e-6),
         (Scheme::Spline, 1e-4, 1e-6),
+        (Scheme::AdaptiveSpline, 1e-4, 1e-6),
         (Scheme::Triangle, 2e-2, 3e-3),
     ] {
         let output = uniform_stamps(START, START.plus_seconds(2.0), 147.0).unwrap();

@@ -6,6 +6,7 @@ use cromosim_spatial::{SpatialError, Stamp};
 
 use crate::schemes::StencilScheme;
 use crate::simulate::{at_frame, between_frames, stencil_variance};
+use crate::stream_adaptive::AdaptiveLag;
 use crate::stream_spline::{FixedLag, LAG_FRAMES};
 use crate::{ImuError, ImuSample, KinematicSample, Scheme, SensorFrame};
 
@@ -36,9 +37,10 @@ impl StreamOptions {
 /// the first frame that is [`StreamingImu::delay_seconds`] later than it.
 ///
 /// Delay, in frames at the nominal rate: 4 for Richardson and 3 for the other stencils (2 of them for
-/// the cubic between estimates); 10 for the spline, which is fitted to
-/// the last 43 frames and smoothed as the last 128 frames ask for. Away from the start, stencils
-/// read exactly what [`crate::simulate`] reads; the spline comes close.
+/// the cubic between estimates); 10 for the splines; `spline` is fitted
+/// to the last 43 frames and smoothed as the last 128 frames ask for, `adaptive_spline` to the last
+/// 56 and as these ask for. Away from the start, stencils
+/// read exactly what [`crate::simulate`] reads; the splines come close.
 #[derive(Clone, Debug)]
 pub struct StreamingImu {
     scheme: Scheme,
@@ -51,6 +53,7 @@ pub struct StreamingImu {
     /// First stamp and number of the next sample on the output grid.
     grid: Option<(Stamp, i64)>,
     fixed_lag: FixedLag,
+    adaptive_lag: AdaptiveLag,
 }
 
 /// Frames that are kept: enough for every stencil, for the spline's window and its smoothing.
@@ -85,6 +88,7 @@ impl StreamingImu {
             pending,
             grid: None,
             fixed_lag: FixedLag::default(),
+            adaptive_lag: AdaptiveLag::default(),
         })
     }
 
@@ -175,6 +179,7 @@ impl StreamingImu {
         self.window.clear();
         self.pending.clear();
         self.fixed_lag.forget_frames();
+        self.adaptive_lag.forget();
         Ok(released)
     }
 
@@ -184,6 +189,7 @@ impl StreamingImu {
         self.pending.clear();
         self.grid = None;
         self.fixed_lag = FixedLag::default();
+        self.adaptive_lag.forget();
     }
 
     /// Notes the samples that fall after the last frame and up to `now`; within a series, so not
@@ -219,7 +225,10 @@ impl StreamingImu {
         }
         let due: Vec<Stamp> = self.pending.drain(..count).collect();
         let Some(stencil) = self.scheme.stencil() else {
-            return self.fixed_lag.sample(&self.window, &due, released);
+            return match self.scheme {
+                Scheme::AdaptiveSpline => self.adaptive_lag.sample(&self.window, &due, released),
+                _ => self.fixed_lag.sample(&self.window, &due, released),
+            };
         };
         for stamp in due {
             let variance = stencil_variance(stencil, &self.window, stamp);

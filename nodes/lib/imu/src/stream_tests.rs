@@ -147,6 +147,36 @@ fn the_live_spline_comes_close_to_the_offline_one() {
 }
 
 #[test]
+fn the_live_adaptive_spline_is_the_offline_one_within_what_it_states() {
+    let frames = jittered(&frames(wrist, 100.0, 20.0));
+    let options = StreamOptions::resampled(100.0, 100.0);
+    let live: Vec<_> = run(Scheme::AdaptiveSpline, options, &frames)
+        .into_iter()
+        .map(|(sample, _)| sample)
+        .collect();
+    let trajectory = SensorTrajectory::new(frames).unwrap();
+    let stamps: Vec<Stamp> = live.iter().map(|sample| sample.stamp).collect();
+    let offline = simulate_kinematics(&trajectory, Scheme::AdaptiveSpline, &stamps).unwrap();
+    let mean = |of: &dyn Fn(&KinematicSample, &KinematicSample) -> f64| {
+        let pairs = live.iter().zip(&offline);
+        pairs.map(|(live, offline)| of(live, offline)).sum::<f64>() / live.len() as f64
+    };
+    let acceleration = mean(&|live, offline| {
+        let step = live.acceleration_in_world - offline.acceleration_in_world;
+        step.norm_squared() / 3.0 / live.variance.acceleration
+    });
+    let turning = mean(&|live, offline| {
+        let step = live.angular_velocity_in_world - offline.angular_velocity_in_world;
+        step.norm_squared() / 3.0 / live.variance.angular_velocity
+    });
+    println!("squared difference over the stated variance: {acceleration:.2}, {turning:.2}");
+    assert!(
+        acceleration < 1.0 && turning < 1.0,
+        "{acceleration} {turning}"
+    );
+}
+
+#[test]
 fn the_same_frames_give_the_same_samples() {
     let frames = jittered(&frames(wrist, 100.0, 4.0));
     let options = StreamOptions::resampled(100.0, 60.0);

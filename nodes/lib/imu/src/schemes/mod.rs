@@ -32,17 +32,21 @@ pub enum Scheme {
     /// at any output rate; O(h^4) for acceleration, O(h^5) for angular velocity.
     #[default]
     Spline,
+    /// The same splines, but they follow the motion: much is smoothed at rest, little in a burst, as
+    /// the frames around each time ask for; samples state how far they may be off.
+    AdaptiveSpline,
     /// Plain second difference of the position and the turn between the neighbours; O(h^2).
     SecondDifference,
 }
 
 impl Scheme {
     /// All schemes.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::Richardson,
         Self::NormalTracking,
         Self::Triangle,
         Self::Spline,
+        Self::AdaptiveSpline,
         Self::SecondDifference,
     ];
 
@@ -53,19 +57,20 @@ impl Scheme {
             Self::NormalTracking => "normal_tracking",
             Self::Triangle => "triangle",
             Self::Spline => "spline",
+            Self::AdaptiveSpline => "adaptive_spline",
             Self::SecondDifference => "second_difference",
         }
     }
 
-    /// The scheme as one that estimates at a frame from its neighbours; `None` for the spline, which
-    /// is fitted to all frames and has no estimate of a single one.
+    /// The scheme as one that estimates at a frame from its neighbours; `None` for the
+    /// splines, which are fitted to all frames and have no estimate of a single one.
     pub(crate) fn stencil(self) -> Option<StencilScheme> {
         match self {
             Self::Richardson => Some(StencilScheme::Richardson),
             Self::NormalTracking => Some(StencilScheme::NormalTracking),
             Self::Triangle => Some(StencilScheme::Triangle),
             Self::SecondDifference => Some(StencilScheme::SecondDifference),
-            Self::Spline => None,
+            Self::Spline | Self::AdaptiveSpline => None,
         }
     }
 }

@@ -6,18 +6,18 @@ use nalgebra::Isometry3;
 use crate::uncertainty::{FrameWeights, any_error};
 use crate::{ImuError, KinematicSample, SampleVariance, SensorFrame};
 
-/// The spline of a series of frames, smoothed as the frames themselves ask for.
-pub(crate) fn fit(times: &PoseTimes, frames: &[SensorFrame]) -> Result<PoseSpline, ImuError> {
+/// The spline of a series of frames.
+pub(crate) fn fit(
+    times: &PoseTimes,
+    frames: &[SensorFrame],
+    smoothing: PoseSmoothing,
+) -> Result<PoseSpline, ImuError> {
     let world_from_sensor: Vec<Isometry3<f64>> =
         frames.iter().map(|frame| frame.world_from_sensor).collect();
-    Ok(PoseSpline::fit_on(
-        times,
-        &world_from_sensor,
-        PoseSmoothing::default(),
-    )?)
+    Ok(PoseSpline::fit_on(times, &world_from_sensor, smoothing)?)
 }
 
-/// The motion at a stamp.
+/// The motion at a stamp, and how far it may be off where the spline has learnt that.
 pub(crate) fn sample(spline: &PoseSpline, stamp: Stamp) -> KinematicSample {
     let motion = spline.evaluate(stamp);
     KinematicSample {
@@ -26,7 +26,14 @@ pub(crate) fn sample(spline: &PoseSpline, stamp: Stamp) -> KinematicSample {
         acceleration_in_world: motion.acceleration,
         angular_velocity_in_world: motion.angular_velocity,
         angular_acceleration_in_world: Some(motion.angular_acceleration),
-        variance: SampleVariance::default(),
+        variance: spline
+            .variance(stamp)
+            .map(|variance| SampleVariance {
+                acceleration: variance.acceleration,
+                angular_velocity: variance.angular_velocity,
+                orientation: variance.orientation,
+            })
+            .unwrap_or_default(),
     }
 }
 

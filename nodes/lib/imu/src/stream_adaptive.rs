@@ -1,0 +1,56 @@
+//! The adaptive spline, live: a window with a fixed lag over which what was learnt moves on.
+
+use cromosim_spatial::{PoseAdaptation, PoseSpline, PoseTimes, Stamp};
+use nalgebra::Isometry3;
+
+use crate::schemes::spline::{SplineVariance, sample};
+use crate::{ImuError, KinematicSample, SensorFrame};
+
+/// Frames before the sample that the window reaches back: three times what neighbours share at 100
+/// Hz.
+const PAST_FRAMES: usize = 45;
+
+/// What was learnt of the frames in the last window.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct AdaptiveLag {
+    stamps: Vec<Stamp>,
+    learnt: PoseAdaptation,
+}
+
+impl AdaptiveLag {
+    /// Samples at stamps within `kept`, by a spline over its last frames.
+    pub(crate) fn sample(
+        &mut self,
+        kept: &[SensorFrame],
+        due: &[Stamp],
+        samples: &mut Vec<KinematicSample>,
+    ) -> Result<(), ImuError> {
+        let first_due = due.first().copied().unwrap_or_default();
+        let before = kept.partition_point(|frame| frame.stamp <= first_due);
+        let frames = &kept[before.saturating_sub(PAST_FRAMES)..];
+        let (stamps, poses): (Vec<Stamp>, Vec<Isometry3<f64>>) = frames
+            .iter()
+            .map(|frame| (frame.stamp, frame.world_from_sensor))
+            .unzip();
+        let start = stamps.first().copied().unwrap_or_default();
+        let dropped = self.stamps.partition_point(|stamp| *stamp < start);
+        let times = PoseTimes::new(&stamps)?;
+        let spline = PoseSpline::fit_following(&times, &poses, &mut self.learnt, dropped)?;
+        self.stamps = stamps;
+        let errors = SplineVariance::new(&times, &spline, frames)?;
+        samples.extend(due.iter().map(|&stamp| {
+            let sample = sample(&spline, stamp);
+            let known = errors.as_ref().map(|errors| errors.at(stamp));
+            KinematicSample {
+                variance: sample.variance.larger(known.unwrap_or_default()),
+                ..sample
+            }
+        }));
+        Ok(())
+    }
+
+    /// Begins anew: a series has ended.
+    pub(crate) fn forget(&mut self) {
+        *self = Self::default();
+    }
+}
