@@ -28,7 +28,7 @@ const EXPECTED_COUNT: f64 = 0.01;
 const FIRST_CUTOFF_HZ: f64 = 12.0;
 /// Steps towards the greatest likelihood. More change the error by less than a hundredth, and carry
 /// what a clip's ends say farther inwards.
-const STEPS: usize = 8;
+const STEPS: usize = 6;
 /// Steps that are taken whole; those that follow go half the way, so that they do not swing.
 const WHOLE_STEPS: usize = 2;
 /// With fewer samples noise and motion cannot be told apart; live, the first sample is due with the
@@ -157,7 +157,8 @@ impl Adaptation {
         inverse: &mut Banded,
     ) -> Result<(), SpatialError> {
         let weights = self.weights();
-        equations.solve(values, PenaltyWeights::Local(&weights), scratch)?;
+        // Not refined: squares are all that is wanted of it.
+        equations.solve_refined(values, PenaltyWeights::Local(&weights), 0, scratch)?;
         scratch.factor.inverse_band(inverse);
         let free = |share: f64| (1.0 - share).max(LEAST_FREE);
         let expected = 1.0 / equations.weight_of_cutoff(EXPECTED_CUTOFF_HZ);

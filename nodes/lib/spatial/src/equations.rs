@@ -202,12 +202,23 @@ impl SplineEquations {
         weights: PenaltyWeights,
         scratch: &mut Scratch<C>,
     ) -> Result<(), SpatialError> {
-        self.factor_into(weights, scratch)?;
-        scratch.coefficients.clear();
-        scratch.coefficients.resize(self.basis.count(), [0.0; C]);
         let largest = weights.largest();
         let refinements =
             usize::from(largest >= REFINED_ONCE) + usize::from(largest > REFINED_TWICE);
+        self.solve_refined(values, weights, refinements, scratch)
+    }
+
+    /// As [`SplineEquations::solve`], refined so many times.
+    pub(crate) fn solve_refined<const C: usize>(
+        &self,
+        values: &[[f64; C]],
+        weights: PenaltyWeights,
+        refinements: usize,
+        scratch: &mut Scratch<C>,
+    ) -> Result<(), SpatialError> {
+        self.factor_into(weights, scratch)?;
+        scratch.coefficients.clear();
+        scratch.coefficients.resize(self.basis.count(), [0.0; C]);
         for _ in 0..=refinements {
             self.residual(values, weights, scratch);
             scratch.factor.solve(&mut scratch.correction);
