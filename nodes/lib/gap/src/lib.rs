@@ -14,7 +14,6 @@ mod evidence;
 mod fill;
 mod findings;
 mod fit;
-mod fourth_differences;
 mod gram;
 mod identify;
 mod lag;

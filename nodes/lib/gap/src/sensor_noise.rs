@@ -1,12 +1,10 @@
 //! The white noise of a sensor, as its readings and residuals show it.
 
 use cromosim_imu::{Channel, PerChannel, ReadOff};
+use cromosim_spatial::{ROUNDED_MEDIAN_OF_SQUARE, fourth_difference, white_noise_variance};
 
 use crate::axes::{axes_of_channel, value_on_axis};
 use crate::digital::Digital;
-use crate::fourth_differences::{
-    ROUNDED_MEDIAN_OF_SQUARE, fourth_difference, white_noise_variance,
-};
 use crate::library::Library;
 use crate::prepared::PreparedPlacement;
 

@@ -66,6 +66,7 @@ mod virtual_imu;
 mod test_motions;
 
 pub use channel::{AXES, Channel, PerChannel, Reading};
+pub use cromosim_spatial::SampleVariance;
 pub use device::{Device, EMBEDDED_DEVICES};
 pub use effects::{
     DeclaredNoise, Dependence, Dropouts, Effect, EffectKind, EffectSet, EffectSpec, EffectsFile,
@@ -80,7 +81,7 @@ pub use mount::{MountedSensor, MountedSensors, SensorPose};
 pub use noise::{Covariances, NoiseSource};
 pub use placement::{Follow, MAX_RATE_HZ, Placement, SiteChoice};
 pub use placement_file::PlacementSet;
-pub use pose_error::{PoseStd, SampleVariance};
+pub use pose_error::PoseStd;
 pub use random::normal_pair;
 pub use sample::{
     GRAVITY_IN_WORLD, ImuSample, KinematicSample, STANDARD_GRAVITY, track_in_sensor_axes,

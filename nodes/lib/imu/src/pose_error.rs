@@ -1,4 +1,4 @@
-//! Errors of poses, and the variances that they leave in a sample.
+//! Errors of poses.
 
 use cromosim_spatial::{CONFIDENCE_LENGTH_M, std_of_confidence};
 
@@ -35,29 +35,6 @@ impl PoseStd {
             position_m,
             rotation_rad: position_m / CONFIDENCE_LENGTH_M,
             correlation_s,
-        }
-    }
-}
-
-/// Variances, along or about each axis, that errors of the poses leave in a sample; 0 where none
-/// are known of, infinite where the sample rests on poses that are not known.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SampleVariance {
-    /// (m/s2)2.
-    pub acceleration: f64,
-    /// (rad/s)2.
-    pub angular_velocity: f64,
-    /// Of the sensor's orientation, rad2.
-    pub orientation: f64,
-}
-
-impl SampleVariance {
-    /// The larger of each: two statements about the same errors.
-    pub(crate) fn larger(self, other: Self) -> Self {
-        Self {
-            acceleration: self.acceleration.max(other.acceleration),
-            angular_velocity: self.angular_velocity.max(other.angular_velocity),
-            orientation: self.orientation.max(other.orientation),
         }
     }
 }

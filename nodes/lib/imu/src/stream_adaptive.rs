@@ -1,9 +1,9 @@
 //! The adaptive spline, live: a window with a fixed lag over which what was learnt moves on.
 
 use cromosim_spatial::{PoseAdaptation, PoseSpline, PoseTimes, Stamp};
-use nalgebra::Isometry3;
 
 use crate::schemes::spline::{SplineVariance, sample};
+use crate::stream_spline::last_frames;
 use crate::{ImuError, KinematicSample, SensorFrame};
 
 /// Frames before the sample that the window reaches back: three times what neighbours share at 100
@@ -25,13 +25,7 @@ impl AdaptiveLag {
         due: &[Stamp],
         samples: &mut Vec<KinematicSample>,
     ) -> Result<(), ImuError> {
-        let first_due = due.first().copied().unwrap_or_default();
-        let before = kept.partition_point(|frame| frame.stamp <= first_due);
-        let frames = &kept[before.saturating_sub(PAST_FRAMES)..];
-        let (stamps, poses): (Vec<Stamp>, Vec<Isometry3<f64>>) = frames
-            .iter()
-            .map(|frame| (frame.stamp, frame.world_from_sensor))
-            .unzip();
+        let (frames, stamps, poses) = last_frames(kept, due, PAST_FRAMES);
         let start = stamps.first().copied().unwrap_or_default();
         let dropped = self.stamps.partition_point(|stamp| *stamp < start);
         let times = PoseTimes::new(&stamps)?;

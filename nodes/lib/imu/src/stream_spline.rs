@@ -84,13 +84,7 @@ impl FixedLag {
         due: &[Stamp],
         samples: &mut Vec<KinematicSample>,
     ) -> Result<(), ImuError> {
-        let first_due = due.first().copied().unwrap_or_default();
-        let before = window.partition_point(|frame| frame.stamp <= first_due);
-        let frames = &window[before.saturating_sub(PAST_FRAMES)..];
-        let (stamps, poses): (Vec<Stamp>, Vec<Isometry3<f64>>) = frames
-            .iter()
-            .map(|frame| (frame.stamp, frame.world_from_sensor))
-            .unzip();
+        let (frames, stamps, poses) = last_frames(window, due, PAST_FRAMES);
         let smoothing = match self.weights {
             Some(Weights { position, rotation }) => PoseSmoothing {
                 position: Smoothing::Weight(position),
@@ -130,6 +124,22 @@ impl FixedLag {
         });
         self.search_count += 1;
     }
+}
+
+/// The frames of a window from `past` before the first stamp that is due on, their stamps and poses.
+pub(crate) fn last_frames<'a>(
+    window: &'a [SensorFrame],
+    due: &[Stamp],
+    past: usize,
+) -> (&'a [SensorFrame], Vec<Stamp>, Vec<Isometry3<f64>>) {
+    let first_due = due.first().copied().unwrap_or_default();
+    let before = window.partition_point(|frame| frame.stamp <= first_due);
+    let frames = &window[before.saturating_sub(past)..];
+    let (stamps, poses) = frames
+        .iter()
+        .map(|frame| (frame.stamp, frame.world_from_sensor))
+        .unzip();
+    (frames, stamps, poses)
 }
 
 impl Search {

@@ -3,31 +3,31 @@
 use crate::SpatialError;
 use crate::banded::Banded;
 use crate::equations::{PenaltyWeights, Scratch, SplineEquations};
+use crate::fourth_differences::{MEDIAN_OF_SQUARE, fourth_difference, white_noise_variance};
 use crate::weight_search::LOWEST_LOG_WEIGHT;
 
 /// Time over which neighbours share one drive, standard deviation, s: shorter, a burst's own noise
-/// decides; longer, a burst's start is smoothed away. Least error of the acceleration among 0.05,
-/// 0.1, 0.15 and 0.25 s on the motions of `tests/bursts` with other seeds.
+/// decides; longer, a burst's start is smoothed away. Chosen among 0.05, 0.1, 0.15 and 0.25 s on
+/// motions like those of `tests/bursts`, none of them among its own.
 const SHARED_DRIVE_S: f64 = 0.1;
-/// The same of the noise, which changes more slowly: markers come and go. With 0.5 s, or one noise
-/// for all times, a clip's ends change its middle: of cuts of 3 s from recorded walks and dances, one
-/// in twenty differed by 15 and 70 % from the same seconds of the whole, half a second from its
-/// ends (5 % with this; same errors on bursts).
+/// The same of the noise, which changes more slowly: markers come and go. Longer, a clip's ends
+/// change its middle (`tests/cuts.rs`). Chosen among 0.12 to 0.5 s on joints of recorded walks and
+/// dances, the clips of that test among them.
 const SHARED_NOISE_S: f64 = 0.15;
-/// The same in intervals at least: fewer say too little.
+/// The same in intervals at least: fewer say too little. No source.
 const LEAST_SHARED_INTERVALS: f64 = 5.0;
 /// Cutoff of the motion that is expected where the samples say nothing, Hz, and what this counts
 /// beside them, in intervals: bodies at rest sway, and those that move have most of their motion
 /// below 6 Hz. Without it stretches at rest are taken for dead still, and the first samples of the
-/// next burst lie far outside of what the estimate states (squared error over variance 45 rather
-/// than 1, same motions).
+/// next burst lie far outside of what the estimate states. Chosen as [`SHARED_DRIVE_S`].
 const EXPECTED_CUTOFF_HZ: f64 = 6.0;
 const EXPECTED_COUNT: f64 = 0.01;
-/// Cutoff from which the search starts, Hz. From below, bursts are first taken for noise and some
-/// stay it: from 6 Hz the error of 48 motions' accelerations was 1.4 times that from 12 or 18 Hz.
+/// Cutoff from which the search starts, Hz. From below (6 Hz), bursts are first taken for noise and
+/// some stay it; from 18 Hz it finds the same. Chosen on seeds 100 to 147 of `tests/bursts`, which
+/// scores others.
 const FIRST_CUTOFF_HZ: f64 = 12.0;
-/// Steps towards the greatest likelihood. More change the error by less than a hundredth, and carry
-/// what a clip's ends say farther inwards.
+/// Steps towards the greatest likelihood. More hardly change the error, and carry what a clip's ends
+/// say farther inwards. Chosen among 4 to 40 as [`SHARED_DRIVE_S`].
 const STEPS: usize = 6;
 /// Steps that are taken whole; those that follow go half the way, so that they do not swing.
 const WHOLE_STEPS: usize = 2;
@@ -45,11 +45,6 @@ const LEAST_NOISE_AT_ALL: f64 = 1e-15;
 /// Largest weight, a cutoff of a sixtieth of the samples' rate: where weights differ from interval to
 /// interval, larger ones leave too few of the sixteen digits.
 const LARGEST_WEIGHT: f64 = 1e10;
-/// The variance of a fourth difference of white noise over that of the noise: 1 + 16 + 36 + 16 + 1.
-const FOURTH_DIFFERENCE_GAIN: f64 = 70.0;
-/// Median of the square of a standard normal variable.
-const MEDIAN_OF_SQUARE: f64 = 0.454_936;
-
 /// What is learnt of a series: how strongly the motion is driven around each time, and how large
 /// the noise is there.
 ///
@@ -223,23 +218,15 @@ fn range<const C: usize>(values: &[[f64; C]]) -> f64 {
         .fold(0.0, |most, v| v.abs().max(most))
 }
 
-/// Variance of white noise from the median of the squared fourth differences, over all channels.
+/// Variance of white noise from the fourth differences of all channels.
 fn fourth_difference_variance<const C: usize>(values: &[[f64; C]]) -> f64 {
-    let mut squares: Vec<f64> = values
+    let of_channel =
+        |run: &[[f64; C]], c: usize| fourth_difference(std::array::from_fn(|k| run[k][c]));
+    let mut differences: Vec<f64> = values
         .windows(5)
-        .flat_map(|run| {
-            (0..C).map(|c| {
-                let ends = run[0][c] + run[4][c] - 4.0 * (run[1][c] + run[3][c]);
-                (ends + 6.0 * run[2][c]).powi(2)
-            })
-        })
+        .flat_map(|run| (0..C).map(move |c| of_channel(run, c)))
         .collect();
-    if squares.is_empty() {
-        return 0.0;
-    }
-    let middle = squares.len() / 2;
-    let median = *squares.select_nth_unstable_by(middle, f64::total_cmp).1;
-    median / (MEDIAN_OF_SQUARE * FOURTH_DIFFERENCE_GAIN)
+    white_noise_variance(&mut differences, MEDIAN_OF_SQUARE).unwrap_or(0.0)
 }
 
 /// `a^|k|` convolved with itself, a so chosen that the standard deviation is as wanted: two

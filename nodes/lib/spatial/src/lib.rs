@@ -38,6 +38,7 @@ mod end_derivatives;
 mod equations;
 mod error;
 mod estimate;
+mod fourth_differences;
 mod gaps;
 mod grid;
 mod influence;
@@ -62,10 +63,13 @@ pub use derivative::Derivative;
 pub use difference::{MAX_STENCIL, derivative_weights};
 pub use error::SpatialError;
 pub use estimate::{PoseEstimate, PoseNoise};
+pub use fourth_differences::{
+    MEDIAN_OF_SQUARE, ROUNDED_MEDIAN_OF_SQUARE, fourth_difference, white_noise_variance,
+};
 pub use grid::{check_times, relative_seconds, uniform_stamps};
 pub use influence::{Influence, SampleWeights};
 pub use pose_spline::{
-    Motion, MotionVariance, PoseAdaptation, PoseSmoothing, PoseSpline, PoseTimes,
+    Motion, PoseAdaptation, PoseSmoothing, PoseSpline, PoseTimes, SampleVariance,
     position_channels, rotation_channels,
 };
 pub use rustfft::num_complex::Complex64;

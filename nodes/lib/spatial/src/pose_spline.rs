@@ -52,15 +52,28 @@ impl Default for PoseSmoothing {
     }
 }
 
-/// Variances along or about each axis.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MotionVariance {
+/// Variances, along or about each axis, that errors of the poses leave in a sample; 0 where none
+/// are known of, infinite where the sample rests on poses that are not known.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SampleVariance {
     /// (m/s2)2.
     pub acceleration: f64,
     /// (rad/s)2.
     pub angular_velocity: f64,
-    /// rad2.
+    /// Of the body's orientation, rad2.
     pub orientation: f64,
+}
+
+impl SampleVariance {
+    /// The larger of each: two statements about the same errors.
+    #[must_use]
+    pub fn larger(self, other: Self) -> Self {
+        Self {
+            acceleration: self.acceleration.max(other.acceleration),
+            angular_velocity: self.angular_velocity.max(other.angular_velocity),
+            orientation: self.orientation.max(other.orientation),
+        }
+    }
 }
 
 /// Variance of a rotation vector per axis over the mean of a quaternion's four components: `q = (1, v
@@ -167,11 +180,15 @@ impl PoseSpline {
 
     /// How far the motion at a stamp may be off, given the noise that was learnt of the poses; none
     /// but for [`Smoothing::Adaptive`] of both.
-    pub fn variance(&self, stamp: Stamp) -> Option<MotionVariance> {
-        let seconds = stamp - self.times.origin;
-        let [_, _, acceleration] = self.position.variance(seconds)?;
-        let [rotation, turning, _] = self.rotation.variance(seconds)?;
-        Some(MotionVariance {
+    pub fn variance(&self, stamp: Stamp) -> Option<SampleVariance> {
+        let (first, values) = self
+            .times
+            .system
+            .equations
+            .basis_at(stamp - self.times.origin);
+        let [_, _, acceleration] = self.position.variance_at(first, &values)?;
+        let [rotation, turning, _] = self.rotation.variance_at(first, &values)?;
+        Some(SampleVariance {
             acceleration,
             angular_velocity: ROTVEC_PER_QUATERNION * turning,
             orientation: ROTVEC_PER_QUATERNION * rotation,

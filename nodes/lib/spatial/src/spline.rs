@@ -57,7 +57,8 @@ impl SplineWeight {
 }
 
 impl Smoothing {
-    /// The one weight for samples on these times; not for [`Smoothing::Adaptive`], which has many.
+    /// The one weight for samples on these times; [`Smoothing::Adaptive`] has one only where there
+    /// are too few of them to learn more.
     fn uniform_weight<const C: usize>(
         self,
         system: &SplineSystem,
@@ -237,10 +238,20 @@ impl<const C: usize> SmoothingSpline<C> {
     /// time: `r b^T (B^T B + P)^-1 b`, r the variance of the samples' noise, b the basis there. None
     /// but for [`Smoothing::Adaptive`]: the others do not tell noise from motion.
     pub fn variance(&self, seconds: f64) -> Option<[f64; 3]> {
-        let uncertainty = self.uncertainty.as_ref()?;
         let (first, values) = self.system.equations.basis_at(seconds);
+        self.variance_at(first, &values)
+    }
+
+    /// As [`SmoothingSpline::variance`], from what
+    /// [`crate::equations::SplineEquations::basis_at`] gave.
+    pub(crate) fn variance_at(&self, first: usize, values: &BasisValues) -> Option<[f64; 3]> {
+        let uncertainty = self.uncertainty.as_ref()?;
         let noise = (uncertainty.noise[first] * uncertainty.noise[first + 1]).sqrt();
-        Some(values.map(|row| noise * uncertainty.inverse.quadratic_form(first, &row)))
+        Some(
+            values
+                .each_ref()
+                .map(|row| noise * uncertainty.inverse.quadratic_form(first, row)),
+        )
     }
 
     /// Standard deviation of the samples' noise around a time, in their unit, under the same

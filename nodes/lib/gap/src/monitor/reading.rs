@@ -1,11 +1,10 @@
 //! Messages of one IMU: how regularly they come, how noisy they are.
 
 use cromosim_imu::{Channel, PerChannel, Reading};
-use cromosim_spatial::Stamp;
+use cromosim_spatial::{MEDIAN_OF_SQUARE, Stamp, fourth_difference, white_noise_variance};
 use nalgebra::Vector3;
 
 use crate::axes::axes_of_channel;
-use crate::fourth_differences::{MEDIAN_OF_SQUARE, fourth_difference, white_noise_variance};
 use crate::period::median_period;
 
 /// One message of an IMU.

@@ -26,14 +26,7 @@ pub(crate) fn sample(spline: &PoseSpline, stamp: Stamp) -> KinematicSample {
         acceleration_in_world: motion.acceleration,
         angular_velocity_in_world: motion.angular_velocity,
         angular_acceleration_in_world: Some(motion.angular_acceleration),
-        variance: spline
-            .variance(stamp)
-            .map(|variance| SampleVariance {
-                acceleration: variance.acceleration,
-                angular_velocity: variance.angular_velocity,
-                orientation: variance.orientation,
-            })
-            .unwrap_or_default(),
+        variance: spline.variance(stamp).unwrap_or_default(),
     }
 }
 

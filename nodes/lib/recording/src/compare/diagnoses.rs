@@ -52,16 +52,8 @@ pub fn compare_diagnoses(a: &Diagnosis, b: &Diagnosis) -> Result<Comparison, Rec
             .collect()
     };
     let (only_a, only_b) = (lacking(a, b), lacking(b, a));
-    only_in(
-        text,
-        "A",
-        &only_a.iter().map(String::as_str).collect::<Vec<_>>(),
-    );
-    only_in(
-        text,
-        "B",
-        &only_b.iter().map(String::as_str).collect::<Vec<_>>(),
-    );
+    only_in(text, "A", &only_a);
+    only_in(text, "B", &only_b);
     Ok(Comparison {
         text: std::mem::take(text),
         json: json!({"kind": "diagnoses", "placements": placements, "only_in_a": only_a, "only_in_b": only_b}),

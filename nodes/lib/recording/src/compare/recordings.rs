@@ -87,16 +87,8 @@ pub fn compare_recordings(a: &BagReader, b: &BagReader) -> Result<Comparison, Re
             b: names(&topics_b),
         });
     }
-    only_in(
-        text,
-        "A",
-        &only_a.iter().map(String::as_str).collect::<Vec<_>>(),
-    );
-    only_in(
-        text,
-        "B",
-        &only_b.iter().map(String::as_str).collect::<Vec<_>>(),
-    );
+    only_in(text, "A", &only_a);
+    only_in(text, "B", &only_b);
     Ok(Comparison {
         text: std::mem::take(text),
         json: json!({"kind": "recordings", "placements": placements, "only_in_a": only_a, "only_in_b": only_b}),

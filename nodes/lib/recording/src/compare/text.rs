@@ -25,7 +25,7 @@ pub(super) fn significant(value: f64, digits: i32) -> String {
 }
 
 /// Adds a line with the names that only one side has; none for no names.
-pub(super) fn only_in(text: &mut String, side: &str, names: &[&str]) {
+pub(super) fn only_in(text: &mut String, side: &str, names: &[String]) {
     if !names.is_empty() {
         line!(text, "\nonly in {side}: {}", names.join(", "));
     }
