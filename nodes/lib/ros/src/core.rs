@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 
 use ros2_client::entities_info::{NodeEntitiesInfo, ParticipantEntitiesInfo};
 use ros2_client::{Context, MessageTypeName, builtin_topics};
-use rustdds::{DomainParticipant, QosPolicies, Topic, TopicKind};
+use rustdds::{DomainParticipant, QosPolicies, RTPSEntity, Topic, TopicDescription, TopicKind};
 
 use crate::clock::Clock;
 use crate::error::{RosResult, dds};
@@ -28,6 +28,7 @@ use crate::qos::{Durability, Qos};
 use crate::raw::{Gid, RawMessage, RawReader, RawWriter};
 use crate::reader::{Reader, ReaderOptions};
 use crate::shutdown::Shutdown;
+use crate::turns::{Planned, Turns};
 use crate::wake::{Bell, lock};
 
 /// A piece of the node thread's work: called at every ring of the node's bell, ends by returning
@@ -40,11 +41,14 @@ pub(crate) struct Core {
     local: Mutex<BTreeMap<Gid, Endpoint>>,
     info_writer: RawWriter,
     pub(crate) graph: Graph,
+    turns: Turns,
     pub(crate) clock: Clock,
     pub(crate) shutdown: Shutdown,
     /// Wakes the node's thread.
     pub(crate) bell: Arc<Bell>,
     pub(crate) new_workers: Mutex<Vec<Worker>>,
+    /// Until all that a node starts with is made, nothing is announced: peers hear it at once.
+    pub(crate) started: AtomicBool,
     pub(crate) stopping: AtomicBool,
     /// Writers of dropped publishers, which stay until their last messages have arrived.
     leaving: Mutex<Vec<Leaving>>,
@@ -66,26 +70,37 @@ impl Core {
     ) -> RosResult<Self> {
         let qos = Qos::reliable();
         let doing = |what: &str| format!("node {name}: create {what}");
-        let context = Context::from_domain_participant(participant.clone())
-            .map_err(|error| dds(doing("ros2-client's context"), error))?;
+        let turns = Turns::new(&participant);
+        let graph = Graph::new(participant.guid(), shutdown.clone());
+        let info_qos = Qos::tf_static().to_dds();
+        let info = Planned::on(INFO_TOPIC, &info_qos, true);
+        // It has a writer on `ros_discovery_info` too.
+        let make_context = || {
+            Context::from_domain_participant(participant.clone())
+                .map_err(|error| dds(doing("ros2-client's context"), error))
+        };
+        let context = turns.make(&graph, info, make_context, |_| None)?;
         let publisher = participant
             .create_publisher(&qos.to_dds())
             .map_err(|error| dds(doing("DDS publisher"), error))?;
         let subscriber = participant
             .create_subscriber(&qos.to_dds())
             .map_err(|error| dds(doing("DDS subscriber"), error))?;
-        let info_qos = Qos::tf_static().to_dds();
         let info_topic = make_topic(&participant, INFO_TOPIC.into(), INFO_TYPE.into(), &info_qos)?;
-        let info_writer = publisher
-            .create_datawriter_no_key(&info_topic, Some(info_qos))
-            .map_err(|error| dds(doing("ros_discovery_info"), error))?;
+        let make_writer = || -> RosResult<RawWriter> {
+            publisher
+                .create_datawriter_no_key(&info_topic, Some(info_qos.clone()))
+                .map_err(|error| dds(doing("ros_discovery_info"), error))
+        };
+        let info_writer = turns.make(&graph, info, make_writer, gid_of)?;
         let ros_name = ros2_client::NodeName::new(name.namespace(), name.name())
             .map_err(|error| dds(doing("ros2-client's name"), error))?;
         let bell = Bell::new();
         shutdown.ring_at_request(&bell);
         Ok(Self {
             ros_name,
-            graph: Graph::new(shutdown.clone()),
+            graph,
+            turns,
             name,
             participant,
             context,
@@ -97,6 +112,7 @@ impl Core {
             shutdown,
             bell,
             new_workers: Mutex::default(),
+            started: AtomicBool::new(false),
             stopping: AtomicBool::new(false),
             leaving: Mutex::default(),
         })
@@ -107,10 +123,17 @@ impl Core {
     pub(crate) fn info_reader(self: &Arc<Self>) -> RosResult<Reader> {
         let qos = Qos::tf_static().depth(1000).to_dds();
         let topic = make_topic(&self.participant, INFO_TOPIC.into(), INFO_TYPE.into(), &qos)?;
-        let reader: RawReader = self
-            .subscriber
-            .create_simple_datareader_no_key(&topic, Some(qos))
-            .map_err(|error| dds(format!("node {}: read {INFO_TOPIC}", self.name), error))?;
+        let make = || -> RosResult<RawReader> {
+            self.subscriber
+                .create_simple_datareader_no_key(&topic, Some(qos.clone()))
+                .map_err(|error| dds(format!("node {}: read {INFO_TOPIC}", self.name), error))
+        };
+        let planned = Planned {
+            counterpart: gid_of(&self.info_writer),
+            ..Planned::on(INFO_TOPIC, &qos, false)
+        };
+        let gid = |reader: &RawReader| Some(reader.guid().into());
+        let reader = self.turns.make(&self.graph, planned, make, gid)?;
         let options = ReaderOptions {
             bell: Arc::clone(&self.bell),
             helper: None,
@@ -131,10 +154,16 @@ impl Core {
         bell: Arc<Bell>,
     ) -> RosResult<(Reader, EndpointGuard)> {
         let topic = self.topic(kind, name, type_name, qos)?;
-        let reader: RawReader = self
-            .subscriber
-            .create_simple_datareader_no_key(&topic, Some(qos.to_dds()))
-            .map_err(|error| dds(format!("subscribe to {name}"), error))?;
+        let dds_qos = qos.to_dds();
+        let make = || -> RosResult<RawReader> {
+            self.subscriber
+                .create_simple_datareader_no_key(&topic, Some(dds_qos.clone()))
+                .map_err(|error| dds(format!("subscribe to {name}"), error))
+        };
+        let dds_name = topic.name();
+        let planned = Planned::on(&dds_name, &dds_qos, false);
+        let gid = |reader: &RawReader| Some(reader.guid().into());
+        let reader = self.turns.make(&self.graph, planned, make, gid)?;
         let gid = Gid::from(reader.guid());
         let guard = self.register(gid, Side::Reads, kind, name, type_name, qos);
         let helped = !Arc::ptr_eq(&bell, &self.bell);
@@ -163,12 +192,16 @@ impl Core {
         type_name: &str,
         qos: Qos,
     ) -> RosResult<(RawWriter, EndpointGuard)> {
-        use rustdds::RTPSEntity;
         let topic = self.topic(kind, name, type_name, qos)?;
-        let writer: RawWriter = self
-            .publisher
-            .create_datawriter_no_key(&topic, Some(qos.to_dds()))
-            .map_err(|error| dds(format!("publish {name}"), error))?;
+        let dds_qos = qos.to_dds();
+        let make = || -> RosResult<RawWriter> {
+            self.publisher
+                .create_datawriter_no_key(&topic, Some(dds_qos.clone()))
+                .map_err(|error| dds(format!("publish {name}"), error))
+        };
+        let dds_name = topic.name();
+        let planned = Planned::on(&dds_name, &dds_qos, true);
+        let writer = self.turns.make(&self.graph, planned, make, gid_of)?;
         let guard = self.register(
             Gid::from(writer.guid()),
             Side::Writes,
@@ -223,6 +256,9 @@ impl Core {
     /// Tells peers which endpoints this node has now; once it is stopping, that it has gone.
     pub(crate) fn announce(&self) {
         let local = lock(&self.local);
+        if !self.started.load(Ordering::SeqCst) {
+            return;
+        }
         let mut node = NodeEntitiesInfo::new(self.ros_name.clone());
         for endpoint in local.values() {
             if endpoint.writes {
@@ -252,7 +288,6 @@ impl Core {
     }
 
     pub(crate) fn participant_gid(&self) -> Gid {
-        use rustdds::RTPSEntity;
         Gid::from(self.participant.guid())
     }
 
@@ -325,6 +360,10 @@ impl Core {
         drop(go);
         some_stay
     }
+}
+
+fn gid_of(writer: &RawWriter) -> Option<Gid> {
+    Some(writer.guid().into())
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]

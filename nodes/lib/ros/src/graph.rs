@@ -47,6 +47,9 @@ pub(crate) struct Graph {
     state: Mutex<State>,
     changed: Condvar,
     shutdown: Shutdown,
+    participant: rustdds::GUID,
+    /// Several threads take events from RustDDS; they must not handle them in another order.
+    taking: Mutex<()>,
 }
 
 #[derive(Default)]
@@ -54,21 +57,33 @@ struct State {
     generation: u64,
     /// Peers matched to each local endpoint, and when the last one came.
     matched: BTreeMap<Gid, (BTreeSet<Gid>, Instant)>,
+    /// Local endpoints that discovery has told RustDDS's event loop of.
+    detected: BTreeSet<Gid>,
     /// What each participant says about its nodes.
     participants: BTreeMap<Gid, Vec<NodeInfo>>,
     bells: Vec<Weak<Bell>>,
 }
 
 impl Graph {
-    pub(crate) fn new(shutdown: Shutdown) -> Self {
+    pub(crate) fn new(participant: rustdds::GUID, shutdown: Shutdown) -> Self {
         Self {
             state: Mutex::default(),
             changed: Condvar::new(),
             shutdown,
+            participant,
+            taking: Mutex::default(),
         }
     }
 
-    pub(crate) fn handle(&self, event: &Event) {
+    /// Handles events until there is no next one.
+    pub(crate) fn handle_each(&self, mut next: impl FnMut() -> Option<Event>) {
+        let _taking = lock(&self.taking);
+        while let Some(event) = next() {
+            self.handle(&event);
+        }
+    }
+
+    fn handle(&self, event: &Event) {
         let mut state = lock(&self.state);
         match event {
             Event::RemoteReaderMatched {
@@ -108,9 +123,13 @@ impl Graph {
                     Gid::from(*remote_writer)
                 );
             }
-            Event::ParticipantDiscovered { .. }
-            | Event::ReaderDetected { .. }
-            | Event::WriterDetected { .. } => {}
+            Event::ReaderDetected { reader: endpoint }
+            | Event::WriterDetected { writer: endpoint } => {
+                if endpoint.guid.prefix == self.participant.prefix {
+                    state.detected.insert(endpoint.guid.into());
+                }
+            }
+            Event::ParticipantDiscovered { .. } => {}
             _ => return,
         }
         self.bump(state);
@@ -123,7 +142,9 @@ impl Graph {
     }
 
     pub(crate) fn forget_local(&self, gid: Gid) {
-        lock(&self.state).matched.remove(&gid);
+        let mut state = lock(&self.state);
+        state.matched.remove(&gid);
+        state.detected.remove(&gid);
     }
 
     /// Wakes waiting threads although nothing changed, so that they see a shutdown.
@@ -153,6 +174,16 @@ impl Graph {
             .matched
             .get(&local)
             .map_or(0, |(peers, _)| peers.len())
+    }
+
+    pub(crate) fn is_detected(&self, local: Gid) -> bool {
+        lock(&self.state).detected.contains(&local)
+    }
+
+    pub(crate) fn is_matched(&self, local: Gid, peer: Gid) -> bool {
+        let state = lock(&self.state);
+        let matched = state.matched.get(&local);
+        matched.is_some_and(|(peers, _)| peers.contains(&peer))
     }
 
     /// Sleeps until the peers of a local endpoint have surely matched it too. They do so some
@@ -269,7 +300,7 @@ mod tests {
     #[test]
     fn a_wait_that_begins_after_the_shutdown_ends_too() {
         let shutdown = Shutdown::new();
-        let graph = Graph::new(shutdown.clone());
+        let graph = Graph::new(rustdds::GUID::GUID_UNKNOWN, shutdown.clone());
         shutdown.request();
         // The node's thread has seen the request, and will not wake anybody again.
         graph.wake();

@@ -63,6 +63,7 @@ mod spin;
 mod subscription;
 #[cfg(feature = "testing")]
 pub mod testing;
+mod turns;
 mod wake;
 
 pub use args::RosArgs;

@@ -74,6 +74,8 @@ impl Node {
             Vec::new()
         };
         let rosout = args.rosout.then(|| Rosout::start(&core)).transpose()?;
+        core.started.store(true, Ordering::SeqCst);
+        core.announce();
         Ok(Self {
             running: Arc::new(Running {
                 core,

@@ -35,11 +35,12 @@ pub(crate) fn spawn_thread(core: &Arc<Core>, parameters: &Parameters) -> RosResu
             let mut events = pin!(listener.as_async_status_stream());
             let waker = core.bell.waker();
             loop {
-                while let Poll::Ready(Some(event)) =
-                    events.as_mut().poll_next(&mut Context::from_waker(&waker))
-                {
-                    core.graph.handle(&event);
-                }
+                core.graph.handle_each(|| {
+                    match events.as_mut().poll_next(&mut Context::from_waker(&waker)) {
+                        Poll::Ready(event) => event,
+                        Poll::Pending => None,
+                    }
+                });
                 workers.append(&mut lock(&core.new_workers));
                 workers.retain_mut(|worker| worker());
                 if core.shutdown.is_requested() {
