@@ -1,7 +1,6 @@
 //! Smoothing that follows the motion: how much is learnt around each time.
 
 use crate::SpatialError;
-use crate::banded::Banded;
 use crate::equations::{PenaltyWeights, Scratch, SplineEquations};
 use crate::fourth_differences::{MEDIAN_OF_SQUARE, fourth_difference, white_noise_variance};
 use crate::weight_search::LOWEST_LOG_WEIGHT;
@@ -26,15 +25,22 @@ const EXPECTED_COUNT: f64 = 0.01;
 /// some stay it; from 18 Hz it finds the same. Chosen on seeds 100 to 147 of `tests/bursts`, which
 /// scores others.
 const FIRST_CUTOFF_HZ: f64 = 12.0;
+/// Rate at which a noise is stated, Hz: white noise of the same density has a variance that grows
+/// with the rate.
+const STATED_AT_HZ: f64 = 100.0;
+/// What the expected noise counts beside the samples, in samples. It decides where they are
+/// interpolated, because then nothing of them is left to tell the noise from, as of errors that were
+/// low-passed before. Chosen among 0.003 to 0.1 on seeds 100 to 147 of `tests/bursts`, which scores
+/// others, and on ten trials of a tracked IMU.
+const EXPECTED_NOISE_COUNT: f64 = 0.01;
 /// Steps towards the greatest likelihood. More hardly change the error, and carry what a clip's ends
-/// say farther inwards. Chosen among 4 to 40 as [`SHARED_DRIVE_S`].
-const STEPS: usize = 6;
-/// Steps that are taken whole; those that follow go half the way, so that they do not swing.
-const WHOLE_STEPS: usize = 2;
+/// say farther inwards. Chosen among 3 to 40 as [`FIRST_CUTOFF_HZ`].
+const STEPS: usize = 4;
 /// With fewer samples noise and motion cannot be told apart; live, the first sample is due with the
 /// eleventh frame.
 pub(crate) const FEWEST_ADAPTIVE: usize = 8;
-/// Steps at each move of a window, live: a frame is seen some ten times before it is due.
+/// Steps at each move of a window, live: a frame is seen some ten times before it is due. They go
+/// half the way, so that they do not swing.
 const STEPS_A_FRAME: usize = 2;
 /// Least part of an observation that decides about the noise or the drive, against division by
 /// nothing.
@@ -45,6 +51,7 @@ const LEAST_NOISE_AT_ALL: f64 = 1e-15;
 /// Largest weight, a cutoff of a sixtieth of the samples' rate: where weights differ from interval to
 /// interval, larger ones leave too few of the sixteen digits.
 const LARGEST_WEIGHT: f64 = 1e10;
+
 /// What is learnt of a series: how strongly the motion is driven around each time, and how large
 /// the noise is there.
 ///
@@ -56,6 +63,7 @@ const LARGEST_WEIGHT: f64 = 1e10;
 /// s(t) = sum_k K(t - t_k) |f5_k|^2      / sum_k K(t - t_k) (1 - V(f5_k) / s_k)        f5_k the fifth derivative over interval k
 /// r(t) = sum_k K(t - t_k) |y_k - f_k|^2 / sum_k K(t - t_k) (1 - V(f_k) / r_k)
 /// ```
+/// and to each sum what is expected is added with its count, see the constants above.
 /// K is a symmetric kernel, so that what is learnt at t depends on the samples near t alone: the
 /// same seconds of a longer series give the same estimate.
 #[derive(Clone, Debug)]
@@ -65,12 +73,17 @@ pub(crate) struct Adaptation {
     /// Variance of each sample's noise, unit^2.
     noise: Vec<f64>,
     least_noise: f64,
-    steps: usize,
+    /// Variance that is expected of the noise, unit^2.
+    expected_noise: f64,
 }
 
 impl Adaptation {
     /// The start: noise as fourth differences show it, and one motion at all times.
-    fn start<const C: usize>(equations: &SplineEquations, values: &[[f64; C]]) -> Self {
+    fn start<const C: usize>(
+        equations: &SplineEquations,
+        values: &[[f64; C]],
+        expected_noise: f64,
+    ) -> Self {
         let least_noise = (LEAST_NOISE * range(values))
             .max(LEAST_NOISE_AT_ALL)
             .powi(2);
@@ -80,19 +93,20 @@ impl Adaptation {
             drive: vec![drive; equations.interval_count()],
             noise: vec![noise; values.len()],
             least_noise,
-            steps: 0,
+            expected_noise: expected_noise.powi(2) / (STATED_AT_HZ * equations.interval),
         }
     }
 
-    /// Learns from a whole series.
+    /// Learns from a whole series; `expected_noise` as in [`crate::Smoothing::Adaptive`].
     pub(crate) fn learn<const C: usize>(
         equations: &SplineEquations,
         values: &[[f64; C]],
+        expected_noise: f64,
     ) -> Result<Self, SpatialError> {
-        let mut adaptation = Self::start(equations, values);
-        let (mut scratch, mut inverse) = (Scratch::default(), Banded::default());
+        let mut adaptation = Self::start(equations, values, expected_noise);
+        let (projected, mut scratch) = (equations.projected(values), Scratch::default());
         for _ in 0..STEPS {
-            adaptation.step(equations, values, &mut scratch, &mut inverse)?;
+            adaptation.step(equations, values, &projected, Stride::Whole, &mut scratch)?;
         }
         Ok(adaptation)
     }
@@ -103,11 +117,12 @@ impl Adaptation {
         &mut self,
         equations: &SplineEquations,
         values: &[[f64; C]],
+        expected_noise: f64,
         dropped: usize,
     ) -> Result<(), SpatialError> {
         let kept = self.noise.len().saturating_sub(dropped);
         if kept < 2 || kept > values.len() {
-            *self = Self::learn(equations, values)?;
+            *self = Self::learn(equations, values, expected_noise)?;
             return Ok(());
         }
         self.noise.drain(..dropped);
@@ -115,9 +130,9 @@ impl Adaptation {
         let (noise, drive) = (self.noise[kept - 1], self.drive[kept - 2]);
         self.noise.resize(values.len(), noise);
         self.drive.resize(values.len() - 1, drive);
-        let (mut scratch, mut inverse) = (Scratch::default(), Banded::default());
+        let (projected, mut scratch) = (equations.projected(values), Scratch::default());
         for _ in 0..STEPS_A_FRAME {
-            self.step(equations, values, &mut scratch, &mut inverse)?;
+            self.step(equations, values, &projected, Stride::Half, &mut scratch)?;
         }
         Ok(())
     }
@@ -148,66 +163,84 @@ impl Adaptation {
         &mut self,
         equations: &SplineEquations,
         values: &[[f64; C]],
+        projected: &[[f64; C]],
+        stride: Stride,
         scratch: &mut Scratch<C>,
-        inverse: &mut Banded,
     ) -> Result<(), SpatialError> {
         let weights = self.weights();
         // Not refined: squares are all that is wanted of it.
-        equations.solve_refined(values, PenaltyWeights::Local(&weights), 0, scratch)?;
-        scratch.factor.inverse_band(inverse);
-        let free = |share: f64| (1.0 - share).max(LEAST_FREE);
-        let expected = 1.0 / equations.weight_of_cutoff(EXPECTED_CUTOFF_HZ);
-        let mut drives = Sums::default();
-        for (k, weight) in weights.iter().enumerate() {
-            let (square, variance) = equations.drive_over(k, &scratch.coefficients, inverse);
-            drives
-                .squares
-                .push(square + EXPECTED_COUNT * expected * self.noise_over(k));
-            drives.counts.push(free(weight * variance) + EXPECTED_COUNT);
-        }
-        let mut residuals = Sums::default();
-        for (k, value) in values.iter().enumerate() {
-            let (square, variance) =
-                equations.residual_at(k, value, &scratch.coefficients, inverse);
-            residuals.squares.push(square);
-            residuals.counts.push(free(variance));
-        }
-        let whole = self.steps < WHOLE_STEPS;
-        let found = drives.local_means(SHARED_DRIVE_S / equations.interval);
+        let local = PenaltyWeights::Local(&weights);
+        equations.solve_projected(values, projected, local, scratch)?;
+        let (drives, residuals) = self.evidence(equations, values, &weights, scratch);
+        let found = local_means(drives, SHARED_DRIVE_S / equations.interval);
         for (drive, found) in self.drive.iter_mut().zip(found) {
-            *drive = if whole {
-                found
-            } else {
-                (*drive * found).sqrt()
+            *drive = match stride {
+                Stride::Whole => found,
+                Stride::Half => (*drive * found).sqrt(),
             };
         }
-        let found = residuals.local_means(SHARED_NOISE_S / equations.interval);
+        let found = local_means(residuals, SHARED_NOISE_S / equations.interval);
         for (noise, found) in self.noise.iter_mut().zip(found) {
             *noise = found.max(self.least_noise);
         }
-        self.steps += 1;
         Ok(())
     }
-}
 
-/// Sums of squares, and of what each counts.
-#[derive(Default)]
-struct Sums {
-    squares: Vec<f64>,
-    counts: Vec<f64>,
-}
-
-impl Sums {
-    /// Means around each entry, by a kernel of this standard deviation.
-    fn local_means(mut self, intervals: f64) -> impl Iterator<Item = f64> {
-        let kernel = Kernel::new(intervals.max(LEAST_SHARED_INTERVALS));
-        kernel.smooth(&mut self.squares);
-        kernel.smooth(&mut self.counts);
-        self.squares
-            .into_iter()
-            .zip(self.counts)
-            .map(|(square, count)| (square / count).max(f64::MIN_POSITIVE))
+    /// What each knot interval says about the drive, and each sample about the noise.
+    fn evidence<const C: usize>(
+        &self,
+        equations: &SplineEquations,
+        values: &[[f64; C]],
+        weights: &[f64],
+        scratch: &Scratch<C>,
+    ) -> (Vec<Evidence>, Vec<Evidence>) {
+        let free = |share: f64| (1.0 - share).max(LEAST_FREE);
+        let expected = EXPECTED_COUNT / equations.weight_of_cutoff(EXPECTED_CUTOFF_HZ);
+        let noise_count = if self.expected_noise > 0.0 {
+            EXPECTED_NOISE_COUNT
+        } else {
+            0.0
+        };
+        let coefficients = &scratch.coefficients;
+        let mut drives = vec![Evidence::default(); weights.len()];
+        let mut residuals = vec![Evidence::default(); values.len()];
+        scratch.factor.for_each_inverse_block(|k, block| {
+            let (square, variance) = equations.drive_over(k, coefficients, block);
+            drives[k] = [
+                square + expected * self.noise_over(k),
+                free(weights[k] * variance) + EXPECTED_COUNT,
+            ];
+            // The last interval's functions are those of two samples.
+            let end = if k + 1 == weights.len() { k + 2 } else { k + 1 };
+            for sample in k..end {
+                let (square, variance) =
+                    equations.residual_at(sample, &values[sample], coefficients, block);
+                residuals[sample] = [
+                    square + EXPECTED_NOISE_COUNT * self.expected_noise,
+                    free(variance) + noise_count,
+                ];
+            }
+        });
+        (drives, residuals)
     }
+}
+
+/// How far a step goes, in the logarithm of the drive.
+#[derive(Clone, Copy)]
+enum Stride {
+    Whole,
+    Half,
+}
+
+/// A sum of squares, and what it counts.
+type Evidence = [f64; 2];
+
+/// Means around each entry, by a kernel of this standard deviation.
+fn local_means(mut evidence: Vec<Evidence>, intervals: f64) -> impl Iterator<Item = f64> {
+    Kernel::new(intervals.max(LEAST_SHARED_INTERVALS)).smooth(&mut evidence);
+    evidence
+        .into_iter()
+        .map(|[square, count]| (square / count).max(f64::MIN_POSITIVE))
 }
 
 /// Largest distance of a sample from the first, over all channels.
@@ -244,18 +277,21 @@ impl Kernel {
     }
 
     /// Weighted sums in place; a quotient of two of them is a weighted mean.
-    fn smooth(&self, values: &mut [f64]) {
-        for _ in 0..2 {
-            let given = values.to_vec();
-            let mut sum = 0.0;
+    fn smooth(&self, values: &mut [Evidence]) {
+        let mut given = values.to_vec();
+        for pass in 0..2 {
+            if pass > 0 {
+                given.copy_from_slice(values);
+            }
+            let mut sum = Evidence::default();
             for (value, own) in values.iter_mut().zip(&given) {
-                sum = sum * self.decay + own;
+                sum = std::array::from_fn(|c| sum[c] * self.decay + own[c]);
                 *value = sum;
             }
-            let mut sum = 0.0;
+            let mut sum = Evidence::default();
             for (value, own) in values.iter_mut().zip(&given).rev() {
-                *value += sum;
-                sum = (sum + own) * self.decay;
+                *value = std::array::from_fn(|c| value[c] + sum[c]);
+                sum = std::array::from_fn(|c| (sum[c] + own[c]) * self.decay);
             }
         }
     }

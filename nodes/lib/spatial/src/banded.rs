@@ -25,9 +25,11 @@ impl Banded {
         row: &[f64; BANDWIDTH + 1],
         weight: f64,
     ) {
-        for i in 0..=BANDWIDTH {
+        let mut rows = self.rows[first..].iter_mut();
+        for (i, own) in row.iter().enumerate() {
+            let Some(entries) = rows.next() else { return };
             for j in 0..=i {
-                self.rows[first + i][i - j] += weight * row[i] * row[j];
+                entries[i - j] += weight * own * row[j];
             }
         }
     }
@@ -79,22 +81,11 @@ impl Factor {
         self.rows.reserve(size);
         let (mut log_determinant, mut product) = (0.0, 1.0_f64);
         for i in 0..size {
-            // `scaled[k]` is L(i, i - k) D(i - k): computed from the far column to the near one.
-            let reach = BANDWIDTH.min(i);
             let given = matrix_row(i);
-            let mut scaled = [0.0; BANDWIDTH + 1];
-            let mut row = [0.0; BANDWIDTH + 1];
-            let mut diagonal = given[0];
-            for k in (1..=reach).rev() {
-                let other = &self.rows[i - k];
-                let mut entry = given[k];
-                for n in k + 1..=reach {
-                    entry -= scaled[n] * other[n - k];
-                }
-                scaled[k] = entry;
-                row[k] = entry * other[0];
-                diagonal -= entry * row[k];
-            }
+            let (mut row, diagonal) = match self.rows.last_chunk::<BANDWIDTH>() {
+                Some(above) => eliminate(above, &given),
+                None => eliminate(&self.rows, &given),
+            };
             if !(diagonal > 0.0 && diagonal.is_finite()) {
                 return Err(SpatialError::Singular { index: i });
             }
@@ -110,28 +101,52 @@ impl Factor {
         Ok(())
     }
 
-    /// The entries of `M^-1` within the band, in O(N) (Takahashi, Fagan and Chin 1973): from `Z =
-    /// D^-1 L^-1 + (1 - L^T) Z`, the last row first.
-    pub(crate) fn inverse_band(&self, inverse: &mut Banded) {
+    /// Visits the blocks of `M^-1` on its diagonal, the last first: where each begins, and its
+    /// entries. O(N) (Takahashi, Fagan and Chin 1973): from `Z = D^-1 L^-1 + (1 - L^T) Z`.
+    pub(crate) fn for_each_inverse_block(&self, mut visit: impl FnMut(usize, &Block)) {
         let size = self.rows.len();
-        inverse.rows.clear();
-        inverse.rows.resize(size, [0.0; BANDWIDTH + 1]);
+        let mut block: Block = [[0.0; BANDWIDTH + 1]; BANDWIDTH + 1];
         for i in (0..size).rev() {
-            let below = BANDWIDTH.min(size - 1 - i);
-            let mut column = [0.0; BANDWIDTH + 1];
-            for (j, entry) in column.iter_mut().enumerate().take(below + 1).skip(1) {
-                for k in 1..=below {
-                    let (row, back) = (i + j.max(k), j.abs_diff(k));
-                    *entry -= self.rows[i + k][k] * inverse.rows[row][back];
+            let below: [f64; BANDWIDTH] =
+                std::array::from_fn(|k| self.rows.get(i + k + 1).map_or(0.0, |row| row[k + 1]));
+            let mut diagonal = self.rows[i][0];
+            let mut column = [0.0; BANDWIDTH];
+            for (k, l) in below.iter().enumerate() {
+                for (entry, z) in column.iter_mut().zip(&block[k]) {
+                    *entry -= l * z;
                 }
             }
-            let mut diagonal = self.rows[i][0];
-            for (k, entry) in column.iter().enumerate().take(below + 1).skip(1) {
-                diagonal -= self.rows[i + k][k] * entry;
-                inverse.rows[i + k][k] = *entry;
+            for (l, entry) in below.iter().zip(&column) {
+                diagonal -= l * entry;
             }
-            inverse.rows[i][0] = diagonal;
+            for j in (0..BANDWIDTH).rev() {
+                let above = block[j];
+                block[j + 1][1..].copy_from_slice(&above[..BANDWIDTH]);
+                block[j + 1][0] = column[j];
+            }
+            block[0][0] = diagonal;
+            block[0][1..].copy_from_slice(&column);
+            if i + BANDWIDTH < size {
+                visit(i, &block);
+            }
         }
+    }
+
+    /// The entries of `M^-1` within the band, see [`Factor::for_each_inverse_block`].
+    pub(crate) fn inverse_band(&self) -> Banded {
+        let mut inverse = Banded::zeros(self.rows.len());
+        let last = self.rows.len().saturating_sub(BANDWIDTH + 1);
+        self.for_each_inverse_block(|first, block| {
+            if first == last {
+                for (i, row) in inverse.rows[first..].iter_mut().enumerate() {
+                    (0..=i).for_each(|k| row[k] = block[i][i - k]);
+                }
+            }
+            let rows = inverse.rows[first..].iter_mut().enumerate();
+            rows.zip(block)
+                .for_each(|((k, row), entries)| row[k] = entries[0]);
+        });
+        inverse
     }
 
     /// Natural logarithm of the determinant.
@@ -143,30 +158,27 @@ impl Factor {
     pub(crate) fn solve<const C: usize>(&self, right: &mut [[f64; C]]) {
         for i in 0..right.len() {
             let row = &self.rows[i];
-            let mut x = right[i];
-            for k in 1..=BANDWIDTH.min(i) {
-                let other = &right[i - k];
+            let (above, here) = right.split_at_mut(i);
+            let x = &mut here[0];
+            for (l, other) in row[1..].iter().zip(above.iter().rev()) {
                 for c in 0..C {
-                    x[c] -= row[k] * other[c];
+                    x[c] -= l * other[c];
                 }
             }
-            right[i] = x;
         }
         for i in (0..right.len()).rev() {
-            let row = &self.rows[i];
-            let x = right[i];
             // L^T: row i scatters into the rows above it once it is final; dividing by D first.
-            let mut solved = x;
-            for s in &mut solved {
-                *s *= row[0];
+            let (here, below) = right[i..].split_at_mut(1);
+            let x = &mut here[0];
+            for s in x.iter_mut() {
+                *s *= self.rows[i][0];
             }
-            for k in 1..=BANDWIDTH.min(right.len() - 1 - i) {
-                let (l, below) = (self.rows[i + k][k], right[i + k]);
+            let rows = self.rows[i + 1..].iter().enumerate();
+            for ((k, row), other) in rows.zip(below.iter()).take(BANDWIDTH) {
                 for c in 0..C {
-                    solved[c] -= l * below[c];
+                    x[c] -= row[k + 1] * other[c];
                 }
             }
-            right[i] = solved;
         }
     }
 
@@ -226,6 +238,46 @@ impl Factor {
     }
 }
 
+/// A block on the diagonal of a symmetric matrix, as wide as what the basis functions of one knot
+/// interval share.
+pub(crate) type Block = [[f64; BANDWIDTH + 1]; BANDWIDTH + 1];
+
+/// `row^T block row`.
+pub(crate) fn quadratic_form(block: &Block, row: &[f64; BANDWIDTH + 1]) -> f64 {
+    let mut product = [0.0; BANDWIDTH + 1];
+    for (entries, r) in block.iter().zip(row) {
+        for (sum, entry) in product.iter_mut().zip(entries) {
+            *sum += r * entry;
+        }
+    }
+    product.iter().zip(row).map(|(sum, r)| sum * r).sum()
+}
+
+/// A row of L, its diagonal left out, and the row's entry of D, from the rows above it (the nearest
+/// last) and the matrix' own row.
+#[inline(always)]
+fn eliminate(
+    above: &[[f64; BANDWIDTH + 1]],
+    given: &[f64; BANDWIDTH + 1],
+) -> ([f64; BANDWIDTH + 1], f64) {
+    let reach = above.len();
+    // `scaled[k]` is L(i, i - k) D(i - k): computed from the far column to the near one.
+    let mut scaled = [0.0; BANDWIDTH + 1];
+    let mut row = [0.0; BANDWIDTH + 1];
+    let mut diagonal = given[0];
+    for k in (1..=reach).rev() {
+        let other = &above[reach - k];
+        let mut entry = given[k];
+        for n in k + 1..=reach {
+            entry -= scaled[n] * other[n - k];
+        }
+        scaled[k] = entry;
+        row[k] = entry * other[0];
+        diagonal -= entry * row[k];
+    }
+    (row, diagonal)
+}
+
 /// Where a solution is cut off, as a part of its largest entry.
 const SMALL: f64 = 1e-7;
 
@@ -275,9 +327,9 @@ mod tests {
                 dense[(i - k, i)] = value;
             }
         }
-        let (mut factor, mut found) = (Factor::default(), Banded::default());
+        let mut factor = Factor::default();
         factor.factor(&banded).unwrap();
-        factor.inverse_band(&mut found);
+        let found = factor.inverse_band();
         let inverse = dense.try_inverse().unwrap();
         for i in 0..size {
             for k in 0..=BANDWIDTH.min(i) {

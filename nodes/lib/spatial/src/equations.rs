@@ -1,7 +1,7 @@
 //! The equations of a smoothing spline: everything that depends on the times alone.
 
 use crate::SpatialError;
-use crate::banded::{Banded, Factor};
+use crate::banded::{Banded, Block, Factor, quadratic_form};
 use crate::basis::{Basis, BasisValues, DEGREE, ORDER};
 use crate::difference::MAX_STENCIL;
 use crate::end_derivatives::{EndDerivative, end_derivatives};
@@ -205,17 +205,6 @@ impl SplineEquations {
         let largest = weights.largest();
         let refinements =
             usize::from(largest >= REFINED_ONCE) + usize::from(largest > REFINED_TWICE);
-        self.solve_refined(values, weights, refinements, scratch)
-    }
-
-    /// As [`SplineEquations::solve`], refined so many times.
-    pub(crate) fn solve_refined<const C: usize>(
-        &self,
-        values: &[[f64; C]],
-        weights: PenaltyWeights,
-        refinements: usize,
-        scratch: &mut Scratch<C>,
-    ) -> Result<(), SpatialError> {
         self.factor_into(weights, scratch)?;
         scratch.coefficients.clear();
         scratch.coefficients.resize(self.basis.count(), [0.0; C]);
@@ -231,6 +220,42 @@ impl SplineEquations {
             }
         }
         Ok(())
+    }
+
+    /// As [`SplineEquations::solve`], but not refined, from what [`SplineEquations::projected`] gave.
+    pub(crate) fn solve_projected<const C: usize>(
+        &self,
+        values: &[[f64; C]],
+        projected: &[[f64; C]],
+        weights: PenaltyWeights,
+        scratch: &mut Scratch<C>,
+    ) -> Result<(), SpatialError> {
+        self.factor_into(weights, scratch)?;
+        let coefficients = &mut scratch.coefficients;
+        coefficients.clear();
+        coefficients.extend_from_slice(projected);
+        for end in &self.ends {
+            let (target, weight) = (end.target(values), self.end_weight(end, weights));
+            let beside = coefficients[end.first..].iter_mut();
+            for (entry, b) in beside.zip(&end.row) {
+                (0..C).for_each(|c| entry[c] += b * weight * target[c]);
+            }
+        }
+        scratch.factor.solve(coefficients);
+        Ok(())
+    }
+
+    /// `B^T y` of the samples alone.
+    pub(crate) fn projected<const C: usize>(&self, values: &[[f64; C]]) -> Vec<[f64; C]> {
+        let last_interval = self.basis.interval_count() - 1;
+        let mut projected = vec![[0.0; C]; self.basis.count()];
+        for (k, (value, row)) in values.iter().zip(&self.collocation).enumerate() {
+            let beside = projected[k.min(last_interval)..].iter_mut();
+            for (entry, b) in beside.zip(row) {
+                (0..C).for_each(|c| entry[c] += b * value[c]);
+            }
+        }
+        projected
     }
 
     /// `B^T B + P`, factored.
@@ -368,35 +393,35 @@ impl SplineEquations {
     }
 
     /// Fifth derivative over a knot interval, times the root of its length: mean square over the
-    /// channels, and what `inverse`, the band of `(B^T B + P)^-1`, makes of it.
+    /// channels, and what `block`, the interval's of `(B^T B + P)^-1`, makes of it.
     pub(crate) fn drive_over<const C: usize>(
         &self,
         interval: usize,
         coefficients: &[[f64; C]],
-        inverse: &Banded,
+        block: &Block,
     ) -> (f64, f64) {
         let (row, ease) = (&self.penalty_rows[interval], self.eased[interval]);
         let fifth = combined(&coefficients[interval..], row);
         (
             mean_square(&fifth) / ease,
-            inverse.quadratic_form(interval, row) / ease,
+            quadratic_form(block, row) / ease,
         )
     }
 
-    /// Distance of a sample from the spline: mean square over the channels, and what `inverse` makes
-    /// of the spline's value there.
+    /// Distance of a sample from the spline: mean square over the channels, and what `block`, as in
+    /// [`SplineEquations::drive_over`], makes of the spline's value there.
     pub(crate) fn residual_at<const C: usize>(
         &self,
         sample: usize,
         value: &[f64; C],
         coefficients: &[[f64; C]],
-        inverse: &Banded,
+        block: &Block,
     ) -> (f64, f64) {
         let first = sample.min(self.basis.interval_count() - 1);
         let row = &self.collocation[sample];
         let estimate = combined(&coefficients[first..], row);
         let residual: [f64; C] = std::array::from_fn(|c| value[c] - estimate[c]);
-        (mean_square(&residual), inverse.quadratic_form(first, row))
+        (mean_square(&residual), quadratic_form(block, row))
     }
 
     /// First function and the basis' values and derivatives, per s and s^2, at a time moved into

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
 use crate::adaptive::Adaptation;
+use crate::basis::BasisValues;
 use crate::grid::relative_seconds;
 use crate::{Derivative, Smoothing, SmoothingSpline, SpatialError, SplineSystem, Stamp, so3};
 
@@ -37,8 +38,12 @@ pub struct PoseSmoothing {
 impl PoseSmoothing {
     /// Each as much as the poses around each time ask for.
     pub const ADAPTIVE: Self = Self {
-        position: Smoothing::Adaptive,
-        rotation: Smoothing::Adaptive,
+        position: Smoothing::Adaptive {
+            expected_noise: EXPECTED_POSITION_NOISE_M,
+        },
+        rotation: Smoothing::Adaptive {
+            expected_noise: EXPECTED_ROTATION_NOISE_RAD * QUATERNION_PER_ROTVEC,
+        },
     };
 }
 
@@ -79,6 +84,13 @@ impl SampleVariance {
 /// Variance of a rotation vector per axis over the mean of a quaternion's four components: `q = (1, v
 /// / 2)` for a small v, so that their sum is 3 / 4 of the former.
 const ROTVEC_PER_QUATERNION: f64 = 16.0 / 3.0;
+/// Standard deviation of a quaternion's component over that of a rotation vector: the root of 3 /
+/// 16.
+const QUATERNION_PER_ROTVEC: f64 = 0.433_012_701_892_219_3;
+/// Noise that is expected of poses at 100 Hz where they do not show it, standard deviation per axis,
+/// m and rad: of the size that optical capture has, 0.3 mm and 0.1 degrees.
+const EXPECTED_POSITION_NOISE_M: f64 = 3e-4;
+const EXPECTED_ROTATION_NOISE_RAD: f64 = 0.1 * std::f64::consts::PI / 180.0;
 
 /// What [`PoseSpline::fit_following`] has learnt of the poses so far.
 #[derive(Clone, Debug, Default)]
@@ -173,38 +185,45 @@ impl PoseSpline {
         let PoseAdaptation { position, rotation } = adaptation;
         Ok(Self {
             times: times.clone(),
-            position: SmoothingSpline::fit_following(&times.system, &positions, position, dropped)?,
-            rotation: SmoothingSpline::fit_following(&times.system, &rotations, rotation, dropped)?,
-        })
-    }
-
-    /// How far the motion at a stamp may be off, given the noise that was learnt of the poses; none
-    /// but for [`Smoothing::Adaptive`] of both.
-    pub fn variance(&self, stamp: Stamp) -> Option<SampleVariance> {
-        let (first, values) = self
-            .times
-            .system
-            .equations
-            .basis_at(stamp - self.times.origin);
-        let [_, _, acceleration] = self.position.variance_at(first, &values)?;
-        let [rotation, turning, _] = self.rotation.variance_at(first, &values)?;
-        Some(SampleVariance {
-            acceleration,
-            angular_velocity: ROTVEC_PER_QUATERNION * turning,
-            orientation: ROTVEC_PER_QUATERNION * rotation,
+            position: SmoothingSpline::fit_following(
+                &times.system,
+                &positions,
+                EXPECTED_POSITION_NOISE_M,
+                position,
+                dropped,
+            )?,
+            rotation: SmoothingSpline::fit_following(
+                &times.system,
+                &rotations,
+                EXPECTED_ROTATION_NOISE_RAD * QUATERNION_PER_ROTVEC,
+                rotation,
+                dropped,
+            )?,
         })
     }
 
     /// The motion at a stamp; stamps outside the samples are moved to the nearest end.
     pub fn evaluate(&self, stamp: Stamp) -> Motion {
-        let (first, values) = self
-            .times
-            .system
-            .equations
-            .basis_at(stamp - self.times.origin);
+        let (first, values) = self.basis_at(stamp);
+        self.motion(first, &values)
+    }
+
+    /// As [`PoseSpline::evaluate`], and how far the motion may be off, given the noise that was
+    /// learnt of the poses; this none but for [`Smoothing::Adaptive`] of both.
+    pub fn evaluate_with_variance(&self, stamp: Stamp) -> (Motion, Option<SampleVariance>) {
+        let (first, values) = self.basis_at(stamp);
+        (self.motion(first, &values), self.variance(first, &values))
+    }
+
+    fn basis_at(&self, stamp: Stamp) -> (usize, BasisValues) {
+        let equations = &self.times.system.equations;
+        equations.basis_at(stamp - self.times.origin)
+    }
+
+    fn motion(&self, first: usize, values: &BasisValues) -> Motion {
         let [position, velocity, acceleration] =
-            self.position.combine(first, &values).map(Vector3::from);
-        let [s, s_dot, s_ddot] = self.rotation.combine(first, &values).map(Quaternion::from);
+            self.position.combine(first, values).map(Vector3::from);
+        let [s, s_dot, s_ddot] = self.rotation.combine(first, values).map(Quaternion::from);
         Motion {
             rotation: UnitQuaternion::new_normalize(s),
             position,
@@ -213,6 +232,16 @@ impl PoseSpline {
             angular_velocity: so3::angular_velocity_in_world(&s, &s_dot),
             angular_acceleration: so3::angular_acceleration_in_world(&s, &s_dot, &s_ddot),
         }
+    }
+
+    fn variance(&self, first: usize, values: &BasisValues) -> Option<SampleVariance> {
+        let [_, _, acceleration] = self.position.variance_at(first, values)?;
+        let [rotation, turning, _] = self.rotation.variance_at(first, values)?;
+        Some(SampleVariance {
+            acceleration,
+            angular_velocity: ROTVEC_PER_QUATERNION * turning,
+            orientation: ROTVEC_PER_QUATERNION * rotation,
+        })
     }
 
     /// The spline of the position, m.

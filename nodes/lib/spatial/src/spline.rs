@@ -21,9 +21,13 @@ pub enum Smoothing {
     /// The same, for the sake of a derivative: near the weight of the greatest likelihood that with
     /// the least error of this derivative, found by comparing the halves of the samples.
     AutomaticFor(Derivative),
-    /// As much as the samples around each time ask for: much at rest, little in a burst. The noise
-    /// is learnt from all of them.
-    Adaptive,
+    /// As much as the samples around each time ask for: much at rest, little in a burst.
+    Adaptive {
+        /// Standard deviation of the white noise that is expected where the samples do not say, in
+        /// their unit, at 100 Hz (at other rates of the same density, as the root of the rate); 0
+        /// where nothing is.
+        expected_noise: f64,
+    },
     /// Not at all: the spline passes through the samples (up to 1e-8 of the fifth derivative's
     /// penalty, which steadies gaps).
     Interpolate,
@@ -66,7 +70,7 @@ impl Smoothing {
     ) -> Result<f64, SpatialError> {
         let lowest = 10f64.powf(LOWEST_LOG_WEIGHT);
         match self {
-            Self::Automatic | Self::Adaptive => system.search(values, None),
+            Self::Automatic | Self::Adaptive { .. } => system.search(values, None),
             Self::AutomaticFor(derivative) => system.search(values, Some(derivative)),
             Self::Interpolate => Ok(lowest),
             Self::CutoffHz(rate_hz) if !(rate_hz > 0.0 && rate_hz.is_finite()) => {
@@ -131,8 +135,10 @@ impl<const C: usize> SmoothingSpline<C> {
     ) -> Result<Self, SpatialError> {
         system.equations.check(values)?;
         let (first, centred) = centred(values);
-        if smoothing == Smoothing::Adaptive && values.len() >= FEWEST_ADAPTIVE {
-            let adaptation = Adaptation::learn(&system.equations, &centred)?;
+        if let Smoothing::Adaptive { expected_noise } = smoothing
+            && values.len() >= FEWEST_ADAPTIVE
+        {
+            let adaptation = Adaptation::learn(&system.equations, &centred, expected_noise)?;
             return Self::solved(
                 system,
                 (first, &centred),
@@ -154,21 +160,26 @@ impl<const C: usize> SmoothingSpline<C> {
     pub(crate) fn fit_following(
         system: &Arc<SplineSystem>,
         values: &[[f64; C]],
+        expected_noise: f64,
         adaptation: &mut Option<Adaptation>,
         dropped: usize,
     ) -> Result<Self, SpatialError> {
         if values.len() < FEWEST_ADAPTIVE {
             *adaptation = None;
-            return Self::fit_on(system, values, Smoothing::Adaptive);
+            return Self::fit_on(system, values, Smoothing::Adaptive { expected_noise });
         }
         system.equations.check(values)?;
         let (first, centred) = centred(values);
         let learnt = match adaptation {
             Some(adaptation) => {
-                adaptation.follow(&system.equations, &centred, dropped)?;
+                adaptation.follow(&system.equations, &centred, expected_noise, dropped)?;
                 adaptation
             }
-            None => adaptation.insert(Adaptation::learn(&system.equations, &centred)?),
+            None => adaptation.insert(Adaptation::learn(
+                &system.equations,
+                &centred,
+                expected_noise,
+            )?),
         };
         Self::solved(
             system,
@@ -196,10 +207,8 @@ impl<const C: usize> SmoothingSpline<C> {
             }
         }
         let uncertainty = noise.map(|noise| {
-            let mut inverse = Banded::default();
-            scratch.factor.inverse_band(&mut inverse);
             Arc::new(Uncertainty {
-                inverse,
+                inverse: scratch.factor.inverse_band(),
                 noise: noise.to_vec(),
             })
         });

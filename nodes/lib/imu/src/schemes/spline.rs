@@ -19,14 +19,14 @@ pub(crate) fn fit(
 
 /// The motion at a stamp, and how far it may be off where the spline has learnt that.
 pub(crate) fn sample(spline: &PoseSpline, stamp: Stamp) -> KinematicSample {
-    let motion = spline.evaluate(stamp);
+    let (motion, variance) = spline.evaluate_with_variance(stamp);
     KinematicSample {
         stamp,
         world_from_sensor: Isometry3::from_parts(motion.position.into(), motion.rotation),
         acceleration_in_world: motion.acceleration,
         angular_velocity_in_world: motion.angular_velocity,
         angular_acceleration_in_world: Some(motion.angular_acceleration),
-        variance: spline.variance(stamp).unwrap_or_default(),
+        variance: variance.unwrap_or_default(),
     }
 }
 

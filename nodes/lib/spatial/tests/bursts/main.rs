@@ -9,6 +9,10 @@ mod motion;
 use cromosim_spatial::{Smoothing, SmoothingSpline};
 use motion::{Seen, butterworth, differences, seen};
 
+/// As positions have it.
+const ADAPTIVE: Smoothing = Smoothing::Adaptive {
+    expected_noise: 3e-4,
+};
 const CUTOFFS_HZ: [f64; 5] = [4.0, 6.0, 10.0, 15.0, 20.0];
 /// Seconds at either end that are looked at apart.
 const END_S: f64 = 0.1;
@@ -52,7 +56,7 @@ struct Score {
 }
 
 fn score(seen: &Seen) -> Score {
-    let spline = SmoothingSpline::fit(&seen.seconds, &seen.samples, Smoothing::Adaptive).unwrap();
+    let spline = SmoothingSpline::fit(&seen.seconds, &seen.samples, ADAPTIVE).unwrap();
     let practice = practice(seen);
     let estimates: Vec<[[f64; 3]; 3]> = seen.seconds.iter().map(|&t| spline.evaluate(t)).collect();
     let error = |order: usize| {
@@ -137,7 +141,7 @@ fn bursts_are_followed_better_than_any_fixed_cutoff_does() {
 }
 
 fn fitted(seconds: &[f64], samples: &[[f64; 3]]) -> SmoothingSpline<3> {
-    SmoothingSpline::fit(seconds, samples, Smoothing::Adaptive).unwrap()
+    SmoothingSpline::fit(seconds, samples, ADAPTIVE).unwrap()
 }
 
 /// Three seconds cut out of the whole, against the same seconds of the whole.
