@@ -150,8 +150,17 @@ fn print_bag(path: &Path, reader: &BagReader) {
     for (name, values) in reader.metadata_records() {
         println!(
             "  metadata {name}: {}",
-            values.keys().cloned().collect::<Vec<_>>().join(", ")
+            values
+                .keys()
+                .filter(|key| !key.contains('.'))
+                .cloned()
+                .collect::<Vec<_>>()
+                .join(", ")
         );
+        // Of single placements.
+        for (key, value) in values.iter().filter(|(key, _)| key.contains('.')) {
+            println!("    {key}: {value}");
+        }
     }
 }
 

@@ -24,6 +24,7 @@ mod progress;
 mod reference;
 mod simulate;
 mod simulate_arguments;
+mod simulated_quality;
 mod summary;
 mod train;
 mod trajectory;

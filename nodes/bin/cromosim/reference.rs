@@ -3,16 +3,15 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 use cromosim_bag::{BagOptions, BagReader, BagSummary, BagWriter, Compression};
 use cromosim_body::BodyModel;
 use cromosim_imu::{Device, EffectsFile, Placement, PlacementEffects, Scheme, SensorFrame};
-use cromosim_learned::LearnedSimulator;
-use cromosim_msgs::sensor_msgs::Imu;
+use cromosim_learned::{LearnedSimulator, scheme_for_networks};
 use cromosim_recording::rigid::{RigidContent, parse_rigid};
 use cromosim_recording::{
-    RecordedPlacement, Resimulation, outside_reference, read_effects, read_placements, read_whole,
-    with_stamps, write_resimulated,
+    RecordedPlacement, Resimulated, Resimulation, outside_reference, read_effects, read_placements,
+    read_whole, with_stamps, write_resimulated,
 };
 use cromosim_spatial::Stamp;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
@@ -21,6 +20,7 @@ use rayon::prelude::*;
 use crate::progress::{self, Interrupt};
 use crate::simulate::read_mapping;
 use crate::simulate_arguments::Arguments;
+use crate::simulated_quality::{quality_entries, quality_line};
 
 /// Runs `simulate --reference RECORDING`.
 pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
@@ -32,7 +32,7 @@ pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
             arguments.out.display()
         );
     }
-    let scheme = given_scheme(arguments)?;
+    let scheme = arguments.differentiation()?;
     let reader = BagReader::open(recording)?;
     let body = arguments.body.as_deref().map(BodyModel::read).transpose()?;
     let recorded = read_placements(&reader, body.as_ref())?
@@ -67,7 +67,7 @@ pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
 
 /// Runs `simulate --rigid TRAJECTORY`: the trajectory is the reference of one placement.
 pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()> {
-    let scheme = given_scheme(arguments)?;
+    let scheme = arguments.differentiation()?;
     let name = arguments.placement.as_deref().unwrap_or("body");
     if let Err((_, problem)) = Placement::at_site(name, "left_watch", 1.0) {
         bail!("--placement {name}: {problem}");
@@ -88,11 +88,14 @@ pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()>
         .as_deref()
         .map(LearnedSimulator::find)
         .transpose()?;
-    // What the networks learned on top of.
-    let scheme = scheme.or(learned.as_ref().map(|_| Scheme::Spline));
+    let scheme = scheme.unwrap_or_else(|| match &learned {
+        Some(_) => scheme_for_networks(Scheme::default()).into(),
+        None => Scheme::default().into(),
+    });
     let mapping = read_mapping(arguments.mapping.as_deref(), &[name])?;
     let how = Resimulation {
-        scheme,
+        scheme: Some(scheme),
+        trim: arguments.trim()?,
         effects,
         learned,
         mapping,
@@ -107,22 +110,17 @@ pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()>
         arguments,
     )?;
     println!(
-        "{}: {} messages of {name}, along {}",
+        "{}: {} messages of {name}, along {}{}",
         arguments.out.display(),
         summary.message_count(),
-        trajectory.display()
+        trajectory.display(),
+        quality_line(
+            simulated
+                .iter()
+                .map(|placement| (placement.bandwidth, placement.trimmed_s))
+        )
     );
     Ok(())
-}
-
-/// The scheme of `--scheme`.
-fn given_scheme(arguments: &Arguments) -> anyhow::Result<Option<Scheme>> {
-    arguments
-        .scheme
-        .as_deref()
-        .map(str::parse)
-        .transpose()
-        .context("--scheme")
 }
 
 /// The effects of `--effects`; none without.
@@ -191,16 +189,16 @@ fn rigid_placement(trajectory: &Path, name: &str) -> anyhow::Result<RecordedPlac
 fn simulate_all(
     recorded: &[RecordedPlacement],
     how: &Resimulation,
-) -> anyhow::Result<Vec<Vec<Imu>>> {
+) -> anyhow::Result<Vec<Resimulated>> {
     let interrupt = Interrupt::watch()?;
     let bar = progress::bar(recorded.len() as u64, "simulating, placements");
     let one = |placement: &RecordedPlacement| {
         interrupt.check()?;
-        let messages = how.messages(placement);
+        let simulated = how.simulate(placement);
         bar.inc(1);
-        Ok(messages?)
+        Ok(simulated?)
     };
-    let results: Vec<anyhow::Result<Vec<Imu>>> = recorded.par_iter().map(one).collect();
+    let results: Vec<anyhow::Result<Resimulated>> = recorded.par_iter().map(one).collect();
     bar.finish_and_clear();
     results.into_iter().collect()
 }
@@ -269,9 +267,9 @@ fn from_arguments(arguments: &Arguments) -> Resimulation {
 }
 
 fn write(
-    metadata: BTreeMap<String, String>,
+    mut metadata: BTreeMap<String, String>,
     recorded: &[RecordedPlacement],
-    simulated: &[Vec<Imu>],
+    simulated: &[Resimulated],
     with_references: bool,
     arguments: &Arguments,
 ) -> anyhow::Result<BagSummary> {
@@ -280,6 +278,12 @@ fn write(
         replace: arguments.force,
         ..BagOptions::default()
     };
+    for (placement, simulated) in recorded.iter().zip(simulated) {
+        if let Some(bandwidth) = simulated.bandwidth {
+            let (name, trimmed_s) = (&placement.name, simulated.trimmed_s);
+            metadata.extend(quality_entries(name, Some(bandwidth), trimmed_s));
+        }
+    }
     let mut bag = BagWriter::create(&arguments.out, options)?;
     bag.write_metadata("cromosim", metadata)?;
     let interrupt = Interrupt::watch()?;

@@ -3,29 +3,31 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 use std::sync::Arc;
 
 use anyhow::{Context, bail};
 use cromosim_bag::{BagOptions, BagWriter, Compression};
 use cromosim_body::{BodyModel, ShapedBody};
 use cromosim_imu::{
-    Device, ImuOptions, MountedSensor, MountedSensors, PlacementSet, PoseStd, Scheme,
-    SensorTrajectory, VirtualImu, measure_all, simulate_kinematics_on,
+    Device, Differentiation, ImuMessages, ImuOptions, MountedSensor, MountedSensors, PlacementSet,
+    PoseStd, SensorTrajectory, Trim, VirtualImu, measure_all, median_bandwidth,
+    simulate_kinematics_on,
 };
-use cromosim_learned::{LearnedSimulator, MappingFile, Patch, SiteMotion};
+use cromosim_learned::{LearnedSimulator, MappingFile, Patch, SiteMotion, scheme_for_networks};
 use cromosim_motion::{MotionOptions, SmplMotion, embedded_walk, read_motion_for, read_people};
 use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_msgs::std_msgs::Header;
 use cromosim_recording::{
-    FIRST_STAMP, PlayedPerson, SimulatedPlacement, reading_mapping, write_people, write_people_csv,
+    FIRST_STAMP, PlayedPerson, SimulatedPlacement, reading_mapping, trimmed, write_people,
+    write_people_csv,
 };
-use cromosim_spatial::{PoseTimes, uniform_stamps};
+use cromosim_spatial::{PoseTimes, Stamp, uniform_stamps};
 use indicatif::ProgressBar;
 use rayon::prelude::*;
 
 use crate::progress::Interrupt;
 use crate::simulate_arguments::Arguments;
+use crate::simulated_quality::{quality_entries, quality_line};
 use crate::{body, progress};
 
 /// What is the same for all motions of a call.
@@ -34,6 +36,8 @@ struct Setup {
     placements: PlacementSet,
     devices: Vec<Device>,
     motion: MotionOptions,
+    bandwidth_hz: Option<f64>,
+    trim: Trim,
     seed: u64,
     noise: bool,
     pose_error_correlation_s: f64,
@@ -117,15 +121,14 @@ impl Setup {
     fn new(arguments: &Arguments) -> anyhow::Result<Self> {
         let file = arguments.placements.as_deref();
         let placements = file.map_or_else(|| Ok(PlacementSet::demo()), PlacementSet::read)?;
-        let scheme = arguments
-            .scheme
-            .as_deref()
-            .map(Scheme::from_str)
-            .transpose()
-            .context("--scheme")?;
+        let given = arguments.differentiation()?;
         let placements = placements.map(|placement| {
             let rate_hz = arguments.rate.unwrap_or(placement.rate_hz());
-            let scheme = scheme.unwrap_or(placement.scheme());
+            let scheme = match given {
+                Some(Differentiation::Scheme(scheme)) => scheme,
+                None if arguments.learned.is_some() => scheme_for_networks(placement.scheme()),
+                _ => placement.scheme(),
+            };
             placement.with_rate_hz(rate_hz).with_scheme(scheme)
         });
         let folder = file.and_then(Path::parent).unwrap_or(Path::new("."));
@@ -138,6 +141,8 @@ impl Setup {
             model: body::model(arguments.body.as_deref())?,
             devices,
             motion: arguments.motion.options()?,
+            bandwidth_hz: arguments.bandwidth,
+            trim: arguments.trim()?,
             seed: arguments.seed,
             noise: !arguments.no_noise,
             pose_error_correlation_s: arguments.pose_error_correlation,
@@ -161,18 +166,26 @@ impl Setup {
                 .into_iter()
                 .map(PlayedPerson::of_several)
                 .collect(),
-            Some(path) => vec![PlayedPerson::alone(read_motion_for(
-                path,
-                &self.model,
-                &self.motion,
-            )?)],
+            Some(path) => {
+                let whole = MotionOptions {
+                    start_s: 0.0,
+                    duration_s: None,
+                    ..self.motion.clone()
+                };
+                let motion = read_motion_for(path, &self.model, &whole)?;
+                vec![self.part(&motion)?]
+            }
             None if several => {
                 bail!("--person: the embedded walk has one person; name a motion file")
             }
-            None => vec![PlayedPerson::alone(
-                embedded_walk().slice(self.motion.start_s, self.motion.duration_s)?,
-            )],
+            None => vec![self.part(&embedded_walk())?],
         })
+    }
+
+    /// The part of a motion that is asked for.
+    fn part(&self, motion: &SmplMotion) -> anyhow::Result<PlayedPerson> {
+        let (start_s, duration_s) = (self.motion.start_s, self.motion.duration_s);
+        Ok(PlayedPerson::part(motion, start_s, duration_s)?)
     }
 
     /// All placements of a person, each on whatever core is free.
@@ -184,11 +197,11 @@ impl Setup {
         let PlayedPerson { motion, stamps, .. } = person;
         let shaped = ShapedBody::new(self.model.clone(), &motion.betas)?;
         let sites = MountedSensors::new(&shaped, self.placements.placements())?;
-        if motion.frames.len() < 2 {
+        let played = person.played.clone().count();
+        if played < 2 {
             bail!(
-                "{}: {} frame is no motion; at least 2 are needed",
-                motion.name,
-                motion.frames.len()
+                "{}: {played} frame is no motion; at least 2 are needed",
+                motion.name
             );
         }
         let confidences = motion.confidence.as_deref().unwrap_or_default();
@@ -228,7 +241,9 @@ impl Setup {
     ) -> anyhow::Result<SimulatedPlacement> {
         let (placement, device) = (&self.placements.placements()[index], &self.devices[index]);
         let (name, rate_hz) = (placement.name(), placement.rate_hz());
-        let output = uniform_stamps(trajectory.start(), trajectory.end(), rate_hz)?;
+        let [start, end] = [person.played.start(), person.played.end()]
+            .map(|frame| trajectory.frames()[*frame].stamp);
+        let output = uniform_stamps(start, end, rate_hz)?;
         let options = ImuOptions {
             rate_hz,
             seed: self.seed,
@@ -239,7 +254,16 @@ impl Setup {
             mapping: reading_mapping(&self.mapping, name),
         };
         let mut imu = [VirtualImu::new(device, options)?];
-        let motion = simulate_kinematics_on(times, trajectory, placement.scheme(), &output)?;
+        let by = match self.bandwidth_hz {
+            Some(bandwidth_hz) => Differentiation::Bandwidth(bandwidth_hz),
+            None => placement.scheme().into(),
+        };
+        let motion = simulate_kinematics_on(times, trajectory, by, &output)?;
+        let bandwidth = median_bandwidth(&motion);
+        let Some(span) = self.trim.span(&motion) else {
+            bail!("--trim leaves nothing of {}; give less", person.motion.name);
+        };
+        let trimmed_s = trimmed(&motion, &span);
         let mut correction = match &self.learned {
             Some(networks) => {
                 let patch = Patch::new(shaped, mounted.site())?;
@@ -251,8 +275,12 @@ impl Setup {
             None => None,
         };
         let messages = measure_all(&mut imu, vec![motion], correction.as_mut())?;
-        let messages = messages.into_iter().map(|(_, messages)| messages);
-        let reference = trajectory.frames().iter().map(|frame| PoseStamped {
+        let messages = messages
+            .into_iter()
+            .map(|(_, messages)| messages)
+            .filter(|messages| span.contains(&stamp(messages)));
+        let played = &trajectory.frames()[person.played.clone()];
+        let reference = played.iter().map(|frame| PoseStamped {
             header: Header::new(frame.stamp.nanos, "world"),
             pose: frame.world_from_sensor.into(),
         });
@@ -260,6 +288,8 @@ impl Setup {
             name: name.to_owned(),
             reference: reference.collect(),
             messages: messages.collect(),
+            bandwidth,
+            trimmed_s,
         })
     }
 
@@ -298,6 +328,10 @@ impl Setup {
             ),
         ])
     }
+}
+
+fn stamp(messages: &ImuMessages) -> Stamp {
+    Stamp::from_nanos(messages.data_raw.header.stamp.nanos())
 }
 
 fn names(placements: &PlacementSet) -> Vec<&str> {
@@ -348,7 +382,14 @@ fn simulate_one(
             ..BagOptions::default()
         },
     )?;
-    bag.write_metadata("cromosim", setup.metadata(motion))?;
+    let mut metadata = setup.metadata(motion);
+    for (person, simulated) in people.iter().zip(&simulated) {
+        metadata.extend(simulated.iter().flat_map(|placement| {
+            let name = person.frame(&placement.name);
+            quality_entries(&name, placement.bandwidth, placement.trimmed_s)
+        }));
+    }
+    bag.write_metadata("cromosim", metadata)?;
     bag.attach(
         "placements.yaml",
         "application/yaml",
@@ -364,7 +405,7 @@ fn simulate_one(
     }
     let last = people
         .iter()
-        .filter_map(|person| person.stamps.last())
+        .filter_map(|person| person.stamps.get(*person.played.end()))
         .max()
         .map_or(0.0, |last| *last - FIRST_STAMP);
     let placements = setup.placements.placements().len();
@@ -374,9 +415,15 @@ fn simulate_one(
         String::new()
     };
     Ok(format!(
-        "{}: {} messages, {who}{placements} placements, {last:.2} s of {}",
+        "{}: {} messages, {who}{placements} placements, {last:.2} s of {}{}",
         out.display(),
         summary.message_count(),
-        motion.name
+        motion.name,
+        quality_line(
+            simulated
+                .iter()
+                .flatten()
+                .map(|placement| (placement.bandwidth, placement.trimmed_s))
+        )
     ))
 }

@@ -1,10 +1,11 @@
 //! The arguments of `cromosim simulate`: three modes, and which options each of them takes.
 
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
-use anyhow::bail;
+use anyhow::{Context, bail};
 use clap::Args;
-use cromosim_imu::MAX_RATE_HZ;
+use cromosim_imu::{Differentiation, MAX_RATE_HZ, Scheme, Trim};
 use cromosim_recording::convert::ReadOptions;
 
 use crate::motion_arguments::MotionArguments;
@@ -49,6 +50,19 @@ pub struct Arguments {
     /// normal_tracking or second_difference. With --reference the default is the estimate that a diagnosis uses
     #[arg(long, value_name = "NAME")]
     pub scheme: Option<String>,
+    /// Pass what is below this frequency, Hz, whatever the motion, rather than what the poses
+    /// resolve: a low-pass without delay in place of a scheme
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    pub bandwidth: Option<f64>,
+    /// Leave out so many seconds at either end; auto: as many as are far more uncertain than the
+    /// middle, at most 0.25
+    #[arg(
+        long,
+        value_name = "auto|SECONDS",
+        default_value = "auto",
+        allow_negative_numbers = true
+    )]
+    pub trim: String,
     /// Messages per second rather than the placements' own rate, Hz
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub rate: Option<f64>,
@@ -79,8 +93,8 @@ pub struct Arguments {
     pub motion: MotionArguments,
     /// Networks (motion_capture, motion_capture_60, video, streaming, streaming_video, or a folder
     /// that `cromosim train` wrote) that correct acceleration and angular velocity before the
-    /// device's effects; with --rigid the scheme is then spline unless --scheme names one, as in
-    /// training
+    /// device's effects; the scheme is then spline unless --scheme or the placements name another
+    /// than the default, as in training
     #[arg(long, value_name = "MODEL", help_heading = NETWORKS)]
     pub learned: Option<PathBuf>,
     /// A distribution mapping (a file that `cromosim map` wrote), applied last to the placements
@@ -91,6 +105,9 @@ pub struct Arguments {
     #[arg(long)]
     pub force: bool,
 }
+
+/// The default of `--trim`.
+const AUTO: &str = "auto";
 
 /// What is simulated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -158,6 +175,12 @@ impl Arguments {
                 );
             }
         }
+        if self.bandwidth.is_some() && self.scheme.is_some() {
+            bail!("--bandwidth takes the place of --scheme; give one of them");
+        }
+        if self.bandwidth.is_some() && self.learned.is_some() {
+            bail!("--learned corrects what a scheme estimates, not a --bandwidth; leave one out");
+        }
         if self.device.is_some() && self.effects.is_some() {
             bail!("--device and --effects both say what errs; give one of them");
         }
@@ -165,6 +188,30 @@ impl Arguments {
             bail!("--rigid needs --rate HZ: the messages of the IMU per second");
         }
         Ok(mode)
+    }
+
+    /// What `--scheme` or `--bandwidth` say; none where neither was given.
+    ///
+    /// # Errors
+    /// An unknown scheme.
+    pub fn differentiation(&self) -> anyhow::Result<Option<Differentiation>> {
+        let scheme = self.scheme.as_deref().map(Scheme::from_str).transpose();
+        let scheme = scheme.context("--scheme")?.map(Differentiation::Scheme);
+        Ok(scheme.or(self.bandwidth.map(Differentiation::Bandwidth)))
+    }
+
+    /// What `--trim` says.
+    ///
+    /// # Errors
+    /// Neither `auto` nor seconds.
+    pub fn trim(&self) -> anyhow::Result<Trim> {
+        if self.trim == AUTO {
+            return Ok(Trim::Uncertain);
+        }
+        match self.trim.parse() {
+            Ok(seconds) if (0.0..f64::INFINITY).contains(&seconds) => Ok(Trim::Seconds(seconds)),
+            _ => bail!("--trim {}: expected auto or 0 s or more", self.trim),
+        }
     }
 
     /// The options that were given and that not every mode takes, with the modes that do.
@@ -190,6 +237,7 @@ impl Arguments {
             (self.placement.is_some(), "--placement", RIGID_BODIES),
             (self.device.is_some(), "--device", RIGID_BODIES),
             (self.effects.is_some(), "--effects", RECORDINGS),
+            (self.trim != AUTO, "--trim", NOT_REFERENCE),
             (self.learned.is_some(), "--learned", NOT_REFERENCE),
             (self.mapping.is_some(), "--mapping", NOT_REFERENCE),
             (self.body.is_some(), "--body", NOT_RIGID),

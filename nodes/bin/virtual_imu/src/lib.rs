@@ -11,6 +11,7 @@ use std::time::Duration;
 use anyhow::Context;
 use cromosim_body::BodyModel;
 use cromosim_imu::{MAX_RATE_HZ, Placement, PlacementSet, Scheme};
+use cromosim_learned::scheme_for_networks;
 use cromosim_msgs::builtin_interfaces::Time;
 use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_msgs::diagnostic_msgs::DiagnosticArray;
@@ -191,7 +192,10 @@ pub fn placements(config: &Config) -> anyhow::Result<PlacementSet> {
         } else {
             placement.rate_hz()
         };
-        let scheme = scheme.unwrap_or(placement.scheme());
+        let scheme = scheme.unwrap_or_else(|| match config.learned.as_str() {
+            "" => placement.scheme(),
+            _ => scheme_for_networks(placement.scheme()),
+        });
         placement.with_rate_hz(rate_hz).with_scheme(scheme)
     }))
 }

@@ -25,6 +25,16 @@ pub enum ImuError {
         /// Why, with line and column.
         source: serde_norway::Error,
     },
+    /// A bandwidth that the frames do not resolve.
+    #[error(
+        "bandwidth {bandwidth_hz} Hz: expected more than 0 and at most {highest_hz:.1} Hz, half the rate of the motion's frames"
+    )]
+    Bandwidth {
+        /// What was asked for.
+        bandwidth_hz: f64,
+        /// Half the frames' rate.
+        highest_hz: f64,
+    },
     /// A file of another kind or version.
     #[error("{file}: schema: expected `{expected}`, found `{found}`")]
     Schema {

@@ -59,6 +59,7 @@ mod stream;
 mod stream_adaptive;
 mod stream_spline;
 mod trajectory;
+mod trim;
 mod uncertainty;
 mod virtual_imu;
 
@@ -66,7 +67,7 @@ mod virtual_imu;
 mod test_motions;
 
 pub use channel::{AXES, Channel, PerChannel, Reading};
-pub use cromosim_spatial::SampleVariance;
+pub use cromosim_spatial::{Bandwidth, SampleVariance};
 pub use device::{Device, EMBEDDED_DEVICES};
 pub use effects::{
     DeclaredNoise, Dependence, Dropouts, Effect, EffectKind, EffectSet, EffectSpec, EffectsFile,
@@ -87,9 +88,10 @@ pub use sample::{
     GRAVITY_IN_WORLD, ImuSample, KinematicSample, STANDARD_GRAVITY, track_in_sensor_axes,
 };
 pub use schemes::Scheme;
-pub use simulate::{simulate, simulate_kinematics, simulate_kinematics_on};
+pub use simulate::{Differentiation, simulate, simulate_kinematics, simulate_kinematics_on};
 pub use stream::{StreamOptions, StreamingImu};
 pub use trajectory::{SensorFrame, SensorTrajectory};
+pub use trim::{LONGEST_TRIM_S, Trim, median_bandwidth};
 pub use virtual_imu::{
     ImuMessages, ImuOptions, MotionCorrection, ReadingMapping, RecordedMotion, VirtualImu,
     measure_all, measure_recording,

@@ -29,7 +29,7 @@ fn shipped_placements_are_the_demos_and_a_full_suits() {
         ["left_wrist", "right_ankle", "pelvis", "sternum", "head"]
     );
     assert!(demo.placements().iter().all(|p| p.rate_hz() == 100.0
-        && p.scheme() == Scheme::Spline
+        && p.scheme() == Scheme::default()
         && p.follow() == Follow::Skin));
     assert_eq!(
         demo.get("left_wrist").unwrap().site(),

@@ -3,7 +3,7 @@
 use cromosim_spatial::{KinematicTrack, Stamp};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
-use crate::SampleVariance;
+use crate::{Bandwidth, SampleVariance};
 
 /// Standard gravity, m/s2 (CGPM 1901).
 pub const STANDARD_GRAVITY: f64 = 9.80665;
@@ -26,6 +26,8 @@ pub struct KinematicSample {
     pub angular_acceleration_in_world: Option<Vector3<f64>>,
     /// What errors of the poses leave in it.
     pub variance: SampleVariance,
+    /// Up to which frequency it resolves the motion; none from schemes that do not smooth.
+    pub bandwidth: Option<Bandwidth>,
 }
 
 /// One reading of an IMU, in sensor axes.

@@ -1,5 +1,7 @@
 //! Whole trajectories at once.
 
+use std::fmt;
+
 use cromosim_spatial::{PoseSmoothing, PoseTimes, Stamp, derivative_weights, so3};
 use nalgebra::{Isometry3, Vector3};
 
@@ -37,47 +39,84 @@ pub fn simulate(
 /// As [`simulate`].
 pub fn simulate_kinematics(
     trajectory: &SensorTrajectory,
-    scheme: Scheme,
+    differentiation: impl Into<Differentiation>,
     output: &[Stamp],
 ) -> Result<Vec<KinematicSample>, ImuError> {
-    if let Some(stencil) = scheme.stencil() {
-        return Ok(by_differences(trajectory, stencil, output));
-    }
     let stamps: Vec<_> = trajectory
         .frames()
         .iter()
         .map(|frame| frame.stamp)
         .collect();
-    by_spline(&PoseTimes::new(&stamps)?, trajectory, scheme, output)
+    simulate_kinematics_on(
+        &PoseTimes::new(&stamps)?,
+        trajectory,
+        differentiation,
+        output,
+    )
+}
+
+/// How motions are differentiated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Differentiation {
+    /// By a scheme.
+    Scheme(Scheme),
+    /// By a spline that passes what is below this frequency, Hz, whatever the motion: of zero phase,
+    /// with the response `1 / (1 + (f / bandwidth)^10)`.
+    Bandwidth(f64),
+}
+
+impl fmt::Display for Differentiation {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Scheme(scheme) => scheme.fmt(formatter),
+            Self::Bandwidth(hz) => write!(formatter, "bandwidth {hz} Hz"),
+        }
+    }
+}
+
+impl From<Scheme> for Differentiation {
+    fn from(scheme: Scheme) -> Self {
+        Self::Scheme(scheme)
+    }
 }
 
 /// As [`simulate_kinematics`], with the spline equations of the trajectory's stamps, which all
 /// placements of a clip can share.
 ///
 /// # Errors
-/// As [`simulate`], also where `times` has another number of stamps than the trajectory has frames.
+/// As [`simulate`], also where `times` has another number of stamps than the trajectory has frames;
+/// [`ImuError::Bandwidth`] for one that the frames do not resolve.
 pub fn simulate_kinematics_on(
     times: &PoseTimes,
     trajectory: &SensorTrajectory,
-    scheme: Scheme,
+    differentiation: impl Into<Differentiation>,
     output: &[Stamp],
 ) -> Result<Vec<KinematicSample>, ImuError> {
-    match scheme.stencil() {
-        Some(stencil) => Ok(by_differences(trajectory, stencil, output)),
-        None => by_spline(times, trajectory, scheme, output),
-    }
+    let smoothing = match differentiation.into() {
+        Differentiation::Bandwidth(bandwidth_hz) => {
+            let highest_hz = 0.5 / times.system().interval();
+            if !(bandwidth_hz > 0.0 && bandwidth_hz <= highest_hz) {
+                return Err(ImuError::Bandwidth {
+                    bandwidth_hz,
+                    highest_hz,
+                });
+            }
+            PoseSmoothing::cutoff_hz(bandwidth_hz)
+        }
+        Differentiation::Scheme(scheme) => match scheme.stencil() {
+            Some(stencil) => return Ok(by_differences(trajectory, stencil, output)),
+            None => scheme.smoothing(),
+        },
+    };
+    by_spline(times, trajectory, smoothing, output)
 }
 
 fn by_spline(
     times: &PoseTimes,
     trajectory: &SensorTrajectory,
-    scheme: Scheme,
+    smoothing: PoseSmoothing,
     output: &[Stamp],
 ) -> Result<Vec<KinematicSample>, ImuError> {
-    let smoothing = match scheme {
-        Scheme::AdaptiveSpline => PoseSmoothing::ADAPTIVE,
-        _ => PoseSmoothing::default(),
-    };
     let fitted = spline::fit(times, trajectory.frames(), smoothing)?;
     let errors = SplineVariance::new(times, &fitted, trajectory.frames())?;
     let sample = |&stamp: &Stamp| {
@@ -139,6 +178,7 @@ pub(crate) fn at_frame(scheme: StencilScheme, frames: &[SensorFrame], k: usize) 
         angular_velocity_in_world: angular_velocity,
         angular_acceleration_in_world: None,
         variance: SampleVariance::default(),
+        bandwidth: None,
     }
 }
 
@@ -180,6 +220,7 @@ pub(crate) fn between_frames(at_frames: &[KinematicSample], stamp: Stamp) -> Kin
         angular_velocity_in_world: sum(&|sample| sample.angular_velocity_in_world),
         angular_acceleration_in_world: None,
         variance: SampleVariance::default(),
+        bandwidth: None,
     }
 }
 

@@ -46,6 +46,7 @@ pub(crate) fn wrist(t: f64) -> KinematicSample {
             + about_zy * Vector3::x() * roll[1],
         angular_acceleration_in_world: None,
         variance: SampleVariance::default(),
+        bandwidth: None,
     }
 }
 
@@ -65,6 +66,7 @@ pub(crate) fn spin(t: f64) -> KinematicSample {
         angular_velocity_in_world: angular_velocity,
         angular_acceleration_in_world: Some(Vector3::zeros()),
         variance: SampleVariance::default(),
+        bandwidth: None,
     }
 }
 

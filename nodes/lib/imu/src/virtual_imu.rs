@@ -137,6 +137,8 @@ pub struct RecordedMotion<'a> {
     pub track: &'a KinematicTrack,
     /// When the IMU reads, by its own clock.
     pub stamps: &'a [Stamp],
+    /// What errors of the poses leave at each stamp; empty where that is not known.
+    pub variances: &'a [SampleVariance],
     /// Whether the stamps are those of a recording, which has its losses in them already.
     pub stamps_are_recorded: bool,
 }
@@ -179,7 +181,8 @@ pub fn measure_recording(
         covariances: Covariances::for_device(&device, rate_hz),
         frame_id,
     };
-    let message = |(stamp, reading): (&Stamp, &Reading)| {
+    let none = SampleVariance::default();
+    let message = |((stamp, reading), variance): ((&Stamp, &Reading), &SampleVariance)| {
         let lost = dropouts.as_mut().is_some_and(Dropouts::next_is_lost);
         let sample = ImuSample {
             stamp: *stamp,
@@ -187,13 +190,13 @@ pub fn measure_recording(
             specific_force: reading.specific_force,
             angular_velocity: reading.angular_velocity,
         };
-        let exact = SampleVariance::default();
-        (!lost).then(|| output.messages(sample, &exact).data_raw)
+        (!lost).then(|| output.messages(sample, variance).data_raw)
     };
     Ok(motion
         .stamps
         .iter()
         .zip(&readings)
+        .zip(motion.variances.iter().chain(std::iter::repeat(&none)))
         .filter_map(message)
         .collect())
 }

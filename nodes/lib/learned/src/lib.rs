@@ -59,7 +59,7 @@ pub use network::{Network, PreparedNetwork};
 pub use pairs::{Pair, PairNames, Target};
 pub use patch::{PATCH_POINTS, Patch};
 pub use shape::{Direction, MOST_PARAMETERS, NetworkShape, Tensor};
-pub use simulator::{LearnedSimulator, WholeMotionCorrection};
+pub use simulator::{LearnedSimulator, WholeMotionCorrection, scheme_for_networks};
 pub use site_motion::{NETWORK_RATE_HZ, SiteMotion};
 pub use streaming::{StreamingBatch, StreamingNetwork};
 pub use virtual_pairs::{DrawnWearer, KnownMotion, WearerRanges};

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use cromosim_imu::{KinematicSample, MotionCorrection};
+use cromosim_imu::{KinematicSample, MotionCorrection, Scheme};
 use cromosim_spatial::{Stamp, derivative_weights};
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -22,6 +22,16 @@ pub struct LearnedSimulator {
     input: Input,
     networks: [Network; 2],
     prepared: [PreparedNetwork; 2],
+}
+
+/// The scheme that networks correct: `scheme`, but where that is the default the one that they were
+/// trained on.
+pub fn scheme_for_networks(scheme: Scheme) -> Scheme {
+    if scheme == Scheme::default() {
+        Scheme::Spline
+    } else {
+        scheme
+    }
 }
 
 impl LearnedSimulator {

@@ -1,5 +1,7 @@
 //! A motion in SMPL's joints, whatever file it came from.
 
+use std::ops::RangeInclusive;
+
 use cromosim_body::{BodyPose, Gender, JOINT_COUNT, ShapeSpace};
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -51,6 +53,18 @@ impl SmplMotion {
     /// # Errors
     /// [`MotionError::Setting`] where the part lies outside the motion.
     pub fn slice(&self, start_s: f64, duration_s: Option<f64>) -> Result<Self, MotionError> {
+        Ok(self.of_frames(self.part(start_s, duration_s)?))
+    }
+
+    /// The frames that [`SmplMotion::slice`] takes.
+    ///
+    /// # Errors
+    /// As [`SmplMotion::slice`].
+    pub fn part(
+        &self,
+        start_s: f64,
+        duration_s: Option<f64>,
+    ) -> Result<RangeInclusive<usize>, MotionError> {
         let whole_s = self.duration_s();
         if !(start_s >= 0.0 && start_s <= whole_s) {
             return Err(self.setting(
@@ -70,14 +84,20 @@ impl SmplMotion {
         let end_s = duration_s.map_or(whole_s, |seconds| (start_s + seconds).min(whole_s));
         let last =
             ((end_s * self.rate_hz + 1e-6).floor() as usize).clamp(first, self.frames.len() - 1);
-        Ok(Self {
-            frames: self.frames[first..=last].to_vec(),
+        Ok(first..=last)
+    }
+
+    /// These frames of it.
+    #[must_use]
+    pub fn of_frames(&self, range: RangeInclusive<usize>) -> Self {
+        Self {
+            frames: self.frames[range.clone()].to_vec(),
             confidence: self
                 .confidence
                 .as_ref()
-                .map(|values| values[first..=last].to_vec()),
+                .map(|values| values[range].to_vec()),
             ..self.clone_without_frames()
-        })
+        }
     }
 
     /// The pose at `time_s` after the first frame, clamped to the motion: spherical linear between

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use cromosim_bag::BagError;
 use cromosim_body::BodyError;
-use cromosim_imu::{EffectError, ImuError, Scheme};
+use cromosim_imu::{EffectError, ImuError};
 use cromosim_learned::LearnedError;
 use cromosim_motion::MotionError;
 use cromosim_msgs::{NotABody, NotARotation};
@@ -111,8 +111,11 @@ pub enum RecordingError {
     #[error("--scheme {scheme} cannot undo reference_smoothing; leave --scheme out")]
     CannotUndo {
         /// The scheme.
-        scheme: Scheme,
+        scheme: String,
     },
+    /// Ends that leave nothing.
+    #[error("--trim leaves nothing of the motion; give less")]
+    AllTrimmed,
     /// Two sides of a comparison that share nothing.
     #[error("{what} in common: A has {a}; B has {b}")]
     NothingInCommon {

@@ -41,7 +41,8 @@ pub use messages::{FIRST_STAMP, MessageHeader, smpl_pose, smpl_state, stamp_of_f
 pub use placement::{RecordedPlacement, read_placements, read_poses};
 pub use played::{PlayedPerson, SimulatedPlacement, write_people, write_people_csv};
 pub use resimulation::{
-    Resimulation, outside_reference, read_effects, reading_mapping, with_stamps, write_resimulated,
+    Resimulated, Resimulation, outside_reference, read_effects, reading_mapping, trimmed,
+    with_stamps, write_resimulated,
 };
 pub use trace::{
     PlacementTrace, activities_csv, first_stamp, seconds_to_first_stamp, write_traces,

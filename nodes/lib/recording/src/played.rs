@@ -1,11 +1,12 @@
 //! The people of a motion, and their messages in a bag.
 
 use std::fs;
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use cromosim_bag::{BagReader, BagWriter, write_imu_csv};
-use cromosim_imu::ImuMessages;
-use cromosim_motion::{Person, SmplMotion};
+use cromosim_imu::{Bandwidth, ImuMessages};
+use cromosim_motion::{MotionError, Person, SmplMotion};
 use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_spatial::Stamp;
@@ -22,6 +23,8 @@ pub struct PlayedPerson {
     pub body_id: String,
     /// Of the motion's frames.
     pub stamps: Vec<Stamp>,
+    /// The frames that are played; those around them are for the derivatives.
+    pub played: RangeInclusive<usize>,
 }
 
 /// One placement's results.
@@ -32,17 +35,52 @@ pub struct SimulatedPlacement {
     pub reference: Vec<PoseStamped>,
     /// Each sample, in the two forms of REP-145.
     pub messages: Vec<ImuMessages>,
+    /// Up to which frequency the samples resolve the motion, median; none from schemes that do not
+    /// smooth.
+    pub bandwidth: Option<Bandwidth>,
+    /// What was left out at the beginning and at the end, s.
+    pub trimmed_s: [f64; 2],
 }
+
+/// Poses on either side of a part that are differentiated with it, s: several times what neighbours
+/// share of their smoothing.
+const BESIDE_S: f64 = 0.75;
 
 impl PlayedPerson {
     /// A file's only person, or the chosen one.
     pub fn alone(motion: SmplMotion) -> Self {
         Self {
             stamps: stamps(&motion, 0.0),
+            played: 0..=motion.frames.len().saturating_sub(1),
             motion,
             label: String::new(),
             body_id: "0".to_owned(),
         }
+    }
+
+    /// A part of [`PlayedPerson::alone`], with the frames beside it that its derivatives need: so
+    /// that they are those of the whole.
+    ///
+    /// # Errors
+    /// Where the part lies outside the motion.
+    pub fn part(
+        motion: &SmplMotion,
+        start_s: f64,
+        duration_s: Option<f64>,
+    ) -> Result<Self, MotionError> {
+        let part = motion.part(start_s, duration_s)?;
+        let beside = (BESIDE_S * motion.rate_hz) as usize;
+        let first = part.start().saturating_sub(beside);
+        let last = (part.end() + beside).min(motion.frames.len().saturating_sub(1));
+        let motion = motion.of_frames(first..=last);
+        let lead = part.start() - first;
+        Ok(Self {
+            stamps: stamps(&motion, -(lead as f64) / motion.rate_hz),
+            played: lead..=part.end() - first,
+            motion,
+            label: String::new(),
+            body_id: "0".to_owned(),
+        })
     }
 
     /// One of several people.
@@ -55,6 +93,7 @@ impl PlayedPerson {
         } = person;
         Self {
             stamps: stamps(&motion, begins_s),
+            played: 0..=motion.frames.len().saturating_sub(1),
             motion,
             label,
             body_id: name,
@@ -125,6 +164,7 @@ pub fn write_people<E: From<RecordingError>>(
                 .stamps
                 .iter()
                 .enumerate()
+                .filter(|(frame, _)| person.played.contains(frame))
                 .map(|(frame, stamp)| (stamp.nanos, number, Scheduled::State(person, frame))),
         );
         for (placement, (reference, samples)) in simulated.iter().zip(&topics[number]) {

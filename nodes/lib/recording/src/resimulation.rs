@@ -1,12 +1,14 @@
 //! The IMUs of a recording again, from its reference motion.
 
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use cromosim_bag::BagWriter;
 use cromosim_imu::{
-    DeclaredNoise, EffectKind, EffectSet, EffectsFile, ImuOptions, PlacementEffects,
-    ReadingMapping, RecordedMotion, Scheme, SensorTrajectory, measure_recording,
-    simulate_kinematics, track_in_sensor_axes,
+    Bandwidth, DeclaredNoise, Differentiation, EffectKind, EffectSet, EffectsFile, ImuOptions,
+    KinematicSample, PlacementEffects, ReadingMapping, RecordedMotion, SampleVariance,
+    SensorTrajectory, Trim, measure_recording, median_bandwidth, simulate_kinematics,
+    track_in_sensor_axes,
 };
 use cromosim_learned::{LearnedSimulator, MappingFile, SiteMotion};
 use cromosim_msgs::geometry_msgs::PoseStamped;
@@ -20,10 +22,12 @@ use crate::{RecordedPlacement, RecordingError};
 #[derive(Default)]
 pub struct Resimulation {
     /// The derivative scheme; none: the estimate of the motion that a diagnosis uses.
-    pub scheme: Option<Scheme>,
+    pub scheme: Option<Differentiation>,
+    /// What is left out at the ends where a scheme differentiates and nothing was measured.
+    pub trim: Trim,
     /// What errs at each placement; those that it does not name stay nominal.
     pub effects: EffectsFile,
-    /// Networks that correct the kinematics; they need a scheme.
+    /// Networks that correct the kinematics; they need a scheme, and do nothing to a bandwidth.
     pub learned: Option<LearnedSimulator>,
     /// Maps readings last, at the placements that it names.
     pub mapping: MappingFile,
@@ -96,12 +100,22 @@ pub fn read_effects(
     Ok(effects)
 }
 
+/// The IMU of one placement, simulated again.
+pub struct Resimulated {
+    /// In order of time.
+    pub messages: Vec<Imu>,
+    /// As in [`crate::SimulatedPlacement`].
+    pub bandwidth: Option<Bandwidth>,
+    /// As in [`crate::SimulatedPlacement`].
+    pub trimmed_s: [f64; 2],
+}
+
 impl Resimulation {
     /// One Imu for each measured message, with its stamp; where nothing was measured, at the rate.
     ///
     /// # Errors
     /// Without stamps and rate, and where the reference's motion cannot be estimated.
-    pub fn messages(&self, placement: &RecordedPlacement) -> Result<Vec<Imu>, RecordingError> {
+    pub fn simulate(&self, placement: &RecordedPlacement) -> Result<Resimulated, RecordingError> {
         let name = &placement.name;
         let stamps = self.stamps(placement)?;
         let rate_hz = mean_rate(&stamps);
@@ -111,13 +125,15 @@ impl Resimulation {
             effects: EffectSet::new(),
         };
         let effects = self.effects.placements.get(name).unwrap_or(&nominal);
-        let track = self
+        let (track, samples) = self
             .track(placement, rate_hz, &effects.effects)
             .map_err(|error| error.at(name.clone()))?;
+        let stamps_are_recorded = !placement.measured.is_empty();
         let motion = RecordedMotion {
             track: &track,
             stamps: &stamps,
-            stamps_are_recorded: !placement.measured.is_empty(),
+            variances: &variances_at(&samples, &stamps),
+            stamps_are_recorded,
         };
         let options = ImuOptions {
             rate_hz,
@@ -130,7 +146,19 @@ impl Resimulation {
             ),
             mapping: reading_mapping(&self.mapping, name),
         };
-        Ok(measure_recording(motion, effects, options)?)
+        let mut messages = measure_recording(motion, effects, options)?;
+        let mut trimmed_s = [0.0; 2];
+        if !stamps_are_recorded && !samples.is_empty() {
+            let span = self.trim.span(&samples).ok_or(RecordingError::AllTrimmed)?;
+            trimmed_s = trimmed(&samples, &span);
+            let stamp = |message: &Imu| Stamp::from_nanos(message.header.stamp.nanos());
+            messages.retain(|message| span.contains(&stamp(message)));
+        }
+        Ok(Resimulated {
+            messages,
+            bandwidth: median_bandwidth(&samples),
+            trimmed_s,
+        })
     }
 
     fn stamps(&self, placement: &RecordedPlacement) -> Result<Vec<Stamp>, RecordingError> {
@@ -148,13 +176,13 @@ impl Resimulation {
     }
 
     /// The reference's motion as the diagnosis estimates it, or by a scheme, at least at 200 Hz and
-    /// twice the IMU's rate.
+    /// twice the IMU's rate; of a scheme its samples too.
     fn track(
         &self,
         placement: &RecordedPlacement,
         imu_rate_hz: f64,
         effects: &EffectSet,
-    ) -> Result<KinematicTrack, RecordingError> {
+    ) -> Result<(KinematicTrack, Vec<KinematicSample>), RecordingError> {
         let undone_hz = effects
             .get(EffectKind::ReferenceSmoothing)
             .and_then(|smoothing| smoothing.values().first().copied());
@@ -163,13 +191,15 @@ impl Resimulation {
             let poses = placement.poses();
             let estimate = PoseEstimate::fit(&poses.stamps, &poses.positions, &poses.rotations)
                 .map_err(|source| RecordingError::NotEstimated { source })?;
-            return Ok(undone_hz
+            let estimate = undone_hz
                 .map(|cutoff_hz| estimate.undoing(cutoff_hz))
-                .unwrap_or(estimate)
-                .track_for(imu_rate_hz));
+                .unwrap_or(estimate);
+            return Ok((estimate.track_for(imu_rate_hz), Vec::new()));
         };
         if undone_hz.is_some() {
-            return Err(RecordingError::CannotUndo { scheme });
+            return Err(RecordingError::CannotUndo {
+                scheme: scheme.to_string(),
+            });
         }
         let trajectory = placement.trajectory()?;
         differentiated(&trajectory, scheme, rate_hz, self.learned.as_ref())
@@ -179,19 +209,37 @@ impl Resimulation {
 /// The motion by a scheme and what networks add to it, on a grid from the first frame to the last.
 fn differentiated(
     trajectory: &SensorTrajectory,
-    scheme: Scheme,
+    scheme: Differentiation,
     least_rate_hz: f64,
     networks: Option<&LearnedSimulator>,
-) -> Result<KinematicTrack, RecordingError> {
+) -> Result<(KinematicTrack, Vec<KinematicSample>), RecordingError> {
     let (start, seconds) = (trajectory.start(), trajectory.end() - trajectory.start());
     // A whole number of intervals, so that the grid ends where the reference does.
     let rate_hz = (seconds * least_rate_hz).ceil().max(1.0) / seconds;
     let grid = uniform_stamps(start, trajectory.end(), rate_hz)?;
     let mut motion = simulate_kinematics(trajectory, scheme, &grid)?;
-    if let Some(networks) = networks {
+    if let (Some(networks), Differentiation::Scheme(scheme)) = (networks, scheme) {
         motion = networks.correct(&SiteMotion::rigid(trajectory, scheme)?, &motion)?;
     }
-    Ok(track_in_sensor_axes(&motion, rate_hz))
+    Ok((track_in_sensor_axes(&motion, rate_hz), motion))
+}
+
+/// The variances of the samples that follow the stamps; none without samples.
+fn variances_at(samples: &[KinematicSample], stamps: &[Stamp]) -> Vec<SampleVariance> {
+    let Some(last) = samples.len().checked_sub(1) else {
+        return Vec::new();
+    };
+    let following = |stamp: &Stamp| samples.partition_point(|sample| sample.stamp < *stamp);
+    let at = |stamp: &Stamp| samples[following(stamp).min(last)].variance;
+    stamps.iter().map(at).collect()
+}
+
+/// What a span leaves out of the samples at the beginning and at the end, s.
+pub fn trimmed(samples: &[KinematicSample], span: &RangeInclusive<Stamp>) -> [f64; 2] {
+    match (samples.first(), samples.last()) {
+        (Some(first), Some(last)) => [*span.start() - first.stamp, last.stamp - *span.end()],
+        _ => [0.0; 2],
+    }
 }
 
 /// The white noise that the messages declare, none where it is unknown: density = sigma /
@@ -243,7 +291,7 @@ pub fn outside_reference(placement: &RecordedPlacement) -> Option<String> {
 pub fn write_resimulated<E: From<RecordingError>>(
     bag: &mut BagWriter,
     recorded: &[RecordedPlacement],
-    simulated: &[Vec<Imu>],
+    simulated: &[Resimulated],
     with_references: bool,
     check: impl Fn() -> Result<(), E>,
 ) -> Result<(), E> {
@@ -257,7 +305,7 @@ pub fn write_resimulated<E: From<RecordingError>>(
         let stamp = Stamp::from_nanos(nanos);
         let [samples, references] = &topics[number];
         let written = if is_sample {
-            bag.write(samples, stamp, &simulated[number][index])
+            bag.write(samples, stamp, &simulated[number].messages[index])
         } else {
             let pose = recorded[number].frames[index].world_from_sensor.into();
             let header = Header::new(nanos, "world");
@@ -279,7 +327,7 @@ fn topic(kind: &str, name: &str) -> String {
 /// first.
 fn in_order_of_time(
     recorded: &[RecordedPlacement],
-    simulated: &[Vec<Imu>],
+    simulated: &[Resimulated],
     with_references: bool,
 ) -> Vec<(i64, bool, usize, usize)> {
     let mut order = Vec::new();
@@ -295,6 +343,7 @@ fn in_order_of_time(
         }
         order.extend(
             simulated[number]
+                .messages
                 .iter()
                 .enumerate()
                 .map(|(index, message)| (message.header.stamp.nanos(), true, number, index)),

@@ -69,7 +69,7 @@ pub use fourth_differences::{
 pub use grid::{check_times, relative_seconds, uniform_stamps};
 pub use influence::{Influence, SampleWeights};
 pub use pose_spline::{
-    Motion, PoseAdaptation, PoseSmoothing, PoseSpline, PoseTimes, SampleVariance,
+    Bandwidth, Motion, PoseAdaptation, PoseSmoothing, PoseSpline, PoseTimes, SampleVariance,
     position_channels, rotation_channels,
 };
 pub use rustfft::num_complex::Complex64;

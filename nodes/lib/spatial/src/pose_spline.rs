@@ -36,6 +36,14 @@ pub struct PoseSmoothing {
 }
 
 impl PoseSmoothing {
+    /// A low-pass of zero phase at this frequency for both, Hz, see [`Smoothing::CutoffHz`].
+    pub const fn cutoff_hz(cutoff_hz: f64) -> Self {
+        Self {
+            position: Smoothing::CutoffHz(cutoff_hz),
+            rotation: Smoothing::CutoffHz(cutoff_hz),
+        }
+    }
+
     /// Each as much as the poses around each time ask for.
     pub const ADAPTIVE: Self = Self {
         position: Smoothing::Adaptive {
@@ -67,6 +75,16 @@ pub struct SampleVariance {
     pub angular_velocity: f64,
     /// Of the body's orientation, rad2.
     pub orientation: f64,
+}
+
+/// Up to which frequency a sample resolves the motion: where the smoothing's response is one half,
+/// at most half the rate of the poses, Hz.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bandwidth {
+    /// Of the acceleration.
+    pub acceleration_hz: f64,
+    /// Of the angular velocity.
+    pub angular_velocity_hz: f64,
 }
 
 impl SampleVariance {
@@ -213,6 +231,16 @@ impl PoseSpline {
     pub fn evaluate_with_variance(&self, stamp: Stamp) -> (Motion, Option<SampleVariance>) {
         let (first, values) = self.basis_at(stamp);
         (self.motion(first, &values), self.variance(first, &values))
+    }
+
+    /// Up to which frequency the motion is resolved at a stamp.
+    pub fn bandwidth(&self, stamp: Stamp) -> Bandwidth {
+        let seconds = stamp - self.times.origin;
+        let highest_hz = 0.5 / self.times.system.equations.interval;
+        Bandwidth {
+            acceleration_hz: self.position.cutoff_hz(seconds).min(highest_hz),
+            angular_velocity_hz: self.rotation.cutoff_hz(seconds).min(highest_hz),
+        }
     }
 
     fn basis_at(&self, stamp: Stamp) -> (usize, BasisValues) {

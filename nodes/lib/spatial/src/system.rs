@@ -69,6 +69,11 @@ impl SplineSystem {
         })
     }
 
+    /// Median interval between the samples, s.
+    pub fn interval(&self) -> f64 {
+        self.equations.interval
+    }
+
     /// The runs of samples that a search for a weight looks at, empty where it looks at all; made
     /// when first asked for. Their times count in this system's interval, so that a weight means
     /// the same in all of them.

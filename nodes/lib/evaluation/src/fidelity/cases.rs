@@ -143,6 +143,7 @@ fn imusim(
             angular_velocity_in_world: motion.angular_velocity,
             angular_acceleration_in_world: Some(motion.angular_acceleration),
             variance: Default::default(),
+            bandwidth: None,
         }
     };
     Ok(stamps.iter().map(sample).collect())

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use cromosim_spatial::PoseSmoothing;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -30,10 +31,10 @@ pub enum Scheme {
     Triangle,
     /// Smoothing quintic splines of position and quaternion, the smoothing chosen from the frames,
     /// at any output rate; O(h^4) for acceleration, O(h^5) for angular velocity.
-    #[default]
     Spline,
     /// The same splines, but they follow the motion: much is smoothed at rest, little in a burst, as
     /// the frames around each time ask for; samples state how far they may be off.
+    #[default]
     AdaptiveSpline,
     /// Plain second difference of the position and the turn between the neighbours; O(h^2).
     SecondDifference,
@@ -59,6 +60,14 @@ impl Scheme {
             Self::Spline => "spline",
             Self::AdaptiveSpline => "adaptive_spline",
             Self::SecondDifference => "second_difference",
+        }
+    }
+
+    /// How a spline smooths by this scheme.
+    pub(crate) fn smoothing(self) -> PoseSmoothing {
+        match self {
+            Self::AdaptiveSpline => PoseSmoothing::ADAPTIVE,
+            _ => PoseSmoothing::default(),
         }
     }
 

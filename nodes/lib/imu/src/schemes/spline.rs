@@ -27,6 +27,7 @@ pub(crate) fn sample(spline: &PoseSpline, stamp: Stamp) -> KinematicSample {
         angular_velocity_in_world: motion.angular_velocity,
         angular_acceleration_in_world: Some(motion.angular_acceleration),
         variance: variance.unwrap_or_default(),
+        bandwidth: Some(spline.bandwidth(stamp)),
     }
 }
 

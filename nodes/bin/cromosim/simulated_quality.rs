@@ -1,0 +1,65 @@
+//! What simulated readings are good for, as bags and summaries say it.
+
+use cromosim_imu::Bandwidth;
+
+/// Entries of a bag's metadata about one placement: `bandwidth_hz.NAME` and `trimmed_s.NAME`.
+pub fn quality_entries(
+    name: &str,
+    bandwidth: Option<Bandwidth>,
+    trimmed_s: [f64; 2],
+) -> Vec<(String, String)> {
+    let [start, end] = trimmed_s;
+    let bandwidth = bandwidth.map(|bandwidth| {
+        let Bandwidth {
+            acceleration_hz,
+            angular_velocity_hz,
+        } = bandwidth;
+        (
+            format!("bandwidth_hz.{name}"),
+            format!(
+                "specific force {acceleration_hz:.1}, angular velocity {angular_velocity_hz:.1}"
+            ),
+        )
+    });
+    let trimmed = (
+        format!("trimmed_s.{name}"),
+        format!("start {start:.3}, end {end:.3}"),
+    );
+    bandwidth.into_iter().chain([trimmed]).collect()
+}
+
+/// The end of a summary: the range of the placements' bandwidths, and the most that was left out.
+pub fn quality_line(placements: impl Iterator<Item = (Option<Bandwidth>, [f64; 2])>) -> String {
+    let (mut bandwidths, mut trimmed) = (Vec::new(), [0.0_f64; 2]);
+    for (bandwidth, [start, end]) in placements {
+        bandwidths.extend(bandwidth);
+        trimmed = [trimmed[0].max(start), trimmed[1].max(end)];
+    }
+    let mut line = String::new();
+    if !bandwidths.is_empty() {
+        let range = |value: fn(&Bandwidth) -> f64| {
+            let values = || bandwidths.iter().map(value);
+            let (least, most) = (
+                values().fold(f64::INFINITY, f64::min),
+                values().fold(0.0, f64::max),
+            );
+            if least.round() == most.round() {
+                format!("{least:.0} Hz")
+            } else {
+                format!("{least:.0} to {most:.0} Hz")
+            }
+        };
+        line += &format!(
+            "; resolved up to {} (specific force) and {} (angular velocity)",
+            range(|bandwidth| bandwidth.acceleration_hz),
+            range(|bandwidth| bandwidth.angular_velocity_hz)
+        );
+    }
+    if trimmed != [0.0; 2] {
+        line += &format!(
+            "; {:.2} s at the start and {:.2} s at the end left out as uncertain (--trim 0 keeps them)",
+            trimmed[0], trimmed[1]
+        );
+    }
+    line
+}

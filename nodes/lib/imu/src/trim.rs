@@ -1,0 +1,159 @@
+//! What a motion is good for: which of its ends are too uncertain, up to which frequency it is known.
+
+use std::ops::RangeInclusive;
+
+use cromosim_spatial::Stamp;
+
+use crate::{Bandwidth, KinematicSample};
+
+/// Variance, over the median of the clip and that of the stretch behind the end, from which samples
+/// at an end are left out. Chosen among 5 and 10 on six recorded walks and dances, by how often the
+/// largest specific force stands at an end.
+const UNCERTAIN: f64 = 10.0;
+/// The most that [`Trim::Uncertain`] takes off an end, s. No source.
+pub const LONGEST_TRIM_S: f64 = 0.25;
+/// Where the stretch behind an end ends, s from it.
+const BEHIND_S: f64 = 1.0;
+
+/// What is left out at the ends of a motion, where there are poses on one side only.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Trim {
+    /// The samples at either end whose acceleration or angular velocity is far more uncertain than
+    /// the median of the motion's, and of those behind them, up to [`LONGEST_TRIM_S`].
+    #[default]
+    Uncertain,
+    /// This time at either end, s; 0 leaves nothing out.
+    Seconds(f64),
+}
+
+impl Trim {
+    /// From the first to the last stamp that are left of a motion; none where nothing is, as of one
+    /// without samples. The stamps of `motion` increase.
+    pub fn span(self, motion: &[KinematicSample]) -> Option<RangeInclusive<Stamp>> {
+        let (start, end) = (motion.first()?.stamp, motion.last()?.stamp);
+        let (from, to) = match self {
+            Self::Seconds(seconds) => (start.plus_seconds(seconds), end.plus_seconds(-seconds)),
+            Self::Uncertain => {
+                let first = first_certain(motion, motion.iter()).unwrap_or(start);
+                let last = first_certain(motion, motion.iter().rev()).unwrap_or(end);
+                let (from, to) = (
+                    first.min(start.plus_seconds(LONGEST_TRIM_S)),
+                    last.max(end.plus_seconds(-LONGEST_TRIM_S)),
+                );
+                // A motion that is all ends is kept.
+                if from <= to { (from, to) } else { (start, end) }
+            }
+        };
+        (from <= to).then_some(from..=to)
+    }
+}
+
+/// Median over the motion; none where a sample has none.
+pub fn median_bandwidth(motion: &[KinematicSample]) -> Option<Bandwidth> {
+    let all: Vec<Bandwidth> = motion
+        .iter()
+        .map(|sample| sample.bandwidth)
+        .collect::<Option<_>>()?;
+    (!all.is_empty()).then(|| Bandwidth {
+        acceleration_hz: median(all.iter().map(|bandwidth| bandwidth.acceleration_hz)),
+        angular_velocity_hz: median(all.iter().map(|bandwidth| bandwidth.angular_velocity_hz)),
+    })
+}
+
+/// The first sample from an end on that is as certain as the others.
+fn first_certain<'a>(
+    motion: &[KinematicSample],
+    from_end: impl Iterator<Item = &'a KinematicSample> + Clone,
+) -> Option<Stamp> {
+    let end = from_end.clone().next()?.stamp;
+    let from_the_end = |sample: &KinematicSample| (sample.stamp - end).abs();
+    let limits = [acceleration, angular_velocity].map(|variance| {
+        let behind = from_end
+            .clone()
+            .skip_while(|sample| from_the_end(sample) < LONGEST_TRIM_S)
+            .take_while(|sample| from_the_end(sample) < BEHIND_S);
+        let of_all = median(motion.iter().map(variance));
+        UNCERTAIN * of_all.max(median(behind.map(variance)))
+    });
+    let mut from_end = from_end;
+    let certain = |sample: &&KinematicSample| {
+        acceleration(sample) <= limits[0] && angular_velocity(sample) <= limits[1]
+    };
+    from_end.find(certain).map(|sample| sample.stamp)
+}
+
+/// 0 of nothing.
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    let middle = values.len() / 2;
+    if values.is_empty() {
+        return 0.0;
+    }
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+fn acceleration(sample: &KinematicSample) -> f64 {
+    sample.variance.acceleration
+}
+
+fn angular_velocity(sample: &KinematicSample) -> f64 {
+    sample.variance.angular_velocity
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::test_motions::{START, wrist};
+
+    /// One sample every 10 ms with these variances of acceleration.
+    fn motion(variances: &[f64]) -> Vec<KinematicSample> {
+        let sample = |(k, variance): (usize, &f64)| {
+            let mut sample = wrist(k as f64 * 0.01);
+            sample.variance.acceleration = *variance;
+            sample
+        };
+        variances.iter().enumerate().map(sample).collect()
+    }
+
+    fn seconds(span: &RangeInclusive<Stamp>) -> [f64; 2] {
+        [span.start(), span.end()].map(|stamp| ((*stamp - START) * 100.0).round() / 100.0)
+    }
+
+    #[test]
+    fn uncertain_ends_go_and_uncertain_middles_stay() {
+        let mut variances = vec![1.0; 200];
+        variances[..3].fill(50.0);
+        variances[100] = 1000.0;
+        variances[198..].fill(11.0);
+        let span = Trim::Uncertain.span(&motion(&variances)).unwrap();
+        assert_eq!(seconds(&span), [0.03, 1.97]);
+    }
+
+    #[test]
+    fn at_most_a_quarter_of_a_second_goes() {
+        let mut variances = vec![1.0; 200];
+        variances[..25].fill(f64::INFINITY);
+        let span = Trim::Uncertain.span(&motion(&variances)).unwrap();
+        assert_eq!(seconds(&span), [0.25, 1.99]);
+    }
+
+    #[test]
+    fn a_motion_that_ends_in_a_burst_keeps_it() {
+        let mut variances = vec![1.0; 300];
+        variances[200..].fill(100.0);
+        let span = Trim::Uncertain.span(&motion(&variances)).unwrap();
+        assert_eq!(seconds(&span), [0.0, 2.99]);
+    }
+
+    #[test]
+    fn nothing_goes_where_nothing_is_known_and_what_is_asked_for_goes() {
+        let motion = motion(&[0.0; 100]);
+        let span = Trim::Uncertain.span(&motion).unwrap();
+        assert_eq!(seconds(&span), [0.0, 0.99]);
+        let span = Trim::Seconds(0.2).span(&motion).unwrap();
+        assert_eq!(seconds(&span), [0.2, 0.79]);
+        assert_eq!(Trim::Seconds(0.5).span(&motion), None);
+        assert_eq!(Trim::Uncertain.span(&[]), None);
+    }
+}
