@@ -15,6 +15,7 @@ mod activity;
 mod bootstrap;
 mod error;
 mod fidelity;
+mod low_pass;
 mod mapping;
 mod observer;
 mod report;

@@ -4,6 +4,8 @@
 mod cases;
 mod errors;
 mod method;
+#[allow(dead_code)]
+mod practice;
 mod protocol;
 mod results;
 mod tables;
