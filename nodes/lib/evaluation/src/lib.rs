@@ -30,8 +30,9 @@ pub use activity::{
 };
 pub use error::EvaluationError;
 pub use fidelity::{
-    FidelityOptions, FidelityResults, Method, MethodResults, PositionResults, Protocol, Study,
-    StudyResults, evaluate_fidelity,
+    FidelityOptions, FidelityResults, Method, MethodResults, PhysicsSource, PoseErrors,
+    PositionResults, PracticeResults, Protocol, RigidMethodResults, RigidPartResults, RigidStudy,
+    RigidStudyResults, StatedResults, Study, StudyResults, evaluate_fidelity,
 };
 pub use mapping::fit_mapping;
 pub use observer::{Observer, Unobserved};
