@@ -55,6 +55,8 @@ pub(super) struct CaseErrors {
     pub stated: [StatedErrors; 2],
     /// What was measured, for its size.
     pub measured: Vec<Reading>,
+    /// Why the method gave no readings; all else is empty then.
+    pub failure: Option<String>,
 }
 
 impl RigidCase {
@@ -68,12 +70,21 @@ impl RigidCase {
         self.trajectory.end() - self.trajectory.start()
     }
 
-    /// A method's errors.
+    /// A method's errors, or that it failed.
     ///
     /// # Errors
-    /// Those of the method, and [`EvaluationError::NotAligned`].
+    /// [`EvaluationError::NotAligned`].
     pub fn errors(&self, method: RigidMethod) -> Result<CaseErrors, EvaluationError> {
-        let samples = method.simulate(&self.trajectory, &self.stamps)?;
+        let samples = match method.simulate(&self.trajectory, &self.stamps) {
+            Ok(samples) => samples,
+            Err(error) => {
+                let (motion, position) = (&self.motion, &self.position);
+                return Ok(CaseErrors {
+                    failure: Some(format!("{motion}, {position}: {}: {error}", method.title())),
+                    ..CaseErrors::default()
+                });
+            }
+        };
         let measured = self.measured(&samples)?;
         let mut found = CaseErrors::default();
         for (sample, measured) in samples.iter().zip(&measured) {

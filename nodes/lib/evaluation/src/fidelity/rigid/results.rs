@@ -32,6 +32,8 @@ pub struct RigidStudyResults {
     pub stated: StatedResults,
     /// `adaptive_spline` by motion and by position.
     pub parts: Vec<RigidPartResults>,
+    /// Where a method gave no readings, and why.
+    pub failures: Vec<String>,
 }
 
 /// One method in a study. Pairs of numbers are specific force (m/s2) and angular velocity (rad/s).
@@ -51,6 +53,8 @@ pub struct RigidMethodResults {
     pub ratio_interval: Option<[[f64; 2]; 2]>,
     /// Root mean square errors per axis within 0.1 s of the ends of the poses.
     pub ends_rmse: [f64; 2],
+    /// IMUs for which it gave no readings; they are in none of its errors.
+    pub failed: usize,
 }
 
 /// The practice in hindsight.
@@ -104,6 +108,16 @@ impl RigidStudyResults {
         let ends_rmse =
             [0, 1].map(|channel| scored.pooled(&all, best[channel])[1].per_axis()[channel]);
         let measured = errors.iter().flatten().flat_map(|own| &own.measured);
+        let failures = errors
+            .iter()
+            .flatten()
+            .filter_map(|own| own.failure.clone());
+        let failed = |method: usize| {
+            errors
+                .iter()
+                .filter(|own| own[method].failure.is_some())
+                .count()
+        };
         Self {
             name: study.name.clone(),
             measured: study.measured.clone(),
@@ -112,7 +126,7 @@ impl RigidStudyResults {
             seconds: cases.iter().map(RigidCase::seconds).sum(),
             signal: signal(measured),
             methods: (0..methods.len())
-                .map(|method| scored.method(method, &all))
+                .map(|method| scored.method(method, &all, failed(method)))
                 .collect(),
             practice: PracticeResults {
                 cutoff_hz: best.map(|method| methods[method].cutoff_hz().unwrap_or_default()),
@@ -121,6 +135,7 @@ impl RigidStudyResults {
             },
             stated: scored.stated(&all),
             parts: scored.parts(cases, errors, best),
+            failures: failures.collect(),
         }
     }
 }
@@ -197,7 +212,7 @@ impl<'a> Scored<'a> {
         (least, best)
     }
 
-    fn method(&self, method: usize, all: &[usize]) -> RigidMethodResults {
+    fn method(&self, method: usize, all: &[usize], failed: usize) -> RigidMethodResults {
         let ratio = |motions: &[usize]| {
             let (own, (practice, _)) = (self.rmse(motions, method), self.best_practice(motions));
             [own[0] / practice[0], own[1] / practice[1]]
@@ -210,6 +225,7 @@ impl<'a> Scored<'a> {
             ratio: ratio(all),
             ratio_interval: (all.len() > 1).then(|| intervals(all.len(), self.seed, ratio)),
             ends_rmse: pooled[1].per_axis(),
+            failed,
         }
     }
 

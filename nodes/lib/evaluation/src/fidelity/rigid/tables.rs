@@ -21,7 +21,10 @@ pub(in crate::fidelity) fn rigid_markdown(studies: &[RigidStudyResults]) -> Stri
             about(study),
             by_method(study).markdown(),
             by_part(study).markdown()
-        )
+        ) + &failures(study)
+            .iter()
+            .map(|failure| format!("\n- {failure}"))
+            .collect::<String>()
     };
     format!(
         "\n{}\n{}",
@@ -54,11 +57,14 @@ pub(in crate::fidelity) fn rigid_sections(studies: &[RigidStudyResults]) -> Vec<
     };
     let own = |study: &RigidStudyResults| Section {
         title: study.name.clone(),
-        blocks: vec![
+        blocks: [
             Block::Text(about(study)),
             Block::Table(by_method(study)),
             Block::Table(by_part(study)),
-        ],
+        ]
+        .into_iter()
+        .chain(failures(study).into_iter().map(Block::Text))
+        .collect(),
     };
     [glance]
         .into_iter()
@@ -117,6 +123,20 @@ fn about(study: &RigidStudyResults) -> String {
     )
 }
 
+/// Where a method gave no readings, a sentence each.
+fn failures(study: &RigidStudyResults) -> Vec<String> {
+    let sentence = |failure: &String| format!("No readings: {failure}.");
+    study.failures.iter().map(sentence).collect()
+}
+
+/// How many IMUs a method's errors are about, where it failed on some.
+fn without_failed(text: String, own: &RigidMethodResults, study: &RigidStudyResults) -> String {
+    match own.failed {
+        0 => text,
+        failed => format!("{text} ({} of {})", study.bodies - failed, study.bodies),
+    }
+}
+
 fn pair(rmse: [f64; 2]) -> String {
     format!("{:.2}, {:.3}", rmse[0], rmse[1])
 }
@@ -133,7 +153,9 @@ fn errors(studies: &[RigidStudyResults]) -> Table {
     let row = |study: &RigidStudyResults| {
         let cell = |title: &String| {
             let own = study.methods.iter().find(|own| own.method == *title);
-            own.map_or_else(String::new, |own| pair(own.rmse))
+            own.map_or_else(String::new, |own| {
+                without_failed(pair(own.rmse), own, study)
+            })
         };
         let [force, rate] = study.practice.cutoff_hz;
         let best = format!("{} ({force:.0}, {rate:.0} Hz)", pair(study.practice.rmse));
@@ -202,7 +224,7 @@ fn by_method(study: &RigidStudyResults) -> Table {
         ]);
     }
     let row = |own: &RigidMethodResults| {
-        let mut cells = vec![own.method.clone()];
+        let mut cells = vec![without_failed(own.method.clone(), own, study)];
         for (index, (.., digits)) in QUANTITIES.iter().enumerate() {
             let interval = own.ratio_interval.map(|ratio| ratio[index]);
             cells.extend([
