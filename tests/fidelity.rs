@@ -245,3 +245,123 @@ fn models_that_come_with_the_suite_are_worth_what_their_evaluation_says() {
         assert!(of(study, "perfect")[0] <= of(study, "learned")[0]);
     }
 }
+
+const RIGID: &str = "\
+schema: cromosim/fidelity/1
+seed: 5
+studies: []
+rigid:
+  - {name: markers, measured: physics, physics: {errors: markers, rate_hz: 120}}
+  - {name: suit, measured: physics, physics: {errors: inertial_suit, rate_hz: 60}}
+  - {name: real, measured: nobody, recordings: [\"none/*.npz\"], optional: true}
+";
+
+const RIGID_COMMAND: [&str; 6] = [
+    "evaluate",
+    "fidelity",
+    "--protocol",
+    "protocol.yaml",
+    "--data",
+    ".",
+];
+
+#[test]
+fn rigid_bodies_are_compared_with_known_readings_and_the_practice() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    fs::write(here.join("protocol.yaml"), RIGID).unwrap();
+    let said = succeed(here, &[&RIGID_COMMAND[..], &["--out", "one"]].concat());
+    assert!(
+        said.contains("practice, best in hindsight") && said.contains("real: skipped: "),
+        "{said}"
+    );
+    let results: serde_json::Value =
+        serde_json::from_slice(&fs::read(here.join("one/results.json")).unwrap()).unwrap();
+    let studies = results["rigid"].as_array().unwrap();
+    assert_eq!(studies.len(), 2);
+    for study in studies {
+        assert_eq!(
+            (&study["motions"], &study["bodies"]),
+            (&6.into(), &36.into())
+        );
+        let of = |name: &str, what: &str| {
+            let methods = study["methods"].as_array().unwrap();
+            let own = methods.iter().find(|own| own["method"] == name).unwrap();
+            [0, 1].map(|channel| own[what][channel].as_f64().unwrap())
+        };
+        // Differences of poses that scatter are mostly noise; no cutoff is better than the best.
+        assert!(of("richardson", "rmse")[0] > 1.5 * of("adaptive_spline", "rmse")[0]);
+        assert!(
+            of("practice, 6 Hz", "ratio")
+                .iter()
+                .all(|ratio| *ratio >= 1.0)
+        );
+        // The estimate that follows the motion does not know the best cutoff, but needs it less.
+        let ratio = of("adaptive_spline", "ratio");
+        assert!(ratio[0] < 1.05 && ratio[1] < 1.0, "{study}");
+        assert!(study["stated"]["middle"][0].as_f64().unwrap() > 0.0);
+    }
+    assert!(here.join("one/rigid_angular_velocity.png").exists());
+    succeed(here, &[&RIGID_COMMAND[..], &["--out", "two"]].concat());
+    for name in ["results.json", "tables.md", "report.html"] {
+        assert!(
+            fs::read(here.join("one").join(name)).unwrap()
+                == fs::read(here.join("two").join(name)).unwrap(),
+            "{name} differs"
+        );
+    }
+    let quick = succeed(
+        here,
+        &[&RIGID_COMMAND[..], &["--out", "quick", "--quick"]].concat(),
+    );
+    assert!(quick.contains("6 motions, 6 IMUs"), "{quick}");
+}
+
+#[test]
+fn rigid_studies_that_cannot_be_run_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let command = [&RIGID_COMMAND[..], &["--out", "out"]].concat();
+    for (from, to, expected) in [
+        ("rate_hz: 120", "rate_hz: 100", "rate_hz 100"),
+        ("rate_hz: 120", "rate_hz: 1", "study markers: rate_hz 1"),
+        ("errors: markers", "errors: magic", "magic"),
+        (
+            "physics: {errors: markers, rate_hz: 120}",
+            "recordings: []",
+            "study markers",
+        ),
+        (", optional: true", "", "none"),
+    ] {
+        fs::write(here.join("protocol.yaml"), RIGID.replace(from, to)).unwrap();
+        refuses(here, &command, &[expected]);
+    }
+    assert!(!here.join("out").exists());
+}
+
+#[test]
+fn real_imus_on_rigid_bodies_are_compared() {
+    let Some(data) = common::shared_data() else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let real = "schema: cromosim/fidelity/1\nseed: 5\nstudies: []\nrigid:\n  \
+                - {name: real, measured: BROAD, recordings: [\"paired_broad/*.npz\"]}\n";
+    fs::write(here.join("protocol.yaml"), real).unwrap();
+    let data = data.display().to_string();
+    let protocol = ["--protocol", "protocol.yaml", "--quick", "--data", &data];
+    let said = succeed(
+        here,
+        &[&["evaluate", "fidelity", "--out", "out"], &protocol[..]].concat(),
+    );
+    assert!(said.contains("2 motions, 2 IMUs"), "{said}");
+    let results: serde_json::Value =
+        serde_json::from_slice(&fs::read(here.join("out/results.json")).unwrap()).unwrap();
+    // A clock, mount or lever arm that is not found leaves metres per second squared.
+    let rmse = &results["rigid"][0]["practice"]["rmse"];
+    assert!(
+        rmse[0].as_f64().unwrap() < 0.5 && rmse[1].as_f64().unwrap() < 0.1,
+        "{rmse}"
+    );
+}

@@ -30,7 +30,8 @@ pub struct Arguments {
     /// embedded one
     #[arg(long, value_name = "FILE")]
     body: Option<PathBuf>,
-    /// Draw one person and device for each motion and site
+    /// Draw one person and device for each motion and site; of rigid bodies, one IMU of each known
+    /// motion and two recordings
     #[arg(long)]
     quick: bool,
     /// Replace what is in DIR

@@ -3,6 +3,7 @@
 use std::io;
 use std::path::PathBuf;
 
+use cromosim_arrays::ArraysError;
 use cromosim_bag::BagError;
 use cromosim_body::BodyError;
 use cromosim_charts::ChartsError;
@@ -89,6 +90,32 @@ pub enum EvaluationError {
         file: String,
         /// The study's name.
         study: String,
+    },
+    /// A study of rigid bodies whose fields do not go together.
+    #[error("{file}: study {study}: {problem}")]
+    RigidStudy {
+        /// The protocol's file.
+        file: String,
+        /// The study's name.
+        study: String,
+        /// What is wrong.
+        problem: String,
+    },
+    /// Poses of a rate at which the known motions have none.
+    #[error(
+        "rate_hz {rate_hz}: the known motions have {truth_hz} Hz, of which it must be a whole part"
+    )]
+    TruthRate {
+        /// The rate that is asked for, Hz.
+        rate_hz: f64,
+        /// That of the motions, Hz.
+        truth_hz: f64,
+    },
+    /// A real IMU that has too little in common with its reference.
+    #[error("{name}: too few readings beside the reference to find the clock and mount of the IMU")]
+    NotAligned {
+        /// The recording and the IMU.
+        name: String,
     },
     /// A pattern with `*` that no file of a folder matches.
     #[error("{}: no file matches {pattern}", folder.display())]
@@ -254,6 +281,9 @@ pub enum EvaluationError {
     /// An effect beyond its bounds.
     #[error(transparent)]
     Effect(#[from] EffectError),
+    /// Arrays that cannot be read.
+    #[error(transparent)]
+    Arrays(#[from] ArraysError),
     /// Kinematics that cannot be had.
     #[error(transparent)]
     Imu(#[from] ImuError),

@@ -15,6 +15,7 @@ mod activity;
 mod bootstrap;
 mod error;
 mod fidelity;
+mod low_pass;
 mod mapping;
 mod observer;
 mod report;
@@ -29,8 +30,9 @@ pub use activity::{
 };
 pub use error::EvaluationError;
 pub use fidelity::{
-    FidelityOptions, FidelityResults, Method, MethodResults, PositionResults, Protocol, Study,
-    StudyResults, evaluate_fidelity,
+    FidelityOptions, FidelityResults, Method, MethodResults, PhysicsSource, PoseErrors,
+    PositionResults, PracticeResults, Protocol, RigidMethodResults, RigidPartResults, RigidStudy,
+    RigidStudyResults, StatedResults, Study, StudyResults, evaluate_fidelity,
 };
 pub use mapping::fit_mapping;
 pub use observer::{Observer, Unobserved};

@@ -1,9 +1,9 @@
 //! From devices' readings to windows on a common grid.
 
-use std::f64::consts::{PI, SQRT_2};
-
 use cromosim_imu::Reading;
 use cromosim_learned::Examples;
+
+use crate::low_pass::ZeroPhaseLowPass;
 
 /// Channels of a device: specific force (m/s2) and angular velocity (rad/s), three axes each.
 pub const CHANNELS_PER_DEVICE: usize = 6;
@@ -59,7 +59,7 @@ impl WindowGrid {
         let count = (samples.max(1) - 1) * every + 1;
         let width = devices.len() * CHANNELS_PER_DEVICE;
         let mut all = vec![0.0; samples * width];
-        let filter = ZeroPhaseLowPass::new(self.low_pass_hz, fine_hz);
+        let filter = ZeroPhaseLowPass::new(self.low_pass_hz, fine_hz).mirroring(MIRRORED);
         for (device, series) in devices.iter().enumerate() {
             let fine = resampled(series, start, count, fine_hz);
             for channel in 0..CHANNELS_PER_DEVICE {
@@ -139,67 +139,11 @@ fn resampled(
     (0..count).map(at).collect()
 }
 
-/// A Butterworth filter of second order by the bilinear transform, run forward and back. It needs
-/// evenly spaced samples and no state between calls, so it shares nothing with the effect
-/// `low_pass`, which runs sample by sample.
-struct ZeroPhaseLowPass {
-    b: [f64; 3],
-    a: [f64; 2],
-}
-
-impl ZeroPhaseLowPass {
-    fn new(cutoff_hz: f64, rate_hz: f64) -> Self {
-        let k = (PI * cutoff_hz / rate_hz).tan();
-        let scale = 1.0 / (1.0 + SQRT_2 * k + k * k);
-        let b = k * k * scale;
-        Self {
-            b: [b, 2.0 * b, b],
-            a: [
-                2.0 * (k * k - 1.0) * scale,
-                (1.0 - SQRT_2 * k + k * k) * scale,
-            ],
-        }
-    }
-
-    /// Forward and back, so that nothing is delayed and the attenuation doubles. Before and behind,
-    /// the values go on mirrored at their ends, so that slopes stay slopes there.
-    fn both_ways(&self, values: &mut [f64]) {
-        let [Some(first), Some(last)] = [values.first(), values.last()] else {
-            return;
-        };
-        let beyond = MIRRORED.min(values.len() - 1);
-        let before = values[1..=beyond]
-            .iter()
-            .rev()
-            .map(|value| 2.0 * first - value);
-        let behind = values[values.len() - 1 - beyond..values.len() - 1]
-            .iter()
-            .rev()
-            .map(|value| 2.0 * last - value);
-        let mut longer: Vec<f64> = before.chain(values.iter().copied()).chain(behind).collect();
-        self.along(longer.iter_mut());
-        self.along(longer.iter_mut().rev());
-        values.copy_from_slice(&longer[beyond..beyond + values.len()]);
-    }
-
-    /// Begins as if the first value had stood there for ever.
-    fn along<'a>(&self, mut values: impl Iterator<Item = &'a mut f64>) {
-        let Some(first) = values.next() else { return };
-        let mut known = [*first; 4];
-        for value in std::iter::once(first).chain(values) {
-            let [x1, x2, y1, y2] = known;
-            let filtered = self.b[0] * *value + self.b[1] * x1 + self.b[2] * x2
-                - self.a[0] * y1
-                - self.a[1] * y2;
-            known = [*value, x1, filtered, y1];
-            *value = filtered;
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
+    use std::f64::consts::PI;
+
     use super::*;
 
     const GRID: WindowGrid = WindowGrid {
@@ -249,22 +193,6 @@ mod tests {
             .map(|row| row[0])
             .collect();
         assert!(level.iter().all(|value| (value - 4.0).abs() < 1e-5));
-    }
-
-    #[test]
-    fn the_cutoff_is_where_the_power_falls_to_a_quarter() {
-        // Twice by 1 / sqrt 2 in amplitude.
-        let filter = ZeroPhaseLowPass::new(10.0, 120.0);
-        let mut values: Vec<f64> = (0..1200)
-            .map(|k| (2.0 * PI * 10.0 * f64::from(k) / 120.0).sin())
-            .collect();
-        filter.both_ways(&mut values);
-        let power = values[300..900]
-            .iter()
-            .map(|value| value * value)
-            .sum::<f64>()
-            / 600.0;
-        assert!((power / 0.5 - 0.25).abs() < 0.005, "{power}");
     }
 
     #[test]

@@ -1,11 +1,13 @@
 //! How far simulators are from measured IMUs: root mean square errors on people and positions that
-//! no network has seen.
+//! no network has seen, and of rigid bodies whose readings are known or measured.
 
 mod cases;
 mod errors;
 mod method;
+mod practice;
 mod protocol;
 mod results;
+mod rigid;
 mod tables;
 
 use std::path::PathBuf;
@@ -16,12 +18,17 @@ use rayon::prelude::*;
 pub use method::Method;
 pub use protocol::{Protocol, Study};
 pub use results::{FidelityResults, MethodResults, PositionResults, StudyResults};
+pub use rigid::{
+    PhysicsSource, PoseErrors, PracticeResults, RigidMethodResults, RigidPartResults, RigidStudy,
+    RigidStudyResults, StatedResults,
+};
 
 use crate::EvaluationError;
 use crate::observer::{self, Observer};
 use crate::training_data::{DataFolder, DataSource};
 use cases::Case;
 use errors::SquaredErrors;
+use rigid::{RigidOutcome, run_rigid_study};
 
 /// What a comparison is run on.
 pub struct FidelityOptions {
@@ -43,12 +50,24 @@ pub fn evaluate_fidelity(
     options: &FidelityOptions,
     observer: &dyn Observer,
 ) -> Result<FidelityResults, EvaluationError> {
-    let studies = protocol
-        .studies
-        .iter()
-        .map(|study| run_study(study, protocol.seed, options, observer))
-        .collect::<Result<_, _>>()?;
-    Ok(FidelityResults::new(protocol, options.quick, studies))
+    let mut results = FidelityResults::new(protocol, options.quick);
+    for study in &protocol.studies {
+        if study.optional && !options.data.folder.is_dir() {
+            let folder = options.data.folder.display();
+            results.skip(&study.name, &format!("no folder {folder}"));
+            continue;
+        }
+        let scored = run_study(study, protocol.seed, options, observer)?;
+        results.studies.push(scored);
+    }
+    let (data, seed) = (&options.data, protocol.seed);
+    for study in &protocol.rigid {
+        match run_rigid_study(study, data, seed, options.quick, observer)? {
+            RigidOutcome::Scored(scored) => results.rigid.push(*scored),
+            RigidOutcome::Skipped(reason) => results.skip(&study.name, &reason),
+        }
+    }
+    Ok(results)
 }
 
 /// All methods on all recordings of a study.

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 
+use super::rigid::RigidStudy;
 use crate::EvaluationError;
 use crate::error::At;
 use crate::training_data::DataSource;
@@ -21,6 +22,9 @@ pub struct Protocol {
     pub seed: u64,
     /// The studies, in the order of the tables.
     pub studies: Vec<Study>,
+    /// Studies of rigid bodies, in the order of the tables.
+    #[serde(default)]
+    pub rigid: Vec<RigidStudy>,
 }
 
 /// Recordings that are scored together, by position.
@@ -39,6 +43,9 @@ pub struct Study {
     /// mapping.
     #[serde(default)]
     pub mapping: Vec<DataSource>,
+    /// Whether the study is left out, and listed as such, where there is no folder of data.
+    #[serde(default)]
+    pub optional: bool,
 }
 
 impl Protocol {
@@ -88,6 +95,15 @@ impl Protocol {
                     .at(|| format!("{file}: study {}", study.name))?;
             }
         }
+        for study in &protocol.rigid {
+            study
+                .check()
+                .map_err(|problem| EvaluationError::RigidStudy {
+                    file: file.to_owned(),
+                    study: study.name.clone(),
+                    problem,
+                })?;
+        }
         Ok(protocol)
     }
 }
@@ -99,7 +115,8 @@ mod tests {
 
     #[test]
     fn files_that_come_with_the_suite_are_sound() {
-        assert_eq!(Protocol::embedded().unwrap().studies.len(), 8);
+        let own = Protocol::embedded().unwrap();
+        assert_eq!((own.studies.len(), own.rigid.len()), (8, 11));
         let totalcapture = Path::new(env!("CARGO_MANIFEST_DIR"))
             .join("../../../config/evaluation/totalcapture.yaml");
         assert_eq!(

@@ -6,6 +6,7 @@ use super::cases::Case;
 use super::errors::{SquaredErrors, signal};
 use super::method::Method;
 use super::protocol::{Protocol, Study};
+use super::rigid::RigidStudyResults;
 use crate::bootstrap::intervals;
 
 /// The errors of all simulators in all studies.
@@ -21,6 +22,12 @@ pub struct FidelityResults {
     pub quick: bool,
     /// The studies, in the protocol's order.
     pub studies: Vec<StudyResults>,
+    /// The studies of rigid bodies, in the protocol's order.
+    #[serde(default)]
+    pub rigid: Vec<RigidStudyResults>,
+    /// Studies that were left out, with the reason.
+    #[serde(default)]
+    pub skipped: Vec<String>,
 }
 
 /// One study.
@@ -72,14 +79,21 @@ pub struct MethodResults {
 }
 
 impl FidelityResults {
-    pub(super) fn new(protocol: &Protocol, quick: bool, studies: Vec<StudyResults>) -> Self {
+    pub(super) fn new(protocol: &Protocol, quick: bool) -> Self {
         Self {
             schema: "cromosim/fidelity-results/1".to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
             seed: protocol.seed,
             quick,
-            studies,
+            studies: Vec::new(),
+            rigid: Vec::new(),
+            skipped: Vec::new(),
         }
+    }
+
+    /// Lists a study as left out.
+    pub(super) fn skip(&mut self, study: &str, reason: &str) {
+        self.skipped.push(format!("{study}: skipped: {reason}"));
     }
 }
 

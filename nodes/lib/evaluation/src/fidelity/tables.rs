@@ -4,6 +4,7 @@ use cromosim_charts::{Bar, BarChart, Block, Chart, Column, Group, Page, Section,
 
 use super::method::Method;
 use super::results::{FidelityResults, MethodResults, PositionResults, StudyResults};
+use super::rigid::{rigid_charts, rigid_markdown, rigid_sections};
 use crate::EvaluationError;
 use crate::report::{Report, json};
 
@@ -49,7 +50,18 @@ fn markdown(results: &FidelityResults) -> String {
         let rows = summary(study).markdown();
         format!("\n**{}**: {}\n\n{rows}", study.name, about(study))
     };
-    overview(results).markdown() + &results.studies.iter().map(table).collect::<String>()
+    let mut text = String::new();
+    if !results.studies.is_empty() {
+        text += &overview(results).markdown();
+    }
+    text.extend(results.studies.iter().map(table));
+    if !results.rigid.is_empty() {
+        text += &rigid_markdown(&results.rigid);
+    }
+    if !results.skipped.is_empty() {
+        text += &format!("\n{}\n", results.skipped.join("\n"));
+    }
+    text
 }
 
 /// Pictures by their file's name.
@@ -61,6 +73,7 @@ fn charts(results: &FidelityResults) -> Vec<(String, Chart)> {
             charts.push((name, Chart::Bars(chart(study, index))));
         }
     }
+    charts.extend(rigid_charts(&results.rigid));
     charts
 }
 
@@ -73,16 +86,22 @@ fn page(results: &FidelityResults) -> Page {
         if results.quick { " --quick" } else { "" },
         results.seed
     );
-    let glance = Section {
+    let glance = (!results.studies.is_empty()).then(|| Section {
         title: "At a glance".to_owned(),
         blocks: vec![Block::Table(overview(results))],
-    };
+    });
+    let skipped = (!results.skipped.is_empty()).then(|| Section {
+        title: "Left out".to_owned(),
+        blocks: results.skipped.iter().cloned().map(Block::Text).collect(),
+    });
     Page {
         title: "Fidelity of simulated IMUs".to_owned(),
         lead,
-        sections: [glance]
+        sections: glance
             .into_iter()
             .chain(results.studies.iter().map(section))
+            .chain(rigid_sections(&results.rigid))
+            .chain(skipped)
             .collect(),
     }
 }

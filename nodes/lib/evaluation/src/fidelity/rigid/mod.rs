@@ -1,0 +1,21 @@
+//! Poses of rigid bodies against readings that are not of our making: a physics engine's, and real
+//! IMUs' beside their optical reference. The practice is compared: one low-pass, then differences.
+
+mod alignment;
+mod case;
+mod definition;
+mod method;
+mod pose_errors;
+mod results;
+mod stated;
+mod study;
+mod tables;
+mod truth;
+
+pub use definition::{PhysicsSource, RigidStudy};
+pub use pose_errors::PoseErrors;
+pub use results::{
+    PracticeResults, RigidMethodResults, RigidPartResults, RigidStudyResults, StatedResults,
+};
+pub(super) use study::{RigidOutcome, run_rigid_study};
+pub(super) use tables::{rigid_charts, rigid_markdown, rigid_sections};
