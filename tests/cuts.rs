@@ -1,5 +1,6 @@
 //! The same seconds of a recorded motion give the same readings, whatever was recorded before and
-//! after them: three seconds cut out of a file, against the same seconds of the whole.
+//! after them: three seconds cut out of a file, and taken by `--start`, against the same seconds of
+//! the whole. And no clip begins or ends with a jolt.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -53,9 +54,8 @@ impl Bvh {
 /// One reading: angular velocity, specific force.
 type Reading = [f64; 6];
 
-/// Readings of every placement.
-fn simulated(folder: &Path, motion: &str) -> BTreeMap<String, Vec<Reading>> {
-    let scheme = "adaptive_spline";
+/// Readings of every placement, by the default scheme.
+fn simulated(folder: &Path, motion: &str, options: &[&str]) -> BTreeMap<String, Vec<Reading>> {
     let arguments = [
         "simulate",
         motion,
@@ -64,10 +64,9 @@ fn simulated(folder: &Path, motion: &str) -> BTreeMap<String, Vec<Reading>> {
         "--csv",
         "csv",
         "--no-noise",
-        "--scheme",
-        scheme,
+        "--force",
     ];
-    succeed(folder, &[&arguments[..], &["--force"]].concat());
+    succeed(folder, &[&arguments[..], options].concat());
     let mut all = BTreeMap::new();
     for entry in fs::read_dir(folder.join("csv")).unwrap() {
         let path = entry.unwrap().path();
@@ -84,6 +83,20 @@ fn simulated(folder: &Path, motion: &str) -> BTreeMap<String, Vec<Reading>> {
         all.insert(name, text.lines().skip(1).map(reading).collect());
     }
     all
+}
+
+/// Largest specific force within 0.1 s of the ends over the 99th percentile.
+fn end_peak(readings: &[Reading]) -> f64 {
+    let norm = |reading: &Reading| reading[3..].iter().map(|f| f * f).sum::<f64>().sqrt();
+    let forces: Vec<f64> = readings.iter().map(norm).collect();
+    let (first, last) = (
+        &forces[..2 * SAMPLES],
+        &forces[forces.len() - 2 * SAMPLES..],
+    );
+    let most = first.iter().chain(last).copied().fold(0.0, f64::max);
+    let mut sorted = forces.clone();
+    sorted.sort_by(f64::total_cmp);
+    most / sorted[sorted.len() * 99 / 100]
 }
 
 /// Root mean square difference over the standard deviation, of three columns.
@@ -111,7 +124,7 @@ fn the_same_seconds_give_the_same_readings() {
     for name in ["06_10", "13_07", "13_36"] {
         let bvh = Bvh::read(&data.join(format!("mocap_cmu/{name}.bvh")));
         bvh.write(&folder.join("whole.bvh"), &bvh.frames);
-        let whole = simulated(folder, "whole.bvh");
+        let whole = simulated(folder, "whole.bvh", &["--trim", "0"]);
         for part in [1, 3] {
             let steps = (bvh.frames.len() - CUT_FRAMES) * part / 4 / FRAMES;
             let first = steps * FRAMES;
@@ -119,7 +132,7 @@ fn the_same_seconds_give_the_same_readings() {
                 &folder.join("cut.bvh"),
                 &bvh.frames[first..first + CUT_FRAMES],
             );
-            for (placement, cut) in simulated(folder, "cut.bvh") {
+            for (placement, cut) in simulated(folder, "cut.bvh", &["--trim", "0"]) {
                 let inside = LEFT_OUT..cut.len() - LEFT_OUT;
                 let same = &whole[&placement][steps * SAMPLES..][inside.clone()];
                 for (shares, columns) in shares.iter_mut().zip([0..3, 3..6]) {
@@ -140,4 +153,56 @@ fn the_same_seconds_give_the_same_readings() {
         );
         assert!(median < 0.02 && most < 0.05, "{channel}: {median} {most}");
     }
+}
+
+/// Differentiated before it is cut: what `--start` and `--duration` take is what the whole has there.
+#[test]
+fn a_part_has_the_readings_of_the_whole() {
+    let Some(data) = shared_data() else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let bvh = Bvh::read(&data.join("mocap_cmu/13_36.bvh"));
+    bvh.write(&folder.join("whole.bvh"), &bvh.frames);
+    let whole = simulated(folder, "whole.bvh", &["--trim", "0"]);
+    let part = simulated(folder, "whole.bvh", &["--start", "4", "--duration", "3"]);
+    for (placement, part) in part {
+        // 4 s at 100 Hz; with its ends.
+        let same = &whole[&placement][400..];
+        assert_eq!(
+            part.len(),
+            301,
+            "{placement}: nothing is cut off a part's ends"
+        );
+        for columns in [0..3, 3..6] {
+            let share = difference(&same[..part.len()], &part, columns);
+            assert!(share < 1e-3, "{placement}: {share}");
+        }
+    }
+}
+
+/// A foot is in the air at both ends of one clip, and one series still ends with its largest value
+/// (1.40 times the 99th percentile); untrimmed it would be 16.
+#[test]
+fn clips_do_not_begin_or_end_with_a_jolt() {
+    let Some(data) = shared_data() else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let mut peaks = Vec::new();
+    for name in ["02_01", "03_01", "06_10", "07_01", "13_07", "13_36"] {
+        let bvh = Bvh::read(&data.join(format!("mocap_cmu/{name}.bvh")));
+        bvh.write(&folder.join("whole.bvh"), &bvh.frames);
+        let series = simulated(folder, "whole.bvh", &[]);
+        peaks.extend(series.values().map(|readings| end_peak(readings)));
+    }
+    let jolts = peaks.iter().filter(|peak| **peak > 1.3).count();
+    let most = peaks.iter().copied().fold(0.0, f64::max);
+    println!(
+        "{jolts} of {} series peak at an end, at most {most:.2}",
+        peaks.len()
+    );
+    assert!(jolts <= 1 && most < 1.5, "{jolts} {most}");
 }

@@ -34,9 +34,14 @@ fn the_embedded_walk_becomes_a_bag() {
             .read::<PoseStamped>(&format!("/reference/{name}"))
             .unwrap();
         assert_eq!(
-            (raw.len(), full.len(), reference.len()),
-            (1001, 1001, states.len()),
+            (full.len(), reference.len()),
+            (raw.len(), states.len()),
             "{name}"
+        );
+        assert!(
+            (990..=1001).contains(&raw.len()),
+            "{name}: little is cut off at the ends, {}",
+            raw.len()
         );
         assert_eq!(
             raw[0].1.orientation_covariance[0], -1.0,
@@ -54,7 +59,7 @@ fn the_embedded_walk_becomes_a_bag() {
             .unwrap()
             .lines()
             .count();
-        assert_eq!(rows, 1002, "{name}: a header and a row a sample");
+        assert_eq!(rows, raw.len() + 1, "{name}: a header and a row a sample");
     }
     assert!(reader.attachment("placements.yaml").is_some());
     assert_eq!(reader.metadata("cromosim").unwrap()["seed"], "0");
@@ -198,6 +203,9 @@ fn a_recording_is_simulated_again_from_its_reference() {
             "--no-noise",
             "--rate",
             "100",
+            // Its poses are exact, and the estimate from a reference takes them so.
+            "--scheme",
+            "spline",
         ],
     );
     succeed(

@@ -96,7 +96,8 @@ fn a_device_with_effects_reads_live_what_it_reads_offline() {
     let mut lost = Vec::new();
     for (noise, option) in [(true, None), (false, Some("--no-noise"))] {
         let mut command = vec!["simulate", "--placements", "placements.yaml", "--seed", "7"];
-        command.extend(["--duration", "4", "--force", "--out", "offline.mcap"]);
+        command.extend(["--duration", "4", "--trim", "0"]);
+        command.extend(["--force", "--out", "offline.mcap"]);
         command.extend(option);
         succeed(here, &command);
         let bag = BagReader::open(&here.join("offline.mcap")).unwrap();

@@ -116,7 +116,15 @@ fn networks_learn_and_simulate_takes_them() {
 
     succeed(
         here,
-        &["simulate", "walk.bvh", "--no-noise", "--out", "plain.mcap"],
+        &[
+            "simulate",
+            "walk.bvh",
+            "--no-noise",
+            "--scheme",
+            "spline",
+            "--out",
+            "plain.mcap",
+        ],
     );
     succeed(
         here,
@@ -159,6 +167,8 @@ fn networks_learn_and_simulate_takes_them() {
             "simulate",
             "walk.bvh",
             "--no-noise",
+            "--scheme",
+            "spline",
             "--mapping",
             "map.yaml",
             "--out",
@@ -275,6 +285,8 @@ fn what_cannot_be_used_is_named() {
             "walk.mcap",
             "--duration",
             "0.1",
+            "--trim",
+            "0",
         ],
     );
     refuses(

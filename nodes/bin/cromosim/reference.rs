@@ -114,11 +114,7 @@ pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()>
         arguments.out.display(),
         summary.message_count(),
         trajectory.display(),
-        quality_line(
-            simulated
-                .iter()
-                .map(|placement| (placement.bandwidth, placement.trimmed_s))
-        )
+        quality_line(simulated.iter().map(|placement| placement.quality))
     );
     Ok(())
 }
@@ -279,9 +275,8 @@ fn write(
         ..BagOptions::default()
     };
     for (placement, simulated) in recorded.iter().zip(simulated) {
-        if let Some(bandwidth) = simulated.bandwidth {
-            let (name, trimmed_s) = (&placement.name, simulated.trimmed_s);
-            metadata.extend(quality_entries(name, Some(bandwidth), trimmed_s));
+        if simulated.quality.bandwidth.is_some() {
+            metadata.extend(quality_entries(&placement.name, &simulated.quality));
         }
     }
     let mut bag = BagWriter::create(&arguments.out, options)?;

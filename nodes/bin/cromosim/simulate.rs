@@ -9,17 +9,16 @@ use anyhow::{Context, bail};
 use cromosim_bag::{BagOptions, BagWriter, Compression};
 use cromosim_body::{BodyModel, ShapedBody};
 use cromosim_imu::{
-    Device, Differentiation, ImuMessages, ImuOptions, MountedSensor, MountedSensors, PlacementSet,
-    PoseStd, SensorTrajectory, Trim, VirtualImu, measure_all, median_bandwidth,
-    simulate_kinematics_on,
+    Device, Differentiation, ImuOptions, MountedSensor, MountedSensors, PlacementSet, PoseStd,
+    SensorTrajectory, Trim, VirtualImu, measure_all, simulate_kinematics_on,
 };
 use cromosim_learned::{LearnedSimulator, MappingFile, Patch, SiteMotion, scheme_for_networks};
 use cromosim_motion::{MotionOptions, SmplMotion, embedded_walk, read_motion_for, read_people};
 use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_msgs::std_msgs::Header;
 use cromosim_recording::{
-    FIRST_STAMP, PlayedPerson, SimulatedPlacement, reading_mapping, trimmed, write_people,
-    write_people_csv,
+    FIRST_STAMP, PlayedPerson, Quality, RecordingError, SimulatedPlacement, reading_mapping,
+    write_people, write_people_csv,
 };
 use cromosim_spatial::{PoseTimes, Stamp, uniform_stamps};
 use indicatif::ProgressBar;
@@ -258,12 +257,9 @@ impl Setup {
             Some(bandwidth_hz) => Differentiation::Bandwidth(bandwidth_hz),
             None => placement.scheme().into(),
         };
-        let motion = simulate_kinematics_on(times, trajectory, by, &output)?;
-        let bandwidth = median_bandwidth(&motion);
-        let Some(span) = self.trim.span(&motion) else {
-            bail!("--trim leaves nothing of {}; give less", person.motion.name);
-        };
-        let trimmed_s = trimmed(&motion, &span);
+        let mut motion = simulate_kinematics_on(times, trajectory, by, &output)?;
+        let (quality, span) = Quality::of(&motion, self.trim).ok_or(RecordingError::AllTrimmed)?;
+        motion.retain(|sample| span.contains(&sample.stamp));
         let mut correction = match &self.learned {
             Some(networks) => {
                 let patch = Patch::new(shaped, mounted.site())?;
@@ -275,10 +271,7 @@ impl Setup {
             None => None,
         };
         let messages = measure_all(&mut imu, vec![motion], correction.as_mut())?;
-        let messages = messages
-            .into_iter()
-            .map(|(_, messages)| messages)
-            .filter(|messages| span.contains(&stamp(messages)));
+        let messages = messages.into_iter().map(|(_, messages)| messages);
         let played = &trajectory.frames()[person.played.clone()];
         let reference = played.iter().map(|frame| PoseStamped {
             header: Header::new(frame.stamp.nanos, "world"),
@@ -288,8 +281,7 @@ impl Setup {
             name: name.to_owned(),
             reference: reference.collect(),
             messages: messages.collect(),
-            bandwidth,
-            trimmed_s,
+            quality,
         })
     }
 
@@ -330,10 +322,6 @@ impl Setup {
     }
 }
 
-fn stamp(messages: &ImuMessages) -> Stamp {
-    Stamp::from_nanos(messages.data_raw.header.stamp.nanos())
-}
-
 fn names(placements: &PlacementSet) -> Vec<&str> {
     placements
         .placements()
@@ -363,6 +351,11 @@ pub fn read_mapping(path: Option<&Path>, placements: &[&str]) -> anyhow::Result<
     Ok(mapping)
 }
 
+fn last_played(people: &[PlayedPerson]) -> Option<Stamp> {
+    let last = |person: &PlayedPerson| person.stamps.get(*person.played.end()).copied();
+    people.iter().filter_map(last).max()
+}
+
 fn simulate_one(
     setup: &Setup,
     people: &[PlayedPerson],
@@ -374,20 +367,18 @@ fn simulate_one(
         .map(|person| setup.simulate(person, bar))
         .collect::<anyhow::Result<Vec<_>>>()?;
     let motion = &people[0].motion;
-    let mut bag = BagWriter::create(
-        out,
-        BagOptions {
-            compression: Compression::Zstd,
-            replace: setup.force,
-            ..BagOptions::default()
-        },
-    )?;
+    let options = BagOptions {
+        compression: Compression::Zstd,
+        replace: setup.force,
+        ..BagOptions::default()
+    };
+    let mut bag = BagWriter::create(out, options)?;
     let mut metadata = setup.metadata(motion);
     for (person, simulated) in people.iter().zip(&simulated) {
-        metadata.extend(simulated.iter().flat_map(|placement| {
-            let name = person.frame(&placement.name);
-            quality_entries(&name, placement.bandwidth, placement.trimmed_s)
-        }));
+        let quality = |placement: &SimulatedPlacement| {
+            quality_entries(&person.frame(&placement.name), &placement.quality)
+        };
+        metadata.extend(simulated.iter().flat_map(quality));
     }
     bag.write_metadata("cromosim", metadata)?;
     bag.attach(
@@ -403,11 +394,7 @@ fn simulate_one(
             write_people_csv(out, folder, person, simulated)?;
         }
     }
-    let last = people
-        .iter()
-        .filter_map(|person| person.stamps.get(*person.played.end()))
-        .max()
-        .map_or(0.0, |last| *last - FIRST_STAMP);
+    let last = last_played(people).map_or(0.0, |last| last - FIRST_STAMP);
     let placements = setup.placements.placements().len();
     let who = if people.len() > 1 {
         format!("{} people, ", people.len())
@@ -423,7 +410,7 @@ fn simulate_one(
             simulated
                 .iter()
                 .flatten()
-                .map(|placement| (placement.bandwidth, placement.trimmed_s))
+                .map(|placement| placement.quality)
         )
     ))
 }

@@ -1,15 +1,12 @@
 //! What simulated readings are good for, as bags and summaries say it.
 
 use cromosim_imu::Bandwidth;
+use cromosim_recording::Quality;
 
 /// Entries of a bag's metadata about one placement: `bandwidth_hz.NAME` and `trimmed_s.NAME`.
-pub fn quality_entries(
-    name: &str,
-    bandwidth: Option<Bandwidth>,
-    trimmed_s: [f64; 2],
-) -> Vec<(String, String)> {
-    let [start, end] = trimmed_s;
-    let bandwidth = bandwidth.map(|bandwidth| {
+pub fn quality_entries(name: &str, quality: &Quality) -> Vec<(String, String)> {
+    let [start, end] = quality.trimmed_s;
+    let bandwidth = quality.bandwidth.map(|bandwidth| {
         let Bandwidth {
             acceleration_hz,
             angular_velocity_hz,
@@ -29,10 +26,11 @@ pub fn quality_entries(
 }
 
 /// The end of a summary: the range of the placements' bandwidths, and the most that was left out.
-pub fn quality_line(placements: impl Iterator<Item = (Option<Bandwidth>, [f64; 2])>) -> String {
+pub fn quality_line(placements: impl Iterator<Item = Quality>) -> String {
     let (mut bandwidths, mut trimmed) = (Vec::new(), [0.0_f64; 2]);
-    for (bandwidth, [start, end]) in placements {
-        bandwidths.extend(bandwidth);
+    for quality in placements {
+        let [start, end] = quality.trimmed_s;
+        bandwidths.extend(quality.bandwidth);
         trimmed = [trimmed[0].max(start), trimmed[1].max(end)];
     }
     let mut line = String::new();

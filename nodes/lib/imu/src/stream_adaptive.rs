@@ -14,6 +14,7 @@ const PAST_FRAMES: usize = 45;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct AdaptiveLag {
     stamps: Vec<Stamp>,
+    times: Option<PoseTimes>,
     learnt: PoseAdaptation,
 }
 
@@ -28,9 +29,17 @@ impl AdaptiveLag {
         let (frames, stamps, poses) = last_frames(kept, due, PAST_FRAMES);
         let start = stamps.first().copied().unwrap_or_default();
         let dropped = self.stamps.partition_point(|stamp| *stamp < start);
-        let times = PoseTimes::new(&stamps)?;
+        let moved = self
+            .times
+            .as_ref()
+            .and_then(|times| times.moved_to(&stamps));
+        let times = match moved {
+            Some(times) => times,
+            None => PoseTimes::new(&stamps)?,
+        };
         let spline = PoseSpline::fit_following(&times, &poses, &mut self.learnt, dropped)?;
         self.stamps = stamps;
+        self.times = Some(times.clone());
         let errors = SplineVariance::new(&times, &spline, frames)?;
         samples.extend(due.iter().map(|&stamp| {
             let sample = sample(&spline, stamp);

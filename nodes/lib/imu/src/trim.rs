@@ -12,6 +12,8 @@ use crate::{Bandwidth, KinematicSample};
 const UNCERTAIN: f64 = 10.0;
 /// The most that [`Trim::Uncertain`] takes off an end, s. No source.
 pub const LONGEST_TRIM_S: f64 = 0.25;
+/// And as a part of the motion.
+const LARGEST_PART: f64 = 0.1;
 /// Where the stretch behind an end ends, s from it.
 const BEHIND_S: f64 = 1.0;
 
@@ -19,7 +21,8 @@ const BEHIND_S: f64 = 1.0;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Trim {
     /// The samples at either end whose acceleration or angular velocity is far more uncertain than
-    /// the median of the motion's, and of those behind them, up to [`LONGEST_TRIM_S`].
+    /// the median of the motion's, and of those behind them, up to [`LONGEST_TRIM_S`] and
+    /// a tenth of the motion.
     #[default]
     Uncertain,
     /// This time at either end, s; 0 leaves nothing out.
@@ -36,12 +39,11 @@ impl Trim {
             Self::Uncertain => {
                 let first = first_certain(motion, motion.iter()).unwrap_or(start);
                 let last = first_certain(motion, motion.iter().rev()).unwrap_or(end);
-                let (from, to) = (
-                    first.min(start.plus_seconds(LONGEST_TRIM_S)),
-                    last.max(end.plus_seconds(-LONGEST_TRIM_S)),
-                );
-                // A motion that is all ends is kept.
-                if from <= to { (from, to) } else { (start, end) }
+                let most_s = LONGEST_TRIM_S.min(LARGEST_PART * (end - start));
+                (
+                    first.min(start.plus_seconds(most_s)),
+                    last.max(end.plus_seconds(-most_s)),
+                )
             }
         };
         (from <= to).then_some(from..=to)
@@ -132,10 +134,12 @@ mod tests {
 
     #[test]
     fn at_most_a_quarter_of_a_second_goes() {
-        let mut variances = vec![1.0; 200];
+        let mut variances = vec![1.0; 300];
         variances[..25].fill(f64::INFINITY);
         let span = Trim::Uncertain.span(&motion(&variances)).unwrap();
-        assert_eq!(seconds(&span), [0.25, 1.99]);
+        assert_eq!(seconds(&span), [0.25, 2.99]);
+        let span = Trim::Uncertain.span(&motion(&variances[..100])).unwrap();
+        assert_eq!(seconds(&span), [0.1, 0.99]);
     }
 
     #[test]

@@ -28,6 +28,7 @@ pub mod inspect;
 mod messages;
 mod placement;
 mod played;
+mod quality;
 mod resimulation;
 pub mod rigid;
 mod trace;
@@ -40,9 +41,10 @@ pub use file::{read_head, read_whole};
 pub use messages::{FIRST_STAMP, MessageHeader, smpl_pose, smpl_state, stamp_of_frame};
 pub use placement::{RecordedPlacement, read_placements, read_poses};
 pub use played::{PlayedPerson, SimulatedPlacement, write_people, write_people_csv};
+pub use quality::Quality;
 pub use resimulation::{
-    Resimulated, Resimulation, outside_reference, read_effects, reading_mapping, trimmed,
-    with_stamps, write_resimulated,
+    Resimulated, Resimulation, outside_reference, read_effects, reading_mapping, with_stamps,
+    write_resimulated,
 };
 pub use trace::{
     PlacementTrace, activities_csv, first_stamp, seconds_to_first_stamp, write_traces,

@@ -5,13 +5,13 @@ use std::ops::RangeInclusive;
 use std::path::Path;
 
 use cromosim_bag::{BagReader, BagWriter, write_imu_csv};
-use cromosim_imu::{Bandwidth, ImuMessages};
+use cromosim_imu::ImuMessages;
 use cromosim_motion::{MotionError, Person, SmplMotion};
 use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_spatial::Stamp;
 
-use crate::{MessageHeader, RecordingError, smpl_state, stamp_of_frame};
+use crate::{MessageHeader, Quality, RecordingError, smpl_state, stamp_of_frame};
 
 /// One person of a motion file.
 pub struct PlayedPerson {
@@ -35,11 +35,8 @@ pub struct SimulatedPlacement {
     pub reference: Vec<PoseStamped>,
     /// Each sample, in the two forms of REP-145.
     pub messages: Vec<ImuMessages>,
-    /// Up to which frequency the samples resolve the motion, median; none from schemes that do not
-    /// smooth.
-    pub bandwidth: Option<Bandwidth>,
-    /// What was left out at the beginning and at the end, s.
-    pub trimmed_s: [f64; 2],
+    /// What they are good for.
+    pub quality: Quality,
 }
 
 /// Poses on either side of a part that are differentiated with it, s: several times what neighbours

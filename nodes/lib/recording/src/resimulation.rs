@@ -1,14 +1,12 @@
 //! The IMUs of a recording again, from its reference motion.
 
-use std::ops::RangeInclusive;
 use std::path::Path;
 
 use cromosim_bag::BagWriter;
 use cromosim_imu::{
-    Bandwidth, DeclaredNoise, Differentiation, EffectKind, EffectSet, EffectsFile, ImuOptions,
+    DeclaredNoise, Differentiation, EffectKind, EffectSet, EffectsFile, ImuOptions,
     KinematicSample, PlacementEffects, ReadingMapping, RecordedMotion, SampleVariance,
-    SensorTrajectory, Trim, measure_recording, median_bandwidth, simulate_kinematics,
-    track_in_sensor_axes,
+    SensorTrajectory, Trim, measure_recording, simulate_kinematics, track_in_sensor_axes,
 };
 use cromosim_learned::{LearnedSimulator, MappingFile, SiteMotion};
 use cromosim_msgs::geometry_msgs::PoseStamped;
@@ -16,7 +14,7 @@ use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_msgs::std_msgs::Header;
 use cromosim_spatial::{KinematicTrack, PoseEstimate, Stamp, uniform_stamps};
 
-use crate::{RecordedPlacement, RecordingError};
+use crate::{Quality, RecordedPlacement, RecordingError};
 
 /// How the IMUs of a recording are simulated again.
 #[derive(Default)]
@@ -104,10 +102,8 @@ pub fn read_effects(
 pub struct Resimulated {
     /// In order of time.
     pub messages: Vec<Imu>,
-    /// As in [`crate::SimulatedPlacement`].
-    pub bandwidth: Option<Bandwidth>,
-    /// As in [`crate::SimulatedPlacement`].
-    pub trimmed_s: [f64; 2],
+    /// What they are good for.
+    pub quality: Quality,
 }
 
 impl Resimulation {
@@ -117,7 +113,7 @@ impl Resimulation {
     /// Without stamps and rate, and where the reference's motion cannot be estimated.
     pub fn simulate(&self, placement: &RecordedPlacement) -> Result<Resimulated, RecordingError> {
         let name = &placement.name;
-        let stamps = self.stamps(placement)?;
+        let mut stamps = self.stamps(placement)?;
         let rate_hz = mean_rate(&stamps);
         let nominal = PlacementEffects {
             epoch: stamps[0],
@@ -129,6 +125,13 @@ impl Resimulation {
             .track(placement, rate_hz, &effects.effects)
             .map_err(|error| error.at(name.clone()))?;
         let stamps_are_recorded = !placement.measured.is_empty();
+        let mut quality = Quality::default();
+        if !stamps_are_recorded && !samples.is_empty() {
+            let (found, span) =
+                Quality::of(&samples, self.trim).ok_or(RecordingError::AllTrimmed)?;
+            quality = found;
+            stamps.retain(|stamp| span.contains(stamp));
+        }
         let motion = RecordedMotion {
             track: &track,
             stamps: &stamps,
@@ -146,19 +149,8 @@ impl Resimulation {
             ),
             mapping: reading_mapping(&self.mapping, name),
         };
-        let mut messages = measure_recording(motion, effects, options)?;
-        let mut trimmed_s = [0.0; 2];
-        if !stamps_are_recorded && !samples.is_empty() {
-            let span = self.trim.span(&samples).ok_or(RecordingError::AllTrimmed)?;
-            trimmed_s = trimmed(&samples, &span);
-            let stamp = |message: &Imu| Stamp::from_nanos(message.header.stamp.nanos());
-            messages.retain(|message| span.contains(&stamp(message)));
-        }
-        Ok(Resimulated {
-            messages,
-            bandwidth: median_bandwidth(&samples),
-            trimmed_s,
-        })
+        let messages = measure_recording(motion, effects, options)?;
+        Ok(Resimulated { messages, quality })
     }
 
     fn stamps(&self, placement: &RecordedPlacement) -> Result<Vec<Stamp>, RecordingError> {
@@ -232,14 +224,6 @@ fn variances_at(samples: &[KinematicSample], stamps: &[Stamp]) -> Vec<SampleVari
     let following = |stamp: &Stamp| samples.partition_point(|sample| sample.stamp < *stamp);
     let at = |stamp: &Stamp| samples[following(stamp).min(last)].variance;
     stamps.iter().map(at).collect()
-}
-
-/// What a span leaves out of the samples at the beginning and at the end, s.
-pub fn trimmed(samples: &[KinematicSample], span: &RangeInclusive<Stamp>) -> [f64; 2] {
-    match (samples.first(), samples.last()) {
-        (Some(first), Some(last)) => [*span.start() - first.stamp, last.stamp - *span.end()],
-        _ => [0.0; 2],
-    }
 }
 
 /// The white noise that the messages declare, none where it is unknown: density = sigma /

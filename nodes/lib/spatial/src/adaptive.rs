@@ -39,9 +39,6 @@ const STEPS: usize = 4;
 /// With fewer samples noise and motion cannot be told apart; live, the first sample is due with the
 /// eleventh frame.
 pub(crate) const FEWEST_ADAPTIVE: usize = 8;
-/// Steps at each move of a window, live: a frame is seen some ten times before it is due. They go
-/// half the way, so that they do not swing.
-const STEPS_A_FRAME: usize = 2;
 /// Least part of an observation that decides about the noise or the drive, against division by
 /// nothing.
 const LEAST_FREE: f64 = 1e-7;
@@ -106,35 +103,42 @@ impl Adaptation {
         let mut adaptation = Self::start(equations, values, expected_noise);
         let (projected, mut scratch) = (equations.projected(values), Scratch::default());
         for _ in 0..STEPS {
-            adaptation.step(equations, values, &projected, Stride::Whole, &mut scratch)?;
+            let weights = adaptation.weights();
+            // Not refined: squares are all that is wanted of it.
+            let local = PenaltyWeights::Local(&weights);
+            equations.solve_projected(values, &projected, local, &mut scratch)?;
+            let evidence = adaptation.evidence(equations, values, &weights, &scratch);
+            adaptation.update(equations, evidence, Stride::Whole);
         }
         Ok(adaptation)
     }
 
-    /// Learns on over a window that has moved: `dropped` samples have left it at its front, others
-    /// have come at its end. One that has nothing in common with the last starts anew.
-    pub(crate) fn follow<const C: usize>(
-        &mut self,
-        equations: &SplineEquations,
-        values: &[[f64; C]],
-        expected_noise: f64,
-        dropped: usize,
-    ) -> Result<(), SpatialError> {
+    /// Moves on with a window: `dropped` samples have left it at its front, others have come at its
+    /// end, to `count`. False where nothing is left of what was learnt.
+    pub(crate) fn move_on(&mut self, count: usize, dropped: usize) -> bool {
         let kept = self.noise.len().saturating_sub(dropped);
-        if kept < 2 || kept > values.len() {
-            *self = Self::learn(equations, values, expected_noise)?;
-            return Ok(());
+        if kept < 2 || kept > count {
+            return false;
         }
         self.noise.drain(..dropped);
         self.drive.drain(..dropped);
         let (noise, drive) = (self.noise[kept - 1], self.drive[kept - 2]);
-        self.noise.resize(values.len(), noise);
-        self.drive.resize(values.len() - 1, drive);
-        let (projected, mut scratch) = (equations.projected(values), Scratch::default());
-        for _ in 0..STEPS_A_FRAME {
-            self.step(equations, values, &projected, Stride::Half, &mut scratch)?;
-        }
-        Ok(())
+        self.noise.resize(count, noise);
+        self.drive.resize(count - 1, drive);
+        true
+    }
+
+    /// Learns from a spline of [`Adaptation::weights`]. Half a step, so that it does not swing from
+    /// window to window.
+    pub(crate) fn learn_from<const C: usize>(
+        &mut self,
+        equations: &SplineEquations,
+        values: &[[f64; C]],
+        weights: &[f64],
+        scratch: &Scratch<C>,
+    ) {
+        let evidence = self.evidence(equations, values, weights, scratch);
+        self.update(equations, evidence, Stride::Half);
     }
 
     /// Variance of each sample's noise, unit^2.
@@ -158,20 +162,13 @@ impl Adaptation {
         (self.noise[interval] * self.noise[interval + 1]).sqrt()
     }
 
-    /// One step towards the greatest likelihood.
-    fn step<const C: usize>(
+    /// A step towards the greatest likelihood.
+    fn update(
         &mut self,
         equations: &SplineEquations,
-        values: &[[f64; C]],
-        projected: &[[f64; C]],
+        (drives, residuals): (Vec<Evidence>, Vec<Evidence>),
         stride: Stride,
-        scratch: &mut Scratch<C>,
-    ) -> Result<(), SpatialError> {
-        let weights = self.weights();
-        // Not refined: squares are all that is wanted of it.
-        let local = PenaltyWeights::Local(&weights);
-        equations.solve_projected(values, projected, local, scratch)?;
-        let (drives, residuals) = self.evidence(equations, values, &weights, scratch);
+    ) {
         let found = local_means(drives, SHARED_DRIVE_S / equations.interval);
         for (drive, found) in self.drive.iter_mut().zip(found) {
             *drive = match stride {
@@ -183,7 +180,6 @@ impl Adaptation {
         for (noise, found) in self.noise.iter_mut().zip(found) {
             *noise = found.max(self.least_noise);
         }
-        Ok(())
     }
 
     /// What each knot interval says about the drive, and each sample about the noise.

@@ -137,6 +137,17 @@ impl PoseTimes {
         })
     }
 
+    /// The same equations for other stamps, where these are as far apart; none where they are not.
+    #[must_use]
+    pub fn moved_to(&self, stamps: &[Stamp]) -> Option<Self> {
+        let origin = *stamps.first()?;
+        let seconds = relative_seconds(stamps, origin);
+        self.system.is_at(&seconds).then(|| Self {
+            origin,
+            system: self.system.clone(),
+        })
+    }
+
     /// The equations, with times in seconds since the first stamp.
     pub fn system(&self) -> &Arc<SplineSystem> {
         &self.system

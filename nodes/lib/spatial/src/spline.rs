@@ -170,27 +170,36 @@ impl<const C: usize> SmoothingSpline<C> {
         }
         system.equations.check(values)?;
         let (first, centred) = centred(values);
+        let goes_on = adaptation
+            .as_mut()
+            .is_some_and(|learnt| learnt.move_on(values.len(), dropped));
+        if !goes_on {
+            *adaptation = None;
+        }
         let learnt = match adaptation {
-            Some(adaptation) => {
-                adaptation.follow(&system.equations, &centred, expected_noise, dropped)?;
-                adaptation
-            }
+            Some(learnt) => learnt,
             None => adaptation.insert(Adaptation::learn(
                 &system.equations,
                 &centred,
                 expected_noise,
             )?),
         };
-        Self::solved(
+        let (weights, noise) = (learnt.weights(), learnt.noise().to_vec());
+        let mut scratch = Scratch::default();
+        let local = PenaltyWeights::Local(&weights);
+        system.equations.solve(&centred, local, &mut scratch)?;
+        learnt.learn_from(&system.equations, &centred, &weights, &scratch);
+        let weight = SplineWeight::Local(weights);
+        Ok(Self::of_solution(
             system,
-            (first, &centred),
-            SplineWeight::Local(learnt.weights()),
-            Some(learnt.noise()),
-        )
+            first,
+            weight,
+            Some(&noise),
+            scratch,
+        ))
     }
 
-    /// The spline of this weight; the basis functions sum to one, so that the constant that was
-    /// taken off may go onto the coefficients.
+    /// The spline of this weight.
     fn solved(
         system: &Arc<SplineSystem>,
         (constant, values): ([f64; C], &[[f64; C]]),
@@ -201,6 +210,18 @@ impl<const C: usize> SmoothingSpline<C> {
         system
             .equations
             .solve(values, weight.of_penalty(), &mut scratch)?;
+        Ok(Self::of_solution(system, constant, weight, noise, scratch))
+    }
+
+    /// The basis functions sum to one, so that the constant that was taken off may go onto the
+    /// coefficients.
+    fn of_solution(
+        system: &Arc<SplineSystem>,
+        constant: [f64; C],
+        weight: SplineWeight,
+        noise: Option<&[f64]>,
+        mut scratch: Scratch<C>,
+    ) -> Self {
         for coefficient in &mut scratch.coefficients {
             for c in 0..C {
                 coefficient[c] += constant[c];
@@ -212,12 +233,12 @@ impl<const C: usize> SmoothingSpline<C> {
                 noise: noise.to_vec(),
             })
         });
-        Ok(Self {
+        Self {
             system: system.clone(),
             coefficients: scratch.coefficients,
             weight,
             uncertainty,
-        })
+        }
     }
 
     /// Value, first and second derivative (per s, per s^2) at a time; times outside the samples are

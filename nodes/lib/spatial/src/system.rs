@@ -43,6 +43,9 @@ pub struct SplineSystem {
     split_runs: [OnceLock<Vec<SplitRun>>; 2],
 }
 
+/// Two stamps may each be rounded to a nanosecond.
+const ROUNDING_S: f64 = 2.5e-9;
+
 impl SplineSystem {
     /// The equations for samples at `seconds`.
     ///
@@ -67,6 +70,16 @@ impl SplineSystem {
             runs: OnceLock::new(),
             split_runs: Default::default(),
         })
+    }
+
+    /// Whether these are the times of the samples, to the rounding of stamps.
+    pub(crate) fn is_at(&self, seconds: &[f64]) -> bool {
+        let interval = self.equations.interval;
+        seconds.len() == self.times.len()
+            && seconds
+                .iter()
+                .zip(&self.times)
+                .all(|(s, t)| (s - seconds[0] - t * interval).abs() < ROUNDING_S)
     }
 
     /// Median interval between the samples, s.
