@@ -46,8 +46,9 @@ pub struct Arguments {
     /// Sensor placements (YAML) rather than left_wrist, right_ankle, pelvis, sternum and head
     #[arg(long, value_name = "FILE", help_heading = MOTIONS)]
     pub placements: Option<PathBuf>,
-    /// Derivative scheme for every placement: spline, adaptive_spline, richardson, triangle,
-    /// normal_tracking or second_difference. With --reference the default is the estimate that a diagnosis uses
+    /// Derivative scheme for every placement: adaptive_spline, spline, richardson, triangle,
+    /// normal_tracking or second_difference; default: the placements' own, adaptive_spline where
+    /// they name none. With --reference the default is the estimate that a diagnosis uses
     #[arg(long, value_name = "NAME")]
     pub scheme: Option<String>,
     /// Pass what is below this frequency, Hz, whatever the motion, rather than what the poses

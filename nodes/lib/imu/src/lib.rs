@@ -64,6 +64,8 @@ mod uncertainty;
 mod virtual_imu;
 
 #[cfg(test)]
+mod symmetry_tests;
+#[cfg(test)]
 mod test_motions;
 
 pub use channel::{AXES, Channel, PerChannel, Reading};
