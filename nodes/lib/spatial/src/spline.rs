@@ -8,7 +8,7 @@ use crate::banded::Banded;
 use crate::basis::BasisValues;
 use crate::derivative::Derivative;
 use crate::equations::{PenaltyWeights, Scratch};
-use crate::system::{SplineSystem, centred};
+use crate::system::{LIGHT, LIGHTER, SplineSystem, centred};
 use crate::weight_search::LOWEST_LOG_WEIGHT;
 
 /// How much a spline smooths.
@@ -146,13 +146,20 @@ impl<const C: usize> SmoothingSpline<C> {
                 Some(adaptation.noise()),
             );
         }
-        let weight = smoothing.uniform_weight(system, values)?;
-        Self::solved(
-            system,
-            (first, &centred),
-            SplineWeight::Uniform(weight),
-            None,
-        )
+        let mut weight = smoothing.uniform_weight(system, values)?;
+        let is_found = matches!(
+            smoothing,
+            Smoothing::Automatic | Smoothing::AutomaticFor(_) | Smoothing::Adaptive { .. }
+        );
+        loop {
+            let uniform = SplineWeight::Uniform(weight);
+            match Self::solved(system, (first, &centred), uniform, None) {
+                Err(SpatialError::Singular { .. }) if is_found && weight > LIGHT => {
+                    weight *= LIGHTER;
+                }
+                spline => return spline,
+            }
+        }
     }
 
     /// As [`SmoothingSpline::fit_on`] with [`Smoothing::Adaptive`], for a window that has moved by

@@ -43,6 +43,11 @@ pub struct SplineSystem {
     split_runs: [OnceLock<Vec<SplitRun>>; 2],
 }
 
+/// A weight between two that were tried can be too large for the digits there are, of a series at
+/// rest: a lighter one is taken, down to where that is not the reason.
+pub(crate) const LIGHTER: f64 = 0.1;
+pub(crate) const LIGHT: f64 = 1.0;
+
 /// Two stamps may each be rounded to a nanosecond.
 const ROUNDING_S: f64 = 2.5e-9;
 
@@ -190,17 +195,23 @@ impl SplineSystem {
             });
             search.record(score.unwrap_or(f64::INFINITY));
         }
-        let likelihood = search.best().unwrap_or(lowest);
+        let mut likelihood = search.best().unwrap_or(lowest);
         let Some(derivative) = derivative else {
             return Ok(likelihood);
         };
-        let weights = PenaltyWeights::Uniform(likelihood);
-        let mut free = 0.0;
-        let square = self.over_runs(|range, equations| {
-            equations.solve(&centred[range.clone()], weights, &mut scratch)?;
-            free += (C * equations.free_count()) as f64;
-            Ok(equations.residual(&centred[range], weights, &mut scratch))
-        })?;
+        let (square, free) = loop {
+            let weights = PenaltyWeights::Uniform(likelihood);
+            let mut free = 0.0;
+            let square = self.over_runs(|range, equations| {
+                equations.solve(&centred[range.clone()], weights, &mut scratch)?;
+                free += (C * equations.free_count()) as f64;
+                Ok(equations.residual(&centred[range], weights, &mut scratch))
+            });
+            match square {
+                Err(SpatialError::Singular { .. }) if likelihood > LIGHT => likelihood *= LIGHTER,
+                square => break (square?, free),
+            }
+        };
         Ok(refine(
             self.split_runs(derivative),
             &centred,
