@@ -251,7 +251,7 @@ schema: cromosim/fidelity/1
 seed: 5
 studies: []
 rigid:
-  - {name: markers, measured: physics, physics: {errors: markers, rate_hz: 120}}
+  - {name: markers, measured: physics, physics: {errors: markers, rate_hz: 120, picture: {motion: jump, position: pelvis, seconds: [2.1, 3.3]}}}
   - {name: suit, measured: physics, physics: {errors: inertial_suit, rate_hz: 60}}
   - {name: real, measured: nobody, recordings: [\"none/*.npz\"], optional: true}
 ";
@@ -302,8 +302,17 @@ fn rigid_bodies_are_compared_with_known_readings_and_the_practice() {
         assert!(study["stated"]["middle"][0].as_f64().unwrap() > 0.0);
     }
     assert!(here.join("one/rigid_angular_velocity.png").exists());
+    assert!(
+        here.join("one/markers_jump_pelvis_angular_velocity.png")
+            .exists()
+    );
     succeed(here, &[&RIGID_COMMAND[..], &["--out", "two"]].concat());
-    for name in ["results.json", "tables.md", "report.html"] {
+    for name in [
+        "results.json",
+        "tables.md",
+        "report.html",
+        "markers_jump_pelvis_specific_force.png",
+    ] {
         assert!(
             fs::read(here.join("one").join(name)).unwrap()
                 == fs::read(here.join("two").join(name)).unwrap(),
@@ -326,10 +335,11 @@ fn rigid_studies_that_cannot_be_run_are_named() {
         ("rate_hz: 120", "rate_hz: 100", "rate_hz 100"),
         ("rate_hz: 120", "rate_hz: 1", "study markers: rate_hz 1"),
         ("errors: markers", "errors: magic", "magic"),
+        ("position: pelvis", "position: tail", "\"tail\""),
         (
-            "physics: {errors: markers, rate_hz: 120}",
+            "physics: {errors: inertial_suit, rate_hz: 60}",
             "recordings: []",
-            "study markers",
+            "study suit",
         ),
         (", optional: true", "", "none"),
     ] {

@@ -107,7 +107,7 @@ impl BarChart {
             frame.bottom() + layout.labels.below,
             &described,
             &self.y_label,
-            Sample::Box,
+            &|_| Sample::Box,
         );
         let mut over = String::new();
         for (index, group) in self.groups.iter().enumerate() {

@@ -34,11 +34,24 @@ pub(crate) fn colour(series: usize) -> String {
     )
 }
 
+/// The classes of a line's colour and width.
+pub(crate) fn line_class(series: usize, sample: Sample) -> String {
+    match sample {
+        Sample::Reference => "reference".to_owned(),
+        _ => colour(series),
+    }
+}
+
 /// How a series is shown in the legend.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Sample {
     Box,
+    /// With its mark.
     Line,
+    /// Of so many points that it has no marks.
+    Curve,
+    /// What the others are to be like.
+    Reference,
 }
 
 /// The four corners of a chart and how values become places in it.
@@ -112,7 +125,13 @@ impl Frame {
     }
 
     /// The opening tag, title, legend, grid and vertical axis.
-    pub fn open(&self, height: f64, described: &str, y_label: &str, sample: Sample) -> String {
+    pub fn open(
+        &self,
+        height: f64,
+        described: &str,
+        y_label: &str,
+        sample: &dyn Fn(usize) -> Sample,
+    ) -> String {
         let mut svg = String::new();
         let (width, described) = (self.width, escape(described));
         let _ = write!(
@@ -133,33 +152,33 @@ impl Frame {
         svg
     }
 
-    fn write_legend(&self, svg: &mut String, sample: Sample) {
+    fn write_legend(&self, svg: &mut String, sample: &dyn Fn(usize) -> Sample) {
         let first = 8.0 + 16.0 * self.title.len() as f64;
         for (row, entries) in self.legend.iter().enumerate() {
             let y = first + 17.0 * row as f64 + 8.5;
             for (x, entry) in entries {
-                match (entry.series, sample) {
-                    (None, _) => {
+                match entry.series.map(|series| (series, sample(series))) {
+                    None => {
                         let _ = write!(svg, "<path class=\"threshold\" d=\"M{x:.1} {y:.1}h16\"/>");
                     }
-                    (Some(series), Sample::Box) => {
+                    Some((series, Sample::Box)) => {
                         let (colour, y) = (colour(series), y - 5.0);
                         let _ = write!(
                             svg,
                             "<rect class=\"fill {colour}\" x=\"{x:.1}\" y=\"{y:.1}\" width=\"14\" height=\"10\" rx=\"1\"/>"
                         );
                     }
-                    (Some(series), Sample::Line) => {
-                        let colour = colour(series);
+                    Some((series, sample)) => {
+                        let class = line_class(series, sample);
                         let _ = write!(
                             svg,
-                            "<g class=\"{colour}\"><path class=\"stroke\" d=\"M{x:.1} {y:.1}h16\"/>"
+                            "<g class=\"{class}\"><path class=\"stroke\" d=\"M{x:.1} {y:.1}h16\"/>"
                         );
-                        let _ = write!(
-                            svg,
-                            "<path class=\"mark\" d=\"{}\"/></g>",
-                            mark(series, x + 8.0, y)
-                        );
+                        if sample == Sample::Line {
+                            let mark = mark(series, x + 8.0, y);
+                            let _ = write!(svg, "<path class=\"mark\" d=\"{mark}\"/>");
+                        }
+                        svg.push_str("</g>");
                     }
                 }
                 let label = escape(&entry.label);

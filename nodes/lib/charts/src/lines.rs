@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::frame::{Frame, LABEL, Level, Parts, Sample, colour, mark, whisker};
+use crate::frame::{Frame, LABEL, Level, Parts, Sample, colour, line_class, mark, whisker};
 use crate::text::{escape, trimmed, width};
 use crate::{Axis, Tick};
 
@@ -20,7 +20,7 @@ const FEW: usize = 8;
 const APART: f64 = 3.0;
 /// How far from their place they stand at most.
 const ASIDE: f64 = 6.0;
-/// A line of more points has no marks.
+/// A line of more points has no marks, and a band for its intervals.
 const MARKS: usize = 30;
 
 /// A measured point, with its interval where there is one.
@@ -30,7 +30,8 @@ pub struct Point {
     pub x: f64,
     /// Value on the vertical axis; one that is not finite interrupts the line.
     pub y: f64,
-    /// Both ends of its interval, in the unit of y (not distances from it).
+    /// Both ends of its interval, in the unit of y (not distances from it). Those of a line of many
+    /// points are drawn as a band.
     pub interval: Option<(f64, f64)>,
 }
 
@@ -41,6 +42,18 @@ pub struct Line {
     pub label: String,
     /// In the order in which they are joined.
     pub points: Vec<Point>,
+    /// Whether it is what the others are to be like: broad and grey, behind them, without marks.
+    pub is_reference: bool,
+}
+
+impl Line {
+    fn sample(&self) -> Sample {
+        match self.points.len() {
+            _ if self.is_reference => Sample::Reference,
+            0..=MARKS => Sample::Line,
+            _ => Sample::Curve,
+        }
+    }
 }
 
 /// Lines over one axis, as a learning curve. Where there are intervals, the lines are moved aside
@@ -98,20 +111,30 @@ impl LineChart {
             frame.bottom() + BELOW,
             &described,
             &self.y_label,
-            Sample::Line,
+            &|number| self.lines[number].sample(),
         );
         let scale = Scale { frame: &frame, x };
         scale.write_axis(&mut svg, &xs, &self.x_label);
         frame.write_level(&mut svg, self.level.as_ref());
-        let spread = points.iter().any(|point| point.interval.is_some());
+        let has_whiskers = |(_, line): (usize, Vec<Point>)| {
+            line.len() <= MARKS && line.iter().any(|point| point.interval.is_some())
+        };
+        let spread = self.drawn().any(has_whiskers);
         for (number, line) in self.drawn() {
+            scale.write_band(&mut svg, number, &line);
+        }
+        let (behind, before): (Vec<_>, Vec<_>) = self
+            .drawn()
+            .partition(|(number, _)| self.lines[*number].is_reference);
+        for (number, line) in behind.into_iter().chain(before) {
             let half = (self.lines.len() as f64 - 1.0) / 2.0;
             let aside = if spread && half > 0.0 {
                 (APART * half).min(ASIDE) * (number as f64 / half - 1.0)
             } else {
                 0.0
             };
-            scale.write_line(&mut svg, number, &line, aside);
+            let sample = self.lines[number].sample();
+            scale.write_line(&mut svg, (number, sample), &line, aside);
         }
         if xs.is_empty() {
             frame.write_nothing(&mut svg);
@@ -237,7 +260,39 @@ impl Scale<'_> {
         );
     }
 
-    fn write_line(&self, svg: &mut String, number: usize, points: &[Point], aside: f64) {
+    /// The intervals of a line of many points, from one to the next that has none.
+    fn write_band(&self, svg: &mut String, number: usize, points: &[Point]) {
+        if points.len() <= MARKS {
+            return;
+        }
+        let ends = |point: &Point| {
+            let (one, other) = point.interval?;
+            let (one, other) = (self.frame.y_at(one)?, self.frame.y_at(other)?);
+            Some((self.x_at(point.x)?, one, other))
+        };
+        let ends: Vec<_> = points.iter().map(ends).collect();
+        let mut path = String::new();
+        for run in ends.split(Option::is_none) {
+            let there = run.iter().flatten().map(|(x, one, _)| (x, one));
+            let back = run.iter().rev().flatten().map(|(x, _, other)| (x, other));
+            for (index, (x, y)) in there.chain(back).enumerate() {
+                let _ = write!(path, "{}{x:.1} {y:.1}", if index == 0 { "M" } else { "L" });
+            }
+            path.push_str(if run.is_empty() { "" } else { "Z" });
+        }
+        if !path.is_empty() {
+            let class = colour(number);
+            let _ = write!(svg, "<path class=\"band {class}\" d=\"{path}\"/>");
+        }
+    }
+
+    fn write_line(
+        &self,
+        svg: &mut String,
+        (number, sample): (usize, Sample),
+        points: &[Point],
+        aside: f64,
+    ) {
         let (mut path, mut spreads, mut marks) = (String::new(), String::new(), String::new());
         let mut is_open = false;
         for point in points {
@@ -250,17 +305,18 @@ impl Scale<'_> {
             };
             let _ = write!(path, "{}{x:.1} {y:.1}", if is_open { "L" } else { "M" });
             is_open = true;
-            if points.len() <= MARKS {
+            if sample == Sample::Line {
                 marks.push_str(&mark(number, x, y));
             }
             spreads.extend(
                 point
                     .interval
+                    .filter(|_| points.len() <= MARKS)
                     .and_then(|interval| whisker(self.frame, x, interval, 3.5))
                     .map(|(path, ..)| path),
             );
         }
-        let _ = write!(svg, "<g class=\"{}\">", colour(number));
+        let _ = write!(svg, "<g class=\"{}\">", line_class(number, sample));
         if !spreads.is_empty() {
             let _ = write!(svg, "<path class=\"spread\" d=\"{spreads}\"/>");
         }
@@ -271,5 +327,50 @@ impl Scale<'_> {
             let _ = write!(svg, "<path class=\"mark\" d=\"{marks}\"/>");
         }
         svg.push_str("</g>");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(label: &str, y: f64, is_reference: bool, interval: fn(usize) -> Option<f64>) -> Line {
+        let point = |k| Point {
+            x: k as f64,
+            y,
+            interval: interval(k).map(|half| (y - half, y + half)),
+        };
+        Line {
+            label: label.to_owned(),
+            points: (0..MARKS + 20).map(point).collect(),
+            is_reference,
+        }
+    }
+
+    #[test]
+    fn many_intervals_are_a_band_and_a_reference_lies_behind() {
+        let chart = LineChart {
+            title: "Jump".to_owned(),
+            x_label: "time, s".to_owned(),
+            y_label: "m/s²".to_owned(),
+            logarithmic_x: false,
+            lines: vec![
+                line("estimate", 3.0, false, |k| (k != 20).then_some(0.5)),
+                line("truth", 2.0, true, |_| None),
+            ],
+            level: None,
+        };
+        let svg = chart.svg();
+        assert!(!svg.contains("class=\"spread\"") && !svg.contains("class=\"mark\""));
+        let band = svg.split("class=\"band c0\" d=\"").nth(1);
+        let band = band.and_then(|rest| rest.split('"').next()).unwrap_or("");
+        assert_eq!(
+            (band.matches('M').count(), band.matches('Z').count()),
+            (2, 2),
+            "interrupted where there is no interval: {band}"
+        );
+        // The last of each is the line; the first stands in the legend.
+        let place = |class: &str| svg.rfind(&format!("<g class=\"{class}\">"));
+        assert!(place("reference").is_some() && place("reference") < place("c0"));
     }
 }

@@ -97,6 +97,7 @@ fn curve(lines: usize) -> LineChart {
         Line {
             label: format!("regime {number}"),
             points: [10.0, 25.0, 50.0, 100.0].map(point).to_vec(),
+            is_reference: false,
         }
     };
     LineChart {
@@ -157,6 +158,7 @@ fn all() -> Vec<(&'static str, Chart)> {
                 interval: None,
             })
             .collect(),
+        is_reference: false,
     };
     many.lines.push(hundred);
     vec![

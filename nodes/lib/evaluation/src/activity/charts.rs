@@ -54,6 +54,7 @@ pub(super) fn curve_chart(results: &ActivityResults) -> LineChart {
         Line {
             label: label.to_owned(),
             points: learning_curve(results).filter_map(point).collect(),
+            is_reference: false,
         }
     };
     LineChart {

@@ -3,6 +3,7 @@
 
 mod cases;
 mod errors;
+mod imusim;
 mod method;
 mod practice;
 mod protocol;
@@ -19,8 +20,8 @@ pub use method::Method;
 pub use protocol::{Protocol, Study};
 pub use results::{FidelityResults, MethodResults, PositionResults, StudyResults};
 pub use rigid::{
-    PhysicsSource, PoseErrors, PracticeResults, RigidMethodResults, RigidPartResults, RigidStudy,
-    RigidStudyResults, StatedResults,
+    PhysicsSource, PictureResults, PoseErrors, PracticeResults, RigidMethodResults,
+    RigidPartResults, RigidPicture, RigidStudy, RigidStudyResults, SeenResults, StatedResults,
 };
 
 use crate::EvaluationError;

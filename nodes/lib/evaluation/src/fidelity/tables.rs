@@ -4,7 +4,7 @@ use cromosim_charts::{Bar, BarChart, Block, Chart, Column, Group, Page, Section,
 
 use super::method::Method;
 use super::results::{FidelityResults, MethodResults, PositionResults, StudyResults};
-use super::rigid::{rigid_charts, rigid_markdown, rigid_sections};
+use super::rigid::{pictures, rigid_charts, rigid_markdown, rigid_sections};
 use crate::EvaluationError;
 use crate::report::{Report, json};
 
@@ -74,6 +74,7 @@ fn charts(results: &FidelityResults) -> Vec<(String, Chart)> {
         }
     }
     charts.extend(rigid_charts(&results.rigid));
+    charts.extend(results.rigid.iter().flat_map(pictures));
     charts
 }
 

@@ -104,6 +104,14 @@ impl RigidCase {
         Ok(found)
     }
 
+    /// Poses, stamps and exact readings; none for a real IMU.
+    pub fn known(&self) -> Option<(&SensorTrajectory, &[Stamp], &[Reading])> {
+        match &self.measured {
+            Measured::Known(readings) => Some((&self.trajectory, &self.stamps, readings)),
+            Measured::Real(_) => None,
+        }
+    }
+
     fn measured(
         &self,
         samples: &[KinematicSample],

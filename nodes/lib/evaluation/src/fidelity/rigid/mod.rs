@@ -5,6 +5,7 @@ mod alignment;
 mod case;
 mod definition;
 mod method;
+mod picture;
 mod pose_errors;
 mod results;
 mod stated;
@@ -12,10 +13,11 @@ mod study;
 mod tables;
 mod truth;
 
-pub use definition::{PhysicsSource, RigidStudy};
+pub use definition::{PhysicsSource, RigidPicture, RigidStudy};
+pub use picture::{PictureResults, SeenResults};
 pub use pose_errors::PoseErrors;
 pub use results::{
     PracticeResults, RigidMethodResults, RigidPartResults, RigidStudyResults, StatedResults,
 };
 pub(super) use study::{RigidOutcome, run_rigid_study};
-pub(super) use tables::{rigid_charts, rigid_markdown, rigid_sections};
+pub(super) use tables::{pictures, rigid_charts, rigid_markdown, rigid_sections};

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::case::{CaseErrors, RigidCase};
 use super::definition::RigidStudy;
 use super::method::{JUDGED, RigidMethod};
+use super::picture::PictureResults;
 use super::stated::StatedErrors;
 use crate::bootstrap::intervals;
 use crate::fidelity::errors::{SquaredErrors, signal};
@@ -34,6 +35,9 @@ pub struct RigidStudyResults {
     pub parts: Vec<RigidPartResults>,
     /// Where a method gave no readings, and why.
     pub failures: Vec<String>,
+    /// Some seconds of one IMU, where the protocol asks for them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub picture: Option<PictureResults>,
 }
 
 /// One method in a study. Pairs of numbers are specific force (m/s2) and angular velocity (rad/s).
@@ -136,6 +140,7 @@ impl RigidStudyResults {
             stated: scored.stated(&all),
             parts: scored.parts(cases, errors, best),
             failures: failures.collect(),
+            picture: None,
         }
     }
 }

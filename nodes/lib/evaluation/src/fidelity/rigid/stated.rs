@@ -44,6 +44,25 @@ impl StatedErrors {
     }
 }
 
+/// Standard deviations that a reading's covariances state of the norms of specific force, m/s2, and
+/// angular velocity, rad/s: `sqrt(u^T C u)` along the reading u; none where none is stated.
+pub(super) fn stated_of_norms(sample: &KinematicSample) -> [Option<f64>; 2] {
+    let simulated = sample.imu();
+    let stated = NONE.with_motion(&sample.variance, &simulated);
+    let along = |reading: Vector3<f64>, covariance: [f64; 9]| {
+        if covariance[0] <= 0.0 {
+            return None;
+        }
+        let unit = reading.try_normalize(0.0).unwrap_or_else(Vector3::z);
+        let variance = unit.dot(&(Matrix3::from_row_slice(&covariance) * unit));
+        Some(variance.sqrt())
+    };
+    [
+        along(simulated.specific_force, stated.linear_acceleration),
+        along(simulated.angular_velocity, stated.angular_velocity),
+    ]
+}
+
 const NONE: Covariances = Covariances {
     orientation: [0.0; 9],
     angular_velocity: [0.0; 9],

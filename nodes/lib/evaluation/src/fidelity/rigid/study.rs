@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::case::{CaseErrors, RigidCase, physics_cases, recorded_cases};
 use super::definition::RigidStudy;
 use super::method::RigidMethod;
+use super::picture::PictureResults;
 use super::results::RigidStudyResults;
 use crate::EvaluationError;
 use crate::observer::{self, Observer};
@@ -63,7 +64,14 @@ pub(in crate::fidelity) fn run_rigid_study(
     };
     let errors: Vec<Vec<CaseErrors>> = cases.par_iter().map(one).collect::<Result<_, _>>()?;
     observer.end();
-    let results = RigidStudyResults::new(study, &cases, &methods, &errors, seed);
+    let mut results = RigidStudyResults::new(study, &cases, &methods, &errors, seed);
+    let wanted = study
+        .physics
+        .as_ref()
+        .and_then(|source| source.picture.as_ref());
+    if let Some(wanted) = wanted {
+        results.picture = PictureResults::new(wanted, &cases, results.practice.cutoff_hz)?;
+    }
     Ok(RigidOutcome::Scored(Box::new(results)))
 }
 

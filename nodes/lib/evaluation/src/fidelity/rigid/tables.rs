@@ -4,6 +4,7 @@ use cromosim_charts::{Bar, BarChart, Block, Chart, Column, Group, Level, Section
 use cromosim_imu::Scheme;
 
 use super::method::{JUDGED, RigidMethod};
+use super::picture::PictureResults;
 use super::results::{RigidMethodResults, RigidStudyResults};
 
 /// Names, units and digits of the two numbers of each pair.
@@ -59,6 +60,7 @@ pub(in crate::fidelity) fn rigid_sections(studies: &[RigidStudyResults]) -> Vec<
         title: study.name.clone(),
         blocks: [
             Block::Text(about(study)),
+            Block::Charts(pictures(study).map(|(_, chart)| chart).collect()),
             Block::Table(by_method(study)),
             Block::Table(by_part(study)),
         ]
@@ -108,6 +110,14 @@ pub(in crate::fidelity) fn rigid_charts(studies: &[RigidStudyResults]) -> Vec<(S
         (name, Chart::Bars(chart))
     };
     QUANTITIES.iter().enumerate().map(chart).collect()
+}
+
+/// Some seconds of a study's IMUs over time, by their file's names.
+pub(in crate::fidelity) fn pictures(
+    study: &RigidStudyResults,
+) -> impl Iterator<Item = (String, Chart)> {
+    let charts = |picture: &PictureResults| picture.charts(&study.name);
+    study.picture.iter().flat_map(charts)
 }
 
 /// What a study's measured side is.

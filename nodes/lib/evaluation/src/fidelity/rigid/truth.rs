@@ -39,6 +39,11 @@ const MOTIONS: [(&str, &[u8]); 6] = [
 /// Where the humanoid wears IMUs.
 pub(super) const POSITIONS: [&str; 6] = ["wrist", "upper_arm", "pelvis", "thigh", "foot", "head"];
 
+/// Whether there is a motion with this name.
+pub(super) fn is_motion(name: &str) -> bool {
+    MOTIONS.iter().any(|(own, _)| *own == name)
+}
+
 /// A motion with an IMU at each of [`POSITIONS`].
 pub(super) struct KnownMotion {
     /// Its name.
