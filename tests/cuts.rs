@@ -182,8 +182,8 @@ fn a_part_has_the_readings_of_the_whole() {
     }
 }
 
-/// A foot is in the air at both ends of one clip, and one series still ends with its largest value
-/// (1.40 times the 99th percentile); untrimmed it would be 16.
+/// One of the 30 series still ends with its largest value, 1.40 times the 99th percentile; untrimmed
+/// it is 16 of them.
 #[test]
 fn clips_do_not_begin_or_end_with_a_jolt() {
     let Some(data) = shared_data() else {
