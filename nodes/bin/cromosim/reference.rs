@@ -6,15 +6,13 @@ use std::path::Path;
 use anyhow::bail;
 use cromosim_bag::{BagOptions, BagReader, BagSummary, BagWriter, Compression};
 use cromosim_body::BodyModel;
-use cromosim_imu::{Device, EffectsFile, Placement, PlacementEffects, Scheme, SensorFrame};
+use cromosim_imu::{Device, EffectsFile, Placement, PlacementEffects, Scheme};
 use cromosim_learned::{LearnedSimulator, scheme_for_networks};
 use cromosim_recording::rigid::{RigidContent, parse_rigid};
 use cromosim_recording::{
     RecordedPlacement, Resimulated, Resimulation, outside_reference, read_effects, read_placements,
     read_whole, with_stamps, write_resimulated,
 };
-use cromosim_spatial::Stamp;
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use crate::progress::{self, Interrupt};
@@ -162,20 +160,9 @@ fn rigid_placement(trajectory: &Path, name: &str) -> anyhow::Result<RecordedPlac
             trajectory.display()
         );
     };
-    let poses = poses.trajectory;
-    let frame = |((stamp, position), rotation): ((&Stamp, &Vector3<f64>), &UnitQuaternion<f64>)| {
-        SensorFrame::new(*stamp, Isometry3::from_parts((*position).into(), *rotation))
-    };
-    let frames = poses
-        .stamps
-        .iter()
-        .zip(&poses.positions)
-        .zip(&poses.rotations)
-        .map(frame)
-        .collect();
     Ok(RecordedPlacement {
         name: name.to_owned(),
-        frames,
+        frames: poses.trajectory.frames(),
         measured: Vec::new(),
         notes: Vec::new(),
     })

@@ -7,8 +7,9 @@ use std::f64::consts::{PI, SQRT_2};
 const MIRRORED: usize = 9;
 
 /// A Butterworth filter of second order by the bilinear transform, run forward and back: power gain
-/// `1 / (1 + (f / cutoff)^4)^2` well below half the rate, no delay. It needs evenly spaced values and no state between
-/// calls, so it shares nothing with the effect `low_pass`, which runs sample by sample.
+/// `1 / (1 + (f / cutoff)^4)^2` well below half the rate, no delay. It needs evenly spaced values and
+/// no state between calls, so it shares nothing with the effect `low_pass`, which runs sample by
+/// sample.
 pub(crate) struct ZeroPhaseLowPass {
     b: [f64; 3],
     a: [f64; 2],

@@ -3,7 +3,7 @@
 use cromosim_spatial::{KinematicTrack, Stamp};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
-use crate::{Bandwidth, SampleVariance};
+use crate::{Bandwidth, Reading, SampleVariance};
 
 /// Standard gravity, m/s2 (CGPM 1901).
 pub const STANDARD_GRAVITY: f64 = 9.80665;
@@ -41,6 +41,16 @@ pub struct ImuSample {
     pub specific_force: Vector3<f64>,
     /// Against the world, rad/s.
     pub angular_velocity: Vector3<f64>,
+}
+
+impl ImuSample {
+    /// Without stamp and orientation.
+    pub fn reading(&self) -> Reading {
+        Reading {
+            specific_force: self.specific_force,
+            angular_velocity: self.angular_velocity,
+        }
+    }
 }
 
 impl KinematicSample {

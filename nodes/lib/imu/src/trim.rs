@@ -37,8 +37,10 @@ impl Trim {
         let (from, to) = match self {
             Self::Seconds(seconds) => (start.plus_seconds(seconds), end.plus_seconds(-seconds)),
             Self::Uncertain => {
-                let first = first_certain(motion, motion.iter()).unwrap_or(start);
-                let last = first_certain(motion, motion.iter().rev()).unwrap_or(end);
+                let of_all = [acceleration, angular_velocity]
+                    .map(|variance| median(motion.iter().map(variance)));
+                let first = first_certain(motion.iter(), of_all).unwrap_or(start);
+                let last = first_certain(motion.iter().rev(), of_all).unwrap_or(end);
                 let most_s = LONGEST_TRIM_S.min(LARGEST_PART * (end - start));
                 (
                     first.min(start.plus_seconds(most_s)),
@@ -62,24 +64,25 @@ pub fn median_bandwidth(motion: &[KinematicSample]) -> Option<Bandwidth> {
     })
 }
 
-/// The first sample from an end on that is as certain as the others.
+/// The first sample from an end on that is as certain as the others, whose medians are given.
 fn first_certain<'a>(
-    motion: &[KinematicSample],
-    from_end: impl Iterator<Item = &'a KinematicSample> + Clone,
+    mut from_end: impl Iterator<Item = &'a KinematicSample> + Clone,
+    [acceleration_of_all, angular_velocity_of_all]: [f64; 2],
 ) -> Option<Stamp> {
     let end = from_end.clone().next()?.stamp;
-    let from_the_end = |sample: &KinematicSample| (sample.stamp - end).abs();
-    let limits = [acceleration, angular_velocity].map(|variance| {
-        let behind = from_end
-            .clone()
-            .skip_while(|sample| from_the_end(sample) < LONGEST_TRIM_S)
-            .take_while(|sample| from_the_end(sample) < BEHIND_S);
-        let of_all = median(motion.iter().map(variance));
-        UNCERTAIN * of_all.max(median(behind.map(variance)))
-    });
-    let mut from_end = from_end;
+    let distance = |sample: &&KinematicSample| (sample.stamp - end).abs();
+    let behind = from_end
+        .clone()
+        .skip_while(|sample| distance(sample) < LONGEST_TRIM_S)
+        .take_while(|sample| distance(sample) < BEHIND_S);
+    let limit = |of_all: f64, variance: fn(&KinematicSample) -> f64| {
+        UNCERTAIN * of_all.max(median(behind.clone().map(variance)))
+    };
+    let most_acceleration = limit(acceleration_of_all, acceleration);
+    let most_angular_velocity = limit(angular_velocity_of_all, angular_velocity);
     let certain = |sample: &&KinematicSample| {
-        acceleration(sample) <= limits[0] && angular_velocity(sample) <= limits[1]
+        acceleration(sample) <= most_acceleration
+            && angular_velocity(sample) <= most_angular_velocity
     };
     from_end.find(certain).map(|sample| sample.stamp)
 }

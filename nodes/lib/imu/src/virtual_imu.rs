@@ -204,10 +204,7 @@ pub fn measure_recording(
 impl Output {
     fn messages(&self, mut sample: ImuSample, variance: &SampleVariance) -> ImuMessages {
         if let Some(mapping) = &self.mapping {
-            let mapped = mapping.map(&Reading {
-                specific_force: sample.specific_force,
-                angular_velocity: sample.angular_velocity,
-            });
+            let mapped = mapping.map(&sample.reading());
             (sample.specific_force, sample.angular_velocity) =
                 (mapped.specific_force, mapped.angular_velocity);
         }

@@ -215,12 +215,7 @@ mod tests {
             .map(|sample| sample.stamp)
             .collect();
         let ideal = motion.kinematics.iter().map(|sample| sample.imu());
-        let readings: Vec<Reading> = ideal
-            .map(|imu| Reading {
-                specific_force: imu.specific_force,
-                angular_velocity: imu.angular_velocity,
-            })
-            .collect();
+        let readings: Vec<Reading> = ideal.map(|imu| imu.reading()).collect();
         let names = PairNames {
             name: "test".to_owned(),
             subject: "s".to_owned(),

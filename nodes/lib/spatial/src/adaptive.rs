@@ -30,8 +30,8 @@ const FIRST_CUTOFF_HZ: f64 = 12.0;
 const STATED_AT_HZ: f64 = 100.0;
 /// What the expected noise counts beside the samples, in samples. It decides where they are
 /// interpolated, because then nothing of them is left to tell the noise from, as of errors that were
-/// low-passed before. Chosen among 0.003 to 0.1 on seeds 100 to 147 of `tests/bursts`, which scores
-/// others, and on ten trials of a tracked IMU.
+/// low-passed before. Chosen among 0.003 to 0.1 on seeds 300 to 347 of `tests/bursts`, which scores
+/// others too, and on ten trials of a tracked IMU (BROAD).
 const EXPECTED_NOISE_COUNT: f64 = 0.01;
 /// Steps towards the greatest likelihood. More hardly change the error, and carry what a clip's ends
 /// say farther inwards. Chosen among 3 to 40 as [`FIRST_CUTOFF_HZ`].

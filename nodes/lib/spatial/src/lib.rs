@@ -69,8 +69,8 @@ pub use fourth_differences::{
 pub use grid::{check_times, relative_seconds, uniform_stamps};
 pub use influence::{Influence, SampleWeights};
 pub use pose_spline::{
-    Bandwidth, Motion, PoseAdaptation, PoseSmoothing, PoseSpline, PoseTimes, SampleVariance,
-    position_channels, rotation_channels,
+    Bandwidth, Motion, MotionEstimate, PoseAdaptation, PoseSmoothing, PoseSpline, PoseTimes,
+    SampleVariance, position_channels, rotation_channels,
 };
 pub use rustfft::num_complex::Complex64;
 pub use spectrum::{FourierPair, Spectrum, welch};

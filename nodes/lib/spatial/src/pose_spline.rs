@@ -87,6 +87,18 @@ pub struct Bandwidth {
     pub angular_velocity_hz: f64,
 }
 
+/// How a frame moves at one time, and what is known about it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotionEstimate {
+    /// The motion.
+    pub motion: Motion,
+    /// How far it may be off, given the noise that was learnt of the poses; none but for
+    /// [`Smoothing::Adaptive`] of both.
+    pub variance: Option<SampleVariance>,
+    /// Up to which frequency it is resolved.
+    pub bandwidth: Bandwidth,
+}
+
 impl SampleVariance {
     /// The larger of each: two statements about the same errors.
     #[must_use]
@@ -237,20 +249,17 @@ impl PoseSpline {
         self.motion(first, &values)
     }
 
-    /// As [`PoseSpline::evaluate`], and how far the motion may be off, given the noise that was
-    /// learnt of the poses; this none but for [`Smoothing::Adaptive`] of both.
-    pub fn evaluate_with_variance(&self, stamp: Stamp) -> (Motion, Option<SampleVariance>) {
+    /// As [`PoseSpline::evaluate`], with what is known about it.
+    pub fn estimate(&self, stamp: Stamp) -> MotionEstimate {
         let (first, values) = self.basis_at(stamp);
-        (self.motion(first, &values), self.variance(first, &values))
-    }
-
-    /// Up to which frequency the motion is resolved at a stamp.
-    pub fn bandwidth(&self, stamp: Stamp) -> Bandwidth {
-        let seconds = stamp - self.times.origin;
         let highest_hz = 0.5 / self.times.system.equations.interval;
-        Bandwidth {
-            acceleration_hz: self.position.cutoff_hz(seconds).min(highest_hz),
-            angular_velocity_hz: self.rotation.cutoff_hz(seconds).min(highest_hz),
+        MotionEstimate {
+            motion: self.motion(first, &values),
+            variance: self.variance(first, &values),
+            bandwidth: Bandwidth {
+                acceleration_hz: self.position.cutoff_over(first).min(highest_hz),
+                angular_velocity_hz: self.rotation.cutoff_over(first).min(highest_hz),
+            },
         }
     }
 

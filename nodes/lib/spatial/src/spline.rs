@@ -291,13 +291,6 @@ impl<const C: usize> SmoothingSpline<C> {
         )
     }
 
-    /// Standard deviation of the samples' noise around a time, in their unit, under the same
-    /// condition.
-    pub fn noise_std(&self, seconds: f64) -> Option<f64> {
-        let noise = &self.uncertainty.as_ref()?.noise;
-        Some(noise[self.system.equations.basis_at(seconds).0].sqrt())
-    }
-
     /// The penalty's weight.
     pub fn weight(&self) -> &SplineWeight {
         &self.weight
@@ -305,16 +298,14 @@ impl<const C: usize> SmoothingSpline<C> {
 
     /// Frequency at which the smoothing's response is one half at a time, Hz.
     pub fn cutoff_hz(&self, seconds: f64) -> f64 {
+        self.cutoff_over(self.system.equations.basis_at(seconds).0)
+    }
+
+    /// The same over a knot interval.
+    pub(crate) fn cutoff_over(&self, interval: usize) -> f64 {
         let weight = match &self.weight {
             SplineWeight::Uniform(weight) => *weight,
-            SplineWeight::Local(weights) => {
-                weights[self
-                    .system
-                    .equations
-                    .basis_at(seconds)
-                    .0
-                    .min(weights.len() - 1)]
-            }
+            SplineWeight::Local(weights) => weights[interval.min(weights.len() - 1)],
         };
         self.system.equations.cutoff_of_weight(weight)
     }

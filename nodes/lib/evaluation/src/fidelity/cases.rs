@@ -44,7 +44,10 @@ impl Case {
         let Some(kinematics) = self.kinematics(method, learned)? else {
             return Ok(None);
         };
-        let readings = kinematics.iter().map(reading).collect::<Vec<_>>();
+        let readings = kinematics
+            .iter()
+            .map(|sample| sample.imu().reading())
+            .collect::<Vec<_>>();
         if method != Method::Mapped {
             return Ok(Some(readings));
         }
@@ -106,14 +109,6 @@ impl Case {
             .zip(&self.pair.targets)
             .map(moved)
             .collect()
-    }
-}
-
-fn reading(sample: &KinematicSample) -> Reading {
-    let imu = sample.imu();
-    Reading {
-        specific_force: imu.specific_force,
-        angular_velocity: imu.angular_velocity,
     }
 }
 

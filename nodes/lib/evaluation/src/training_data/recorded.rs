@@ -9,7 +9,6 @@ use cromosim_learned::{Pair, PairNames, SiteMotion};
 use cromosim_recording::datasets::{DatasetFiles, DatasetRecording, open_dataset};
 use cromosim_recording::{PlacementTrace, RecordedPlacement, RecordingError, read_placements};
 use cromosim_spatial::Stamp;
-use nalgebra::Isometry3;
 
 use super::clips::name_of_file;
 use super::source::{DataFolder, DataSource};
@@ -100,28 +99,11 @@ pub fn recorded_pieces(
 fn devices_in_dataset(recording: &DatasetRecording) -> Vec<Device> {
     let device = |trace: PlacementTrace<'_>| {
         let (poses, series) = (trace.reference?, trace.imu?);
-        let frames = poses
-            .stamps
-            .iter()
-            .zip(&poses.positions)
-            .zip(&poses.rotations)
-            .map(|((stamp, position), rotation)| {
-                let world_from_sensor = Isometry3::from_parts((*position).into(), *rotation);
-                SensorFrame::new(*stamp, world_from_sensor)
-            });
-        let readings = series
-            .specific_force
-            .iter()
-            .zip(&series.angular_velocity)
-            .map(|(specific_force, angular_velocity)| Reading {
-                specific_force: *specific_force,
-                angular_velocity: *angular_velocity,
-            });
         Some(Device {
             position: trace.name.to_owned(),
-            frames: frames.collect(),
+            frames: poses.frames(),
             stamps: series.stamps.clone(),
-            readings: readings.collect(),
+            readings: series.readings(),
         })
     };
     recording.traces().into_iter().filter_map(device).collect()

@@ -1,6 +1,6 @@
 //! Smoothing quintic splines of position and quaternion, see [`cromosim_spatial::PoseSpline`].
 
-use cromosim_spatial::{Influence, PoseSmoothing, PoseSpline, PoseTimes, Stamp};
+use cromosim_spatial::{Influence, MotionEstimate, PoseSmoothing, PoseSpline, PoseTimes, Stamp};
 use nalgebra::Isometry3;
 
 use crate::uncertainty::{FrameWeights, any_error};
@@ -19,7 +19,11 @@ pub(crate) fn fit(
 
 /// The motion at a stamp, and how far it may be off where the spline has learnt that.
 pub(crate) fn sample(spline: &PoseSpline, stamp: Stamp) -> KinematicSample {
-    let (motion, variance) = spline.evaluate_with_variance(stamp);
+    let MotionEstimate {
+        motion,
+        variance,
+        bandwidth,
+    } = spline.estimate(stamp);
     KinematicSample {
         stamp,
         world_from_sensor: Isometry3::from_parts(motion.position.into(), motion.rotation),
@@ -27,7 +31,7 @@ pub(crate) fn sample(spline: &PoseSpline, stamp: Stamp) -> KinematicSample {
         angular_velocity_in_world: motion.angular_velocity,
         angular_acceleration_in_world: Some(motion.angular_acceleration),
         variance: variance.unwrap_or_default(),
-        bandwidth: Some(spline.bandwidth(stamp)),
+        bandwidth: Some(bandwidth),
     }
 }
 

@@ -1,7 +1,8 @@
 //! Poses and IMU readings over time.
 
+use cromosim_imu::{Reading, SensorFrame};
 use cromosim_spatial::Stamp;
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 /// Poses of one rigid body. All lists have the same length; stamps increase.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -28,6 +29,15 @@ impl PoseTrajectory {
         self.positions.push(position);
         self.rotations.push(rotation);
     }
+
+    /// The poses as frames of a sensor that is the body.
+    pub fn frames(&self) -> Vec<SensorFrame> {
+        let poses = self.positions.iter().zip(&self.rotations);
+        let frame = |(stamp, (position, rotation)): (&Stamp, (&Vector3<f64>, &_))| {
+            SensorFrame::new(*stamp, Isometry3::from_parts((*position).into(), *rotation))
+        };
+        self.stamps.iter().zip(poses).map(frame).collect()
+    }
 }
 
 /// Readings of one IMU. All lists have the same length; stamps increase.
@@ -52,5 +62,16 @@ impl ImuSeries {
         self.stamps.push(stamp);
         self.specific_force.push(specific_force);
         self.angular_velocity.push(angular_velocity);
+    }
+
+    /// The readings, one for each stamp.
+    pub fn readings(&self) -> Vec<Reading> {
+        let both = self.specific_force.iter().zip(&self.angular_velocity);
+        let reading =
+            |(specific_force, angular_velocity): (&Vector3<f64>, &Vector3<f64>)| Reading {
+                specific_force: *specific_force,
+                angular_velocity: *angular_velocity,
+            };
+        both.map(reading).collect()
     }
 }

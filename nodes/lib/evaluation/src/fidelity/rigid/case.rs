@@ -4,7 +4,6 @@ use cromosim_imu::{KinematicSample, Reading, SensorFrame, SensorTrajectory};
 use cromosim_recording::datasets::{DatasetFiles, open_dataset};
 use cromosim_recording::rigid::PoseTrajectory;
 use cromosim_spatial::Stamp;
-use nalgebra::Isometry3;
 
 use super::alignment::{Lagged, aligned, all_lags};
 use super::method::{JUDGED, RigidMethod};
@@ -90,11 +89,7 @@ impl RigidCase {
         for (sample, measured) in samples.iter().zip(&measured) {
             let Some(measured) = measured else { continue };
             let place = usize::from(self.to_nearer_end(sample.stamp) < END_S);
-            let own = sample.imu();
-            let simulated = Reading {
-                specific_force: own.specific_force,
-                angular_velocity: own.angular_velocity,
-            };
+            let simulated = sample.imu().reading();
             found.errors[place].add(&SquaredErrors::between(&[simulated], &[Some(*measured)]));
             if method == JUDGED {
                 found.stated[place].add_reading(sample, measured);
@@ -201,21 +196,12 @@ pub(super) fn recorded_cases(path: &std::path::Path) -> Result<Vec<RigidCase>, E
         let Some(trajectory) = longest_stretch(poses).at(|| path.display().to_string())? else {
             continue;
         };
-        let readings: Vec<Reading> = series
-            .specific_force
-            .iter()
-            .zip(&series.angular_velocity)
-            .map(|(specific_force, angular_velocity)| Reading {
-                specific_force: *specific_force,
-                angular_velocity: *angular_velocity,
-            })
-            .collect();
         let inside = |stamp: &&Stamp| (trajectory.start()..=trajectory.end()).contains(*stamp);
         let stamps: Vec<Stamp> = series.stamps.iter().filter(inside).copied().collect();
         cases.push(RigidCase {
             motion: name.to_string(),
             position: trace.name.to_owned(),
-            measured: Measured::Real(all_lags(&series.stamps, &readings, &stamps)),
+            measured: Measured::Real(all_lags(&series.stamps, &series.readings(), &stamps)),
             trajectory,
             stamps,
         });
@@ -240,17 +226,9 @@ fn longest_stretch(poses: &PoseTrajectory) -> Result<Option<SensorTrajectory>, E
             first = k + 1;
         }
     }
-    let frames: Vec<SensorFrame> = best
-        .map(|k| {
-            let pose = Isometry3::from_parts(poses.positions[k].into(), poses.rotations[k]);
-            SensorFrame::new(poses.stamps[k], pose)
-        })
-        .collect();
+    let mut frames = poses.frames()[best].to_vec();
     let start = frames[0].stamp;
-    let frames: Vec<SensorFrame> = frames
-        .into_iter()
-        .take_while(|frame| frame.stamp - start <= LONGEST_S)
-        .collect();
+    frames.retain(|frame| frame.stamp - start <= LONGEST_S);
     if frames[frames.len() - 1].stamp - start < SHORTEST_S {
         return Ok(None);
     }
