@@ -1,8 +1,9 @@
 //! Smoothing that follows the motion: how much is learnt around each time.
 
 use crate::SpatialError;
-use crate::equations::{PenaltyWeights, Scratch, SplineEquations};
+use crate::equations::SplineEquations;
 use crate::fourth_differences::{MEDIAN_OF_SQUARE, fourth_difference, white_noise_variance};
+use crate::local_spline::{LocalSolution, Series};
 use crate::weight_search::LOWEST_LOG_WEIGHT;
 
 /// Time over which neighbours share one drive, standard deviation, s: shorter, a burst's own noise
@@ -63,51 +64,58 @@ const LARGEST_WEIGHT: f64 = 1e10;
 /// and to each sum what is expected is added with its count, see the constants above.
 /// K is a symmetric kernel, so that what is learnt at t depends on the samples near t alone: the
 /// same seconds of a longer series give the same estimate.
+///
+/// Several series on the same times are learnt at once, a lane each; none knows of the others.
 #[derive(Clone, Debug)]
-pub(crate) struct Adaptation {
+pub(crate) struct Adaptation<const L: usize> {
     /// Density of the fifth derivative over each knot interval, unit^2 per interval^9.
-    drive: Vec<f64>,
+    drive: Vec<[f64; L]>,
     /// Variance of each sample's noise, unit^2.
-    noise: Vec<f64>,
-    least_noise: f64,
+    noise: Vec<[f64; L]>,
+    least_noise: [f64; L],
     /// Variance that is expected of the noise, unit^2.
-    expected_noise: f64,
+    expected_noise: [f64; L],
 }
 
-impl Adaptation {
+impl<const L: usize> Adaptation<L> {
     /// The start: noise as fourth differences show it, and one motion at all times.
     fn start<const C: usize>(
         equations: &SplineEquations,
-        values: &[[f64; C]],
-        expected_noise: f64,
+        series: &Series<C, L>,
+        expected_noise: [f64; L],
     ) -> Self {
-        let least_noise = (LEAST_NOISE * range(values))
-            .max(LEAST_NOISE_AT_ALL)
-            .powi(2);
-        let noise = fourth_difference_variance(values).max(least_noise);
-        let drive = noise / equations.weight_of_cutoff(FIRST_CUTOFF_HZ);
+        let least_noise: [f64; L] = std::array::from_fn(|lane| {
+            (LEAST_NOISE * range(series, lane))
+                .max(LEAST_NOISE_AT_ALL)
+                .powi(2)
+        });
+        let noise: [f64; L] = std::array::from_fn(|lane| {
+            fourth_difference_variance(series, lane).max(least_noise[lane])
+        });
+        let drive = noise.map(|noise| noise / equations.weight_of_cutoff(FIRST_CUTOFF_HZ));
         Self {
             drive: vec![drive; equations.interval_count()],
-            noise: vec![noise; values.len()],
+            noise: vec![noise; series.values.len()],
             least_noise,
-            expected_noise: expected_noise.powi(2) / (STATED_AT_HZ * equations.interval),
+            expected_noise: expected_noise
+                .map(|noise| noise.powi(2) / (STATED_AT_HZ * equations.interval)),
         }
     }
 
-    /// Learns from a whole series; `expected_noise` as in [`crate::Smoothing::Adaptive`].
+    /// Learns from whole series; `expected_noise` as in [`crate::Smoothing::Adaptive`], of each
+    /// lane. What `solution` holds afterwards is of no use.
     pub(crate) fn learn<const C: usize>(
         equations: &SplineEquations,
-        values: &[[f64; C]],
-        expected_noise: f64,
+        series: &Series<C, L>,
+        expected_noise: [f64; L],
+        solution: &mut LocalSolution<C, L>,
     ) -> Result<Self, SpatialError> {
-        let mut adaptation = Self::start(equations, values, expected_noise);
-        let (projected, mut scratch) = (equations.projected(values), Scratch::default());
+        let mut adaptation = Self::start(equations, series, expected_noise);
         for _ in 0..STEPS {
             let weights = adaptation.weights();
             // Not refined: squares are all that is wanted of it.
-            let local = PenaltyWeights::Local(&weights);
-            equations.solve_projected(values, &projected, local, &mut scratch)?;
-            let evidence = adaptation.evidence(equations, values, &weights, &scratch);
+            solution.solve_and_state(equations, series, &weights)?;
+            let evidence = adaptation.evidence(equations, &weights, solution);
             adaptation.update(equations, evidence, Stride::Whole);
         }
         Ok(adaptation)
@@ -128,57 +136,55 @@ impl Adaptation {
         true
     }
 
-    /// Learns from a spline of [`Adaptation::weights`]. Half a step, so that it does not swing from
-    /// window to window.
+    /// Learns from what splines of [`Adaptation::weights`] say. Half a step, so that it does not
+    /// swing from window to window.
     pub(crate) fn learn_from<const C: usize>(
         &mut self,
         equations: &SplineEquations,
-        values: &[[f64; C]],
-        weights: &[f64],
-        scratch: &Scratch<C>,
+        weights: &[[f64; L]],
+        solution: &LocalSolution<C, L>,
     ) {
-        let evidence = self.evidence(equations, values, weights, scratch);
+        let evidence = self.evidence(equations, weights, solution);
         self.update(equations, evidence, Stride::Half);
     }
 
     /// Variance of each sample's noise, unit^2.
-    pub(crate) fn noise(&self) -> &[f64] {
-        &self.noise
+    pub(crate) fn into_noise(self) -> Vec<[f64; L]> {
+        self.noise
     }
 
     /// The penalty's weight over each knot interval: the noise changes so little over a spline's
     /// width that its quotient with the drive may stand for both.
-    pub(crate) fn weights(&self) -> Vec<f64> {
+    pub(crate) fn weights(&self) -> Vec<[f64; L]> {
         let lowest = 10f64.powf(LOWEST_LOG_WEIGHT);
-        self.drive
-            .iter()
-            .enumerate()
-            .map(|(k, drive)| (self.noise_over(k) / drive).clamp(lowest, LARGEST_WEIGHT))
+        let weight = |k: usize, lane: usize| self.noise_over(k, lane) / self.drive[k][lane];
+        (0..self.drive.len())
+            .map(|k| std::array::from_fn(|lane| weight(k, lane).clamp(lowest, LARGEST_WEIGHT)))
             .collect()
     }
 
     /// Variance of the noise over a knot interval.
-    fn noise_over(&self, interval: usize) -> f64 {
-        (self.noise[interval] * self.noise[interval + 1]).sqrt()
+    fn noise_over(&self, interval: usize, lane: usize) -> f64 {
+        (self.noise[interval][lane] * self.noise[interval + 1][lane]).sqrt()
     }
 
     /// A step towards the greatest likelihood.
     fn update(
         &mut self,
         equations: &SplineEquations,
-        (drives, residuals): (Vec<Evidence>, Vec<Evidence>),
+        (drives, residuals): (Vec<Evidence<L>>, Vec<Evidence<L>>),
         stride: Stride,
     ) {
         let found = local_means(drives, SHARED_DRIVE_S / equations.interval);
         for (drive, found) in self.drive.iter_mut().zip(found) {
             *drive = match stride {
                 Stride::Whole => found,
-                Stride::Half => (*drive * found).sqrt(),
+                Stride::Half => std::array::from_fn(|lane| (drive[lane] * found[lane]).sqrt()),
             };
         }
         let found = local_means(residuals, SHARED_NOISE_S / equations.interval);
         for (noise, found) in self.noise.iter_mut().zip(found) {
-            *noise = found.max(self.least_noise);
+            *noise = std::array::from_fn(|lane| found[lane].max(self.least_noise[lane]));
         }
     }
 
@@ -186,38 +192,43 @@ impl Adaptation {
     fn evidence<const C: usize>(
         &self,
         equations: &SplineEquations,
-        values: &[[f64; C]],
-        weights: &[f64],
-        scratch: &Scratch<C>,
-    ) -> (Vec<Evidence>, Vec<Evidence>) {
+        weights: &[[f64; L]],
+        solution: &LocalSolution<C, L>,
+    ) -> (Vec<Evidence<L>>, Vec<Evidence<L>>) {
         let free = |share: f64| (1.0 - share).max(LEAST_FREE);
         let expected = EXPECTED_COUNT / equations.weight_of_cutoff(EXPECTED_CUTOFF_HZ);
-        let noise_count = if self.expected_noise > 0.0 {
-            EXPECTED_NOISE_COUNT
-        } else {
-            0.0
-        };
-        let coefficients = &scratch.coefficients;
-        let mut drives = vec![Evidence::default(); weights.len()];
-        let mut residuals = vec![Evidence::default(); values.len()];
-        scratch.factor.for_each_inverse_block(|k, block| {
-            let (square, variance) = equations.drive_over(k, coefficients, block);
-            drives[k] = [
-                square + expected * self.noise_over(k),
-                free(weights[k] * variance) + EXPECTED_COUNT,
-            ];
-            // The last interval's functions are those of two samples.
-            let end = if k + 1 == weights.len() { k + 2 } else { k + 1 };
-            for sample in k..end {
-                let (square, variance) =
-                    equations.residual_at(sample, &values[sample], coefficients, block);
-                residuals[sample] = [
-                    square + EXPECTED_NOISE_COUNT * self.expected_noise,
-                    free(variance) + noise_count,
-                ];
+        let noise_count = self.expected_noise.map(|expected_noise| {
+            if expected_noise > 0.0 {
+                EXPECTED_NOISE_COUNT
+            } else {
+                0.0
             }
         });
-        (drives, residuals)
+        let of_interval = |(k, [square, variance]): (usize, &[[f64; L]; 2])| {
+            let mut evidence = [[0.0; L]; 2];
+            for lane in 0..L {
+                evidence[0][lane] = square[lane] + expected * self.noise_over(k, lane);
+                evidence[1][lane] = free(weights[k][lane] * variance[lane]) + EXPECTED_COUNT;
+            }
+            evidence
+        };
+        let of_sample = |[square, variance]: &[[f64; L]; 2]| {
+            let mut evidence = [[0.0; L]; 2];
+            for lane in 0..L {
+                evidence[0][lane] = square[lane] + EXPECTED_NOISE_COUNT * self.expected_noise[lane];
+                evidence[1][lane] = free(variance[lane]) + noise_count[lane];
+            }
+            evidence
+        };
+        (
+            solution
+                .drives
+                .iter()
+                .enumerate()
+                .map(of_interval)
+                .collect(),
+            solution.residuals.iter().map(of_sample).collect(),
+        )
     }
 }
 
@@ -228,32 +239,39 @@ enum Stride {
     Half,
 }
 
-/// A sum of squares, and what it counts.
-type Evidence = [f64; 2];
+/// A sum of squares, and what it counts, of each lane.
+type Evidence<const L: usize> = [[f64; L]; 2];
 
 /// Means around each entry, by a kernel of this standard deviation.
-fn local_means(mut evidence: Vec<Evidence>, intervals: f64) -> impl Iterator<Item = f64> {
+fn local_means<const L: usize>(
+    mut evidence: Vec<Evidence<L>>,
+    intervals: f64,
+) -> impl Iterator<Item = [f64; L]> {
     Kernel::new(intervals.max(LEAST_SHARED_INTERVALS)).smooth(&mut evidence);
-    evidence
-        .into_iter()
-        .map(|[square, count]| (square / count).max(f64::MIN_POSITIVE))
+    evidence.into_iter().map(|[square, count]| {
+        std::array::from_fn(|lane| (square[lane] / count[lane]).max(f64::MIN_POSITIVE))
+    })
 }
 
 /// Largest distance of a sample from the first, over all channels.
-fn range<const C: usize>(values: &[[f64; C]]) -> f64 {
+fn range<const C: usize, const L: usize>(series: &Series<C, L>, lane: usize) -> f64 {
+    let values = series.values.iter();
     values
-        .iter()
-        .flatten()
+        .flat_map(|value| series.channels_of(lane).map(|c| value[c]))
         .fold(0.0, |most, v| v.abs().max(most))
 }
 
 /// Variance of white noise from the fourth differences of all channels.
-fn fourth_difference_variance<const C: usize>(values: &[[f64; C]]) -> f64 {
+fn fourth_difference_variance<const C: usize, const L: usize>(
+    series: &Series<C, L>,
+    lane: usize,
+) -> f64 {
     let of_channel =
         |run: &[[f64; C]], c: usize| fourth_difference(std::array::from_fn(|k| run[k][c]));
-    let mut differences: Vec<f64> = values
+    let mut differences: Vec<f64> = series
+        .values
         .windows(5)
-        .flat_map(|run| (0..C).map(move |c| of_channel(run, c)))
+        .flat_map(|run| series.channels_of(lane).map(move |c| of_channel(run, c)))
         .collect();
     white_noise_variance(&mut differences, MEDIAN_OF_SQUARE).unwrap_or(0.0)
 }
@@ -273,21 +291,27 @@ impl Kernel {
     }
 
     /// Weighted sums in place; a quotient of two of them is a weighted mean.
-    fn smooth(&self, values: &mut [Evidence]) {
+    fn smooth<const L: usize>(&self, values: &mut [Evidence<L>]) {
         let mut given = values.to_vec();
         for pass in 0..2 {
             if pass > 0 {
                 given.copy_from_slice(values);
             }
-            let mut sum = Evidence::default();
+            let mut sum = [[0.0; L]; 2];
             for (value, own) in values.iter_mut().zip(&given) {
-                sum = std::array::from_fn(|c| sum[c] * self.decay + own[c]);
+                for (sum, own) in sum.iter_mut().zip(own) {
+                    (0..L).for_each(|lane| sum[lane] = sum[lane] * self.decay + own[lane]);
+                }
                 *value = sum;
             }
-            let mut sum = Evidence::default();
+            let mut sum = [[0.0; L]; 2];
             for (value, own) in values.iter_mut().zip(&given).rev() {
-                *value = std::array::from_fn(|c| value[c] + sum[c]);
-                sum = std::array::from_fn(|c| (sum[c] + own[c]) * self.decay);
+                for ((value, sum), own) in value.iter_mut().zip(&mut sum).zip(own) {
+                    for lane in 0..L {
+                        value[lane] += sum[lane];
+                        sum[lane] = (sum[lane] + own[lane]) * self.decay;
+                    }
+                }
             }
         }
     }

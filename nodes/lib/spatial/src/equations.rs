@@ -1,7 +1,7 @@
 //! The equations of a smoothing spline: everything that depends on the times alone.
 
 use crate::SpatialError;
-use crate::banded::{Banded, Block, Factor, quadratic_form};
+use crate::banded::{Banded, Factor, Row};
 use crate::basis::{Basis, BasisValues, DEGREE, ORDER};
 use crate::difference::MAX_STENCIL;
 use crate::end_derivatives::{EndDerivative, end_derivatives};
@@ -35,14 +35,14 @@ pub(crate) struct SplineEquations {
     pub(crate) sample_count: usize,
     /// Values of the basis functions at the samples: sample k lies under the functions from min(k,
     /// N - 2) on.
-    collocation: Vec<[f64; ORDER]>,
-    ends: [EndDerivative; 4],
+    pub(crate) collocation: Vec<[f64; ORDER]>,
+    pub(crate) ends: [EndDerivative; 4],
     /// Fifth derivative over each knot interval, times the root of the interval's length and of its
     /// ease: `|rows c|^2 = c^T P c` for a uniform weight of one.
-    penalty_rows: Vec<[f64; ORDER]>,
+    pub(crate) penalty_rows: Vec<[f64; ORDER]>,
     /// What a uniform weight is multiplied with over each interval, see [`EASED_INTERVALS`]; local
     /// weights are divided by it.
-    eased: Vec<f64>,
+    pub(crate) eased: Vec<f64>,
     /// `B^T B` of the samples alone, and with the derivatives at the ends.
     gram: Banded,
     gram_with_ends: Banded,
@@ -67,11 +67,21 @@ impl PenaltyWeights<'_> {
     }
 }
 
+/// One weight for each knot interval, for as many series at once as there are lanes.
+#[derive(Clone, Debug)]
+pub(crate) struct LocalWeights<const L: usize> {
+    /// Of each lane.
+    pub(crate) largest: [f64; L],
+    /// What each penalty row counts.
+    pub(crate) penalty: Vec<[f64; L]>,
+    /// What each derivative at the ends counts.
+    pub(crate) ends: [[f64; L]; 4],
+}
+
 /// Memory that solving reuses.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Scratch<const C: usize> {
     pub(crate) factor: Factor,
-    matrix: Banded,
     pub(crate) coefficients: Vec<[f64; C]>,
     pub(crate) correction: Vec<[f64; C]>,
 }
@@ -149,16 +159,57 @@ impl SplineEquations {
         }
     }
 
-    /// What the derivative at an end counts. They are made of the samples that count already, which
-    /// does no harm where there is nothing to smooth; where weights are local, and stand for what is
-    /// known, they count no more than there.
     fn end_weight(&self, end: &EndDerivative, weights: PenaltyWeights) -> f64 {
         match weights {
             PenaltyWeights::Uniform(_) => end.weight,
-            PenaltyWeights::Local(weights) => {
-                end.weight / (1.0 + weights[end.first] / NOTHING_TO_SMOOTH)
+            PenaltyWeights::Local(weights) => local_end_weight(end, weights[end.first]),
+        }
+    }
+
+    /// What these weights of the knot intervals make of each row.
+    pub(crate) fn local_weights<const L: usize>(&self, weights: &[[f64; L]]) -> LocalWeights<L> {
+        let mut largest = [0.0_f64; L];
+        for weight in weights {
+            (0..L).for_each(|lane| largest[lane] = largest[lane].max(weight[lane]));
+        }
+        let penalty = weights.iter().zip(&self.eased);
+        LocalWeights {
+            largest,
+            penalty: penalty
+                .map(|(weight, ease)| weight.map(|weight| weight / ease))
+                .collect(),
+            ends: self
+                .ends
+                .map(|end| weights[end.first].map(|weight| local_end_weight(&end, weight))),
+        }
+    }
+
+    /// Row i of `B^T B + P` for local weights.
+    #[inline(always)]
+    pub(crate) fn local_row<const L: usize>(&self, i: usize, weights: &LocalWeights<L>) -> Row<L> {
+        let mut entries = self.gram.rows[i].map(|entry| [entry; L]);
+        let mut add = |m: usize, row: &[f64; ORDER], weight: &[f64; L]| {
+            let own = weight.map(|weight| weight * row[m]);
+            for j in 0..=m {
+                (0..L).for_each(|lane| entries[m - j][lane] += own[lane] * row[j]);
+            }
+        };
+        if i < ORDER || i + ORDER >= self.basis.count() {
+            for (end, weight) in self.ends.iter().zip(&weights.ends) {
+                if (end.first..end.first + ORDER).contains(&i) {
+                    add(i - end.first, &end.row, weight);
+                }
             }
         }
+        for m in (0..ORDER).rev() {
+            let first = i.wrapping_sub(m);
+            if let (Some(row), Some(weight)) =
+                (self.penalty_rows.get(first), weights.penalty.get(first))
+            {
+                add(m, row, weight);
+            }
+        }
+        entries
     }
 
     /// Factors `B^T B + P` into the scratch.
@@ -173,19 +224,11 @@ impl SplineEquations {
                     .factor
                     .factor_sum(&self.gram_with_ends, weight, &self.penalty)
             }
-            PenaltyWeights::Local(_) => {
-                scratch.matrix.rows.clone_from(&self.gram.rows);
-                for end in &self.ends {
-                    let weight = self.end_weight(end, weights);
-                    scratch
-                        .matrix
-                        .add_outer_product(end.first, &end.row, weight);
-                }
-                for (first, row) in self.penalty_rows.iter().enumerate() {
-                    let weight = self.weight_over(first, weights);
-                    scratch.matrix.add_outer_product(first, row, weight);
-                }
-                scratch.factor.factor(&scratch.matrix)
+            PenaltyWeights::Local(weights) => {
+                let weights: Vec<[f64; 1]> = weights.iter().map(|weight| [*weight]).collect();
+                let weights = self.local_weights(&weights);
+                let row = |i: usize| self.local_row(i, &weights);
+                scratch.factor.factor_rows(self.basis.count(), row)
             }
         }
     }
@@ -202,9 +245,7 @@ impl SplineEquations {
         weights: PenaltyWeights,
         scratch: &mut Scratch<C>,
     ) -> Result<(), SpatialError> {
-        let largest = weights.largest();
-        let refinements =
-            usize::from(largest >= REFINED_ONCE) + usize::from(largest > REFINED_TWICE);
+        let refinements = refinements(weights.largest());
         self.factor_into(weights, scratch)?;
         scratch.coefficients.clear();
         scratch.coefficients.resize(self.basis.count(), [0.0; C]);
@@ -220,42 +261,6 @@ impl SplineEquations {
             }
         }
         Ok(())
-    }
-
-    /// As [`SplineEquations::solve`], but not refined, from what [`SplineEquations::projected`] gave.
-    pub(crate) fn solve_projected<const C: usize>(
-        &self,
-        values: &[[f64; C]],
-        projected: &[[f64; C]],
-        weights: PenaltyWeights,
-        scratch: &mut Scratch<C>,
-    ) -> Result<(), SpatialError> {
-        self.factor_into(weights, scratch)?;
-        let coefficients = &mut scratch.coefficients;
-        coefficients.clear();
-        coefficients.extend_from_slice(projected);
-        for end in &self.ends {
-            let (target, weight) = (end.target(values), self.end_weight(end, weights));
-            let beside = coefficients[end.first..].iter_mut();
-            for (entry, b) in beside.zip(&end.row) {
-                (0..C).for_each(|c| entry[c] += b * weight * target[c]);
-            }
-        }
-        scratch.factor.solve(coefficients);
-        Ok(())
-    }
-
-    /// `B^T y` of the samples alone.
-    pub(crate) fn projected<const C: usize>(&self, values: &[[f64; C]]) -> Vec<[f64; C]> {
-        let last_interval = self.basis.interval_count() - 1;
-        let mut projected = vec![[0.0; C]; self.basis.count()];
-        for (k, (value, row)) in values.iter().zip(&self.collocation).enumerate() {
-            let beside = projected[k.min(last_interval)..].iter_mut();
-            for (entry, b) in beside.zip(row) {
-                (0..C).for_each(|c| entry[c] += b * value[c]);
-            }
-        }
-        projected
     }
 
     /// `B^T B + P`, factored.
@@ -337,7 +342,7 @@ impl SplineEquations {
                 &coefficients[first..],
                 row,
                 value,
-                1.0,
+                &[1.0],
                 &mut correction[first..],
             );
         }
@@ -347,7 +352,7 @@ impl SplineEquations {
                 &coefficients[end.first..],
                 &end.row,
                 &target,
-                self.end_weight(end, weights),
+                &[self.end_weight(end, weights)],
                 &mut correction[end.first..],
             );
         }
@@ -356,7 +361,7 @@ impl SplineEquations {
                 &coefficients[first..],
                 row,
                 &[0.0; C],
-                self.weight_over(first, weights),
+                &[self.weight_over(first, weights)],
                 &mut correction[first..],
             );
         }
@@ -390,38 +395,6 @@ impl SplineEquations {
             .enumerate()
             .map(square)
             .sum()
-    }
-
-    /// Fifth derivative over a knot interval, times the root of its length: mean square over the
-    /// channels, and what `block`, the interval's of `(B^T B + P)^-1`, makes of it.
-    pub(crate) fn drive_over<const C: usize>(
-        &self,
-        interval: usize,
-        coefficients: &[[f64; C]],
-        block: &Block,
-    ) -> (f64, f64) {
-        let (row, ease) = (&self.penalty_rows[interval], self.eased[interval]);
-        let fifth = combined(&coefficients[interval..], row);
-        (
-            mean_square(&fifth) / ease,
-            quadratic_form(block, row) / ease,
-        )
-    }
-
-    /// Distance of a sample from the spline: mean square over the channels, and what `block`, as in
-    /// [`SplineEquations::drive_over`], makes of the spline's value there.
-    pub(crate) fn residual_at<const C: usize>(
-        &self,
-        sample: usize,
-        value: &[f64; C],
-        coefficients: &[[f64; C]],
-        block: &Block,
-    ) -> (f64, f64) {
-        let first = sample.min(self.basis.interval_count() - 1);
-        let row = &self.collocation[sample];
-        let estimate = combined(&coefficients[first..], row);
-        let residual: [f64; C] = std::array::from_fn(|c| value[c] - estimate[c]);
-        (mean_square(&residual), quadratic_form(block, row))
     }
 
     /// First function and the basis' values and derivatives, per s and s^2, at a time moved into
@@ -476,14 +449,26 @@ impl SplineEquations {
     }
 }
 
+/// How often a solution is refined.
+pub(crate) fn refinements(largest_weight: f64) -> usize {
+    usize::from(largest_weight >= REFINED_ONCE) + usize::from(largest_weight > REFINED_TWICE)
+}
+
+/// What the derivative at an end counts. They are made of the samples that count already, which does
+/// no harm where there is nothing to smooth; where weights are local, and stand for what is known,
+/// they count no more than there.
+fn local_end_weight(end: &EndDerivative, weight: f64) -> f64 {
+    end.weight / (1.0 + weight / NOTHING_TO_SMOOTH)
+}
+
 /// Residual of one row: its weighted square is returned, its weighted product with the row added to
-/// `correction`.
+/// `correction`; the weight of channel c is that of lane c modulo L.
 #[inline]
-fn add_residual<const C: usize>(
+pub(crate) fn add_residual<const C: usize, const L: usize>(
     coefficients: &[[f64; C]],
     row: &[f64; ORDER],
     value: &[f64; C],
-    weight: f64,
+    weight: &[f64; L],
     correction: &mut [[f64; C]],
 ) -> f64 {
     let mut residual = *value;
@@ -492,26 +477,14 @@ fn add_residual<const C: usize>(
             residual[c] -= b * coefficient[c];
         }
     }
-    let weighted = residual.map(|r| weight * r);
+    let mut weighted = residual;
+    (0..C).for_each(|c| weighted[c] *= weight[c % L]);
     for (entry, b) in correction[..ORDER].iter_mut().zip(row) {
         for c in 0..C {
             entry[c] += b * weighted[c];
         }
     }
     (0..C).map(|c| residual[c] * weighted[c]).sum()
-}
-
-fn combined<const C: usize>(coefficients: &[[f64; C]], row: &[f64; ORDER]) -> [f64; C] {
-    coefficients
-        .iter()
-        .zip(row)
-        .fold([0.0; C], |sum, (coefficient, b)| {
-            std::array::from_fn(|c| sum[c] + b * coefficient[c])
-        })
-}
-
-fn mean_square<const C: usize>(values: &[f64; C]) -> f64 {
-    values.iter().map(|value| value * value).sum::<f64>() / C as f64
 }
 
 /// The fifth derivatives are constant between knots.

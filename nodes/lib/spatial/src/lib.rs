@@ -28,6 +28,7 @@
 //! ```
 
 mod adaptive;
+mod adaptive_fit;
 mod banded;
 mod basis;
 mod confidence;
@@ -42,6 +43,7 @@ mod fourth_differences;
 mod gaps;
 mod grid;
 mod influence;
+mod local_spline;
 mod noise_floor;
 mod noise_shape;
 mod pose_spectra;

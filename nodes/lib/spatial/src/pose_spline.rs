@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
-use crate::adaptive::Adaptation;
+use crate::adaptive::{Adaptation, FEWEST_ADAPTIVE};
+use crate::adaptive_fit::AdaptiveFit;
 use crate::basis::BasisValues;
 use crate::grid::relative_seconds;
 use crate::{Derivative, Smoothing, SmoothingSpline, SpatialError, SplineSystem, Stamp, so3};
@@ -47,10 +48,10 @@ impl PoseSmoothing {
     /// Each as much as the poses around each time ask for.
     pub const ADAPTIVE: Self = Self {
         position: Smoothing::Adaptive {
-            expected_noise: EXPECTED_POSITION_NOISE_M,
+            expected_noise: EXPECTED_NOISE[0],
         },
         rotation: Smoothing::Adaptive {
-            expected_noise: EXPECTED_ROTATION_NOISE_RAD * QUATERNION_PER_ROTVEC,
+            expected_noise: EXPECTED_NOISE[1],
         },
     };
 }
@@ -124,10 +125,14 @@ const EXPECTED_ROTATION_NOISE_RAD: f64 = 0.1 * std::f64::consts::PI / 180.0;
 
 /// What [`PoseSpline::fit_following`] has learnt of the poses so far.
 #[derive(Clone, Debug, Default)]
-pub struct PoseAdaptation {
-    position: Option<Adaptation>,
-    rotation: Option<Adaptation>,
-}
+pub struct PoseAdaptation(Option<Adaptation<2>>);
+
+/// Channels of position and rotation as two lanes, see [`pose_channels`].
+const CHANNELS: [usize; 2] = [3, 4];
+const EXPECTED_NOISE: [f64; 2] = [
+    EXPECTED_POSITION_NOISE_M,
+    EXPECTED_ROTATION_NOISE_RAD * QUATERNION_PER_ROTVEC,
+];
 
 /// The spline equations for a series of stamps; made once and shared by every series of poses on
 /// them.
@@ -198,6 +203,24 @@ impl PoseSpline {
         world_from_body: &[Isometry3<f64>],
         smoothing: PoseSmoothing,
     ) -> Result<Self, SpatialError> {
+        if let (
+            Smoothing::Adaptive {
+                expected_noise: position,
+            },
+            Smoothing::Adaptive {
+                expected_noise: rotation,
+            },
+        ) = (smoothing.position, smoothing.rotation)
+            && world_from_body.len() >= FEWEST_ADAPTIVE
+        {
+            let fit = AdaptiveFit::learn(
+                &times.system.equations,
+                &pose_channels(world_from_body),
+                CHANNELS,
+                [position, rotation],
+            )?;
+            return Ok(Self::of_lanes(times, &fit));
+        }
         let positions = position_channels(world_from_body);
         let rotations = rotation_channels(world_from_body);
         let position = SmoothingSpline::fit_on(&times.system, &positions, smoothing.position)?;
@@ -221,26 +244,27 @@ impl PoseSpline {
         adaptation: &mut PoseAdaptation,
         dropped: usize,
     ) -> Result<Self, SpatialError> {
-        let positions = position_channels(world_from_body);
-        let rotations = rotation_channels(world_from_body);
-        let PoseAdaptation { position, rotation } = adaptation;
-        Ok(Self {
+        let PoseAdaptation(learnt) = adaptation;
+        if world_from_body.len() < FEWEST_ADAPTIVE {
+            *learnt = None;
+            return Self::fit_on(times, world_from_body, PoseSmoothing::ADAPTIVE);
+        }
+        let fit = AdaptiveFit::follow(
+            &times.system.equations,
+            &pose_channels(world_from_body),
+            CHANNELS,
+            EXPECTED_NOISE,
+            (learnt, dropped),
+        )?;
+        Ok(Self::of_lanes(times, &fit))
+    }
+
+    fn of_lanes(times: &PoseTimes, fit: &AdaptiveFit<8, 2>) -> Self {
+        Self {
             times: times.clone(),
-            position: SmoothingSpline::fit_following(
-                &times.system,
-                &positions,
-                EXPECTED_POSITION_NOISE_M,
-                position,
-                dropped,
-            )?,
-            rotation: SmoothingSpline::fit_following(
-                &times.system,
-                &rotations,
-                EXPECTED_ROTATION_NOISE_RAD * QUATERNION_PER_ROTVEC,
-                rotation,
-                dropped,
-            )?,
-        })
+            position: SmoothingSpline::of_lane(&times.system, fit, 0),
+            rotation: SmoothingSpline::of_lane(&times.system, fit, 1),
+        }
     }
 
     /// The motion at a stamp; stamps outside the samples are moved to the nearest end.
@@ -283,12 +307,12 @@ impl PoseSpline {
     }
 
     fn variance(&self, first: usize, values: &BasisValues) -> Option<SampleVariance> {
-        let [_, _, acceleration] = self.position.variance_at(first, values)?;
-        let [rotation, turning, _] = self.rotation.variance_at(first, values)?;
+        let [value, slope, second] = values;
+        let rotation = |row| self.rotation.variance_of(first, row);
         Some(SampleVariance {
-            acceleration,
-            angular_velocity: ROTVEC_PER_QUATERNION * turning,
-            orientation: ROTVEC_PER_QUATERNION * rotation,
+            acceleration: self.position.variance_of(first, second)?,
+            angular_velocity: ROTVEC_PER_QUATERNION * rotation(slope)?,
+            orientation: ROTVEC_PER_QUATERNION * rotation(value)?,
         })
     }
 
@@ -320,6 +344,16 @@ pub fn rotation_channels(world_from_body: &[Isometry3<f64>]) -> Vec<[f64; 4]> {
     so3::sign_continuous(&rotations)
         .into_iter()
         .map(|q| q.coords.into())
+        .collect()
+}
+
+/// Both in turn: x, i, y, j, z, k, 0, w.
+fn pose_channels(world_from_body: &[Isometry3<f64>]) -> Vec<[f64; 8]> {
+    let rotations = rotation_channels(world_from_body);
+    let positions = world_from_body.iter().map(|isometry| isometry.translation);
+    positions
+        .zip(rotations)
+        .map(|(p, [i, j, k, w])| [p.x, i, p.y, j, p.z, k, 0.0, w])
         .collect()
 }
 

@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use crate::SpatialError;
-use crate::adaptive::{Adaptation, FEWEST_ADAPTIVE};
-use crate::banded::Banded;
-use crate::basis::BasisValues;
+use crate::adaptive::FEWEST_ADAPTIVE;
+use crate::adaptive_fit::AdaptiveFit;
+use crate::banded::InverseBand;
+use crate::basis::{BasisValues, ORDER};
 use crate::derivative::Derivative;
 use crate::equations::{PenaltyWeights, Scratch};
 use crate::system::{LIGHT, LIGHTER, SplineSystem, centred};
@@ -95,7 +96,7 @@ impl Smoothing {
 #[derive(Clone, Debug)]
 struct Uncertainty {
     /// Band of `(B^T B + P)^-1`.
-    inverse: Banded,
+    inverse: InverseBand,
     /// Variance of each sample's noise, unit^2.
     noise: Vec<f64>,
 }
@@ -133,19 +134,14 @@ impl<const C: usize> SmoothingSpline<C> {
         values: &[[f64; C]],
         smoothing: Smoothing,
     ) -> Result<Self, SpatialError> {
-        system.equations.check(values)?;
-        let (first, centred) = centred(values);
         if let Smoothing::Adaptive { expected_noise } = smoothing
             && values.len() >= FEWEST_ADAPTIVE
         {
-            let adaptation = Adaptation::learn(&system.equations, &centred, expected_noise)?;
-            return Self::solved(
-                system,
-                (first, &centred),
-                SplineWeight::Local(adaptation.weights()),
-                Some(adaptation.noise()),
-            );
+            let fit = AdaptiveFit::learn(&system.equations, values, [C], [expected_noise])?;
+            return Ok(Self::of_lane(system, &fit, 0));
         }
+        system.equations.check(values)?;
+        let (first, centred) = centred(values);
         let mut weight = smoothing.uniform_weight(system, values)?;
         let is_found = matches!(
             smoothing,
@@ -153,7 +149,7 @@ impl<const C: usize> SmoothingSpline<C> {
         );
         loop {
             let uniform = SplineWeight::Uniform(weight);
-            match Self::solved(system, (first, &centred), uniform, None) {
+            match Self::solved(system, (first, &centred), uniform) {
                 Err(SpatialError::Singular { .. }) if is_found && weight > LIGHT => {
                     weight *= LIGHTER;
                 }
@@ -162,89 +158,49 @@ impl<const C: usize> SmoothingSpline<C> {
         }
     }
 
-    /// As [`SmoothingSpline::fit_on`] with [`Smoothing::Adaptive`], for a window that has moved by
-    /// `dropped` samples since `adaptation` was learnt; made where there is none.
-    pub(crate) fn fit_following(
-        system: &Arc<SplineSystem>,
-        values: &[[f64; C]],
-        expected_noise: f64,
-        adaptation: &mut Option<Adaptation>,
-        dropped: usize,
-    ) -> Result<Self, SpatialError> {
-        if values.len() < FEWEST_ADAPTIVE {
-            *adaptation = None;
-            return Self::fit_on(system, values, Smoothing::Adaptive { expected_noise });
-        }
-        system.equations.check(values)?;
-        let (first, centred) = centred(values);
-        let goes_on = adaptation
-            .as_mut()
-            .is_some_and(|learnt| learnt.move_on(values.len(), dropped));
-        if !goes_on {
-            *adaptation = None;
-        }
-        let learnt = match adaptation {
-            Some(learnt) => learnt,
-            None => adaptation.insert(Adaptation::learn(
-                &system.equations,
-                &centred,
-                expected_noise,
-            )?),
-        };
-        let (weights, noise) = (learnt.weights(), learnt.noise().to_vec());
-        let mut scratch = Scratch::default();
-        let local = PenaltyWeights::Local(&weights);
-        system.equations.solve(&centred, local, &mut scratch)?;
-        learnt.learn_from(&system.equations, &centred, &weights, &scratch);
-        let weight = SplineWeight::Local(weights);
-        Ok(Self::of_solution(
-            system,
-            first,
-            weight,
-            Some(&noise),
-            scratch,
-        ))
-    }
-
-    /// The spline of this weight.
+    /// The spline of this weight. The basis functions sum to one, so that the constant that was taken
+    /// off may go onto the coefficients.
     fn solved(
         system: &Arc<SplineSystem>,
         (constant, values): ([f64; C], &[[f64; C]]),
         weight: SplineWeight,
-        noise: Option<&[f64]>,
     ) -> Result<Self, SpatialError> {
         let mut scratch = Scratch::default();
         system
             .equations
             .solve(values, weight.of_penalty(), &mut scratch)?;
-        Ok(Self::of_solution(system, constant, weight, noise, scratch))
-    }
-
-    /// The basis functions sum to one, so that the constant that was taken off may go onto the
-    /// coefficients.
-    fn of_solution(
-        system: &Arc<SplineSystem>,
-        constant: [f64; C],
-        weight: SplineWeight,
-        noise: Option<&[f64]>,
-        mut scratch: Scratch<C>,
-    ) -> Self {
         for coefficient in &mut scratch.coefficients {
             for c in 0..C {
                 coefficient[c] += constant[c];
             }
         }
-        let uncertainty = noise.map(|noise| {
-            Arc::new(Uncertainty {
-                inverse: scratch.factor.inverse_band(),
-                noise: noise.to_vec(),
-            })
-        });
-        Self {
+        Ok(Self {
             system: system.clone(),
             coefficients: scratch.coefficients,
             weight,
-            uncertainty,
+            uncertainty: None,
+        })
+    }
+
+    /// The spline of one of the series that were fitted at once, the constant as in
+    /// [`SmoothingSpline::solved`].
+    pub(crate) fn of_lane<const W: usize, const L: usize>(
+        system: &Arc<SplineSystem>,
+        fit: &AdaptiveFit<W, L>,
+        lane: usize,
+    ) -> Self {
+        let coefficient = |of_all: &[f64; W]| {
+            std::array::from_fn(|c| of_all[L * c + lane] + fit.constant[L * c + lane])
+        };
+        let of_lane = |all: &[[f64; L]]| all.iter().map(|lanes| lanes[lane]).collect();
+        Self {
+            system: system.clone(),
+            coefficients: fit.solution.coefficients.iter().map(coefficient).collect(),
+            weight: SplineWeight::Local(of_lane(&fit.weights)),
+            uncertainty: Some(Arc::new(Uncertainty {
+                inverse: InverseBand::of_lane(&fit.solution.inverse, lane),
+                noise: of_lane(&fit.noise),
+            })),
         }
     }
 
@@ -276,19 +232,15 @@ impl<const C: usize> SmoothingSpline<C> {
     /// but for [`Smoothing::Adaptive`]: the others do not tell noise from motion.
     pub fn variance(&self, seconds: f64) -> Option<[f64; 3]> {
         let (first, values) = self.system.equations.basis_at(seconds);
-        self.variance_at(first, &values)
+        let [value, slope, second] = values.each_ref().map(|row| self.variance_of(first, row));
+        Some([value?, slope?, second?])
     }
 
-    /// As [`SmoothingSpline::variance`], from what
-    /// [`crate::equations::SplineEquations::basis_at`] gave.
-    pub(crate) fn variance_at(&self, first: usize, values: &BasisValues) -> Option<[f64; 3]> {
+    /// The variance of one of what [`crate::equations::SplineEquations::basis_at`] gave.
+    pub(crate) fn variance_of(&self, first: usize, row: &[f64; ORDER]) -> Option<f64> {
         let uncertainty = self.uncertainty.as_ref()?;
         let noise = (uncertainty.noise[first] * uncertainty.noise[first + 1]).sqrt();
-        Some(
-            values
-                .each_ref()
-                .map(|row| noise * uncertainty.inverse.quadratic_form(first, row)),
-        )
+        Some(noise * uncertainty.inverse.quadratic_form(first, row))
     }
 
     /// The penalty's weight.
