@@ -3,7 +3,7 @@
 use crate::SpatialError;
 use crate::equations::SplineEquations;
 use crate::fourth_differences::{MEDIAN_OF_SQUARE, fourth_difference, white_noise_variance};
-use crate::local_spline::{LocalSolution, Series};
+use crate::local_spline::{LocalSolution, Series, Statements};
 use crate::weight_search::LOWEST_LOG_WEIGHT;
 
 /// Time over which neighbours share one drive, standard deviation, s: shorter, a burst's own noise
@@ -111,12 +111,13 @@ impl<const L: usize> Adaptation<L> {
         solution: &mut LocalSolution<C, L>,
     ) -> Result<Self, SpatialError> {
         let mut adaptation = Self::start(equations, series, expected_noise);
+        let mut statements = Statements::default();
         for _ in 0..STEPS {
             let weights = adaptation.weights();
             // Not refined: squares are all that is wanted of it.
-            solution.solve_and_state(equations, series, &weights)?;
-            let evidence = adaptation.evidence(equations, &weights, solution);
-            adaptation.update(equations, evidence, Stride::Whole);
+            solution.solve_and_state(equations, series, &weights, &mut statements)?;
+            adaptation.take_evidence(equations, &weights, &mut statements);
+            adaptation.update(equations, &mut statements, Stride::Whole);
         }
         Ok(adaptation)
     }
@@ -138,14 +139,14 @@ impl<const L: usize> Adaptation<L> {
 
     /// Learns from what splines of [`Adaptation::weights`] say. Half a step, so that it does not
     /// swing from window to window.
-    pub(crate) fn learn_from<const C: usize>(
+    pub(crate) fn learn_from(
         &mut self,
         equations: &SplineEquations,
         weights: &[[f64; L]],
-        solution: &LocalSolution<C, L>,
+        statements: &mut Statements<L>,
     ) {
-        let evidence = self.evidence(equations, weights, solution);
-        self.update(equations, evidence, Stride::Half);
+        self.take_evidence(equations, weights, statements);
+        self.update(equations, statements, Stride::Half);
     }
 
     /// Variance of each sample's noise, unit^2.
@@ -172,7 +173,7 @@ impl<const L: usize> Adaptation<L> {
     fn update(
         &mut self,
         equations: &SplineEquations,
-        (drives, residuals): (Vec<Evidence<L>>, Vec<Evidence<L>>),
+        Statements { drives, residuals }: &mut Statements<L>,
         stride: Stride,
     ) {
         let found = local_means(drives, SHARED_DRIVE_S / equations.interval);
@@ -188,15 +189,22 @@ impl<const L: usize> Adaptation<L> {
         }
     }
 
-    /// What each knot interval says about the drive, and each sample about the noise.
-    fn evidence<const C: usize>(
+    /// Turns what each knot interval says about the drive, and each sample about the noise, into
+    /// sums of squares and what they count.
+    fn take_evidence(
         &self,
         equations: &SplineEquations,
         weights: &[[f64; L]],
-        solution: &LocalSolution<C, L>,
-    ) -> (Vec<Evidence<L>>, Vec<Evidence<L>>) {
+        Statements { drives, residuals }: &mut Statements<L>,
+    ) {
         let free = |share: f64| (1.0 - share).max(LEAST_FREE);
         let expected = EXPECTED_COUNT / equations.weight_of_cutoff(EXPECTED_CUTOFF_HZ);
+        for (k, [square, variance]) in drives.iter_mut().enumerate() {
+            for lane in 0..L {
+                square[lane] += expected * self.noise_over(k, lane);
+                variance[lane] = free(weights[k][lane] * variance[lane]) + EXPECTED_COUNT;
+            }
+        }
         let noise_count = self.expected_noise.map(|expected_noise| {
             if expected_noise > 0.0 {
                 EXPECTED_NOISE_COUNT
@@ -204,31 +212,12 @@ impl<const L: usize> Adaptation<L> {
                 0.0
             }
         });
-        let of_interval = |(k, [square, variance]): (usize, &[[f64; L]; 2])| {
-            let mut evidence = [[0.0; L]; 2];
+        for [square, variance] in residuals {
             for lane in 0..L {
-                evidence[0][lane] = square[lane] + expected * self.noise_over(k, lane);
-                evidence[1][lane] = free(weights[k][lane] * variance[lane]) + EXPECTED_COUNT;
+                square[lane] += EXPECTED_NOISE_COUNT * self.expected_noise[lane];
+                variance[lane] = free(variance[lane]) + noise_count[lane];
             }
-            evidence
-        };
-        let of_sample = |[square, variance]: &[[f64; L]; 2]| {
-            let mut evidence = [[0.0; L]; 2];
-            for lane in 0..L {
-                evidence[0][lane] = square[lane] + EXPECTED_NOISE_COUNT * self.expected_noise[lane];
-                evidence[1][lane] = free(variance[lane]) + noise_count[lane];
-            }
-            evidence
-        };
-        (
-            solution
-                .drives
-                .iter()
-                .enumerate()
-                .map(of_interval)
-                .collect(),
-            solution.residuals.iter().map(of_sample).collect(),
-        )
+        }
     }
 }
 
@@ -244,11 +233,11 @@ type Evidence<const L: usize> = [[f64; L]; 2];
 
 /// Means around each entry, by a kernel of this standard deviation.
 fn local_means<const L: usize>(
-    mut evidence: Vec<Evidence<L>>,
+    evidence: &mut [Evidence<L>],
     intervals: f64,
 ) -> impl Iterator<Item = [f64; L]> {
-    Kernel::new(intervals.max(LEAST_SHARED_INTERVALS)).smooth(&mut evidence);
-    evidence.into_iter().map(|[square, count]| {
+    Kernel::new(intervals.max(LEAST_SHARED_INTERVALS)).smooth(evidence);
+    evidence.iter().map(|[square, count]| {
         std::array::from_fn(|lane| (square[lane] / count[lane]).max(f64::MIN_POSITIVE))
     })
 }
@@ -292,24 +281,22 @@ impl Kernel {
 
     /// Weighted sums in place; a quotient of two of them is a weighted mean.
     fn smooth<const L: usize>(&self, values: &mut [Evidence<L>]) {
-        let mut given = values.to_vec();
-        for pass in 0..2 {
-            if pass > 0 {
-                given.copy_from_slice(values);
-            }
+        let mut before = vec![[[0.0; L]; 2]; values.len()];
+        for _ in 0..2 {
             let mut sum = [[0.0; L]; 2];
-            for (value, own) in values.iter_mut().zip(&given) {
+            for (before, own) in before.iter_mut().zip(&*values) {
                 for (sum, own) in sum.iter_mut().zip(own) {
                     (0..L).for_each(|lane| sum[lane] = sum[lane] * self.decay + own[lane]);
                 }
-                *value = sum;
+                *before = sum;
             }
-            let mut sum = [[0.0; L]; 2];
-            for (value, own) in values.iter_mut().zip(&given).rev() {
-                for ((value, sum), own) in value.iter_mut().zip(&mut sum).zip(own) {
+            let mut after = [[0.0; L]; 2];
+            for (value, before) in values.iter_mut().zip(&before).rev() {
+                for ((value, before), after) in value.iter_mut().zip(before).zip(&mut after) {
                     for lane in 0..L {
-                        value[lane] += sum[lane];
-                        sum[lane] = (sum[lane] + own[lane]) * self.decay;
+                        let own = value[lane];
+                        value[lane] = before[lane] + after[lane];
+                        after[lane] = (after[lane] + own) * self.decay;
                     }
                 }
             }

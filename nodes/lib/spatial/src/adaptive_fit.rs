@@ -2,9 +2,10 @@
 
 use crate::SpatialError;
 use crate::adaptive::Adaptation;
+use crate::banded::InverseBand;
 use crate::equations::SplineEquations;
-use crate::local_spline::{LocalSolution, Series};
-use crate::system::centred;
+use crate::local_spline::{LocalSolution, Series, Statements};
+use crate::system::centre;
 
 /// Splines of [`Adaptation`]'s weights, a lane each, see [`Series`].
 #[derive(Clone, Debug)]
@@ -14,30 +15,32 @@ pub(crate) struct AdaptiveFit<const C: usize, const L: usize> {
     pub(crate) weights: Vec<[f64; L]>,
     /// Variance of each sample's noise, unit^2.
     pub(crate) noise: Vec<[f64; L]>,
-    pub(crate) solution: LocalSolution<C, L>,
+    pub(crate) coefficients: Vec<[f64; C]>,
+    /// Of `(B^T B + P)^-1`, of each lane.
+    pub(crate) inverse: [InverseBand; L],
 }
 
 impl<const C: usize, const L: usize> AdaptiveFit<C, L> {
     /// Learns from whole series; `channels` and `expected_noise` are those of each lane.
     pub(crate) fn learn(
         equations: &SplineEquations,
-        values: &[[f64; C]],
+        mut values: Vec<[f64; C]>,
         channels: [usize; L],
         expected_noise: [f64; L],
     ) -> Result<Self, SpatialError> {
-        equations.check(values)?;
-        let (constant, values) = centred(values);
+        equations.check(&values)?;
+        let constant = centre(&mut values);
         let series = Series::new(equations, values, channels);
         let mut solution = LocalSolution::default();
         let learnt = Adaptation::learn(equations, &series, expected_noise, &mut solution)?;
         let weights = learnt.weights();
         solution.solve(equations, &series, &weights)?;
-        solution.invert();
         Ok(Self {
             constant,
             weights,
             noise: learnt.into_noise(),
-            solution,
+            inverse: solution.inverse_bands(false),
+            coefficients: solution.coefficients,
         })
     }
 
@@ -45,13 +48,13 @@ impl<const C: usize, const L: usize> AdaptiveFit<C, L> {
     /// `adaptation` was learnt; made where there is none.
     pub(crate) fn follow(
         equations: &SplineEquations,
-        values: &[[f64; C]],
+        mut values: Vec<[f64; C]>,
         channels: [usize; L],
         expected_noise: [f64; L],
         (adaptation, dropped): (&mut Option<Adaptation<L>>, usize),
     ) -> Result<Self, SpatialError> {
-        equations.check(values)?;
-        let (constant, values) = centred(values);
+        equations.check(&values)?;
+        let constant = centre(&mut values);
         let series = Series::new(equations, values, channels);
         let mut solution = LocalSolution::default();
         let moved = adaptation.take().and_then(|mut learnt| {
@@ -64,14 +67,16 @@ impl<const C: usize, const L: usize> AdaptiveFit<C, L> {
         };
         let (weights, noise) = (learnt.weights(), learnt.clone().into_noise());
         solution.solve(equations, &series, &weights)?;
-        solution.invert_and_state(equations, &series);
-        learnt.learn_from(equations, &weights, &solution);
+        let mut statements = Statements::default();
+        solution.state(equations, &series, &mut statements);
+        learnt.learn_from(equations, &weights, &mut statements);
         *adaptation = Some(learnt);
         Ok(Self {
             constant,
             weights,
             noise,
-            solution,
+            inverse: solution.inverse_bands(true),
+            coefficients: solution.coefficients,
         })
     }
 }

@@ -19,10 +19,10 @@ impl Banded {
     }
 
     /// Adds `weight * row row^T`, the row's entries standing at `first` and after it.
-    pub(crate) fn add_outer_product(
+    pub(crate) fn add_outer_product<const W: usize>(
         &mut self,
         first: usize,
-        row: &[f64; BANDWIDTH + 1],
+        row: &[f64; W],
         weight: f64,
     ) {
         let mut rows = self.rows[first..].iter_mut();
@@ -40,18 +40,24 @@ impl Banded {
 /// waits for its own last row most of the time.
 pub(crate) type Row<const L: usize> = [[f64; L]; BANDWIDTH + 1];
 
-/// L and D of `M = L D L^T`, L unit lower triangular, in as many lanes as there are matrices:
-/// `rows[i][k]` is L's entry (i, i - k) for k > 0, `rows[i][0]` is 1 / D_i.
+/// L and D of `M = L D L^T`, L unit lower triangular, in as many lanes as there are matrices.
 #[derive(Clone, Debug)]
 pub(crate) struct Factor<const L: usize = 1> {
+    /// `rows[i][k]` is L's entry (i, i - k) for k > 0, `rows[i][0]` is 1 / D_i; [`PADDING`] rows of
+    /// zeros follow. From [`Factor::invert`] on, row `i + 5` is the inverse's row i.
     rows: Vec<Row<L>>,
+    size: usize,
     log_determinant: [f64; L],
 }
+
+/// Rows below the last that inverting reads.
+const PADDING: usize = 2 * BANDWIDTH;
 
 impl<const L: usize> Default for Factor<L> {
     fn default() -> Self {
         Self {
             rows: Vec::new(),
+            size: 0,
             log_determinant: [0.0; L],
         }
     }
@@ -67,7 +73,8 @@ impl<const L: usize> Factor<L> {
         right: &mut [[f64; C]],
     ) -> Result<(), SpatialError> {
         self.rows.clear();
-        self.rows.reserve(size);
+        self.rows.reserve(size + PADDING);
+        self.size = size;
         let (mut log_determinant, mut product) = ([0.0; L], [1.0_f64; L]);
         for i in 0..size {
             let given = matrix_row(i);
@@ -88,55 +95,64 @@ impl<const L: usize> Factor<L> {
                 }
             }
             if i < right.len() {
-                solve_down(&row, i, right);
+                solve_row_down(&row, i, right);
             }
         }
+        self.rows.resize(size + PADDING, [[0.0; L]; BANDWIDTH + 1]);
         self.log_determinant =
             std::array::from_fn(|lane| log_determinant[lane] + product[lane].ln());
         Ok(())
     }
 
-    /// The entries of `M^-1` within the band, the last row first, in O(N) (Takahashi, Fagan and Chin
-    /// 1973): from `Z = D^-1 L^-1 + (1 - L^T) Z`. `inverse[i][k]` becomes its entry (i, i + k), and
-    /// five rows of zeros follow the last; each row is visited with those after it when it is made.
-    pub(crate) fn invert(
-        &self,
-        inverse: &mut Vec<Row<L>>,
-        mut visit: impl FnMut(usize, &InverseBlock<L>),
+    /// Turns into the entries of `M^-1` within the band, the last row first, in O(N) (Takahashi,
+    /// Fagan and Chin 1973): from `Z = D^-1 L^-1 + (1 - L^T) Z`. On the way up finishes `x` where it
+    /// has only been solved down, and visits each row of the inverse with those after it.
+    pub(crate) fn invert<const C: usize>(
+        &mut self,
+        x: &mut [[f64; C]],
+        solved: Solved,
+        mut visit: impl FnMut(usize, &[[f64; C]], &InverseBlock<L>),
     ) {
-        let size = self.rows.len();
-        inverse.clear();
-        inverse.resize(size + BANDWIDTH, [[0.0; L]; BANDWIDTH + 1]);
-        for i in (0..size).rev() {
-            let Some((own, near)) = inverse[i..].split_first_mut() else {
-                return;
-            };
-            let Some(near) = near.first_chunk::<BANDWIDTH>() else {
-                return;
-            };
-            *own = match self.rows[i + 1..].first_chunk::<BANDWIDTH>() {
-                Some(below) => inverse_row(&self.rows[i], below, near),
-                None => inverse_row(&self.rows[i], &self.rows[i + 1..], near),
-            };
-            if let Some(block) = inverse[i..].first_chunk() {
-                visit(i, block);
+        for i in (0..self.size).rev() {
+            if solved == Solved::Down {
+                self.solve_row_up(i, x);
             }
+            let Some(window) = self.rows[i..].first_chunk() else {
+                return;
+            };
+            let row = inverse_row(window);
+            self.rows[i + BANDWIDTH] = row;
+            if let Some(block) = self.rows[i + BANDWIDTH..].first_chunk() {
+                visit(i, x, block);
+            }
+        }
+    }
+
+    /// One lane of the band, after [`Factor::invert`].
+    pub(crate) fn inverse(&self, lane: usize) -> InverseBand {
+        let rows = self.rows[BANDWIDTH..self.size + BANDWIDTH].iter();
+        InverseBand {
+            rows: rows.map(|row| row.map(|entry| entry[lane])).collect(),
         }
     }
 
     /// Solves `M x = right` in place, all channels at once; channel c belongs to lane c modulo L.
     pub(crate) fn solve<const C: usize>(&self, right: &mut [[f64; C]]) {
         for i in 0..right.len() {
-            solve_down(&self.rows[i], i, right);
+            solve_row_down(&self.rows[i], i, right);
         }
+        self.solve_up(right);
+    }
+
+    /// The second half of solving.
+    pub(crate) fn solve_up<const C: usize>(&self, right: &mut [[f64; C]]) {
         for i in (0..right.len()).rev() {
-            self.solve_up(i, right);
+            self.solve_row_up(i, right);
         }
     }
 
-    /// The second half of solving, row i after those below it.
     #[inline(always)]
-    pub(crate) fn solve_up<const C: usize>(&self, i: usize, right: &mut [[f64; C]]) {
+    fn solve_row_up<const C: usize>(&self, i: usize, right: &mut [[f64; C]]) {
         // L^T: row i scatters into the rows above it once it is final; dividing by D first.
         let (here, below) = right[i..].split_at_mut(1);
         let x = &mut here[0];
@@ -151,6 +167,15 @@ impl<const L: usize> Factor<L> {
             _ => solve_up_from(x, rows, below),
         }
     }
+}
+
+/// How far a solution has come.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Solved {
+    /// By [`Factor::factor_and_solve_down`].
+    Down,
+    /// To its end.
+    Whole,
 }
 
 impl Factor {
@@ -190,7 +215,7 @@ impl Factor {
     ) -> (usize, Vec<[f64; C]>) {
         let mut forward: Vec<[f64; C]> = Vec::new();
         let mut most = [0.0_f64; C];
-        for i in first..self.rows.len() {
+        for i in first..self.size {
             let mut x = right.get(i - first).copied().unwrap_or([0.0; C]);
             for k in 1..=BANDWIDTH.min(i - first) {
                 let ([l], other) = (self.rows[i][k], forward[i - k - first]);
@@ -239,22 +264,13 @@ impl Factor {
 /// Rows of an inverse, see [`Factor::invert`]: what the basis functions of one knot interval share.
 pub(crate) type InverseBlock<const L: usize> = [Row<L>; BANDWIDTH + 1];
 
-/// One lane of an inverse within the band: `rows[i][k]` is entry (i, i + k).
+/// An inverse within the band: `rows[i][k]` is entry (i, i + k).
 #[derive(Clone, Debug)]
 pub(crate) struct InverseBand {
     rows: Vec<[f64; BANDWIDTH + 1]>,
 }
 
 impl InverseBand {
-    pub(crate) fn of_lane<const L: usize>(inverse: &[Row<L>], lane: usize) -> Self {
-        Self {
-            rows: inverse
-                .iter()
-                .map(|row| row.map(|entry| entry[lane]))
-                .collect(),
-        }
-    }
-
     /// `row^T Z row`, the row's entries standing at `first` and after it.
     pub(crate) fn quadratic_form(&self, first: usize, row: &[f64; BANDWIDTH + 1]) -> f64 {
         let rows = &self.rows[first..=first + BANDWIDTH];
@@ -267,16 +283,16 @@ impl InverseBand {
     }
 }
 
-/// `row^T Z row` in each lane, Z the block.
+/// `row^T Z row` in each lane, Z the block or, for shorter rows, its upper left part.
 #[inline(always)]
-pub(crate) fn quadratic_form<const L: usize>(
+pub(crate) fn quadratic_form<const L: usize, const W: usize>(
     block: &InverseBlock<L>,
-    row: &[f64; BANDWIDTH + 1],
+    row: &[f64; W],
 ) -> [f64; L] {
     let mut form = [0.0; L];
-    for j in 0..=BANDWIDTH {
+    for j in 0..W {
         let mut product = [0.0; L];
-        for i in 0..=BANDWIDTH {
+        for i in 0..W {
             let entry = &block[i.min(j)][i.abs_diff(j)];
             for lane in 0..L {
                 product[lane] += row[i] * entry[lane];
@@ -317,7 +333,7 @@ fn eliminate<const L: usize>(above: &[Row<L>], given: &Row<L>) -> (Row<L>, [f64;
 
 /// The first half of solving, row i after those above it.
 #[inline(always)]
-fn solve_down<const L: usize, const C: usize>(row: &Row<L>, i: usize, right: &mut [[f64; C]]) {
+fn solve_row_down<const L: usize, const C: usize>(row: &Row<L>, i: usize, right: &mut [[f64; C]]) {
     let (above, here) = right.split_at_mut(i);
     let x = &mut here[0];
     match above.last_chunk::<BANDWIDTH>() {
@@ -352,30 +368,26 @@ fn solve_up_from<const L: usize, const C: usize>(
     }
 }
 
-/// A row of the inverse from L's rows (its own and those below) and the inverse's rows below.
+/// A row of the inverse from L's own row and the five below it, and the inverse's five rows below.
 #[inline(always)]
-fn inverse_row<const L: usize>(
-    own: &Row<L>,
-    below: &[Row<L>],
-    near: &[Row<L>; BANDWIDTH],
-) -> Row<L> {
-    let mut column = [[0.0; L]; BANDWIDTH + 1];
-    let mut diagonal = own[0];
-    for j in 0..BANDWIDTH {
-        for (k, row) in below.iter().enumerate().take(BANDWIDTH) {
-            let (l, z) = (&row[k + 1], &near[k.min(j)][k.abs_diff(j)]);
+fn inverse_row<const L: usize>(window: &[Row<L>; 1 + PADDING]) -> Row<L> {
+    let mut row = [[0.0; L]; BANDWIDTH + 1];
+    let mut diagonal = window[0][0];
+    for j in 1..=BANDWIDTH {
+        for k in 1..=BANDWIDTH {
+            let (l, z) = (&window[k][k], &window[BANDWIDTH + k.min(j)][k.abs_diff(j)]);
             for lane in 0..L {
-                column[j + 1][lane] -= l[lane] * z[lane];
+                row[j][lane] -= l[lane] * z[lane];
             }
         }
     }
-    for (k, row) in below.iter().enumerate().take(BANDWIDTH) {
+    for k in 1..=BANDWIDTH {
         for lane in 0..L {
-            diagonal[lane] -= row[k + 1][lane] * column[k + 1][lane];
+            diagonal[lane] -= window[k][k][lane] * row[k][lane];
         }
     }
-    column[0] = diagonal;
-    column
+    row[0] = diagonal;
+    row
 }
 
 /// Where a solution is cut off, as a part of its largest entry.
@@ -430,12 +442,12 @@ mod tests {
         let mut factor = Factor::default();
         let row = |i: usize| banded.rows[i].map(|entry| [entry]);
         factor.factor_rows(size, row).unwrap();
-        let mut found = Vec::new();
-        factor.invert(&mut found, |_, _| {});
+        factor.invert::<0>(&mut [], Solved::Whole, |_, _, _| {});
+        let found = factor.inverse(0);
         let inverse = dense.try_inverse().unwrap();
         for i in 0..size {
             for k in 0..=BANDWIDTH.min(i) {
-                assert!((found[i - k][k][0] - inverse[(i, i - k)]).abs() < 1e-14);
+                assert!((found.rows[i - k][k] - inverse[(i, i - k)]).abs() < 1e-14);
             }
         }
         let row = [0.3, -1.0, 2.0, 0.5, -0.7, 1.1];
@@ -443,8 +455,7 @@ mod tests {
             .flat_map(|i| (0..6).map(move |j| (i, j)))
             .map(|(i, j)| row[i] * row[j] * inverse[(4 + i, 4 + j)])
             .sum();
-        let band = InverseBand::of_lane(&found, 0);
-        assert!((band.quadratic_form(4, &row) - expected).abs() < 1e-14);
+        assert!((found.quadratic_form(4, &row) - expected).abs() < 1e-14);
     }
 
     #[test]

@@ -6,6 +6,9 @@ pub(crate) const DEGREE: usize = 5;
 /// Basis functions that overlap one point.
 pub(crate) const ORDER: usize = DEGREE + 1;
 
+/// Basis functions that overlap a knot: the last of those over the interval after it begins there.
+pub(crate) const AT_KNOT: usize = DEGREE;
+
 /// Values, first and second derivatives of the basis functions at one point.
 pub(crate) type BasisValues = [[f64; ORDER]; 3];
 
@@ -62,6 +65,13 @@ impl Basis {
             raise_derivative(&mut values, window, q);
         }
         values
+    }
+
+    /// The values at knot k, from 0 on, of the functions `k ..= k + 4`.
+    pub(crate) fn at_knot(&self, k: usize) -> [f64; AT_KNOT] {
+        let first = k.min(self.interval_count() - 1);
+        let values = self.derivatives(first, self.knots[k + DEGREE], 0);
+        std::array::from_fn(|j| values[k - first + j])
     }
 
     /// Value, first and second derivatives at `t` of the functions from `first` on.

@@ -2,7 +2,7 @@
 
 use crate::SpatialError;
 use crate::banded::{Banded, Factor, Row};
-use crate::basis::{Basis, BasisValues, DEGREE, ORDER};
+use crate::basis::{AT_KNOT, Basis, BasisValues, DEGREE, ORDER};
 use crate::difference::MAX_STENCIL;
 use crate::end_derivatives::{EndDerivative, end_derivatives};
 
@@ -33,9 +33,8 @@ pub(crate) struct SplineEquations {
     /// Time of the first sample, s.
     pub(crate) origin: f64,
     pub(crate) sample_count: usize,
-    /// Values of the basis functions at the samples: sample k lies under the functions from min(k,
-    /// N - 2) on.
-    pub(crate) collocation: Vec<[f64; ORDER]>,
+    /// Values of the basis functions at the samples: sample k lies under the functions from k on.
+    pub(crate) collocation: Vec<[f64; AT_KNOT]>,
     pub(crate) ends: [EndDerivative; 4],
     /// Fifth derivative over each knot interval, times the root of the interval's length and of its
     /// ease: `|rows c|^2 = c^T P c` for a uniform weight of one.
@@ -90,15 +89,10 @@ impl SplineEquations {
     /// `times`: at least two, increasing, in intervals since the origin.
     pub(crate) fn from_times(times: &[f64], interval: f64, origin: f64) -> Self {
         let basis = Basis::new(times);
-        let last_interval = basis.interval_count() - 1;
-        let collocation: Vec<_> = times
-            .iter()
-            .enumerate()
-            .map(|(k, &t)| basis.derivatives(k.min(last_interval), t, 0))
-            .collect();
+        let collocation: Vec<_> = (0..times.len()).map(|k| basis.at_knot(k)).collect();
         let mut gram = Banded::zeros(basis.count());
         for (k, row) in collocation.iter().enumerate() {
-            gram.add_outer_product(k.min(last_interval), row, 1.0);
+            gram.add_outer_product(k, row, 1.0);
         }
         let ends = end_derivatives(&basis, times);
         let mut gram_with_ends = gram.clone();
@@ -279,8 +273,7 @@ impl SplineEquations {
         start: usize,
         x: &[[f64; C]],
     ) -> (usize, Vec<[f64; C]>) {
-        let last_interval = self.basis.interval_count() - 1;
-        let dot = |first: usize, row: &[f64; ORDER]| -> [f64; C] {
+        let dot = |first: usize, row: &[f64]| -> [f64; C] {
             let entry = |j: usize| {
                 (first + j)
                     .checked_sub(start)
@@ -288,8 +281,8 @@ impl SplineEquations {
                     .copied()
                     .unwrap_or([0.0; C])
             };
-            (0..ORDER).fold([0.0; C], |sum, j| {
-                std::array::from_fn(|c| sum[c] + row[j] * entry(j)[c])
+            row.iter().enumerate().fold([0.0; C], |sum, (j, b)| {
+                std::array::from_fn(|c| sum[c] + b * entry(j)[c])
             })
         };
         let (mut low, mut high) = (
@@ -306,9 +299,7 @@ impl SplineEquations {
             high = high.max((end.start + MAX_STENCIL).min(self.sample_count));
         }
         low = low.min(high);
-        let mut rows: Vec<[f64; C]> = (low..high)
-            .map(|k| dot(k.min(last_interval), &self.collocation[k]))
-            .collect();
+        let mut rows: Vec<[f64; C]> = (low..high).map(|k| dot(k, &self.collocation[k])).collect();
         for end in reached {
             let weight = self.end_weight(end, weights);
             let weighted = dot(end.first, &end.row).map(|d| d * weight);
@@ -334,17 +325,10 @@ impl SplineEquations {
         } = scratch;
         correction.clear();
         correction.resize(self.basis.count(), [0.0; C]);
-        let last_interval = self.basis.interval_count() - 1;
         let mut sum = 0.0;
         for (k, (value, row)) in values.iter().zip(&self.collocation).enumerate() {
-            let first = k.min(last_interval);
-            sum += add_residual(
-                &coefficients[first..],
-                row,
-                value,
-                &[1.0],
-                &mut correction[first..],
-            );
+            let near = &mut correction[k..];
+            sum += add_residual(&coefficients[k..], row, value, &[1.0], near);
         }
         for end in &self.ends {
             let target = end.target(values);
@@ -374,9 +358,8 @@ impl SplineEquations {
         values: &[[f64; C]],
         coefficients: &[[f64; C]],
     ) -> f64 {
-        let last_interval = self.basis.interval_count() - 1;
-        let square = |(k, (value, row)): (usize, (&[f64; C], &[f64; ORDER]))| -> f64 {
-            let near = &coefficients[k.min(last_interval)..];
+        let square = |(k, (value, row)): (usize, (&[f64; C], &[f64; AT_KNOT]))| -> f64 {
+            let near = &coefficients[k..];
             (0..C)
                 .map(|c| {
                     (value[c]
@@ -464,22 +447,22 @@ fn local_end_weight(end: &EndDerivative, weight: f64) -> f64 {
 /// Residual of one row: its weighted square is returned, its weighted product with the row added to
 /// `correction`; the weight of channel c is that of lane c modulo L.
 #[inline]
-pub(crate) fn add_residual<const C: usize, const L: usize>(
+pub(crate) fn add_residual<const C: usize, const W: usize, const L: usize>(
     coefficients: &[[f64; C]],
-    row: &[f64; ORDER],
+    row: &[f64; W],
     value: &[f64; C],
     weight: &[f64; L],
     correction: &mut [[f64; C]],
 ) -> f64 {
     let mut residual = *value;
-    for (coefficient, b) in coefficients[..ORDER].iter().zip(row) {
+    for (coefficient, b) in coefficients[..W].iter().zip(row) {
         for c in 0..C {
             residual[c] -= b * coefficient[c];
         }
     }
     let mut weighted = residual;
     (0..C).for_each(|c| weighted[c] *= weight[c % L]);
-    for (entry, b) in correction[..ORDER].iter_mut().zip(row) {
+    for (entry, b) in correction[..W].iter_mut().zip(row) {
         for c in 0..C {
             entry[c] += b * weighted[c];
         }

@@ -2,8 +2,7 @@
 //! once.
 
 use crate::SpatialError;
-use crate::banded::{Factor, InverseBlock, Row, quadratic_form};
-use crate::basis::ORDER;
+use crate::banded::{Factor, InverseBand, InverseBlock, Solved, quadratic_form};
 use crate::equations::{LocalWeights, SplineEquations, add_residual, refinements};
 
 /// Series on the same times, a lane each: channel c belongs to lane c modulo L, and where a lane has
@@ -25,10 +24,9 @@ impl<const C: usize, const L: usize> Series<C, L> {
         values: Vec<[f64; C]>,
         channels: [usize; L],
     ) -> Self {
-        let last_interval = equations.interval_count() - 1;
         let mut projected = vec![[0.0; C]; equations.basis.count()];
         for (k, (value, row)) in values.iter().zip(&equations.collocation).enumerate() {
-            add_multiples(row, value, &mut projected[k.min(last_interval)..]);
+            add_multiples(row, value, &mut projected[k..]);
         }
         Self {
             targets: equations.ends.map(|end| end.target(&values)),
@@ -47,40 +45,31 @@ impl<const C: usize, const L: usize> Series<C, L> {
 /// A mean square over the channels, and the share of it that the inverse states, of each lane.
 pub(crate) type Stated<const L: usize> = [[f64; L]; 2];
 
-/// A solution of the equations in each lane, what it says, and memory that solving reuses.
-#[derive(Clone, Debug)]
-pub(crate) struct LocalSolution<const C: usize, const L: usize> {
-    pub(crate) coefficients: Vec<[f64; C]>,
-    /// Band of `(B^T B + P)^-1`, see [`Factor::invert`].
-    pub(crate) inverse: Vec<Row<L>>,
+/// What solutions say of the motion and its noise.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Statements<const L: usize> {
     /// Of each knot interval: the fifth derivative over it, times the root of its length.
     pub(crate) drives: Vec<Stated<L>>,
     /// Of each sample: its distance from the spline.
     pub(crate) residuals: Vec<Stated<L>>,
+}
+
+/// A solution of the equations in each lane, and memory that solving reuses.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct LocalSolution<const C: usize, const L: usize> {
+    pub(crate) coefficients: Vec<[f64; C]>,
     factor: Factor<L>,
     correction: Vec<[f64; C]>,
 }
 
-impl<const C: usize, const L: usize> Default for LocalSolution<C, L> {
-    fn default() -> Self {
-        Self {
-            coefficients: Vec::new(),
-            inverse: Vec::new(),
-            drives: Vec::new(),
-            residuals: Vec::new(),
-            factor: Factor::default(),
-            correction: Vec::new(),
-        }
-    }
-}
-
 impl<const C: usize, const L: usize> LocalSolution<C, L> {
-    /// Solves, not refined, and fills what the solution says: one way down the rows, and one up.
+    /// Solves, not refined, and fills in what the solution says: one way down the rows, and one up.
     pub(crate) fn solve_and_state(
         &mut self,
         equations: &SplineEquations,
         series: &Series<C, L>,
         weights: &[[f64; L]],
+        statements: &mut Statements<L>,
     ) -> Result<(), SpatialError> {
         let weights = equations.local_weights(weights);
         self.coefficients.clone_from(&series.projected);
@@ -94,28 +83,8 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
                 (0..C).for_each(|c| entry[c] += b * weight[c % L] * target[c]);
             }
         }
-        let row = |i: usize| equations.local_row(i, &weights);
-        let size = equations.basis.count();
-        self.factor
-            .factor_and_solve_down(size, row, &mut self.coefficients)?;
-        self.start_stating(equations);
-        let Self {
-            coefficients,
-            inverse,
-            drives,
-            residuals,
-            factor,
-            ..
-        } = self;
-        factor.invert(inverse, |i, block| {
-            factor.solve_up(i, coefficients);
-            state(
-                equations,
-                series,
-                (i, coefficients, block),
-                (drives, residuals),
-            );
-        });
+        self.solve_down(equations, &weights)?;
+        self.invert(equations, series, Solved::Down, statements);
         Ok(())
     }
 
@@ -127,8 +96,7 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
         weights: &[[f64; L]],
     ) -> Result<(), SpatialError> {
         let weights = equations.local_weights(weights);
-        let size = equations.basis.count();
-        self.correction.clone_from(&series.projected);
+        self.coefficients.clone_from(&series.projected);
         for ((end, weight), target) in equations
             .ends
             .iter()
@@ -137,66 +105,74 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
         {
             let mut weighted = *target;
             (0..C).for_each(|c| weighted[c] *= weight[c % L]);
-            add_multiples(&end.row, &weighted, &mut self.correction[end.first..]);
+            add_multiples(&end.row, &weighted, &mut self.coefficients[end.first..]);
         }
-        let row = |i: usize| equations.local_row(i, &weights);
-        self.factor
-            .factor_and_solve_down(size, row, &mut self.correction)?;
-        for i in (0..size).rev() {
-            self.factor.solve_up(i, &mut self.correction);
-        }
-        self.coefficients.clear();
-        self.coefficients.resize(size, [0.0; C]);
-        self.add_correction([true; L]);
+        self.solve_down(equations, &weights)?;
+        self.factor.solve_up(&mut self.coefficients);
         let refined = weights.largest.map(refinements);
         for round in 1..=refined.into_iter().max().unwrap_or(0) {
             self.residual(equations, series, &weights);
             self.factor.solve(&mut self.correction);
-            self.add_correction(refined.map(|rounds| round <= rounds));
+            for (coefficient, correction) in self.coefficients.iter_mut().zip(&self.correction) {
+                for c in 0..C {
+                    if round <= refined[c % L] {
+                        coefficient[c] += correction[c];
+                    }
+                }
+            }
         }
         Ok(())
     }
 
-    /// Fills the band of the inverse.
-    pub(crate) fn invert(&mut self) {
-        self.factor.invert(&mut self.inverse, |_, _| {});
+    fn solve_down(
+        &mut self,
+        equations: &SplineEquations,
+        weights: &LocalWeights<L>,
+    ) -> Result<(), SpatialError> {
+        let row = |i: usize| equations.local_row(i, weights);
+        let size = equations.basis.count();
+        self.factor
+            .factor_and_solve_down(size, row, &mut self.coefficients)
     }
 
-    /// Fills the band of the inverse and what the solution says.
-    pub(crate) fn invert_and_state(&mut self, equations: &SplineEquations, series: &Series<C, L>) {
-        self.start_stating(equations);
-        let Self {
-            coefficients,
-            inverse,
-            drives,
-            residuals,
-            factor,
-            ..
-        } = self;
-        factor.invert(inverse, |i, block| {
-            state(
-                equations,
-                series,
-                (i, coefficients, block),
-                (drives, residuals),
-            );
-        });
+    /// Inverts what was solved with, and fills in what the solution says.
+    pub(crate) fn state(
+        &mut self,
+        equations: &SplineEquations,
+        series: &Series<C, L>,
+        statements: &mut Statements<L>,
+    ) {
+        self.invert(equations, series, Solved::Whole, statements);
     }
 
-    fn start_stating(&mut self, equations: &SplineEquations) {
-        let nothing = [[0.0; L]; 2];
-        self.drives.resize(equations.interval_count(), nothing);
-        self.residuals.resize(equations.sample_count, nothing);
-    }
-
-    fn add_correction(&mut self, lanes: [bool; L]) {
-        for (coefficient, correction) in self.coefficients.iter_mut().zip(&self.correction) {
-            for c in 0..C {
-                if lanes[c % L] {
-                    coefficient[c] += correction[c];
+    fn invert(
+        &mut self,
+        equations: &SplineEquations,
+        series: &Series<C, L>,
+        solved: Solved,
+        statements: &mut Statements<L>,
+    ) {
+        let Statements { drives, residuals } = statements;
+        drives.resize(equations.interval_count(), [[0.0; L]; 2]);
+        residuals.resize(equations.sample_count, [[0.0; L]; 2]);
+        self.factor
+            .invert(&mut self.coefficients, solved, |i, coefficients, block| {
+                if i < drives.len() {
+                    drives[i] = drive_over(i, equations, series, coefficients, block);
                 }
-            }
+                if i < residuals.len() {
+                    residuals[i] = residual_at(i, equations, series, coefficients, block);
+                }
+            });
+    }
+
+    /// Bands of `(B^T B + P)^-1`, a lane each.
+    pub(crate) fn inverse_bands(&mut self, is_inverted: bool) -> [InverseBand; L] {
+        if !is_inverted {
+            let nothing: &mut [[f64; 0]] = &mut [];
+            self.factor.invert(nothing, Solved::Whole, |_, _, _| {});
         }
+        std::array::from_fn(|lane| self.factor.inverse(lane))
     }
 
     /// `B^T (y - B c) - P c`, into the correction.
@@ -206,15 +182,11 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
         series: &Series<C, L>,
         weights: &LocalWeights<L>,
     ) {
-        let (coefficients, correction) = (&self.coefficients, &mut self.correction);
-        correction.fill([0.0; C]);
-        let last_interval = equations.interval_count() - 1;
-        let mut add = |first: usize, row: &[f64; ORDER], value: &[f64; C], weight: &[f64; L]| {
-            let near = &mut correction[first..];
-            add_residual(&coefficients[first..], row, value, weight, near);
-        };
+        let (x, correction) = (&self.coefficients, &mut self.correction);
+        correction.clear();
+        correction.resize(x.len(), [0.0; C]);
         for (k, (value, row)) in series.values.iter().zip(&equations.collocation).enumerate() {
-            add(k.min(last_interval), row, value, &[1.0; L]);
+            add_residual(&x[k..], row, value, &[1.0; L], &mut correction[k..]);
         }
         for ((end, weight), target) in equations
             .ends
@@ -222,58 +194,65 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
             .zip(&weights.ends)
             .zip(&series.targets)
         {
-            add(end.first, &end.row, target, weight);
+            let near = &mut correction[end.first..];
+            add_residual(&x[end.first..], &end.row, target, weight, near);
         }
         let rows = equations.penalty_rows.iter().zip(&weights.penalty);
-        for (first, (row, weight)) in rows.enumerate() {
-            add(first, row, &[0.0; C], weight);
+        for (k, (row, weight)) in rows.enumerate() {
+            add_residual(&x[k..], row, &[0.0; C], weight, &mut correction[k..]);
         }
     }
 }
 
-/// What a solution says of the knot interval that begins with function i, and of the samples at its
-/// ends.
 #[inline(always)]
-fn state<const C: usize, const L: usize>(
+fn drive_over<const C: usize, const L: usize>(
+    interval: usize,
     equations: &SplineEquations,
     series: &Series<C, L>,
-    (i, coefficients, block): (usize, &[[f64; C]], &InverseBlock<L>),
-    (drives, residuals): (&mut [Stated<L>], &mut [Stated<L>]),
-) {
-    let interval_count = equations.interval_count();
-    if i >= interval_count {
-        return;
-    }
-    let ease = equations.eased[i];
-    let mean = |values: &[f64; C]| mean_squares(values, &series.channels);
-    let row = &equations.penalty_rows[i];
-    let fifth = combined(&coefficients[i..], row);
-    drives[i] = [mean(&fifth), quadratic_form(block, row)].map(|said| said.map(|s| s / ease));
-    // The last interval's functions are those of two samples.
-    let end = if i + 1 == interval_count {
-        i + 2
-    } else {
-        i + 1
-    };
-    for sample in i..end {
-        let row = &equations.collocation[sample];
-        let mut residual = combined(&coefficients[i..], row);
-        (0..C).for_each(|c| residual[c] = series.values[sample][c] - residual[c]);
-        residuals[sample] = [mean(&residual), quadratic_form(block, row)];
-    }
+    coefficients: &[[f64; C]],
+    block: &InverseBlock<L>,
+) -> Stated<L> {
+    let (row, ease) = (&equations.penalty_rows[interval], equations.eased[interval]);
+    let fifth = combined(&coefficients[interval..], row);
+    [
+        mean_squares(&fifth, &series.channels),
+        quadratic_form(block, row),
+    ]
+    .map(|stated| stated.map(|lane| lane / ease))
 }
 
 #[inline(always)]
-fn add_multiples<const C: usize>(row: &[f64; ORDER], value: &[f64; C], entries: &mut [[f64; C]]) {
-    for (entry, b) in entries[..ORDER].iter_mut().zip(row) {
+fn residual_at<const C: usize, const L: usize>(
+    sample: usize,
+    equations: &SplineEquations,
+    series: &Series<C, L>,
+    coefficients: &[[f64; C]],
+    block: &InverseBlock<L>,
+) -> Stated<L> {
+    let (row, value) = (&equations.collocation[sample], &series.values[sample]);
+    let mut residual = combined(&coefficients[sample..], row);
+    (0..C).for_each(|c| residual[c] = value[c] - residual[c]);
+    [
+        mean_squares(&residual, &series.channels),
+        quadratic_form(block, row),
+    ]
+}
+
+#[inline(always)]
+fn add_multiples<const C: usize, const W: usize>(
+    row: &[f64; W],
+    value: &[f64; C],
+    entries: &mut [[f64; C]],
+) {
+    for (entry, b) in entries[..W].iter_mut().zip(row) {
         (0..C).for_each(|c| entry[c] += b * value[c]);
     }
 }
 
 #[inline(always)]
-fn combined<const C: usize>(coefficients: &[[f64; C]], row: &[f64; ORDER]) -> [f64; C] {
+fn combined<const C: usize, const W: usize>(coefficients: &[[f64; C]], row: &[f64; W]) -> [f64; C] {
     let mut sum = [0.0; C];
-    for (coefficient, b) in coefficients[..ORDER].iter().zip(row) {
+    for (coefficient, b) in coefficients[..W].iter().zip(row) {
         (0..C).for_each(|c| sum[c] += b * coefficient[c]);
     }
     sum

@@ -215,7 +215,7 @@ impl PoseSpline {
         {
             let fit = AdaptiveFit::learn(
                 &times.system.equations,
-                &pose_channels(world_from_body),
+                pose_channels(world_from_body),
                 CHANNELS,
                 [position, rotation],
             )?;
@@ -251,7 +251,7 @@ impl PoseSpline {
         }
         let fit = AdaptiveFit::follow(
             &times.system.equations,
-            &pose_channels(world_from_body),
+            pose_channels(world_from_body),
             CHANNELS,
             EXPECTED_NOISE,
             (learnt, dropped),

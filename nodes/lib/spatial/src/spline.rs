@@ -137,7 +137,8 @@ impl<const C: usize> SmoothingSpline<C> {
         if let Smoothing::Adaptive { expected_noise } = smoothing
             && values.len() >= FEWEST_ADAPTIVE
         {
-            let fit = AdaptiveFit::learn(&system.equations, values, [C], [expected_noise])?;
+            let fit =
+                AdaptiveFit::learn(&system.equations, values.to_vec(), [C], [expected_noise])?;
             return Ok(Self::of_lane(system, &fit, 0));
         }
         system.equations.check(values)?;
@@ -195,10 +196,10 @@ impl<const C: usize> SmoothingSpline<C> {
         let of_lane = |all: &[[f64; L]]| all.iter().map(|lanes| lanes[lane]).collect();
         Self {
             system: system.clone(),
-            coefficients: fit.solution.coefficients.iter().map(coefficient).collect(),
+            coefficients: fit.coefficients.iter().map(coefficient).collect(),
             weight: SplineWeight::Local(of_lane(&fit.weights)),
             uncertainty: Some(Arc::new(Uncertainty {
-                inverse: InverseBand::of_lane(&fit.solution.inverse, lane),
+                inverse: fit.inverse[lane].clone(),
                 noise: of_lane(&fit.noise),
             })),
         }

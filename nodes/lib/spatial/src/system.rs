@@ -258,14 +258,17 @@ fn searched_ranges(sample_count: usize) -> Vec<Range<usize>> {
 /// The first value, and all values less the first: differences do not change, and rounding does not
 /// grow with the distance from zero.
 pub(crate) fn centred<const C: usize>(values: &[[f64; C]]) -> ([f64; C], Vec<[f64; C]>) {
+    let mut values = values.to_vec();
+    (centre(&mut values), values)
+}
+
+/// As [`centred`], in place.
+pub(crate) fn centre<const C: usize>(values: &mut [[f64; C]]) -> [f64; C] {
     let first = values.first().copied().unwrap_or([0.0; C]);
-    (
-        first,
-        values
-            .iter()
-            .map(|value| std::array::from_fn(|c| value[c] - first[c]))
-            .collect(),
-    )
+    for value in values {
+        (0..C).for_each(|c| value[c] -= first[c]);
+    }
+    first
 }
 
 #[cfg(test)]
