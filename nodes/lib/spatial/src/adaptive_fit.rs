@@ -1,8 +1,11 @@
 //! Series smoothed as much as they ask for around each time, several at once.
 
+use std::sync::Arc;
+
 use crate::SpatialError;
 use crate::adaptive::Adaptation;
-use crate::banded::InverseBand;
+use crate::banded::InverseBands;
+use crate::basis::ORDER;
 use crate::equations::SplineEquations;
 use crate::local_spline::{LocalSolution, Series, Statements};
 use crate::system::centre;
@@ -13,11 +16,26 @@ pub(crate) struct AdaptiveFit<const C: usize, const L: usize> {
     /// What was taken off the values.
     pub(crate) constant: [f64; C],
     pub(crate) weights: Vec<[f64; L]>,
-    /// Variance of each sample's noise, unit^2.
-    pub(crate) noise: Vec<[f64; L]>,
     pub(crate) coefficients: Vec<[f64; C]>,
-    /// Of `(B^T B + P)^-1`, of each lane.
-    pub(crate) inverse: [InverseBand; L],
+    pub(crate) uncertainty: Arc<Uncertainty>,
+}
+
+/// How far the estimates of splines may be off, a lane each.
+#[derive(Debug)]
+pub(crate) struct Uncertainty {
+    /// `(B^T B + P)^-1`.
+    inverse: InverseBands,
+    /// Variance of each sample's noise, unit^2, lane by lane.
+    noise: Vec<f64>,
+    lanes: usize,
+}
+
+impl Uncertainty {
+    /// Of a lane, `r b^T (B^T B + P)^-1 b` for basis functions b from `first` on.
+    pub(crate) fn variance(&self, lane: usize, first: usize, b: &[f64; ORDER]) -> f64 {
+        let noise = |sample: usize| self.noise[sample * self.lanes + lane];
+        (noise(first) * noise(first + 1)).sqrt() * self.inverse.quadratic_form(lane, first, b)
+    }
 }
 
 impl<const C: usize, const L: usize> AdaptiveFit<C, L> {
@@ -35,13 +53,8 @@ impl<const C: usize, const L: usize> AdaptiveFit<C, L> {
         let learnt = Adaptation::learn(equations, &series, expected_noise, &mut solution)?;
         let weights = learnt.weights();
         solution.solve(equations, &series, &weights)?;
-        Ok(Self {
-            constant,
-            weights,
-            noise: learnt.into_noise(),
-            inverse: solution.inverse_bands(false),
-            coefficients: solution.coefficients,
-        })
+        let noise = learnt.into_noise();
+        Ok(Self::of(constant, weights, noise, solution.finish(false)))
     }
 
     /// As [`AdaptiveFit::learn`], for a window that has moved by `dropped` samples since
@@ -71,12 +84,24 @@ impl<const C: usize, const L: usize> AdaptiveFit<C, L> {
         solution.state(equations, &series, &mut statements);
         learnt.learn_from(equations, &weights, &mut statements);
         *adaptation = Some(learnt);
-        Ok(Self {
+        Ok(Self::of(constant, weights, noise, solution.finish(true)))
+    }
+
+    fn of(
+        constant: [f64; C],
+        weights: Vec<[f64; L]>,
+        noise: Vec<[f64; L]>,
+        (coefficients, inverse): (Vec<[f64; C]>, InverseBands),
+    ) -> Self {
+        Self {
             constant,
             weights,
-            noise,
-            inverse: solution.inverse_bands(true),
-            coefficients: solution.coefficients,
-        })
+            coefficients,
+            uncertainty: Arc::new(Uncertainty {
+                inverse,
+                noise: noise.into_flattened(),
+                lanes: L,
+            }),
+        }
     }
 }

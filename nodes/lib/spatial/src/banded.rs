@@ -78,9 +78,9 @@ impl<const L: usize> Factor<L> {
         let (mut log_determinant, mut product) = ([0.0; L], [1.0_f64; L]);
         for i in 0..size {
             let given = matrix_row(i);
-            let (mut row, diagonal) = match self.rows.last_chunk::<BANDWIDTH>() {
+            let (mut row, diagonal) = match self.rows.last_chunk() {
                 Some(above) => eliminate(above, &given),
-                None => eliminate(&self.rows, &given),
+                None => eliminate(&after_zeros(&self.rows), &given),
             };
             if !diagonal.iter().all(|d| *d > 0.0 && d.is_finite()) {
                 return Err(SpatialError::Singular { index: i });
@@ -128,11 +128,11 @@ impl<const L: usize> Factor<L> {
         }
     }
 
-    /// One lane of the band, after [`Factor::invert`].
-    pub(crate) fn inverse(&self, lane: usize) -> InverseBand {
-        let rows = self.rows[BANDWIDTH..self.size + BANDWIDTH].iter();
-        InverseBand {
-            rows: rows.map(|row| row.map(|entry| entry[lane])).collect(),
+    /// The band, after [`Factor::invert`].
+    pub(crate) fn into_inverse(self) -> InverseBands {
+        InverseBands {
+            entries: self.rows.into_flattened().into_flattened(),
+            lanes: L,
         }
     }
 
@@ -264,71 +264,118 @@ impl Factor {
 /// Rows of an inverse, see [`Factor::invert`]: what the basis functions of one knot interval share.
 pub(crate) type InverseBlock<const L: usize> = [Row<L>; BANDWIDTH + 1];
 
-/// An inverse within the band: `rows[i][k]` is entry (i, i + k).
+/// Inverses within the band, a lane each.
 #[derive(Clone, Debug)]
-pub(crate) struct InverseBand {
-    rows: Vec<[f64; BANDWIDTH + 1]>,
+pub(crate) struct InverseBands {
+    /// Rows as in [`Factor`].
+    entries: Vec<f64>,
+    lanes: usize,
 }
 
-impl InverseBand {
-    /// `row^T Z row`, the row's entries standing at `first` and after it.
-    pub(crate) fn quadratic_form(&self, first: usize, row: &[f64; BANDWIDTH + 1]) -> f64 {
-        let rows = &self.rows[first..=first + BANDWIDTH];
+impl InverseBands {
+    /// `row^T Z row` of one lane, the row's entries standing at `first` and after it.
+    pub(crate) fn quadratic_form(
+        &self,
+        lane: usize,
+        first: usize,
+        row: &[f64; BANDWIDTH + 1],
+    ) -> f64 {
+        let lanes = self.lanes;
+        let own = (first + BANDWIDTH) * (BANDWIDTH + 1) * lanes + lane;
+        let block = &self.entries[own..=own + (BANDWIDTH + 1) * BANDWIDTH * lanes];
+        let entry = |i: usize, j: usize| block[(j * (BANDWIDTH + 1) + i - j) * lanes];
         let mut sum = 0.0;
         for i in 0..=BANDWIDTH {
-            let beside: f64 = (0..i).map(|j| row[j] * rows[j][i - j]).sum();
-            sum += row[i] * (row[i] * rows[i][0] + 2.0 * beside);
+            let beside: f64 = (0..i).map(|j| row[j] * entry(i, j)).sum();
+            sum += row[i] * (row[i] * entry(i, i) + 2.0 * beside);
         }
         sum
     }
 }
 
-/// `row^T Z row` in each lane, Z the block or, for shorter rows, its upper left part.
+/// `row^T Z row` in each lane, Z the block or, for rows of five, its upper left part.
 #[inline(always)]
 pub(crate) fn quadratic_form<const L: usize, const W: usize>(
     block: &InverseBlock<L>,
     row: &[f64; W],
 ) -> [f64; L] {
     let mut form = [0.0; L];
-    for j in 0..W {
-        let mut product = [0.0; L];
-        for i in 0..W {
-            let entry = &block[i.min(j)][i.abs_diff(j)];
-            for lane in 0..L {
-                product[lane] += row[i] * entry[lane];
-            }
-        }
-        for lane in 0..L {
-            form[lane] += product[lane] * row[j];
-        }
+    add_column::<L, W, 0>(&mut form, block, row);
+    add_column::<L, W, 1>(&mut form, block, row);
+    add_column::<L, W, 2>(&mut form, block, row);
+    add_column::<L, W, 3>(&mut form, block, row);
+    add_column::<L, W, 4>(&mut form, block, row);
+    if W > BANDWIDTH {
+        add_column::<L, W, 5>(&mut form, block, row);
     }
     form
+}
+
+#[inline(always)]
+fn add_column<const L: usize, const W: usize, const J: usize>(
+    form: &mut [f64; L],
+    block: &InverseBlock<L>,
+    row: &[f64; W],
+) {
+    let mut product = [0.0; L];
+    for i in 0..W {
+        let entry = &block[i.min(J)][i.abs_diff(J)];
+        for lane in 0..L {
+            product[lane] += row[i] * entry[lane];
+        }
+    }
+    for lane in 0..L {
+        form[lane] += product[lane] * row[J];
+    }
+}
+
+/// Fewer rows than the band is wide, after rows of zeros, which change nothing.
+fn after_zeros<const L: usize>(rows: &[Row<L>]) -> [Row<L>; BANDWIDTH] {
+    let mut all = [[[0.0; L]; BANDWIDTH + 1]; BANDWIDTH];
+    all[BANDWIDTH - rows.len()..].copy_from_slice(rows);
+    all
 }
 
 /// A row of L, its diagonal left out, and the row's entry of D, from the rows above it (the nearest
 /// last) and the matrix' own row.
 #[inline(always)]
-fn eliminate<const L: usize>(above: &[Row<L>], given: &Row<L>) -> (Row<L>, [f64; L]) {
-    let reach = above.len();
-    // `scaled[k]` is L(i, i - k) D(i - k): computed from the far column to the near one.
-    let mut scaled = [[0.0; L]; BANDWIDTH + 1];
-    let mut row = [[0.0; L]; BANDWIDTH + 1];
-    let mut diagonal = given[0];
-    for k in (1..=reach).rev() {
-        let other = &above[reach - k];
-        let mut entry = given[k];
-        for n in k + 1..=reach {
+fn eliminate<const L: usize>(above: &[Row<L>; BANDWIDTH], given: &Row<L>) -> (Row<L>, [f64; L]) {
+    let mut made = Eliminated {
+        scaled: *given,
+        row: [[0.0; L]; BANDWIDTH + 1],
+        diagonal: given[0],
+    };
+    // Each by its own name: all places are then known when this is compiled.
+    made.column::<5>(above);
+    made.column::<4>(above);
+    made.column::<3>(above);
+    made.column::<2>(above);
+    made.column::<1>(above);
+    (made.row, made.diagonal)
+}
+
+/// A row on its way from the matrix to its factor, from the far column to the near one.
+struct Eliminated<const L: usize> {
+    /// `scaled[k]` is L(i, i - k) D(i - k).
+    scaled: Row<L>,
+    row: Row<L>,
+    diagonal: [f64; L],
+}
+
+impl<const L: usize> Eliminated<L> {
+    #[inline(always)]
+    fn column<const K: usize>(&mut self, above: &[Row<L>; BANDWIDTH]) {
+        let other = &above[BANDWIDTH - K];
+        for n in K + 1..=BANDWIDTH {
             for lane in 0..L {
-                entry[lane] -= scaled[n][lane] * other[n - k][lane];
+                self.scaled[K][lane] -= self.scaled[n][lane] * other[n - K][lane];
             }
         }
-        scaled[k] = entry;
         for lane in 0..L {
-            row[k][lane] = entry[lane] * other[0][lane];
-            diagonal[lane] -= entry[lane] * row[k][lane];
+            self.row[K][lane] = self.scaled[K][lane] * other[0][lane];
+            self.diagonal[lane] -= self.scaled[K][lane] * self.row[K][lane];
         }
     }
-    (row, diagonal)
 }
 
 /// The first half of solving, row i after those above it.
@@ -371,23 +418,32 @@ fn solve_up_from<const L: usize, const C: usize>(
 /// A row of the inverse from L's own row and the five below it, and the inverse's five rows below.
 #[inline(always)]
 fn inverse_row<const L: usize>(window: &[Row<L>; 1 + PADDING]) -> Row<L> {
-    let mut row = [[0.0; L]; BANDWIDTH + 1];
-    let mut diagonal = window[0][0];
-    for j in 1..=BANDWIDTH {
-        for k in 1..=BANDWIDTH {
-            let (l, z) = (&window[k][k], &window[BANDWIDTH + k.min(j)][k.abs_diff(j)]);
-            for lane in 0..L {
-                row[j][lane] -= l[lane] * z[lane];
-            }
-        }
-    }
+    let mut row = [
+        window[0][0],
+        inverse_entry::<L, 1>(window),
+        inverse_entry::<L, 2>(window),
+        inverse_entry::<L, 3>(window),
+        inverse_entry::<L, 4>(window),
+        inverse_entry::<L, 5>(window),
+    ];
     for k in 1..=BANDWIDTH {
         for lane in 0..L {
-            diagonal[lane] -= window[k][k][lane] * row[k][lane];
+            row[0][lane] -= window[k][k][lane] * row[k][lane];
         }
     }
-    row[0] = diagonal;
     row
+}
+
+#[inline(always)]
+fn inverse_entry<const L: usize, const J: usize>(window: &[Row<L>; 1 + PADDING]) -> [f64; L] {
+    let mut entry = [0.0; L];
+    for k in 1..=BANDWIDTH {
+        let (l, z) = (&window[k][k], &window[BANDWIDTH + k.min(J)][k.abs_diff(J)]);
+        for lane in 0..L {
+            entry[lane] -= l[lane] * z[lane];
+        }
+    }
+    entry
 }
 
 /// Where a solution is cut off, as a part of its largest entry.
@@ -443,11 +499,16 @@ mod tests {
         let row = |i: usize| banded.rows[i].map(|entry| [entry]);
         factor.factor_rows(size, row).unwrap();
         factor.invert::<0>(&mut [], Solved::Whole, |_, _, _| {});
-        let found = factor.inverse(0);
+        let found = factor.into_inverse();
         let inverse = dense.try_inverse().unwrap();
         for i in 0..size {
             for k in 0..=BANDWIDTH.min(i) {
-                assert!((found.rows[i - k][k] - inverse[(i, i - k)]).abs() < 1e-14);
+                assert!(
+                    (found.entries[(BANDWIDTH + i - k) * (BANDWIDTH + 1) + k]
+                        - inverse[(i, i - k)])
+                        .abs()
+                        < 1e-14
+                );
             }
         }
         let row = [0.3, -1.0, 2.0, 0.5, -0.7, 1.1];
@@ -455,7 +516,7 @@ mod tests {
             .flat_map(|i| (0..6).map(move |j| (i, j)))
             .map(|(i, j)| row[i] * row[j] * inverse[(4 + i, 4 + j)])
             .sum();
-        assert!((found.quadratic_form(4, &row) - expected).abs() < 1e-14);
+        assert!((found.quadratic_form(0, 4, &row) - expected).abs() < 1e-14);
     }
 
     #[test]

@@ -181,26 +181,33 @@ impl SplineEquations {
     /// Row i of `B^T B + P` for local weights.
     #[inline(always)]
     pub(crate) fn local_row<const L: usize>(&self, i: usize, weights: &LocalWeights<L>) -> Row<L> {
-        let mut entries = self.gram.rows[i].map(|entry| [entry; L]);
-        let mut add = |m: usize, row: &[f64; ORDER], weight: &[f64; L]| {
-            let own = weight.map(|weight| weight * row[m]);
-            for j in 0..=m {
-                (0..L).for_each(|lane| entries[m - j][lane] += own[lane] * row[j]);
-            }
-        };
+        let mut entries = [[0.0; L]; ORDER];
+        for (entry, given) in entries.iter_mut().zip(&self.gram.rows[i]) {
+            *entry = [*given; L];
+        }
         if i < ORDER || i + ORDER >= self.basis.count() {
             for (end, weight) in self.ends.iter().zip(&weights.ends) {
                 if (end.first..end.first + ORDER).contains(&i) {
-                    add(i - end.first, &end.row, weight);
+                    add_products(&mut entries, i - end.first, &end.row, weight);
                 }
             }
         }
-        for m in (0..ORDER).rev() {
-            let first = i.wrapping_sub(m);
-            if let (Some(row), Some(weight)) =
-                (self.penalty_rows.get(first), weights.penalty.get(first))
-            {
-                add(m, row, weight);
+        let first = i.saturating_sub(DEGREE);
+        let rows = &self.penalty_rows[first..self.interval_count().min(i + 1)];
+        let weights = &weights.penalty[first..self.interval_count().min(i + 1)];
+        match (rows.first_chunk::<ORDER>(), weights.first_chunk::<ORDER>()) {
+            (Some(rows), Some(weights)) => {
+                add_products(&mut entries, 5, &rows[0], &weights[0]);
+                add_products(&mut entries, 4, &rows[1], &weights[1]);
+                add_products(&mut entries, 3, &rows[2], &weights[2]);
+                add_products(&mut entries, 2, &rows[3], &weights[3]);
+                add_products(&mut entries, 1, &rows[4], &weights[4]);
+                add_products(&mut entries, 0, &rows[5], &weights[5]);
+            }
+            _ => {
+                for (k, (row, weight)) in rows.iter().zip(weights).enumerate() {
+                    add_products(&mut entries, i - first - k, row, weight);
+                }
             }
         }
         entries
@@ -442,6 +449,21 @@ pub(crate) fn refinements(largest_weight: f64) -> usize {
 /// they count no more than there.
 fn local_end_weight(end: &EndDerivative, weight: f64) -> f64 {
     end.weight / (1.0 + weight / NOTHING_TO_SMOOTH)
+}
+
+/// Adds `weight * row row^T` to a row of a band matrix, of which it is entry m.
+#[inline(always)]
+fn add_products<const L: usize>(
+    entries: &mut Row<L>,
+    m: usize,
+    row: &[f64; ORDER],
+    weight: &[f64; L],
+) {
+    for j in 0..=m {
+        for lane in 0..L {
+            entries[m - j][lane] += weight[lane] * row[m] * row[j];
+        }
+    }
 }
 
 /// Residual of one row: its weighted square is returned, its weighted product with the row added to

@@ -2,7 +2,7 @@
 //! once.
 
 use crate::SpatialError;
-use crate::banded::{Factor, InverseBand, InverseBlock, Solved, quadratic_form};
+use crate::banded::{Factor, InverseBands, InverseBlock, Solved, quadratic_form};
 use crate::equations::{LocalWeights, SplineEquations, add_residual, refinements};
 
 /// Series on the same times, a lane each: channel c belongs to lane c modulo L, and where a lane has
@@ -166,13 +166,13 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
             });
     }
 
-    /// Bands of `(B^T B + P)^-1`, a lane each.
-    pub(crate) fn inverse_bands(&mut self, is_inverted: bool) -> [InverseBand; L] {
+    /// The coefficients and `(B^T B + P)^-1`.
+    pub(crate) fn finish(mut self, is_inverted: bool) -> (Vec<[f64; C]>, InverseBands) {
         if !is_inverted {
             let nothing: &mut [[f64; 0]] = &mut [];
             self.factor.invert(nothing, Solved::Whole, |_, _, _| {});
         }
-        std::array::from_fn(|lane| self.factor.inverse(lane))
+        (self.coefficients, self.factor.into_inverse())
     }
 
     /// `B^T (y - B c) - P c`, into the correction.

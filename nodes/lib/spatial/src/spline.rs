@@ -4,8 +4,7 @@ use std::sync::Arc;
 
 use crate::SpatialError;
 use crate::adaptive::FEWEST_ADAPTIVE;
-use crate::adaptive_fit::AdaptiveFit;
-use crate::banded::InverseBand;
+use crate::adaptive_fit::{AdaptiveFit, Uncertainty};
 use crate::basis::{BasisValues, ORDER};
 use crate::derivative::Derivative;
 use crate::equations::{PenaltyWeights, Scratch};
@@ -92,15 +91,6 @@ impl Smoothing {
     }
 }
 
-/// How far a spline's estimate may be off.
-#[derive(Clone, Debug)]
-struct Uncertainty {
-    /// Band of `(B^T B + P)^-1`.
-    inverse: InverseBand,
-    /// Variance of each sample's noise, unit^2.
-    noise: Vec<f64>,
-}
-
 /// A quintic spline through or near samples of C channels, which share one smoothing (so that
 /// turning the axes turns the result).
 #[derive(Clone, Debug)]
@@ -108,7 +98,8 @@ pub struct SmoothingSpline<const C: usize> {
     system: Arc<SplineSystem>,
     coefficients: Vec<[f64; C]>,
     weight: SplineWeight,
-    uncertainty: Option<Arc<Uncertainty>>,
+    /// And its lane.
+    uncertainty: Option<(Arc<Uncertainty>, usize)>,
 }
 
 impl<const C: usize> SmoothingSpline<C> {
@@ -198,10 +189,7 @@ impl<const C: usize> SmoothingSpline<C> {
             system: system.clone(),
             coefficients: fit.coefficients.iter().map(coefficient).collect(),
             weight: SplineWeight::Local(of_lane(&fit.weights)),
-            uncertainty: Some(Arc::new(Uncertainty {
-                inverse: fit.inverse[lane].clone(),
-                noise: of_lane(&fit.noise),
-            })),
+            uncertainty: Some((fit.uncertainty.clone(), lane)),
         }
     }
 
@@ -239,9 +227,8 @@ impl<const C: usize> SmoothingSpline<C> {
 
     /// The variance of one of what [`crate::equations::SplineEquations::basis_at`] gave.
     pub(crate) fn variance_of(&self, first: usize, row: &[f64; ORDER]) -> Option<f64> {
-        let uncertainty = self.uncertainty.as_ref()?;
-        let noise = (uncertainty.noise[first] * uncertainty.noise[first + 1]).sqrt();
-        Some(noise * uncertainty.inverse.quadratic_form(first, row))
+        let (uncertainty, lane) = self.uncertainty.as_ref()?;
+        Some(uncertainty.variance(*lane, first, row))
     }
 
     /// The penalty's weight.
