@@ -53,8 +53,9 @@ impl<const C: usize, const L: usize> AdaptiveFit<C, L> {
         let learnt = Adaptation::learn(equations, &series, expected_noise, &mut solution)?;
         let weights = learnt.weights();
         solution.solve(equations, &series, &weights)?;
+        solution.invert();
         let noise = learnt.into_noise();
-        Ok(Self::of(constant, weights, noise, solution.finish(false)))
+        Ok(Self::of(constant, weights, noise, solution.finish()))
     }
 
     /// As [`AdaptiveFit::learn`], for a window that has moved by `dropped` samples since
@@ -84,7 +85,7 @@ impl<const C: usize, const L: usize> AdaptiveFit<C, L> {
         solution.state(equations, &series, &mut statements);
         learnt.learn_from(equations, &weights, &mut statements);
         *adaptation = Some(learnt);
-        Ok(Self::of(constant, weights, noise, solution.finish(true)))
+        Ok(Self::of(constant, weights, noise, solution.finish()))
     }
 
     fn of(

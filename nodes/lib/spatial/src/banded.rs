@@ -519,6 +519,45 @@ mod tests {
         assert!((found.quadratic_form(0, 4, &row) - expected).abs() < 1e-14);
     }
 
+    /// Diagonally dominant, and different for each `seed`.
+    fn row(i: usize, seed: usize) -> Row<1> {
+        std::array::from_fn(|k| {
+            let value = ((i * 5 + k * 3 + seed) % 7) as f64 / 7.0;
+            let inside = if k <= i { value } else { 0.0 };
+            [inside + if k == 0 { 6.0 } else { 0.0 }]
+        })
+    }
+
+    #[test]
+    fn lanes_do_what_each_does_alone_to_the_bit() {
+        let size = 19;
+        let channel = |i: usize, seed: usize| ((i * 11 + seed * 5) % 13) as f64 - 6.1;
+        let mut right: Vec<[f64; 2]> = (0..size).map(|i| [channel(i, 1), channel(i, 2)]).collect();
+        let mut both = Factor::<2>::default();
+        let rows = |i: usize| std::array::from_fn(|k| [row(i, 1)[k][0], row(i, 2)[k][0]]);
+        both.factor_and_solve_down(size, rows, &mut right).unwrap();
+        both.invert(&mut right, Solved::Down, |_, _, _| {});
+        let inverses = both.into_inverse();
+        for (lane, seed) in [1, 2].into_iter().enumerate() {
+            let mut alone = Factor::default();
+            alone.factor_rows(size, |i| row(i, seed)).unwrap();
+            let mut x: Vec<[f64; 1]> = (0..size).map(|i| [channel(i, seed)]).collect();
+            alone.solve(&mut x);
+            assert!((0..size).all(|i| right[i][lane].to_bits() == x[i][0].to_bits()));
+            alone.invert(&mut x, Solved::Whole, |_, _, _| {});
+            let of_lane = inverses.entries.chunks_exact(2).map(|lanes| lanes[lane]);
+            let inverse = alone.into_inverse().entries;
+            // Before them stands what the inversion left of the factor's first rows.
+            let of_inverse = BANDWIDTH * (BANDWIDTH + 1);
+            assert!(
+                of_lane
+                    .zip(&inverse)
+                    .skip(of_inverse)
+                    .all(|(a, b)| a.to_bits() == b.to_bits())
+            );
+        }
+    }
+
     #[test]
     fn a_local_solution_is_the_whole_one_where_it_counts() {
         let size = 400;

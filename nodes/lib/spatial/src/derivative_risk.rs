@@ -5,7 +5,7 @@ use std::ops::Range;
 use crate::SpatialError;
 use crate::basis::ORDER;
 use crate::derivative::Derivative;
-use crate::equations::{PenaltyWeights, Scratch, SplineEquations};
+use crate::equations::{Scratch, SplineEquations};
 
 /// Step of the walk from the weight of the greatest likelihood, decimal logarithm: the search's own
 /// finest step.
@@ -179,8 +179,8 @@ fn difference<const C: usize>(
 }
 
 /// With half the samples in the same time, half the weight cuts off at the same frequency.
-fn halved(weight: f64) -> PenaltyWeights<'static> {
-    PenaltyWeights::Uniform(0.5 * weight)
+fn halved(weight: f64) -> f64 {
+    0.5 * weight
 }
 
 fn apply<const C: usize>(

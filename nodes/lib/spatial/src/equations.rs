@@ -57,15 +57,6 @@ pub(crate) enum PenaltyWeights<'a> {
     Local(&'a [f64]),
 }
 
-impl PenaltyWeights<'_> {
-    fn largest(self) -> f64 {
-        match self {
-            Self::Uniform(weight) => weight,
-            Self::Local(weights) => weights.iter().copied().fold(0.0, f64::max),
-        }
-    }
-}
-
 /// One weight for each knot interval, for as many series at once as there are lanes.
 #[derive(Clone, Debug)]
 pub(crate) struct LocalWeights<const L: usize> {
@@ -146,13 +137,6 @@ impl SplineEquations {
         self.penalty_rows.len()
     }
 
-    fn weight_over(&self, interval: usize, weights: PenaltyWeights) -> f64 {
-        match weights {
-            PenaltyWeights::Uniform(weight) => weight,
-            PenaltyWeights::Local(weights) => weights[interval] / self.eased[interval],
-        }
-    }
-
     fn end_weight(&self, end: &EndDerivative, weights: PenaltyWeights) -> f64 {
         match weights {
             PenaltyWeights::Uniform(_) => end.weight,
@@ -213,28 +197,7 @@ impl SplineEquations {
         entries
     }
 
-    /// Factors `B^T B + P` into the scratch.
-    fn factor_into<const C: usize>(
-        &self,
-        weights: PenaltyWeights,
-        scratch: &mut Scratch<C>,
-    ) -> Result<(), SpatialError> {
-        match weights {
-            PenaltyWeights::Uniform(weight) => {
-                scratch
-                    .factor
-                    .factor_sum(&self.gram_with_ends, weight, &self.penalty)
-            }
-            PenaltyWeights::Local(weights) => {
-                let weights: Vec<[f64; 1]> = weights.iter().map(|weight| [*weight]).collect();
-                let weights = self.local_weights(&weights);
-                let row = |i: usize| self.local_row(i, &weights);
-                scratch.factor.factor_rows(self.basis.count(), row)
-            }
-        }
-    }
-
-    /// Minimises `|y - B c|^2 + c^T P c`, P the penalty with its weights; the coefficients come in
+    /// Minimises `|y - B c|^2 + c^T P c`, P the penalty with one weight for all intervals; the coefficients come in
     /// `scratch`.
     ///
     /// A large weight drowns B in the sum `B^T B + P`: solutions are then refined with the
@@ -243,15 +206,16 @@ impl SplineEquations {
     pub(crate) fn solve<const C: usize>(
         &self,
         values: &[[f64; C]],
-        weights: PenaltyWeights,
+        weight: f64,
         scratch: &mut Scratch<C>,
     ) -> Result<(), SpatialError> {
-        let refinements = refinements(weights.largest());
-        self.factor_into(weights, scratch)?;
+        scratch
+            .factor
+            .factor_sum(&self.gram_with_ends, weight, &self.penalty)?;
         scratch.coefficients.clear();
         scratch.coefficients.resize(self.basis.count(), [0.0; C]);
-        for _ in 0..=refinements {
-            self.residual(values, weights, scratch);
+        for _ in 0..=refinements(weight) {
+            self.residual(values, weight, scratch);
             scratch.factor.solve(&mut scratch.correction);
             for (coefficient, correction) in
                 scratch.coefficients.iter_mut().zip(&scratch.correction)
@@ -266,9 +230,19 @@ impl SplineEquations {
 
     /// `B^T B + P`, factored.
     pub(crate) fn factor(&self, weights: PenaltyWeights) -> Result<Factor, SpatialError> {
-        let mut scratch = Scratch::<1>::default();
-        self.factor_into(weights, &mut scratch)?;
-        Ok(scratch.factor)
+        let mut factor = Factor::default();
+        match weights {
+            PenaltyWeights::Uniform(weight) => {
+                factor.factor_sum(&self.gram_with_ends, weight, &self.penalty)?;
+            }
+            PenaltyWeights::Local(weights) => {
+                let weights: Vec<[f64; 1]> = weights.iter().map(|weight| [*weight]).collect();
+                let weights = self.local_weights(&weights);
+                let row = |i: usize| self.local_row(i, &weights);
+                factor.factor_rows(self.basis.count(), row)?;
+            }
+        }
+        Ok(factor)
     }
 
     /// What the samples are multiplied with in `x^T B^T y`, the derivatives at the ends included,
@@ -322,7 +296,7 @@ impl SplineEquations {
     pub(crate) fn residual<const C: usize>(
         &self,
         values: &[[f64; C]],
-        weights: PenaltyWeights,
+        weight: f64,
         scratch: &mut Scratch<C>,
     ) -> f64 {
         let Scratch {
@@ -343,7 +317,7 @@ impl SplineEquations {
                 &coefficients[end.first..],
                 &end.row,
                 &target,
-                &[self.end_weight(end, weights)],
+                &[end.weight],
                 &mut correction[end.first..],
             );
         }
@@ -352,7 +326,7 @@ impl SplineEquations {
                 &coefficients[first..],
                 row,
                 &[0.0; C],
-                &[self.weight_over(first, weights)],
+                &[weight],
                 &mut correction[first..],
             );
         }
@@ -427,9 +401,8 @@ impl SplineEquations {
         weight: f64,
         scratch: &mut Scratch<C>,
     ) -> Result<f64, SpatialError> {
-        let weights = PenaltyWeights::Uniform(weight);
-        self.solve(values, weights, scratch)?;
-        let square = self.residual(values, weights, scratch);
+        self.solve(values, weight, scratch)?;
+        let square = self.residual(values, weight, scratch);
         let free = self.free_count() as f64;
         // A series at rest leaves nothing: any weight is right for it, and the logarithm must stay
         // finite.

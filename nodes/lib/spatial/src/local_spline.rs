@@ -84,7 +84,7 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
             }
         }
         self.solve_down(equations, &weights)?;
-        self.invert(equations, series, Solved::Down, statements);
+        self.invert_and_state(equations, series, Solved::Down, statements);
         Ok(())
     }
 
@@ -142,10 +142,10 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
         series: &Series<C, L>,
         statements: &mut Statements<L>,
     ) {
-        self.invert(equations, series, Solved::Whole, statements);
+        self.invert_and_state(equations, series, Solved::Whole, statements);
     }
 
-    fn invert(
+    fn invert_and_state(
         &mut self,
         equations: &SplineEquations,
         series: &Series<C, L>,
@@ -166,12 +166,14 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
             });
     }
 
-    /// The coefficients and `(B^T B + P)^-1`.
-    pub(crate) fn finish(mut self, is_inverted: bool) -> (Vec<[f64; C]>, InverseBands) {
-        if !is_inverted {
-            let nothing: &mut [[f64; 0]] = &mut [];
-            self.factor.invert(nothing, Solved::Whole, |_, _, _| {});
-        }
+    /// Inverts what was solved with, and no more.
+    pub(crate) fn invert(&mut self) {
+        let nothing: &mut [[f64; 0]] = &mut [];
+        self.factor.invert(nothing, Solved::Whole, |_, _, _| {});
+    }
+
+    /// The coefficients and, of what was inverted, `(B^T B + P)^-1`.
+    pub(crate) fn finish(self) -> (Vec<[f64; C]>, InverseBands) {
         (self.coefficients, self.factor.into_inverse())
     }
 

@@ -106,3 +106,37 @@ fn turning_the_world_turns_the_result() {
             < 1e-6
     );
 }
+
+#[test]
+fn both_halves_learn_at_once_what_each_learns_alone_to_the_bit() {
+    let stamps: Vec<Stamp> = (0..150)
+        .map(|k| Stamp::from_seconds(0.01 * f64::from(k) + if k > 70 { 0.013 } else { 0.0 }))
+        .collect();
+    let poses: Vec<_> = stamps
+        .iter()
+        .enumerate()
+        .map(|(k, stamp)| {
+            let motion = cone(stamp.as_seconds());
+            let jitter = 1e-3 * ((k * 7919 % 101) as f64 / 101.0 - 0.5);
+            let position = motion.position + Vector3::new(jitter, -jitter, 0.5 * jitter);
+            let turn = so3::exp(&Vector3::new(2.0 * jitter, jitter, -jitter));
+            Isometry3::from_parts(Translation3::from(position), turn * motion.rotation)
+        })
+        .collect();
+    let times = PoseTimes::new(&stamps).unwrap();
+    let both = PoseSpline::fit_on(&times, &poses, PoseSmoothing::ADAPTIVE).unwrap();
+    let PoseSmoothing { position, rotation } = PoseSmoothing::ADAPTIVE;
+    let position =
+        SmoothingSpline::fit_on(times.system(), &position_channels(&poses), position).unwrap();
+    let rotation =
+        SmoothingSpline::fit_on(times.system(), &rotation_channels(&poses), rotation).unwrap();
+    assert_eq!(both.position.weight(), position.weight());
+    assert_eq!(both.rotation.weight(), rotation.weight());
+    for k in 0..400 {
+        let t = 0.0038 * f64::from(k);
+        assert_eq!(both.position.evaluate(t), position.evaluate(t));
+        assert_eq!(both.rotation.evaluate(t), rotation.evaluate(t));
+        assert_eq!(both.position.variance(t), position.variance(t));
+        assert_eq!(both.rotation.variance(t), rotation.variance(t));
+    }
+}

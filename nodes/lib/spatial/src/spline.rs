@@ -140,8 +140,7 @@ impl<const C: usize> SmoothingSpline<C> {
             Smoothing::Automatic | Smoothing::AutomaticFor(_) | Smoothing::Adaptive { .. }
         );
         loop {
-            let uniform = SplineWeight::Uniform(weight);
-            match Self::solved(system, (first, &centred), uniform) {
+            match Self::solved(system, (first, &centred), weight) {
                 Err(SpatialError::Singular { .. }) if is_found && weight > LIGHT => {
                     weight *= LIGHTER;
                 }
@@ -155,12 +154,10 @@ impl<const C: usize> SmoothingSpline<C> {
     fn solved(
         system: &Arc<SplineSystem>,
         (constant, values): ([f64; C], &[[f64; C]]),
-        weight: SplineWeight,
+        weight: f64,
     ) -> Result<Self, SpatialError> {
         let mut scratch = Scratch::default();
-        system
-            .equations
-            .solve(values, weight.of_penalty(), &mut scratch)?;
+        system.equations.solve(values, weight, &mut scratch)?;
         for coefficient in &mut scratch.coefficients {
             for c in 0..C {
                 coefficient[c] += constant[c];
@@ -169,7 +166,7 @@ impl<const C: usize> SmoothingSpline<C> {
         Ok(Self {
             system: system.clone(),
             coefficients: scratch.coefficients,
-            weight,
+            weight: SplineWeight::Uniform(weight),
             uncertainty: None,
         })
     }

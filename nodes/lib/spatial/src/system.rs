@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 use crate::SpatialError;
 use crate::derivative::Derivative;
 use crate::derivative_risk::{SplitRun, refine};
-use crate::equations::{PenaltyWeights, Scratch, SplineEquations};
+use crate::equations::{Scratch, SplineEquations};
 use crate::grid::check_times;
 use crate::weight_search::{HIGHEST_LOG_WEIGHT, LOWEST_LOG_WEIGHT, WeightSearch};
 
@@ -152,11 +152,8 @@ impl SplineSystem {
         let (_, centred) = centred(values);
         let mut scratch = Scratch::default();
         let mut leaves = |log: f64| -> Result<f64, SpatialError> {
-            self.equations.solve(
-                &centred,
-                PenaltyWeights::Uniform(10f64.powf(log)),
-                &mut scratch,
-            )?;
+            self.equations
+                .solve(&centred, 10f64.powf(log), &mut scratch)?;
             let distance = self.equations.distance(&centred, &scratch.coefficients);
             Ok((distance / (C * values.len()) as f64).sqrt())
         };
@@ -200,12 +197,11 @@ impl SplineSystem {
             return Ok(likelihood);
         };
         let (square, free) = loop {
-            let weights = PenaltyWeights::Uniform(likelihood);
             let mut free = 0.0;
             let square = self.over_runs(|range, equations| {
-                equations.solve(&centred[range.clone()], weights, &mut scratch)?;
+                equations.solve(&centred[range.clone()], likelihood, &mut scratch)?;
                 free += (C * equations.free_count()) as f64;
-                Ok(equations.residual(&centred[range], weights, &mut scratch))
+                Ok(equations.residual(&centred[range], likelihood, &mut scratch))
             });
             match square {
                 Err(SpatialError::Singular { .. }) if likelihood > LIGHT => likelihood *= LIGHTER,
