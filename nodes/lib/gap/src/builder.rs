@@ -1,6 +1,6 @@
 //! Findings put into the numbers and words of diagnosis.json.
 
-use cromosim_imu::{Effect, EffectSet, Reading};
+use cromosim_imu::{Effect, EffectSet, PerChannel, Reading};
 
 use crate::diagnosis::{Cause, Gap, Metrics, PlacementDiagnosis, Unexplained};
 use crate::evidence::{Evidence, collect};
@@ -10,6 +10,7 @@ use crate::location::locate;
 use crate::probability::probability_of;
 use crate::shares::{Shares, shares};
 use crate::simulations::Simulations;
+use crate::unexplained::unexplained_variances;
 use crate::words::{described, described_errors, unknown_cause, verdict};
 
 /// Everything a diagnosis is made of.
@@ -33,8 +34,8 @@ impl<'a> DiagnosisBuilder<'a> {
         }
     }
 
-    /// Diagnosis and curves.
-    pub fn build(&self) -> (PlacementDiagnosis, Evidence) {
+    /// Diagnosis, curves, and the variance that stays unexplained.
+    pub fn build(&self) -> (PlacementDiagnosis, Evidence, PerChannel<f64>) {
         let simulations = &self.simulations;
         let reportable = &self.findings.reportable;
         let named: Vec<Effect> = reportable.iter().cloned().collect();
@@ -78,7 +79,8 @@ impl<'a> DiagnosisBuilder<'a> {
         };
         let comparison = &simulations.comparison;
         let evidence = collect(self.findings, comparison, &before_readings, &after_readings);
-        (diagnosis, evidence)
+        let unexplained = unexplained_variances(self.findings, simulations, &after);
+        (diagnosis, evidence, unexplained)
     }
 
     /// The named causes, the largest share first, each with what it and those above it leave.

@@ -91,9 +91,9 @@ pub fn diagnose(
     };
     let findings = analysis.run(track);
     trace(|| eprintln!("{}: {:?}", prepared.name, names(&findings.reportable)));
-    let (diagnosis, evidence) =
+    let (diagnosis, evidence, unexplained) =
         DiagnosisBuilder::new(&findings, &raw, &covered, options.seed).build();
-    let effects = simulated_effects(&findings);
+    let effects = simulated_effects(&findings, unexplained);
     Ok(PlacementAnswer {
         diagnosis,
         effects,
@@ -112,7 +112,7 @@ fn bring_to_si(prepared: &mut PreparedPlacement, units: PerChannel<f64>) {
 
 /// What a simulation of the device takes: the named effects and the declared noise, where none is
 /// declared the one that was found.
-fn simulated_effects(findings: &Findings) -> PlacementEffects {
+fn simulated_effects(findings: &Findings, unexplained: PerChannel<f64>) -> PlacementEffects {
     let prepared = findings.model.prepared;
     let density = |channel| findings.declared_sigma(channel) / prepared.rate_hz.sqrt();
     PlacementEffects {
@@ -122,6 +122,7 @@ fn simulated_effects(findings: &Findings) -> PlacementEffects {
             gyro_density: density(Channel::Gyroscope),
         },
         effects: findings.reportable.clone(),
+        unexplained,
     }
 }
 

@@ -39,6 +39,7 @@ mod shares;
 mod simulations;
 mod smoothing;
 mod trace;
+mod unexplained;
 mod unknown;
 mod whiten;
 mod words;

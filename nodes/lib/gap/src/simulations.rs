@@ -114,7 +114,7 @@ impl<'a> Simulations<'a> {
     }
 
     /// Variance per sample of the declared white noise and that of a set, in SI units.
-    fn white_variance(&self, set: &EffectSet, channel: Channel) -> f64 {
+    pub fn white_variance(&self, set: &EffectSet, channel: Channel) -> f64 {
         self.findings.declared_sigma(channel).powi(2)
             + set.noise_density(channel).powi(2) * self.whole.rate_hz
     }

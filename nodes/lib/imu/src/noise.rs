@@ -5,7 +5,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use rand_chacha::ChaCha12Rng;
 
 use crate::random::{normal_pair, stream};
-use crate::{DeclaredNoise, Device, ImuError, Reading};
+use crate::{DeclaredNoise, Device, ImuError, PerChannel, Reading};
 
 /// Covariances of a sensor_msgs/Imu, row-major 3x3, as REP-145 reads them: all zero is unknown, -1
 /// first is "not reported".
@@ -28,6 +28,15 @@ impl Covariances {
             orientation: diagonal(device.orientation_stddev().powi(2)),
             angular_velocity: diagonal(device.gyro_density().powi(2) * rate_hz),
             linear_acceleration: diagonal(device.accel_density().powi(2) * rate_hz),
+        }
+    }
+
+    /// Of independent axes with these variances, (m/s2)2 and (rad/s)2; the orientation's are unknown.
+    pub fn white(variances: PerChannel<f64>) -> Self {
+        Self {
+            orientation: [0.0; 9],
+            angular_velocity: diagonal(variances.gyroscope),
+            linear_acceleration: diagonal(variances.accelerometer),
         }
     }
 

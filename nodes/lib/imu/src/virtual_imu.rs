@@ -12,9 +12,9 @@ use cromosim_spatial::{KinematicTrack, Stamp};
 use nalgebra::UnitQuaternion;
 
 use crate::{
-    Covariances, Device, Dropouts, EffectKind, ImuError, ImuSample, KinematicSample,
-    MeasurementInput, NoiseSource, PlacementEffects, Reading, SampleVariance, SensorModel,
-    StreamingEffects,
+    Channel, Covariances, DeclaredNoise, Device, Dropouts, EffectKind, ImuError, ImuSample,
+    KinematicSample, MeasurementInput, NoiseSource, PerChannel, PlacementEffects, Reading,
+    SampleVariance, SensorModel, StreamingEffects,
 };
 
 /// Changes a motion before it is measured: the place of learned networks.
@@ -175,14 +175,16 @@ pub fn measure_recording(
     let mut dropouts = (noise && !motion.stamps_are_recorded)
         .then(|| Dropouts::new(losses, seed, &name))
         .flatten();
-    let device = Device::white(declared.accel_density, declared.gyro_density);
+    let units = PerChannel::from_fn(|channel| effects.effects.unit_factor(channel));
+    let variances = stated_variances(effects, &model.total_noise(&declared), rate_hz);
     let output = Output {
         mapping,
-        covariances: Covariances::for_device(&device, rate_hz),
+        covariances: Covariances::white(variances),
         frame_id,
     };
     let none = SampleVariance::default();
     let message = |((stamp, reading), variance): ((&Stamp, &Reading), &SampleVariance)| {
+        let variance = &in_units(*variance, units);
         let lost = dropouts.as_mut().is_some_and(Dropouts::next_is_lost);
         let sample = ImuSample {
             stamp: *stamp,
@@ -199,6 +201,34 @@ pub fn measure_recording(
         .zip(motion.variances.iter().chain(std::iter::repeat(&none)))
         .filter_map(message)
         .collect())
+}
+
+/// Variances per sample and axis of what is the device's own: its white noise, its rounding (step^2
+/// / 12), and what stays unexplained; in the units that it reports.
+fn stated_variances(
+    effects: &PlacementEffects,
+    noise: &DeclaredNoise,
+    rate_hz: f64,
+) -> PerChannel<f64> {
+    let set = &effects.effects;
+    PerChannel::from_fn(|channel| {
+        let density = match channel {
+            Channel::Accelerometer => noise.accel_density,
+            Channel::Gyroscope => noise.gyro_density,
+        };
+        let rounding = set.lsb(channel).powi(2) / 12.0;
+        let own = density.powi(2) * rate_hz + rounding + effects.unexplained[channel];
+        own * set.unit_factor(channel).powi(2)
+    })
+}
+
+/// What errors of the poses leave in readings in other units.
+fn in_units(variance: SampleVariance, units: PerChannel<f64>) -> SampleVariance {
+    SampleVariance {
+        acceleration: variance.acceleration * units.accelerometer.powi(2),
+        angular_velocity: variance.angular_velocity * units.gyroscope.powi(2),
+        ..variance
+    }
 }
 
 impl Output {

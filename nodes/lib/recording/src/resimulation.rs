@@ -5,7 +5,7 @@ use std::path::Path;
 use cromosim_bag::BagWriter;
 use cromosim_imu::{
     DeclaredNoise, Differentiation, EffectKind, EffectSet, EffectsFile, ImuOptions,
-    KinematicSample, PlacementEffects, ReadingMapping, RecordedMotion, SampleVariance,
+    KinematicSample, PerChannel, PlacementEffects, ReadingMapping, RecordedMotion, SampleVariance,
     SensorTrajectory, Trim, measure_recording, simulate_kinematics, track_in_sensor_axes,
 };
 use cromosim_learned::{LearnedSimulator, MappingFile, SiteMotion};
@@ -119,23 +119,24 @@ impl Resimulation {
             epoch: stamps[0],
             declared_noise: declared(placement, rate_hz),
             effects: EffectSet::new(),
+            unexplained: PerChannel::default(),
         };
         let effects = self.effects.placements.get(name).unwrap_or(&nominal);
-        let (track, samples) = self
+        let (track, known) = self
             .track(placement, rate_hz, &effects.effects)
             .map_err(|error| error.at(name.clone()))?;
         let stamps_are_recorded = !placement.measured.is_empty();
         let mut quality = Quality::default();
-        if !stamps_are_recorded && !samples.is_empty() {
+        if let (Known::Samples(samples), false) = (&known, stamps_are_recorded) {
             let (found, span) =
-                Quality::of(&samples, self.trim).ok_or(RecordingError::AllTrimmed)?;
+                Quality::of(samples, self.trim).ok_or(RecordingError::AllTrimmed)?;
             quality = found;
             stamps.retain(|stamp| span.contains(stamp));
         }
         let motion = RecordedMotion {
             track: &track,
             stamps: &stamps,
-            variances: &variances_at(&samples, &stamps),
+            variances: &known.variances(&stamps, &effects.effects),
             stamps_are_recorded,
         };
         let options = ImuOptions {
@@ -168,13 +169,13 @@ impl Resimulation {
     }
 
     /// The reference's motion as the diagnosis estimates it, or by a scheme, at least at 200 Hz and
-    /// twice the IMU's rate; of a scheme its samples too.
+    /// twice the IMU's rate; and what is known of its errors.
     fn track(
         &self,
         placement: &RecordedPlacement,
         imu_rate_hz: f64,
         effects: &EffectSet,
-    ) -> Result<(KinematicTrack, Vec<KinematicSample>), RecordingError> {
+    ) -> Result<(KinematicTrack, Known), RecordingError> {
         let undone_hz = effects
             .get(EffectKind::ReferenceSmoothing)
             .and_then(|smoothing| smoothing.values().first().copied());
@@ -186,7 +187,8 @@ impl Resimulation {
             let estimate = undone_hz
                 .map(|cutoff_hz| estimate.undoing(cutoff_hz))
                 .unwrap_or(estimate);
-            return Ok((estimate.track_for(imu_rate_hz), Vec::new()));
+            let track = estimate.track_for(imu_rate_hz);
+            return Ok((track, Known::Estimate(Box::new(estimate))));
         };
         if undone_hz.is_some() {
             return Err(RecordingError::CannotUndo {
@@ -194,7 +196,26 @@ impl Resimulation {
             });
         }
         let trajectory = placement.trajectory()?;
-        differentiated(&trajectory, scheme, rate_hz, self.learned.as_ref())
+        let networks = self.learned.as_ref();
+        let (track, samples) = differentiated(&trajectory, scheme, rate_hz, networks)?;
+        Ok((track, Known::Samples(samples)))
+    }
+}
+
+/// What is known of the errors of a motion.
+enum Known {
+    /// Samples of a scheme, with their variances.
+    Samples(Vec<KinematicSample>),
+    Estimate(Box<PoseEstimate>),
+}
+
+impl Known {
+    /// What the errors leave at the stamps.
+    fn variances(&self, stamps: &[Stamp], effects: &EffectSet) -> Vec<SampleVariance> {
+        match self {
+            Self::Samples(samples) => variances_at(samples, stamps),
+            Self::Estimate(estimate) => estimate.variances(stamps, effects.lever_arm().norm()),
+        }
     }
 }
 

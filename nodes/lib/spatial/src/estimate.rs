@@ -28,7 +28,7 @@ const FEWEST_POSES: usize = 16;
 const LEAST_TRACK_RATE_HZ: f64 = 200.0;
 /// Mean variance of a quaternion's four components, for a variance of 1 per axis of the rotation
 /// vector: `q = (1, v / 2)` for a small v, so that their sum is 3 / 4.
-const QUATERNION_PER_ROTVEC: f64 = 3.0 / 16.0;
+pub(crate) const QUATERNION_PER_ROTVEC: f64 = 3.0 / 16.0;
 
 /// White noise of poses: standard deviation per sample and axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -51,7 +51,7 @@ pub struct PoseNoise {
 /// spectrum and are reported by [`PoseEstimate::gaps`].
 #[derive(Clone, Debug)]
 pub struct PoseEstimate {
-    start: Stamp,
+    pub(crate) start: Stamp,
     rate_hz: f64,
     count: usize,
     /// Entries that the coordinates hold before the first pose and after the last.
@@ -60,8 +60,8 @@ pub struct PoseEstimate {
     coordinates: Arc<Vec<Vec<f64>>>,
     /// Spectra around each window's centre: of position, of rotation.
     local: Arc<[Vec<Spectrum>; 2]>,
-    position: NoiseFloor,
-    rotation: NoiseFloor,
+    pub(crate) position: NoiseFloor,
+    pub(crate) rotation: NoiseFloor,
     gaps: Vec<(Stamp, Stamp)>,
     /// Cutoff of a smoothing that is undone.
     undone_hz: Option<f64>,

@@ -39,6 +39,7 @@ mod end_derivatives;
 mod equations;
 mod error;
 mod estimate;
+mod estimate_error;
 mod fourth_differences;
 mod gaps;
 mod grid;
@@ -71,12 +72,12 @@ pub use fourth_differences::{
 pub use grid::{check_times, relative_seconds, uniform_stamps};
 pub use influence::{Influence, SampleWeights};
 pub use pose_spline::{
-    Bandwidth, Motion, MotionEstimate, PoseAdaptation, PoseSmoothing, PoseSpline, PoseTimes,
-    SampleVariance, position_channels, rotation_channels,
+    Bandwidth, Motion, MotionEstimate, PoseAdaptation, PoseSmoothing, PoseSource, PoseSpline,
+    PoseTimes, SampleVariance, position_channels, rotation_channels,
 };
 pub use rustfft::num_complex::Complex64;
 pub use spectrum::{FourierPair, Spectrum, welch};
-pub use spline::{Smoothing, SmoothingSpline, SplineWeight};
+pub use spline::{ExpectedNoise, LocalWeight, Smoothing, SmoothingSpline, SplineWeight};
 pub use stamp::Stamp;
 pub use system::SplineSystem;
 pub use track::KinematicTrack;

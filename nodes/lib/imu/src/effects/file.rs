@@ -10,7 +10,7 @@ use serde::{Deserialize, Deserializer};
 
 use super::spec::Shape;
 use super::{Effect, EffectSet};
-use crate::ImuError;
+use crate::{ImuError, PerChannel};
 
 const SCHEMA: &str = "cromosim/effects/1";
 
@@ -25,6 +25,7 @@ const SCHEMA: &str = "cromosim/effects/1";
 ///     effects:
 ///       - {effect: lever_arm, offset: [0.05, 0.0, -0.06]}
 ///       - {effect: time_offset, seconds: 0.021}
+///     unexplained: {accel_variance: 0.0021, gyro_variance: 1.2e-5}   # where something is
 /// ```
 /// Parameters stand in SI units, see [`super::EffectSpec::parameters`]; a matrix is a list of three
 /// rows.
@@ -43,6 +44,9 @@ pub struct PlacementEffects {
     pub declared_noise: DeclaredNoise,
     /// What acts beyond it.
     pub effects: EffectSet,
+    /// Variance, mean over the axes, that readings have beyond all that is known of: (m/s2)2 and
+    /// (rad/s)2. It goes into the covariances of messages, and is never drawn.
+    pub unexplained: PerChannel<f64>,
 }
 
 /// White noise densities, one-sided.
@@ -68,6 +72,15 @@ struct RawPlacement {
     epoch: Seconds,
     declared_noise: DeclaredNoise,
     effects: EffectSet,
+    #[serde(default)]
+    unexplained: RawUnexplained,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawUnexplained {
+    accel_variance: f64,
+    gyro_variance: f64,
 }
 
 /// A decimal number of seconds, read to the nanosecond.
@@ -93,10 +106,12 @@ impl EffectsFile {
         }
         let mut placements = BTreeMap::new();
         for (name, placement) in raw.placements {
-            let noise = placement.declared_noise;
+            let (noise, rest) = (placement.declared_noise, placement.unexplained);
             for (field, value) in [
                 ("accel_density", noise.accel_density),
                 ("gyro_density", noise.gyro_density),
+                ("accel_variance", rest.accel_variance),
+                ("gyro_variance", rest.gyro_variance),
             ] {
                 if !(value >= 0.0 && value.is_finite()) {
                     return Err(ImuError::DeviceNumber {
@@ -112,6 +127,10 @@ impl EffectsFile {
                     epoch: placement.epoch.0,
                     declared_noise: noise,
                     effects: placement.effects,
+                    unexplained: PerChannel {
+                        accelerometer: rest.accel_variance,
+                        gyroscope: rest.gyro_variance,
+                    },
                 },
             );
         }
@@ -160,6 +179,14 @@ impl EffectsFile {
             );
             for effect in &placement.effects {
                 let _ = writeln!(text, "      - {}", flow(effect));
+            }
+            if placement.unexplained != PerChannel::default() {
+                let rest = placement.unexplained;
+                let (accel, gyro) = (number(rest.accelerometer), number(rest.gyroscope));
+                let _ = writeln!(
+                    text,
+                    "    unexplained: {{accel_variance: {accel}, gyro_variance: {gyro}}}"
+                );
             }
         }
         text

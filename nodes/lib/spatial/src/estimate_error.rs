@@ -1,0 +1,65 @@
+//! How far a [`PoseEstimate`] may be off at each time.
+
+use std::f64::consts::{PI, TAU};
+
+use crate::estimate::QUATERNION_PER_ROTVEC;
+use crate::noise_floor::NoiseFloor;
+use crate::segments::{Filter, HOP_S};
+use crate::{PoseEstimate, SampleVariance, Stamp};
+
+/// Variances around one window's centre: of the value, and of its first and second derivative.
+type Variances = [f64; 3];
+
+impl PoseEstimate {
+    /// Variances, along or about each axis, that the poses' noise leaves in the kinematics of a point
+    /// `lever_arm_m` from the origin, at times in order.
+    ///
+    /// With N the noise's density and W a window's filter (see [`PoseEstimate`]) the n-th derivative
+    /// errs by `integral N W (2 pi f)^(2 n) df`; windows are cross-faded as the motion is. An error of
+    /// the angular acceleration moves the point by two thirds of its square times the arm's, mean
+    /// over directions. What the filter takes for noise though it is motion is not in it.
+    pub fn variances(&self, stamps: &[Stamp], lever_arm_m: f64) -> Vec<SampleVariance> {
+        let of_windows = |floor: &NoiseFloor| -> Vec<Variances> {
+            let windows = floor.windows.iter();
+            windows.map(|filter| through(floor, filter)).collect()
+        };
+        let (positions, rotations) = (of_windows(&self.position), of_windows(&self.rotation));
+        let at = |stamp: &Stamp| {
+            let place = ((*stamp - self.start) / HOP_S).max(0.0);
+            let [_, _, acceleration] = faded(&positions, place);
+            let [rotation, turning, spinning_up] =
+                faded(&rotations, place).map(|variance| variance / QUATERNION_PER_ROTVEC);
+            SampleVariance {
+                acceleration: acceleration + 2.0 / 3.0 * lever_arm_m.powi(2) * spinning_up,
+                angular_velocity: turning,
+                orientation: rotation,
+            }
+        };
+        stamps.iter().map(at).collect()
+    }
+}
+
+/// What a filter lets through of the noise.
+fn through(floor: &NoiseFloor, filter: &Filter) -> Variances {
+    let mut sums = Variances::default();
+    for (k, weight) in filter.weights.iter().enumerate() {
+        let frequency_hz = k as f64 * filter.spacing_hz;
+        let mut power = floor.noise_at(frequency_hz) * weight * filter.spacing_hz;
+        for sum in &mut sums {
+            *sum += power;
+            power *= (TAU * frequency_hz).powi(2);
+        }
+    }
+    sums
+}
+
+/// At a place counted in windows, by raised cosines between neighbours.
+fn faded(windows: &[Variances], place: f64) -> Variances {
+    let Some(last) = windows.len().checked_sub(1) else {
+        return Variances::default();
+    };
+    let first = (place as usize).min(last);
+    let next = (first + 1).min(last);
+    let share = 0.5 - 0.5 * (PI * (place - first as f64).min(1.0)).cos();
+    std::array::from_fn(|n| windows[first][n] * (1.0 - share) + windows[next][n] * share)
+}
