@@ -211,7 +211,11 @@ impl Setup {
         let trajectories: Vec<SensorTrajectory> = sites
             .trajectories(stamps, &motion.frames)?
             .into_iter()
-            .map(|trajectory| trajectory.with_pose_stds(&stds))
+            .map(|trajectory| {
+                trajectory
+                    .with_pose_stds(&stds)
+                    .from_source(motion.source())
+            })
             .collect();
         let times = PoseTimes::new(stamps)?;
         bar.inc(1);

@@ -105,7 +105,7 @@ pub fn simulate_kinematics_on(
         }
         Differentiation::Scheme(scheme) => match scheme.stencil() {
             Some(stencil) => return Ok(by_differences(trajectory, stencil, output)),
-            None => scheme.smoothing(),
+            None => scheme.smoothing(trajectory.source()),
         },
     };
     by_spline(times, trajectory, smoothing, output)

@@ -1,6 +1,6 @@
 //! The adaptive spline, live: a window with a fixed lag over which what was learnt moves on.
 
-use cromosim_spatial::{PoseAdaptation, PoseSpline, PoseTimes, Stamp};
+use cromosim_spatial::{PoseAdaptation, PoseSource, PoseSpline, PoseTimes, Stamp};
 
 use crate::schemes::spline::{SplineVariance, sample};
 use crate::stream_spline::last_frames;
@@ -37,7 +37,10 @@ impl AdaptiveLag {
             Some(times) => times,
             None => PoseTimes::new(&stamps)?,
         };
-        let spline = PoseSpline::fit_following(&times, &poses, &mut self.learnt, dropped)?;
+        // Messages do not say where poses come from.
+        let source = PoseSource::Tracked;
+        let learnt = (&mut self.learnt, dropped);
+        let spline = PoseSpline::fit_following(&times, &poses, source, learnt)?;
         self.stamps = stamps;
         self.times = Some(times.clone());
         let errors = SplineVariance::new(&times, &spline, frames)?;

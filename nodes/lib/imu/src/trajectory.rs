@@ -1,6 +1,6 @@
 //! A sensor's frames over time: what the schemes differentiate.
 
-use cromosim_spatial::{SpatialError, Stamp, check_times, relative_seconds};
+use cromosim_spatial::{PoseSource, SpatialError, Stamp, check_times, relative_seconds};
 use nalgebra::{Isometry3, Vector3};
 
 use crate::{ImuError, PoseStd};
@@ -52,6 +52,7 @@ impl SensorFrame {
 #[derive(Clone, Debug, PartialEq)]
 pub struct SensorTrajectory {
     frames: Vec<SensorFrame>,
+    source: PoseSource,
 }
 
 impl SensorTrajectory {
@@ -76,7 +77,10 @@ impl SensorTrajectory {
             }
             .into());
         }
-        Ok(Self { frames })
+        Ok(Self {
+            frames,
+            source: PoseSource::default(),
+        })
     }
 
     /// The same frames, off by so much; frames beyond `pose_stds` are taken as they are.
@@ -87,6 +91,18 @@ impl SensorTrajectory {
             .zip(pose_stds)
             .for_each(|(frame, pose_std)| frame.pose_std = *pose_std);
         self
+    }
+
+    /// The same frames, whose poses come from there.
+    #[must_use]
+    pub fn from_source(mut self, source: PoseSource) -> Self {
+        self.source = source;
+        self
+    }
+
+    /// Where the poses come from.
+    pub fn source(&self) -> PoseSource {
+        self.source
     }
 
     /// The frames, in order of time.

@@ -7,9 +7,9 @@ use cromosim_spatial::Stamp;
 use crate::{Bandwidth, KinematicSample};
 
 /// Variance, over the median of the clip and that of the stretch behind the end, from which samples
-/// at an end are left out. Chosen among 5 and 10 on six recorded walks and dances, by how often the
-/// largest specific force stands at an end.
-const UNCERTAIN: f64 = 10.0;
+/// at an end are left out. Chosen among 3, 5 and 10 on the clips of `mocap_cmu`, by how often the
+/// largest specific force stands at an end; `tests/every_clip.rs` has others.
+const UNCERTAIN: f64 = 3.0;
 /// The most that [`Trim::Uncertain`] takes off an end, s. No source.
 pub const LONGEST_TRIM_S: f64 = 0.25;
 /// And as a part of the motion.

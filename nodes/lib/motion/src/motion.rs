@@ -3,6 +3,7 @@
 use std::ops::RangeInclusive;
 
 use cromosim_body::{BodyPose, Gender, JOINT_COUNT, ShapeSpace};
+use cromosim_spatial::PoseSource;
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::{MarkerReport, MotionError, PoseReport, RetargetReport};
@@ -37,6 +38,14 @@ impl SmplMotion {
     /// Time from the first to the last frame, s: `(frames - 1) / rate`.
     pub fn duration_s(&self) -> f64 {
         self.frames.len().saturating_sub(1) as f64 / self.rate_hz
+    }
+
+    /// What the poses' noise is like: SMPL parameters that are not a video's were fitted to markers.
+    pub fn source(&self) -> PoseSource {
+        match &self.poses {
+            Some(report) if !report.format.is_video() => PoseSource::Fitted,
+            _ => PoseSource::Tracked,
+        }
     }
 
     /// How the source was read, in a line, where it has a report.

@@ -1,10 +1,10 @@
 //! Smoothing that follows the motion: how much is learnt around each time.
 
-use crate::SpatialError;
-use crate::equations::SplineEquations;
+use crate::equations::{IntervalWeights, SplineEquations};
 use crate::fourth_differences::{MEDIAN_OF_SQUARE, fourth_difference, white_noise_variance};
 use crate::local_spline::{LocalSolution, Series, Statements};
 use crate::weight_search::LOWEST_LOG_WEIGHT;
+use crate::{ExpectedNoise, SpatialError};
 
 /// Time over which neighbours share one drive, standard deviation, s: shorter, a burst's own noise
 /// decides; longer, a burst's start is smoothed away. Chosen among 0.05, 0.1, 0.15 and 0.25 s on
@@ -14,6 +14,16 @@ const SHARED_DRIVE_S: f64 = 0.1;
 /// change its middle (`tests/cuts.rs`). Chosen among 0.12 to 0.5 s on joints of recorded walks and
 /// dances, the clips of that test among them.
 const SHARED_NOISE_S: f64 = 0.15;
+/// The same of the vigour, s. Longer, cuts differ more from the whole (0.5 s: a specific force of 95 %
+/// 0.025 rather than 0.012 in `tests/every_clip.rs`).
+const SHARED_VIGOUR_S: f64 = 0.2;
+/// Band that holds a body's accelerations, Hz: their mean square, spread over it, is their density at
+/// low frequencies. Chosen among 1.5, 3, 5 and 8 Hz on the studies of `evaluate fidelity`: larger, the
+/// ends are held too still.
+const VIGOUR_BAND_HZ: f64 = 3.0;
+/// Cutoff of the vigour that is expected beyond that, Hz: bodies at rest start to move. Chosen among
+/// 1 to 6 Hz on the same studies: smaller, rests are stated to be far more certain than they are.
+const LEAST_VIGOUR_CUTOFF_HZ: f64 = 4.0;
 /// The same in intervals at least: fewer say too little. No source.
 const LEAST_SHARED_INTERVALS: f64 = 5.0;
 /// Cutoff of the motion that is expected where the samples say nothing, Hz, and what this counts
@@ -29,11 +39,6 @@ const FIRST_CUTOFF_HZ: f64 = 12.0;
 /// Rate at which a noise is stated, Hz: white noise of the same density has a variance that grows
 /// with the rate.
 const STATED_AT_HZ: f64 = 100.0;
-/// What the expected noise counts beside the samples, in samples. It decides where they are
-/// interpolated, because then nothing of them is left to tell the noise from, as of errors that were
-/// low-passed before. Chosen among 0.003 to 0.1 on seeds 300 to 347 of `tests/bursts`, which scores
-/// others too, and on ten trials of a tracked IMU (BROAD).
-const EXPECTED_NOISE_COUNT: f64 = 0.01;
 /// Steps towards the greatest likelihood. More hardly change the error, and carry what a clip's ends
 /// say farther inwards. Chosen among 3 to 40 as [`FIRST_CUTOFF_HZ`].
 const STEPS: usize = 4;
@@ -61,7 +66,11 @@ const LARGEST_WEIGHT: f64 = 1e10;
 /// s(t) = sum_k K(t - t_k) |f5_k|^2      / sum_k K(t - t_k) (1 - V(f5_k) / s_k)        f5_k the fifth derivative over interval k
 /// r(t) = sum_k K(t - t_k) |y_k - f_k|^2 / sum_k K(t - t_k) (1 - V(f_k) / r_k)
 /// ```
-/// and to each sum what is expected is added with its count, see the constants above.
+/// Beside it the second derivative of f is held to be no larger than around: white noise of density
+/// `v(t) = sum_k K(t - t_k) |f2_k|^2 / sum_k K(t - t_k) / (2 b)`, b the band of a body's accelerations.
+/// This keeps a clip's ends, which have samples on one side only, from taking noise for motion.
+///
+/// To each sum what is expected is added with its count, see the constants above.
 /// K is a symmetric kernel, so that what is learnt at t depends on the samples near t alone: the
 /// same seconds of a longer series give the same estimate.
 ///
@@ -70,11 +79,16 @@ const LARGEST_WEIGHT: f64 = 1e10;
 pub(crate) struct Adaptation<const L: usize> {
     /// Density of the fifth derivative over each knot interval, unit^2 per interval^9.
     drive: Vec<[f64; L]>,
+    /// Density of the second derivative at low frequencies over each knot interval, unit^2 per
+    /// interval^3.
+    vigour: Vec<[f64; L]>,
+    /// What is expected beyond it, in units of the noise's variance.
+    least_vigour: f64,
     /// Variance of each sample's noise, unit^2.
     noise: Vec<[f64; L]>,
     least_noise: [f64; L],
-    /// Variance that is expected of the noise, unit^2.
-    expected_noise: [f64; L],
+    /// Variance that is expected of the noise, unit^2, and what it counts, in samples.
+    expected_noise: [[f64; 2]; L],
 }
 
 impl<const L: usize> Adaptation<L> {
@@ -82,7 +96,7 @@ impl<const L: usize> Adaptation<L> {
     fn start<const C: usize>(
         equations: &SplineEquations,
         series: &Series<C, L>,
-        expected_noise: [f64; L],
+        expected: [ExpectedNoise; L],
     ) -> Self {
         let least_noise: [f64; L] = std::array::from_fn(|lane| {
             (LEAST_NOISE * range(series, lane))
@@ -95,22 +109,27 @@ impl<const L: usize> Adaptation<L> {
         let drive = noise.map(|noise| noise / equations.weight_of_cutoff(FIRST_CUTOFF_HZ));
         Self {
             drive: vec![drive; equations.interval_count()],
+            vigour: vec![[f64::INFINITY; L]; equations.interval_count()],
+            least_vigour: equations
+                .second_weight_of_cutoff(LEAST_VIGOUR_CUTOFF_HZ)
+                .recip(),
             noise: vec![noise; series.values.len()],
             least_noise,
-            expected_noise: expected_noise
-                .map(|noise| noise.powi(2) / (STATED_AT_HZ * equations.interval)),
+            expected_noise: expected.map(|expected| {
+                let variance = expected.std.powi(2) / (STATED_AT_HZ * equations.interval);
+                [variance, if variance > 0.0 { expected.count } else { 0.0 }]
+            }),
         }
     }
 
-    /// Learns from whole series; `expected_noise` as in [`crate::Smoothing::Adaptive`], of each
-    /// lane. What `solution` holds afterwards is of no use.
+    /// Learns from whole series; `expected` is that of each lane. What `solution` holds afterwards is of no use.
     pub(crate) fn learn<const C: usize>(
         equations: &SplineEquations,
         series: &Series<C, L>,
-        expected_noise: [f64; L],
+        expected: [ExpectedNoise; L],
         solution: &mut LocalSolution<C, L>,
     ) -> Result<Self, SpatialError> {
-        let mut adaptation = Self::start(equations, series, expected_noise);
+        let mut adaptation = Self::start(equations, series, expected);
         let mut statements = Statements::default();
         for _ in 0..STEPS {
             let weights = adaptation.weights();
@@ -131,7 +150,9 @@ impl<const L: usize> Adaptation<L> {
         }
         self.noise.drain(..dropped);
         self.drive.drain(..dropped);
+        self.vigour.drain(..dropped);
         let (noise, drive) = (self.noise[kept - 1], self.drive[kept - 2]);
+        self.vigour.resize(count - 1, self.vigour[kept - 2]);
         self.noise.resize(count, noise);
         self.drive.resize(count - 1, drive);
         true
@@ -142,7 +163,7 @@ impl<const L: usize> Adaptation<L> {
     pub(crate) fn learn_from(
         &mut self,
         equations: &SplineEquations,
-        weights: &[[f64; L]],
+        weights: &[IntervalWeights<L>],
         statements: &mut Statements<L>,
     ) {
         self.take_evidence(equations, weights, statements);
@@ -156,12 +177,20 @@ impl<const L: usize> Adaptation<L> {
 
     /// The penalty's weight over each knot interval: the noise changes so little over a spline's
     /// width that its quotient with the drive may stand for both.
-    pub(crate) fn weights(&self) -> Vec<[f64; L]> {
+    pub(crate) fn weights(&self) -> Vec<IntervalWeights<L>> {
         let lowest = 10f64.powf(LOWEST_LOG_WEIGHT);
-        let weight = |k: usize, lane: usize| self.noise_over(k, lane) / self.drive[k][lane];
-        (0..self.drive.len())
-            .map(|k| std::array::from_fn(|lane| weight(k, lane).clamp(lowest, LARGEST_WEIGHT)))
-            .collect()
+        let of_interval = |k: usize| {
+            let noise: [f64; L] = std::array::from_fn(|lane| self.noise_over(k, lane));
+            [
+                std::array::from_fn(|lane| {
+                    (noise[lane] / self.drive[k][lane]).clamp(lowest, LARGEST_WEIGHT)
+                }),
+                std::array::from_fn(|lane| {
+                    noise[lane] / (self.vigour[k][lane] + noise[lane] * self.least_vigour)
+                }),
+            ]
+        };
+        (0..self.drive.len()).map(of_interval).collect()
     }
 
     /// Variance of the noise over a knot interval.
@@ -173,7 +202,11 @@ impl<const L: usize> Adaptation<L> {
     fn update(
         &mut self,
         equations: &SplineEquations,
-        Statements { drives, residuals }: &mut Statements<L>,
+        Statements {
+            drives,
+            accelerations,
+            residuals,
+        }: &mut Statements<L>,
         stride: Stride,
     ) {
         let found = local_means(drives, SHARED_DRIVE_S / equations.interval);
@@ -183,9 +216,19 @@ impl<const L: usize> Adaptation<L> {
                 Stride::Half => std::array::from_fn(|lane| (drive[lane] * found[lane]).sqrt()),
             };
         }
+        self.learn_vigour(equations, accelerations);
         let found = local_means(residuals, SHARED_NOISE_S / equations.interval);
         for (noise, found) in self.noise.iter_mut().zip(found) {
             *noise = std::array::from_fn(|lane| found[lane].max(self.least_noise[lane]));
+        }
+    }
+
+    fn learn_vigour(&mut self, equations: &SplineEquations, accelerations: &mut [Evidence<L>]) {
+        // White up to half the samples' rate, the same square would be less dense.
+        let denser = 0.5 / (equations.interval * VIGOUR_BAND_HZ);
+        let found = local_means(accelerations, SHARED_VIGOUR_S / equations.interval);
+        for (vigour, found) in self.vigour.iter_mut().zip(found) {
+            *vigour = found.map(|square| denser * square);
         }
     }
 
@@ -194,28 +237,24 @@ impl<const L: usize> Adaptation<L> {
     fn take_evidence(
         &self,
         equations: &SplineEquations,
-        weights: &[[f64; L]],
-        Statements { drives, residuals }: &mut Statements<L>,
+        weights: &[IntervalWeights<L>],
+        Statements {
+            drives, residuals, ..
+        }: &mut Statements<L>,
     ) {
         let free = |share: f64| (1.0 - share).max(LEAST_FREE);
         let expected = EXPECTED_COUNT / equations.weight_of_cutoff(EXPECTED_CUTOFF_HZ);
         for (k, [square, variance]) in drives.iter_mut().enumerate() {
             for lane in 0..L {
                 square[lane] += expected * self.noise_over(k, lane);
-                variance[lane] = free(weights[k][lane] * variance[lane]) + EXPECTED_COUNT;
+                variance[lane] = free(weights[k][0][lane] * variance[lane]) + EXPECTED_COUNT;
             }
         }
-        let noise_count = self.expected_noise.map(|expected_noise| {
-            if expected_noise > 0.0 {
-                EXPECTED_NOISE_COUNT
-            } else {
-                0.0
-            }
-        });
         for [square, variance] in residuals {
             for lane in 0..L {
-                square[lane] += EXPECTED_NOISE_COUNT * self.expected_noise[lane];
-                variance[lane] = free(variance[lane]) + noise_count[lane];
+                let [expected, count] = self.expected_noise[lane];
+                square[lane] += count * expected;
+                variance[lane] = free(variance[lane]) + count;
             }
         }
     }

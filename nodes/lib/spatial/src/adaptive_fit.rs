@@ -2,20 +2,20 @@
 
 use std::sync::Arc;
 
-use crate::SpatialError;
 use crate::adaptive::Adaptation;
 use crate::banded::InverseBands;
 use crate::basis::ORDER;
-use crate::equations::SplineEquations;
+use crate::equations::{IntervalWeights, SplineEquations};
 use crate::local_spline::{LocalSolution, Series, Statements};
 use crate::system::centre;
+use crate::{ExpectedNoise, SpatialError};
 
 /// Splines of [`Adaptation`]'s weights, a lane each, see [`Series`].
 #[derive(Clone, Debug)]
 pub(crate) struct AdaptiveFit<const C: usize, const L: usize> {
     /// What was taken off the values.
     pub(crate) constant: [f64; C],
-    pub(crate) weights: Vec<[f64; L]>,
+    pub(crate) weights: Vec<IntervalWeights<L>>,
     pub(crate) coefficients: Vec<[f64; C]>,
     pub(crate) uncertainty: Arc<Uncertainty>,
 }
@@ -39,18 +39,18 @@ impl Uncertainty {
 }
 
 impl<const C: usize, const L: usize> AdaptiveFit<C, L> {
-    /// Learns from whole series; `channels` and `expected_noise` are those of each lane.
+    /// Learns from whole series; `channels` and `expected` are those of each lane.
     pub(crate) fn learn(
         equations: &SplineEquations,
         mut values: Vec<[f64; C]>,
         channels: [usize; L],
-        expected_noise: [f64; L],
+        expected: [ExpectedNoise; L],
     ) -> Result<Self, SpatialError> {
         equations.check(&values)?;
         let constant = centre(&mut values);
         let series = Series::new(equations, values, channels);
         let mut solution = LocalSolution::default();
-        let learnt = Adaptation::learn(equations, &series, expected_noise, &mut solution)?;
+        let learnt = Adaptation::learn(equations, &series, expected, &mut solution)?;
         let weights = learnt.weights();
         solution.solve(equations, &series, &weights)?;
         solution.invert();
@@ -64,7 +64,7 @@ impl<const C: usize, const L: usize> AdaptiveFit<C, L> {
         equations: &SplineEquations,
         mut values: Vec<[f64; C]>,
         channels: [usize; L],
-        expected_noise: [f64; L],
+        expected: [ExpectedNoise; L],
         (adaptation, dropped): (&mut Option<Adaptation<L>>, usize),
     ) -> Result<Self, SpatialError> {
         equations.check(&values)?;
@@ -77,7 +77,7 @@ impl<const C: usize, const L: usize> AdaptiveFit<C, L> {
         });
         let mut learnt = match moved {
             Some(learnt) => learnt,
-            None => Adaptation::learn(equations, &series, expected_noise, &mut solution)?,
+            None => Adaptation::learn(equations, &series, expected, &mut solution)?,
         };
         let (weights, noise) = (learnt.weights(), learnt.clone().into_noise());
         solution.solve(equations, &series, &weights)?;
@@ -90,7 +90,7 @@ impl<const C: usize, const L: usize> AdaptiveFit<C, L> {
 
     fn of(
         constant: [f64; C],
-        weights: Vec<[f64; L]>,
+        weights: Vec<IntervalWeights<L>>,
         noise: Vec<[f64; L]>,
         (coefficients, inverse): (Vec<[f64; C]>, InverseBands),
     ) -> Self {

@@ -1,10 +1,10 @@
 //! The equations of a smoothing spline: everything that depends on the times alone.
 
-use crate::SpatialError;
 use crate::banded::{Banded, Factor, Row};
 use crate::basis::{AT_KNOT, Basis, BasisValues, DEGREE, ORDER};
 use crate::difference::MAX_STENCIL;
 use crate::end_derivatives::{EndDerivative, end_derivatives};
+use crate::{LocalWeight, SpatialError};
 
 /// Derivative that smoothing penalises. Five is the highest that a quintic has; the response to
 /// noise, `1 / (1 + weight w^10)`, then falls the most sharply, and motion below the cutoff passes
@@ -39,6 +39,8 @@ pub(crate) struct SplineEquations {
     /// Fifth derivative over each knot interval, times the root of the interval's length and of its
     /// ease: `|rows c|^2 = c^T P c` for a uniform weight of one.
     pub(crate) penalty_rows: Vec<[f64; ORDER]>,
+    /// Second derivative in the middle of each knot interval, times the root of its length.
+    pub(crate) second_rows: Vec<[f64; ORDER]>,
     /// What a uniform weight is multiplied with over each interval, see [`EASED_INTERVALS`]; local
     /// weights are divided by it.
     pub(crate) eased: Vec<f64>,
@@ -54,16 +56,21 @@ pub(crate) enum PenaltyWeights<'a> {
     /// The same everywhere, eased off at the ends.
     Uniform(f64),
     /// One for each knot interval.
-    Local(&'a [f64]),
+    Local(&'a [LocalWeight]),
 }
 
-/// One weight for each knot interval, for as many series at once as there are lanes.
+/// What the squares of the fifth and the second derivative over one knot interval weigh, of each lane.
+pub(crate) type IntervalWeights<const L: usize> = [[f64; L]; 2];
+
+/// The weights of all knot intervals, for as many series at once as there are lanes.
 #[derive(Clone, Debug)]
 pub(crate) struct LocalWeights<const L: usize> {
     /// Of each lane.
     pub(crate) largest: [f64; L],
     /// What each penalty row counts.
     pub(crate) penalty: Vec<[f64; L]>,
+    /// What each second derivative counts.
+    pub(crate) second: Vec<[f64; L]>,
     /// What each derivative at the ends counts.
     pub(crate) ends: [[f64; L]; 4],
 }
@@ -92,6 +99,7 @@ impl SplineEquations {
         }
         let eased = eased(basis.interval_count());
         let penalty_rows = penalty_rows(&basis, &eased);
+        let second_rows = second_rows(&basis);
         let mut penalty = Banded::zeros(basis.count());
         for (first, row) in penalty_rows.iter().enumerate() {
             penalty.add_outer_product(first, row, 1.0);
@@ -103,6 +111,7 @@ impl SplineEquations {
             sample_count: times.len(),
             collocation,
             ends,
+            second_rows,
             penalty_rows,
             eased,
             gram,
@@ -140,25 +149,29 @@ impl SplineEquations {
     fn end_weight(&self, end: &EndDerivative, weights: PenaltyWeights) -> f64 {
         match weights {
             PenaltyWeights::Uniform(_) => end.weight,
-            PenaltyWeights::Local(weights) => local_end_weight(end, weights[end.first]),
+            PenaltyWeights::Local(weights) => local_end_weight(end, weights[end.first].fifth),
         }
     }
 
     /// What these weights of the knot intervals make of each row.
-    pub(crate) fn local_weights<const L: usize>(&self, weights: &[[f64; L]]) -> LocalWeights<L> {
+    pub(crate) fn local_weights<const L: usize>(
+        &self,
+        weights: &[IntervalWeights<L>],
+    ) -> LocalWeights<L> {
         let mut largest = [0.0_f64; L];
-        for weight in weights {
+        for [weight, _] in weights {
             (0..L).for_each(|lane| largest[lane] = largest[lane].max(weight[lane]));
         }
         let penalty = weights.iter().zip(&self.eased);
         LocalWeights {
             largest,
             penalty: penalty
-                .map(|(weight, ease)| weight.map(|weight| weight / ease))
+                .map(|([weight, _], ease)| weight.map(|weight| weight / ease))
                 .collect(),
+            second: weights.iter().map(|[_, second]| *second).collect(),
             ends: self
                 .ends
-                .map(|end| weights[end.first].map(|weight| local_end_weight(&end, weight))),
+                .map(|end| weights[end.first][0].map(|weight| local_end_weight(&end, weight))),
         }
     }
 
@@ -177,22 +190,18 @@ impl SplineEquations {
             }
         }
         let first = i.saturating_sub(DEGREE);
-        let rows = &self.penalty_rows[first..self.interval_count().min(i + 1)];
-        let weights = &weights.penalty[first..self.interval_count().min(i + 1)];
-        match (rows.first_chunk::<ORDER>(), weights.first_chunk::<ORDER>()) {
-            (Some(rows), Some(weights)) => {
-                add_products(&mut entries, 5, &rows[0], &weights[0]);
-                add_products(&mut entries, 4, &rows[1], &weights[1]);
-                add_products(&mut entries, 3, &rows[2], &weights[2]);
-                add_products(&mut entries, 2, &rows[3], &weights[3]);
-                add_products(&mut entries, 1, &rows[4], &weights[4]);
-                add_products(&mut entries, 0, &rows[5], &weights[5]);
-            }
-            _ => {
-                for (k, (row, weight)) in rows.iter().zip(weights).enumerate() {
-                    add_products(&mut entries, i - first - k, row, weight);
-                }
-            }
+        let intervals = first..self.interval_count().min(i + 1);
+        for (rows, weights) in [
+            (&self.penalty_rows, &weights.penalty),
+            (&self.second_rows, &weights.second),
+        ] {
+            let place = i - first;
+            add_all_products(
+                &mut entries,
+                place,
+                &rows[intervals.clone()],
+                &weights[intervals.clone()],
+            );
         }
         entries
     }
@@ -236,7 +245,10 @@ impl SplineEquations {
                 factor.factor_sum(&self.gram_with_ends, weight, &self.penalty)?;
             }
             PenaltyWeights::Local(weights) => {
-                let weights: Vec<[f64; 1]> = weights.iter().map(|weight| [*weight]).collect();
+                let weights: Vec<IntervalWeights<1>> = weights
+                    .iter()
+                    .map(|weight| [[weight.fifth], [weight.second]])
+                    .collect();
                 let weights = self.local_weights(&weights);
                 let row = |i: usize| self.local_row(i, &weights);
                 factor.factor_rows(self.basis.count(), row)?;
@@ -384,6 +396,12 @@ impl SplineEquations {
         (std::f64::consts::TAU * cutoff_hz * self.interval).powi(-2 * PENALTY_ORDER as i32)
     }
 
+    /// Weight of the second derivative whose response `1 / (1 + weight w^4)` is one half at
+    /// `cutoff_hz`.
+    pub(crate) fn second_weight_of_cutoff(&self, cutoff_hz: f64) -> f64 {
+        (std::f64::consts::TAU * cutoff_hz * self.interval).powi(-4)
+    }
+
     /// Frequency at which a weight's response is one half, Hz.
     pub(crate) fn cutoff_of_weight(&self, weight: f64) -> f64 {
         weight.powf(-0.5 / PENALTY_ORDER as f64) / (std::f64::consts::TAU * self.interval)
@@ -422,6 +440,32 @@ pub(crate) fn refinements(largest_weight: f64) -> usize {
 /// they count no more than there.
 fn local_end_weight(end: &EndDerivative, weight: f64) -> f64 {
     end.weight / (1.0 + weight / NOTHING_TO_SMOOTH)
+}
+
+/// Adds the products of all rows that reach a row of a band matrix, which is entry `place` of the first
+/// of them, one less of the next, and so on.
+#[inline(always)]
+fn add_all_products<const L: usize>(
+    entries: &mut Row<L>,
+    place: usize,
+    rows: &[[f64; ORDER]],
+    weights: &[[f64; L]],
+) {
+    match (rows.first_chunk::<ORDER>(), weights.first_chunk::<ORDER>()) {
+        (Some(rows), Some(weights)) => {
+            add_products(entries, 5, &rows[0], &weights[0]);
+            add_products(entries, 4, &rows[1], &weights[1]);
+            add_products(entries, 3, &rows[2], &weights[2]);
+            add_products(entries, 2, &rows[3], &weights[3]);
+            add_products(entries, 1, &rows[4], &weights[4]);
+            add_products(entries, 0, &rows[5], &weights[5]);
+        }
+        _ => {
+            for (k, (row, weight)) in rows.iter().zip(weights).enumerate() {
+                add_products(entries, place - k, row, weight);
+            }
+        }
+    }
 }
 
 /// Adds `weight * row row^T` to a row of a band matrix, of which it is entry m.
@@ -472,6 +516,15 @@ fn penalty_rows(basis: &Basis, eased: &[f64]) -> Vec<[f64; ORDER]> {
         basis
             .derivatives(first, 0.5 * (start + end), PENALTY_ORDER)
             .map(|d| d * ((end - start) * eased[first]).sqrt())
+    };
+    (0..basis.interval_count()).map(row).collect()
+}
+
+fn second_rows(basis: &Basis) -> Vec<[f64; ORDER]> {
+    let row = |first: usize| {
+        let (start, end) = basis.interval(first);
+        let second = basis.derivatives(first, 0.5 * (start + end), 2);
+        second.map(|d| d * (end - start).sqrt())
     };
     (0..basis.interval_count()).map(row).collect()
 }

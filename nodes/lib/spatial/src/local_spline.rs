@@ -3,7 +3,7 @@
 
 use crate::SpatialError;
 use crate::banded::{Factor, InverseBands, InverseBlock, Solved, quadratic_form};
-use crate::equations::{LocalWeights, SplineEquations, add_residual, refinements};
+use crate::equations::{IntervalWeights, LocalWeights, SplineEquations, add_residual, refinements};
 
 /// Series on the same times, a lane each: channel c belongs to lane c modulo L, and where a lane has
 /// fewer channels than others, those that it lacks are zero.
@@ -50,6 +50,9 @@ pub(crate) type Stated<const L: usize> = [[f64; L]; 2];
 pub(crate) struct Statements<const L: usize> {
     /// Of each knot interval: the fifth derivative over it, times the root of its length.
     pub(crate) drives: Vec<Stated<L>>,
+    /// Of each knot interval: the mean square over the channels of the second derivative in its
+    /// middle, times its length; and one.
+    pub(crate) accelerations: Vec<Stated<L>>,
     /// Of each sample: its distance from the spline.
     pub(crate) residuals: Vec<Stated<L>>,
 }
@@ -68,7 +71,7 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
         &mut self,
         equations: &SplineEquations,
         series: &Series<C, L>,
-        weights: &[[f64; L]],
+        weights: &[IntervalWeights<L>],
         statements: &mut Statements<L>,
     ) -> Result<(), SpatialError> {
         let weights = equations.local_weights(weights);
@@ -93,7 +96,7 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
         &mut self,
         equations: &SplineEquations,
         series: &Series<C, L>,
-        weights: &[[f64; L]],
+        weights: &[IntervalWeights<L>],
     ) -> Result<(), SpatialError> {
         let weights = equations.local_weights(weights);
         self.coefficients.clone_from(&series.projected);
@@ -152,13 +155,20 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
         solved: Solved,
         statements: &mut Statements<L>,
     ) {
-        let Statements { drives, residuals } = statements;
+        let Statements {
+            drives,
+            accelerations,
+            residuals,
+        } = statements;
+        accelerations.resize(equations.interval_count(), [[1.0; L]; 2]);
         drives.resize(equations.interval_count(), [[0.0; L]; 2]);
         residuals.resize(equations.sample_count, [[0.0; L]; 2]);
         self.factor
             .invert(&mut self.coefficients, solved, |i, coefficients, block| {
                 if i < drives.len() {
                     drives[i] = drive_over(i, equations, series, coefficients, block);
+                    let second = combined(&coefficients[i..], &equations.second_rows[i]);
+                    accelerations[i] = [mean_squares(&second, &series.channels), [1.0; L]];
                 }
                 if i < residuals.len() {
                     residuals[i] = residual_at(i, equations, series, coefficients, block);
@@ -200,6 +210,10 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
             add_residual(&x[end.first..], &end.row, target, weight, near);
         }
         let rows = equations.penalty_rows.iter().zip(&weights.penalty);
+        for (k, (row, weight)) in rows.enumerate() {
+            add_residual(&x[k..], row, &[0.0; C], weight, &mut correction[k..]);
+        }
+        let rows = equations.second_rows.iter().zip(&weights.second);
         for (k, (row, weight)) in rows.enumerate() {
             add_residual(&x[k..], row, &[0.0; C], weight, &mut correction[k..]);
         }

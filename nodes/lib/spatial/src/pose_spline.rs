@@ -8,7 +8,9 @@ use crate::adaptive::{Adaptation, FEWEST_ADAPTIVE};
 use crate::adaptive_fit::AdaptiveFit;
 use crate::basis::BasisValues;
 use crate::grid::relative_seconds;
-use crate::{Derivative, Smoothing, SmoothingSpline, SpatialError, SplineSystem, Stamp, so3};
+use crate::{
+    Derivative, ExpectedNoise, Smoothing, SmoothingSpline, SpatialError, SplineSystem, Stamp, so3,
+};
 
 /// How a frame moves at one time, against the world and in the world's axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,15 +47,43 @@ impl PoseSmoothing {
         }
     }
 
-    /// Each as much as the poses around each time ask for.
-    pub const ADAPTIVE: Self = Self {
-        position: Smoothing::Adaptive {
-            expected_noise: EXPECTED_NOISE[0],
-        },
-        rotation: Smoothing::Adaptive {
-            expected_noise: EXPECTED_NOISE[1],
-        },
-    };
+    /// Each as much as the poses around each time ask for, and where they do not say, as their
+    /// source lets expect.
+    pub fn adaptive(source: PoseSource) -> Self {
+        let [position, rotation] = source
+            .expected()
+            .map(|expected| Smoothing::Adaptive { expected });
+        Self { position, rotation }
+    }
+}
+
+/// Where poses come from, which says what their noise is like.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PoseSource {
+    /// Tracked, as they are: their noise is white and shows in them.
+    #[default]
+    Tracked,
+    /// Fitted to markers and smoothed before they were handed out, as AMASS: what is left of their
+    /// noise looks like motion.
+    Fitted,
+}
+
+impl PoseSource {
+    /// The noise of position, m, and of a quaternion's component.
+    ///
+    /// Tracked: of the size that optical capture has, 0.3 mm and 0.1 degrees; the count was chosen
+    /// among 0.003 to 0.1 on seeds 300 to 347 of `tests/bursts`, which scores others too, and on ten
+    /// trials of a tracked IMU (BROAD). Fitted: a millimetre and a third of a degree within 6 Hz are
+    /// as dense as 3 mm and 1 degree up to 50 Hz; the count was chosen among 0.01 to 1 on the study
+    /// `physics, marker fit, 60 Hz` of `evaluate fidelity`, which has others.
+    fn expected(self) -> [ExpectedNoise; 2] {
+        let (position, degrees, count) = match self {
+            Self::Tracked => (3e-4, 0.1_f64, 0.01),
+            Self::Fitted => (3e-3, 1.0, 0.1),
+        };
+        [position, degrees.to_radians() * QUATERNION_PER_ROTVEC]
+            .map(|std| ExpectedNoise { std, count })
+    }
 }
 
 impl Default for PoseSmoothing {
@@ -118,10 +148,6 @@ const ROTVEC_PER_QUATERNION: f64 = 16.0 / 3.0;
 /// Standard deviation of a quaternion's component over that of a rotation vector: the root of 3 /
 /// 16.
 const QUATERNION_PER_ROTVEC: f64 = 0.433_012_701_892_219_3;
-/// Noise that is expected of poses at 100 Hz where they do not show it, standard deviation per axis,
-/// m and rad: of the size that optical capture has, 0.3 mm and 0.1 degrees.
-const EXPECTED_POSITION_NOISE_M: f64 = 3e-4;
-const EXPECTED_ROTATION_NOISE_RAD: f64 = 0.1 * std::f64::consts::PI / 180.0;
 
 /// What [`PoseSpline::fit_following`] has learnt of the poses so far.
 #[derive(Clone, Debug, Default)]
@@ -129,10 +155,6 @@ pub struct PoseAdaptation(Option<Adaptation<2>>);
 
 /// Channels of position and rotation as two lanes, see [`pose_channels`].
 const CHANNELS: [usize; 2] = [3, 4];
-const EXPECTED_NOISE: [f64; 2] = [
-    EXPECTED_POSITION_NOISE_M,
-    EXPECTED_ROTATION_NOISE_RAD * QUATERNION_PER_ROTVEC,
-];
 
 /// The spline equations for a series of stamps; made once and shared by every series of poses on
 /// them.
@@ -204,12 +226,8 @@ impl PoseSpline {
         smoothing: PoseSmoothing,
     ) -> Result<Self, SpatialError> {
         if let (
-            Smoothing::Adaptive {
-                expected_noise: position,
-            },
-            Smoothing::Adaptive {
-                expected_noise: rotation,
-            },
+            Smoothing::Adaptive { expected: position },
+            Smoothing::Adaptive { expected: rotation },
         ) = (smoothing.position, smoothing.rotation)
             && world_from_body.len() >= FEWEST_ADAPTIVE
         {
@@ -232,7 +250,7 @@ impl PoseSpline {
         })
     }
 
-    /// As [`PoseSpline::fit_on`] with [`PoseSmoothing::ADAPTIVE`], over a window of poses that moves
+    /// As [`PoseSpline::fit_on`] with [`PoseSmoothing::adaptive`], over a window of poses that moves
     /// on: what was learnt of a pose goes on with it, so that a move costs a fraction of a fit.
     /// `dropped` poses have left the window at its front since the last call.
     ///
@@ -241,19 +259,19 @@ impl PoseSpline {
     pub fn fit_following(
         times: &PoseTimes,
         world_from_body: &[Isometry3<f64>],
-        adaptation: &mut PoseAdaptation,
-        dropped: usize,
+        source: PoseSource,
+        (adaptation, dropped): (&mut PoseAdaptation, usize),
     ) -> Result<Self, SpatialError> {
         let PoseAdaptation(learnt) = adaptation;
         if world_from_body.len() < FEWEST_ADAPTIVE {
             *learnt = None;
-            return Self::fit_on(times, world_from_body, PoseSmoothing::ADAPTIVE);
+            return Self::fit_on(times, world_from_body, PoseSmoothing::adaptive(source));
         }
         let fit = AdaptiveFit::follow(
             &times.system.equations,
             pose_channels(world_from_body),
             CHANNELS,
-            EXPECTED_NOISE,
+            source.expected(),
             (learnt, dropped),
         )?;
         Ok(Self::of_lanes(times, &fit))

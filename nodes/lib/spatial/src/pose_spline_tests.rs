@@ -124,8 +124,9 @@ fn both_halves_learn_at_once_what_each_learns_alone_to_the_bit() {
         })
         .collect();
     let times = PoseTimes::new(&stamps).unwrap();
-    let both = PoseSpline::fit_on(&times, &poses, PoseSmoothing::ADAPTIVE).unwrap();
-    let PoseSmoothing { position, rotation } = PoseSmoothing::ADAPTIVE;
+    let both =
+        PoseSpline::fit_on(&times, &poses, PoseSmoothing::adaptive(PoseSource::Tracked)).unwrap();
+    let PoseSmoothing { position, rotation } = PoseSmoothing::adaptive(PoseSource::Tracked);
     let position =
         SmoothingSpline::fit_on(times.system(), &position_channels(&poses), position).unwrap();
     let rotation =

@@ -11,6 +11,17 @@ use crate::equations::{PenaltyWeights, Scratch};
 use crate::system::{LIGHT, LIGHTER, SplineSystem, centred};
 use crate::weight_search::LOWEST_LOG_WEIGHT;
 
+/// Noise that is expected of samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ExpectedNoise {
+    /// Standard deviation at 100 Hz (at other rates of the same density, as the root of the rate), in
+    /// the samples' unit; 0 where nothing is expected.
+    pub std: f64,
+    /// What it counts beside the samples around each time, in samples: little where they show their
+    /// noise, more where it was filtered before.
+    pub count: f64,
+}
+
 /// How much a spline smooths.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Smoothing {
@@ -23,10 +34,8 @@ pub enum Smoothing {
     AutomaticFor(Derivative),
     /// As much as the samples around each time ask for: much at rest, little in a burst.
     Adaptive {
-        /// Standard deviation of the white noise that is expected where the samples do not say, in
-        /// their unit, at 100 Hz (at other rates of the same density, as the root of the rate); 0
-        /// where nothing is.
-        expected_noise: f64,
+        /// What is expected of the samples' noise.
+        expected: ExpectedNoise,
     },
     /// Not at all: the spline passes through the samples (up to 1e-8 of the fifth derivative's
     /// penalty, which steadies gaps).
@@ -48,7 +57,16 @@ pub enum SplineWeight {
     /// The same at all times.
     Uniform(f64),
     /// One for each interval between samples.
-    Local(Vec<f64>),
+    Local(Vec<LocalWeight>),
+}
+
+/// What the penalty of one interval weighs, for times counted in median sample intervals; no unit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LocalWeight {
+    /// The square of the fifth derivative: smoothness.
+    pub fifth: f64,
+    /// The square of the second derivative: that no acceleration is larger than those around.
+    pub second: f64,
 }
 
 impl SplineWeight {
@@ -125,11 +143,10 @@ impl<const C: usize> SmoothingSpline<C> {
         values: &[[f64; C]],
         smoothing: Smoothing,
     ) -> Result<Self, SpatialError> {
-        if let Smoothing::Adaptive { expected_noise } = smoothing
+        if let Smoothing::Adaptive { expected } = smoothing
             && values.len() >= FEWEST_ADAPTIVE
         {
-            let fit =
-                AdaptiveFit::learn(&system.equations, values.to_vec(), [C], [expected_noise])?;
+            let fit = AdaptiveFit::learn(&system.equations, values.to_vec(), [C], [expected])?;
             return Ok(Self::of_lane(system, &fit, 0));
         }
         system.equations.check(values)?;
@@ -181,11 +198,14 @@ impl<const C: usize> SmoothingSpline<C> {
         let coefficient = |of_all: &[f64; W]| {
             std::array::from_fn(|c| of_all[L * c + lane] + fit.constant[L * c + lane])
         };
-        let of_lane = |all: &[[f64; L]]| all.iter().map(|lanes| lanes[lane]).collect();
+        let of_lane = |[fifth, second]: &[[f64; L]; 2]| LocalWeight {
+            fifth: fifth[lane],
+            second: second[lane],
+        };
         Self {
             system: system.clone(),
             coefficients: fit.coefficients.iter().map(coefficient).collect(),
-            weight: SplineWeight::Local(of_lane(&fit.weights)),
+            weight: SplineWeight::Local(fit.weights.iter().map(of_lane).collect()),
             uncertainty: Some((fit.uncertainty.clone(), lane)),
         }
     }
@@ -242,7 +262,7 @@ impl<const C: usize> SmoothingSpline<C> {
     pub(crate) fn cutoff_over(&self, interval: usize) -> f64 {
         let weight = match &self.weight {
             SplineWeight::Uniform(weight) => *weight,
-            SplineWeight::Local(weights) => weights[interval.min(weights.len() - 1)],
+            SplineWeight::Local(weights) => weights[interval.min(weights.len() - 1)].fifth,
         };
         self.system.equations.cutoff_of_weight(weight)
     }

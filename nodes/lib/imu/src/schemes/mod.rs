@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use cromosim_spatial::PoseSmoothing;
+use cromosim_spatial::{PoseSmoothing, PoseSource};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -64,9 +64,9 @@ impl Scheme {
     }
 
     /// How a spline smooths by this scheme.
-    pub(crate) fn smoothing(self) -> PoseSmoothing {
+    pub(crate) fn smoothing(self, source: PoseSource) -> PoseSmoothing {
         match self {
-            Self::AdaptiveSpline => PoseSmoothing::ADAPTIVE,
+            Self::AdaptiveSpline => PoseSmoothing::adaptive(source),
             _ => PoseSmoothing::default(),
         }
     }

@@ -141,7 +141,7 @@ pub(super) fn physics_cases(
     seed: u64,
     quick: bool,
 ) -> Result<Vec<RigidCase>, EvaluationError> {
-    let mut cases = Vec::new();
+    let (mut cases, source) = (Vec::new(), errors.source());
     for (number, motion) in known_motions()?.into_iter().enumerate() {
         let every = (motion.rate_hz / rate_hz).round().max(1.0) as usize;
         if (every as f64 * rate_hz - motion.rate_hz).abs() > 1e-6 {
@@ -167,7 +167,7 @@ pub(super) fn physics_cases(
                 cases.push(RigidCase {
                     motion: motion.name.to_owned(),
                     position: POSITIONS[index].to_owned(),
-                    trajectory: SensorTrajectory::new(frames)?,
+                    trajectory: SensorTrajectory::new(frames)?.from_source(source),
                     stamps: (0..count).map(stamp).collect(),
                     measured: Measured::Known(site.readings[..count].to_vec()),
                 });

@@ -4,7 +4,7 @@ use cromosim_body::{BodyModel, BodyPose, ShapedBody};
 use cromosim_imu::{MountedSensor, Placement, SensorTrajectory, normal_pair};
 use cromosim_learned::SourceErrors;
 use cromosim_motion::embedded_walk;
-use cromosim_spatial::{Stamp, so3};
+use cromosim_spatial::{PoseSource, Stamp, so3};
 use nalgebra::{Isometry3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
@@ -70,6 +70,14 @@ impl PoseError {
 }
 
 impl PoseErrors {
+    /// What a simulation is told of where the poses come from.
+    pub(super) fn source(self) -> PoseSource {
+        match self {
+            Self::MarkerFit => PoseSource::Fitted,
+            _ => PoseSource::Tracked,
+        }
+    }
+
     /// Errors of `frames` frames at each of [`POSITIONS`]; the same for the same seed.
     ///
     /// # Errors
