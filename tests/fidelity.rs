@@ -81,6 +81,12 @@ fn simulators_are_compared_and_the_same_again_is_the_same() {
             spline[0] < 0.8 * analytic[0],
             "{position}: {spline:?} {analytic:?}"
         );
+        // What `simulate` runs by default is judged too.
+        let adaptive = rmse(&results, position, "adaptive_spline");
+        assert!(
+            adaptive[0] < 0.8 * analytic[0] && adaptive != spline,
+            "{position}: {adaptive:?} {analytic:?}"
+        );
     }
     // The forearm's skin turns nearly as its joint does, but lies away from it.
     let [analytic, joint] =
