@@ -39,6 +39,12 @@ impl Method {
         Self::Perfect,
     ];
 
+    /// Whether it is `spline`, or networks that were trained on top of it: what truth that the same
+    /// spline made does not rank.
+    pub fn is_of_spline(self) -> bool {
+        matches!(self, Self::Spline | Self::Learned | Self::Mapped)
+    }
+
     /// The name in tables.
     pub fn title(self) -> &'static str {
         match self {
