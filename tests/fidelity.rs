@@ -71,6 +71,14 @@ fn simulators_are_compared_and_the_same_again_is_the_same() {
         said.contains("| left watch (2 recordings") && said.contains("learned, mapped"),
         "{said}"
     );
+    // Truth that the spline made does not rank it, and every row says so.
+    assert!(
+        said.contains("| walk, 60 Hz | our spline of the clip † |")
+            && said.contains("| spline † |")
+            && said.contains("| adaptive_spline |")
+            && said.contains("† The measured side was made by `spline`"),
+        "{said}"
+    );
     let results: serde_json::Value =
         serde_json::from_slice(&fs::read(here.join("one/results.json")).unwrap()).unwrap();
     for position in ["left_watch", "right_instep", "all"] {
@@ -80,6 +88,12 @@ fn simulators_are_compared_and_the_same_again_is_the_same() {
         assert!(
             spline[0] < 0.8 * analytic[0],
             "{position}: {spline:?} {analytic:?}"
+        );
+        // What `simulate` runs by default is judged too.
+        let adaptive = rmse(&results, position, "adaptive_spline");
+        assert!(
+            adaptive[0] < 0.8 * analytic[0] && adaptive != spline,
+            "{position}: {adaptive:?} {analytic:?}"
         );
     }
     // The forearm's skin turns nearly as its joint does, but lies away from it.
@@ -253,6 +267,7 @@ studies: []
 rigid:
   - {name: markers, measured: physics, physics: {errors: markers, rate_hz: 120, picture: {motion: jump, position: pelvis, seconds: [2.1, 3.3]}}}
   - {name: suit, measured: physics, physics: {errors: inertial_suit, rate_hz: 60}}
+  - {name: closed form, measured: known, analytic: {errors: markers, rate_hz: 60}}
   - {name: real, measured: nobody, recordings: [\"none/*.npz\"], optional: true}
 ";
 
@@ -278,11 +293,15 @@ fn rigid_bodies_are_compared_with_known_readings_and_the_practice() {
     let results: serde_json::Value =
         serde_json::from_slice(&fs::read(here.join("one/results.json")).unwrap()).unwrap();
     let studies = results["rigid"].as_array().unwrap();
-    assert_eq!(studies.len(), 2);
-    for study in studies {
+    assert_eq!(studies.len(), 3);
+    for (study, (truth, motions, bodies)) in studies.iter().zip([
+        ("physics", 6, 36),
+        ("physics", 6, 36),
+        ("closed_form", 5, 30),
+    ]) {
         assert_eq!(
-            (&study["motions"], &study["bodies"]),
-            (&6.into(), &36.into())
+            (&study["truth"], &study["motions"], &study["bodies"]),
+            (&truth.into(), &motions.into(), &bodies.into())
         );
         let of = |name: &str, what: &str| {
             let methods = study["methods"].as_array().unwrap();
@@ -336,6 +355,21 @@ fn rigid_studies_that_cannot_be_run_are_named() {
         ("rate_hz: 120", "rate_hz: 1", "study markers: rate_hz 1"),
         ("errors: markers", "errors: magic", "magic"),
         ("position: pelvis", "position: tail", "\"tail\""),
+        (
+            "analytic: {errors: markers, rate_hz: 60}",
+            "analytic: {errors: vibe, rate_hz: 30}",
+            "study closed form: errors Vibe: drawn on a body",
+        ),
+        (
+            "analytic: {errors: markers, rate_hz: 60}",
+            "analytic: {errors: markers, rate_hz: 70}",
+            "rate_hz 70",
+        ),
+        (
+            "analytic: {errors: markers, rate_hz: 60}",
+            "analytic: {errors: markers, rate_hz: 60}, recordings: [a]",
+            "expected only one of",
+        ),
         (
             "physics: {errors: inertial_suit, rate_hz: 60}",
             "recordings: []",

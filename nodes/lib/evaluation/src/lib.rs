@@ -30,10 +30,10 @@ pub use activity::{
 };
 pub use error::EvaluationError;
 pub use fidelity::{
-    FidelityOptions, FidelityResults, Method, MethodResults, PhysicsSource, PictureResults,
-    PoseErrors, PositionResults, PracticeResults, Protocol, RigidMethodResults, RigidPartResults,
-    RigidPicture, RigidStudy, RigidStudyResults, SeenResults, StatedResults, Study, StudyResults,
-    evaluate_fidelity,
+    AnalyticSource, FidelityOptions, FidelityResults, Method, MethodResults, PhysicsSource,
+    PictureResults, PoseErrors, PositionResults, PracticeResults, Protocol, RigidMethodResults,
+    RigidPartResults, RigidPicture, RigidStudy, RigidStudyResults, SeenResults, StatedResults,
+    Study, StudyResults, TruthSource, evaluate_fidelity,
 };
 pub use mapping::fit_mapping;
 pub use observer::{Observer, Unobserved};

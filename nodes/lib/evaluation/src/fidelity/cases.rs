@@ -81,6 +81,9 @@ impl Case {
             Method::Imusim => imusim(&self.trajectory, &stamps)?,
             Method::Analytic => simulate_kinematics(&self.trajectory, Scheme::Richardson, &stamps)?,
             Method::Spline => self.pair.motion.kinematics.clone(),
+            Method::AdaptiveSpline => {
+                simulate_kinematics(&self.trajectory, Scheme::AdaptiveSpline, &stamps)?
+            }
             Method::Learned | Method::Mapped => match learned {
                 Some(networks) => networks.simulate(&self.pair.motion)?,
                 None => return Ok(None),

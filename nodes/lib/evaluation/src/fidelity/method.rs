@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// A way from a motion to readings. A further one gets a variant here, a place in [`Method::ALL`],
-/// a title, and its kinematics in `Case::simulate`.
+/// a title, and its kinematics in `Case::kinematics`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
@@ -13,8 +13,10 @@ pub enum Method {
     Imusim,
     /// The skin's frame by Richardson's extrapolation: the paper's analytic simulator.
     Analytic,
-    /// Splines that choose their smoothing themselves: our analytic simulator.
+    /// Splines that choose one smoothing for a clip: what the networks rest on.
     Spline,
+    /// The same splines with a smoothing that follows the motion: the suite's default scheme.
+    AdaptiveSpline,
     /// The networks on top of the spline.
     Learned,
     /// The networks, then the distribution mapping.
@@ -26,15 +28,22 @@ pub enum Method {
 
 impl Method {
     /// All, in the order of the tables.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Joint,
         Self::Imusim,
         Self::Analytic,
         Self::Spline,
+        Self::AdaptiveSpline,
         Self::Learned,
         Self::Mapped,
         Self::Perfect,
     ];
+
+    /// Whether it is `spline`, or networks that were trained on top of it: what truth that the same
+    /// spline made does not rank.
+    pub fn is_of_spline(self) -> bool {
+        matches!(self, Self::Spline | Self::Learned | Self::Mapped)
+    }
 
     /// The name in tables.
     pub fn title(self) -> &'static str {
@@ -43,6 +52,7 @@ impl Method {
             Self::Imusim => "IMUSim-like",
             Self::Analytic => "analytic (Richardson)",
             Self::Spline => "spline",
+            Self::AdaptiveSpline => "adaptive_spline",
             Self::Learned => "learned",
             Self::Mapped => "learned, mapped",
             Self::Perfect => "(perfect networks)",

@@ -10,6 +10,7 @@ mod protocol;
 mod results;
 mod rigid;
 mod tables;
+mod truth_source;
 
 use std::path::PathBuf;
 
@@ -20,9 +21,10 @@ pub use method::Method;
 pub use protocol::{Protocol, Study};
 pub use results::{FidelityResults, MethodResults, PositionResults, StudyResults};
 pub use rigid::{
-    PhysicsSource, PictureResults, PoseErrors, PracticeResults, RigidMethodResults,
+    AnalyticSource, PhysicsSource, PictureResults, PoseErrors, PracticeResults, RigidMethodResults,
     RigidPartResults, RigidPicture, RigidStudy, RigidStudyResults, SeenResults, StatedResults,
 };
+pub use truth_source::TruthSource;
 
 use crate::EvaluationError;
 use crate::observer::{self, Observer};

@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::rigid::RigidStudy;
+use super::truth_source::TruthSource;
 use crate::EvaluationError;
 use crate::error::At;
 use crate::training_data::DataSource;
@@ -46,6 +47,17 @@ pub struct Study {
     /// Whether the study is left out, and listed as such, where there is no folder of data.
     #[serde(default)]
     pub optional: bool,
+}
+
+impl Study {
+    /// What the measured side of its test rests on; the suite's own spline, where a part of it does.
+    pub fn truth(&self) -> TruthSource {
+        if self.test.iter().any(|source| !source.motions.is_empty()) {
+            TruthSource::OwnSpline
+        } else {
+            TruthSource::MeasuredBesideSpline
+        }
+    }
 }
 
 impl Protocol {
@@ -116,7 +128,9 @@ mod tests {
     #[test]
     fn files_that_come_with_the_suite_are_sound() {
         let own = Protocol::embedded().unwrap();
-        assert_eq!((own.studies.len(), own.rigid.len()), (8, 11));
+        assert_eq!((own.studies.len(), own.rigid.len()), (8, 14));
+        let own_spline = |study: &&Study| study.truth() == TruthSource::OwnSpline;
+        assert_eq!(own.studies.iter().filter(own_spline).count(), 6);
         let totalcapture = Path::new(env!("CARGO_MANIFEST_DIR"))
             .join("../../../config/evaluation/totalcapture.yaml");
         assert_eq!(

@@ -7,6 +7,7 @@ use super::errors::{SquaredErrors, signal};
 use super::method::Method;
 use super::protocol::{Protocol, Study};
 use super::rigid::RigidStudyResults;
+use super::truth_source::TruthSource;
 use crate::bootstrap::intervals;
 
 /// The errors of all simulators in all studies.
@@ -37,6 +38,8 @@ pub struct StudyResults {
     pub name: String,
     /// What its measured side is.
     pub measured: String,
+    /// What that side rests on.
+    pub truth: TruthSource,
     /// The networks' name.
     pub model: String,
     /// By position, and where there are several all together as `all`.
@@ -123,6 +126,7 @@ impl StudyResults {
         Self {
             name: study.name.clone(),
             measured: study.measured.clone(),
+            truth: study.truth(),
             model: study.model.clone(),
             positions,
         }

@@ -5,6 +5,7 @@ use cromosim_charts::{Bar, BarChart, Block, Chart, Column, Group, Page, Section,
 use super::method::Method;
 use super::results::{FidelityResults, MethodResults, PositionResults, StudyResults};
 use super::rigid::{pictures, rigid_charts, rigid_markdown, rigid_sections};
+use super::truth_source::{MARK_EXPLAINED, TruthSource};
 use crate::EvaluationError;
 use crate::report::{Report, json};
 
@@ -54,6 +55,9 @@ fn markdown(results: &FidelityResults) -> String {
     if !results.studies.is_empty() {
         text += &overview(results).markdown();
     }
+    if let Some(explained) = mark_explained(results) {
+        text += &format!("\n{explained}\n");
+    }
     text.extend(results.studies.iter().map(table));
     if !results.rigid.is_empty() {
         text += &rigid_markdown(&results.rigid);
@@ -89,7 +93,10 @@ fn page(results: &FidelityResults) -> Page {
     );
     let glance = (!results.studies.is_empty()).then(|| Section {
         title: "At a glance".to_owned(),
-        blocks: vec![Block::Table(overview(results))],
+        blocks: [Block::Table(overview(results))]
+            .into_iter()
+            .chain(mark_explained(results).map(|text| Block::Text(text.to_owned())))
+            .collect(),
     });
     let skipped = (!results.skipped.is_empty()).then(|| Section {
         title: "Left out".to_owned(),
@@ -123,14 +130,18 @@ fn section(study: &StudyResults) -> Section {
 
 /// All positions of a study together.
 fn overview(results: &FidelityResults) -> Table {
-    let mut columns = vec![Column::text("RMSE, m/s² and rad/s")];
+    let mut columns = vec![Column::text("RMSE, m/s² and rad/s"), Column::text("truth")];
     columns.extend(Method::ALL.map(|method| Column::numbers(method.title())));
     let cells = |study: &StudyResults| {
         let all = study.positions.last();
         let find = |method: Method| all?.methods.iter().find(|own| own.method == method);
-        let cell = |own: &MethodResults| format!("{:.2}, {:.3}", own.rmse[0], own.rmse[1]);
+        let cell = |own: &MethodResults| {
+            let mark = mark(study, own.method);
+            format!("{:.2}, {:.3}{mark}", own.rmse[0], own.rmse[1])
+        };
         let own = Method::ALL.map(|method| find(method).map_or_else(String::new, cell));
-        [vec![study.name.clone()], own.to_vec()].concat()
+        let named = vec![study.name.clone(), study.truth.title().to_owned()];
+        [named, own.to_vec()].concat()
     };
     Table {
         columns,
@@ -140,7 +151,36 @@ fn overview(results: &FidelityResults) -> Table {
 
 /// What a study's measured side and networks are.
 fn about(study: &StudyResults) -> String {
-    format!("{}; networks `{}`.", study.measured, study.model)
+    let truth = study.truth.title();
+    format!(
+        "{} (truth: {truth}); networks `{}`.",
+        study.measured, study.model
+    )
+}
+
+/// Whether the suite's own spline made a study's truth.
+fn is_marked(study: &StudyResults) -> bool {
+    study.truth == TruthSource::OwnSpline
+}
+
+/// What the mark means, where a study has it.
+fn mark_explained(results: &FidelityResults) -> Option<&'static str> {
+    let is_any = results.studies.iter().any(is_marked);
+    is_any.then_some(MARK_EXPLAINED)
+}
+
+/// What stands behind the errors of a simulator that the study's truth does not rank.
+fn mark(study: &StudyResults, method: Method) -> &'static str {
+    if is_marked(study) && method.is_of_spline() {
+        " †"
+    } else {
+        ""
+    }
+}
+
+/// A simulator's name, marked where the study's truth does not rank it.
+fn title(study: &StudyResults, method: Method) -> String {
+    format!("{}{}", method.title(), mark(study, method))
 }
 
 /// A position with the size of its data.
@@ -163,7 +203,7 @@ fn rows(study: &StudyResults, cells: impl Fn(&MethodResults) -> Vec<String>) -> 
             } else {
                 String::new()
             };
-            rows.push([vec![named, own.method.title().to_owned()], cells(own)].concat());
+            rows.push([vec![named, title(study, own.method)], cells(own)].concat());
         }
     }
     rows
@@ -218,7 +258,7 @@ fn chart(study: &StudyResults, index: usize) -> BarChart {
     let bar = |own: &MethodResults| {
         let [low, high] = own.rmse_interval[index];
         Bar {
-            series: own.method.title().to_owned(),
+            series: title(study, own.method),
             value: own.rmse[index],
             interval: Some((low, high)),
         }
@@ -228,7 +268,7 @@ fn chart(study: &StudyResults, index: usize) -> BarChart {
         bars: position.methods.iter().map(bar).collect(),
     };
     BarChart {
-        title: format!("{}: {name}", study.name),
+        title: format!("{}: {name} (truth: {})", study.name, study.truth.title()),
         y_label: format!("RMSE per axis, {unit}"),
         groups: study.positions.iter().map(group).collect(),
         level: None,

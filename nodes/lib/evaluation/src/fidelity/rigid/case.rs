@@ -6,10 +6,11 @@ use cromosim_recording::rigid::PoseTrajectory;
 use cromosim_spatial::Stamp;
 
 use super::alignment::{Lagged, aligned, all_lags};
+use super::analytic::analytic_motions;
 use super::method::{JUDGED, RigidMethod};
 use super::pose_errors::PoseErrors;
 use super::stated::StatedErrors;
-use super::truth::{POSITIONS, known_motions};
+use super::truth::{KnownMotion, POSITIONS, known_motions};
 use crate::EvaluationError;
 use crate::error::At;
 use crate::fidelity::errors::SquaredErrors;
@@ -129,20 +130,61 @@ impl RigidCase {
     }
 }
 
-/// The physics' motions as a source of `rate_hz` sees them, `repeats` times with newly drawn errors.
-/// Where `quick`, one position of each motion, another one every time.
+/// How motions are seen whose readings are known.
+#[derive(Clone, Copy)]
+pub(super) struct Seen {
+    /// What errs.
+    pub errors: PoseErrors,
+    /// Frames per second, Hz.
+    pub rate_hz: f64,
+    /// Draws for each motion.
+    pub repeats: u64,
+    /// Seed of the draws.
+    pub seed: u64,
+    /// Whether one IMU of each motion is enough, at another place every time.
+    pub quick: bool,
+}
+
+/// The physics' motions, `repeats` times with newly drawn errors.
 ///
 /// # Errors
-/// A rate that does not divide the truth's, and those of the errors' drawing.
-pub(super) fn physics_cases(
-    errors: PoseErrors,
-    rate_hz: f64,
-    repeats: u64,
-    seed: u64,
-    quick: bool,
-) -> Result<Vec<RigidCase>, EvaluationError> {
-    let (mut cases, source) = (Vec::new(), errors.source());
-    for (number, motion) in known_motions()?.into_iter().enumerate() {
+/// Arrays that are not as they should be, and as [`Seen::cases`].
+pub(super) fn physics_cases(seen: Seen) -> Result<Vec<RigidCase>, EvaluationError> {
+    let mut cases = Vec::new();
+    for (number, motion) in known_motions()?.iter().enumerate() {
+        for repeat in 0..seen.repeats {
+            cases.extend(seen.cases(motion, number, repeat)?);
+        }
+    }
+    Ok(cases)
+}
+
+/// Motions of closed form, which are drawn anew in each repeat as their errors are.
+///
+/// # Errors
+/// As [`Seen::cases`].
+pub(super) fn analytic_cases(seen: Seen) -> Result<Vec<RigidCase>, EvaluationError> {
+    let mut cases = Vec::new();
+    for repeat in 0..seen.repeats {
+        for (number, motion) in analytic_motions(seen.seed, repeat).iter().enumerate() {
+            cases.extend(seen.cases(motion, number, repeat)?);
+        }
+    }
+    Ok(cases)
+}
+
+impl Seen {
+    /// A motion's IMUs with drawn errors of their poses; `number` is its place among the motions.
+    ///
+    /// # Errors
+    /// A rate that does not divide the truth's, and those of the errors' drawing.
+    fn cases(
+        &self,
+        motion: &KnownMotion,
+        number: usize,
+        repeat: u64,
+    ) -> Result<Vec<RigidCase>, EvaluationError> {
+        let rate_hz = self.rate_hz;
         let every = (motion.rate_hz / rate_hz).round().max(1.0) as usize;
         if (every as f64 * rate_hz - motion.rate_hz).abs() > 1e-6 {
             return Err(EvaluationError::TruthRate {
@@ -151,30 +193,30 @@ pub(super) fn physics_cases(
             });
         }
         let stamp = |k: usize| Stamp::from_seconds(k as f64 / motion.rate_hz);
-        for repeat in 0..repeats {
-            let frames = motion.sites[0].poses.len().div_ceil(every);
-            let drawn = errors.draw(frames, rate_hz, mixed_seed(&[seed, number as u64, repeat]))?;
-            for (index, (site, errors)) in motion.sites.iter().zip(&drawn).enumerate() {
-                if quick && index != number % POSITIONS.len() {
-                    continue;
-                }
-                let poses = site.poses.iter().enumerate().step_by(every).zip(errors);
-                let frames: Vec<SensorFrame> = poses
-                    .map(|((k, pose), error)| SensorFrame::new(stamp(k), error.apply(pose)))
-                    .collect();
-                // Behind the last pose nothing can be known.
-                let count = (frames.len() - 1) * every + 1;
-                cases.push(RigidCase {
-                    motion: motion.name.to_owned(),
-                    position: POSITIONS[index].to_owned(),
-                    trajectory: SensorTrajectory::new(frames)?.from_source(source),
-                    stamps: (0..count).map(stamp).collect(),
-                    measured: Measured::Known(site.readings[..count].to_vec()),
-                });
+        let frames = motion.sites[0].poses.len().div_ceil(every);
+        let seed = mixed_seed(&[self.seed, number as u64, repeat]);
+        let drawn = self.errors.draw(frames, rate_hz, seed)?;
+        let mut cases = Vec::new();
+        for (index, (site, errors)) in motion.sites.iter().zip(&drawn).enumerate() {
+            if self.quick && index != number % POSITIONS.len() {
+                continue;
             }
+            let poses = site.poses.iter().enumerate().step_by(every).zip(errors);
+            let frames: Vec<SensorFrame> = poses
+                .map(|((k, pose), error)| SensorFrame::new(stamp(k), error.apply(pose)))
+                .collect();
+            // Behind the last pose nothing can be known.
+            let count = (frames.len() - 1) * every + 1;
+            cases.push(RigidCase {
+                motion: motion.name.to_owned(),
+                position: site.position.to_owned(),
+                trajectory: SensorTrajectory::new(frames)?.from_source(self.errors.source()),
+                stamps: (0..count).map(stamp).collect(),
+                measured: Measured::Known(site.readings[..count].to_vec()),
+            });
         }
+        Ok(cases)
     }
-    Ok(cases)
 }
 
 /// The longest stretch without a gap of each real IMU with poses in a file; none where all are shorter

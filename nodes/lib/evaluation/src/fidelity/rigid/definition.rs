@@ -4,8 +4,9 @@ use serde::Deserialize;
 
 use super::pose_errors::PoseErrors;
 use super::truth::{POSITIONS, is_motion};
+use crate::fidelity::truth_source::TruthSource;
 
-/// Rigid bodies that are scored together. Either `physics` or `recordings` is given.
+/// Rigid bodies that are scored together. One of `physics`, `analytic` and `recordings` is given.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RigidStudy {
@@ -16,6 +17,9 @@ pub struct RigidStudy {
     /// The humanoid of the physics engine, seen by a source.
     #[serde(default)]
     pub physics: Option<PhysicsSource>,
+    /// Motions of closed form, seen by a source.
+    #[serde(default)]
+    pub analytic: Option<AnalyticSource>,
     /// Recordings of real IMUs on rigid bodies, of a data set; a `*` stands for any part of a file's
     /// name.
     #[serde(default)]
@@ -39,6 +43,19 @@ pub struct PhysicsSource {
     /// What is drawn over time beside the errors.
     #[serde(default)]
     pub picture: Option<RigidPicture>,
+}
+
+/// How motions of closed form are drawn and seen.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AnalyticSource {
+    /// What errs; none of those that are drawn on a body.
+    pub errors: PoseErrors,
+    /// Frames per second, Hz; divides 240.
+    pub rate_hz: f64,
+    /// Draws of each kind of motion, with errors of their own.
+    #[serde(default = "one")]
+    pub repeats: u64,
 }
 
 /// Some seconds of one IMU of the physics.
@@ -68,27 +85,61 @@ impl RigidPicture {
 }
 
 impl RigidStudy {
+    /// What the measured side rests on.
+    pub fn truth(&self) -> TruthSource {
+        match (&self.physics, &self.analytic) {
+            (Some(_), _) => TruthSource::Physics,
+            (_, Some(_)) => TruthSource::ClosedForm,
+            _ => TruthSource::Measured,
+        }
+    }
+
     /// Whether everything that is needed is there.
     ///
     /// # Errors
     /// A sentence on what is wrong.
     pub(in crate::fidelity) fn check(&self) -> Result<(), String> {
-        match &self.physics {
-            None if self.recordings.is_empty() => Err("expected physics or recordings".to_owned()),
-            Some(_) if !self.recordings.is_empty() => {
-                Err("expected either physics or recordings".to_owned())
-            }
-            Some(source) if !(10.0..=240.0).contains(&source.rate_hz) => {
-                Err(format!("rate_hz {}: expected 10 to 240", source.rate_hz))
-            }
-            Some(PhysicsSource {
-                picture: Some(picture),
-                ..
-            }) if !picture.is_sound() => Err(format!(
+        match (&self.physics, &self.analytic, self.recordings.is_empty()) {
+            (None, None, true) => Err("expected physics, analytic or recordings".to_owned()),
+            (None, None, false) => Ok(()),
+            (Some(source), None, true) => source.check(),
+            (None, Some(source), true) => source.check(),
+            _ => Err("expected only one of physics, analytic and recordings".to_owned()),
+        }
+    }
+}
+
+impl PhysicsSource {
+    fn check(&self) -> Result<(), String> {
+        check_frames(self.rate_hz, self.repeats)?;
+        match &self.picture {
+            Some(picture) if !picture.is_sound() => Err(format!(
                 "picture {picture:?}: expected a motion and position of bags/truth, and two times"
             )),
-            Some(source) if source.repeats == 0 => Err("repeats 0: expected at least 1".to_owned()),
             _ => Ok(()),
         }
     }
+}
+
+impl AnalyticSource {
+    fn check(&self) -> Result<(), String> {
+        if self.errors.needs_body() {
+            return Err(format!(
+                "errors {:?}: drawn on a body, which analytic motions lack; expected markers, marker_fit or inertial_suit",
+                self.errors
+            ));
+        }
+        check_frames(self.rate_hz, self.repeats)
+    }
+}
+
+/// Frames per second, Hz, and draws.
+fn check_frames(rate_hz: f64, repeats: u64) -> Result<(), String> {
+    if !(10.0..=240.0).contains(&rate_hz) {
+        return Err(format!("rate_hz {rate_hz}: expected 10 to 240"));
+    }
+    if repeats == 0 {
+        return Err("repeats 0: expected at least 1".to_owned());
+    }
+    Ok(())
 }

@@ -1,7 +1,8 @@
-//! Poses of rigid bodies against readings that are not of our making: a physics engine's, and real
-//! IMUs' beside their optical reference. The practice is compared: one low-pass, then differences.
+//! Poses of rigid bodies against readings that no scheme of ours made: a physics engine's, derivatives
+//! of closed forms, and real IMUs' beside their optical reference. The practice is compared: one low-pass, then differences.
 
 mod alignment;
+mod analytic;
 mod case;
 mod definition;
 mod method;
@@ -13,7 +14,7 @@ mod study;
 mod tables;
 mod truth;
 
-pub use definition::{PhysicsSource, RigidPicture, RigidStudy};
+pub use definition::{AnalyticSource, PhysicsSource, RigidPicture, RigidStudy};
 pub use picture::{PictureResults, SeenResults};
 pub use pose_errors::PoseErrors;
 pub use results::{

@@ -173,13 +173,20 @@ fn pairs<T>(values: impl Iterator<Item = [T; 2]>) -> [Vec<T>; 2] {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use super::super::case::physics_cases;
+    use super::super::case::{Seen, physics_cases};
     use super::super::pose_errors::PoseErrors;
     use super::*;
 
     #[test]
     fn a_picture_is_a_part_of_what_was_seen_with_a_band() {
-        let cases = physics_cases(PoseErrors::Markers, 60.0, 1, 3, true).unwrap();
+        let seen = Seen {
+            errors: PoseErrors::Markers,
+            rate_hz: 60.0,
+            repeats: 1,
+            seed: 3,
+            quick: true,
+        };
+        let cases = physics_cases(seen).unwrap();
         let wanted = |position: &str| RigidPicture {
             motion: "jump".to_owned(),
             position: position.to_owned(),

@@ -78,6 +78,11 @@ impl PoseErrors {
         }
     }
 
+    /// Whether they are those of a body's site, rather than of anything that is tracked by itself.
+    pub(super) fn needs_body(self) -> bool {
+        matches!(self, Self::Vibe | Self::Wham)
+    }
+
     /// Errors of `frames` frames at each of [`POSITIONS`]; the same for the same seed.
     ///
     /// # Errors

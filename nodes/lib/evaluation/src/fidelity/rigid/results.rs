@@ -9,6 +9,7 @@ use super::picture::PictureResults;
 use super::stated::StatedErrors;
 use crate::bootstrap::intervals;
 use crate::fidelity::errors::{SquaredErrors, signal};
+use crate::fidelity::truth_source::TruthSource;
 
 /// One study of rigid bodies.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -17,6 +18,8 @@ pub struct RigidStudyResults {
     pub name: String,
     /// What its measured side is.
     pub measured: String,
+    /// What that side rests on.
+    pub truth: TruthSource,
     /// Motions or trials, which intervals draw anew.
     pub motions: usize,
     /// IMUs in all of them.
@@ -125,6 +128,7 @@ impl RigidStudyResults {
         Self {
             name: study.name.clone(),
             measured: study.measured.clone(),
+            truth: study.truth(),
             motions: all.len(),
             bodies: cases.len(),
             seconds: cases.iter().map(RigidCase::seconds).sum(),

@@ -4,10 +4,11 @@ use std::path::PathBuf;
 
 use rayon::prelude::*;
 
-use super::case::{CaseErrors, RigidCase, physics_cases, recorded_cases};
+use super::case::{CaseErrors, RigidCase, Seen, analytic_cases, physics_cases, recorded_cases};
 use super::definition::RigidStudy;
 use super::method::RigidMethod;
 use super::picture::PictureResults;
+use super::pose_errors::PoseErrors;
 use super::results::RigidStudyResults;
 use crate::EvaluationError;
 use crate::observer::{self, Observer};
@@ -35,12 +36,17 @@ pub(in crate::fidelity) fn run_rigid_study(
     quick: bool,
     observer: &dyn Observer,
 ) -> Result<RigidOutcome, EvaluationError> {
-    let cases = match &study.physics {
-        Some(source) => {
-            let repeats = if quick { 1 } else { source.repeats };
-            physics_cases(source.errors, source.rate_hz, repeats, seed, quick)?
-        }
-        None => match files(study, data) {
+    let seen = |errors: PoseErrors, rate_hz: f64, repeats: u64| Seen {
+        errors,
+        rate_hz,
+        repeats: if quick { 1 } else { repeats },
+        seed,
+        quick,
+    };
+    let cases = match (&study.physics, &study.analytic) {
+        (Some(source), _) => physics_cases(seen(source.errors, source.rate_hz, source.repeats))?,
+        (_, Some(source)) => analytic_cases(seen(source.errors, source.rate_hz, source.repeats))?,
+        _ => match files(study, data) {
             Err(error) if study.optional => return Ok(RigidOutcome::Skipped(error.to_string())),
             found => recordings(&found?, quick)?,
         },

@@ -39,7 +39,7 @@ pub(in crate::fidelity) fn rigid_sections(studies: &[RigidStudyResults]) -> Vec<
     if studies.is_empty() {
         return Vec::new();
     }
-    let lead = "Poses of rigid bodies against a physics engine's exact readings and real IMUs. The practice is a Butterworth low-pass of second order, \
+    let lead = "Poses of rigid bodies against a physics engine's exact readings, closed forms and real IMUs. The practice is a Butterworth low-pass of second order, \
                 forward and back, then differences; best in hindsight is its cutoff with the least error for the study and channel. Squared errors over what the \
                 readings' covariances state are 1 where they err as much as they say.";
     let glance = Section {
@@ -123,8 +123,9 @@ pub(in crate::fidelity) fn pictures(
 /// What a study's measured side is.
 fn about(study: &RigidStudyResults) -> String {
     format!(
-        "{}; {} motions, {} IMUs, {:.0} s; what was measured has {:.2} m/s² and {:.3} rad/s.",
+        "{} (truth: {}); {} motions, {} IMUs, {:.0} s; what was measured has {:.2} m/s² and {:.3} rad/s.",
         study.measured,
+        study.truth.title(),
         study.motions,
         study.bodies,
         study.seconds,
@@ -157,7 +158,10 @@ fn errors(studies: &[RigidStudyResults]) -> Table {
         .into_iter()
         .map(RigidMethod::title)
         .collect();
-    let mut columns = vec![Column::text("rigid bodies, RMSE, m/s² and rad/s")];
+    let mut columns = vec![
+        Column::text("rigid bodies, RMSE, m/s² and rad/s"),
+        Column::text("truth"),
+    ];
     columns.extend(usual.iter().map(Column::numbers));
     columns.push(Column::numbers("practice, best in hindsight"));
     let row = |study: &RigidStudyResults| {
@@ -169,7 +173,7 @@ fn errors(studies: &[RigidStudyResults]) -> Table {
         };
         let [force, rate] = study.practice.cutoff_hz;
         let best = format!("{} ({force:.0}, {rate:.0} Hz)", pair(study.practice.rmse));
-        let mut cells = vec![study.name.clone()];
+        let mut cells = vec![study.name.clone(), study.truth.title().to_owned()];
         cells.extend(usual.iter().map(cell));
         cells.push(best);
         cells

@@ -1,4 +1,4 @@
-//! Motion whose exact readings are known: a humanoid in a physics engine.
+//! Motion whose exact readings are known, and that of a humanoid in a physics engine.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -44,18 +44,20 @@ pub(super) fn is_motion(name: &str) -> bool {
     MOTIONS.iter().any(|(own, _)| *own == name)
 }
 
-/// A motion with an IMU at each of [`POSITIONS`].
+/// A motion with as many IMUs as there are [`POSITIONS`], for which errors are drawn.
 pub(super) struct KnownMotion {
     /// Its name.
     pub name: &'static str,
     /// Frames per second of poses and readings, Hz.
     pub rate_hz: f64,
-    /// In the order of [`POSITIONS`].
+    /// Of the humanoid, in the order of [`POSITIONS`].
     pub sites: Vec<KnownSite>,
 }
 
 /// An IMU on a rigid body; as many readings as poses, frame k at `k / rate_hz`.
 pub(super) struct KnownSite {
+    /// Where it is.
+    pub position: &'static str,
     /// World from sensor, m.
     pub poses: Vec<Isometry3<f64>>,
     /// What it reads, sensor axes.
@@ -90,7 +92,7 @@ fn read(name: &'static str, bytes: &[u8]) -> Result<KnownMotion, EvaluationError
 
 fn read_site(
     file: &mut Container<Cursor<&[u8]>>,
-    position: &str,
+    position: &'static str,
 ) -> Result<KnownSite, EvaluationError> {
     let mut vectors = |quantity: &str| -> Result<Vec<Vector3<f64>>, EvaluationError> {
         let entry = file.at(&format!("{position}_{quantity}"))?;
@@ -117,6 +119,7 @@ fn read_site(
         angular_velocity,
     };
     Ok(KnownSite {
+        position,
         poses: places
             .iter()
             .zip(turns.as_chunks::<4>().0)
@@ -139,7 +142,7 @@ mod tests {
     #[test]
     fn readings_are_those_of_the_poses() {
         for motion in known_motions().unwrap() {
-            for (position, site) in POSITIONS.iter().zip(&motion.sites) {
+            for site in &motion.sites {
                 assert_eq!(site.poses.len(), site.readings.len());
                 let (mut errors, mut sizes, mut count) = ([0.0; 2], [0.0; 2], 0.0);
                 for (k, reading) in site.readings.iter().enumerate().skip(2) {
@@ -166,8 +169,9 @@ mod tests {
                 let all = errors.map(|sum: f64| (sum / count).sqrt());
                 assert!(
                     (part[0] < 0.5 || all[0] < 0.2) && (part[1] < 0.15 || all[1] < 0.01),
-                    "{} {position}: {part:?} {all:?}",
-                    motion.name
+                    "{} {}: {part:?} {all:?}",
+                    motion.name,
+                    site.position
                 );
             }
         }
