@@ -59,8 +59,12 @@ pub fn diagnose(
     let library = Library::without(&options.excluded);
     let mut prepared = PreparedPlacement::new(record)?;
     let raw = prepared.measured.clone();
-    let track = prepared.track(&prepared.estimate);
+    let mut track = prepared.track(&prepared.estimate);
     let alignment = CoarseAlignment::find(&prepared, &track);
+    if alignment.length_units != 1.0 && library.allows_read_off(ReadOff::ReferenceLength) {
+        prepared.bring_to_metres(&record.reference, alignment.length_units)?;
+        track = prepared.track(&prepared.estimate);
+    }
     let digital =
         PerChannel::from_fn(|channel| Digital::read_off(&prepared.measured, channel, &library));
     prepared.cover(alignment.lag_s)?;

@@ -8,7 +8,7 @@ use cromosim_spatial::{KinematicTrack, PoseEstimate, Spectrum, Stamp, welch};
 use crate::axes::{axes_of_channel, value_on_axis};
 use crate::error::GapError;
 use crate::period::median_period;
-use crate::record::PlacementRecord;
+use crate::record::{PlacementRecord, PoseSeries};
 
 /// Common time of IMU and reference below which nothing is said, s.
 const LEAST_OVERLAP_S: f64 = 4.0;
@@ -48,7 +48,10 @@ pub(crate) struct PreparedPlacement {
     pub usable: Vec<[bool; 6]>,
     /// White noise per sample that the device declares.
     pub declared: PerChannel<Option<f64>>,
+    /// Of the reference's motion, in metres.
     pub estimate: PoseEstimate,
+    /// Units per metre in which the reference reports positions.
+    pub length_units: f64,
     pub missing: MissingMessages,
 }
 
@@ -114,16 +117,7 @@ impl PreparedPlacement {
     pub fn new(record: &PlacementRecord) -> Result<Self, GapError> {
         let name = record.name.clone();
         let (stamps, measured) = in_order(record)?;
-        let reference = &record.reference;
-        let estimate = PoseEstimate::fit(
-            &reference.stamps,
-            &reference.positions,
-            &reference.rotations,
-        )
-        .map_err(|source| GapError::Reference {
-            placement: name.clone(),
-            source,
-        })?;
+        let estimate = estimated(&name, &record.reference)?;
         let grid = SampleGrid::under(&stamps).ok_or_else(|| GapError::TooFewMessages {
             placement: name.clone(),
             messages: stamps.len(),
@@ -149,9 +143,25 @@ impl PreparedPlacement {
             measured,
             declared: record.imu.declared,
             estimate,
+            length_units: 1.0,
         };
         prepared.refuse_stuck_axes()?;
         Ok(prepared)
+    }
+
+    /// Takes a factor of units of length out of the reference's positions.
+    pub fn bring_to_metres(
+        &mut self,
+        reference: &PoseSeries,
+        length_units: f64,
+    ) -> Result<(), GapError> {
+        let mut reference = reference.clone();
+        for position in &mut reference.positions {
+            *position /= length_units;
+        }
+        self.estimate = estimated(&self.name, &reference)?;
+        self.length_units = length_units;
+        Ok(())
     }
 
     /// Leaves out what the reference does not cover when the IMU's stamps are late by `lag_s`, and
@@ -307,6 +317,19 @@ impl PreparedPlacement {
         }
         sum
     }
+}
+
+/// The motion behind the poses of a reference.
+fn estimated(placement: &str, reference: &PoseSeries) -> Result<PoseEstimate, GapError> {
+    PoseEstimate::fit(
+        &reference.stamps,
+        &reference.positions,
+        &reference.rotations,
+    )
+    .map_err(|source| GapError::Reference {
+        placement: placement.to_owned(),
+        source,
+    })
 }
 
 /// Straight lines over entries without a usable value, held at the ends; all 0 without any.

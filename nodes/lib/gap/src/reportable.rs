@@ -146,6 +146,9 @@ fn read_off(model: &FitModel, observations: &Observations, from: ReadOff) -> Opt
             let factor = observations.units[channel];
             (factor != 1.0).then(|| vec![factor])
         }
+        ReadOff::ReferenceLength => {
+            (prepared.length_units != 1.0).then(|| vec![prepared.length_units])
+        }
         ReadOff::MissingMessages => {
             let missing = prepared.missing;
             (missing.fraction > 0.0).then(|| vec![missing.fraction, missing.mean_burst.max(1.0)])

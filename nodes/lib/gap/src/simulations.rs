@@ -1,5 +1,6 @@
 //! Simulations of a placement under sets of effects, and how far each lies from the readings.
 
+use std::borrow::Cow;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
@@ -25,7 +26,9 @@ pub(crate) struct Simulations<'a> {
     pub comparison: Comparison<'a>,
     /// The placement with clipped readings compared as well.
     pub whole: PreparedPlacement,
-    /// The track of the poses as they are, where the analysis undoes a smoothing.
+    /// The track of the analysis, in the reference's units of length.
+    track: Cow<'a, KinematicTrack>,
+    /// The same of the poses as they are, where the analysis undoes a smoothing.
     plain: Option<KinematicTrack>,
     /// Of the fit, at every covered reading.
     residual: Vec<Vec<f64>>,
@@ -58,7 +61,11 @@ impl<'a> Simulations<'a> {
                 measured: raw,
                 covered,
             },
-            plain: undone_hz.map(|_| whole.track(&whole.estimate)),
+            track: reported(Cow::Borrowed(&findings.model.track), whole.length_units),
+            plain: undone_hz.map(|_| {
+                let plain = Cow::Owned(whole.track(&whole.estimate));
+                reported(plain, whole.length_units).into_owned()
+            }),
             residual: whole.residual(&findings.scored.fit.prediction.readings),
             whiteners: RefCell::default(),
             units: PerChannel::from_fn(|channel| findings.reportable.unit_factor(channel)),
@@ -71,7 +78,7 @@ impl<'a> Simulations<'a> {
     pub fn simulate(&self, set: &EffectSet) -> Vec<Reading> {
         let track = match &self.plain {
             Some(plain) if set.get_read_off(ReadOff::ReferenceSpectrum).is_none() => plain,
-            _ => &self.findings.model.track,
+            _ => &self.track,
         };
         SensorModel::new(set, self.whole.epoch).run(track, &self.whole.stamps)
     }
@@ -199,4 +206,16 @@ impl<'a> Simulations<'a> {
         }
         self.metrics(&self.findings.reportable, &held_out)
     }
+}
+
+/// A track in metres as the reference reports it, in its units of length.
+fn reported(track: Cow<'_, KinematicTrack>, length_units: f64) -> Cow<'_, KinematicTrack> {
+    if length_units == 1.0 {
+        return track;
+    }
+    let mut reported = track.into_owned();
+    for acceleration in &mut reported.acceleration_in_segment {
+        *acceleration *= length_units;
+    }
+    Cow::Owned(reported)
 }

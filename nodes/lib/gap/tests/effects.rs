@@ -51,11 +51,13 @@ followed! {
     reference_smoothing: ReferenceSmoothing [6.0] => [0.5, 0.7];
     reference_tilt: ReferenceTilt [0.04, -0.05, 0.0] => [0.5, KEPT];
     reference_scale: ReferenceScale [1.1] => [0.5, KEPT];
+    reference_units: ReferenceUnits [1000.0] => [0.01, KEPT];
     mount_rotation: MountRotation [0.2, -0.15, 0.3] => [0.2, 0.2];
     lever_arm: LeverArm [0.05, 0.02, -0.06] => [0.5, KEPT];
     soft_tissue: SoftTissue [7.0, 0.3] => [0.5, KEPT];
     time_offset: TimeOffset [0.021] => [0.5, 0.5];
     clock_drift: ClockDrift [400.0] => [0.6, 0.6];
+    channel_delay: ChannelDelay [0.0115] => [KEPT, 0.2];
     accel_bias: AccelBias [0.2, -0.15, 0.1] => [0.7, KEPT];
     gyro_bias: GyroBias [0.05, -0.06, 0.03] => [KEPT, 0.6];
     accel_scale: AccelScale [1.04, 0.95, 1.03] => [0.6, KEPT];
@@ -73,6 +75,26 @@ followed! {
     accel_units: AccelUnits [1.0 / STANDARD_GRAVITY] => [0.1, KEPT];
     gyro_units: GyroUnits [180.0 / std::f64::consts::PI] => [KEPT, 0.1];
     gravity_convention: GravityConvention [1.0] => [0.1, KEPT];
+}
+
+#[test]
+fn every_unit_of_length_is_known() {
+    for (seed, factor) in [
+        (43, 100.0),
+        (44, 10.0),
+        (45, 39.370_078_74),
+        (46, 3.280_839_895),
+    ] {
+        found(&Scene::new(seed).with(K::ReferenceUnits, &[factor]));
+    }
+}
+
+#[test]
+fn a_gyroscope_that_is_early() {
+    followed(
+        &Scene::new(47).with(K::ChannelDelay, &[-0.004]),
+        [KEPT, 0.4],
+    );
 }
 
 #[test]

@@ -96,6 +96,16 @@ fn reference_tilt() {
 }
 
 #[test]
+fn reference_units() {
+    excluded(K::ReferenceUnits, &[1000.0]);
+}
+
+#[test]
+fn channel_delay() {
+    excluded(K::ChannelDelay, &[0.0115]);
+}
+
+#[test]
 fn low_pass() {
     excluded(K::LowPass, &[8.0]);
 }

@@ -34,6 +34,24 @@ fn a_low_pass_and_a_delay_are_told_apart() {
 }
 
 #[test]
+fn a_late_gyroscope_and_a_low_pass_are_told_apart() {
+    pair(
+        &Scene::new(63)
+            .with(K::ChannelDelay, &[0.012])
+            .with(K::LowPass, &[12.0]),
+    );
+}
+
+#[test]
+fn a_late_accelerometer_is_a_delay_and_an_early_gyroscope() {
+    pair(
+        &Scene::new(64)
+            .with(K::ChannelDelay, &[-0.012])
+            .with(K::TimeOffset, &[0.012]),
+    );
+}
+
+#[test]
 fn a_tilt_and_a_bias_are_told_apart() {
     pair(
         &Scene::new(61)
@@ -134,6 +152,8 @@ kept! {
     lever_arm: 70 LeverArm [0.05, 0.02, -0.06];
     mount_rotation: 71 MountRotation [0.2, -0.15, 0.3];
     time_offset: 72 TimeOffset [0.021];
+    reference_units: 81 ReferenceUnits [1000.0];
+    channel_delay: 82 ChannelDelay [0.0115];
     // What grows is 300 s further on.
     clock_drift: 73 ClockDrift [300.0];
     accel_bias_drift: 74 AccelBiasDrift [0.008, -0.006, 0.007];

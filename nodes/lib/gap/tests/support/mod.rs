@@ -11,7 +11,7 @@ use std::ops::Range;
 use cromosim_gap::{MeasuredImu, PlacementRecord, PoseSeries};
 use cromosim_imu::{
     DeclaredNoise, Dropouts, Effect, EffectKind, EffectSet, MeasurementInput, PerChannel, Reading,
-    SensorModel, normal_pair,
+    SensorModel, Stage, normal_pair,
 };
 use cromosim_spatial::{Stamp, so3};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -103,7 +103,8 @@ impl Scene {
         self.effects.get(kind).map(|effect| effect.values()[index])
     }
 
-    /// `p = T s p + noise`, `R = T R exp(noise)`, smoothed before the noise comes.
+    /// `p = u (T s p + noise)`, `R = T R exp(noise)`, smoothed before the noise comes; u the units of
+    /// length.
     fn reference(&self) -> PoseSeries {
         // 0.41 s before the IMU and after it, at no whole number of its intervals.
         let (before, count) = (0.4137, ((self.seconds + 0.83) * REFERENCE_HZ) as usize);
@@ -131,6 +132,7 @@ impl Scene {
             });
         let tilt = so3::exp(&tilt);
         let scale = self.value(EffectKind::ReferenceScale, 0).unwrap_or(1.0);
+        let units = self.effects.length_factor();
         let mut random = ChaCha12Rng::seed_from_u64(self.seed ^ 0x5eed);
         let mut series = PoseSeries::default();
         for k in margin..margin + count {
@@ -145,10 +147,10 @@ impl Scene {
                 rotation[2][k],
             ));
             series.stamps.push(self.start.plus_seconds(seconds(k)));
-            series.positions.push(
-                tilt * Vector3::new(position[0][k], position[1][k], position[2][k]) * scale
-                    + noise[0] * scatter[0],
-            );
+            let position = Vector3::new(position[0][k], position[1][k], position[2][k]);
+            series
+                .positions
+                .push((tilt * position * scale + noise[0] * scatter[0]) * units);
             series
                 .rotations
                 .push(tilt * world_from_segment * so3::exp(&(noise[1] * scatter[1])));
@@ -160,15 +162,9 @@ impl Scene {
     /// then losses.
     fn imu(&self) -> MeasuredImu {
         use EffectKind as K;
-        let mut device = self.effects.clone();
-        for kind in [
-            K::ReferenceNoise,
-            K::ReferenceSmoothing,
-            K::ReferenceTilt,
-            K::ReferenceScale,
-        ] {
-            device.remove(kind);
-        }
+        let is_device = |effect: &&Effect| effect.kind().spec().stage != Stage::Reference;
+        let device: Vec<Effect> = self.effects.iter().filter(is_device).cloned().collect();
+        let device = EffectSet::try_from(device).unwrap();
         let model = SensorModel::new(&device, self.epoch);
         let stamps: Vec<Stamp> = (0..(self.seconds * IMU_HZ) as usize)
             .map(|k| self.start.plus_seconds(k as f64 / IMU_HZ))

@@ -65,9 +65,10 @@ impl EffectKind {
             | ReadOff::ExcessNoise(_)
             | ReadOff::ReferenceScatter
             | ReadOff::ReferenceSpectrum => true,
-            ReadOff::ClippedReadings(_) | ReadOff::UnitFactor(_) | ReadOff::MissingMessages => {
-                false
-            }
+            ReadOff::ClippedReadings(_)
+            | ReadOff::UnitFactor(_)
+            | ReadOff::ReferenceLength
+            | ReadOff::MissingMessages => false,
         }
     }
 }

@@ -5,17 +5,19 @@ use super::{Effect, EffectKind, EffectSet, FirstGuess, Search, Shape, Stage};
 use crate::EffectError;
 
 /// The contract's table, in its order.
-const NAMES: [&str; 32] = [
+const NAMES: [&str; 34] = [
     "reference_noise",
     "reference_smoothing",
     "reference_tilt",
     "reference_scale",
+    "reference_units",
     "mount_rotation",
     "lever_arm",
     "mount_slip",
     "soft_tissue",
     "time_offset",
     "clock_drift",
+    "channel_delay",
     "dropped_samples",
     "accel_bias",
     "gyro_bias",

@@ -36,6 +36,7 @@ pub struct SensorModel {
     pub(super) epoch: Stamp,
     /// `c T g`, in the reported world.
     pub(super) gravity: Vector3<f64>,
+    /// 1 over the factor on positions of the reference: of scale and units.
     pub(super) inverse_scale: f64,
     pub(super) lever_arm: Option<Vector3<f64>>,
     pub(super) tissue: Option<SecondOrder>,
@@ -48,6 +49,8 @@ pub struct SensorModel {
     pub(super) low_pass: Option<SecondOrder>,
     pub(super) vibration: Option<SpectralLine>,
     pub(super) clock: Clock,
+    /// Of the gyroscope against the accelerometer, s.
+    pub(super) channel_delay: f64,
     pub(super) accelerometer: Readout,
     pub(super) gyroscope: Readout,
 }
@@ -80,7 +83,8 @@ impl SensorModel {
         Self {
             epoch,
             gravity: gravity * gravity_convention::gravity_factor(mode),
-            inverse_scale: scalar(Kind::ReferenceScale).map_or(1.0, f64::recip),
+            inverse_scale: scalar(Kind::ReferenceScale).map_or(1.0, f64::recip)
+                / effects.length_factor(),
             lever_arm: vector(Kind::LeverArm, 0),
             tissue: effects
                 .get(Kind::SoftTissue)
@@ -96,13 +100,14 @@ impl SensorModel {
                 offset: scalar(Kind::TimeOffset).unwrap_or(0.0),
                 ppm: scalar(Kind::ClockDrift).unwrap_or(0.0),
             },
+            channel_delay: scalar(Kind::ChannelDelay).unwrap_or(0.0),
             accelerometer: Readout::new(effects, Channel::Accelerometer),
             gyroscope: Readout::new(effects, Channel::Gyroscope),
         }
     }
 
-    /// [`super::Stage::Segment`]: specific force of the segment at the lever arm, with tilt and scale
-    /// of the reference undone; segment axes: `f = a / s + alpha x l + w x (w x l) - c R^T T g`, c = 1, 0 (removed) or
+    /// [`super::Stage::Segment`]: specific force of the segment at the lever arm, with tilt, scale
+    /// and units of the reference undone; segment axes: `f = a / s + alpha x l + w x (w x l) - c R^T T g`, c = 1, 0 (removed) or
     /// -1 (negated).
     pub(super) fn segment(&self, track: &KinematicTrack) -> GridTrace {
         let motion = track
@@ -195,9 +200,9 @@ impl SensorModel {
         }
     }
 
-    /// [`super::Stage::Timing`]: readings at the true times of the stamps, with the vibration in
-    /// closed form; `trace` is that of [`SensorModel::sensor`]. Before and after the grid its ends
-    /// are held.
+    /// [`super::Stage::Timing`]: readings at the true times of the stamps, those of the gyroscope
+    /// earlier by its delay, with the vibration in closed form; `trace` is that of
+    /// [`SensorModel::sensor`]. Before and after the grid its ends are held.
     pub(super) fn sample(&self, trace: &GridTrace, stamps: &[Stamp]) -> Vec<Reading> {
         let start = trace.start - self.epoch;
         let vibration = self.vibration.map(|line| match &self.low_pass {
@@ -207,8 +212,7 @@ impl SensorModel {
         let slip = self
             .slip
             .map(|(at, after)| Slip::new(self, trace, start, at, after));
-        let read = |stamp: &Stamp| {
-            let seconds = self.clock.true_seconds(*stamp - self.epoch);
+        let at = |seconds: f64| {
             let position = (seconds - start) * trace.rate_hz;
             let mut reading = match sampling::GridPosition::at(
                 position,
@@ -232,6 +236,14 @@ impl SensorModel {
                 if let Some(coupling) = &self.coupling {
                     reading.angular_velocity += coupling * specific_force;
                 }
+            }
+            reading
+        };
+        let read = |stamp: &Stamp| {
+            let seconds = self.clock.true_seconds(*stamp - self.epoch);
+            let mut reading = at(seconds);
+            if self.channel_delay != 0.0 {
+                reading.angular_velocity = at(seconds - self.channel_delay).angular_velocity;
             }
             reading
         };

@@ -170,6 +170,7 @@ fn effects_on_the_grid_act_as_by_hand() {
         &[
             (Kind::ReferenceTilt, tilt.as_slice()),
             (Kind::ReferenceScale, &[2.0]),
+            (Kind::ReferenceUnits, &[100.0]),
         ],
         &track,
         &stamps,
@@ -177,7 +178,7 @@ fn effects_on_the_grid_act_as_by_hand() {
     close(
         &tilted,
         |k| Reading {
-            specific_force: track.acceleration_in_segment[k] / 2.0 + leaning(k),
+            specific_force: track.acceleration_in_segment[k] / 200.0 + leaning(k),
             angular_velocity: track.angular_velocity_in_segment[k],
         },
         1e-9,
@@ -280,6 +281,38 @@ fn stamps_are_those_of_the_devices_clock() {
         },
         1e-7,
     );
+}
+
+#[test]
+fn the_gyroscope_alone_is_late_with_all_that_it_feels() {
+    let track = track(6.0);
+    let stamps = uniform_stamps(START.plus_seconds(1.0), START.plus_seconds(5.0), 200.0).unwrap();
+    let g = [0.0, 0.02, 0.0, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0];
+    let felt: [(Kind, &[f64]); 4] = [
+        (Kind::GyroGSensitivity, &g),
+        (Kind::LowPass, &[12.0]),
+        (Kind::MountSlip, &[START.as_seconds() + 3.0, 0.3, 0.0, 0.0]),
+        (Kind::TimeOffset, &[0.02]),
+    ];
+    for seconds in [0.0125, -0.004] {
+        let late: Vec<(Kind, &[f64])> = felt
+            .iter()
+            .copied()
+            .chain([(Kind::ChannelDelay, std::slice::from_ref(&seconds))])
+            .collect();
+        let read = run(&late, &track, &stamps);
+        let plain = run(&felt, &track, &stamps);
+        let before: Vec<Stamp> = stamps.iter().map(|t| t.plus_seconds(-seconds)).collect();
+        let earlier = run(&felt, &track, &before);
+        close(
+            &read,
+            |k| Reading {
+                specific_force: plain[k].specific_force,
+                angular_velocity: earlier[k].angular_velocity,
+            },
+            1e-6,
+        );
+    }
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! `reference_scale`: positions of the reference in wrong units of length.
+//! `reference_scale`: positions of the reference that are a little too large or too small.
 
 use super::search::{FirstGuess, FittedSearch, Identifiability, Ordinary, Search};
 use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};

@@ -141,6 +141,8 @@ pub enum ReadOff {
     ExcessNoise(Channel),
     /// Slope of measured on simulated readings: a known factor of units.
     UnitFactor(Channel),
+    /// Slope of the reference's accelerations on measured ones: a known factor of units of length.
+    ReferenceLength,
     /// Stamps that are missing between others: fraction and mean burst.
     MissingMessages,
     /// Scatter of the reported poses: standard deviations of position and rotation.

@@ -3,6 +3,7 @@
 use cromosim_spatial::Stamp;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
+use super::channel_delay::DelayLine;
 use super::dropped_samples::Dropouts;
 use super::filter::Streamed;
 use super::{EffectKind, Reading, SensorModel, Stage, lever_arm};
@@ -24,6 +25,8 @@ pub struct StreamingEffects {
     dropouts: Option<Dropouts>,
     tissue: Option<Streamed>,
     low_pass: Option<PerChannel<Streamed>>,
+    /// Of the gyroscope.
+    delay: Option<DelayLine>,
     /// Stamp and angular velocity (segment axes) of the sample before.
     previous: Option<(Stamp, Vector3<f64>)>,
 }
@@ -61,6 +64,7 @@ impl StreamingEffects {
             low_pass: model
                 .low_pass
                 .map(|filter| PerChannel::from_fn(|_| Streamed::new(filter))),
+            delay: (model.channel_delay != 0.0).then(|| DelayLine::new(model.channel_delay)),
             model: None,
             previous: None,
         })
@@ -87,6 +91,7 @@ impl StreamingEffects {
     fn forget(&mut self) {
         self.previous = None;
         self.tissue.iter_mut().for_each(Streamed::reset);
+        self.delay.iter_mut().for_each(DelayLine::reset);
         if let Some(filters) = &mut self.low_pass {
             Channel::ALL
                 .into_iter()
@@ -136,6 +141,9 @@ impl StreamingEffects {
                     self.shake_and_filter(model, &mut reading, seconds, interval);
                 }
                 Stage::Timing => {
+                    if let Some(delay) = &mut self.delay {
+                        reading.angular_velocity = delay.push(seconds, reading.angular_velocity);
+                    }
                     stamp = model.epoch.plus_seconds(model.clock.stamp_seconds(seconds));
                 }
                 Stage::Linear => reading = model.linear_reading(&reading, seconds),
@@ -182,8 +190,8 @@ impl StreamingEffects {
     fn segment(&mut self, model: &SensorModel, sample: &KinematicSample) -> Reading {
         let segment_from_world = sample.world_from_sensor.rotation.inverse();
         let angular_velocity = segment_from_world * sample.angular_velocity_in_world;
-        let mut specific_force =
-            segment_from_world * (sample.acceleration_in_world - model.gravity);
+        let mut specific_force = segment_from_world
+            * (sample.acceleration_in_world * model.inverse_scale - model.gravity);
         if let Some(offset) = &model.lever_arm {
             let difference = |(stamp, before): (Stamp, Vector3<f64>)| {
                 (angular_velocity - before) / (sample.stamp - stamp)
