@@ -82,10 +82,11 @@ pub(crate) mod vibration {
     pub const BELOW_HZ: f64 = 0.75;
     /// To this above it, Hz.
     pub const ABOVE_HZ: f64 = 1.0;
-    /// Least height of the line in the accelerometer, over the median of its surroundings.
+    /// Least height of the line in one channel, over the median of its surroundings.
     pub const LEAST_HEIGHT: f64 = 20.0;
-    /// Most height that stays in the gyroscope: a turning segment shows there too.
-    pub const MOST_TURNING: f64 = 8.0;
+    /// Most height that may stay in a channel where the sinusoid takes little away: a segment that
+    /// moves at this frequency shows there too, and no sinusoid follows it.
+    pub const MOST_HEIGHT_LEFT: f64 = 8.0;
     /// Most of the line's power that one sinusoid may leave.
     pub const MOST_LEFT: f64 = 0.3;
 }

@@ -112,14 +112,11 @@ pub(crate) fn search(
 }
 
 /// Candidates beside a set, each with its predicted score, the best first.
-fn candidates<'a>(
-    model: &FitModel,
-    fit: &Fit,
-    kinds: impl Iterator<Item = &'a EffectKind>,
-) -> Vec<(f64, Candidate)> {
-    let mut candidates: Vec<_> = kinds
+fn candidates(model: &FitModel, fit: &Fit, library: &[EffectKind]) -> Vec<(f64, Candidate)> {
+    let mut candidates: Vec<_> = library
+        .iter()
         .filter(|kind| fit.set.get(**kind).is_none())
-        .filter_map(|kind| screen(model, fit, *kind))
+        .flat_map(|kind| screen(model, fit, *kind, library))
         .map(|candidate| {
             (
                 candidate.predicted_gain - price_of(model, &candidate.set),
@@ -137,7 +134,7 @@ fn grown(
     scored: &ScoredEffectSet,
     library: &[EffectKind],
 ) -> Vec<ScoredEffectSet> {
-    let candidates = candidates(model, &scored.fit, library.iter());
+    let candidates = candidates(model, &scored.fit, library);
     trace(|| {
         let list: Vec<String> = candidates
             .iter()
@@ -199,8 +196,12 @@ pub(crate) fn exchanged(
         for kind in members {
             let smaller = score(model, scored.fit.set.without(kind));
             let mut rival = smaller.score;
-            let others = library.iter().filter(|other| **other != kind);
-            let candidates = candidates(model, &smaller.fit, others);
+            let others: Vec<EffectKind> = library
+                .iter()
+                .copied()
+                .filter(|other| *other != kind)
+                .collect();
+            let candidates = candidates(model, &smaller.fit, &others);
             for (predicted, candidate) in candidates.into_iter().take(RIVALS) {
                 let part = PART_OF_BEST_PREDICTION * (scored.score - smaller.score);
                 if predicted < smaller.score + part {

@@ -5,7 +5,7 @@ mod support;
 
 use cromosim_gap::PlacementAnswer;
 use cromosim_imu::{EffectKind as K, STANDARD_GRAVITY};
-use support::judge::{answer, cause, names_exactly, near, values_are};
+use support::judge::{answer, cause, names, names_exactly, near, values_are};
 use support::{IMU_HZ, Scene};
 
 /// Names exactly what was put in, with its values.
@@ -70,7 +70,7 @@ followed! {
     gyro_saturation: GyroSaturation [2.0] => [KEPT, 0.7];
     low_pass: LowPass [8.0] => [0.5, 0.5];
     gyro_g_sensitivity: GyroGSensitivity [2e-3, -1e-3, 1e-3, 1e-3, 2e-3, -2e-3, -1e-3, 1e-3, 2e-3] => [KEPT, 0.95];
-    vibration: Vibration [17.3, 0.5, -0.3, 0.4, 0.8] => [0.7, KEPT];
+    vibration: Vibration [17.3, 0.5, 0.3, 0.4, 0.8, 2.9, 5.1, 0.05, 0.03, 0.08, 1.6, 4.2, 3.0] => [0.7, 0.7];
     axis_convention: AxisConvention [0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, 1.0, 0.0] => [0.05, 0.1];
     accel_units: AccelUnits [1.0 / STANDARD_GRAVITY] => [0.1, KEPT];
     gyro_units: GyroUnits [180.0 / std::f64::consts::PI] => [KEPT, 0.1];
@@ -95,6 +95,28 @@ fn a_gyroscope_that_is_early() {
         &Scene::new(47).with(K::ChannelDelay, &[-0.004]),
         [KEPT, 0.4],
     );
+}
+
+#[test]
+fn a_vibration_of_the_accelerometer_alone() {
+    let scene = Scene::new(48);
+    let values = [
+        17.3, 0.5, 0.3, 0.4, 0.8, 0.8, 0.8, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+    ];
+    let diagnosis = answer(&scene.with(K::Vibration, &values).record()).diagnosis;
+    assert_eq!(names(&diagnosis), ["vibration"]);
+    assert!(diagnosis.gap.after.accel_rmse < 0.7 * diagnosis.gap.before.accel_rmse);
+}
+
+#[test]
+fn a_vibration_of_the_gyroscope_alone() {
+    let scene = Scene::new(49);
+    let values = [
+        23.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.05, 0.03, 0.08, 1.6, 4.2, 3.0,
+    ];
+    let diagnosis = answer(&scene.with(K::Vibration, &values).record()).diagnosis;
+    assert_eq!(names(&diagnosis), ["vibration"]);
+    assert!(diagnosis.gap.after.gyro_rmse < 0.5 * diagnosis.gap.before.gyro_rmse);
 }
 
 #[test]

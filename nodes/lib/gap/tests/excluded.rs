@@ -78,7 +78,7 @@ excluded! {
     accel_bias_drift: AccelBiasDrift [0.008, -0.006, 0.007];
     gyro_saturation: GyroSaturation [2.0];
     gyro_g_sensitivity: GyroGSensitivity [2e-3, -1e-3, 1e-3, 1e-3, 2e-3, -2e-3, -1e-3, 1e-3, 2e-3];
-    vibration: Vibration [17.3, 0.5, -0.3, 0.4, 0.8];
+    vibration: Vibration [17.3, 0.5, 0.3, 0.4, 0.8, 2.9, 5.1, 0.05, 0.03, 0.08, 1.6, 4.2, 3.0];
     axis_convention: AxisConvention [0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
     accel_units: AccelUnits [1.0 / STANDARD_GRAVITY];
     gravity_convention: GravityConvention [1.0];

@@ -160,7 +160,7 @@ kept! {
     scales: 75 AccelScale [1.04, 0.95, 1.03], GyroScale [0.97, 1.04, 1.03];
     low_pass: 76 LowPass [8.0];
     soft_tissue: 77 SoftTissue [7.0, 0.3];
-    vibration: 78 Vibration [17.3, 0.5, -0.3, 0.4, 0.8];
+    vibration: 78 Vibration [17.3, 0.5, 0.3, 0.4, 0.8, 2.9, 5.1, 0.05, 0.03, 0.08, 1.6, 4.2, 3.0];
     tilt_and_offset: 79 ReferenceTilt [0.04, -0.05, 0.0], TimeOffset [0.015];
 }
 

@@ -32,6 +32,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
     channels: &[Channel::Gyroscope],
     search: Search::Fitted(FittedSearch {
         first_guess: FirstGuess::Neutral,
+        companion: Some(EffectKind::TimeOffset),
         is_plausible: always,
         ordinary: Some(Ordinary::EachValue(ORDINARY_S)),
         rounding: None,

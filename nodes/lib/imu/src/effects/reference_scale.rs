@@ -31,6 +31,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
     channels: &[Channel::Accelerometer],
     search: Search::Fitted(FittedSearch {
         first_guess: FirstGuess::Neutral,
+        companion: None,
         is_plausible,
         ordinary: Some(Ordinary::EachValue(ORDINARY)),
         rounding: None,

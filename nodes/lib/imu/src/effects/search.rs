@@ -20,6 +20,9 @@ pub enum Search {
 pub struct FittedSearch {
     /// Where its fit begins.
     pub first_guess: FirstGuess,
+    /// Another effect that it is also tried together with, from neutral values: alone neither may
+    /// help.
+    pub companion: Option<EffectKind>,
     /// Whether fitted values are what such an effect has; else it stands in for something else. The
     /// set holds the effect and those fitted beside it.
     pub is_plausible: fn(&Effect, &EffectSet) -> bool,

@@ -41,7 +41,7 @@ const MANY: &str = "- {effect: lever_arm, offset: [0.05, 0.0, -0.06]}
 - {effect: accel_saturation, limit: 30.0}
 - {effect: low_pass, cutoff_hz: 15.0}
 - {effect: gyro_g_sensitivity, matrix: [[0.001, 0.0, 0.0], [0.0, 0.0, 0.002], [0.0, 0.0, 0.0]]}
-- {effect: vibration, hz: 31.0, amplitude: [0.1, 0.2, 0.3], phase: 0.4}
+- {effect: vibration, hz: 31.0, amplitude: [0.1, 0.2, 0.3], phase: [0.4, 1.0, 5.0], gyro_amplitude: [0.02, 0.0, 0.01], gyro_phase: [0.3, 0.0, 2.0]}
 ";
 
 #[test]
