@@ -3,7 +3,7 @@
 use cromosim_imu::{
     AXES, Channel, EffectSet, PerChannel, Reading, ResidualView, SensorModel, Stage, StagedReadings,
 };
-use cromosim_spatial::{KinematicTrack, PoseEstimate, Spectrum, Stamp, welch};
+use cromosim_spatial::{FrameGrid, KinematicTrack, PoseEstimate, Spectrum, Stamp, welch};
 
 use crate::axes::{axes_of_channel, value_on_axis};
 use crate::error::GapError;
@@ -48,11 +48,30 @@ pub(crate) struct PreparedPlacement {
     pub usable: Vec<[bool; 6]>,
     /// White noise per sample that the device declares.
     pub declared: PerChannel<Option<f64>>,
-    /// Of the reference's motion, in metres.
+    /// Of the reference's motion, in metres, from its own frames.
     pub estimate: PoseEstimate,
-    /// Units per metre in which the reference reports positions.
-    pub length_units: f64,
+    /// The same from poses that were interpolated between these frames; none where they were not.
+    pub interpolated: Option<PoseEstimate>,
+    pub report: ReferenceReport,
     pub missing: MissingMessages,
+}
+
+/// How a reference reports its poses.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ReferenceReport {
+    /// Units per metre of positions.
+    pub length_units: f64,
+    /// The frames between which poses were interpolated; none where they were not.
+    pub frames: Option<FrameGrid>,
+}
+
+impl Default for ReferenceReport {
+    fn default() -> Self {
+        Self {
+            length_units: 1.0,
+            frames: None,
+        }
+    }
 }
 
 /// Entries of the sample grid without a message.
@@ -143,24 +162,32 @@ impl PreparedPlacement {
             measured,
             declared: record.imu.declared,
             estimate,
-            length_units: 1.0,
+            interpolated: None,
+            report: ReferenceReport::default(),
         };
         prepared.refuse_stuck_axes()?;
         Ok(prepared)
     }
 
-    /// Takes a factor of units of length out of the reference's positions.
-    pub fn bring_to_metres(
+    /// Takes the way in which the reference was reported back: its units of length, and the
+    /// interpolation between its frames.
+    pub fn restore_reference(
         &mut self,
         reference: &PoseSeries,
-        length_units: f64,
+        report: ReferenceReport,
     ) -> Result<(), GapError> {
-        let mut reference = reference.clone();
-        for position in &mut reference.positions {
-            *position /= length_units;
+        let mut poses = reference.clone();
+        if report.length_units != 1.0 {
+            for position in &mut poses.positions {
+                *position /= report.length_units;
+            }
+            self.estimate = estimated(&self.name, &poses)?;
         }
-        self.estimate = estimated(&self.name, &reference)?;
-        self.length_units = length_units;
+        if let Some(frames) = report.frames {
+            let restored = estimated(&self.name, &frames.frames(&poses))?;
+            self.interpolated = Some(std::mem::replace(&mut self.estimate, restored));
+        }
+        self.report = report;
         Ok(())
     }
 
@@ -293,6 +320,15 @@ impl PreparedPlacement {
     pub fn residual(&self, predicted: &[Reading]) -> Vec<Vec<f64>> {
         self.on_sample_grid(|k, axis| {
             value_on_axis(&self.measured[k], axis) - value_on_axis(&predicted[k], axis)
+        })
+    }
+
+    /// Norms of the residual by channel, m/s2 and rad/s times the root of the number of values.
+    pub fn residual_norms(&self, predicted: &[Reading]) -> PerChannel<f64> {
+        let residual = self.residual(predicted);
+        PerChannel::from_fn(|channel| {
+            let own = residual[axes_of_channel(channel)].iter().flatten();
+            own.map(|e| e * e).sum::<f64>().sqrt()
         })
     }
 

@@ -147,7 +147,12 @@ fn read_off(model: &FitModel, observations: &Observations, from: ReadOff) -> Opt
             (factor != 1.0).then(|| vec![factor])
         }
         ReadOff::ReferenceLength => {
-            (prepared.length_units != 1.0).then(|| vec![prepared.length_units])
+            let units = prepared.report.length_units;
+            (units != 1.0).then(|| vec![units])
+        }
+        ReadOff::ReferenceFrames => {
+            let frames = prepared.report.frames?;
+            Some(vec![frames.rate_hz()])
         }
         ReadOff::MissingMessages => {
             let missing = prepared.missing;

@@ -6,7 +6,7 @@ mod support;
 use cromosim_gap::PlacementAnswer;
 use cromosim_imu::{EffectKind as K, STANDARD_GRAVITY};
 use support::judge::{answer, cause, names, names_exactly, near, values_are};
-use support::{IMU_HZ, Scene};
+use support::{IMU_HZ, Scene, seed_of};
 
 /// Names exactly what was put in, with its values.
 fn found(scene: &Scene) -> PlacementAnswer {
@@ -41,7 +41,7 @@ macro_rules! followed {
     ($($name:ident: $kind:ident $values:expr => $parts:expr;)*) => {
         $(#[test]
         fn $name() {
-            followed(&Scene::new(K::$kind as u64).with(K::$kind, &$values), $parts);
+            followed(&Scene::new(seed_of(K::$kind)).with(K::$kind, &$values), $parts);
         })*
         const FOLLOWED: &[K] = &[$(K::$kind),*];
     };
@@ -49,6 +49,7 @@ macro_rules! followed {
 
 followed! {
     reference_smoothing: ReferenceSmoothing [6.0] => [0.5, 0.7];
+    reference_interpolation: ReferenceInterpolation [47.3] => [0.75, 0.6];
     reference_tilt: ReferenceTilt [0.04, -0.05, 0.0] => [0.5, KEPT];
     reference_scale: ReferenceScale [1.1] => [0.5, KEPT];
     reference_units: ReferenceUnits [1000.0] => [0.01, KEPT];
@@ -149,7 +150,7 @@ macro_rules! noise_like {
     ($($name:ident: $kind:ident $values:expr;)*) => {
         $(#[test]
         fn $name() {
-            found(&Scene::new(K::$kind as u64).with(K::$kind, &$values));
+            found(&Scene::new(seed_of(K::$kind)).with(K::$kind, &$values));
         })*
         const NOISE_LIKE: &[K] = &[$(K::$kind),*];
     };

@@ -6,8 +6,8 @@ mod support;
 use cromosim_gap::{DiagnoseOptions, PlacementAnswer, diagnose};
 use cromosim_imu::EffectKind as K;
 use cromosim_imu::STANDARD_GRAVITY;
-use support::Scene;
 use support::judge::{names, shares_add_up};
+use support::{Scene, seed_of};
 
 /// Without the effect the gap holds structure that nothing explains.
 fn excluded(kind: K, values: &[f64]) -> PlacementAnswer {
@@ -16,7 +16,7 @@ fn excluded(kind: K, values: &[f64]) -> PlacementAnswer {
         ..DiagnoseOptions::default()
     };
     let answer = diagnose(
-        &Scene::new(kind as u64).with(kind, values).record(),
+        &Scene::new(seed_of(kind)).with(kind, values).record(),
         &options,
     )
     .unwrap();
@@ -98,6 +98,11 @@ fn reference_tilt() {
 #[test]
 fn reference_units() {
     excluded(K::ReferenceUnits, &[1000.0]);
+}
+
+#[test]
+fn reference_interpolation() {
+    excluded(K::ReferenceInterpolation, &[24.0]);
 }
 
 #[test]

@@ -5,7 +5,7 @@ mod support;
 
 use cromosim_gap::{PlacementAnswer, PlacementRecord};
 use cromosim_imu::{EffectKind as K, EffectSet, Reading, SensorModel};
-use cromosim_spatial::{PoseEstimate, Stamp};
+use cromosim_spatial::{FrameGrid, PoseEstimate, Stamp};
 use support::Scene;
 use support::judge::{answer, names_exactly, values_are};
 
@@ -74,12 +74,11 @@ fn a_delay_and_a_lever_arm() {
 /// second.
 fn simulated_gap(record: &PlacementRecord, effects: &EffectSet, epoch: Stamp) -> [f64; 2] {
     let reference = &record.reference;
-    let estimate = PoseEstimate::fit(
-        &reference.stamps,
-        &reference.positions,
-        &reference.rotations,
-    )
-    .unwrap();
+    let frames = effects
+        .frame_rate_hz()
+        .and_then(|rate_hz| FrameGrid::at_rate(reference, rate_hz))
+        .map_or_else(|| reference.clone(), |grid| grid.frames(reference));
+    let estimate = PoseEstimate::fit(&frames.stamps, &frames.positions, &frames.rotations).unwrap();
     let readings = SensorModel::new(effects, epoch).run(&estimate.track(200.0), &record.imu.stamps);
     let kept = |stamp: &Stamp| *stamp - estimate.start() > 1.0 && estimate.end() - *stamp > 1.0;
     let residuals: Vec<(&Reading, &Reading)> = record
@@ -153,6 +152,7 @@ kept! {
     mount_rotation: 71 MountRotation [0.2, -0.15, 0.3];
     time_offset: 72 TimeOffset [0.021];
     reference_units: 81 ReferenceUnits [1000.0];
+    reference_interpolation: 83 ReferenceInterpolation [47.3];
     channel_delay: 82 ChannelDelay [0.0115];
     // What grows is 300 s further on.
     clock_drift: 73 ClockDrift [300.0];

@@ -5,14 +5,17 @@ use std::path::Path;
 use cromosim_bag::BagWriter;
 use cromosim_imu::{
     DeclaredNoise, Differentiation, EffectKind, EffectSet, EffectsFile, ImuOptions,
-    KinematicSample, PlacementEffects, ReadingMapping, RecordedMotion, SampleVariance,
+    KinematicSample, PlacementEffects, ReadingMapping, RecordedMotion, SampleVariance, SensorFrame,
     SensorTrajectory, Trim, measure_recording, simulate_kinematics, track_in_sensor_axes,
 };
 use cromosim_learned::{LearnedSimulator, MappingFile, SiteMotion};
 use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_msgs::std_msgs::Header;
-use cromosim_spatial::{KinematicTrack, PoseEstimate, Stamp, uniform_stamps};
+use cromosim_spatial::{
+    FrameGrid, KinematicTrack, PoseEstimate, PoseSeries, Stamp, uniform_stamps,
+};
+use nalgebra::Isometry3;
 
 use crate::{Quality, RecordedPlacement, RecordingError};
 
@@ -179,8 +182,8 @@ impl Resimulation {
             .get(EffectKind::ReferenceSmoothing)
             .and_then(|smoothing| smoothing.values().first().copied());
         let rate_hz = (2.0 * imu_rate_hz).max(200.0);
+        let poses = own_frames(placement.poses(), effects);
         let Some(scheme) = self.scheme else {
-            let poses = placement.poses();
             let estimate = PoseEstimate::fit(&poses.stamps, &poses.positions, &poses.rotations)
                 .map_err(|source| RecordingError::NotEstimated { source })?;
             let estimate = undone_hz
@@ -193,9 +196,40 @@ impl Resimulation {
                 scheme: scheme.to_string(),
             });
         }
-        let trajectory = placement.trajectory()?;
-        differentiated(&trajectory, scheme, rate_hz, self.learned.as_ref())
+        let units = effects.length_factor();
+        let trajectory = trajectory_in_metres(&poses, units)?;
+        let (mut track, samples) =
+            differentiated(&trajectory, scheme, rate_hz, self.learned.as_ref())?;
+        // The effects take the units back.
+        for acceleration in &mut track.acceleration_in_segment {
+            *acceleration *= units;
+        }
+        Ok((track, samples))
     }
+}
+
+/// The frames of a reference that was interpolated between them, where the effects say so and the
+/// poses show it; else the poses.
+fn own_frames(poses: PoseSeries, effects: &EffectSet) -> PoseSeries {
+    effects
+        .frame_rate_hz()
+        .and_then(|rate_hz| FrameGrid::at_rate(&poses, rate_hz))
+        .map_or_else(|| poses.clone(), |grid| grid.frames(&poses))
+}
+
+/// Poses as the derivative schemes take them.
+fn trajectory_in_metres(
+    poses: &PoseSeries,
+    length_units: f64,
+) -> Result<SensorTrajectory, RecordingError> {
+    let frame = |k: usize| {
+        let position = poses.positions[k] / length_units;
+        let pose = Isometry3::from_parts(position.into(), poses.rotations[k]);
+        SensorFrame::new(poses.stamps[k], pose)
+    };
+    Ok(SensorTrajectory::new(
+        (0..poses.stamps.len()).map(frame).collect(),
+    )?)
 }
 
 /// The motion by a scheme and what networks add to it, on a grid from the first frame to the last.

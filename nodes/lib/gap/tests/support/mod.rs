@@ -33,6 +33,25 @@ const MARGIN_S: f64 = 4.0;
 /// An instant of today, so that nothing may lean on small times.
 const TODAY: Stamp = Stamp::from_nanos(1_700_000_000_123_456_789);
 
+/// Effects that came later than the others' tests.
+const LATER: [EffectKind; 3] = [
+    EffectKind::ReferenceInterpolation,
+    EffectKind::ReferenceUnits,
+    EffectKind::ChannelDelay,
+];
+
+/// Seed of the scene in which an effect is tested: a new effect gives the others no other motions.
+pub fn seed_of(kind: EffectKind) -> u64 {
+    let place = |list: &[EffectKind]| list.iter().position(|other| *other == kind);
+    let first: Vec<EffectKind> = EffectKind::ALL
+        .into_iter()
+        .filter(|other| !LATER.contains(other))
+        .collect();
+    place(&first)
+        .or_else(|| place(&LATER).map(|place| 90 + place))
+        .unwrap() as u64
+}
+
 /// What is to be recorded.
 #[derive(Clone, Debug)]
 pub struct Scene {
@@ -111,7 +130,7 @@ impl Scene {
         let margin = (MARGIN_S * REFERENCE_HZ) as usize;
         let seconds = |k: usize| (k as f64 - margin as f64) / REFERENCE_HZ - before;
         let instants: Vec<_> = (0..count + 2 * margin)
-            .map(|k| self.motion.at(seconds(k)))
+            .map(|k| self.reported_instant(seconds(k)))
             .collect();
         let channel = |of: &dyn Fn(&motion::Instant) -> f64| {
             let series: Vec<f64> = instants.iter().map(of).collect();
@@ -156,6 +175,21 @@ impl Scene {
                 .push(tilt * world_from_segment * so3::exp(&(noise[1] * scatter[1])));
         }
         series
+    }
+
+    /// The motion, or what lies on the chord between two frames of it.
+    fn reported_instant(&self, t: f64) -> motion::Instant {
+        let Some(rate_hz) = self.effects.frame_rate_hz() else {
+            return self.motion.at(t);
+        };
+        let frame = (t * rate_hz).floor();
+        let share = t * rate_hz - frame;
+        let [from, to] = [frame, frame + 1.0].map(|frame| self.motion.at(frame / rate_hz));
+        motion::Instant {
+            position: from.position.lerp(&to.position, share),
+            world_from_segment: from.world_from_segment.slerp(&to.world_from_segment, share),
+            ..from
+        }
     }
 
     /// The device's part of the effects on the exact kinematics, then noise, then what is digital,

@@ -64,7 +64,8 @@ impl EffectKind {
             ReadOff::Lattice(_)
             | ReadOff::ExcessNoise(_)
             | ReadOff::ReferenceScatter
-            | ReadOff::ReferenceSpectrum => true,
+            | ReadOff::ReferenceSpectrum
+            | ReadOff::ReferenceFrames => true,
             ReadOff::ClippedReadings(_)
             | ReadOff::UnitFactor(_)
             | ReadOff::ReferenceLength

@@ -5,9 +5,10 @@ use super::{Effect, EffectKind, EffectSet, FirstGuess, Search, Shape, Stage};
 use crate::EffectError;
 
 /// The contract's table, in its order.
-const NAMES: [&str; 34] = [
+const NAMES: [&str; 35] = [
     "reference_noise",
     "reference_smoothing",
+    "reference_interpolation",
     "reference_tilt",
     "reference_scale",
     "reference_units",

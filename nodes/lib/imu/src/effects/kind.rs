@@ -9,6 +9,8 @@ macro_rules! with_effects {
             ReferenceNoise => reference_noise::SPEC,
             /// A reference that was low-passed.
             ReferenceSmoothing => reference_smoothing::SPEC,
+            /// A reference interpolated between frames.
+            ReferenceInterpolation => reference_interpolation::SPEC,
             /// A world of the reference that is not level.
             ReferenceTilt => reference_tilt::SPEC,
             /// A reference whose positions are a little too large or too small.

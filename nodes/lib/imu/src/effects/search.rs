@@ -152,6 +152,8 @@ pub enum ReadOff {
     ReferenceScatter,
     /// What the reported poses lack at high frequencies: a cutoff.
     ReferenceSpectrum,
+    /// Kinks of the reported poses that come back at a steady rate.
+    ReferenceFrames,
 }
 
 /// For [`FittedSearch::is_plausible`]: all values within the bounds are.

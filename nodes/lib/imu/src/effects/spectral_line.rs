@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use cromosim_spatial::{Complex64, FourierPair};
+use cromosim_spatial::{Complex64, FourierPair, greatest_near};
 use nalgebra::Vector3;
 
 use super::residual_view::{ResidualView, median};
@@ -37,7 +37,7 @@ pub fn strongest_line(view: &ResidualView) -> Option<SpectralLine> {
             .iter()
             .sum()
     };
-    let hz = refined(power, coarse_hz, spectra.spacing_hz);
+    let hz = greatest_near(power, coarse_hz, spectra.spacing_hz, PRECISION_HZ);
     Some(SpectralLine {
         hz,
         waves: centred.waves(hz),
@@ -175,24 +175,4 @@ impl Spectra {
         }
         best
     }
-}
-
-/// The greatest value near a coarse peak, by golden sections.
-fn refined(power: impl Fn(f64) -> f64, peak: f64, width: f64) -> f64 {
-    let golden = 0.618_033_988_749_895;
-    let (mut low, mut high) = (peak - width, peak + width);
-    let (mut a, mut b) = (high - golden * (high - low), low + golden * (high - low));
-    let (mut at_a, mut at_b) = (power(a), power(b));
-    while high - low > PRECISION_HZ {
-        if at_a > at_b {
-            (high, b, at_b) = (b, a, at_a);
-            a = high - golden * (high - low);
-            at_a = power(a);
-        } else {
-            (low, a, at_a) = (a, b, at_b);
-            b = low + golden * (high - low);
-            at_b = power(b);
-        }
-    }
-    0.5 * (low + high)
 }
