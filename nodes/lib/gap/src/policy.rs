@@ -31,6 +31,10 @@ pub(crate) mod search {
     pub const PART_OF_BEST_PREDICTION: f64 = 0.3;
     /// And so is one within so many nats of the best.
     pub const NEAR_BEST_NATS: f64 = 20.0;
+    /// Most by which a member of a set may raise the norm of a channel's residual: what helps one
+    /// channel at the cost of the other stands in for something else, such as a low-pass for a
+    /// gyroscope that is late.
+    pub const MOST_RISE: f64 = 1.02;
     /// And none that loses more than this, nats.
     pub const MOST_LOSS_NATS: f64 = 10.0;
 }
