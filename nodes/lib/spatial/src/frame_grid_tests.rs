@@ -66,6 +66,8 @@ fn frames_are_found_and_come_back() {
         (100.0, 54.27, 0.0, ORDINARY),
         (100.0, 45.73, 0.0, ORDINARY),
         (200.0, 25.0, 0.011, ORDINARY),
+        (200.0, 23.14, 0.0, ORDINARY),
+        (200.0, 41.305, 0.0, ORDINARY),
         (200.0, 60.0, 0.0, [2e-4, 1.2e-3]),
         (200.0, 50.0, 0.0, [3e-4, 1.7e-3]),
         (120.0, 30.0, 0.0, ORDINARY),
@@ -86,6 +88,10 @@ fn frames_are_found_and_come_back() {
             "{case}: {again:?}"
         );
         let frames = grid.frames(&poses);
+        if poses_hz < 2.0 * frames_hz {
+            assert_eq!(frames.stamps, poses.stamps, "{case}");
+            continue;
+        }
         let mut squares = [0.0; 2];
         for (k, stamp) in frames.stamps.iter().enumerate() {
             let t = *stamp - poses.stamps[0];

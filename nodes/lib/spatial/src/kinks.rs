@@ -37,6 +37,9 @@ pub(crate) struct Kinks {
     rate_hz: f64,
     /// Mean squares of the second differences, per axis: m2, rad2.
     pub mean_squares: [f64; 2],
+    /// Up to half the poses' rate, zero-padded, and its spacing, Hz.
+    power: Vec<f64>,
+    spacing_hz: f64,
 }
 
 /// Second differences at a pose: of the position, m, and of the rotation vector, rad; none where the
@@ -92,13 +95,20 @@ impl Kinks {
             .iter()
             .map(|pair| pair.as_ref().map_or(0.0, |pair| own(pair) - mean))
             .collect();
-        (rate_hz.is_finite() && mean > 0.0).then_some(Self {
+        if !(rate_hz.is_finite() && mean > 0.0) {
+            return None;
+        }
+        let mut kinks = Self {
             seconds: seconds[1..seconds.len() - 1].to_vec(),
             energy,
             mean,
             rate_hz,
             mean_squares,
-        })
+            power: Vec::new(),
+            spacing_hz: 0.0,
+        };
+        (kinks.power, kinks.spacing_hz) = kinks.spectrum();
+        Some(kinks)
     }
 
     /// Rate of the poses, Hz.
@@ -125,16 +135,15 @@ impl Kinks {
     /// The rate that stands out most, up to half the poses', Hz: that of the kinks, or how it shows
     /// in samples of the poses' rate. None where none stands out.
     pub fn strongest_rate(&self) -> Option<f64> {
-        let (power, spacing_hz) = self.spectrum();
-        let around = ((SURROUNDINGS_HZ / spacing_hz) as usize).max(20);
-        let lowest = (LEAST_HZ / spacing_hz).ceil() as usize;
+        let lowest = (LEAST_HZ / self.spacing_hz).ceil() as usize;
+        let around = self.around();
         let mut best = (LEAST_HEIGHT, None);
-        for from in (lowest..power.len()).step_by(around) {
-            let to = (from + around).min(power.len());
-            let level = level(&power, from..to, around, lowest);
-            for (k, value) in power.iter().enumerate().take(to).skip(from) {
+        for from in (lowest..self.power.len()).step_by(around) {
+            let to = (from + around).min(self.power.len());
+            let level = level(&self.power, from..to, around, lowest);
+            for (k, value) in self.power.iter().enumerate().take(to).skip(from) {
                 if value / level > best.0 {
-                    best = (value / level, Some(k as f64 * spacing_hz));
+                    best = (value / level, Some(k as f64 * self.spacing_hz));
                 }
             }
         }
@@ -150,7 +159,11 @@ impl Kinks {
 
     /// Whether kinks come back at a rate.
     pub fn have_rate(&self, hz: f64) -> bool {
-        let (power, spacing_hz) = self.spectrum();
+        self.height(hz) > LEAST_HEIGHT && self.modulation(self.sharpened(hz)) > LEAST_MODULATION
+    }
+
+    /// Height of the line that kinks of a rate make, over its surroundings; 0 where none can be seen.
+    pub fn height(&self, hz: f64) -> f64 {
         let nyquist_hz = self.rate_hz / 2.0;
         let shown_hz = if hz > nyquist_hz {
             self.rate_hz - hz
@@ -158,16 +171,18 @@ impl Kinks {
             hz
         };
         if !(LEAST_HZ..=nyquist_hz).contains(&shown_hz) {
-            return false;
+            return 0.0;
         }
-        let k = (shown_hz / spacing_hz).round() as usize;
-        let around = ((SURROUNDINGS_HZ / spacing_hz) as usize).max(20);
-        let peak = power[k.saturating_sub(2)..(k + 3).min(power.len())]
+        let k = (shown_hz / self.spacing_hz).round() as usize;
+        let peak = self.power[k.saturating_sub(2)..(k + 3).min(self.power.len())]
             .iter()
             .copied()
             .fold(0.0, f64::max);
-        peak > LEAST_HEIGHT * level(&power, k..k + 1, around, 1)
-            && self.modulation(self.sharpened(hz)) > LEAST_MODULATION
+        peak / level(&self.power, k..k + 1, self.around(), 1)
+    }
+
+    fn around(&self) -> usize {
+        ((SURROUNDINGS_HZ / self.spacing_hz) as usize).max(20)
     }
 
     /// Zero-padded spectrum up to half the poses' rate, and its spacing, Hz.
