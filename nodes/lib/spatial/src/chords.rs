@@ -18,6 +18,8 @@ pub(crate) struct Chords {
     frames: PoseSeries,
     /// Sum of the squared weights of the poses on each.
     support: Vec<f64>,
+    /// Of the poses.
+    places: Vec<Place>,
     /// Mean squares that the poses are off the chords, per axis and less what the frames take up: m2,
     /// rad2.
     pub misfit: [f64; 2],
@@ -39,21 +41,20 @@ impl Chords {
     pub fn fit(poses: &PoseSeries, rate_hz: f64, offset_s: f64) -> Self {
         let seconds = poses.seconds();
         let first = offset_s - 1.0 / rate_hz;
-        let places: Vec<Place> = seconds
-            .iter()
-            .map(|seconds| {
-                let position = ((seconds - first) * rate_hz).max(0.0);
-                Place {
-                    frame: position as usize,
-                    share: position.fract(),
-                }
-            })
-            .collect();
+        let place = |seconds: &f64| {
+            let position = ((seconds - first) * rate_hz).max(0.0);
+            Place {
+                frame: position as usize,
+                share: position.fract(),
+            }
+        };
+        let places: Vec<Place> = seconds.iter().map(place).collect();
         let count = places.last().map_or(0, |place| place.frame) + 2;
         let times: Vec<f64> = (0..count).map(|k| first + k as f64 / rate_hz).collect();
         let mut chords = Self {
             frames: between(poses, &seconds, &times),
             support: support(&places, count),
+            places: places.clone(),
             misfit: [0.0; 2],
         };
         for _ in 0..STEPS {
@@ -79,6 +80,42 @@ impl Chords {
         }
     }
 
+    /// The poses, each moved from its chord to the cubic through the four frames around:
+    /// `- u (1 - u) (d_0 / 3 + d_1 / 6 + u (d_1 - d_0) / 6)`, with u the pose's share of the way and d the
+    /// frames' second differences.
+    pub fn onto_curve(&self, poses: &PoseSeries) -> PoseSeries {
+        let mut curved = poses.clone();
+        for (k, place) in self.places.iter().enumerate() {
+            let [from, to] = [place.frame, place.frame + 1].map(|frame| self.bend(frame));
+            let u = place.share;
+            let moved = |of: usize| {
+                let change = from[of] / 3.0 + to[of] / 6.0 + (to[of] - from[of]) * (u / 6.0);
+                change * (-u * (1.0 - u))
+            };
+            curved.positions[k] += moved(0);
+            curved.rotations[k] *= so3::exp(&moved(1));
+        }
+        curved
+    }
+
+    /// Second differences at a frame; zero at the ends and beside frames that no pose tells of.
+    fn bend(&self, frame: usize) -> Change {
+        let is_told = |k: usize| self.support.get(k).is_some_and(|own| *own > LEAST_SUPPORT);
+        if frame == 0 || !(frame - 1..=frame + 1).all(is_told) {
+            return [Vector3::zeros(); 2];
+        }
+        let PoseSeries {
+            positions,
+            rotations,
+            ..
+        } = &self.frames;
+        let turn = |k: usize| so3::log(&(rotations[k].inverse() * rotations[k + 1]));
+        [
+            positions[frame - 1] - positions[frame] * 2.0 + positions[frame + 1],
+            turn(frame) - turn(frame - 1),
+        ]
+    }
+
     /// How far a pose is off its chord.
     fn off(&self, poses: &PoseSeries, k: usize, place: &Place) -> Change {
         let (a, b) = (place.frame, place.frame + 1);
@@ -101,9 +138,9 @@ impl Chords {
         for (k, place) in places.iter().enumerate() {
             let off = self.off(poses, k, place);
             beside[place.frame] += place.share * (1.0 - place.share);
-            for of in 0..2 {
-                changes[place.frame][of] += off[of] * (1.0 - place.share);
-                changes[place.frame + 1][of] += off[of] * place.share;
+            for (of, off) in off.iter().enumerate() {
+                changes[place.frame][of] += off * (1.0 - place.share);
+                changes[place.frame + 1][of] += off * place.share;
             }
         }
         // Thomas' algorithm.

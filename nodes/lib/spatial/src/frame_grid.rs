@@ -86,15 +86,17 @@ impl FrameGrid {
         self.rate_hz
     }
 
-    /// The frames themselves, by least squares; the poses, where they are so few that the frames would
-    /// be noisier.
+    /// The frames themselves, by least squares; where these are so many that they would be noisier than
+    /// the poses, the poses moved from the chords to a curve through the frames.
     pub fn frames(&self, poses: &PoseSeries) -> PoseSeries {
         let seconds = poses.seconds();
         let span = seconds.last().copied().unwrap_or(0.0);
+        let chords = Chords::fit(poses, self.rate_hz, self.offset_s);
         if (seconds.len() as f64) < LEAST_TO_RESTORE * self.rate_hz * span {
-            return poses.clone();
+            chords.onto_curve(poses)
+        } else {
+            chords.into_frames()
         }
-        Chords::fit(poses, self.rate_hz, self.offset_s).into_frames()
     }
 
     /// With frames where the kinks of this rate come, sharpened to where poses are least off the

@@ -90,7 +90,6 @@ fn frames_are_found_and_come_back() {
         let frames = grid.frames(&poses);
         if poses_hz < 2.0 * frames_hz {
             assert_eq!(frames.stamps, poses.stamps, "{case}");
-            continue;
         }
         let mut squares = [0.0; 2];
         for (k, stamp) in frames.stamps.iter().enumerate() {
