@@ -147,17 +147,15 @@ impl Chords {
         for k in 1..count {
             let factor = beside[k - 1] / diagonal[k - 1];
             diagonal[k] -= factor * beside[k - 1];
-            for of in 0..2 {
-                let before = changes[k - 1][of];
-                changes[k][of] -= before * factor;
+            let before = changes[k - 1];
+            for (own, before) in changes[k].iter_mut().zip(before) {
+                *own -= before * factor;
             }
         }
         for k in (0..count).rev() {
-            for of in 0..2 {
-                let after = changes
-                    .get(k + 1)
-                    .map_or_else(Vector3::zeros, |next| next[of]);
-                changes[k][of] = (changes[k][of] - after * beside[k]) / diagonal[k];
+            let after = changes.get(k + 1).copied().unwrap_or_default();
+            for (own, after) in changes[k].iter_mut().zip(after) {
+                *own = (*own - after * beside[k]) / diagonal[k];
             }
         }
         for (k, [step, turn]) in changes.iter().enumerate() {

@@ -147,8 +147,8 @@ impl FrameGrid {
             let is_within = frame(k - 1) == frame(k + 1);
             within_count += usize::from(is_within);
             count += 1;
-            for of in 0..2 {
-                let square = differences[of].norm_squared() / 18.0;
+            for (of, difference) in differences.iter().enumerate() {
+                let square = difference.norm_squared() / 18.0;
                 all[of] += square;
                 within[of] += if is_within { square } else { 0.0 };
             }

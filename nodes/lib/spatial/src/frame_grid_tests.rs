@@ -97,9 +97,9 @@ fn frames_are_found_and_come_back() {
             squares[0] += (frames.positions[k] - position(t)).norm_squared();
             squares[1] += so3::log(&(rotation(t).inverse() * frames.rotations[k])).norm_squared();
         }
-        for of in 0..2 {
-            let rms = (squares[of] / (3.0 * frames.stamps.len() as f64)).sqrt();
-            assert!(rms < 1.3 * noise[of] + 2e-4, "{case}: off by {rms}");
+        for (square, noise) in squares.iter().zip(noise) {
+            let rms = (square / (3.0 * frames.stamps.len() as f64)).sqrt();
+            assert!(rms < 1.3 * noise + 2e-4, "{case}: off by {rms}");
         }
     }
 }
