@@ -45,7 +45,7 @@ placements:
       - {effect: mount_rotation, rotvec: [0.1, -0.05, 0.02]}
       - {effect: mount_slip, at: 5.0, rotvec: [0.0, 0.1, 0.0]}
       - {effect: soft_tissue, natural_hz: 7.0, damping_ratio: 0.4}
-      - {effect: vibration, hz: 31.0, amplitude: [0.2, 0.1, 0.0], phase: 0.3}
+      - {effect: vibration, hz: 31.0, amplitude: [0.2, 0.1, 0.0], phase: [0.3, 0.3, 0.0], gyro_amplitude: [0.0, 0.02, 0.0], gyro_phase: [0.0, 1.0, 0.0]}
       - {effect: clock_drift, ppm: 80.0}
       - {effect: accel_noise, density: 0.003}
       - {effect: accel_quantization, lsb: 0.01}
@@ -88,7 +88,7 @@ YAML
 run train training.yaml --data . --out model
 
 if [ -d "$cases" ]; then
-    for case in lever-arm none time-offset-and-bias vibration soft-tissue reference-units; do
+    for case in lever-arm none time-offset-and-bias vibration soft-tissue reference-units channel-delay reference-interpolation; do
         run diagnose "$cases/$case/fit.mcap" --out "diagnosis-$case"
         run simulate --reference "$cases/$case/check.mcap" --effects "diagnosis-$case/effects.yaml" --out "$case.mcap"
     done

@@ -5,12 +5,12 @@ import numpy as np
 
 STRENGTHS = ("weak", "medium", "strong")
 ALL = (
-    "reference_noise reference_smoothing reference_tilt reference_scale mount_rotation lever_arm mount_slip soft_tissue "
-    "time_offset clock_drift dropped_samples accel_bias gyro_bias accel_scale gyro_scale accel_misalignment gyro_misalignment "
+    "reference_noise reference_smoothing reference_interpolation reference_tilt reference_scale reference_units mount_rotation lever_arm mount_slip soft_tissue "
+    "time_offset clock_drift channel_delay dropped_samples accel_bias gyro_bias accel_scale gyro_scale accel_misalignment gyro_misalignment "
     "accel_noise gyro_noise accel_bias_drift gyro_bias_drift accel_saturation gyro_saturation accel_quantization gyro_quantization "
     "low_pass gyro_g_sensitivity vibration axis_convention accel_units gyro_units gravity_convention").split()
 # no strength: these are plain to see, or not there at all
-CONVENTIONS = ("axis_convention", "accel_units", "gyro_units", "gravity_convention")
+CONVENTIONS = ("reference_units", "axis_convention", "accel_units", "gyro_units", "gravity_convention")
 STANDARD_GRAVITY = 9.80665
 
 # pairs whose product is one effect, or of which one hides the other by its nature
@@ -18,7 +18,8 @@ INCOMPATIBLE = [{"axis_convention", "mount_rotation"}, {"accel_units", "accel_sc
                 {"gravity_convention", "reference_tilt"}, {"gravity_convention", "accel_saturation"},
                 {"gravity_convention", "axis_convention"}, {"reference_noise", "reference_smoothing"},
                 {"accel_noise", "accel_quantization"}, {"gyro_noise", "gyro_quantization"},
-                {"gravity_convention", "accel_units"}]
+                {"gravity_convention", "accel_units"}, {"reference_interpolation", "reference_smoothing"},
+                {"reference_interpolation", "reference_noise"}, {"reference_units", "reference_scale"}]
 
 
 def compatible(names):
@@ -61,6 +62,10 @@ def draw(rng, effect, level, context):
         return {"position": 0.0 if which == "rotation" else max(position, 1.05e-3), "rotation": 0.0 if which == "position" else max(rotation, 0.27 * degrees)}
     if effect == "reference_smoothing":
         return {"cutoff_hz": size(6.0, 4.0, 2.5)}
+    if effect == "reference_interpolation":
+        return {"rate_hz": size(50, 35, 25)}
+    if effect == "reference_units":
+        return {"factor": float(rng.choice([1000.0, 100.0, 10.0, 39.37007874015748, 3.280839895013123]))}
     if effect == "reference_tilt":
         angle, azimuth = size(1, 3, 8) * degrees, rng.uniform(0, 2 * np.pi)
         return {"rotvec": [angle * np.cos(azimuth), angle * np.sin(azimuth), 0.0]}
@@ -77,6 +82,8 @@ def draw(rng, effect, level, context):
     if effect == "time_offset":
         far = level == 2 and rng.random() < 0.3
         return {"seconds": sign * (rng.uniform(0.3, 2.0) if far else size(0.004, 0.020, 0.080))}
+    if effect == "channel_delay":
+        return {"seconds": sign * size(0.003, 0.007, 0.013)}
     if effect == "clock_drift":
         return {"ppm": sign * size(60, 300, 1500)}
     if effect == "dropped_samples":
@@ -101,7 +108,11 @@ def draw(rng, effect, level, context):
         return {"matrix": _signed(rng, size(2e-4, 1e-3, 5e-3), 9).reshape(3, 3).tolist()}
     if effect == "vibration":
         hz = rng.uniform(8, min(45, 0.45 * context["rate"]))
-        return {"hz": hz, "amplitude": _direction(rng, size(0.1, 0.5, 3.0)), "phase": rng.uniform(0, 2 * np.pi)}
+        amplitude = size(0.1, 0.5, 3.0)
+        turning = amplitude * rng.uniform(0.02, 0.1) if rng.random() < 0.7 else 0.0
+        phases = rng.uniform(0, 2 * np.pi, (2, 3)) if rng.random() < 0.7 else np.full((2, 3), rng.uniform(0, 2 * np.pi))
+        return {"hz": hz, "amplitude": np.abs(_direction(rng, amplitude)).tolist(), "phase": phases[0].tolist(),
+                "gyro_amplitude": np.abs(_direction(rng, turning)).tolist(), "gyro_phase": phases[1].tolist()}
     if effect == "axis_convention":
         choices = signed_permutations()
         return {"matrix": choices[rng.integers(len(choices))].tolist()}

@@ -94,10 +94,12 @@ def compare(effect, true, said, errors):
     """Scalars inside their 90 % interval and in all, and the named error of the effect where it has one."""
     inside = total = 0
     said = dict(said)
-    if effect == "vibration" and {"amplitude", "phase"} <= set(said):
-        if np.dot(said["amplitude"], true["amplitude"]) < 0:  # the same wave, half a turn on
-            said["amplitude"], said["phase"] = (-_flat(said["amplitude"])).tolist(), said["phase"] + np.pi
-        said["phase"] = true["phase"] + (said["phase"] - true["phase"] + np.pi) % (2 * np.pi) - np.pi
+    if effect == "vibration":
+        for amplitude, phase in (("amplitude", "phase"), ("gyro_amplitude", "gyro_phase")):
+            if {amplitude, phase} <= set(said):  # a negative amplitude is the same wave, half a turn on
+                turned = _flat(said[phase]) + np.where(_flat(said[amplitude]) < 0, np.pi, 0.0) - _flat(true[phase])
+                said[amplitude] = np.abs(_flat(said[amplitude])).tolist()
+                said[phase] = (_flat(true[phase]) + (turned + np.pi) % (2 * np.pi) - np.pi).tolist()
     for key, value in true.items():
         if effect in UNSCALED or key not in said or errors is None or errors.get(key) is None:
             continue

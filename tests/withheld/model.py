@@ -1,9 +1,10 @@
 """The measurement model of the contract, stage by stage, for one placement. `effects`: name -> parameters, as in effects.yaml."""
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
 from scipy.signal import butter, lfilter, sosfiltfilt
 from scipy.ndimage import gaussian_filter1d
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import Rotation, Slerp
 
 GRAVITY = np.array([0.0, 0.0, -9.80665])
 DENSE_RATE = 2000.0  # Hz at least, for the continuous stages
@@ -25,9 +26,34 @@ def _second_order(values, step, natural, damping, lead):
     return values[0] + lfilter(numerator, denominator, values - values[0], axis=0)
 
 
-def soft_tissue(force, step, natural_hz, damping_ratio):
-    natural = 2 * np.pi * natural_hz
-    return _second_order(force, step, natural, 2 * damping_ratio * natural, 2 * damping_ratio * natural)
+def _cross(a, b):
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def soft_tissue(force, rate, change, step, natural_hz, damping_ratio):
+    """A mass on spring and damper in the turning segment frame, by Runge and Kutta's method over two steps; all in segment axes."""
+    square, damper = (2 * np.pi * natural_hz) ** 2, 4 * np.pi * natural_hz * damping_ratio
+
+    def slope(d, speed, f, w, alpha):
+        coriolis, euler, centrifugal = _cross(w, speed), _cross(alpha, d), _cross(w, _cross(w, d))
+        return [-square * d[i] - damper * speed[i] - f[i] - 2 * coriolis[i] - euler[i] - centrifugal[i] for i in range(3)]
+
+    def moved(value, by, factor):
+        return [a + factor * b for a, b in zip(value, by)]
+
+    f, w, alpha = force.tolist(), rate.tolist(), change.tolist()
+    d, speed, h = [-x / square for x in f[0]], [0.0] * 3, 2 * step
+    out = [d + speed]
+    for k in range(0, len(f) - 2, 2):
+        a = speed, slope(d, speed, f[k], w[k], alpha[k])
+        b = moved(speed, a[1], h / 2), slope(moved(d, a[0], h / 2), moved(speed, a[1], h / 2), f[k + 1], w[k + 1], alpha[k + 1])
+        c = moved(speed, b[1], h / 2), slope(moved(d, b[0], h / 2), moved(speed, b[1], h / 2), f[k + 1], w[k + 1], alpha[k + 1])
+        e = moved(speed, c[1], h), slope(moved(d, c[0], h), moved(speed, c[1], h), f[k + 2], w[k + 2], alpha[k + 2])
+        d, speed = ([x + h / 6 * (p + 2 * q + 2 * r + s) for x, p, q, r, s in zip(own, a[i], b[i], c[i], e[i])] for i, own in enumerate((d, speed)))
+        out.append(d + speed)
+    read = -np.array(out) @ np.vstack([square * np.eye(3), damper * np.eye(3)])
+    at = np.arange(len(f))
+    return np.column_stack([np.interp(at, at[:2 * len(read):2][:len(read)], column) for column in read.T])
 
 
 def low_pass(values, step, cutoff_hz):
@@ -36,14 +62,14 @@ def low_pass(values, step, cutoff_hz):
 
 
 def segment_values(motion, times, effects):
-    """Stage 1: specific force and angular velocity in segment axes."""
+    """Stage 1: specific force, angular velocity and its derivative in segment axes."""
     rotation, acceleration, rate, change = motion.kinematics(times)
     mode = effects.get("gravity_convention", {}).get("mode")
     gravity = {None: GRAVITY, "removed": 0 * GRAVITY, "negated": -GRAVITY}[mode]
     if "lever_arm" in effects:
         lever = rotation.apply(effects["lever_arm"]["offset"])
         acceleration = acceleration + np.cross(change, lever) + np.cross(rate, np.cross(rate, lever))
-    return rotation.apply(acceleration - gravity, inverse=True), rotation.apply(rate, inverse=True)
+    return [rotation.apply(x, inverse=True) for x in (acceleration - gravity, rate, change)]
 
 
 def mount(force, rate, times, effects):
@@ -73,19 +99,24 @@ def inner_stages(motion, times, t0, effects, extra=None):
     step = interval / fine
     warm = int(WARM_UP / interval) * fine
     dense = times[0] + step * (np.arange((len(times) - 1) * fine + 1 + warm) - warm)
-    force, rate = segment_values(motion, dense, effects)
+    force, rate, change = segment_values(motion, dense, effects)
     if "soft_tissue" in effects:
-        force = soft_tissue(force, step, **effects["soft_tissue"])
+        force = soft_tissue(force, rate, change, step, **effects["soft_tissue"])
     force, rate = mount(force, rate, dense, effects)
     if "mount" in extra:
         force, rate = extra["mount"](dense - t0, force, rate)
     if "vibration" in effects:
         wave = effects["vibration"]
-        force = force + np.array(wave["amplitude"]) * np.sin(2 * np.pi * wave["hz"] * (dense - t0) + wave["phase"])[:, None]
+        turns = 2 * np.pi * wave["hz"] * (dense - t0)[:, None]
+        force = force + np.array(wave["amplitude"]) * np.sin(turns + np.array(wave["phase"]))
+        rate = rate + np.array(wave["gyro_amplitude"]) * np.sin(turns + np.array(wave["gyro_phase"]))
     if "gyro_g_sensitivity" in effects:
         rate = rate + force @ np.array(effects["gyro_g_sensitivity"]["matrix"]).T
     if "low_pass" in effects:
         force, rate = (low_pass(x, step, **effects["low_pass"]) for x in (force, rate))
+    if "channel_delay" in effects:
+        late = dense - effects["channel_delay"]["seconds"]
+        rate = CubicSpline(dense, rate)(np.clip(late, dense[0], dense[-1]))
     force, rate = force[warm::fine], rate[warm::fine]
     if "channel" in extra:
         force, rate = extra["channel"](times - t0, force, rate)
@@ -155,12 +186,17 @@ def reference(rng, motion, times, effects, ordinary, smoothing):
         position, rotation = position + position_noise, rotation * Rotation.from_rotvec(rotation_noise)
     if "reference_smoothing" in effects:
         position, rotation = smooth(position, rotation, 1 / (times[1] - times[0]), effects["reference_smoothing"]["cutoff_hz"], smoothing)
+    if "reference_interpolation" in effects:
+        frames = np.arange(times[0], times[-1] + 2 / effects["reference_interpolation"]["rate_hz"], 1 / effects["reference_interpolation"]["rate_hz"])
+        at_frames, turned = motion.pose(frames)
+        position = np.column_stack([np.interp(times, frames, column) for column in at_frames.T])
+        rotation = Slerp(frames, turned)(times)
     position = position * effects.get("reference_scale", {}).get("factor", 1.0)
     tilt = Rotation.from_rotvec(effects.get("reference_tilt", {}).get("rotvec", [0.0, 0.0, 0.0]))
     position, rotation = tilt.apply(position), tilt * rotation
     if "reference_smoothing" not in effects or not before:
         position, rotation = position + position_noise, rotation * Rotation.from_rotvec(rotation_noise)
-    return position, rotation
+    return position * effects.get("reference_units", {}).get("factor", 1.0), rotation
 
 
 def smooth(position, rotation, rate, cutoff, smoothing):

@@ -3,7 +3,7 @@
 
 use cromosim_imu::{
     Channel, Effect, EffectError, EffectSet, GRAVITY_IN_WORLD, GravityMode, PerChannel, Reading,
-    nearest_signed_permutation, unit_factors,
+    length_factors, nearest_signed_permutation, unit_factors,
 };
 use cromosim_spatial::{KinematicTrack, so3};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
@@ -22,6 +22,13 @@ const LEAST_SPREAD: f64 = 0.0025;
 /// Smallest over largest singular value below which readings have too little to do with the
 /// reference to have axes.
 const LEAST_LIKENESS: f64 = 0.3;
+/// Squared correlation of the accelerations below which nothing is told of the reference's units of
+/// length: a turned mount or a poor reference halves a slope too, but not along with a good
+/// correlation.
+const LEAST_LIKENESS_FOR_LENGTH: f64 = 0.5;
+/// Cost of a reference that is not in metres, in units of a slope's squared scatter; that of a device
+/// with other units or gravity, which is met more often, is 1.
+const UNUSUAL_LENGTH: f64 = 1.5;
 /// A scale is a known unit's factor when it is within 12 % of it (natural logarithm).
 const FACTOR_TOLERANCE: f64 = 0.12;
 
@@ -33,6 +40,8 @@ pub(crate) struct CoarseAlignment {
     /// Factors of the units.
     pub units: PerChannel<f64>,
     pub gravity: GravityMode,
+    /// Units per metre of the reference's positions.
+    pub length_units: f64,
     /// sensor_from_segment, a reflection where the determinant says so; none without enough
     /// rotation.
     pub axes: Option<Matrix3<f64>>,
@@ -53,14 +62,15 @@ impl CoarseAlignment {
             .collect();
         let (axes, gyro) = gyro_axes(&rows, track);
         let turn = axes.unwrap_or_else(Matrix3::identity);
-        let (accel, gravity) = accel_units(&rows, track, &turn);
+        let scales = ForceSlopes::new(&rows, track, &turn).scales();
         Self {
             lag_s,
             units: PerChannel {
-                accelerometer: accel,
+                accelerometer: scales.accel,
                 gyroscope: gyro,
             },
-            gravity,
+            gravity: scales.gravity,
+            length_units: scales.length,
             axes,
         }
     }
@@ -166,55 +176,111 @@ pub(crate) fn known_factor(scale: f64, channel: Channel) -> f64 {
         .unwrap_or(1.0)
 }
 
-/// Units and gravity from `y = s_a R^T a + s_g (-R^T g)`.
-fn accel_units(
-    rows: &[(&Reading, usize)],
-    track: &KinematicTrack,
-    turn: &Matrix3<f64>,
-) -> (f64, GravityMode) {
-    let (mut aa, mut ag, mut gg, mut ya, mut yg) = (0.0, 0.0, 0.0, 0.0, 0.0);
-    for (reading, entry) in rows {
-        let a = turn * track.acceleration_in_segment[*entry];
-        let g = turn * (track.world_from_segment[*entry].inverse() * -GRAVITY_IN_WORLD);
-        aa += a.dot(&a);
-        ag += a.dot(&g);
-        gg += g.dot(&g);
-        ya += reading.specific_force.dot(&a);
-        yg += reading.specific_force.dot(&g);
+/// Factors of the accelerometer's units, gravity, and units per metre of the reference.
+struct Scales {
+    accel: f64,
+    gravity: GravityMode,
+    length: f64,
+}
+
+/// Inner products of the measured specific force y, the reference's acceleration `R^T a` and its
+/// gravity `-R^T g`, for the slopes of `y = s_a R^T a + s_g (-R^T g)`.
+#[derive(Default)]
+struct ForceSlopes {
+    aa: f64,
+    ag: f64,
+    gg: f64,
+    ya: f64,
+    yg: f64,
+    yy: f64,
+}
+
+impl ForceSlopes {
+    fn new(rows: &[(&Reading, usize)], track: &KinematicTrack, turn: &Matrix3<f64>) -> Self {
+        let mut sums = Self::default();
+        for (reading, entry) in rows {
+            let a = turn * track.acceleration_in_segment[*entry];
+            let g = turn * (track.world_from_segment[*entry].inverse() * -GRAVITY_IN_WORLD);
+            let y = reading.specific_force;
+            sums.aa += a.dot(&a);
+            sums.ag += a.dot(&g);
+            sums.gg += g.dot(&g);
+            sums.ya += y.dot(&a);
+            sums.yg += y.dot(&g);
+            sums.yy += y.dot(&y);
+        }
+        sums
     }
-    let determinant = aa * gg - ag * ag;
-    if gg <= 0.0 || determinant <= 1e-9 * gg * gg {
-        // At rest gravity alone tells.
-        let slope = if gg > 0.0 { yg / gg } else { 1.0 };
-        let mode = if slope < 0.0 {
-            GravityMode::Negated
+
+    /// The known factors that the slopes are nearest to.
+    fn scales(&self) -> Scales {
+        let Self {
+            aa, ag, gg, ya, yg, ..
+        } = *self;
+        let determinant = aa * gg - ag * ag;
+        if gg <= 0.0 || determinant <= 1e-9 * gg * gg {
+            return self.at_rest();
+        }
+        let (of_a, of_g) = (
+            (ya * gg - yg * ag) / determinant,
+            (yg * aa - ya * ag) / determinant,
+        );
+        let lengths = if self.likeness() > LEAST_LIKENESS_FOR_LENGTH {
+            length_factors()
         } else {
-            GravityMode::Kept
+            &length_factors()[..1]
         };
-        return (known_factor(slope.abs(), Channel::Accelerometer), mode);
-    }
-    let (of_a, of_g) = (
-        (ya * gg - yg * ag) / determinant,
-        (yg * aa - ya * ag) / determinant,
-    );
-    // An acceleration that is small in the reference weighs little.
-    let weight = (aa / gg * 50.0).min(1.0);
-    let mut best = (f64::INFINITY, 1.0, GravityMode::Kept);
-    for &factor in unit_factors(Channel::Accelerometer) {
-        for mode in GravityMode::ALL {
-            let unusual = if factor == 1.0 && mode == GravityMode::Kept {
-                0.0
-            } else {
-                1.0
-            };
-            // Scatter of the slopes: 0.15 of gravity's, 0.4 of the acceleration's.
-            let cost = ((of_g / factor - mode.factor()) / 0.15).powi(2)
-                + weight * ((of_a / factor - 1.0) / 0.4).powi(2)
-                + unusual;
-            if cost < best.0 {
-                best = (cost, factor, mode);
+        let mut best = f64::INFINITY;
+        let mut scales = self.at_rest();
+        for &length in lengths {
+            // An acceleration that is small in the reference weighs little.
+            let weight = (aa / length.powi(2) / gg * 50.0).min(1.0);
+            for &accel in unit_factors(Channel::Accelerometer) {
+                for gravity in GravityMode::ALL {
+                    let is_device_unusual = accel != 1.0 || gravity != GravityMode::Kept;
+                    let unusual = f64::from(u8::from(is_device_unusual))
+                        + if length == 1.0 { 0.0 } else { UNUSUAL_LENGTH };
+                    // Scatter of the slopes: 0.15 of gravity's, 0.4 of the acceleration's.
+                    let cost = ((of_g / accel - gravity.factor()) / 0.15).powi(2)
+                        + weight * ((of_a * length / accel - 1.0) / 0.4).powi(2)
+                        + unusual;
+                    if cost < best {
+                        best = cost;
+                        scales = Scales {
+                            accel,
+                            gravity,
+                            length,
+                        };
+                    }
+                }
             }
         }
+        scales
     }
-    (best.1, best.2)
+
+    /// Without acceleration: gravity alone tells.
+    fn at_rest(&self) -> Scales {
+        let slope = if self.gg > 0.0 {
+            self.yg / self.gg
+        } else {
+            1.0
+        };
+        Scales {
+            accel: known_factor(slope.abs(), Channel::Accelerometer),
+            gravity: if slope < 0.0 {
+                GravityMode::Negated
+            } else {
+                GravityMode::Kept
+            },
+            length: 1.0,
+        }
+    }
+
+    /// Squared correlation of what is measured with the reference's acceleration, gravity taken out
+    /// of both.
+    fn likeness(&self) -> f64 {
+        let y = self.yy - self.yg * self.yg / self.gg;
+        let a = self.aa - self.ag * self.ag / self.gg;
+        (self.ya - self.yg * self.ag / self.gg).powi(2) / (y * a).max(f64::MIN_POSITIVE)
+    }
 }

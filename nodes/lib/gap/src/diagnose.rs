@@ -3,7 +3,7 @@
 use cromosim_imu::{
     Channel, DeclaredNoise, Effect, EffectKind, EffectSet, PerChannel, PlacementEffects, ReadOff,
 };
-use cromosim_spatial::KinematicTrack;
+use cromosim_spatial::{FrameGrid, KinematicTrack};
 
 use crate::builder::DiagnosisBuilder;
 use crate::coarse_alignment::CoarseAlignment;
@@ -18,7 +18,7 @@ use crate::library::{Library, without_all};
 use crate::noise_updates::{first_model, with_updated_noise};
 use crate::policy::report::MOSTLY_EXPLAINED;
 use crate::policy::search::{MOST, MOST_AT_FIRST, ROUNDS};
-use crate::prepared::PreparedPlacement;
+use crate::prepared::{PreparedPlacement, ReferenceReport};
 use crate::record::PlacementRecord;
 use crate::reportable::{Observations, is_ordinary, reportable_effects};
 use crate::search::{ScoredEffectSet, excess, exchanged, score, score_as_it_is, search};
@@ -59,8 +59,13 @@ pub fn diagnose(
     let library = Library::without(&options.excluded);
     let mut prepared = PreparedPlacement::new(record)?;
     let raw = prepared.measured.clone();
-    let track = prepared.track(&prepared.estimate);
+    let mut track = prepared.track(&prepared.estimate);
     let alignment = CoarseAlignment::find(&prepared, &track);
+    let report = reference_report(record, &alignment, &library);
+    if report.length_units != 1.0 || report.frames.is_some() {
+        prepared.restore_reference(&record.reference, report)?;
+        track = prepared.track(&prepared.estimate);
+    }
     let digital =
         PerChannel::from_fn(|channel| Digital::read_off(&prepared.measured, channel, &library));
     prepared.cover(alignment.lag_s)?;
@@ -135,6 +140,26 @@ fn allowed_units(alignment: &CoarseAlignment, library: &Library) -> PerChannel<f
             1.0
         }
     })
+}
+
+/// How the reference reports its poses, as far as the library may name it.
+fn reference_report(
+    record: &PlacementRecord,
+    alignment: &CoarseAlignment,
+    library: &Library,
+) -> ReferenceReport {
+    let nominal = ReferenceReport::default();
+    ReferenceReport {
+        length_units: if library.allows_read_off(ReadOff::ReferenceLength) {
+            alignment.length_units
+        } else {
+            nominal.length_units
+        },
+        frames: library
+            .allows_read_off(ReadOff::ReferenceFrames)
+            .then(|| FrameGrid::find(&record.reference))
+            .flatten(),
+    }
 }
 
 /// What the analysis starts from.

@@ -29,6 +29,7 @@ mod policy;
 mod prepared;
 mod probability;
 mod record;
+mod reference_tracks;
 pub mod report;
 mod reportable;
 mod residual_regressions;

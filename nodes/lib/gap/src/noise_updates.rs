@@ -7,8 +7,8 @@ use crate::digital::Digital;
 use crate::fit::FitModel;
 use crate::library::Library;
 use crate::noise_model::{NoiseBasis, NoiseModel, ReferenceShare};
+use crate::plausibility::is_strong;
 use crate::policy::report::ORDINARY_REFERENCE_NOISE;
-use crate::policy::vibration::LEAST_POWER;
 use crate::prepared::PreparedPlacement;
 use crate::search::ScoredEffectSet;
 use crate::sensor_noise::{found_noise, white_noise};
@@ -81,12 +81,12 @@ pub(crate) fn ordinary_share(found: PoseNoise) -> ReferenceShare {
     }
 }
 
-/// Frequency of the strongest line of the accelerometer's residual where it may be a vibration, Hz.
+/// Frequency of the strongest line of the residual where it may be a vibration, Hz.
 fn suspicious_line(
     prepared: &PreparedPlacement,
     basis: &NoiseBasis,
     simulated: &[Reading],
 ) -> Option<f64> {
     let line = strongest_line(&prepared.view(simulated))?;
-    (line.power() > LEAST_POWER * basis.sigma.accelerometer.powi(2)).then_some(line.hz)
+    is_strong(&line, basis.sigma).then_some(line.hz)
 }

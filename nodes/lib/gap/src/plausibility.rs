@@ -1,11 +1,11 @@
 //! Whether fitted effects look like what they are named after.
 
-use cromosim_imu::{Channel, EffectSet, Search};
+use cromosim_imu::{Channel, EffectSet, PerChannel, Search, SpectralLine};
 use cromosim_spatial::Spectrum;
 
 use crate::fit::{Fit, FitModel};
 use crate::policy::vibration::{
-    ABOVE_HZ, BELOW_HZ, LEAST_HEIGHT, LEAST_HZ, LEAST_POWER, MOST_LEFT, MOST_TURNING,
+    ABOVE_HZ, BELOW_HZ, LEAST_HEIGHT, LEAST_HZ, LEAST_POWER, MOST_HEIGHT_LEFT, MOST_LEFT,
     SURROUNDINGS_HZ,
 };
 
@@ -19,8 +19,8 @@ pub(crate) fn is_plausible(set: &EffectSet) -> bool {
 }
 
 /// Whether a vibration in the set is more than motion that the reference does not resolve: strong
-/// against the white noise, faster than gait, alone in the accelerometer, and one sinusoid that
-/// takes most of the line away.
+/// against the white noise of a channel, faster than gait, a line there, and one sinusoid that takes
+/// most of the line away in each channel that has it.
 pub(crate) fn is_true_vibration(model: &FitModel, fit: &Fit) -> bool {
     let Some((kind, line)) = fit
         .set
@@ -29,8 +29,7 @@ pub(crate) fn is_true_vibration(model: &FitModel, fit: &Fit) -> bool {
     else {
         return true;
     };
-    let sigma = model.basis.sigma.accelerometer;
-    if line.power() < LEAST_POWER * sigma.powi(2) || line.hz < LEAST_HZ {
+    if !is_strong(&line, model.basis.sigma) || line.hz < LEAST_HZ {
         return false;
     }
     let prepared = model.prepared;
@@ -40,12 +39,24 @@ pub(crate) fn is_true_vibration(model: &FitModel, fit: &Fit) -> bool {
     let line_of = |series: &[Vec<f64>], channel: Channel| {
         LineInSpectrum::at(&prepared.channel_spectrum(series, channel), line.hz)
     };
-    let before = line_of(&before, Channel::Accelerometer);
-    let left = line_of(&after, Channel::Accelerometer);
-    let turning = line_of(&after, Channel::Gyroscope);
-    before.height > LEAST_HEIGHT
-        && turning.height < MOST_TURNING
-        && left.power < MOST_LEFT * before.power
+    let mut stands_out = false;
+    for channel in Channel::ALL {
+        let (before, left) = (line_of(&before, channel), line_of(&after, channel));
+        let is_high = before.height > LEAST_HEIGHT;
+        let is_taken_away = left.power < MOST_LEFT * before.power;
+        if !is_taken_away && (is_high || left.height > MOST_HEIGHT_LEFT) {
+            return false;
+        }
+        stands_out |= is_high;
+    }
+    stands_out
+}
+
+/// Whether a line is strong against the white noise (per sample) of either channel.
+pub(crate) fn is_strong(line: &SpectralLine, sigma: PerChannel<f64>) -> bool {
+    Channel::ALL
+        .into_iter()
+        .any(|channel| line.power(channel) > LEAST_POWER * sigma[channel].powi(2))
 }
 
 /// A line of a spectrum against its surroundings.

@@ -31,6 +31,10 @@ pub(crate) mod search {
     pub const PART_OF_BEST_PREDICTION: f64 = 0.3;
     /// And so is one within so many nats of the best.
     pub const NEAR_BEST_NATS: f64 = 20.0;
+    /// Most by which a member of a set may raise the norm of a channel's residual: what helps one
+    /// channel at the cost of the other stands in for something else, such as a low-pass for a
+    /// gyroscope that is late.
+    pub const MOST_RISE: f64 = 1.02;
     /// And none that loses more than this, nats.
     pub const MOST_LOSS_NATS: f64 = 10.0;
 }
@@ -82,10 +86,11 @@ pub(crate) mod vibration {
     pub const BELOW_HZ: f64 = 0.75;
     /// To this above it, Hz.
     pub const ABOVE_HZ: f64 = 1.0;
-    /// Least height of the line in the accelerometer, over the median of its surroundings.
+    /// Least height of the line in one channel, over the median of its surroundings.
     pub const LEAST_HEIGHT: f64 = 20.0;
-    /// Most height that stays in the gyroscope: a turning segment shows there too.
-    pub const MOST_TURNING: f64 = 8.0;
+    /// Most height that may stay in a channel where the sinusoid takes little away: a segment that
+    /// moves at this frequency shows there too, and no sinusoid follows it.
+    pub const MOST_HEIGHT_LEFT: f64 = 8.0;
     /// Most of the line's power that one sinusoid may leave.
     pub const MOST_LEFT: f64 = 0.3;
 }

@@ -3,12 +3,12 @@
 use cromosim_imu::{
     AXES, Channel, EffectSet, PerChannel, Reading, ResidualView, SensorModel, Stage, StagedReadings,
 };
-use cromosim_spatial::{KinematicTrack, PoseEstimate, Spectrum, Stamp, welch};
+use cromosim_spatial::{FrameGrid, KinematicTrack, PoseEstimate, Spectrum, Stamp, welch};
 
 use crate::axes::{axes_of_channel, value_on_axis};
 use crate::error::GapError;
 use crate::period::median_period;
-use crate::record::PlacementRecord;
+use crate::record::{PlacementRecord, PoseSeries};
 
 /// Common time of IMU and reference below which nothing is said, s.
 const LEAST_OVERLAP_S: f64 = 4.0;
@@ -48,8 +48,30 @@ pub(crate) struct PreparedPlacement {
     pub usable: Vec<[bool; 6]>,
     /// White noise per sample that the device declares.
     pub declared: PerChannel<Option<f64>>,
+    /// Of the reference's motion, in metres, from its own frames.
     pub estimate: PoseEstimate,
+    /// The same from poses that were interpolated between these frames; none where they were not.
+    pub interpolated: Option<PoseEstimate>,
+    pub report: ReferenceReport,
     pub missing: MissingMessages,
+}
+
+/// How a reference reports its poses.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ReferenceReport {
+    /// Units per metre of positions.
+    pub length_units: f64,
+    /// The frames between which poses were interpolated; none where they were not.
+    pub frames: Option<FrameGrid>,
+}
+
+impl Default for ReferenceReport {
+    fn default() -> Self {
+        Self {
+            length_units: 1.0,
+            frames: None,
+        }
+    }
 }
 
 /// Entries of the sample grid without a message.
@@ -114,16 +136,7 @@ impl PreparedPlacement {
     pub fn new(record: &PlacementRecord) -> Result<Self, GapError> {
         let name = record.name.clone();
         let (stamps, measured) = in_order(record)?;
-        let reference = &record.reference;
-        let estimate = PoseEstimate::fit(
-            &reference.stamps,
-            &reference.positions,
-            &reference.rotations,
-        )
-        .map_err(|source| GapError::Reference {
-            placement: name.clone(),
-            source,
-        })?;
+        let estimate = estimated(&name, &record.reference)?;
         let grid = SampleGrid::under(&stamps).ok_or_else(|| GapError::TooFewMessages {
             placement: name.clone(),
             messages: stamps.len(),
@@ -149,9 +162,33 @@ impl PreparedPlacement {
             measured,
             declared: record.imu.declared,
             estimate,
+            interpolated: None,
+            report: ReferenceReport::default(),
         };
         prepared.refuse_stuck_axes()?;
         Ok(prepared)
+    }
+
+    /// Takes the way in which the reference was reported back: its units of length, and the
+    /// interpolation between its frames.
+    pub fn restore_reference(
+        &mut self,
+        reference: &PoseSeries,
+        report: ReferenceReport,
+    ) -> Result<(), GapError> {
+        let mut poses = reference.clone();
+        if report.length_units != 1.0 {
+            for position in &mut poses.positions {
+                *position /= report.length_units;
+            }
+            self.estimate = estimated(&self.name, &poses)?;
+        }
+        if let Some(frames) = report.frames {
+            let restored = estimated(&self.name, &frames.frames(&poses))?;
+            self.interpolated = Some(std::mem::replace(&mut self.estimate, restored));
+        }
+        self.report = report;
+        Ok(())
     }
 
     /// Leaves out what the reference does not cover when the IMU's stamps are late by `lag_s`, and
@@ -286,6 +323,15 @@ impl PreparedPlacement {
         })
     }
 
+    /// Norms of the residual by channel, m/s2 and rad/s times the root of the number of values.
+    pub fn residual_norms(&self, predicted: &[Reading]) -> PerChannel<f64> {
+        let residual = self.residual(predicted);
+        PerChannel::from_fn(|channel| {
+            let own = residual[axes_of_channel(channel)].iter().flatten();
+            own.map(|e| e * e).sum::<f64>().sqrt()
+        })
+    }
+
     /// The Welch spectrum of one channel of series on the sample grid, mean over its three axes.
     pub fn channel_spectrum(&self, series: &[Vec<f64>], channel: Channel) -> Spectrum {
         let window = ((WINDOW_S * self.rate_hz) as usize)
@@ -307,6 +353,19 @@ impl PreparedPlacement {
         }
         sum
     }
+}
+
+/// The motion behind the poses of a reference.
+fn estimated(placement: &str, reference: &PoseSeries) -> Result<PoseEstimate, GapError> {
+    PoseEstimate::fit(
+        &reference.stamps,
+        &reference.positions,
+        &reference.rotations,
+    )
+    .map_err(|source| GapError::Reference {
+        placement: placement.to_owned(),
+        source,
+    })
 }
 
 /// Straight lines over entries without a usable value, held at the ends; all 0 without any.

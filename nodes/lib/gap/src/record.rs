@@ -1,8 +1,8 @@
 //! What is diagnosed: the poses and the readings of one placement.
 
 use cromosim_imu::{PerChannel, Reading};
+pub use cromosim_spatial::PoseSeries;
 use cromosim_spatial::Stamp;
-use nalgebra::{UnitQuaternion, Vector3};
 
 /// One placement of a recording.
 #[derive(Clone, Debug, Default)]
@@ -13,18 +13,6 @@ pub struct PlacementRecord {
     pub reference: PoseSeries,
     /// What the IMU read.
     pub imu: MeasuredImu,
-}
-
-/// Poses of a segment's mount frame in the world (z up), in the order of time; all lists have the same
-/// length.
-#[derive(Clone, Debug, Default)]
-pub struct PoseSeries {
-    /// By the reference's clock.
-    pub stamps: Vec<Stamp>,
-    /// Origin of the frame in the world, m.
-    pub positions: Vec<Vector3<f64>>,
-    /// `world_from_segment`.
-    pub rotations: Vec<UnitQuaternion<f64>>,
 }
 
 /// What a real IMU sent, in the order of its messages; both lists have the same length.

@@ -146,6 +146,14 @@ fn read_off(model: &FitModel, observations: &Observations, from: ReadOff) -> Opt
             let factor = observations.units[channel];
             (factor != 1.0).then(|| vec![factor])
         }
+        ReadOff::ReferenceLength => {
+            let units = prepared.report.length_units;
+            (units != 1.0).then(|| vec![units])
+        }
+        ReadOff::ReferenceFrames => {
+            let frames = prepared.report.frames?;
+            Some(vec![frames.rate_hz()])
+        }
         ReadOff::MissingMessages => {
             let missing = prepared.missing;
             (missing.fraction > 0.0).then(|| vec![missing.fraction, missing.mean_burst.max(1.0)])

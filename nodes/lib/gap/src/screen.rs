@@ -6,6 +6,7 @@ use nalgebra::{Cholesky, DMatrix, Dyn, Matrix3, Vector3};
 use crate::axes::channel_of_axis;
 use crate::fit::{Fit, FitModel, layout_of, prior_weights, stepped};
 use crate::gram::dot;
+use crate::prepared::Prediction;
 
 /// Part of a recording at either end in which no change is looked for.
 const END_PART: usize = 8;
@@ -20,10 +21,16 @@ pub(crate) struct Candidate {
     pub predicted_gain: f64,
 }
 
-/// The best start of one effect beside `fit`; none where it is not fitted, or cannot be started.
-pub(crate) fn screen(model: &FitModel, fit: &Fit, kind: EffectKind) -> Option<Candidate> {
+/// The best start of one effect beside `fit`, and that together with its companion; none where it is
+/// not fitted, or cannot be started.
+pub(crate) fn screen(
+    model: &FitModel,
+    fit: &Fit,
+    kind: EffectKind,
+    library: &[EffectKind],
+) -> Vec<Candidate> {
     let Search::Fitted(search) = kind.spec().search else {
-        return None;
+        return Vec::new();
     };
     let starts = match search.first_guess {
         FirstGuess::Neutral => vec![Effect::neutral(kind)],
@@ -31,30 +38,50 @@ pub(crate) fn screen(model: &FitModel, fit: &Fit, kind: EffectKind) -> Option<Ca
             .into_iter()
             .filter_map(|values| Effect::new(kind, values).ok())
             .collect(),
-        FirstGuess::ChangeOf(base) => vec![change_point(model, fit, kind, base)?],
+        FirstGuess::ChangeOf(base) => change_point(model, fit, kind, base).into_iter().collect(),
     };
+    let together = search
+        .companion
+        .filter(|companion| library.contains(companion) && !fit.set.contains(*companion))
+        .map(|companion| [kind, companion].map(Effect::neutral))
+        .map(|pair| candidate(model, fit, &pair));
     starts
         .into_iter()
-        .map(|start| candidate(model, fit, start))
+        .map(|start| candidate(model, fit, &[start]))
         .max_by(|a, b| a.predicted_gain.total_cmp(&b.predicted_gain))
+        .into_iter()
+        .chain(together)
+        .collect()
 }
 
-/// One linear step of the fit's own values and those of one more effect, from where it starts.
-fn candidate(model: &FitModel, fit: &Fit, start: Effect) -> Candidate {
-    let kind = start.kind();
-    let is_neutral = start == Effect::neutral(kind);
-    let set = fit.set.clone().with(start);
-    let prior = prior_weights(kind);
-    let linear = if is_neutral {
-        let columns = model.columns(&set, &fit.prediction, kind);
-        model.extended(fit, &fit.residual, &columns, &prior)
+/// One linear step of the fit's own values and those of more effects, from where they start.
+fn candidate(model: &FitModel, fit: &Fit, starts: &[Effect]) -> Candidate {
+    let kinds = || starts.iter().map(Effect::kind);
+    let are_neutral = starts
+        .iter()
+        .all(|start| *start == Effect::neutral(start.kind()));
+    let set = starts
+        .iter()
+        .fold(fit.set.clone(), |set, start| set.with(start.clone()));
+    let prior: Vec<f64> = kinds().flat_map(prior_weights).collect();
+    let columns = |prediction: &Prediction| -> Vec<Vec<f64>> {
+        kinds()
+            .flat_map(|kind| model.columns(&set, prediction, kind))
+            .collect()
+    };
+    let linear = if are_neutral {
+        model.extended(fit, &fit.residual, &columns(&fit.prediction), &prior)
     } else {
         let prediction = model.prepared.predict(&model.track, &set);
-        let columns = model.columns(&set, &prediction, kind);
         let residual = model.residual(&prediction.readings);
-        model.extended(fit, &residual, &columns, &prior)
+        model.extended(fit, &residual, &columns(&prediction), &prior)
     };
-    let layout: Vec<_> = fit.layout.iter().copied().chain(layout_of(kind)).collect();
+    let layout: Vec<_> = fit
+        .layout
+        .iter()
+        .copied()
+        .chain(kinds().flat_map(layout_of))
+        .collect();
     Candidate {
         set: stepped(&set, &layout, &linear.step, 1.0),
         predicted_gain: linear.held_out,

@@ -1,13 +1,14 @@
 //! The search for the smallest set of effects.
 
-use cromosim_imu::{EffectKind, EffectSet, Search};
+use cromosim_imu::{Channel, EffectKind, EffectSet, Search};
 
 use crate::axes::{larger, sum_over_channels};
 use crate::fit::{Fit, FitModel, free_values};
 use crate::plausibility::{is_plausible, is_true_vibration};
 use crate::policy::price;
 use crate::policy::search::{
-    BEAM, EXCHANGES, MOST_LOSS_NATS, NEAR_BEST_NATS, PART_OF_BEST_PREDICTION, REFITS, RIVALS,
+    BEAM, EXCHANGES, MOST_LOSS_NATS, MOST_RISE, NEAR_BEST_NATS, PART_OF_BEST_PREDICTION, REFITS,
+    RIVALS,
 };
 use crate::screen::{Candidate, screen, sharpen_change_point};
 use crate::trace::{names, trace};
@@ -112,14 +113,11 @@ pub(crate) fn search(
 }
 
 /// Candidates beside a set, each with its predicted score, the best first.
-fn candidates<'a>(
-    model: &FitModel,
-    fit: &Fit,
-    kinds: impl Iterator<Item = &'a EffectKind>,
-) -> Vec<(f64, Candidate)> {
-    let mut candidates: Vec<_> = kinds
+fn candidates(model: &FitModel, fit: &Fit, library: &[EffectKind]) -> Vec<(f64, Candidate)> {
+    let mut candidates: Vec<_> = library
+        .iter()
         .filter(|kind| fit.set.get(**kind).is_none())
-        .filter_map(|kind| screen(model, fit, *kind))
+        .flat_map(|kind| screen(model, fit, *kind, library))
         .map(|candidate| {
             (
                 candidate.predicted_gain - price_of(model, &candidate.set),
@@ -137,7 +135,7 @@ fn grown(
     scored: &ScoredEffectSet,
     library: &[EffectKind],
 ) -> Vec<ScoredEffectSet> {
-    let candidates = candidates(model, &scored.fit, library.iter());
+    let candidates = candidates(model, &scored.fit, library);
     trace(|| {
         let list: Vec<String> = candidates
             .iter()
@@ -185,8 +183,8 @@ fn pruned(model: &FitModel, mut scored: ScoredEffectSet) -> ScoredEffectSet {
     }
 }
 
-/// Tries every member against every effect outside; at the end, by how much each member beats the
-/// best set without it.
+/// Tries every member against every effect outside, and leaves out members that make a channel worse
+/// in the end; by how much each member beats the best set without it.
 pub(crate) fn exchanged(
     model: &FitModel,
     mut scored: ScoredEffectSet,
@@ -195,31 +193,63 @@ pub(crate) fn exchanged(
     for _ in 0..EXCHANGES {
         let members: Vec<EffectKind> = scored.fit.set.iter().map(|effect| effect.kind()).collect();
         let mut best: Option<ScoredEffectSet> = None;
+        let mut without_harm: Option<ScoredEffectSet> = None;
         scored.margins.clear();
         for kind in members {
             let smaller = score(model, scored.fit.set.without(kind));
-            let mut rival = smaller.score;
-            let others = library.iter().filter(|other| **other != kind);
-            let candidates = candidates(model, &smaller.fit, others);
-            for (predicted, candidate) in candidates.into_iter().take(RIVALS) {
-                let part = PART_OF_BEST_PREDICTION * (scored.score - smaller.score);
-                if predicted < smaller.score + part {
-                    continue;
-                }
-                let other = score(model, candidate.set);
-                rival = rival.max(other.score);
-                if other.score > best.as_ref().map_or(scored.score, |best| best.score) {
-                    best = Some(other);
-                }
+            let rival = best_rival(model, &scored, &smaller, kind, library);
+            let rival_score = rival
+                .as_ref()
+                .map_or(smaller.score, |rival| rival.score.max(smaller.score));
+            scored.margins.push((kind, scored.score - rival_score));
+            let best_score = best.as_ref().map_or(scored.score, |best| best.score);
+            best = rival.filter(|rival| rival.score > best_score).or(best);
+            if rises(model, &smaller.fit, &scored.fit) {
+                without_harm = Some(smaller);
             }
-            scored.margins.push((kind, scored.score - rival));
         }
-        match best {
-            Some(better) => scored = pruned(model, better),
-            None => break,
+        match (best, without_harm) {
+            (Some(better), _) => scored = pruned(model, better),
+            // What it gained is not looked for elsewhere: the next best would stand in as well.
+            (None, Some(smaller)) => {
+                let margins = std::mem::take(&mut scored.margins);
+                return ScoredEffectSet { margins, ..smaller };
+            }
+            (None, None) => break,
         }
     }
     scored
+}
+
+/// The best of the sets in which another effect stands in the place of one member.
+fn best_rival(
+    model: &FitModel,
+    scored: &ScoredEffectSet,
+    smaller: &ScoredEffectSet,
+    member: EffectKind,
+    library: &[EffectKind],
+) -> Option<ScoredEffectSet> {
+    let others: Vec<EffectKind> = library
+        .iter()
+        .copied()
+        .filter(|other| *other != member)
+        .collect();
+    let needed = smaller.score + PART_OF_BEST_PREDICTION * (scored.score - smaller.score);
+    candidates(model, &smaller.fit, &others)
+        .into_iter()
+        .take(RIVALS)
+        .filter(|(predicted, _)| *predicted >= needed)
+        .map(|(_, candidate)| score(model, candidate.set))
+        .max_by(|a, b| a.score.total_cmp(&b.score))
+}
+
+/// Whether the residual of a channel rises from one fit to another.
+fn rises(model: &FitModel, from: &Fit, to: &Fit) -> bool {
+    let norms = |fit: &Fit| model.prepared.residual_norms(&fit.prediction.readings);
+    let (before, after) = (norms(from), norms(to));
+    Channel::ALL
+        .into_iter()
+        .any(|channel| after[channel] > MOST_RISE * before[channel])
 }
 
 fn sort(scored_sets: &mut [ScoredEffectSet]) {

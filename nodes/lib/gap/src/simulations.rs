@@ -3,10 +3,8 @@
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
-use std::sync::Arc;
 
 use cromosim_imu::{Channel, EffectKind, EffectSet, PerChannel, ReadOff, Reading, SensorModel};
-use cromosim_spatial::KinematicTrack;
 use rand::SeedableRng;
 use rand_chacha::ChaCha12Rng;
 
@@ -17,6 +15,7 @@ use crate::metrics::Comparison;
 use crate::noise_model::NoiseModel;
 use crate::noise_updates::ordinary_share;
 use crate::prepared::{FOLDS, PreparedPlacement};
+use crate::reference_tracks::ReferenceTracks;
 use crate::whiten::Whitener;
 
 /// Simulations of one placement, with all covered readings compared, clipped ones as well.
@@ -25,8 +24,7 @@ pub(crate) struct Simulations<'a> {
     pub comparison: Comparison<'a>,
     /// The placement with clipped readings compared as well.
     pub whole: PreparedPlacement,
-    /// The track of the poses as they are, where the analysis undoes a smoothing.
-    plain: Option<KinematicTrack>,
+    tracks: ReferenceTracks<'a>,
     /// Of the fit, at every covered reading.
     residual: Vec<Vec<f64>>,
     /// By the effects that change the predicted noise.
@@ -50,7 +48,6 @@ impl<'a> Simulations<'a> {
             usable: covered.to_vec(),
             ..prepared.clone()
         };
-        let undone_hz = findings.model.basis.undone_hz;
         Self {
             findings,
             comparison: Comparison {
@@ -58,7 +55,7 @@ impl<'a> Simulations<'a> {
                 measured: raw,
                 covered,
             },
-            plain: undone_hz.map(|_| whole.track(&whole.estimate)),
+            tracks: ReferenceTracks::new(&findings.model),
             residual: whole.residual(&findings.scored.fit.prediction.readings),
             whiteners: RefCell::default(),
             units: PerChannel::from_fn(|channel| findings.reportable.unit_factor(channel)),
@@ -69,11 +66,8 @@ impl<'a> Simulations<'a> {
 
     /// The readings in the device's units under a set of effects, without noise.
     pub fn simulate(&self, set: &EffectSet) -> Vec<Reading> {
-        let track = match &self.plain {
-            Some(plain) if set.get_read_off(ReadOff::ReferenceSpectrum).is_none() => plain,
-            _ => &self.findings.model.track,
-        };
-        SensorModel::new(set, self.whole.epoch).run(track, &self.whole.stamps)
+        let track = self.tracks.track(set);
+        SensorModel::new(set, self.whole.epoch).run(&track, &self.whole.stamps)
     }
 
     /// For the noise that is predicted under those effects of `set` that change it.
@@ -103,10 +97,8 @@ impl<'a> Simulations<'a> {
         if reportable.get_read_off(scatter).is_some() && set.get_read_off(scatter).is_none() {
             basis.reference_share = ordinary_share(self.whole.estimate.noise());
         }
-        if set.get_read_off(ReadOff::ReferenceSpectrum).is_none() {
-            basis.undone_hz = None;
-            basis.estimate = Arc::new(self.whole.estimate.clone());
-        }
+        basis.undone_hz = self.tracks.undone_hz(set);
+        basis.estimate = self.tracks.estimate(set);
         Whitener::new(
             &self.whole,
             &NoiseModel::new(&self.whole, &basis, &self.residual),

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use cromosim_imu::{EffectKind, EffectSet, PerChannel};
 
-use crate::axes::{axes_of_channel, larger, smaller, sum_over_channels};
+use crate::axes::{larger, smaller, sum_over_channels};
 use crate::fit::FitModel;
 use crate::noise_model::NoiseModel;
 use crate::policy::smoothing::{
@@ -148,15 +148,8 @@ fn with_undone_smoothing<'a>(
 /// undone must not cost more than it gives.
 fn comes_closer(model: &FitModel, plain: &ScoredEffectSet, undone: &ScoredEffectSet) -> bool {
     let norms = |scored: &ScoredEffectSet| {
-        let residual = model.prepared.residual(&scored.fit.prediction.readings);
-        PerChannel::from_fn(|channel| {
-            residual[axes_of_channel(channel)]
-                .iter()
-                .flatten()
-                .map(|e| e * e)
-                .sum::<f64>()
-                .sqrt()
-        })
+        let readings = &scored.fit.prediction.readings;
+        model.prepared.residual_norms(readings)
     };
     let (undone, plain) = (norms(undone), norms(plain));
     let ratio = PerChannel::from_fn(|channel| undone[channel] / plain[channel].max(1e-30));

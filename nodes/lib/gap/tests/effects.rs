@@ -5,8 +5,8 @@ mod support;
 
 use cromosim_gap::PlacementAnswer;
 use cromosim_imu::{EffectKind as K, STANDARD_GRAVITY};
-use support::judge::{answer, cause, names_exactly, near, values_are};
-use support::{IMU_HZ, Scene};
+use support::judge::{answer, cause, names, names_exactly, near, values_are};
+use support::{IMU_HZ, Scene, seed_of};
 
 /// Names exactly what was put in, with its values.
 fn found(scene: &Scene) -> PlacementAnswer {
@@ -41,7 +41,7 @@ macro_rules! followed {
     ($($name:ident: $kind:ident $values:expr => $parts:expr;)*) => {
         $(#[test]
         fn $name() {
-            followed(&Scene::new(K::$kind as u64).with(K::$kind, &$values), $parts);
+            followed(&Scene::new(seed_of(K::$kind)).with(K::$kind, &$values), $parts);
         })*
         const FOLLOWED: &[K] = &[$(K::$kind),*];
     };
@@ -49,13 +49,16 @@ macro_rules! followed {
 
 followed! {
     reference_smoothing: ReferenceSmoothing [6.0] => [0.5, 0.7];
+    reference_interpolation: ReferenceInterpolation [47.3] => [0.75, 0.6];
     reference_tilt: ReferenceTilt [0.04, -0.05, 0.0] => [0.5, KEPT];
     reference_scale: ReferenceScale [1.1] => [0.5, KEPT];
+    reference_units: ReferenceUnits [1000.0] => [0.01, KEPT];
     mount_rotation: MountRotation [0.2, -0.15, 0.3] => [0.2, 0.2];
     lever_arm: LeverArm [0.05, 0.02, -0.06] => [0.5, KEPT];
     soft_tissue: SoftTissue [7.0, 0.3] => [0.5, KEPT];
     time_offset: TimeOffset [0.021] => [0.5, 0.5];
     clock_drift: ClockDrift [400.0] => [0.6, 0.6];
+    channel_delay: ChannelDelay [0.0115] => [KEPT, 0.2];
     accel_bias: AccelBias [0.2, -0.15, 0.1] => [0.7, KEPT];
     gyro_bias: GyroBias [0.05, -0.06, 0.03] => [KEPT, 0.6];
     accel_scale: AccelScale [1.04, 0.95, 1.03] => [0.6, KEPT];
@@ -68,11 +71,53 @@ followed! {
     gyro_saturation: GyroSaturation [2.0] => [KEPT, 0.7];
     low_pass: LowPass [8.0] => [0.5, 0.5];
     gyro_g_sensitivity: GyroGSensitivity [2e-3, -1e-3, 1e-3, 1e-3, 2e-3, -2e-3, -1e-3, 1e-3, 2e-3] => [KEPT, 0.95];
-    vibration: Vibration [17.3, 0.5, -0.3, 0.4, 0.8] => [0.7, KEPT];
+    vibration: Vibration [17.3, 0.5, 0.3, 0.4, 0.8, 2.9, 5.1, 0.05, 0.03, 0.08, 1.6, 4.2, 3.0] => [0.7, 0.7];
     axis_convention: AxisConvention [0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, 1.0, 0.0] => [0.05, 0.1];
     accel_units: AccelUnits [1.0 / STANDARD_GRAVITY] => [0.1, KEPT];
     gyro_units: GyroUnits [180.0 / std::f64::consts::PI] => [KEPT, 0.1];
     gravity_convention: GravityConvention [1.0] => [0.1, KEPT];
+}
+
+#[test]
+fn every_unit_of_length_is_known() {
+    for (seed, factor) in [
+        (43, 100.0),
+        (44, 10.0),
+        (45, 39.370_078_74),
+        (46, 3.280_839_895),
+    ] {
+        found(&Scene::new(seed).with(K::ReferenceUnits, &[factor]));
+    }
+}
+
+#[test]
+fn a_gyroscope_that_is_early() {
+    followed(
+        &Scene::new(47).with(K::ChannelDelay, &[-0.004]),
+        [KEPT, 0.4],
+    );
+}
+
+#[test]
+fn a_vibration_of_the_accelerometer_alone() {
+    let scene = Scene::new(48);
+    let values = [
+        17.3, 0.5, 0.3, 0.4, 0.8, 0.8, 0.8, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+    ];
+    let diagnosis = answer(&scene.with(K::Vibration, &values).record()).diagnosis;
+    assert_eq!(names(&diagnosis), ["vibration"]);
+    assert!(diagnosis.gap.after.accel_rmse < 0.7 * diagnosis.gap.before.accel_rmse);
+}
+
+#[test]
+fn a_vibration_of_the_gyroscope_alone() {
+    let scene = Scene::new(49);
+    let values = [
+        23.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.05, 0.03, 0.08, 1.6, 4.2, 3.0,
+    ];
+    let diagnosis = answer(&scene.with(K::Vibration, &values).record()).diagnosis;
+    assert_eq!(names(&diagnosis), ["vibration"]);
+    assert!(diagnosis.gap.after.gyro_rmse < 0.5 * diagnosis.gap.before.gyro_rmse);
 }
 
 #[test]
@@ -105,7 +150,7 @@ macro_rules! noise_like {
     ($($name:ident: $kind:ident $values:expr;)*) => {
         $(#[test]
         fn $name() {
-            found(&Scene::new(K::$kind as u64).with(K::$kind, &$values));
+            found(&Scene::new(seed_of(K::$kind)).with(K::$kind, &$values));
         })*
         const NOISE_LIKE: &[K] = &[$(K::$kind),*];
     };

@@ -6,8 +6,8 @@ mod support;
 use cromosim_gap::{DiagnoseOptions, PlacementAnswer, diagnose};
 use cromosim_imu::EffectKind as K;
 use cromosim_imu::STANDARD_GRAVITY;
-use support::Scene;
 use support::judge::{names, shares_add_up};
+use support::{Scene, seed_of};
 
 /// Without the effect the gap holds structure that nothing explains.
 fn excluded(kind: K, values: &[f64]) -> PlacementAnswer {
@@ -16,7 +16,7 @@ fn excluded(kind: K, values: &[f64]) -> PlacementAnswer {
         ..DiagnoseOptions::default()
     };
     let answer = diagnose(
-        &Scene::new(kind as u64).with(kind, values).record(),
+        &Scene::new(seed_of(kind)).with(kind, values).record(),
         &options,
     )
     .unwrap();
@@ -78,7 +78,7 @@ excluded! {
     accel_bias_drift: AccelBiasDrift [0.008, -0.006, 0.007];
     gyro_saturation: GyroSaturation [2.0];
     gyro_g_sensitivity: GyroGSensitivity [2e-3, -1e-3, 1e-3, 1e-3, 2e-3, -2e-3, -1e-3, 1e-3, 2e-3];
-    vibration: Vibration [17.3, 0.5, -0.3, 0.4, 0.8];
+    vibration: Vibration [17.3, 0.5, 0.3, 0.4, 0.8, 2.9, 5.1, 0.05, 0.03, 0.08, 1.6, 4.2, 3.0];
     axis_convention: AxisConvention [0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
     accel_units: AccelUnits [1.0 / STANDARD_GRAVITY];
     gravity_convention: GravityConvention [1.0];
@@ -93,6 +93,21 @@ fn clock_drift() {
 #[test]
 fn reference_tilt() {
     excluded(K::ReferenceTilt, &[0.04, -0.05, 0.0]);
+}
+
+#[test]
+fn reference_units() {
+    excluded(K::ReferenceUnits, &[1000.0]);
+}
+
+#[test]
+fn reference_interpolation() {
+    excluded(K::ReferenceInterpolation, &[24.0]);
+}
+
+#[test]
+fn channel_delay() {
+    excluded(K::ChannelDelay, &[0.0115]);
 }
 
 #[test]

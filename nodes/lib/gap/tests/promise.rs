@@ -5,7 +5,7 @@ mod support;
 
 use cromosim_gap::{PlacementAnswer, PlacementRecord};
 use cromosim_imu::{EffectKind as K, EffectSet, Reading, SensorModel};
-use cromosim_spatial::{PoseEstimate, Stamp};
+use cromosim_spatial::{FrameGrid, PoseEstimate, Stamp};
 use support::Scene;
 use support::judge::{answer, names_exactly, values_are};
 
@@ -34,6 +34,24 @@ fn a_low_pass_and_a_delay_are_told_apart() {
 }
 
 #[test]
+fn a_late_gyroscope_and_a_low_pass_are_told_apart() {
+    pair(
+        &Scene::new(63)
+            .with(K::ChannelDelay, &[0.012])
+            .with(K::LowPass, &[12.0]),
+    );
+}
+
+#[test]
+fn a_late_accelerometer_is_a_delay_and_an_early_gyroscope() {
+    pair(
+        &Scene::new(64)
+            .with(K::ChannelDelay, &[-0.012])
+            .with(K::TimeOffset, &[0.012]),
+    );
+}
+
+#[test]
 fn a_tilt_and_a_bias_are_told_apart() {
     pair(
         &Scene::new(61)
@@ -56,12 +74,11 @@ fn a_delay_and_a_lever_arm() {
 /// second.
 fn simulated_gap(record: &PlacementRecord, effects: &EffectSet, epoch: Stamp) -> [f64; 2] {
     let reference = &record.reference;
-    let estimate = PoseEstimate::fit(
-        &reference.stamps,
-        &reference.positions,
-        &reference.rotations,
-    )
-    .unwrap();
+    let frames = effects
+        .frame_rate_hz()
+        .and_then(|rate_hz| FrameGrid::at_rate(reference, rate_hz))
+        .map_or_else(|| reference.clone(), |grid| grid.frames(reference));
+    let estimate = PoseEstimate::fit(&frames.stamps, &frames.positions, &frames.rotations).unwrap();
     let readings = SensorModel::new(effects, epoch).run(&estimate.track(200.0), &record.imu.stamps);
     let kept = |stamp: &Stamp| *stamp - estimate.start() > 1.0 && estimate.end() - *stamp > 1.0;
     let residuals: Vec<(&Reading, &Reading)> = record
@@ -134,13 +151,16 @@ kept! {
     lever_arm: 70 LeverArm [0.05, 0.02, -0.06];
     mount_rotation: 71 MountRotation [0.2, -0.15, 0.3];
     time_offset: 72 TimeOffset [0.021];
+    reference_units: 81 ReferenceUnits [1000.0];
+    reference_interpolation: 83 ReferenceInterpolation [47.3];
+    channel_delay: 82 ChannelDelay [0.0115];
     // What grows is 300 s further on.
     clock_drift: 73 ClockDrift [300.0];
     accel_bias_drift: 74 AccelBiasDrift [0.008, -0.006, 0.007];
     scales: 75 AccelScale [1.04, 0.95, 1.03], GyroScale [0.97, 1.04, 1.03];
     low_pass: 76 LowPass [8.0];
     soft_tissue: 77 SoftTissue [7.0, 0.3];
-    vibration: 78 Vibration [17.3, 0.5, -0.3, 0.4, 0.8];
+    vibration: 78 Vibration [17.3, 0.5, 0.3, 0.4, 0.8, 2.9, 5.1, 0.05, 0.03, 0.08, 1.6, 4.2, 3.0];
     tilt_and_offset: 79 ReferenceTilt [0.04, -0.05, 0.0], TimeOffset [0.015];
 }
 

@@ -52,7 +52,12 @@ fn effects(criterion: &mut Criterion) {
         one(EffectKind::AccelQuantization, &[0.0048]),
         one(EffectKind::LowPass, &[20.0]),
         one(EffectKind::GyroGSensitivity, &[1e-3; 9]),
-        one(EffectKind::Vibration, &[31.0, 0.1, 0.2, 0.3, 0.4]),
+        one(
+            EffectKind::Vibration,
+            &[
+                31.0, 0.1, 0.2, 0.3, 0.4, 1.0, 2.0, 0.01, 0.0, 0.02, 0.3, 0.0, 1.0,
+            ],
+        ),
     ])
     .expect("one of each");
     let nominal = SensorModel::new(&EffectSet::new(), Stamp::default());

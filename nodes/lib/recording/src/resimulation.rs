@@ -6,13 +6,17 @@ use cromosim_bag::BagWriter;
 use cromosim_imu::{
     DeclaredNoise, Differentiation, EffectKind, EffectSet, EffectsFile, ImuOptions,
     KinematicSample, PerChannel, PlacementEffects, ReadingMapping, RecordedMotion, SampleVariance,
-    SensorTrajectory, Trim, measure_recording, simulate_kinematics, track_in_sensor_axes,
+    SensorFrame, SensorTrajectory, Trim, measure_recording, simulate_kinematics,
+    track_in_sensor_axes,
 };
 use cromosim_learned::{LearnedSimulator, MappingFile, SiteMotion};
 use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_msgs::std_msgs::Header;
-use cromosim_spatial::{KinematicTrack, PoseEstimate, Stamp, uniform_stamps};
+use cromosim_spatial::{
+    FrameGrid, KinematicTrack, PoseEstimate, PoseSeries, Stamp, uniform_stamps,
+};
+use nalgebra::Isometry3;
 
 use crate::{Quality, RecordedPlacement, RecordingError};
 
@@ -180,8 +184,8 @@ impl Resimulation {
             .get(EffectKind::ReferenceSmoothing)
             .and_then(|smoothing| smoothing.values().first().copied());
         let rate_hz = (2.0 * imu_rate_hz).max(200.0);
+        let poses = own_frames(placement.poses(), effects);
         let Some(scheme) = self.scheme else {
-            let poses = placement.poses();
             let estimate = PoseEstimate::fit(&poses.stamps, &poses.positions, &poses.rotations)
                 .map_err(|source| RecordingError::NotEstimated { source })?;
             let estimate = undone_hz
@@ -195,9 +199,14 @@ impl Resimulation {
                 scheme: scheme.to_string(),
             });
         }
-        let trajectory = placement.trajectory()?;
+        let units = effects.length_factor();
+        let trajectory = trajectory_in_metres(&poses, units)?;
         let networks = self.learned.as_ref();
-        let (track, samples) = differentiated(&trajectory, scheme, rate_hz, networks)?;
+        let (mut track, samples) = differentiated(&trajectory, scheme, rate_hz, networks)?;
+        // The effects take the units back.
+        for acceleration in &mut track.acceleration_in_segment {
+            *acceleration *= units;
+        }
         Ok((track, Known::Samples(samples)))
     }
 }
@@ -206,6 +215,7 @@ impl Resimulation {
 enum Known {
     /// Samples of a scheme, with their variances.
     Samples(Vec<KinematicSample>),
+    /// Of positions in the reference's own units.
     Estimate(Box<PoseEstimate>),
 }
 
@@ -214,9 +224,36 @@ impl Known {
     fn variances(&self, stamps: &[Stamp], effects: &EffectSet) -> Vec<SampleVariance> {
         match self {
             Self::Samples(samples) => variances_at(samples, stamps),
-            Self::Estimate(estimate) => estimate.variances(stamps, effects.lever_arm().norm()),
+            Self::Estimate(estimate) => {
+                let arm_m = effects.lever_arm().norm();
+                estimate.variances(stamps, effects.length_factor(), arm_m)
+            }
         }
     }
+}
+
+/// The frames of a reference that was interpolated between them, where the effects say so and the
+/// poses show it; else the poses.
+fn own_frames(poses: PoseSeries, effects: &EffectSet) -> PoseSeries {
+    effects
+        .frame_rate_hz()
+        .and_then(|rate_hz| FrameGrid::at_rate(&poses, rate_hz))
+        .map_or_else(|| poses.clone(), |grid| grid.frames(&poses))
+}
+
+/// Poses as the derivative schemes take them.
+fn trajectory_in_metres(
+    poses: &PoseSeries,
+    length_units: f64,
+) -> Result<SensorTrajectory, RecordingError> {
+    let frame = |k: usize| {
+        let position = poses.positions[k] / length_units;
+        let pose = Isometry3::from_parts(position.into(), poses.rotations[k]);
+        SensorFrame::new(poses.stamps[k], pose)
+    };
+    Ok(SensorTrajectory::new(
+        (0..poses.stamps.len()).map(frame).collect(),
+    )?)
 }
 
 /// The motion by a scheme and what networks add to it, on a grid from the first frame to the last.

@@ -12,13 +12,19 @@ type Variances = [f64; 3];
 
 impl PoseEstimate {
     /// Variances, along or about each axis, that the poses' noise leaves in the kinematics of a point
-    /// `lever_arm_m` from the origin, at times in order.
+    /// `lever_arm_m` from the origin, at times in order; the positions are in units of which
+    /// `units_per_metre` are a metre.
     ///
     /// With N the noise's density and W a window's filter (see [`PoseEstimate`]) the n-th derivative
     /// errs by `integral N W (2 pi f)^(2 n) df`; windows are cross-faded as the motion is. An error of
     /// the angular acceleration moves the point by two thirds of its square times the arm's, mean
     /// over directions. What the filter takes for noise though it is motion is not in it.
-    pub fn variances(&self, stamps: &[Stamp], lever_arm_m: f64) -> Vec<SampleVariance> {
+    pub fn variances(
+        &self,
+        stamps: &[Stamp],
+        units_per_metre: f64,
+        lever_arm_m: f64,
+    ) -> Vec<SampleVariance> {
         let of_windows = |floor: &NoiseFloor| -> Vec<Variances> {
             let windows = floor.windows.iter();
             windows.map(|filter| through(floor, filter)).collect()
@@ -30,7 +36,8 @@ impl PoseEstimate {
             let [rotation, turning, spinning_up] =
                 faded(&rotations, place).map(|variance| variance / QUATERNION_PER_ROTVEC);
             SampleVariance {
-                acceleration: acceleration + 2.0 / 3.0 * lever_arm_m.powi(2) * spinning_up,
+                acceleration: acceleration / units_per_metre.powi(2)
+                    + 2.0 / 3.0 * lever_arm_m.powi(2) * spinning_up,
                 angular_velocity: turning,
                 orientation: rotation,
             }

@@ -111,13 +111,13 @@ fn derivatives_err_as_much_as_is_stated() {
     let track = estimate.track(100.0);
     let inner = &stamps[100..5800];
     let stated: f64 = estimate
-        .variances(inner, 0.0)
+        .variances(inner, 1.0, 0.0)
         .iter()
         .map(|variance| 3.0 * variance.acceleration)
         .sum();
     let ratio = acceleration_error(&track).powi(2) / (stated / inner.len() as f64);
     assert!((0.7..1.4).contains(&ratio), "{ratio}");
-    let [near, far] = [0.0, 0.1].map(|arm_m| estimate.variances(&stamps[300..301], arm_m)[0]);
+    let [near, far] = [0.0, 0.1].map(|arm_m| estimate.variances(&stamps[300..301], 1.0, arm_m)[0]);
     assert!(far.acceleration > near.acceleration);
     assert_eq!(far.angular_velocity, near.angular_velocity);
 }

@@ -11,6 +11,7 @@
 //!   velocity and acceleration at any time.
 //! - [`PoseEstimate`]: a motion from noisy poses, its noise learnt from them, with derivatives and
 //!   their error; [`KinematicTrack`] is what it gives.
+//! - [`FrameGrid`]: the frames between which poses were interpolated along straight chords.
 //! - [`derivative_weights`]: finite-difference stencils on any times; [`uniform_stamps`]: output
 //!   grids.
 //!
@@ -31,6 +32,7 @@ mod adaptive;
 mod adaptive_fit;
 mod banded;
 mod basis;
+mod chords;
 mod confidence;
 mod derivative;
 mod derivative_risk;
@@ -41,12 +43,16 @@ mod error;
 mod estimate;
 mod estimate_error;
 mod fourth_differences;
+mod frame_grid;
 mod gaps;
+mod golden;
 mod grid;
 mod influence;
+mod kinks;
 mod local_spline;
 mod noise_floor;
 mod noise_shape;
+mod pose_series;
 mod pose_spectra;
 mod pose_spline;
 mod sample_grid;
@@ -69,8 +75,11 @@ pub use estimate::{PoseEstimate, PoseNoise};
 pub use fourth_differences::{
     MEDIAN_OF_SQUARE, ROUNDED_MEDIAN_OF_SQUARE, fourth_difference, white_noise_variance,
 };
+pub use frame_grid::FrameGrid;
+pub use golden::greatest_near;
 pub use grid::{check_times, relative_seconds, uniform_stamps};
 pub use influence::{Influence, SampleWeights};
+pub use pose_series::PoseSeries;
 pub use pose_spline::{
     Bandwidth, Motion, MotionEstimate, PoseAdaptation, PoseSmoothing, PoseSource, PoseSpline,
     PoseTimes, SampleVariance, position_channels, rotation_channels,

@@ -11,7 +11,7 @@ use std::ops::Range;
 use cromosim_gap::{MeasuredImu, PlacementRecord, PoseSeries};
 use cromosim_imu::{
     DeclaredNoise, Dropouts, Effect, EffectKind, EffectSet, MeasurementInput, PerChannel, Reading,
-    SensorModel, normal_pair,
+    SensorModel, Stage, normal_pair,
 };
 use cromosim_spatial::{Stamp, so3};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -32,6 +32,25 @@ const SCATTER: [f64; 2] = [1e-4, 0.05 * PI / 180.0];
 const MARGIN_S: f64 = 4.0;
 /// An instant of today, so that nothing may lean on small times.
 const TODAY: Stamp = Stamp::from_nanos(1_700_000_000_123_456_789);
+
+/// Effects that came later than the others' tests.
+const LATER: [EffectKind; 3] = [
+    EffectKind::ReferenceInterpolation,
+    EffectKind::ReferenceUnits,
+    EffectKind::ChannelDelay,
+];
+
+/// Seed of the scene in which an effect is tested: a new effect gives the others no other motions.
+pub fn seed_of(kind: EffectKind) -> u64 {
+    let place = |list: &[EffectKind]| list.iter().position(|other| *other == kind);
+    let first: Vec<EffectKind> = EffectKind::ALL
+        .into_iter()
+        .filter(|other| !LATER.contains(other))
+        .collect();
+    place(&first)
+        .or_else(|| place(&LATER).map(|place| 90 + place))
+        .unwrap() as u64
+}
 
 /// What is to be recorded.
 #[derive(Clone, Debug)]
@@ -103,14 +122,15 @@ impl Scene {
         self.effects.get(kind).map(|effect| effect.values()[index])
     }
 
-    /// `p = T s p + noise`, `R = T R exp(noise)`, smoothed before the noise comes.
+    /// `p = u (T s p + noise)`, `R = T R exp(noise)`, smoothed before the noise comes; u the units of
+    /// length.
     fn reference(&self) -> PoseSeries {
         // 0.41 s before the IMU and after it, at no whole number of its intervals.
         let (before, count) = (0.4137, ((self.seconds + 0.83) * REFERENCE_HZ) as usize);
         let margin = (MARGIN_S * REFERENCE_HZ) as usize;
         let seconds = |k: usize| (k as f64 - margin as f64) / REFERENCE_HZ - before;
         let instants: Vec<_> = (0..count + 2 * margin)
-            .map(|k| self.motion.at(seconds(k)))
+            .map(|k| self.reported_instant(seconds(k)))
             .collect();
         let channel = |of: &dyn Fn(&motion::Instant) -> f64| {
             let series: Vec<f64> = instants.iter().map(of).collect();
@@ -131,6 +151,7 @@ impl Scene {
             });
         let tilt = so3::exp(&tilt);
         let scale = self.value(EffectKind::ReferenceScale, 0).unwrap_or(1.0);
+        let units = self.effects.length_factor();
         let mut random = ChaCha12Rng::seed_from_u64(self.seed ^ 0x5eed);
         let mut series = PoseSeries::default();
         for k in margin..margin + count {
@@ -145,10 +166,10 @@ impl Scene {
                 rotation[2][k],
             ));
             series.stamps.push(self.start.plus_seconds(seconds(k)));
-            series.positions.push(
-                tilt * Vector3::new(position[0][k], position[1][k], position[2][k]) * scale
-                    + noise[0] * scatter[0],
-            );
+            let position = Vector3::new(position[0][k], position[1][k], position[2][k]);
+            series
+                .positions
+                .push((tilt * position * scale + noise[0] * scatter[0]) * units);
             series
                 .rotations
                 .push(tilt * world_from_segment * so3::exp(&(noise[1] * scatter[1])));
@@ -156,19 +177,28 @@ impl Scene {
         series
     }
 
+    /// The motion, or what lies on the chord between two frames of it.
+    fn reported_instant(&self, t: f64) -> motion::Instant {
+        let Some(rate_hz) = self.effects.frame_rate_hz() else {
+            return self.motion.at(t);
+        };
+        let frame = (t * rate_hz).floor();
+        let share = t * rate_hz - frame;
+        let [from, to] = [frame, frame + 1.0].map(|frame| self.motion.at(frame / rate_hz));
+        motion::Instant {
+            position: from.position.lerp(&to.position, share),
+            world_from_segment: from.world_from_segment.slerp(&to.world_from_segment, share),
+            ..from
+        }
+    }
+
     /// The device's part of the effects on the exact kinematics, then noise, then what is digital,
     /// then losses.
     fn imu(&self) -> MeasuredImu {
         use EffectKind as K;
-        let mut device = self.effects.clone();
-        for kind in [
-            K::ReferenceNoise,
-            K::ReferenceSmoothing,
-            K::ReferenceTilt,
-            K::ReferenceScale,
-        ] {
-            device.remove(kind);
-        }
+        let is_device = |effect: &&Effect| effect.kind().spec().stage != Stage::Reference;
+        let device: Vec<Effect> = self.effects.iter().filter(is_device).cloned().collect();
+        let device = EffectSet::try_from(device).unwrap();
         let model = SensorModel::new(&device, self.epoch);
         let stamps: Vec<Stamp> = (0..(self.seconds * IMU_HZ) as usize)
             .map(|k| self.start.plus_seconds(k as f64 / IMU_HZ))

@@ -28,6 +28,7 @@ pub(super) static ACCEL: EffectSpec = EffectSpec {
     channels: &[Channel::Accelerometer],
     search: Search::Fitted(FittedSearch {
         first_guess: FirstGuess::Neutral,
+        companion: None,
         is_plausible: always,
         ordinary: Some(Ordinary::EachValue(5e-3)),
         rounding: Some(Rounding::Offset),
@@ -66,6 +67,7 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
     channels: &[Channel::Gyroscope],
     search: Search::Fitted(FittedSearch {
         first_guess: FirstGuess::Neutral,
+        companion: None,
         is_plausible: always,
         ordinary: Some(Ordinary::EachValue(4e-4)),
         rounding: Some(Rounding::Offset),

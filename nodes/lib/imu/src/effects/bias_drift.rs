@@ -26,6 +26,7 @@ pub(super) static ACCEL: EffectSpec = EffectSpec {
     channels: &[Channel::Accelerometer],
     search: Search::Fitted(FittedSearch {
         first_guess: FirstGuess::Neutral,
+        companion: None,
         is_plausible: always,
         ordinary: Some(Ordinary::EachValue(2e-4)),
         rounding: Some(Rounding::Ramp),
@@ -56,6 +57,7 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
     channels: &[Channel::Gyroscope],
     search: Search::Fitted(FittedSearch {
         first_guess: FirstGuess::Neutral,
+        companion: None,
         is_plausible: always,
         ordinary: Some(Ordinary::EachValue(1.5e-5)),
         rounding: Some(Rounding::Ramp),

@@ -64,10 +64,12 @@ impl EffectKind {
             ReadOff::Lattice(_)
             | ReadOff::ExcessNoise(_)
             | ReadOff::ReferenceScatter
-            | ReadOff::ReferenceSpectrum => true,
-            ReadOff::ClippedReadings(_) | ReadOff::UnitFactor(_) | ReadOff::MissingMessages => {
-                false
-            }
+            | ReadOff::ReferenceSpectrum
+            | ReadOff::ReferenceFrames => true,
+            ReadOff::ClippedReadings(_)
+            | ReadOff::UnitFactor(_)
+            | ReadOff::ReferenceLength
+            | ReadOff::MissingMessages => false,
         }
     }
 }

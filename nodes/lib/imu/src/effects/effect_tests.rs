@@ -5,17 +5,20 @@ use super::{Effect, EffectKind, EffectSet, FirstGuess, Search, Shape, Stage};
 use crate::EffectError;
 
 /// The contract's table, in its order.
-const NAMES: [&str; 32] = [
+const NAMES: [&str; 35] = [
     "reference_noise",
     "reference_smoothing",
+    "reference_interpolation",
     "reference_tilt",
     "reference_scale",
+    "reference_units",
     "mount_rotation",
     "lever_arm",
     "mount_slip",
     "soft_tissue",
     "time_offset",
     "clock_drift",
+    "channel_delay",
     "dropped_samples",
     "accel_bias",
     "gyro_bias",
@@ -152,20 +155,18 @@ fn effects_come_back_from_yaml() {
 
 #[test]
 fn parameters_are_found_by_name() {
-    let vibration = Effect::new(EffectKind::Vibration, vec![20.0, 1.0, 2.0, 3.0, 0.5]).unwrap();
+    let mut values: Vec<f64> = (0..13).map(|k| 0.1 * f64::from(k)).collect();
+    values[0] = 20.0;
+    values[1..4].copy_from_slice(&[1.0, 2.0, 3.0]);
+    let vibration = Effect::new(EffectKind::Vibration, values.clone()).unwrap();
     assert_eq!(
         vibration.parameter("amplitude"),
         Some([1.0, 2.0, 3.0].as_slice())
     );
-    assert_eq!(vibration.parameter("phase"), Some([0.5].as_slice()));
+    assert_eq!(vibration.parameter("gyro_phase"), Some(&values[10..]));
     assert_eq!(vibration.parameter("speed"), None);
-    assert_eq!(
-        vibration
-            .with_values(vec![21.0, 1.0, 2.0, 3.0, 0.5])
-            .unwrap()
-            .values()[0],
-        21.0
-    );
+    values[0] = 21.0;
+    assert_eq!(vibration.with_values(values).unwrap().values()[0], 21.0);
 }
 
 #[test]

@@ -7,19 +7,18 @@ use nalgebra::{Matrix2, Vector2, Vector3};
 /// Samples whose polynomial stands for the input between the middle two of them: degree 5, error
 /// O(h^6).
 const TAPS: usize = 6;
+/// The first of them, counted from the start of the interval.
+const FIRST_TAP: i32 = -2;
 
-/// `wn^2 / D` (low-pass) or `(2 z wn s + wn^2) / D` (base excitation) with `D = s^2 + 2 z wn s +
-/// wn^2`.
+/// The low-pass `wn^2 / (s^2 + 2 z wn s + wn^2)`.
 ///
 /// State `x = (y, y'/wn)` of the low-pass output y: `x' = A x + B u`, `A = wn [[0, 1], [-1, -2
-/// z]]`, `B = (0, wn)`; the output is `x_0`, or `x_0 + 2 z x_1`. A step of h: `x(h) = e^(A h) x(0)
+/// z]]`, `B = (0, wn)`; the output is `x_0`. A step of h: `x(h) = e^(A h) x(0)
 /// + int_0^h e^(A (h - s)) B u(s) ds`, with u the polynomial through N samples around.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SecondOrder {
     pub natural_hz: f64,
     pub damping_ratio: f64,
-    /// Whether the base is shaken: the transfer function with a zero.
-    pub base: bool,
 }
 
 impl SecondOrder {
@@ -27,8 +26,7 @@ impl SecondOrder {
     /// Hz on a grid of 200 Hz is right to 0.1 %.
     pub(super) fn apply(&self, series: &mut [Vector3<f64>], rate_hz: f64) {
         let Some(&first) = series.first() else { return };
-        let (turn, taps) = self.step::<TAPS>(1.0 / rate_hz);
-        let output = self.output();
+        let (turn, taps) = self.step_from::<TAPS>(1.0 / rate_hz, FIRST_TAP);
         let last = series.len() - 1;
         // The samples from k - 2 to k + 3, held at the ends; the series itself is overwritten
         // behind them.
@@ -38,7 +36,7 @@ impl SecondOrder {
         }
         let (mut x, mut v) = (first, Vector3::zeros());
         for k in 0..=last {
-            series[k] = x * output.x + v * output.y;
+            series[k] = x;
             let (mut x_next, mut v_next) =
                 (x * turn.m11 + v * turn.m12, x * turn.m21 + v * turn.m22);
             for (tap, input) in taps.iter().zip(&around) {
@@ -51,33 +49,25 @@ impl SecondOrder {
         }
     }
 
-    /// What reaches the output of the state.
-    fn output(&self) -> Vector2<f64> {
-        Vector2::new(
-            1.0,
-            if self.base {
-                2.0 * self.damping_ratio
-            } else {
-                0.0
-            },
-        )
-    }
-
     /// `A h`.
     fn generator(&self, h: f64) -> Matrix2<f64> {
         Matrix2::new(0.0, 1.0, -1.0, -2.0 * self.damping_ratio) * (TAU * self.natural_hz * h)
     }
 
-    /// `e^(A h)` and the weights of N samples around an interval of length h, which lies between
-    /// the middle two.
-    pub(super) fn step<const N: usize>(&self, h: f64) -> (Matrix2<f64>, [Vector2<f64>; N]) {
+    /// `e^(A h)` and the weights of N samples at distances of h, of which number 0 is at the start of
+    /// the interval and `first` the first.
+    pub(super) fn step_from<const N: usize>(
+        &self,
+        h: f64,
+        first: i32,
+    ) -> (Matrix2<f64>, [Vector2<f64>; N]) {
         let generator = self.generator(h);
         // int_0^1 e^(Ah (1 - s)) Ah s^m ds times (A h)^-1 B h, where (A h)^-1 B h = A^-1 B = (-1,
         // 0).
         let moments = moments::<N>(&generator).map(|moment| moment * Vector2::new(-1.0, 0.0));
         let mut taps = [Vector2::zeros(); N];
         for (j, tap) in taps.iter_mut().enumerate() {
-            let polynomial = lagrange_coefficients::<N>(j);
+            let polynomial = lagrange_coefficients::<N>(j, first);
             *tap = moments
                 .iter()
                 .zip(polynomial)
@@ -125,7 +115,7 @@ impl Streamed {
             None => (input, Vector3::zeros()),
             Some((x, v, before)) => {
                 if (interval - self.prepared.0).abs() > 1e-9 {
-                    let (turn, taps) = self.filter.step(interval);
+                    let (turn, taps) = self.filter.step_from(interval, 0);
                     self.prepared = (interval, turn, taps);
                 }
                 let (_, turn, [from, to]) = &self.prepared;
@@ -136,8 +126,7 @@ impl Streamed {
             }
         };
         self.state = Some((x, v, input));
-        let output = self.filter.output();
-        x * output.x + v * output.y
+        x
     }
 
     /// Begins anew with the next input.
@@ -186,9 +175,9 @@ fn moments<const N: usize>(z: &Matrix2<f64>) -> [Matrix2<f64>; N] {
 }
 
 /// Coefficients of 1, s, s^2, ... of the polynomial that is 1 at node j and 0 at the others; nodes
-/// 1 - N/2, ..., N/2.
-fn lagrange_coefficients<const N: usize>(j: usize) -> [f64; N] {
-    let node = |k: usize| k as f64 + 1.0 - (N / 2) as f64;
+/// `first`, `first + 1` and so on.
+fn lagrange_coefficients<const N: usize>(j: usize, first: i32) -> [f64; N] {
+    let node = |k: usize| k as f64 + f64::from(first);
     let mut coefficients = [0.0; N];
     coefficients[0] = 1.0;
     for (degree, k) in (0..N).filter(|k| *k != j).enumerate() {

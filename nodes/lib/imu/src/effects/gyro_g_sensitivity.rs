@@ -28,6 +28,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
     channels: &[Channel::Gyroscope],
     search: Search::Fitted(FittedSearch {
         first_guess: FirstGuess::Neutral,
+        companion: None,
         is_plausible: always,
         ordinary: Some(Ordinary::EachValue(5e-5)),
         rounding: None,

@@ -9,10 +9,14 @@ macro_rules! with_effects {
             ReferenceNoise => reference_noise::SPEC,
             /// A reference that was low-passed.
             ReferenceSmoothing => reference_smoothing::SPEC,
+            /// A reference interpolated between frames.
+            ReferenceInterpolation => reference_interpolation::SPEC,
             /// A world of the reference that is not level.
             ReferenceTilt => reference_tilt::SPEC,
-            /// A reference in wrong units of length.
+            /// A reference whose positions are a little too large or too small.
             ReferenceScale => reference_scale::SPEC,
+            /// A reference that is not in metres.
+            ReferenceUnits => reference_units::SPEC,
             /// A sensor turned on its segment.
             MountRotation => mount_rotation::SPEC,
             /// A sensor beside the reference frame.
@@ -25,6 +29,8 @@ macro_rules! with_effects {
             TimeOffset => time_offset::SPEC,
             /// A clock of another rate.
             ClockDrift => clock_drift::SPEC,
+            /// A gyroscope late against the accelerometer.
+            ChannelDelay => channel_delay::SPEC,
             /// Messages lost.
             DroppedSamples => dropped_samples::SPEC,
             /// Constant error of the specific force.

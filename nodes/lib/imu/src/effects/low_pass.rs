@@ -27,6 +27,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
     channels: &Channel::ALL,
     search: Search::Fitted(FittedSearch {
         first_guess: FirstGuess::FromResidual(starts),
+        companion: None,
         is_plausible,
         ordinary: None,
         rounding: None,

@@ -30,6 +30,7 @@ pub(super) static ACCEL: EffectSpec = EffectSpec {
     channels: &[Channel::Accelerometer],
     search: Search::Fitted(FittedSearch {
         first_guess: FirstGuess::Neutral,
+        companion: None,
         is_plausible: always,
         ordinary: Some(Ordinary::EachValue(3e-3)),
         rounding: None,
@@ -64,6 +65,7 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
     channels: &[Channel::Gyroscope],
     search: Search::Fitted(FittedSearch {
         first_guess: FirstGuess::Neutral,
+        companion: None,
         is_plausible: always,
         ordinary: Some(Ordinary::EachValue(3e-3)),
         rounding: None,

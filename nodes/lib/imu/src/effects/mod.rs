@@ -4,25 +4,29 @@
 //! With R, a, w the orientation, acceleration and angular velocity of the reference frame at the
 //! true time t, and the epoch t0, the stages ([`Stage`]) are, in the order of [`Stage::ORDER`]:
 //! ```text
-//! Segment  f = R^T (a + alpha x l + w x (w x l) - g)                 lever_arm; reference_tilt, reference_scale, gravity_convention
-//! Tissue   f <- H f                                                  soft_tissue
+//! Segment  f = R^T (a + alpha x l + w x (w x l) - g)                 lever_arm; reference_tilt, reference_scale, reference_units, gravity_convention
+//! Tissue   f <- -(wn^2 d + 2 z wn d'), where                         soft_tissue
+//!          d'' = -wn^2 d - 2 z wn d' - f - 2 w x d' - alpha x d - w x (w x d)
 //! Sensor   f, w <- M R_mount^T f, M R_mount^T w                      mount_rotation, mount_slip, axis_convention
-//!          f += amplitude sin(2 pi hz (t - t0) + phase)              vibration
+//!          f, w += amplitude sin(2 pi hz (t - t0) + phase)           vibration
 //!          w += G f                                                  gyro_g_sensitivity
 //!          second-order Butterworth, both channels                   low_pass
-//! Timing   stamp = t0 + (t - t0) (1 + ppm 1e-6) + seconds            clock_drift, time_offset; dropped_samples
+//! Timing   w(t) <- w(t - seconds)                                    channel_delay
+//!          stamp = t0 + (t - t0) (1 + ppm 1e-6) + seconds            clock_drift, time_offset; dropped_samples
 //! Linear   x <- diag(scale) (I + upper) x + bias + rate (t - t0)     scale, misalignment, bias, bias_drift
 //! Digital  white noise, clip, round, times factor                    noise, saturation, quantization, units
 //! ```
 //! [`SensorModel`] runs them over a whole recording, [`crate::StreamingEffects`] over live samples.
 //! A recording adds the vibration with the timing, in closed form and as the low-pass leaves it, so
 //! that a fit of its parameters repeats nothing on the grid; its effect therefore has
-//! [`Stage::Timing`].
+//! [`Stage::Timing`]. Errors of a reading go by its own true time, so that stamps may come before
+//! them.
 
 mod axis_convention;
 mod bias;
 mod bias_drift;
 mod catalogue;
+mod channel_delay;
 mod clock_drift;
 mod dropped_samples;
 mod effect;
@@ -40,10 +44,12 @@ mod mount_slip;
 mod noise;
 mod quantization;
 mod readout;
+mod reference_interpolation;
 mod reference_noise;
 mod reference_scale;
 mod reference_smoothing;
 mod reference_tilt;
+mod reference_units;
 mod residual_view;
 mod sampling;
 mod saturation;
@@ -52,9 +58,11 @@ mod search;
 mod serde_impl;
 mod soft_tissue;
 mod spec;
+mod spectral_line;
 mod stages;
 mod streaming;
 mod time_offset;
+mod tissue;
 mod units;
 mod vibration;
 
@@ -75,6 +83,7 @@ pub use kind::EffectKind;
 pub use model::{GridTrace, SensorModel};
 pub use noise::white_noise_density;
 pub use quantization::lattice_spacing;
+pub use reference_units::length_factors;
 pub use residual_view::ResidualView;
 pub use saturation::clipping_limit;
 pub use search::{
@@ -82,7 +91,8 @@ pub use search::{
     Rounding, Search,
 };
 pub use spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+pub use spectral_line::strongest_line;
 pub use stages::{MeasurementInput, StagedReadings};
 pub use streaming::StreamingEffects;
 pub use units::unit_factors;
-pub use vibration::{SpectralLine, strongest_line};
+pub use vibration::{SpectralLine, Wave};

@@ -8,6 +8,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::clock_drift::Clock;
 use super::filter::SecondOrder;
 use super::readout::Readout;
+use super::tissue::{Tissue, Turning};
 use super::vibration::SpectralLine;
 use super::{
     DeclaredNoise, Effect, EffectKind, EffectSet, Reading, gravity_convention, lever_arm, low_pass,
@@ -36,9 +37,10 @@ pub struct SensorModel {
     pub(super) epoch: Stamp,
     /// `c T g`, in the reported world.
     pub(super) gravity: Vector3<f64>,
+    /// 1 over the factor on positions of the reference: of scale and units.
     pub(super) inverse_scale: f64,
     pub(super) lever_arm: Option<Vector3<f64>>,
-    pub(super) tissue: Option<SecondOrder>,
+    pub(super) tissue: Option<Tissue>,
     /// `M R_mount^T`.
     pub(super) sensor_from_segment: Option<Matrix3<f64>>,
     /// Seconds from the epoch, and `M (R_mount R_slip)^T`.
@@ -48,6 +50,8 @@ pub struct SensorModel {
     pub(super) low_pass: Option<SecondOrder>,
     pub(super) vibration: Option<SpectralLine>,
     pub(super) clock: Clock,
+    /// Of the gyroscope against the accelerometer, s.
+    pub(super) channel_delay: f64,
     pub(super) accelerometer: Readout,
     pub(super) gyroscope: Readout,
 }
@@ -80,29 +84,32 @@ impl SensorModel {
         Self {
             epoch,
             gravity: gravity * gravity_convention::gravity_factor(mode),
-            inverse_scale: scalar(Kind::ReferenceScale).map_or(1.0, f64::recip),
+            inverse_scale: scalar(Kind::ReferenceScale).map_or(1.0, f64::recip)
+                / effects.length_factor(),
             lever_arm: vector(Kind::LeverArm, 0),
             tissue: effects
                 .get(Kind::SoftTissue)
-                .and_then(|effect| filter(effect, effect.scalar(1), true)),
+                .and_then(|effect| filter(effect, effect.scalar(1)))
+                .map(|filter| Tissue { filter }),
             sensor_from_segment,
             slip: effects.get(Kind::MountSlip).map(slipped),
             coupling: effects.get(Kind::GyroGSensitivity).map(Effect::matrix),
             low_pass: effects
                 .get(Kind::LowPass)
-                .and_then(|effect| filter(effect, low_pass::DAMPING_RATIO, false)),
+                .and_then(|effect| filter(effect, low_pass::DAMPING_RATIO)),
             vibration: effects.get(Kind::Vibration).and_then(Effect::spectral_line),
             clock: Clock {
                 offset: scalar(Kind::TimeOffset).unwrap_or(0.0),
                 ppm: scalar(Kind::ClockDrift).unwrap_or(0.0),
             },
+            channel_delay: scalar(Kind::ChannelDelay).unwrap_or(0.0),
             accelerometer: Readout::new(effects, Channel::Accelerometer),
             gyroscope: Readout::new(effects, Channel::Gyroscope),
         }
     }
 
-    /// [`super::Stage::Segment`]: specific force of the segment at the lever arm, with tilt and scale
-    /// of the reference undone; segment axes: `f = a / s + alpha x l + w x (w x l) - c R^T T g`, c = 1, 0 (removed) or
+    /// [`super::Stage::Segment`]: specific force of the segment at the lever arm, with tilt, scale
+    /// and units of the reference undone; segment axes: `f = a / s + alpha x l + w x (w x l) - c R^T T g`, c = 1, 0 (removed) or
     /// -1 (negated).
     pub(super) fn segment(&self, track: &KinematicTrack) -> GridTrace {
         let motion = track
@@ -133,10 +140,15 @@ impl SensorModel {
         }
     }
 
-    /// [`super::Stage::Tissue`]: soft tissue under the sensor, on the specific force alone.
-    pub(super) fn tissue(&self, mut trace: GridTrace) -> GridTrace {
-        if let Some(filter) = &self.tissue {
-            filter.apply(&mut trace.specific_force, trace.rate_hz);
+    /// [`super::Stage::Tissue`]: soft tissue under the sensor, on the specific force alone; `motion` is
+    /// that of the trace.
+    pub(super) fn tissue(&self, mut trace: GridTrace, motion: &KinematicTrack) -> GridTrace {
+        if let Some(tissue) = &self.tissue {
+            let turning = |k: usize| Turning {
+                velocity: motion.angular_velocity_in_segment[k],
+                acceleration: motion.angular_acceleration_in_segment[k],
+            };
+            tissue.apply(&mut trace.specific_force, turning, trace.rate_hz);
         }
         trace
     }
@@ -195,9 +207,9 @@ impl SensorModel {
         }
     }
 
-    /// [`super::Stage::Timing`]: readings at the true times of the stamps, with the vibration in
-    /// closed form; `trace` is that of [`SensorModel::sensor`]. Before and after the grid its ends
-    /// are held.
+    /// [`super::Stage::Timing`]: readings at the true times of the stamps, those of the gyroscope
+    /// earlier by its delay, with the vibration in closed form; `trace` is that of
+    /// [`SensorModel::sensor`]. Before and after the grid its ends are held.
     pub(super) fn sample(&self, trace: &GridTrace, stamps: &[Stamp]) -> Vec<Reading> {
         let start = trace.start - self.epoch;
         let vibration = self.vibration.map(|line| match &self.low_pass {
@@ -207,8 +219,7 @@ impl SensorModel {
         let slip = self
             .slip
             .map(|(at, after)| Slip::new(self, trace, start, at, after));
-        let read = |stamp: &Stamp| {
-            let seconds = self.clock.true_seconds(*stamp - self.epoch);
+        let at = |seconds: f64| {
             let position = (seconds - start) * trace.rate_hz;
             let mut reading = match sampling::GridPosition::at(
                 position,
@@ -227,15 +238,30 @@ impl SensorModel {
                 reading = slip.turn(self, &reading, seconds);
             }
             if let Some(line) = &vibration {
-                let specific_force = line.at(seconds);
-                reading.specific_force += specific_force;
-                if let Some(coupling) = &self.coupling {
-                    reading.angular_velocity += coupling * specific_force;
-                }
+                self.shake(line, &mut reading, seconds);
+            }
+            reading
+        };
+        let read = |stamp: &Stamp| {
+            let seconds = self.clock.true_seconds(*stamp - self.epoch);
+            let mut reading = at(seconds);
+            if self.channel_delay != 0.0 {
+                reading.angular_velocity = at(seconds - self.channel_delay).angular_velocity;
             }
             reading
         };
         stamps.iter().map(read).collect()
+    }
+
+    /// Adds a vibration, with what the gyroscope feels of it.
+    #[inline]
+    pub(super) fn shake(&self, line: &SpectralLine, reading: &mut Reading, seconds: f64) {
+        let shaken = line.at(seconds);
+        reading.specific_force += shaken.specific_force;
+        reading.angular_velocity += shaken.angular_velocity;
+        if let Some(coupling) = &self.coupling {
+            reading.angular_velocity += coupling * shaken.specific_force;
+        }
     }
 
     /// [`super::Stage::Linear`]: scale, misalignment, bias and drift.
@@ -273,13 +299,12 @@ impl SensorModel {
 }
 
 /// A filter, but for cutoffs so high that it changes nothing.
-fn filter(effect: &Effect, damping_ratio: f64, base: bool) -> Option<SecondOrder> {
+fn filter(effect: &Effect, damping_ratio: f64) -> Option<SecondOrder> {
     let natural_hz = effect.scalar(0);
     let neutral = effect.kind().spec().parameters[0].neutral[0];
     (natural_hz < neutral).then_some(SecondOrder {
         natural_hz,
         damping_ratio,
-        base,
     })
 }
 

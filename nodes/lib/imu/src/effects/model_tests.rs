@@ -170,6 +170,7 @@ fn effects_on_the_grid_act_as_by_hand() {
         &[
             (Kind::ReferenceTilt, tilt.as_slice()),
             (Kind::ReferenceScale, &[2.0]),
+            (Kind::ReferenceUnits, &[100.0]),
         ],
         &track,
         &stamps,
@@ -177,7 +178,7 @@ fn effects_on_the_grid_act_as_by_hand() {
     close(
         &tilted,
         |k| Reading {
-            specific_force: track.acceleration_in_segment[k] / 2.0 + leaning(k),
+            specific_force: track.acceleration_in_segment[k] / 200.0 + leaning(k),
             angular_velocity: track.angular_velocity_in_segment[k],
         },
         1e-9,
@@ -283,6 +284,38 @@ fn stamps_are_those_of_the_devices_clock() {
 }
 
 #[test]
+fn the_gyroscope_alone_is_late_with_all_that_it_feels() {
+    let track = track(6.0);
+    let stamps = uniform_stamps(START.plus_seconds(1.0), START.plus_seconds(5.0), 200.0).unwrap();
+    let g = [0.0, 0.02, 0.0, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0];
+    let felt: [(Kind, &[f64]); 4] = [
+        (Kind::GyroGSensitivity, &g),
+        (Kind::LowPass, &[12.0]),
+        (Kind::MountSlip, &[START.as_seconds() + 3.0, 0.3, 0.0, 0.0]),
+        (Kind::TimeOffset, &[0.02]),
+    ];
+    for seconds in [0.0125, -0.004] {
+        let late: Vec<(Kind, &[f64])> = felt
+            .iter()
+            .copied()
+            .chain([(Kind::ChannelDelay, std::slice::from_ref(&seconds))])
+            .collect();
+        let read = run(&late, &track, &stamps);
+        let plain = run(&felt, &track, &stamps);
+        let before: Vec<Stamp> = stamps.iter().map(|t| t.plus_seconds(-seconds)).collect();
+        let earlier = run(&felt, &track, &before);
+        close(
+            &read,
+            |k| Reading {
+                specific_force: plain[k].specific_force,
+                angular_velocity: earlier[k].angular_velocity,
+            },
+            1e-6,
+        );
+    }
+}
+
+#[test]
 fn a_slip_is_sharp_and_turns_the_mount_further() {
     let track = track(4.0);
     let stamps = uniform_stamps(START, START.plus_seconds(4.0), 1000.0).unwrap();
@@ -356,7 +389,6 @@ fn the_low_pass_remembers_across_a_slip() {
     let mut filter = super::filter::Streamed::new(super::filter::SecondOrder {
         natural_hz: 5.0,
         damping_ratio: low_pass::DAMPING_RATIO,
-        base: false,
     });
     let mut rates = filter.clone();
     let plain: Vec<Reading> = turned
@@ -378,29 +410,44 @@ fn vibration_passes_the_filter_and_reaches_the_gyroscope() {
     still.world_from_segment.fill(so3::exp(&Vector3::zeros()));
     let stamps = uniform_stamps(START.plus_seconds(1.0), START.plus_seconds(3.0), 333.0).unwrap();
     let g = [0.0, 0.02, 0.0, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0];
-    let vibration = [31.7, 1.0, -2.0, 0.5, 0.7];
-    let amplitude = Vector3::new(1.0, -2.0, 0.5);
+    let vibration = [
+        31.7, 1.0, -2.0, 0.5, 0.7, 2.1, 5.9, 0.1, 0.2, 0.05, 0.3, 4.0, 1.1,
+    ];
     let gravity = Vector3::new(0.0, 0.0, G);
     let plain: [(Kind, &[f64]); 2] = [(Kind::Vibration, &vibration), (Kind::GyroGSensitivity, &g)];
-    let by_hand = |gain: f64, delay: f64| {
+    let by_hand = |gain: f64, delay: f64, gyroscope_late: f64| {
         let stamps = &stamps;
         move |k: usize| {
-            let specific_force =
-                amplitude * (TAU * 31.7 * (stamps[k] - START) + 0.7 + delay).sin() * gain + gravity;
+            let wave = |first: usize, late: f64| {
+                let x = TAU * 31.7 * (stamps[k] - START - late) + delay;
+                Vector3::from_fn(|axis, _| {
+                    vibration[first + axis] * (x + vibration[first + 3 + axis]).sin() * gain
+                })
+            };
             Reading {
-                specific_force,
-                angular_velocity: Matrix3::from_row_slice(&g) * specific_force,
+                specific_force: wave(1, 0.0) + gravity,
+                angular_velocity: wave(7, gyroscope_late)
+                    + Matrix3::from_row_slice(&g) * (wave(1, gyroscope_late) + gravity),
             }
         }
     };
-    close(&run(&plain, &still, &stamps), by_hand(1.0, 0.0), 1e-9);
-    let filtered: [(Kind, &[f64]); 3] = [plain[0], plain[1], (Kind::LowPass, &[20.0])];
+    close(&run(&plain, &still, &stamps), by_hand(1.0, 0.0, 0.0), 1e-9);
+    let filtered: [(Kind, &[f64]); 4] = [
+        plain[0],
+        plain[1],
+        (Kind::LowPass, &[20.0]),
+        (Kind::ChannelDelay, &[0.006]),
+    ];
     // 1 / (1 - r^2 + sqrt(2) i r) at r = 31.7 / 20.
     let r: f64 = 31.7 / 20.0;
     let (real, imaginary) = (1.0 - r * r, 2f64.sqrt() * r);
     close(
         &run(&filtered, &still, &stamps),
-        by_hand((1.0 + r.powi(4)).sqrt().recip(), -imaginary.atan2(real)),
+        by_hand(
+            (1.0 + r.powi(4)).sqrt().recip(),
+            -imaginary.atan2(real),
+            0.006,
+        ),
         1e-9,
     );
 }
@@ -493,7 +540,7 @@ fn the_order_is_that_of_the_measurement_model() {
         },
         1e-9,
     );
-    // 2 before 3 and on the force alone: tissue and mount commute, so the gyroscope is what tells.
+    // 2 before 3 and on the force alone.
     let tissue = run(&[(Kind::SoftTissue, &[2.0, 0.3])], &track, &stamps);
     assert!(
         (0..stamps.len())
@@ -512,12 +559,17 @@ fn the_order_is_that_of_the_measurement_model() {
             self::ideal(&track, k, &Vector3::from(arm)).specific_force - ideal(k).specific_force
         })
         .collect();
-    super::filter::SecondOrder {
-        natural_hz: 2.0,
-        damping_ratio: 0.3,
-        base: true,
-    }
-    .apply(&mut added, 200.0);
+    let tissue_alone = super::tissue::Tissue {
+        filter: super::filter::SecondOrder {
+            natural_hz: 2.0,
+            damping_ratio: 0.3,
+        },
+    };
+    let turning = |k: usize| super::tissue::Turning {
+        velocity: track.angular_velocity_in_segment[k],
+        acceleration: track.angular_acceleration_in_segment[k],
+    };
+    tissue_alone.apply(&mut added, turning, 200.0);
     close(
         &both,
         |k| Reading {

@@ -33,6 +33,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
     channels: &Channel::ALL,
     search: Search::Fitted(FittedSearch {
         first_guess: FirstGuess::Neutral,
+        companion: None,
         is_plausible: always,
         ordinary: Some(Ordinary::EachValue(3e-3)),
         rounding: None,

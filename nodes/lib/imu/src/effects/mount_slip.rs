@@ -43,6 +43,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
     channels: &Channel::ALL,
     search: Search::Fitted(FittedSearch {
         first_guess: FirstGuess::ChangeOf(EffectKind::MountRotation),
+        companion: None,
         is_plausible: always,
         ordinary: Some(Ordinary::Change(5e-3)),
         rounding: None,

@@ -1,4 +1,4 @@
-//! `reference_scale`: positions of the reference in wrong units of length.
+//! `reference_scale`: positions of the reference that are a little too large or too small.
 
 use super::search::{FirstGuess, FittedSearch, Identifiability, Ordinary, Search};
 use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
@@ -31,6 +31,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
     channels: &[Channel::Accelerometer],
     search: Search::Fitted(FittedSearch {
         first_guess: FirstGuess::Neutral,
+        companion: None,
         is_plausible,
         ordinary: Some(Ordinary::EachValue(ORDINARY)),
         rounding: None,

@@ -29,6 +29,7 @@ pub(super) static ACCEL: EffectSpec = EffectSpec {
     channels: &[Channel::Accelerometer],
     search: Search::Fitted(FittedSearch {
         first_guess: FirstGuess::Neutral,
+        companion: None,
         is_plausible,
         ordinary: Some(Ordinary::EachValue(2e-3)),
         rounding: None,
@@ -63,6 +64,7 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
     channels: &[Channel::Gyroscope],
     search: Search::Fitted(FittedSearch {
         first_guess: FirstGuess::Neutral,
+        companion: None,
         is_plausible,
         ordinary: Some(Ordinary::EachValue(2e-3)),
         rounding: None,

@@ -20,6 +20,9 @@ pub enum Search {
 pub struct FittedSearch {
     /// Where its fit begins.
     pub first_guess: FirstGuess,
+    /// Another effect that it is also tried together with, from neutral values: alone neither may
+    /// help.
+    pub companion: Option<EffectKind>,
     /// Whether fitted values are what such an effect has; else it stands in for something else. The
     /// set holds the effect and those fitted beside it.
     pub is_plausible: fn(&Effect, &EffectSet) -> bool,
@@ -141,12 +144,16 @@ pub enum ReadOff {
     ExcessNoise(Channel),
     /// Slope of measured on simulated readings: a known factor of units.
     UnitFactor(Channel),
+    /// Slope of the reference's accelerations on measured ones: a known factor of units of length.
+    ReferenceLength,
     /// Stamps that are missing between others: fraction and mean burst.
     MissingMessages,
     /// Scatter of the reported poses: standard deviations of position and rotation.
     ReferenceScatter,
     /// What the reported poses lack at high frequencies: a cutoff.
     ReferenceSpectrum,
+    /// Kinks of the reported poses that come back at a steady rate.
+    ReferenceFrames,
 }
 
 /// For [`FittedSearch::is_plausible`]: all values within the bounds are.

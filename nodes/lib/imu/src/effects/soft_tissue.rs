@@ -41,6 +41,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
     channels: &[Channel::Accelerometer],
     search: Search::Fitted(FittedSearch {
         first_guess: FirstGuess::FromResidual(starts),
+        companion: None,
         is_plausible,
         ordinary: None,
         rounding: None,

@@ -12,11 +12,12 @@ pub enum Stage {
     Reference,
     /// Specific force of the rigid segment, on the motion's grid.
     Segment,
-    /// Soft tissue under the sensor, on the grid.
+    /// Soft tissue under the sensor, in the turning segment frame, on the grid.
     Tissue,
     /// Mount, axes, coupling and low-pass, on the grid.
     Sensor,
-    /// The device's clock, and the vibration in closed form: from the grid to the stamps.
+    /// The gyroscope's delay, the device's clock, and the vibration in closed form: from the grid to
+    /// the stamps.
     Timing,
     /// Scale, misalignment, bias and drift of each reading.
     Linear,

@@ -85,7 +85,10 @@ impl SensorModel {
                 work.trace = Cow::Owned(work.motion.map(|m| self.segment(m)).unwrap_or_default());
             }
             Stage::Tissue => {
-                work.trace = Cow::Owned(self.tissue(take(&mut work.trace).into_owned()))
+                if let Some(motion) = work.motion {
+                    let trace = take(&mut work.trace).into_owned();
+                    work.trace = Cow::Owned(self.tissue(trace, motion));
+                }
             }
             Stage::Sensor => {
                 work.trace = Cow::Owned(self.sensor(take(&mut work.trace).into_owned()))

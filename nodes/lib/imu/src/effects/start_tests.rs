@@ -156,24 +156,32 @@ fn signed_permutations_are_found_near_rotations() {
     assert_eq!(effect.matrix(), axes);
 }
 
+/// A rotating force, and a line that shows in the gyroscope alone.
 #[test]
-fn a_vibration_is_found_with_its_phase() {
-    let line = [31.417, 0.05, -0.1, 0.08, 1.2];
-    let start = case(&[(Kind::Vibration, &line)])
-        .starts(Kind::Vibration)
-        .unwrap()
-        .remove(0);
-    assert!((start[0] - line[0]).abs() < 1e-3, "{start:?}");
-    // Amplitude and phase are as good as their common sign.
-    let sign = (start[1] * line[1]).signum();
-    for axis in 1..4 {
-        assert!((start[axis] * sign - line[axis]).abs() < 0.003, "{start:?}");
+fn a_vibration_is_found_with_its_phases() {
+    let rotating = [
+        31.417, 0.05, 0.1, 0.08, 1.2, 2.7, 5.9, 0.002, 0.004, 0.003, 0.4, 3.3, 6.1,
+    ];
+    let mut turning = rotating;
+    turning[1..4].fill(0.0);
+    for line in [rotating, turning] {
+        let start = case(&[(Kind::Vibration, &line)])
+            .starts(Kind::Vibration)
+            .unwrap()
+            .remove(0);
+        assert!((start[0] - line[0]).abs() < 1e-3, "{start:?}");
+        for (first, tolerance) in [(1, 0.005), (7, 0.0005)] {
+            for axis in first..first + 3 {
+                let wave = |values: &[f64]| {
+                    let (sin, cos) = values[axis + 3].sin_cos();
+                    [values[axis] * sin, values[axis] * cos]
+                };
+                let (found, expected) = (wave(&start), wave(&line));
+                assert!(
+                    (0..2).all(|part| (found[part] - expected[part]).abs() < tolerance),
+                    "{start:?}"
+                );
+            }
+        }
     }
-    let phase = start[4]
-        + if sign < 0.0 {
-            std::f64::consts::PI
-        } else {
-            0.0
-        };
-    assert!((phase - line[4]).sin().abs() < 0.1, "{start:?}");
 }

@@ -3,8 +3,10 @@
 use cromosim_spatial::Stamp;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
+use super::channel_delay::DelayLine;
 use super::dropped_samples::Dropouts;
 use super::filter::Streamed;
+use super::tissue::{StreamedTissue, Turning};
 use super::{EffectKind, Reading, SensorModel, Stage, lever_arm};
 use crate::{Channel, Device, ImuError, ImuSample, KinematicSample, NoiseSource, PerChannel};
 
@@ -22,8 +24,10 @@ pub struct StreamingEffects {
     model: Option<SensorModel>,
     noise: Option<NoiseSource>,
     dropouts: Option<Dropouts>,
-    tissue: Option<Streamed>,
+    tissue: Option<StreamedTissue>,
     low_pass: Option<PerChannel<Streamed>>,
+    /// Of the gyroscope.
+    delay: Option<DelayLine>,
     /// Stamp and angular velocity (segment axes) of the sample before.
     previous: Option<(Stamp, Vector3<f64>)>,
 }
@@ -57,10 +61,11 @@ impl StreamingEffects {
                 seed,
                 placement,
             ),
-            tissue: model.tissue.map(Streamed::new),
+            tissue: model.tissue.map(StreamedTissue::new),
             low_pass: model
                 .low_pass
                 .map(|filter| PerChannel::from_fn(|_| Streamed::new(filter))),
+            delay: (model.channel_delay != 0.0).then(|| DelayLine::new(model.channel_delay)),
             model: None,
             previous: None,
         })
@@ -86,7 +91,8 @@ impl StreamingEffects {
     /// Filters begin anew.
     fn forget(&mut self) {
         self.previous = None;
-        self.tissue.iter_mut().for_each(Streamed::reset);
+        self.tissue.iter_mut().for_each(StreamedTissue::reset);
+        self.delay.iter_mut().for_each(DelayLine::reset);
         if let Some(filters) = &mut self.low_pass {
             Channel::ALL
                 .into_iter()
@@ -118,17 +124,21 @@ impl StreamingEffects {
             .filter(|(at, _)| seconds >= *at)
             .map(|(_, after)| after)
             .or(model.sensor_from_segment);
-        let mut reading = Reading::default();
+        let (mut reading, mut turning) = (Reading::default(), Turning::default());
         let mut stamp = sample.stamp;
         let mut world_from_sensor =
             sample.world_from_sensor.rotation * orientation(sensor_from_segment.as_ref());
         for stage in Stage::ORDER {
             match stage {
                 Stage::Reference => {}
-                Stage::Segment => reading = self.segment(model, sample),
+                Stage::Segment => {
+                    turning = self.turning(sample);
+                    reading = self.segment(model, sample, &turning);
+                }
                 Stage::Tissue => {
-                    if let Some(filter) = &mut self.tissue {
-                        reading.specific_force = filter.push(reading.specific_force, interval);
+                    if let Some(tissue) = &mut self.tissue {
+                        reading.specific_force =
+                            tissue.push(reading.specific_force, &turning, interval);
                     }
                 }
                 Stage::Sensor => {
@@ -136,6 +146,9 @@ impl StreamingEffects {
                     self.shake_and_filter(model, &mut reading, seconds, interval);
                 }
                 Stage::Timing => {
+                    if let Some(delay) = &mut self.delay {
+                        reading.angular_velocity = delay.push(seconds, reading.angular_velocity);
+                    }
                     stamp = model.epoch.plus_seconds(model.clock.stamp_seconds(seconds));
                 }
                 Stage::Linear => reading = model.linear_reading(&reading, seconds),
@@ -165,11 +178,7 @@ impl StreamingEffects {
         interval: f64,
     ) {
         if let Some(line) = &model.vibration {
-            let specific_force = line.at(seconds);
-            reading.specific_force += specific_force;
-            reading.angular_velocity += model
-                .coupling
-                .map_or_else(Vector3::zeros, |coupling| coupling * specific_force);
+            model.shake(line, reading, seconds);
         }
         if let Some(filters) = &mut self.low_pass {
             for channel in Channel::ALL {
@@ -178,29 +187,37 @@ impl StreamingEffects {
         }
     }
 
-    /// [`Stage::Segment`]; in segment axes.
-    fn segment(&mut self, model: &SensorModel, sample: &KinematicSample) -> Reading {
+    /// How the segment turns; where the sample does not tell the angular acceleration, the difference
+    /// from the sample before does.
+    fn turning(&mut self, sample: &KinematicSample) -> Turning {
         let segment_from_world = sample.world_from_sensor.rotation.inverse();
-        let angular_velocity = segment_from_world * sample.angular_velocity_in_world;
-        let mut specific_force =
-            segment_from_world * (sample.acceleration_in_world - model.gravity);
-        if let Some(offset) = &model.lever_arm {
-            let difference = |(stamp, before): (Stamp, Vector3<f64>)| {
-                (angular_velocity - before) / (sample.stamp - stamp)
-            };
-            let given = sample
-                .angular_acceleration_in_world
-                .map(|alpha| segment_from_world * alpha);
-            let angular_acceleration = given
-                .or_else(|| self.previous.map(difference))
-                .unwrap_or_default();
-            specific_force +=
-                lever_arm::acceleration(offset, &angular_velocity, &angular_acceleration);
+        let velocity = segment_from_world * sample.angular_velocity_in_world;
+        let difference =
+            |(stamp, before): (Stamp, Vector3<f64>)| (velocity - before) / (sample.stamp - stamp);
+        let acceleration = sample
+            .angular_acceleration_in_world
+            .map(|alpha| segment_from_world * alpha)
+            .or_else(|| self.previous.map(difference))
+            .unwrap_or_default();
+        self.previous = Some((sample.stamp, velocity));
+        Turning {
+            velocity,
+            acceleration,
         }
-        self.previous = Some((sample.stamp, angular_velocity));
+    }
+
+    /// [`Stage::Segment`]; in segment axes.
+    fn segment(&self, model: &SensorModel, sample: &KinematicSample, turning: &Turning) -> Reading {
+        let acceleration = sample.acceleration_in_world * model.inverse_scale;
+        let mut specific_force =
+            sample.world_from_sensor.rotation.inverse() * (acceleration - model.gravity);
+        if let Some(offset) = &model.lever_arm {
+            specific_force +=
+                lever_arm::acceleration(offset, &turning.velocity, &turning.acceleration);
+        }
         Reading {
             specific_force,
-            angular_velocity,
+            angular_velocity: turning.velocity,
         }
     }
 }

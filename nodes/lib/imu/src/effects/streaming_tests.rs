@@ -35,12 +35,13 @@ const MANY: &str = "- {effect: lever_arm, offset: [0.05, 0.0, -0.06]}
 - {effect: soft_tissue, natural_hz: 9.0, damping_ratio: 0.2}
 - {effect: time_offset, seconds: 0.0125}
 - {effect: clock_drift, ppm: 200}
+- {effect: channel_delay, seconds: 0.0081}
 - {effect: accel_bias, bias: [0.1, 0.2, 0.3]}
 - {effect: gyro_bias_drift, rate: [0.01, 0.0, 0.0]}
 - {effect: accel_saturation, limit: 30.0}
 - {effect: low_pass, cutoff_hz: 15.0}
 - {effect: gyro_g_sensitivity, matrix: [[0.001, 0.0, 0.0], [0.0, 0.0, 0.002], [0.0, 0.0, 0.0]]}
-- {effect: vibration, hz: 31.0, amplitude: [0.1, 0.2, 0.3], phase: 0.4}
+- {effect: vibration, hz: 31.0, amplitude: [0.1, 0.2, 0.3], phase: [0.4, 1.0, 5.0], gyro_amplitude: [0.02, 0.0, 0.01], gyro_phase: [0.3, 0.0, 2.0]}
 ";
 
 #[test]

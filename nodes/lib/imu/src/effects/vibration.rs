@@ -1,21 +1,22 @@
-//! `vibration`: a sinusoid of specific force at the sensor, coherent over the session.
+//! `vibration`: a sinusoid of both channels at the sensor, each axis with amplitude and phase of its
+//! own; coherent over the session.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
-use cromosim_spatial::{Complex64, FourierPair};
-use nalgebra::{Matrix3x2, Vector3};
+use nalgebra::Vector3;
 
-use super::residual_view::{ResidualView, median};
+use super::residual_view::ResidualView;
 use super::search::{FirstGuess, FittedSearch, Search, always};
 use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+use super::spectral_line::strongest_line;
 use super::{Effect, EffectKind};
-use crate::Channel;
+use crate::{Channel, PerChannel, Reading};
 
 pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::Vibration,
     name: "vibration",
     stage: Stage::Timing,
-    summary: "Something vibrates at the sensor (a motor, a fan): the specific force's residual has a sharp line of one frequency.",
+    summary: "Something vibrates at the sensor (a motor, a fan): the residual of one channel or both has a sharp line of one frequency.",
     remedy: "Find and damp the source, or mount the sensor on rubber.",
     parameters: &[
         ParameterSpec {
@@ -30,34 +31,15 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
                 prior_deviation: 50.0,
             }),
         },
-        ParameterSpec {
-            name: "amplitude",
-            unit: "m/s2",
-            shape: Shape::Vector3,
-            neutral: &[0.0; 3],
-            lower: -1e3,
-            upper: 1e3,
-            fit: Some(ParameterFit {
-                step: 1e-4,
-                prior_deviation: 5.0,
-            }),
-        },
-        ParameterSpec {
-            name: "phase",
-            unit: "rad",
-            shape: Shape::Scalar,
-            neutral: &[0.0],
-            lower: -TAU,
-            upper: TAU,
-            fit: Some(ParameterFit {
-                step: 1e-4,
-                prior_deviation: 10.0,
-            }),
-        },
+        amplitude("amplitude", "m/s2", 5.0),
+        phase("phase"),
+        amplitude("gyro_amplitude", "rad/s", 1.0),
+        phase("gyro_phase"),
     ],
-    channels: &[Channel::Accelerometer],
+    channels: &Channel::ALL,
     search: Search::Fitted(FittedSearch {
         first_guess: FirstGuess::FromResidual(starts),
+        companion: None,
         is_plausible: always,
         ordinary: None,
         rounding: None,
@@ -67,55 +49,135 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
     }),
 };
 
-/// `amplitude sin(2 pi hz (t - t0) + phase)`, parsed.
+const fn amplitude(name: &'static str, unit: &'static str, prior_deviation: f64) -> ParameterSpec {
+    ParameterSpec {
+        name,
+        unit,
+        shape: Shape::Vector3,
+        neutral: &[0.0; 3],
+        lower: -1e3,
+        upper: 1e3,
+        fit: Some(ParameterFit {
+            step: 1e-4,
+            prior_deviation,
+        }),
+    }
+}
+
+/// At t0; a fit may go on a turn beyond the one that it starts in.
+const fn phase(name: &'static str) -> ParameterSpec {
+    ParameterSpec {
+        name,
+        unit: "rad",
+        shape: Shape::Vector3,
+        neutral: &[0.0; 3],
+        lower: -2.0 * TAU,
+        upper: 2.0 * TAU,
+        fit: Some(ParameterFit {
+            step: 1e-4,
+            prior_deviation: 10.0,
+        }),
+    }
+}
+
+/// `amplitude sin(2 pi hz (t - t0) + phase)` of each axis and channel, parsed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpectralLine {
     /// Frequency, Hz.
     pub hz: f64,
-    /// Of each sensor axis, m/s2.
-    pub amplitude: Vector3<f64>,
-    /// At t0, rad.
-    pub phase: f64,
+    /// Of the channels, in sensor axes.
+    pub waves: PerChannel<Wave>,
+}
+
+/// One frequency on three axes: `sine sin(2 pi hz (t - t0)) + cosine cos(2 pi hz (t - t0))`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wave {
+    /// In the channel's unit.
+    pub sine: Vector3<f64>,
+    /// In the channel's unit.
+    pub cosine: Vector3<f64>,
+}
+
+impl Wave {
+    /// `amplitude sin(x + phase) = amplitude cos(phase) sin(x) + amplitude sin(phase) cos(x)`.
+    fn from_polar(amplitude: &Vector3<f64>, phase: &Vector3<f64>) -> Self {
+        Self {
+            sine: amplitude.zip_map(phase, |amplitude, phase| amplitude * phase.cos()),
+            cosine: amplitude.zip_map(phase, |amplitude, phase| amplitude * phase.sin()),
+        }
+    }
+
+    /// Amplitudes, and phases from 0 to 2 pi.
+    fn polar(&self) -> [Vector3<f64>; 2] {
+        [
+            self.sine.zip_map(&self.cosine, f64::hypot),
+            self.sine.zip_map(&self.cosine, |sine, cosine| {
+                cosine.atan2(sine).rem_euclid(TAU)
+            }),
+        ]
+    }
+
+    /// Mean square, summed over the axes.
+    fn power(&self) -> f64 {
+        0.5 * (self.sine.norm_squared() + self.cosine.norm_squared())
+    }
+
+    fn filtered(&self, gain: f64, phase: f64) -> Self {
+        let (sin, cos) = phase.sin_cos();
+        Self {
+            sine: (self.sine * cos - self.cosine * sin) * gain,
+            cosine: (self.cosine * cos + self.sine * sin) * gain,
+        }
+    }
 }
 
 impl SpectralLine {
     /// Of a vibration's values.
-    pub(super) fn from_effect(effect: &Effect) -> Self {
+    fn from_effect(effect: &Effect) -> Self {
+        let wave = |first| Wave::from_polar(&effect.vector(first), &effect.vector(first + 3));
         Self {
             hz: effect.scalar(0),
-            amplitude: effect.vector(1),
-            phase: effect.scalar(4),
+            waves: PerChannel {
+                accelerometer: wave(1),
+                gyroscope: wave(7),
+            },
         }
     }
 
-    /// Specific force at seconds since the epoch, in sensor axes.
-    #[inline]
-    pub(super) fn at(&self, seconds: f64) -> Vector3<f64> {
-        self.amplitude * (TAU * self.hz * seconds + self.phase).sin()
+    /// A vibration's values.
+    fn values(&self) -> Vec<f64> {
+        let polar = Channel::ALL.map(|channel| self.waves[channel].polar());
+        let values = polar.iter().flatten().flat_map(|vector| vector.iter());
+        std::iter::once(self.hz).chain(values.copied()).collect()
     }
 
-    /// Mean square of the specific force, summed over the axes, m2/s4.
-    pub fn power(&self) -> f64 {
-        self.amplitude
-            .iter()
-            .map(|amplitude| 0.5 * amplitude * amplitude)
-            .sum()
+    /// What it adds to both channels at seconds since the epoch.
+    #[inline]
+    pub(super) fn at(&self, seconds: f64) -> Reading {
+        let (sin, cos) = (TAU * self.hz * seconds).sin_cos();
+        let [specific_force, angular_velocity] = Channel::ALL.map(|channel| {
+            let wave = &self.waves[channel];
+            wave.sine * sin + wave.cosine * cos
+        });
+        Reading {
+            specific_force,
+            angular_velocity,
+        }
+    }
+
+    /// Mean square of a channel, summed over the axes, m2/s4 or rad2/s2.
+    pub fn power(&self, channel: Channel) -> f64 {
+        self.waves[channel].power()
     }
 
     /// What a filter of this gain and phase leaves of it.
     pub(super) fn filtered(self, (gain, phase): (f64, f64)) -> Self {
         Self {
-            amplitude: self.amplitude * gain,
-            phase: self.phase + phase,
+            waves: PerChannel::from_fn(|channel| self.waves[channel].filtered(gain, phase)),
             ..self
         }
     }
 }
-
-/// Readings below which no line is looked for.
-const LEAST_READINGS: usize = 64;
-/// Least frequency that is looked at, Hz: below it the residual of motion lives.
-const LEAST_HZ: f64 = 2.0;
 
 impl Effect {
     /// The line of a vibration; none of any other effect.
@@ -126,126 +188,5 @@ impl Effect {
 
 /// The strongest line of the residual; the neutral values where there is none.
 fn starts(view: &ResidualView) -> Vec<Vec<f64>> {
-    let values = strongest_line(view).map(|line| {
-        let [x, y, z] = line.amplitude.into();
-        vec![line.hz, x, y, z, line.phase]
-    });
-    vec![values.unwrap_or_else(|| SPEC.neutral())]
-}
-
-/// The line of the accelerometer's residual that stands out most over its surroundings, with
-/// amplitudes and phase by least squares in absolute time.
-pub fn strongest_line(view: &ResidualView) -> Option<SpectralLine> {
-    let residual: Vec<Vector3<f64>> = view.residual(Channel::Accelerometer).collect();
-    if residual.len() < LEAST_READINGS || view.rate_hz.is_nan() || view.rate_hz <= 0.0 {
-        return None;
-    }
-    let seconds: Vec<f64> = view
-        .stamps
-        .iter()
-        .map(|stamp| *stamp - view.epoch)
-        .collect();
-    let mean = residual.iter().sum::<Vector3<f64>>() / residual.len() as f64;
-    let (coarse, width) = coarse_line(&seconds, &residual, &mean, view.rate_hz)?;
-    let power = |hz: f64| fit(&seconds, &residual, &mean, hz).norm_squared();
-    let hz = refined(power, coarse, width);
-    let svd = fit(&seconds, &residual, &mean, hz).svd(true, true);
-    let (u, v_t) = (svd.u?, svd.v_t?);
-    let (strongest, sigma) = svd.singular_values.argmax();
-    // S = A cos(phase), C = A sin(phase), as A sin(x + phase) = S sin x + C cos x.
-    let phase = v_t[(strongest, 1)].atan2(v_t[(strongest, 0)]);
-    Some(SpectralLine {
-        hz,
-        amplitude: u.column(strongest) * sigma,
-        phase: phase.clamp(-PI, PI),
-    })
-}
-
-/// Coefficients of sine and cosine for each axis, by least squares.
-fn fit(seconds: &[f64], residual: &[Vector3<f64>], mean: &Vector3<f64>, hz: f64) -> Matrix3x2<f64> {
-    let (mut ss, mut sc, mut cc) = (0.0, 0.0, 0.0);
-    let (mut with_sine, mut with_cosine) = (Vector3::zeros(), Vector3::zeros());
-    for (seconds, residual) in seconds.iter().zip(residual) {
-        let (sine, cosine) = (TAU * hz * seconds).sin_cos();
-        let residual = residual - mean;
-        (ss, sc, cc) = (ss + sine * sine, sc + sine * cosine, cc + cosine * cosine);
-        with_sine += residual * sine;
-        with_cosine += residual * cosine;
-    }
-    let determinant = ss * cc - sc * sc;
-    Matrix3x2::from_columns(&[
-        (with_sine * cc - with_cosine * sc) / determinant,
-        (with_cosine * ss - with_sine * sc) / determinant,
-    ])
-}
-
-/// The greatest value near a coarse peak, by golden sections.
-fn refined(power: impl Fn(f64) -> f64, peak: f64, width: f64) -> f64 {
-    let golden = 0.618_033_988_749_895;
-    let (mut low, mut high) = (peak - width, peak + width);
-    let (mut a, mut b) = (high - golden * (high - low), low + golden * (high - low));
-    let (mut at_a, mut at_b) = (power(a), power(b));
-    for _ in 0..40 {
-        if at_a > at_b {
-            (high, b, at_b) = (b, a, at_a);
-            a = high - golden * (high - low);
-            at_a = power(a);
-        } else {
-            (low, a, at_a) = (a, b, at_b);
-            b = low + golden * (high - low);
-            at_b = power(b);
-        }
-        if high - low < 1e-7 {
-            break;
-        }
-    }
-    0.5 * (low + high)
-}
-
-/// Frequency of the bin that stands out most over the median of its surroundings, and the bins'
-/// spacing, from a zero-padded spectrum of all axes.
-fn coarse_line(
-    seconds: &[f64],
-    residual: &[Vector3<f64>],
-    mean: &Vector3<f64>,
-    rate_hz: f64,
-) -> Option<(f64, f64)> {
-    let first = *seconds.first()?;
-    let count = ((seconds.last()? - first) * rate_hz).round() as usize + 1;
-    let size = (2 * count).next_power_of_two();
-    if size > 1 << 24 {
-        return None;
-    }
-    let transform = FourierPair::new(size);
-    let mut power = vec![0.0; size / 2];
-    for axis in 0..3 {
-        let mut signal = vec![Complex64::default(); size];
-        for (seconds, residual) in seconds.iter().zip(residual) {
-            let index = ((seconds - first) * rate_hz).round() as usize;
-            // A Hann window, so that strong motion does not leak over the line.
-            let window = 0.5 - 0.5 * (TAU * index as f64 / count as f64).cos();
-            signal[index.min(size - 1)].re = (residual[axis] - mean[axis]) * window;
-        }
-        transform.forward(&mut signal);
-        power
-            .iter_mut()
-            .zip(&signal)
-            .for_each(|(power, value)| *power += value.norm_sqr());
-    }
-    let spacing = rate_hz / size as f64;
-    let around = ((1.0 / spacing) as usize).max(20);
-    let lowest = (LEAST_HZ / spacing).ceil() as usize;
-    let mut best = (0.0, 0);
-    for k in lowest.max(1)..power.len() - 1 {
-        if power[k] < power[k - 1] || power[k] < power[k + 1] {
-            continue;
-        }
-        let mut neighbours =
-            power[k.saturating_sub(around).max(lowest)..(k + around).min(power.len())].to_vec();
-        let score = power[k] / median(&mut neighbours).max(f64::MIN_POSITIVE);
-        if score > best.0 {
-            best = (score, k);
-        }
-    }
-    (best.1 > 0).then_some((best.1 as f64 * spacing, spacing))
+    vec![strongest_line(view).map_or_else(|| SPEC.neutral(), |line| line.values())]
 }

@@ -1,0 +1,92 @@
+//! The reference's motion under sets of effects: what a set names is undone, the rest stays as it was
+//! reported.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::rc::Rc;
+use std::sync::Arc;
+
+use cromosim_imu::{EffectSet, ReadOff};
+use cromosim_spatial::{KinematicTrack, PoseEstimate};
+
+use crate::fit::FitModel;
+
+/// Tracks of one reference, made when they are asked for; positions in its units of length.
+pub(crate) struct ReferenceTracks<'a> {
+    model: &'a FitModel<'a>,
+    tracks: RefCell<BTreeMap<Undone, Rc<KinematicTrack>>>,
+}
+
+/// What of the analysis' motion is undone.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Undone {
+    smoothing: bool,
+    interpolation: bool,
+}
+
+impl<'a> ReferenceTracks<'a> {
+    pub fn new(model: &'a FitModel<'a>) -> Self {
+        Self {
+            model,
+            tracks: RefCell::default(),
+        }
+    }
+
+    /// The motion that a simulation under a set starts from.
+    pub fn track(&self, set: &EffectSet) -> Rc<KinematicTrack> {
+        let make = || {
+            let prepared = self.model.prepared;
+            let mut track = if self.is_that_of_analysis(set) {
+                self.model.track.clone()
+            } else {
+                prepared.track(&self.estimate(set))
+            };
+            for acceleration in &mut track.acceleration_in_segment {
+                *acceleration *= prepared.report.length_units;
+            }
+            Rc::new(track)
+        };
+        let undone = self.undone(set);
+        Rc::clone(self.tracks.borrow_mut().entry(undone).or_insert_with(make))
+    }
+
+    /// The estimate of that motion, in metres.
+    pub fn estimate(&self, set: &EffectSet) -> Arc<PoseEstimate> {
+        let (prepared, basis) = (self.model.prepared, &self.model.basis);
+        if self.is_that_of_analysis(set) {
+            return basis.estimate.clone();
+        }
+        let undone = self.undone(set);
+        let reported = prepared.interpolated.as_ref();
+        let estimate = reported
+            .filter(|_| !undone.interpolation)
+            .unwrap_or(&prepared.estimate);
+        Arc::new(match basis.undone_hz.filter(|_| undone.smoothing) {
+            Some(cutoff_hz) => estimate.undoing(cutoff_hz),
+            None => estimate.clone(),
+        })
+    }
+
+    /// Cutoff of the smoothing that a set undoes, Hz.
+    pub fn undone_hz(&self, set: &EffectSet) -> Option<f64> {
+        let cutoff_hz = self.model.basis.undone_hz;
+        cutoff_hz.filter(|_| set.get_read_off(ReadOff::ReferenceSpectrum).is_some())
+    }
+
+    fn undone(&self, set: &EffectSet) -> Undone {
+        Undone {
+            smoothing: self.undone_hz(set).is_some(),
+            interpolation: self.model.prepared.interpolated.is_some()
+                && set.get_read_off(ReadOff::ReferenceFrames).is_some(),
+        }
+    }
+
+    /// Whether a set undoes all that the analysis undoes.
+    fn is_that_of_analysis(&self, set: &EffectSet) -> bool {
+        self.undone(set)
+            == Undone {
+                smoothing: self.model.basis.undone_hz.is_some(),
+                interpolation: self.model.prepared.interpolated.is_some(),
+            }
+    }
+}

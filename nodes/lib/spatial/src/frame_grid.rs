@@ -1,0 +1,198 @@
+//! Poses that were interpolated along straight chords between frames of a lower rate.
+
+use std::f64::consts::TAU;
+
+use crate::PoseSeries;
+use crate::chords::Chords;
+use crate::golden::greatest_near;
+use crate::kinks::{Kinks, second_differences};
+
+/// Poses per frame below which frames cannot be told from poses. No source.
+const LEAST_POSES_PER_FRAME: f64 = 1.5;
+/// Poses per frame from which on the frames are told well enough to stand for the poses: below, least
+/// squares make more noise than the chords cost. Found on a motion of CMU at 100 Hz with frames at 59 Hz.
+const LEAST_TO_RESTORE: f64 = 2.0;
+/// Multiples of a rate that may stand out more than itself. No source.
+const HIGHEST_MULTIPLE: u32 = 8;
+/// Height of the rate's own line then, over the median of its surroundings: of white noise one in 4000
+/// reaches it. No source.
+const LEAST_FUNDAMENTAL: f64 = 12.0;
+/// How much better chords have to fit (natural logarithm of the two misfits' product) than those of a
+/// part of their rate, whose frames are fewer. No source.
+const BETTER: f64 = 0.2;
+/// The same of any other lower rate. No source.
+const BETTER_HIDDEN: f64 = 0.06;
+/// How much better chords have to fit than the same half an interval later. The least, and times the
+/// number of poses: thirty nats are beyond chance. No source.
+const BETTER_THAN_SHIFTED: f64 = 0.02;
+const BETTER_THAN_SHIFTED_NATS: f64 = 30.0;
+/// Mean squares off the chords that matter, as a part of those of second differences. No source.
+const RELEVANT_PART: f64 = 1e-2;
+/// How far the frames may be from where the kinks say that they are, in intervals, and how sharp they
+/// are found. No source.
+const NEAR_TURNS: f64 = 0.2;
+const PRECISION_TURNS: f64 = 3e-3;
+/// Poses that the frames' offset is found from: more only cost time.
+const ENOUGH_POSES: usize = 3000;
+/// Second differences within a chord that tell how noisy the poses are; with fewer nothing does.
+const LEAST_WITHIN: usize = 50;
+/// Most that poses are off their chords, as a multiple of the noise that they show within them; a curve
+/// between the frames is farther off. No source.
+const MOST_OFF: f64 = 2.0;
+/// And as a part of all second differences, where there is hardly any noise. No source.
+const MOST_OFF_PART: f64 = 0.02;
+
+/// The times of the frames between which poses were interpolated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrameGrid {
+    /// Frames per second.
+    rate_hz: f64,
+    /// Of the first frame after the first pose, since that pose, s.
+    offset_s: f64,
+}
+
+impl FrameGrid {
+    /// The frames that the poses show: between two of them second differences vanish but for noise,
+    /// and at each they do not. None where the poses are frames themselves, or follow a curve.
+    pub fn find(poses: &PoseSeries) -> Option<Self> {
+        let kinks = Kinks::new(poses)?;
+        let shown_hz = kinks.strongest_rate()?;
+        let mut best: Option<(f64, Self)> = None;
+        for hz in candidates(&kinks, shown_hz) {
+            let (misfit, grid) = Self::through(&kinks, poses, hz);
+            let is_better = best.as_ref().is_none_or(|(least, best)| {
+                let ratio = grid.rate_hz / best.rate_hz;
+                let is_multiple = (ratio - ratio.round()).abs() < 1e-2;
+                misfit < least - if is_multiple { BETTER } else { BETTER_HIDDEN }
+            });
+            if is_better {
+                best = Some((misfit, grid));
+            }
+        }
+        best.map(|(_, grid)| grid)
+            .filter(|grid| grid.is_convincing(&kinks, poses))
+    }
+
+    /// The frames of a rate that is known already; none where the poses do not show them.
+    pub fn at_rate(poses: &PoseSeries, rate_hz: f64) -> Option<Self> {
+        let kinks = Kinks::new(poses)?;
+        let is_possible = rate_hz * LEAST_POSES_PER_FRAME <= kinks.poses_hz();
+        (is_possible && kinks.have_rate(rate_hz))
+            .then(|| Self::through(&kinks, poses, kinks.sharpened(rate_hz)).1)
+    }
+
+    /// Frames per second.
+    pub fn rate_hz(&self) -> f64 {
+        self.rate_hz
+    }
+
+    /// The frames themselves, by least squares; where these are so many that they would be noisier than
+    /// the poses, the poses moved from the chords to a curve through the frames.
+    pub fn frames(&self, poses: &PoseSeries) -> PoseSeries {
+        let seconds = poses.seconds();
+        let span = seconds.last().copied().unwrap_or(0.0);
+        let chords = Chords::fit(poses, self.rate_hz, self.offset_s);
+        if (seconds.len() as f64) < LEAST_TO_RESTORE * self.rate_hz * span {
+            chords.onto_curve(poses)
+        } else {
+            chords.into_frames()
+        }
+    }
+
+    /// With frames where the kinks of this rate come, sharpened to where poses are least off the
+    /// chords, and how far they are.
+    fn through(kinks: &Kinks, poses: &PoseSeries, rate_hz: f64) -> (f64, Self) {
+        let turns = -kinks.wave(rate_hz).arg() / TAU;
+        let grid = |turns: f64| Self {
+            rate_hz,
+            offset_s: turns.rem_euclid(1.0) / rate_hz,
+        };
+        let part = middle(poses);
+        let since = part.stamps[0] - poses.stamps[0];
+        let misfit = |turns: f64| grid(turns - since * rate_hz).misfit(kinks, &part);
+        let turns = greatest_near(|turns| -misfit(turns), turns, NEAR_TURNS, PRECISION_TURNS);
+        (misfit(turns), grid(turns))
+    }
+
+    /// ln of how far poses are off the chords, both kinds of misfit together.
+    fn misfit(&self, kinks: &Kinks, poses: &PoseSeries) -> f64 {
+        let chords = Chords::fit(poses, self.rate_hz, self.offset_s);
+        (0..2)
+            .map(|of| chords.misfit[of] + RELEVANT_PART * kinks.mean_squares[of] + 1e-300)
+            .map(f64::ln)
+            .sum()
+    }
+
+    fn is_convincing(&self, kinks: &Kinks, poses: &PoseSeries) -> bool {
+        let shifted = Self {
+            offset_s: (self.offset_s + 0.5 / self.rate_hz) % (1.0 / self.rate_hz),
+            ..*self
+        };
+        let chance = BETTER_THAN_SHIFTED_NATS / (1.5 * poses.stamps.len() as f64);
+        let gain = shifted.misfit(kinks, poses) - self.misfit(kinks, poses);
+        gain > chance.max(BETTER_THAN_SHIFTED) && self.is_straight(poses)
+    }
+
+    /// Whether the poses lie on the chords as well as their noise lets them, which their second
+    /// differences within a chord tell: white noise has six times its variance there.
+    fn is_straight(&self, poses: &PoseSeries) -> bool {
+        let seconds = poses.seconds();
+        let frame = |k: usize| ((seconds[k] - self.offset_s) * self.rate_hz).floor();
+        let (mut within, mut all) = ([0.0; 2], [0.0; 2]);
+        let (mut within_count, mut count) = (0, 0);
+        for k in 1..seconds.len() - 1 {
+            let Some(differences) = second_differences(poses, &seconds, k) else {
+                continue;
+            };
+            let is_within = frame(k - 1) == frame(k + 1);
+            within_count += usize::from(is_within);
+            count += 1;
+            for (of, difference) in differences.iter().enumerate() {
+                let square = difference.norm_squared() / 18.0;
+                all[of] += square;
+                within[of] += if is_within { square } else { 0.0 };
+            }
+        }
+        if within_count < LEAST_WITHIN {
+            return true;
+        }
+        let chords = Chords::fit(poses, self.rate_hz, self.offset_s);
+        (0..2).all(|of| {
+            let noise = within[of] / within_count as f64;
+            chords.misfit[of] <= MOST_OFF * noise + MOST_OFF_PART * all[of] / count as f64
+        })
+    }
+}
+
+/// Rates of kinks that show as a line, the lowest first: as itself or, above half the poses' rate, as
+/// what it lacks of that; or a multiple of a rate that shows too, as narrow kinks have many.
+fn candidates(kinks: &Kinks, shown_hz: f64) -> Vec<f64> {
+    let poses_hz = kinks.poses_hz();
+    let highest_hz = poses_hz / LEAST_POSES_PER_FRAME;
+    let lines = [shown_hz, poses_hz - shown_hz, poses_hz + shown_hz];
+    let mut candidates: Vec<f64> = (1..=HIGHEST_MULTIPLE)
+        .flat_map(|multiple| lines.map(|hz| (hz / f64::from(multiple), multiple)))
+        .filter(|(hz, multiple)| {
+            *hz <= highest_hz && (*multiple == 1 || kinks.height(*hz) > LEAST_FUNDAMENTAL)
+        })
+        .map(|(hz, _)| hz)
+        .collect();
+    candidates.sort_unstable_by(f64::total_cmp);
+    candidates
+}
+
+/// A stretch of poses that is long enough to place the frames by.
+fn middle(poses: &PoseSeries) -> PoseSeries {
+    let count = poses.stamps.len().min(ENOUGH_POSES);
+    let first = (poses.stamps.len() - count) / 2;
+    let own = first..first + count;
+    PoseSeries {
+        stamps: poses.stamps[own.clone()].to_vec(),
+        positions: poses.positions[own.clone()].to_vec(),
+        rotations: poses.rotations[own].to_vec(),
+    }
+}
+
+#[cfg(test)]
+#[path = "frame_grid_tests.rs"]
+mod tests;

@@ -1,0 +1,140 @@
+#![allow(clippy::unwrap_used)]
+use nalgebra::{UnitQuaternion, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha12Rng;
+
+use super::*;
+use crate::{Stamp, so3};
+
+fn position(t: f64) -> Vector3<f64> {
+    Vector3::new(
+        0.2 * (5.0 * t).sin() + 0.01 * (19.0 * t).sin(),
+        0.15 * (6.1 * t).cos(),
+        0.1 * (9.3 * t + 0.4).sin(),
+    )
+}
+
+fn rotation(t: f64) -> UnitQuaternion<f64> {
+    so3::exp(&Vector3::new(
+        0.6 * (4.0 * t).sin(),
+        0.4 * (7.1 * t).cos(),
+        0.5 * (5.3 * t).sin(),
+    ))
+}
+
+/// Poses at a rate on the chords between frames of another; none: on the motion itself.
+fn poses(poses_hz: f64, frames_hz: Option<f64>, first_frame_s: f64, noise: [f64; 2]) -> PoseSeries {
+    let mut random = ChaCha12Rng::seed_from_u64(3);
+    let mut scatter = |size: f64| {
+        Vector3::from_fn(|_, _| {
+            let sum: f64 = (0..12).map(|_| random.random::<f64>()).sum();
+            size * (sum - 6.0)
+        })
+    };
+    let mut series = PoseSeries::default();
+    for k in 0..(40.0 * poses_hz) as usize {
+        let t = k as f64 / poses_hz;
+        let (p, r) = match frames_hz {
+            None => (position(t), rotation(t)),
+            Some(hz) => {
+                let turns = ((t - first_frame_s) * hz).floor();
+                let [from, to] = [turns, turns + 1.0].map(|k| first_frame_s + k / hz);
+                let share = (t - from) * hz;
+                let turn = so3::log(&(rotation(from).inverse() * rotation(to)));
+                (
+                    position(from) * (1.0 - share) + position(to) * share,
+                    rotation(from) * so3::exp(&(turn * share)),
+                )
+            }
+        };
+        series
+            .stamps
+            .push(Stamp::from_nanos(1_700_000_000_000_000_000).plus_seconds(t));
+        series.positions.push(p + scatter(noise[0]));
+        series.rotations.push(r * so3::exp(&scatter(noise[1])));
+    }
+    series
+}
+
+const ORDINARY: [f64; 2] = [1e-4, 8e-4];
+
+#[test]
+fn frames_are_found_and_come_back() {
+    for (poses_hz, frames_hz, first, noise) in [
+        (200.0, 54.27, 0.0, ORDINARY),
+        (120.0, 54.27, 0.007, ORDINARY),
+        (100.0, 54.27, 0.0, ORDINARY),
+        (100.0, 45.73, 0.0, ORDINARY),
+        (200.0, 25.0, 0.011, ORDINARY),
+        (200.0, 23.14, 0.0, ORDINARY),
+        (200.0, 41.305, 0.0, ORDINARY),
+        (200.0, 60.0, 0.0, [2e-4, 1.2e-3]),
+        (200.0, 50.0, 0.0, [3e-4, 1.7e-3]),
+        (120.0, 30.0, 0.0, ORDINARY),
+        (120.0, 60.0, 0.0, ORDINARY),
+        (286.0, 120.0, 0.001, [1e-5, 1e-4]),
+        (200.0, 40.0, 0.004, [0.0, 0.0]),
+    ] {
+        let case = format!("{frames_hz} Hz at {poses_hz} Hz");
+        let poses = poses(poses_hz, Some(frames_hz), first, noise);
+        let grid = FrameGrid::find(&poses).unwrap_or_else(|| panic!("{case}: none"));
+        assert!(
+            (grid.rate_hz() - frames_hz).abs() < 0.02,
+            "{case}: {grid:?}"
+        );
+        let again = FrameGrid::at_rate(&poses, frames_hz).unwrap();
+        assert!(
+            (again.rate_hz() - frames_hz).abs() < 0.02,
+            "{case}: {again:?}"
+        );
+        let frames = grid.frames(&poses);
+        if poses_hz < 2.0 * frames_hz {
+            assert_eq!(frames.stamps, poses.stamps, "{case}");
+        }
+        let mut squares = [0.0; 2];
+        for (k, stamp) in frames.stamps.iter().enumerate() {
+            let t = *stamp - poses.stamps[0];
+            squares[0] += (frames.positions[k] - position(t)).norm_squared();
+            squares[1] += so3::log(&(rotation(t).inverse() * frames.rotations[k])).norm_squared();
+        }
+        for (square, noise) in squares.iter().zip(noise) {
+            let rms = (square / (3.0 * frames.stamps.len() as f64)).sqrt();
+            assert!(rms < 1.3 * noise + 2e-4, "{case}: off by {rms}");
+        }
+    }
+}
+
+#[test]
+fn where_there_are_no_chords_none_are_found() {
+    for noise in [[0.0, 0.0], ORDINARY, [4e-3, 0.014]] {
+        for poses_hz in [60.0, 120.0, 200.0] {
+            let plain = poses(poses_hz, None, 0.0, noise);
+            assert_eq!(FrameGrid::find(&plain), None, "{poses_hz} {noise:?}");
+            assert_eq!(FrameGrid::at_rate(&plain, 50.0), None);
+        }
+    }
+    // Frames faster than the poses leave no trace.
+    let fast = poses(100.0, Some(240.0), 0.0, ORDINARY);
+    assert_eq!(FrameGrid::find(&fast), None);
+    assert!(FrameGrid::find(&PoseSeries::default()).is_none());
+}
+
+#[test]
+fn missing_poses_leave_missing_frames() {
+    let mut poses = poses(120.0, Some(40.0), 0.0, ORDINARY);
+    let keep = |k: usize| !(1200..1500).contains(&k) && k % 131 != 7;
+    let kept: Vec<usize> = (0..poses.stamps.len()).filter(|k| keep(*k)).collect();
+    poses = PoseSeries {
+        stamps: kept.iter().map(|&k| poses.stamps[k]).collect(),
+        positions: kept.iter().map(|&k| poses.positions[k]).collect(),
+        rotations: kept.iter().map(|&k| poses.rotations[k]).collect(),
+    };
+    let grid = FrameGrid::find(&poses).unwrap();
+    let frames = grid.frames(&poses);
+    let largest = frames
+        .stamps
+        .windows(2)
+        .map(|pair| pair[1] - pair[0])
+        .fold(0.0, f64::max);
+    assert!((2.4..2.6).contains(&largest), "{largest}");
+}
