@@ -75,7 +75,8 @@ def _doubles(data):
 
 
 def read(path):
-    """name -> {reference: (stamps, pos, quat), imu: (stamps, gyro, accel), variances}; topics that are absent stay absent."""
+    """name -> {reference: (stamps, pos, quat), imu: (stamps, gyro, accel), variances: of the first message, covariances: diagonals of each
+    message (gyro, accel)}; topics that are absent stay absent."""
     rows = {}
     with open(path, "rb") as stream:
         for _, channel, message in make_reader(stream).iter_messages():
@@ -92,5 +93,6 @@ def read(path):
             item["reference"] = (stamps, values[:, :3], values[:, 3:7])
         else:
             item["imu"] = (stamps, values[:, 13:16], values[:, 25:28])
-            item["variances"] = (values[0, 16:25:4].copy(), values[0, 28:37:4].copy())
+            item["covariances"] = (values[:, 16:25:4], values[:, 28:37:4])
+            item["variances"] = tuple(own[0].copy() for own in item["covariances"])
     return out
