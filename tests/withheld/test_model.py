@@ -64,7 +64,7 @@ def test_interpolation_leaves_chords():
     position, rotation = model.reference(np.random.default_rng(0), motion, times, {"reference_interpolation": {"rate_hz": 20.0}}, (0.0, 0.0), filtering)
     bent = np.linalg.norm(np.diff(position, 2, axis=0), axis=1) > 1e-9
     assert 0.15 < bent.mean() < 0.25  # one frame in ten samples bends two of the second differences
-    assert (rotation.inv() * motion.pose(times)[1]).magnitude().max() < 0.01
+    assert (rotation.inv() * motion.pose(times)[1]).magnitude().max() < 0.03
 
 
 def test_units_come_last():
