@@ -163,9 +163,7 @@ class Placement:
         reference_times, reference_keep = _reference_times(rng, first, seconds, self.reference_rate, self.gaps)
         self.filtering["frame_phase"] = float(rng.choice([0.0, rng.random()]))
         position, rotation = model.reference(rng, motion, reference_times, self.effects, self.ordinary, self.filtering)
-        quaternion = rotation.as_quat()
-        flips = np.cumprod(np.where(np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0, -1.0, 1.0))
-        quaternion = quaternion * np.concatenate([[1.0], flips])[:, None]
+        quaternion = motions.continuous(rotation.as_quat())
         variances = (self.sigmas[1] ** 2, self.sigmas[0] ** 2) if self.declared else (0.0, 0.0)
         reference_stamps = first + (reference_times - first) * (1 - self.reference_ppm * 1e-6)
         return {"reference": (self._nanoseconds(reference_stamps)[reference_keep], position[reference_keep], quaternion[reference_keep]),
@@ -272,13 +270,18 @@ def read_label(labels, case):
         return json.loads(key_of(labels).decrypt(stream.read()))
 
 
+def write_label(labels, label):
+    with open(os.path.join(labels, f"{label['case']}.json.enc"), "wb") as stream:
+        stream.write(key_of(labels).encrypt(json.dumps(label).encode()))
+    return label["case"]
+
+
 def generate(out, suite, seed=1, count=None, only=None, jobs=1, seconds=None):
     if seconds and suite == "outside":
         sys.exit("--seconds: the effects of the outside suite are made for its own length")
     labels = labels_folder(out)
     os.makedirs(out, exist_ok=True)
     os.makedirs(labels, exist_ok=True)
-    cipher = key_of(labels)
     if motions.data_folder() is None:
         print("motion data absent (CROMOSIM_DATA): synthetic motions only", file=sys.stderr)
     seconds = seconds or usual_seconds(suite)
@@ -287,9 +290,7 @@ def generate(out, suite, seed=1, count=None, only=None, jobs=1, seconds=None):
     names = []
     with ProcessPoolExecutor(jobs) as pool:
         for label in pool.map(build, work):
-            names.append(label["case"])
-            with open(os.path.join(labels, f"{label['case']}.json.enc"), "wb") as stream:
-                stream.write(cipher.encrypt(json.dumps(label).encode()))
+            names.append(write_label(labels, label))
     return names
 
 

@@ -236,7 +236,7 @@ def grade_case(case, out, labels, results, cromosim):
     diagnosis, seconds = read_diagnosis(folder, record), read_seconds(folder)
     record["seconds"] = seconds and [value / len(label["placements"]) for value in seconds]
     plain = simulation_seconds(cromosim, generate.recordings(case_folder, "fit"), folder)
-    record["cost"] = seconds[1] / plain if seconds and plain else None
+    record["cost"] = seconds[1] / plain if seconds and plain and diagnosis else None
     gaps = check_gaps(record, label, case_folder, folder, cromosim)
     record["placements"] = {name: grade_placement(label, name, diagnosis, gaps) for name in label["placements"]}
     tables.judge(record)

@@ -6,6 +6,8 @@ from scipy.signal import butter, lfilter, sosfiltfilt
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation, Slerp
 
+from motions import continuous
+
 GRAVITY = np.array([0.0, 0.0, -9.80665])
 DENSE_RATE = 2000.0  # Hz at least, for the continuous stages
 WARM_UP = 3.0  # s
@@ -222,9 +224,7 @@ def chords(frames, position, rotation, times):
 
 
 def smooth(position, rotation, rate, cutoff, filtering):
-    quaternion = rotation.as_quat()
-    flips = np.cumprod(np.where(np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0, -1.0, 1.0))
-    both = np.hstack([position, quaternion * np.concatenate([[1.0], flips])[:, None]])
+    both = np.hstack([position, continuous(rotation.as_quat())])
     if filtering["kernel"] == "butterworth":
         both = sosfiltfilt(butter(2, cutoff / (rate / 2), output="sos"), both, axis=0)
     else:  # Gaussian with half power at the cutoff

@@ -71,9 +71,16 @@ def leave_one_out(options, out, labels, results):
     return records
 
 
+def write_cases(options, out, suite):
+    if suite == "mechanics":
+        import mechanics  # MuJoCo is no requirement of the others
+        return mechanics.generate(out, options.seed, options.count, options.jobs)
+    return generate.generate(out, suite, options.seed, options.count, jobs=options.jobs, seconds=options.seconds)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--suite", action="append", choices=generate.SUITES, help="may be repeated; default all")
+    parser.add_argument("--suite", action="append", choices=[*generate.SUITES, "mechanics"], help="may be repeated; default all but mechanics, which needs MuJoCo")
     parser.add_argument("--count", type=int, help="cases of each suite; default the suite's own")
     parser.add_argument("--seconds", type=float, help="length of the fit recordings; default the suite's own")
     parser.add_argument("--jobs", type=int, default=2)
@@ -94,7 +101,7 @@ def main():
             if os.path.isdir(out) and os.listdir(out):
                 sys.exit(f"{out} is not empty: use --keep or another --out")
             begin = time.monotonic()
-            generate.generate(out, suite, options.seed, options.count, jobs=options.jobs, seconds=options.seconds)
+            write_cases(options, out, suite)
             print(f"generated {suite} in {time.monotonic() - begin:.0f} s", file=sys.stderr)
         if options.leave_one_out:
             records = leave_one_out(options, out, labels, results)

@@ -28,8 +28,7 @@ REFERENCE_RATE = 400.0  # Hz of the grid on which the reference is smoothed
 def true_reference(stamps, position, quaternion, effects):
     """Undoes units and interpolation: frames that, joined by chords, come nearest to what is reported."""
     position = position / effects.get("reference_units", {}).get("factor", 1.0)
-    flips = np.cumprod(np.where(np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0, -1.0, 1.0))
-    values = np.hstack([position, quaternion * np.concatenate([[1.0], flips])[:, None]])
+    values = np.hstack([position, motions.continuous(quaternion)])
     if "reference_interpolation" not in effects:
         return stamps, values
     place = (stamps - stamps[0]) * effects["reference_interpolation"]["rate_hz"]
