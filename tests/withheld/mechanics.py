@@ -30,6 +30,7 @@ SETTLE, FIT, PAUSE, CHECK, REST = 3.0, 45.0, 3.0, 25.0, 0.5  # s
 REFERENCE_EVERY = 10  # steps: 200 Hz
 MECHANISMS = ("nothing", "displaced", "turned", "flesh", "motor", "late_gyro", "clock", "bias", "saturated", "loose")
 SECOND = ("displaced", "turned", "clock", "bias")  # what may join another mechanism
+KNOCKS = 30  # in the fit recording, at least
 HOUSING = 0.03  # kg: the IMU with its case
 SERVOS = ("z 40", "y 40", "x 20", "y 12", "x 4", "y 4")  # axis and stiffness [Nm/rad] from shoulder to wrist
 BODY_MASS = 0.8  # kg, moved by hand
@@ -50,7 +51,7 @@ def sensor_xml(parts):
             joints += f'<joint type="slide" axis="{_text(axis)}" stiffness="{HOUSING * natural**2:.9g}" damping="{2 * ratio * natural * HOUSING:.9g}"/>'
     if "loose" in parts:  # free between two stops that are hard and bounce a little
         loose = parts["loose"]
-        joints += (f'<joint type="{loose["type"]}" axis="{_text(loose["axis"])}" pos="{_text(loose["hinge"])}" range="{-loose["play"]:.9g} {loose["play"]:.9g}" limited="true" '
+        joints += (f'<joint name="play" type="{loose["type"]}" axis="{_text(loose["axis"])}" range="{-loose["play"]:.9g} {loose["play"]:.9g}" limited="true" '
                    f'solreflimit="0.004 0.4" damping="{loose["damping"]:.9g}"/>')
     return (f'<body name="housing" {placed} quat="{_text(turn)}">{joints}<inertial pos="0 0 0" mass="{HOUSING}" diaginertia="8e-6 8e-6 8e-6"/>'
             '<site name="sensor"/></body>')
@@ -119,7 +120,8 @@ def parts_of(rng, mechanism, level):
     if mechanism == "loose":
         slide = bool(rng.random() < 0.4)
         play = size(1e-3, 2e-3, 4e-3) if slide else np.radians(size(2, 4, 8))
-        loose = {"type": "slide" if slide else "hinge", "axis": direction(1.0), "hinge": np.zeros(3) if slide else direction(0.02), "play": play, "damping": 0.02 if slide else 1e-5}
+        # turns about its own centre: about another, its weight would hold it at one stop
+        loose = {"type": "slide" if slide else "hinge", "axis": direction(1.0), "play": play, "damping": 0.02 if slide else 1e-5}
         return {"loose": loose}, {"unknown": {}}
     return {}, {}
 
@@ -172,20 +174,30 @@ def run(rng, body, parts):
     if hand:
         hand.begin(data)
     place, turn, reading = np.empty((steps, 3)), np.empty((steps, 9)), np.empty((steps, 6))
+    play = engine.joint("play").qposadr[0] if "loose" in parts else 0
+    travel = np.empty(steps)
 
     for n in range(steps):
         data.ctrl[:] = control[2 * n]
         if hand:
             hand.pull(data, limb, n)
         mujoco.mj_forward(engine, data)
-        place[n], turn[n], reading[n] = data.site_xpos[site], data.site_xmat[site], data.sensordata
+        place[n], turn[n], reading[n], travel[n] = data.site_xpos[site], data.site_xmat[site], data.sensordata, data.qpos[play]
         data.ctrl[:] = control[2 * n + 1]  # held over the step: that of its middle, or the readings would lead
         if hand:
             data.xfrc_applied[limb] = hand.middle
         mujoco.mj_step(engine, data)
     if data.warning.number.any() or not np.isfinite(reading).all():
         raise SystemExit("the engine warns; see MUJOCO_LOG.TXT")
+    if "loose" in parts:
+        parts["loose"]["knocks"] = knocks(travel[int(SETTLE / STEP):int((SETTLE + FIT) / STEP)], parts["loose"]["play"])
     return np.arange(steps) * STEP, place, Rotation.from_matrix(turn.reshape(-1, 3, 3)), reading[:, :3], reading[:, 3:]
+
+
+def knocks(travel, play):
+    """How often it goes from one stop to the other."""
+    sides = np.sign(travel[np.abs(travel) > 0.8 * play])
+    return int(np.sum(sides[1:] != sides[:-1]))
 
 
 def at_times(times, values, wanted):
@@ -257,13 +269,17 @@ def build(job):
     if mechanism in SECOND and rng.random() < 0.5:  # two of the plain ones together
         more = parts_of(rng, str(rng.choice([other for other in SECOND if other != mechanism])), level)
         parts, effects = {**parts, **more[0]}, {**effects, **more[1]}
-    device = Device(rng, parts, effects, run(rng, body, parts))
+    simulated = run(rng, body, parts)
+    while "loose" in parts and parts["loose"]["knocks"] < KNOCKS:  # at rest at one stop it is a mount like any other
+        parts, effects = parts_of(rng, mechanism, level)
+        simulated = run(rng, body, parts)
+    device = Device(rng, parts, effects, simulated)
     base, place = 1_700_000_000 + int(rng.integers(0, 20_000_000)), str(rng.choice(["wrist", "ankle"]))
     os.makedirs(os.path.join(folder, name), exist_ok=True)
     for file, first, seconds in (("fit", SETTLE, FIT), ("check", SETTLE + FIT + PAUSE, CHECK)):
         recording.write(os.path.join(folder, name, f"{file}.mcap"), {place: device.record(base, first, seconds)})
     if verify:
-        print(name, mechanism, body, sorted(device.effects), device.verify(), flush=True)
+        print(name, mechanism, body, sorted(device.effects), parts.get("loose", {}).get("knocks", ""), device.verify(), flush=True)
     item = {"effects": device.effects, "epoch_ns": base * 1_000_000_000 + int(round(device.t0 * 1e9)), "imu_rate": device.rate, "sigmas": device.sigmas, "declared": True,
             "ordinary": device.ordinary, "reference_ppm": device.ppm, "body": body, "outside": None}
     return {"case": name, "suite": "mechanics", "seconds": FIT, "affected": place if effects else None, "formula": False,

@@ -214,7 +214,7 @@ def confusion_table(records):
         for name, place in record["placements"].items():
             if place["hidden"] == place["named"]:
                 continue
-            hidden = ", ".join(f"{x} ({record['strength'].get(x, '')})" for x in place["hidden"]) or "nothing"
+            hidden = ", ".join(f"{x} ({record['strength'][x]})" if x in record["strength"] else x for x in place["hidden"]) or "nothing"
             if record["suite"] == "outside" and place["hidden"]:
                 hidden = "outside: " + ", ".join(f"{x} ({y})" for x, y in record["strength"].items())
             if "failed" in record:
