@@ -55,7 +55,9 @@ def white(values, order=8):
 
 def floor(rng, stamps, values, true, t0, effects):
     """Root mean square of what the reference's noise does to the two channels: the same again with as much noise added."""
-    with_noise = values + np.hstack([white(values[:, :3]) * rng.standard_normal((len(values), 3)), white(values[:, 3:]) * rng.standard_normal((len(values), 4))])
+    # of a quaternion's four parts the noise of a rotation has but three; the fourth is lost where the length is made one again
+    sigmas = np.repeat([white(values[:, :3]), white(values[:, 3:]) * np.sqrt(4 / 3)], [3, 4])
+    with_noise = values + sigmas * rng.standard_normal(values.shape)
     return [a - b for a, b in zip(model.inner_stages(smoothed(stamps, with_noise), true, t0, effects), model.inner_stages(smoothed(stamps, values), true, t0, effects))]
 
 
@@ -75,21 +77,21 @@ def compare(item, base, t0, effects):
     noise = floor(np.random.default_rng(0), at, values, true, t0, effects)
     out = []
     for index, own in enumerate((accel, gyro)):
-        drift = reference_drift(at, values, true, usable, t0, effects, own, index)
-        straight = lambda given: given[0] + (given - given[0]) * (1 + drift)
-        said = model.inner_stages(smoothed(straight(at), values), true, t0, effects)[index]
-        nothing = model.inner_stages(smoothed(straight(naive[0]), naive[1]), stamps, t0, {})[index]
+        drift = clock_drift(smoothed(at, values), true, usable, t0, effects, own, index)
+        straight = lambda given: at[0] + (given - at[0]) * (1 - drift)
+        said = model.inner_stages(smoothed(at, values), straight(true), t0, effects)[index]
+        nothing = model.inner_stages(smoothed(*naive), straight(stamps), t0, {})[index]
         least = float(np.hypot(rms(noise[index][usable]), np.sqrt(np.sum(item["variances"][1 - index]))))
         out += [f"{drift * 1e6:.1f}"] + [f"{value:.4f}" for value in (rms((own - said)[usable]), least, rms((own - nothing)[usable]))]
     return out
 
 
-def reference_drift(at, values, true, usable, t0, effects, own, index):
-    """By how much the reference's clock runs slow, as one channel sees it: up to some 25 ppm, anew from each recording's start, is in
-    all samples, labelled in none, and so ordinary. (The sample of channel_delay has it in the accelerometer alone.)"""
-    motion, step = smoothed(at, values), 1e-3
+def clock_drift(motion, true, usable, t0, effects, own, index):
+    """By how much the IMU's clock runs fast against the reference's, as one channel sees it: up to some 25 ppm, anew from each recording's start,
+    is in all samples, labelled in none, and so ordinary. (The sample of channel_delay has it in the accelerometer alone.)"""
+    step = 1e-3
     said, earlier = (model.inner_stages(motion, times, t0, effects)[index] for times in (true, true - step))
-    by_drift = (earlier - said) / step * (true - at[0])[:, None]
+    by_drift = (earlier - said) / step * (true - true[0])[:, None]
     return float(np.sum((own - said)[usable] * by_drift[usable]) / np.sum(by_drift[usable] ** 2))
 
 
