@@ -1,5 +1,6 @@
 """The parts of the model that are more than a line of arithmetic, against the contract's own equations. By hand: pytest tests/withheld."""
 import numpy as np
+import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
@@ -91,3 +92,11 @@ def test_every_effect_draws_at_every_strength():
             assert library.draw(rng, effect, level, context)
     assert set(library.SESSION) < set(library.ALL)
     assert not set(generate.SUITES) & set(library.ALL)
+
+
+def test_a_mass_on_springs_in_the_engine_is_the_formula():
+    mechanics = pytest.importorskip("mechanics")
+    rng = np.random.default_rng(3)
+    parts, hidden = mechanics.parts_of(rng, "flesh", 2)
+    (accel, size), (gyro, _) = mechanics.Device(rng, parts, hidden, mechanics.run(rng, "arm", parts)).verify()
+    assert accel < 1e-4 * size and gyro < 1e-4
