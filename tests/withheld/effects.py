@@ -3,6 +3,7 @@ import itertools
 
 import numpy as np
 
+USUAL_SECONDS = 60.0  # what the rates of bias drifts are meant for
 STRENGTHS = ("weak", "medium", "strong")
 ALL = (
     "reference_noise reference_smoothing reference_interpolation reference_tilt reference_scale reference_units mount_rotation lever_arm mount_slip soft_tissue "
@@ -18,8 +19,11 @@ INCOMPATIBLE = [{"axis_convention", "mount_rotation"}, {"accel_units", "accel_sc
                 {"gravity_convention", "reference_tilt"}, {"gravity_convention", "accel_saturation"},
                 {"gravity_convention", "axis_convention"}, {"reference_noise", "reference_smoothing"},
                 {"accel_noise", "accel_quantization"}, {"gyro_noise", "gyro_quantization"},
-                {"gravity_convention", "accel_units"}, {"reference_interpolation", "reference_smoothing"},
-                {"reference_interpolation", "reference_noise"}, {"reference_units", "reference_scale"}]
+                {"gravity_convention", "accel_units"}, {"reference_units", "reference_scale"},
+                {"reference_interpolation", "reference_smoothing"}, {"reference_interpolation", "reference_noise"}]
+# what a session has for itself; the rest belongs to the device and its mount
+SESSION = ("reference_noise reference_smoothing reference_interpolation reference_tilt reference_scale reference_units mount_slip "
+           "time_offset clock_drift dropped_samples accel_bias gyro_bias accel_bias_drift gyro_bias_drift vibration").split()
 
 
 def compatible(names):
@@ -49,8 +53,24 @@ def _signed(rng, size, count=3):
     return size * value / value.max() * rng.choice([-1.0, 1.0], count)
 
 
+def _wave(rng, context, accel, gyro):
+    """One frequency, seen by the accelerometer alone, by both channels, or from a force that turns in a plane."""
+    hz = rng.uniform(8, min(45, 0.45 * context["rate"]))
+    kind = str(rng.choice(["accel", "both", "turning"], p=[0.3, 0.4, 0.3]))
+    if kind == "turning":  # u cos + v sin along two directions at right angles
+        u, v = np.linalg.qr(rng.standard_normal((3, 2)))[0].T * accel / np.sqrt(2)
+        amplitude, phase = np.hypot(u, v), np.arctan2(u, v) + rng.uniform(0, 2 * np.pi)
+    else:  # a phase for each axis, as in a body that gives way
+        amplitude, phase = np.abs(_direction(rng, accel)), rng.uniform(0, 2 * np.pi, 3)
+    wave = {"hz": hz, "amplitude": np.array(amplitude).tolist(), "phase": (phase % (2 * np.pi)).tolist()}
+    silent = kind == "accel"
+    wave["gyro_amplitude"] = [0.0] * 3 if silent else np.abs(_direction(rng, gyro)).tolist()
+    wave["gyro_phase"] = [0.0] * 3 if silent else rng.uniform(0, 2 * np.pi, 3).tolist()
+    return wave
+
+
 def draw(rng, effect, level, context):
-    """Parameters at level 0, 1, 2. context: sigmas (accel, gyro) per sample, rate, start and seconds of the fit.
+    """Parameters at level 0, 1, 2. context: sigmas (accel, gyro) per sample, rate, reference_rate, start and seconds of the fit.
     A saturation returns `clipped`, the share of samples to be clipped; the generator turns it into a limit."""
     size = lambda *sizes: float(sizes[level] * rng.uniform(0.85, 1.2))
     sign = rng.choice([-1.0, 1.0])
@@ -62,10 +82,10 @@ def draw(rng, effect, level, context):
         return {"position": 0.0 if which == "rotation" else max(position, 1.05e-3), "rotation": 0.0 if which == "position" else max(rotation, 0.27 * degrees)}
     if effect == "reference_smoothing":
         return {"cutoff_hz": size(6.0, 4.0, 2.5)}
-    if effect == "reference_interpolation":
-        return {"rate_hz": size(50, 35, 25)}
-    if effect == "reference_units":
-        return {"factor": float(rng.choice([1000.0, 100.0, 10.0, 39.37007874015748, 3.280839895013123]))}
+    if effect == "reference_interpolation":  # below the reported rate, or there would be no chords
+        return {"rate_hz": min(size(60, 40, 20), context["reference_rate"] / 1.6)}
+    if effect == "reference_units":  # millimetres, centimetres, inches
+        return {"factor": float(rng.choice([1000.0, 100.0, 1 / 0.0254], p=[0.6, 0.3, 0.1]))}
     if effect == "reference_tilt":
         angle, azimuth = size(1, 3, 8) * degrees, rng.uniform(0, 2 * np.pi)
         return {"rotvec": [angle * np.cos(azimuth), angle * np.sin(azimuth), 0.0]}
@@ -82,10 +102,10 @@ def draw(rng, effect, level, context):
     if effect == "time_offset":
         far = level == 2 and rng.random() < 0.3
         return {"seconds": sign * (rng.uniform(0.3, 2.0) if far else size(0.004, 0.020, 0.080))}
-    if effect == "channel_delay":
-        return {"seconds": sign * size(0.003, 0.007, 0.013)}
     if effect == "clock_drift":
         return {"ppm": sign * size(60, 300, 1500)}
+    if effect == "channel_delay":  # as often the accelerometer's own filter is the slower one
+        return {"seconds": rng.choice([1.0, -1.0], p=[0.7, 0.3]) * size(0.002, 0.007, 0.020)}
     if effect == "dropped_samples":
         return {"fraction": size(0.01, 0.05, 0.15), "mean_burst": rng.uniform(1.0, 5.0)}
     if effect.endswith("_bias"):
@@ -97,7 +117,8 @@ def draw(rng, effect, level, context):
     if effect.endswith("_noise"):
         return {"density": size(3, 10, 40) * sigma / np.sqrt(context["rate"])}
     if effect.endswith("_bias_drift"):
-        return {"rate": _direction(rng, size(0.001, 0.005, 0.02) if effect == "accel_bias_drift" else size(1e-4, 5e-4, 2e-3))}
+        rate = size(0.001, 0.005, 0.02) if effect == "accel_bias_drift" else size(1e-4, 5e-4, 2e-3)
+        return {"rate": _direction(rng, rate * USUAL_SECONDS / context["seconds"])}
     if effect.endswith("_saturation"):
         return {"clipped": size(0.003, 0.02, 0.08)}
     if effect.endswith("_quantization"):
@@ -107,12 +128,7 @@ def draw(rng, effect, level, context):
     if effect == "gyro_g_sensitivity":
         return {"matrix": _signed(rng, size(2e-4, 1e-3, 5e-3), 9).reshape(3, 3).tolist()}
     if effect == "vibration":
-        hz = rng.uniform(8, min(45, 0.45 * context["rate"]))
-        amplitude = size(0.1, 0.5, 3.0)
-        turning = amplitude * rng.uniform(0.02, 0.1) if rng.random() < 0.7 else 0.0
-        phases = rng.uniform(0, 2 * np.pi, (2, 3)) if rng.random() < 0.7 else np.full((2, 3), rng.uniform(0, 2 * np.pi))
-        return {"hz": hz, "amplitude": np.abs(_direction(rng, amplitude)).tolist(), "phase": phases[0].tolist(),
-                "gyro_amplitude": np.abs(_direction(rng, turning)).tolist(), "gyro_phase": phases[1].tolist()}
+        return _wave(rng, context, size(0.1, 0.5, 3.0), size(0.02, 0.08, 0.3))
     if effect == "axis_convention":
         choices = signed_permutations()
         return {"matrix": choices[rng.integers(len(choices))].tolist()}

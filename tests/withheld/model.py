@@ -6,9 +6,13 @@ from scipy.signal import butter, lfilter, sosfiltfilt
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation, Slerp
 
+from motions import continuous
+
 GRAVITY = np.array([0.0, 0.0, -9.80665])
 DENSE_RATE = 2000.0  # Hz at least, for the continuous stages
 WARM_UP = 3.0  # s
+COOL_DOWN = 0.25  # s beyond the end: a gyroscope that is early looks ahead
+PIECE = 120.0  # s computed at once: what is dense would else fill the memory on long recordings
 
 
 def _second_order(values, step, natural, damping, lead):
@@ -26,34 +30,23 @@ def _second_order(values, step, natural, damping, lead):
     return values[0] + lfilter(numerator, denominator, values - values[0], axis=0)
 
 
-def _cross(a, b):
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+def soft_tissue(force, rate, rotation, step, natural_hz, damping_ratio):
+    """The reading of a mass on spring and damper in the turning segment frame; all in segment axes, rotation: world_from_segment.
 
-
-def soft_tissue(force, rate, change, step, natural_hz, damping_ratio):
-    """A mass on spring and damper in the turning segment frame, by Runge and Kutta's method over two steps; all in segment axes."""
-    square, damper = (2 * np.pi * natural_hz) ** 2, 4 * np.pi * natural_hz * damping_ratio
-
-    def slope(d, speed, f, w, alpha):
-        coriolis, euler, centrifugal = _cross(w, speed), _cross(alpha, d), _cross(w, _cross(w, d))
-        return [-square * d[i] - damper * speed[i] - f[i] - 2 * coriolis[i] - euler[i] - centrifugal[i] for i in range(3)]
-
-    def moved(value, by, factor):
-        return [a + factor * b for a, b in zip(value, by)]
-
-    f, w, alpha = force.tolist(), rate.tolist(), change.tolist()
-    d, speed, h = [-x / square for x in f[0]], [0.0] * 3, 2 * step
-    out = [d + speed]
-    for k in range(0, len(f) - 2, 2):
-        a = speed, slope(d, speed, f[k], w[k], alpha[k])
-        b = moved(speed, a[1], h / 2), slope(moved(d, a[0], h / 2), moved(speed, a[1], h / 2), f[k + 1], w[k + 1], alpha[k + 1])
-        c = moved(speed, b[1], h / 2), slope(moved(d, b[0], h / 2), moved(speed, b[1], h / 2), f[k + 1], w[k + 1], alpha[k + 1])
-        e = moved(speed, c[1], h), slope(moved(d, c[0], h), moved(speed, c[1], h), f[k + 2], w[k + 2], alpha[k + 2])
-        d, speed = ([x + h / 6 * (p + 2 * q + 2 * r + s) for x, p, q, r, s in zip(own, a[i], b[i], c[i], e[i])] for i, own in enumerate((d, speed)))
-        out.append(d + speed)
-    read = -np.array(out) @ np.vstack([square * np.eye(3), damper * np.eye(3)])
-    at = np.arange(len(f))
-    return np.column_stack([np.interp(at, at[:2 * len(read):2][:len(read)], column) for column in read.T])
+    With D = R d the four terms of the turning frame fold into R'' and what is left is D'' = -wn^2 D - c (D' - W x D) - F, c = 2 z wn:
+    a filter with constant coefficients but for c W x D. That term is fed back until it stands still; each round gains a factor of
+    |W| / wn at least, and the start is the sag at rest."""
+    natural = 2 * np.pi * natural_hz
+    damping = 2 * damping_ratio * natural
+    force, rate = rotation.apply(force), rotation.apply(rate)
+    sag = np.zeros_like(force)  # -D
+    for _ in range(60):
+        before, drive = sag, force + damping * np.cross(rate, sag)
+        sag = _second_order(drive, step, natural, damping, 0.0) / natural**2
+        if np.abs(sag - before).max() * natural**2 < 1e-9:
+            break
+    reading = _second_order(drive, step, natural, damping, damping) - damping * np.cross(rate, sag)
+    return rotation.apply(reading, inverse=True)
 
 
 def low_pass(values, step, cutoff_hz):
@@ -61,15 +54,18 @@ def low_pass(values, step, cutoff_hz):
     return _second_order(values, step, natural, np.sqrt(2) * natural, 0.0)
 
 
-def segment_values(motion, times, effects):
-    """Stage 1: specific force, angular velocity and its derivative in segment axes."""
+def segment_values(motion, times, effects, step):
+    """Stages 1 and 2: specific force and angular velocity in segment axes."""
     rotation, acceleration, rate, change = motion.kinematics(times)
     mode = effects.get("gravity_convention", {}).get("mode")
     gravity = {None: GRAVITY, "removed": 0 * GRAVITY, "negated": -GRAVITY}[mode]
     if "lever_arm" in effects:
         lever = rotation.apply(effects["lever_arm"]["offset"])
         acceleration = acceleration + np.cross(change, lever) + np.cross(rate, np.cross(rate, lever))
-    return [rotation.apply(x, inverse=True) for x in (acceleration - gravity, rate, change)]
+    force, rate = rotation.apply(acceleration - gravity, inverse=True), rotation.apply(rate, inverse=True)
+    if "soft_tissue" in effects:
+        force = soft_tissue(force, rate, rotation, step, **effects["soft_tissue"])
+    return force, rate
 
 
 def mount(force, rate, times, effects):
@@ -90,34 +86,53 @@ def channel_matrix(effects, channel):
     return np.diag(scale) @ np.array([[1, xy, xz], [0, 1, yz], [0, 0, 1.0]])
 
 
-def inner_stages(motion, times, t0, effects, extra=None):
-    """Stages 1 to 7 without noise at true times that are evenly spaced (times, t0, slip: session seconds).
-    `extra`: functions of the outside suite, by the stage they act at."""
-    extra = extra or {}
+def vibration(times, wave, force, rate):
+    """Stage 4: a sine per axis, each with its own amplitude and phase; without gyro_amplitude the accelerometer alone."""
+    angle = 2 * np.pi * wave["hz"] * times[:, None]
+    force = force + np.array(wave["amplitude"]) * np.sin(angle + np.array(wave["phase"]))
+    return force, rate + np.array(wave.get("gyro_amplitude", np.zeros(3))) * np.sin(angle + np.array(wave.get("gyro_phase", np.zeros(3))))
+
+
+def delayed(values, start, step, times):
+    """Cubic between dense values; only those near the wanted times are drawn in."""
+    first = max(0, int((times[0] - start) / step) - 8)
+    last = int((times[-1] - start) / step) + 9
+    inner = values[first:last]
+    return CubicSpline(start + step * (first + np.arange(len(inner))), inner)(times)
+
+
+def continuous_stages(motion, times, t0, effects, hooks):
+    """Stages 1 to 6, at times that are evenly spaced."""
     interval = times[1] - times[0]
     fine = max(1, int(np.ceil(DENSE_RATE * interval)))
     step = interval / fine
-    warm = int(WARM_UP / interval) * fine
-    dense = times[0] + step * (np.arange((len(times) - 1) * fine + 1 + warm) - warm)
-    force, rate, change = segment_values(motion, dense, effects)
-    if "soft_tissue" in effects:
-        force = soft_tissue(force, rate, change, step, **effects["soft_tissue"])
+    warm, cool = int(WARM_UP / interval) * fine, int(COOL_DOWN / interval) * fine
+    dense = times[0] + step * (np.arange((len(times) - 1) * fine + 1 + warm + cool) - warm)
+    force, rate = segment_values(motion, dense, effects, step)
     force, rate = mount(force, rate, dense, effects)
-    if "mount" in extra:
-        force, rate = extra["mount"](dense - t0, force, rate)
+    if "mount" in hooks:
+        force, rate = hooks["mount"](dense - t0, force, rate)
     if "vibration" in effects:
-        wave = effects["vibration"]
-        turns = 2 * np.pi * wave["hz"] * (dense - t0)[:, None]
-        force = force + np.array(wave["amplitude"]) * np.sin(turns + np.array(wave["phase"]))
-        rate = rate + np.array(wave["gyro_amplitude"]) * np.sin(turns + np.array(wave["gyro_phase"]))
+        force, rate = vibration(dense - t0, effects["vibration"], force, rate)
     if "gyro_g_sensitivity" in effects:
         rate = rate + force @ np.array(effects["gyro_g_sensitivity"]["matrix"]).T
     if "low_pass" in effects:
         force, rate = (low_pass(x, step, **effects["low_pass"]) for x in (force, rate))
-    if "channel_delay" in effects:
-        late = dense - effects["channel_delay"]["seconds"]
-        rate = CubicSpline(dense, rate)(np.clip(late, dense[0], dense[-1]))
-    force, rate = force[warm::fine], rate[warm::fine]
+    kept = slice(warm, len(dense) - cool, fine)
+    late = effects.get("channel_delay", {}).get("seconds", 0.0)
+    return force[kept], delayed(rate, dense[0], step, times - late) if late else rate[kept]
+
+
+def inner_stages(motion, times, t0, effects, extra=None):
+    """Stages 1 to 7 without noise at true times that are evenly spaced (times, t0, slip: session seconds).
+    `extra`: functions of the outside suite, by the stage they act at."""
+    extra = extra or {}
+    # a hook may remember, so its recording stays in one piece; the filters forget within the warm-up
+    count = len(times) if extra else max(2, int(PIECE / (times[1] - times[0])))
+    starts = [k for k in range(0, len(times), count) if len(times) - k > 1]
+    ends = starts[1:] + [len(times)]
+    pieces = [continuous_stages(motion, times[a:b], t0, effects, extra) for a, b in zip(starts, ends)]
+    force, rate = (np.concatenate(parts) for parts in zip(*pieces))
     if "channel" in extra:
         force, rate = extra["channel"](times - t0, force, rate)
     out = []
@@ -172,38 +187,45 @@ def kept_samples(rng, count, effects):
     return keep
 
 
-def reference(rng, motion, times, effects, ordinary, smoothing):
+def reference(rng, motion, times, effects, ordinary, filtering):
     """The reported pose. ordinary: the noise of usual motion capture (m, rad per axis).
-    smoothing: how and in which order a smoothing reference treats its noise; the contract leaves both open."""
-    noise = effects.get("reference_noise", {})
-    sigma_position = np.hypot(ordinary[0], noise.get("position", 0.0))
-    sigma_rotation = np.hypot(ordinary[1], noise.get("rotation", 0.0))
-    position_noise = sigma_position * rng.standard_normal((len(times), 3))
-    rotation_noise = sigma_rotation * rng.standard_normal((len(times), 3))
-    position, rotation = motion.pose(times)
-    before = smoothing["noise_first"]
-    if "reference_smoothing" in effects and before:
-        position, rotation = position + position_noise, rotation * Rotation.from_rotvec(rotation_noise)
-    if "reference_smoothing" in effects:
-        position, rotation = smooth(position, rotation, 1 / (times[1] - times[0]), effects["reference_smoothing"]["cutoff_hz"], smoothing)
+    filtering: what the contract leaves open of a reference that is smoothed or interpolated: kernel, order of the noise, phase of the frames."""
+    early = filtering["noise_first"] and bool({"reference_smoothing", "reference_interpolation"} & set(effects))
     if "reference_interpolation" in effects:
-        frames = np.arange(times[0], times[-1] + 2 / effects["reference_interpolation"]["rate_hz"], 1 / effects["reference_interpolation"]["rate_hz"])
-        at_frames, turned = motion.pose(frames)
-        position = np.column_stack([np.interp(times, frames, column) for column in at_frames.T])
-        rotation = Slerp(frames, turned)(times)
+        step = 1 / effects["reference_interpolation"]["rate_hz"]
+        frames = times[0] + step * (np.arange(int((times[-1] - times[0]) / step) + 3) - filtering["frame_phase"])
+        position, rotation = reported(rng, *motion.pose(frames), effects, ordinary if early else None)
+        position, rotation = chords(frames, position, rotation, times)
+    else:
+        position, rotation = reported(rng, *motion.pose(times), effects, ordinary if early else None)
+    if "reference_smoothing" in effects:
+        position, rotation = smooth(position, rotation, 1 / (times[1] - times[0]), effects["reference_smoothing"]["cutoff_hz"], filtering)
     position = position * effects.get("reference_scale", {}).get("factor", 1.0)
     tilt = Rotation.from_rotvec(effects.get("reference_tilt", {}).get("rotvec", [0.0, 0.0, 0.0]))
     position, rotation = tilt.apply(position), tilt * rotation
-    if "reference_smoothing" not in effects or not before:
-        position, rotation = position + position_noise, rotation * Rotation.from_rotvec(rotation_noise)
+    if not early:
+        position, rotation = reported(rng, position, rotation, effects, ordinary)
     return position * effects.get("reference_units", {}).get("factor", 1.0), rotation
 
 
-def smooth(position, rotation, rate, cutoff, smoothing):
-    quaternion = rotation.as_quat()
-    flips = np.cumprod(np.where(np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0, -1.0, 1.0))
-    both = np.hstack([position, quaternion * np.concatenate([[1.0], flips])[:, None]])
-    if smoothing["kernel"] == "butterworth":
+def reported(rng, position, rotation, effects, ordinary):
+    """The pose with its noise, in metres still."""
+    if ordinary is None:
+        return position, rotation
+    noise = effects.get("reference_noise", {})
+    sigmas = [np.hypot(own, noise.get(key, 0.0)) for own, key in zip(ordinary, ("position", "rotation"))]
+    noise = [sigma * rng.standard_normal((len(position), 3)) for sigma in sigmas]
+    return position + noise[0], rotation * Rotation.from_rotvec(noise[1])
+
+
+def chords(frames, position, rotation, times):
+    """Straight between frames: linear in position, slerp in rotation."""
+    return np.stack([np.interp(times, frames, axis) for axis in position.T], axis=1), Slerp(frames, rotation)(times)
+
+
+def smooth(position, rotation, rate, cutoff, filtering):
+    both = np.hstack([position, continuous(rotation.as_quat())])
+    if filtering["kernel"] == "butterworth":
         both = sosfiltfilt(butter(2, cutoff / (rate / 2), output="sos"), both, axis=0)
     else:  # Gaussian with half power at the cutoff
         both = gaussian_filter1d(both, np.sqrt(np.log(2)) / (2 * np.pi * cutoff) * rate, axis=0, mode="nearest")

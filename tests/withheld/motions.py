@@ -17,13 +17,18 @@ def quaternion_product(a, b):
     return np.concatenate([scalar, a[..., :1] * b[..., 1:] + b[..., :1] * a[..., 1:] + np.cross(a[..., 1:], b[..., 1:])], -1)
 
 
+def continuous(quaternion):
+    """The same rotations without jumps of sign."""
+    flips = np.cumprod(np.where(np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0, -1.0, 1.0))
+    return quaternion * np.concatenate([[1.0], flips])[:, None]
+
+
 class Motion:
     """position [m] and quaternion wxyz (world_from_segment) on a grid that starts at `start`, in session seconds."""
 
     def __init__(self, start, position, quaternion, rate=KNOT_RATE):
         quaternion = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
-        flips = np.cumprod(np.where(np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0, -1.0, 1.0))
-        quaternion = quaternion * np.concatenate([[1.0], flips])[:, None]
+        quaternion = continuous(quaternion)
         times = start + np.arange(len(position)) / rate
         self.span = (times[0], times[-1])
         self._curves = [make_interp_spline(times, np.hstack([position, quaternion]), k=5)]
@@ -113,8 +118,7 @@ def _clean_runs(good, shortest):
 
 
 def _lowpass(position, quaternion, rate, cutoff):
-    flips = np.cumprod(np.where(np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0, -1.0, 1.0))
-    quaternion = quaternion * np.concatenate([[1.0], flips])[:, None]
+    quaternion = continuous(quaternion)
     sections = butter(4, cutoff / (rate / 2), output="sos")
     both = sosfiltfilt(sections, np.hstack([position, quaternion]), axis=0)
     trim = int(0.15 * rate)  # the filter's edges
@@ -176,8 +180,7 @@ def recorded(rng, kind, start, seconds):
         new_position = turn.apply(new_position)
         new_quaternion = (turn * Rotation.from_quat(new_quaternion[:, [1, 2, 3, 0]])).as_quat()[:, [3, 0, 1, 2]]
         new_position += position[-fade // 2] - new_position[fade // 2]
-        flips = np.cumprod(np.where(np.sum(new_quaternion[1:] * new_quaternion[:-1], axis=1) < 0, -1.0, 1.0))
-        new_quaternion *= np.concatenate([[1.0], flips])[:, None]
+        new_quaternion = continuous(new_quaternion)
         if new_quaternion[fade // 2] @ quaternion[-fade // 2] < 0:
             new_quaternion = -new_quaternion
         weight = _smootherstep(np.linspace(0, 1, fade))[:, None]

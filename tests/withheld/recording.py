@@ -1,4 +1,5 @@
 """Reads and writes the recordings: rosbag2 MCAP, profile ros2, CDR by hand."""
+import heapq
 import struct
 
 import numpy as np
@@ -37,6 +38,11 @@ def _cdr(stamps, frame, doubles):
         yield int(stamp), b"\0\1\0\0" + struct.pack("<iI", sec, nanosec) + head + pad + row.tobytes()
 
 
+def _numbered(channel, rows):
+    for sequence, (stamp, data) in enumerate(rows):
+        yield stamp, channel, sequence, data
+
+
 def write(path, placements):
     """placements: name -> {reference: (stamps ns, pos, quat xyzw), imu: (stamps ns, gyro, accel), variances: (gyro, accel)}"""
     with open(path, "wb") as stream:
@@ -44,12 +50,11 @@ def write(path, placements):
         writer.start(profile="ros2", library="mcap-python")
         imu_schema = writer.register_schema("sensor_msgs/msg/Imu", "ros2msg", IMU_SCHEMA.encode())
         pose_schema = writer.register_schema("geometry_msgs/msg/PoseStamped", "ros2msg", POSE_SCHEMA.encode())
-        messages = []
+        streams = []  # merged as they are made: ten minutes of five placements are close to a million messages
         for name, item in placements.items():
             channel = writer.register_channel(f"/reference/{name}", "cdr", pose_schema)
             stamps, position, quaternion = item["reference"]
-            for sequence, (stamp, data) in enumerate(_cdr(stamps, "world", np.hstack([position, quaternion]))):
-                messages.append((stamp, channel, sequence, data))
+            streams.append(_numbered(channel, _cdr(stamps, "world", np.hstack([position, quaternion]))))
             channel = writer.register_channel(f"/imu/{name}/data_raw", "cdr", imu_schema)
             stamps, gyro, accel = item["imu"]
             gyro_variance, accel_variance = item["variances"]
@@ -59,10 +64,8 @@ def write(path, placements):
             doubles[:, 4] = -1.0  # no orientation
             doubles[:, 13:16], doubles[:, 25:28] = gyro, accel
             doubles[:, 16:25:4], doubles[:, 28:37:4] = gyro_variance, accel_variance
-            for sequence, (stamp, data) in enumerate(_cdr(stamps, f"{name}_imu", doubles)):
-                messages.append((stamp, channel, sequence, data))
-        messages.sort(key=lambda message: message[0])
-        for stamp, channel, sequence, data in messages:
+            streams.append(_numbered(channel, _cdr(stamps, f"{name}_imu", doubles)))
+        for stamp, channel, sequence, data in heapq.merge(*streams, key=lambda message: message[0]):
             writer.add_message(channel, log_time=stamp, publish_time=stamp, sequence=sequence, data=data)
         writer.finish()
 
@@ -75,7 +78,8 @@ def _doubles(data):
 
 
 def read(path):
-    """name -> {reference: (stamps, pos, quat), imu: (stamps, gyro, accel), variances}; topics that are absent stay absent."""
+    """name -> {reference: (stamps, pos, quat), imu: (stamps, gyro, accel), variances: of the first message, covariances: diagonals of each
+    message (gyro, accel)}; topics that are absent stay absent."""
     rows = {}
     with open(path, "rb") as stream:
         for _, channel, message in make_reader(stream).iter_messages():
@@ -92,5 +96,6 @@ def read(path):
             item["reference"] = (stamps, values[:, :3], values[:, 3:7])
         else:
             item["imu"] = (stamps, values[:, 13:16], values[:, 25:28])
-            item["variances"] = (values[0, 16:25:4].copy(), values[0, 28:37:4].copy())
+            item["covariances"] = (values[:, 16:25:4], values[:, 28:37:4])
+            item["variances"] = tuple(own[0].copy() for own in item["covariances"])
     return out

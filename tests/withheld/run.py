@@ -13,10 +13,10 @@ import grade
 import tables
 
 
-def diagnose(cromosim, recording, out, without=None):
-    """One diagnosis; time.txt gets wall and processor seconds, log.txt what was printed."""
+def diagnose(cromosim, recordings, out, without=None):
+    """One diagnosis of one recording or several; time.txt gets wall and processor seconds, log.txt what was printed."""
     os.makedirs(out, exist_ok=True)
-    command = [cromosim, "diagnose", recording, "--out", out] + (["--without", without] if without else [])
+    command = [cromosim, "diagnose", *recordings, "--out", out] + (["--without", without] if without else [])
     with open(os.path.join(out, "log.txt"), "w") as log:
         begin = time.monotonic()
         child = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT)
@@ -27,6 +27,10 @@ def diagnose(cromosim, recording, out, without=None):
     with open(os.path.join(out, "time.txt"), "w") as stream:
         stream.write(f"{seconds:.3f} {usage.ru_utime + usage.ru_stime:.3f}\n")
     return child.returncode
+
+
+def fits(out, case):
+    return generate.recordings(os.path.join(out, case), "fit")
 
 
 def progress(done, count, begin, what):
@@ -54,7 +58,7 @@ def leave_one_out(options, out, labels, results):
         if strength == "weak":
             continue
         folder = os.path.join(results, f"{case}-without")
-        work.append(lambda case=case, folder=folder, effect=effect: diagnose(options.cromosim, os.path.join(out, case, "fit.mcap"), folder, effect))
+        work.append(lambda case=case, folder=folder, effect=effect: diagnose(options.cromosim, fits(out, case), folder, effect))
         records.append({"case": case, "without": effect, "strength": strength, "affected": label["affected"], "folder": folder})
     many(options.jobs, work, "leave one out")
     for record in records:
@@ -67,10 +71,18 @@ def leave_one_out(options, out, labels, results):
     return records
 
 
+def write_cases(options, out, suite):
+    if suite == "mechanics":
+        import mechanics  # MuJoCo is no requirement of the others
+        return mechanics.generate(out, options.seed, options.count, options.jobs)
+    return generate.generate(out, suite, options.seed, options.count, jobs=options.jobs, seconds=options.seconds)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--suite", action="append", choices=generate.SUITES, help="may be repeated; default all")
+    parser.add_argument("--suite", action="append", choices=[*generate.SUITES, "mechanics"], help="may be repeated; default all but mechanics, which needs MuJoCo")
     parser.add_argument("--count", type=int, help="cases of each suite; default the suite's own")
+    parser.add_argument("--seconds", type=float, help="length of the fit recordings; default the suite's own")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--cromosim", required=True)
@@ -82,18 +94,19 @@ def main():
     suites = ["single"] if options.leave_one_out else options.suite or list(generate.SUITES)
     records = []
     for suite in suites:
-        out, results = os.path.join(options.out, suite), os.path.join(options.out, f"{suite}-results")
+        folder = suite + (f"-{options.seconds:.0f}" if options.seconds else "")
+        out, results = os.path.join(options.out, folder), os.path.join(options.out, f"{folder}-results")
         labels = generate.labels_folder(out)
         if not (options.keep and os.path.isdir(out)):
             if os.path.isdir(out) and os.listdir(out):
                 sys.exit(f"{out} is not empty: use --keep or another --out")
             begin = time.monotonic()
-            generate.generate(out, suite, options.seed, options.count, jobs=options.jobs)
+            write_cases(options, out, suite)
             print(f"generated {suite} in {time.monotonic() - begin:.0f} s", file=sys.stderr)
         if options.leave_one_out:
             records = leave_one_out(options, out, labels, results)
             continue
-        work = [lambda case=case: diagnose(options.cromosim, os.path.join(out, case, "fit.mcap"), os.path.join(results, case)) for case in sorted(os.listdir(out))]
+        work = [lambda case=case: diagnose(options.cromosim, fits(out, case), os.path.join(results, case)) for case in sorted(os.listdir(out))]
         many(options.jobs, work, f"diagnose {suite}")
         records += grade.grade(out, labels, results, options.cromosim, options.jobs)
     print("\n".join(["## Effect left out of the library", *tables.left_out_table(records)]) if options.leave_one_out else tables.report(records))

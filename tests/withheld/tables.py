@@ -5,7 +5,10 @@ import numpy as np
 
 Z90 = 1.645
 TOLERANCE = 0.15  # of the gap, by the contract
-BINS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 0.99, 1.0001)
+NO_WORSE = 0.02  # of a channel's gap without any effects
+STATED = (0.7, 1.4)  # squared difference over stated variance, by the contract
+DEAREST = 20.0  # processor time of a diagnosis over that of a plain re-simulation, by the contract
+BINS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99, 1.0001)
 
 
 def wilson(right, count):
@@ -31,6 +34,18 @@ def _within(said, measured):
     return abs(said - measured) <= TOLERANCE * measured
 
 
+def _no_worse(said, nominal, channel):
+    """Without an answer nothing is known of a channel; without its samples in either, nothing is judged."""
+    if nominal[channel] is None:
+        return None
+    return bool(said and said[channel] is not None and said[channel] <= (1 + NO_WORSE) * nominal[channel])
+
+
+def _honest(said, channel):
+    ratio = (said or {}).get(f"{channel}_over_stated")
+    return ratio is not None and STATED[0] <= ratio <= STATED[1]
+
+
 def judge(record):
     """Adds the yes-or-no answers of one case."""
     places, affected = record["placements"], record["affected"]
@@ -44,6 +59,9 @@ def judge(record):
         said, true = measured.get("said"), measured.get("true")
         whole = bool(said and true and said["accel"] is not None and true["accel"] is not None)
         place["closed"] = {channel: whole and said[channel] <= (1 + TOLERANCE) * true[channel] for channel in ("accel", "gyro")} if true else {}
+        nominal = measured.get("nominal")
+        place["no_worse"] = {channel: _no_worse(said, nominal, channel) for channel in ("accel", "gyro")} if nominal else {}
+        place["stated"] = {channel: _honest(said, channel) for channel in ("accel", "gyro")}
         after = (place["gap"] or {}).get("after") or {}
         place["kept"] = {channel: _within(after.get(f"{channel}_rmse"), said and said[channel]) for channel in ("accel", "gyro")}
     return record
@@ -58,6 +76,10 @@ def _all_of(answers):
     return None if not answers or None in answers.values() else all(answers.values())
 
 
+def _stretch(seconds):
+    return f"{np.median(seconds):.1f}, {np.max(seconds):.1f}" if seconds else "–"
+
+
 def suites_table(records):
     lines = ["| suite | n | exact set | contained | cases with a false alarm | false alarms | right placement | gap ≤ 1.15 × true | failed | seconds / placement (median, max) |",
              "|---|---|---|---|---|---|---|---|---|---|"]
@@ -69,7 +91,7 @@ def suites_table(records):
         lines.append(f"| {suite} | {len(own)} | {_share([r['exact'] for r in own])} | {_share([r['contained'] for r in own])} "
                      f"| {_share([r['false_alarms'] > 0 for r in own])} | {sum(r['false_alarms'] for r in own)} | {_share([r['right_place'] for r in own])} "
                      f"| {_share([_all_of(place['closed']) for place in judged])} | {failed} "
-                     f"| {np.median(seconds):.1f}, {np.max(seconds):.1f} |" if seconds else f"| {suite} | {len(own)} | – |")
+                     f"| {_stretch(seconds)} |")
     return lines
 
 
@@ -86,6 +108,46 @@ def promises_table(records):
         scalars = sum(item["scalars"] for place in places for item in place["parameters"])
         lines.append(f"| {suite} | {_share([p['kept']['accel'] for p in places])} | {_share([p['kept']['gyro'] for p in places])} | {_share([_all_of(p['kept']) for p in places])} "
                      f"| {ratios[0]} | {ratios[1]} | {100 * inside / scalars if scalars else 0:.0f} % | {scalars} |")
+    return lines
+
+
+def _quantiles(values, digits=2):
+    values = [value for value in values if value is not None]
+    return " ".join(f"{x:.{digits}f}" for x in np.quantile(values, (0.05, 0.5, 0.95))) if values else "–"
+
+
+def harm_table(records):
+    """Whether anything gets worse, by every placement, whether affected or not."""
+    lines = ["| suite | placements | accel no worse | gyro no worse | neither worse | worst accel | worst gyro |", "|---|---|---|---|---|---|---|"]
+    for suite in sorted({record["suite"] for record in records}):
+        places = [place for record in records if record["suite"] == suite for place in record["placements"].values()]
+        worst = []
+        for channel in ("accel", "gyro"):
+            pairs = [(place["measured"].get("said") or {}, place["measured"].get("nominal") or {}) for place in places]
+            ratios = [a[channel] / b[channel] for a, b in pairs if a.get(channel) is not None and b.get(channel)]
+            worst.append(f"{max(ratios):.2f}" if ratios else "–")
+        flags = [_share([place["no_worse"].get(channel) for place in places]) for channel in ("accel", "gyro")]
+        lines.append(f"| {suite} | {len(places)} | {flags[0]} | {flags[1]} | {_share([_all_of(place['no_worse']) for place in places])} | {worst[0]} | {worst[1]} |")
+    return lines
+
+
+def stated_table(records):
+    """Squared differences over stated variances on the check recordings, of the placements that are judged."""
+    lines = [f"| suite | accel within {STATED[0]} to {STATED[1]} | gyro | both | accel (5, 50, 95 %) | gyro |", "|---|---|---|---|---|---|"]
+    for suite in sorted({record["suite"] for record in records}):
+        places = [place for record in records if record["suite"] == suite for place in _judged(record)]
+        ratios = [_quantiles([(place["measured"].get("said") or {}).get(f"{channel}_over_stated") for place in places]) for channel in ("accel", "gyro")]
+        flags = [_share([place["stated"][channel] for place in places]) for channel in ("accel", "gyro")]
+        lines.append(f"| {suite} | {flags[0]} | {flags[1]} | {_share([_all_of(place['stated']) for place in places])} | {ratios[0]} | {ratios[1]} |")
+    return lines
+
+
+def cost_table(records):
+    lines = [f"| suite | within {DEAREST:.0f} times | processor time over `simulate --reference` (5, 50, 95 %) | largest |", "|---|---|---|---|"]
+    for suite in sorted({record["suite"] for record in records}):
+        costs = [record["cost"] for record in records if record["suite"] == suite and record["cost"] is not None]
+        if costs:
+            lines.append(f"| {suite} | {_share([cost <= DEAREST for cost in costs])} | {_quantiles(costs, 1)} | {max(costs):.1f} |")
     return lines
 
 
@@ -112,10 +174,17 @@ def coverage_table(records):
 def calibration_table(records):
     lines = ["| said probability | mean said | right | n |", "|---|---|---|---|"]
     causes = [cause for r in records for place in r["placements"].values() for cause in place["causes"] if cause["probability"] is not None]
+    said, right = (np.array([cause[key] for cause in causes], float) for key in ("probability", "right"))
+    error = 0.0
     for low, high in zip(BINS, BINS[1:]):
-        own = [cause for cause in causes if low <= cause["probability"] < high]
-        if own:
-            lines.append(f"| {low:.2f}–{min(high, 1.0):.2f} | {np.mean([c['probability'] for c in own]):.3f} | {_share([c['right'] for c in own])} | {len(own)} |")
+        own = (said >= low) & (said < high)
+        mean = f"{said[own].mean():.3f}" if own.any() else "–"
+        lines.append(f"| {low:.2f}–{min(high, 1.0):.2f} | {mean} | {_share(right[own])} | {own.sum()} |")
+        error += abs(said[own].sum() - right[own].sum()) / max(1, len(said))
+    if len(said):
+        brier, base = np.mean((said - right) ** 2), right.mean()
+        lines += ["", f"Brier score {brier:.4f} ({base * (1 - base):.4f} for always saying {base:.3f}, the share that is right); "
+                      f"expected calibration error {error:.4f} over these bins; {len(said)} causes."]
     sums = [abs(place["share_sum"] - 1) for r in records for place in r["placements"].values() if place["share_sum"] is not None]
     if sums:
         lines += ["", f"Shares: |sum − 1| is {np.mean(sums):.4f} in the mean, {np.max(sums):.4f} at most, over {len(sums)} placements."]
@@ -132,8 +201,9 @@ def strengths_table(records):
         for strength in ("weak", "medium", "strong"):
             some = [r["exact"] for r in own if r["strength"][effect] == strength]
             cells.append(f"{sum(some)}/{len(some)}" if some else "")
-        sought = "unknown" if own[0]["suite"] == "outside" else effect
-        found = [sought in r["placements"][r["affected"]]["named"] for r in own]
+        # outside and mechanics have names of their own for what is hidden
+        places = [r["placements"][r["affected"]] for r in own if r["affected"]]
+        found = [set(place["hidden"]) <= set(place["named"]) for place in places]
         lines.append(f"| {effect} | {' | '.join(cells)} | {sum(found)}/{len(found)} |")
     return lines
 
@@ -144,7 +214,7 @@ def confusion_table(records):
         for name, place in record["placements"].items():
             if place["hidden"] == place["named"]:
                 continue
-            hidden = ", ".join(f"{x} ({record['strength'].get(x, '')})" for x in place["hidden"]) or "nothing"
+            hidden = ", ".join(f"{x} ({record['strength'][x]})" if x in record["strength"] else x for x in place["hidden"]) or "nothing"
             if record["suite"] == "outside" and place["hidden"]:
                 hidden = "outside: " + ", ".join(f"{x} ({y})" for x, y in record["strength"].items())
             if "failed" in record:
@@ -167,9 +237,10 @@ def left_out_table(records):
 
 
 def report(records):
-    parts = [("Suites", suites_table(records)), ("Promises and intervals", promises_table(records)), ("Errors of parameters", errors_table(records)),
+    parts = [("Suites", suites_table(records)), ("No channel worse", harm_table(records)), ("Promises and intervals", promises_table(records)),
+             ("Squared differences over stated variances", stated_table(records)), ("Cost", cost_table(records)), ("Errors of parameters", errors_table(records)),
              ("Probabilities", calibration_table(records)), ("Intervals by effect", coverage_table(records))]
-    for suite in ("single", "placement", "outside"):
+    for suite in ("single", "placement", "outside", "mechanics"):
         own = [r for r in records if r["suite"] == suite]
         if own:
             parts.append((f"By effect and strength: {suite}", strengths_table(own)))
