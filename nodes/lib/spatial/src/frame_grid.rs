@@ -24,7 +24,7 @@ const BETTER: f64 = 0.2;
 const BETTER_HIDDEN: f64 = 0.06;
 /// How much better chords have to fit than the same half an interval later. The least, and times the
 /// number of poses: thirty nats are beyond chance. No source.
-const BETTER_THAN_SHIFTED: f64 = 0.02;
+const BETTER_THAN_SHIFTED: f64 = 0.1;
 const BETTER_THAN_SHIFTED_NATS: f64 = 30.0;
 /// Mean squares off the chords that matter, as a part of those of second differences. No source.
 const RELEVANT_PART: f64 = 1e-2;
@@ -130,7 +130,9 @@ impl FrameGrid {
         };
         let chance = BETTER_THAN_SHIFTED_NATS / (1.5 * poses.stamps.len() as f64);
         let gain = shifted.misfit(kinks, poses) - self.misfit(kinks, poses);
-        gain > chance.max(BETTER_THAN_SHIFTED) && self.is_straight(poses)
+        gain > chance.max(BETTER_THAN_SHIFTED)
+            && kinks.are_marked(self.rate_hz)
+            && self.is_straight(poses)
     }
 
     /// Whether the poses lie on the chords as well as their noise lets them, which their second

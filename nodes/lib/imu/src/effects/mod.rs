@@ -65,6 +65,7 @@ mod time_offset;
 mod tissue;
 mod units;
 mod vibration;
+mod wave;
 
 #[cfg(test)]
 mod effect_tests;
@@ -95,4 +96,4 @@ pub use spectral_line::strongest_line;
 pub use stages::{MeasurementInput, StagedReadings};
 pub use streaming::StreamingEffects;
 pub use units::unit_factors;
-pub use vibration::{SpectralLine, Wave};
+pub use wave::{SpectralLine, Wave};

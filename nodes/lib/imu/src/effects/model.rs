@@ -9,7 +9,7 @@ use super::clock_drift::Clock;
 use super::filter::SecondOrder;
 use super::readout::Readout;
 use super::tissue::{Tissue, Turning};
-use super::vibration::SpectralLine;
+use super::wave::SpectralLine;
 use super::{
     DeclaredNoise, Effect, EffectKind, EffectSet, Reading, gravity_convention, lever_arm, low_pass,
     mount_rotation, mount_slip, reference_tilt, sampling,

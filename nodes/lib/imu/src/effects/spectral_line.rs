@@ -6,7 +6,7 @@ use cromosim_spatial::{Complex64, FourierPair, greatest_near};
 use nalgebra::Vector3;
 
 use super::residual_view::{ResidualView, median};
-use super::vibration::{SpectralLine, Wave};
+use super::wave::{SpectralLine, Wave};
 use crate::{Channel, PerChannel};
 
 /// Readings below which no line is looked for.
