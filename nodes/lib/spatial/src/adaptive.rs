@@ -1,10 +1,10 @@
 //! Smoothing that follows the motion: how much is learnt around each time.
 
+use crate::SpatialError;
 use crate::equations::{IntervalWeights, SplineEquations};
 use crate::fourth_differences::{MEDIAN_OF_SQUARE, fourth_difference, white_noise_variance};
 use crate::local_spline::{LocalSolution, Series, Statements};
 use crate::weight_search::LOWEST_LOG_WEIGHT;
-use crate::{ExpectedNoise, SpatialError};
 
 /// Time over which neighbours share one drive, standard deviation, s: shorter, a burst's own noise
 /// decides; longer, a burst's start is smoothed away. Chosen among 0.05, 0.1, 0.15 and 0.25 s on
@@ -54,6 +54,17 @@ const LEAST_NOISE_AT_ALL: f64 = 1e-15;
 /// Largest weight, a cutoff of a sixtieth of the samples' rate: where weights differ from interval to
 /// interval, larger ones leave too few of the sixteen digits.
 const LARGEST_WEIGHT: f64 = 1e10;
+
+/// Noise that is expected of samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ExpectedNoise {
+    /// Standard deviation at 100 Hz (at other rates of the same density, as the root of the rate), in
+    /// the samples' unit; 0 where nothing is expected.
+    pub std: f64,
+    /// What it counts beside the samples around each time, in samples: little where they show their
+    /// noise, more where it was filtered before.
+    pub count: f64,
+}
 
 /// What is learnt of a series: how strongly the motion is driven around each time, and how large
 /// the noise is there.

@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use crate::adaptive::Adaptation;
+use crate::SpatialError;
+use crate::adaptive::{Adaptation, ExpectedNoise};
 use crate::banded::InverseBands;
 use crate::basis::ORDER;
 use crate::equations::{IntervalWeights, SplineEquations};
 use crate::local_spline::{LocalSolution, Series, Statements};
 use crate::system::centre;
-use crate::{ExpectedNoise, SpatialError};
 
 /// Splines of [`Adaptation`]'s weights, a lane each, see [`Series`].
 #[derive(Clone, Debug)]

@@ -1,10 +1,10 @@
 //! The equations of a smoothing spline: everything that depends on the times alone.
 
+use crate::SpatialError;
 use crate::banded::{Banded, Factor, Row};
 use crate::basis::{AT_KNOT, Basis, BasisValues, DEGREE, ORDER};
 use crate::difference::MAX_STENCIL;
 use crate::end_derivatives::{EndDerivative, end_derivatives};
-use crate::{LocalWeight, SpatialError};
 
 /// Derivative that smoothing penalises. Five is the highest that a quintic has; the response to
 /// noise, `1 / (1 + weight w^10)`, then falls the most sharply, and motion below the cutoff passes
@@ -48,6 +48,15 @@ pub(crate) struct SplineEquations {
     gram: Banded,
     gram_with_ends: Banded,
     penalty: Banded,
+}
+
+/// What the penalty of one interval weighs, for times counted in median sample intervals; no unit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LocalWeight {
+    /// The square of the fifth derivative: smoothness.
+    pub fifth: f64,
+    /// The square of the second derivative: that no acceleration is larger than those around.
+    pub second: f64,
 }
 
 /// What the penalty weighs.

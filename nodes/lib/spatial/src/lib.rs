@@ -65,11 +65,13 @@ mod system;
 mod track;
 mod weight_search;
 
+pub use adaptive::ExpectedNoise;
 pub use confidence::{
     CONFIDENCE_LENGTH_M, HALF_CONFIDENCE_STD_M, confidence_of_std, std_of_confidence,
 };
 pub use derivative::Derivative;
 pub use difference::{MAX_STENCIL, derivative_weights};
+pub use equations::LocalWeight;
 pub use error::SpatialError;
 pub use estimate::{PoseEstimate, PoseNoise};
 pub use fourth_differences::{
@@ -86,7 +88,7 @@ pub use pose_spline::{
 };
 pub use rustfft::num_complex::Complex64;
 pub use spectrum::{FourierPair, Spectrum, welch};
-pub use spline::{ExpectedNoise, LocalWeight, Smoothing, SmoothingSpline, SplineWeight};
+pub use spline::{Smoothing, SmoothingSpline, SplineWeight};
 pub use stamp::Stamp;
 pub use system::SplineSystem;
 pub use track::KinematicTrack;

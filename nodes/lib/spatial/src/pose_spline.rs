@@ -4,13 +4,11 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
-use crate::adaptive::{Adaptation, FEWEST_ADAPTIVE};
+use crate::adaptive::{Adaptation, ExpectedNoise, FEWEST_ADAPTIVE};
 use crate::adaptive_fit::AdaptiveFit;
 use crate::basis::BasisValues;
 use crate::grid::relative_seconds;
-use crate::{
-    Derivative, ExpectedNoise, Smoothing, SmoothingSpline, SpatialError, SplineSystem, Stamp, so3,
-};
+use crate::{Derivative, Smoothing, SmoothingSpline, SpatialError, SplineSystem, Stamp, so3};
 
 /// How a frame moves at one time, against the world and in the world's axes.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,24 +3,13 @@
 use std::sync::Arc;
 
 use crate::SpatialError;
-use crate::adaptive::FEWEST_ADAPTIVE;
+use crate::adaptive::{ExpectedNoise, FEWEST_ADAPTIVE};
 use crate::adaptive_fit::{AdaptiveFit, Uncertainty};
 use crate::basis::{BasisValues, ORDER};
 use crate::derivative::Derivative;
-use crate::equations::{PenaltyWeights, Scratch};
+use crate::equations::{LocalWeight, PenaltyWeights, Scratch};
 use crate::system::{LIGHT, LIGHTER, SplineSystem, centred};
 use crate::weight_search::LOWEST_LOG_WEIGHT;
-
-/// Noise that is expected of samples.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ExpectedNoise {
-    /// Standard deviation at 100 Hz (at other rates of the same density, as the root of the rate), in
-    /// the samples' unit; 0 where nothing is expected.
-    pub std: f64,
-    /// What it counts beside the samples around each time, in samples: little where they show their
-    /// noise, more where it was filtered before.
-    pub count: f64,
-}
 
 /// How much a spline smooths.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -58,15 +47,6 @@ pub enum SplineWeight {
     Uniform(f64),
     /// One for each interval between samples.
     Local(Vec<LocalWeight>),
-}
-
-/// What the penalty of one interval weighs, for times counted in median sample intervals; no unit.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LocalWeight {
-    /// The square of the fifth derivative: smoothness.
-    pub fifth: f64,
-    /// The square of the second derivative: that no acceleration is larger than those around.
-    pub second: f64,
 }
 
 impl SplineWeight {
