@@ -6,7 +6,7 @@ mod common;
 
 use std::process::Command;
 
-use common::{CROMOSIM, python, root, shared_data};
+use common::{CROMOSIM, python, root};
 
 #[test]
 fn a_few_withheld_cases_are_graded() {
@@ -53,8 +53,7 @@ fn a_few_withheld_cases_are_graded() {
                 .all(exact)
         })
         .count();
-    // All six are right on the motions that include people's (the shared data). Without them the
-    // generator hides the same effects in other, synthetic motions, on which one may be missed.
-    let least = if shared_data().is_some() { 6 } else { 5 };
-    assert!(right >= least, "{right} of 6 cases right\n{text}");
+    // One of the three cases without effect is said to hold something unknown. With the shared data
+    // the motions are partly people's, without them others, all synthetic.
+    assert!(right >= 5, "{right} of 6 cases right\n{text}");
 }
