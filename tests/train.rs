@@ -82,7 +82,7 @@ fn networks_learn_and_simulate_takes_them() {
     let [analytic, learned, ..] = errors[..] else {
         panic!("{row}")
     };
-    // So few steps take off little: soft tissue in a turning frame is harder to learn than a filter.
+    // So few steps take off little.
     assert!(learned < 0.99 * analytic, "{row}");
     let history = fs::read_to_string(here.join("model/acceleration_history.csv")).unwrap();
     assert_eq!(history.lines().count(), 7);
