@@ -2,7 +2,7 @@
 //! against the reference's, and its mount.
 
 use cromosim_imu::{GRAVITY_IN_WORLD, KinematicSample, Reading};
-use cromosim_spatial::Stamp;
+use cromosim_spatial::{Stamp, greatest_near};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use crate::LearnedError;
@@ -11,6 +11,8 @@ use crate::LearnedError;
 const WIDEST: f64 = 0.25;
 /// Steps of the first search, s.
 const STEP: f64 = 0.005;
+/// Sharpness of the time offset, s.
+const PRECISION: f64 = 1e-6;
 /// Fewer samples say nothing of a mount.
 const LEAST: usize = 50;
 
@@ -56,9 +58,8 @@ pub fn align(
         needed: LEAST,
     };
     let (coarse, _) = best.ok_or_else(too_few)?;
-    let time_offset = golden(coarse - STEP, coarse + STEP, |offset| {
-        cost(offset).unwrap_or(f64::INFINITY)
-    });
+    let likeness = |offset| -cost(offset).unwrap_or(f64::INFINITY);
+    let time_offset = greatest_near(likeness, coarse, STEP, PRECISION);
     let both = matched(kinematics, stamps, readings, time_offset);
     let mean_square = |of: &dyn Fn(&Both) -> Vector3<f64>| {
         both.iter().map(|pair| of(pair).norm_squared()).sum::<f64>() / both.len() as f64
@@ -145,26 +146,6 @@ fn wahba(
     let rotation = u * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, sign)) * v_t;
     let most = svd.singular_values[0] + svd.singular_values[1] + sign * svd.singular_values[2];
     (UnitQuaternion::from_matrix(&rotation), squares - 2.0 * most)
-}
-
-/// The least of a function with one valley between two places, to a microsecond.
-fn golden(mut low: f64, mut high: f64, cost: impl Fn(f64) -> f64) -> f64 {
-    let ratio = 0.5 * (5.0_f64.sqrt() - 1.0);
-    let inner = |low: f64, high: f64| [high - ratio * (high - low), low + ratio * (high - low)];
-    let mut at = inner(low, high);
-    let mut costs = at.map(&cost);
-    while high - low > 1e-6 {
-        if costs[0] < costs[1] {
-            high = at[1];
-            at = inner(low, high);
-            costs = [cost(at[0]), costs[0]];
-        } else {
-            low = at[0];
-            at = inner(low, high);
-            costs = [costs[1], cost(at[1])];
-        }
-    }
-    0.5 * (low + high)
 }
 
 #[cfg(test)]

@@ -75,18 +75,7 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
         statements: &mut Statements<L>,
     ) -> Result<(), SpatialError> {
         let weights = equations.local_weights(weights);
-        self.coefficients.clone_from(&series.projected);
-        for ((end, weight), target) in equations
-            .ends
-            .iter()
-            .zip(&weights.ends)
-            .zip(&series.targets)
-        {
-            for (entry, b) in self.coefficients[end.first..].iter_mut().zip(&end.row) {
-                (0..C).for_each(|c| entry[c] += b * weight[c % L] * target[c]);
-            }
-        }
-        self.solve_down(equations, &weights)?;
+        self.solve_down(equations, series, &weights)?;
         self.invert_and_state(equations, series, Solved::Down, statements);
         Ok(())
     }
@@ -99,18 +88,7 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
         weights: &[IntervalWeights<L>],
     ) -> Result<(), SpatialError> {
         let weights = equations.local_weights(weights);
-        self.coefficients.clone_from(&series.projected);
-        for ((end, weight), target) in equations
-            .ends
-            .iter()
-            .zip(&weights.ends)
-            .zip(&series.targets)
-        {
-            let mut weighted = *target;
-            (0..C).for_each(|c| weighted[c] *= weight[c % L]);
-            add_multiples(&end.row, &weighted, &mut self.coefficients[end.first..]);
-        }
-        self.solve_down(equations, &weights)?;
+        self.solve_down(equations, series, &weights)?;
         self.factor.solve_up(&mut self.coefficients);
         let refined = weights.largest.map(refinements);
         for round in 1..=refined.into_iter().max().unwrap_or(0) {
@@ -127,11 +105,23 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
         Ok(())
     }
 
+    /// `B^T y`, the derivatives at the ends included, and the first half of the solution.
     fn solve_down(
         &mut self,
         equations: &SplineEquations,
+        series: &Series<C, L>,
         weights: &LocalWeights<L>,
     ) -> Result<(), SpatialError> {
+        self.coefficients.clone_from(&series.projected);
+        for ((end, weight), target) in equations
+            .ends
+            .iter()
+            .zip(&weights.ends)
+            .zip(&series.targets)
+        {
+            let weighted = std::array::from_fn(|c| target[c] * weight[c % L]);
+            add_multiples(&end.row, &weighted, &mut self.coefficients[end.first..]);
+        }
         let row = |i: usize| equations.local_row(i, weights);
         let size = equations.basis.count();
         self.factor
