@@ -8,14 +8,8 @@ use crate::axes::{channel_of_axis, sum_over_channels, value_on_axis};
 use crate::gram::{Gram, Linear, channel_likelihood, dot};
 use crate::noise_model::{NoiseBasis, NoiseModel};
 use crate::policy::report::STANDARD_ERROR_FACTOR;
-use crate::policy::search::{CONVERGED_NATS, FIT_STEPS};
 use crate::prepared::{FOLDS, Prediction, PreparedPlacement};
 use crate::whiten::Whitener;
-
-/// Part of a step below which a fit gives up halving it.
-const LEAST_PART: f64 = 1e-3;
-/// Factor on a step that did not help.
-const SHORTER: f64 = 0.3;
 
 /// A prepared placement with one kinematic track and one model of the noise.
 #[derive(Clone, Debug)]
@@ -191,7 +185,8 @@ impl<'a> FitModel<'a> {
         self.whitener.apply(&difference)
     }
 
-    fn gram(&self, columns: &[&[f64]], residual: &[f64], prior: Vec<f64>) -> Gram {
+    /// Normal equations of columns against a residual.
+    pub fn gram(&self, columns: &[&[f64]], residual: &[f64], prior: Vec<f64>) -> Gram {
         Gram::new(
             columns,
             residual,
@@ -214,59 +209,8 @@ impl<'a> FitModel<'a> {
         })
     }
 
-    /// Gauss-Newton steps with halving from the values in `set`.
-    pub fn fit(&self, set: EffectSet) -> Fit {
-        self.fit_steps(set, FIT_STEPS)
-    }
-
-    /// As [`FitModel::fit`], with another limit on the steps: with 0 the values stay.
-    pub fn fit_steps(&self, set: EffectSet, steps: usize) -> Fit {
-        let layout: Vec<(EffectKind, usize)> = set
-            .iter()
-            .flat_map(|effect| layout_of(effect.kind()))
-            .collect();
-        let mut now = self.evaluated(set);
-        let mut steps_left = steps;
-        loop {
-            let columns: Vec<Vec<f64>> = now
-                .set
-                .iter()
-                .flat_map(|effect| self.columns(&now.set, &now.prediction, effect.kind()))
-                .collect();
-            let slices: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
-            let prior = now
-                .set
-                .iter()
-                .flat_map(|effect| prior_weights(effect.kind()))
-                .collect();
-            let linear = self.gram(&slices, &now.residual, prior).solve();
-            let is_last =
-                steps_left == 0 || layout.is_empty() || now.cost + linear.trained < CONVERGED_NATS;
-            let better = if is_last {
-                None
-            } else {
-                self.better(&now, &layout, &linear.step)
-            };
-            match better {
-                Some(better) => {
-                    now = better;
-                    steps_left -= 1;
-                }
-                None => {
-                    return Fit {
-                        set: now.set,
-                        layout,
-                        prediction: now.prediction,
-                        residual: now.residual,
-                        columns,
-                        linear,
-                    };
-                }
-            }
-        }
-    }
-
-    fn evaluated(&self, set: EffectSet) -> Evaluated {
+    /// What a set predicts, and what it costs.
+    pub fn evaluated(&self, set: EffectSet) -> Evaluated {
         let prediction = self.prepared.predict(&self.track, &set);
         let residual = self.residual(&prediction.readings);
         let cost = self.cost(&residual);
@@ -276,24 +220,6 @@ impl<'a> FitModel<'a> {
             residual,
             cost,
         }
-    }
-
-    /// The first of ever shorter parts of a step that lowers the cost.
-    fn better(
-        &self,
-        now: &Evaluated,
-        layout: &[(EffectKind, usize)],
-        step: &DVector<f64>,
-    ) -> Option<Evaluated> {
-        let mut part = 1.0;
-        while part > LEAST_PART {
-            let next = self.evaluated(stepped(&now.set, layout, step, part));
-            if next.cost < now.cost {
-                return Some(next);
-            }
-            part *= SHORTER;
-        }
-        None
     }
 
     /// How well columns beside those of a fit would do, in one linear step.
@@ -316,13 +242,13 @@ impl<'a> FitModel<'a> {
 }
 
 /// A set with what it predicts and costs.
-struct Evaluated {
-    set: EffectSet,
-    prediction: Prediction,
+pub(crate) struct Evaluated {
+    pub set: EffectSet,
+    pub prediction: Prediction,
     /// Whitened, flat.
-    residual: Vec<f64>,
+    pub residual: Vec<f64>,
     /// Negative log-likelihood, nats.
-    cost: f64,
+    pub cost: f64,
 }
 
 impl Fit {

@@ -13,14 +13,23 @@ const REWEIGHTINGS: usize = 3;
 /// Relative change of these weights below which they have settled.
 const SETTLED: f64 = 0.01;
 
-/// Inner products of columns (the last is the residual), by fold.
+/// Inner products of columns (the last is the residual), by fold: of one series, or of several whose
+/// columns share coefficients.
 #[derive(Clone, Debug)]
 pub(crate) struct Gram {
+    blocks: Vec<Block>,
+    /// 1 / prior variance of each coefficient.
+    prior: Vec<f64>,
+}
+
+/// The inner products of one series.
+#[derive(Clone, Debug)]
+struct Block {
+    /// Which coefficient each column has.
+    coefficients: Vec<usize>,
     parts: Vec<PerChannel<DMatrix<f64>>>,
     /// Number of values, by fold.
     counts: Vec<PerChannel<f64>>,
-    /// 1 / prior variance of each column's coefficient.
-    prior: Vec<f64>,
 }
 
 /// What a linear fit leaves.
@@ -28,8 +37,6 @@ pub(crate) struct Gram {
 pub(crate) struct Linear {
     /// Coefficients.
     pub step: DVector<f64>,
-    /// Log-likelihood on the data it was fitted to.
-    pub trained: f64,
     /// Log-likelihood of each part of time under the fit to the others, summed.
     pub held_out: f64,
     /// Held-out mean square of the whitened residual by channel.
@@ -38,6 +45,17 @@ pub(crate) struct Linear {
     pub fold_steps: Vec<DVector<f64>>,
     /// Inverse of the normal matrix: covariance of the coefficients.
     pub covariance: DMatrix<f64>,
+}
+
+/// What a linear fit leaves of several series.
+#[derive(Clone, Debug)]
+pub(crate) struct Solution {
+    /// All coefficients.
+    pub step: DVector<f64>,
+    /// Log-likelihood of all series, less the prior's cost.
+    pub trained: f64,
+    /// Of each series, with its own coefficients and likelihoods.
+    pub parts: Vec<Linear>,
 }
 
 /// Log-likelihood of a channel: unit variance, or a common factor q where the residual is larger
@@ -95,9 +113,32 @@ impl Gram {
                 part[channel].fill_upper_triangle_with_lower_triangle();
             }
         }
-        Self {
+        let block = Block {
+            coefficients: (0..columns.len()).collect(),
             parts,
             counts: counts.to_vec(),
+        };
+        Self {
+            blocks: vec![block],
+            prior,
+        }
+    }
+
+    /// Of several series, each with the coefficients of its columns; `prior` is that of all
+    /// coefficients.
+    pub fn together(series: Vec<(Self, Vec<usize>)>, prior: Vec<f64>) -> Self {
+        let of = |(gram, coefficients): (Self, Vec<usize>)| {
+            gram.blocks.into_iter().map(move |block| Block {
+                coefficients: block
+                    .coefficients
+                    .iter()
+                    .map(|&column| coefficients[column])
+                    .collect(),
+                ..block
+            })
+        };
+        Self {
+            blocks: series.into_iter().flat_map(of).collect(),
             prior,
         }
     }
@@ -106,35 +147,51 @@ impl Gram {
         self.prior.len()
     }
 
-    /// Solves with each channel in units of its own residual, then scores each part of time under
-    /// the fit to the others.
+    /// [`Gram::solution`] of one series.
     pub fn solve(&self) -> Linear {
-        let total = self.sum(None);
-        let count = self.count(None);
-        let (step, ratio, covariance) = self.minimise(&total, &count);
-        let trained = sum_over_channels(|channel| {
-            channel_likelihood(count[channel], ratio[channel] * count[channel])
-        }) - self.prior_cost(&step);
-        let mut squares = PerChannel::<f64>::default();
-        let mut fold_steps = Vec::with_capacity(FOLDS);
-        for (fold, part) in self.parts.iter().enumerate() {
-            let (step, _, _) = self.minimise(&self.sum(Some(fold)), &self.count(Some(fold)));
-            for channel in Channel::ALL {
-                squares[channel] += left(&part[channel], &step).max(0.0);
+        self.solution().parts.swap_remove(0)
+    }
+
+    /// Solves with each channel of each series in units of its own residual, then scores each part
+    /// of time under the fit to the others.
+    pub fn solution(&self) -> Solution {
+        let all = self.minimise(None);
+        let of_folds: Vec<Minimum> = (0..FOLDS).map(|fold| self.minimise(Some(fold))).collect();
+        let mut trained = 0.0;
+        let parts = self.blocks.iter().enumerate().map(|(index, block)| {
+            let count = block.count(None);
+            let ratio = all.ratios[index];
+            trained += sum_over_channels(|channel| {
+                channel_likelihood(count[channel], ratio[channel] * count[channel])
+            });
+            let mut squares = PerChannel::<f64>::default();
+            for (part, minimum) in block.parts.iter().zip(&of_folds) {
+                let step = minimum.step.select_rows(&block.coefficients);
+                for channel in Channel::ALL {
+                    squares[channel] += left(&part[channel], &step).max(0.0);
+                }
             }
-            fold_steps.push(step);
-        }
-        let held_out_ratio =
-            PerChannel::from_fn(|channel| squares[channel] / count[channel].max(1.0));
-        let held_out =
-            sum_over_channels(|channel| channel_likelihood(count[channel], squares[channel]));
-        Linear {
-            step,
-            trained,
-            held_out,
-            held_out_ratio,
-            fold_steps,
-            covariance,
+            let of = |values: &DVector<f64>| values.select_rows(&block.coefficients);
+            Linear {
+                step: of(&all.step),
+                held_out: sum_over_channels(|channel| {
+                    channel_likelihood(count[channel], squares[channel])
+                }),
+                held_out_ratio: PerChannel::from_fn(|channel| {
+                    squares[channel] / count[channel].max(1.0)
+                }),
+                fold_steps: of_folds.iter().map(|minimum| of(&minimum.step)).collect(),
+                covariance: all
+                    .covariance
+                    .select_rows(&block.coefficients)
+                    .select_columns(&block.coefficients),
+            }
+        });
+        let parts = parts.collect();
+        Solution {
+            trained: trained - self.prior_cost(&all.step),
+            step: all.step,
+            parts,
         }
     }
 
@@ -146,9 +203,100 @@ impl Gram {
             .sum::<f64>()
     }
 
+    /// The coefficients that leave least, with all parts of time but one.
+    fn minimise(&self, excluded: Option<usize>) -> Minimum {
+        let size = self.size();
+        let totals: Vec<_> = self
+            .blocks
+            .iter()
+            .map(|block| block.sum(excluded))
+            .collect();
+        let counts: Vec<_> = self
+            .blocks
+            .iter()
+            .map(|block| block.count(excluded))
+            .collect();
+        let ratios_after = |step: &DVector<f64>| -> Vec<PerChannel<f64>> {
+            let blocks = self.blocks.iter().zip(totals.iter().zip(&counts));
+            blocks
+                .map(|(block, (total, count))| {
+                    let step = step.select_rows(&block.coefficients);
+                    PerChannel::from_fn(|channel| {
+                        left(&total[channel], &step).max(0.0) / count[channel].max(1.0)
+                    })
+                })
+                .collect()
+        };
+        let step = DVector::zeros(size);
+        let mut minimum = Minimum {
+            ratios: ratios_after(&step),
+            step,
+            covariance: DMatrix::zeros(size, size),
+        };
+        for _ in 0..REWEIGHTINGS {
+            let (normal, right) = self.normal_equations(&totals, &minimum.ratios);
+            let Some(factor) = normal.cholesky() else {
+                break;
+            };
+            let step = factor.solve(&right);
+            let ratios = ratios_after(&step);
+            let pairs = ratios.iter().zip(&minimum.ratios);
+            let settled = pairs.into_iter().all(|(next, ratio)| {
+                Channel::ALL.into_iter().all(|channel| {
+                    (next[channel].max(1.0) / ratio[channel].max(1.0) - 1.0).abs() < SETTLED
+                })
+            });
+            minimum = Minimum {
+                step,
+                ratios,
+                covariance: factor.inverse(),
+            };
+            if settled {
+                break;
+            }
+        }
+        minimum
+    }
+
+    /// Normal matrix and right-hand side, each channel in units of its residual.
+    fn normal_equations(
+        &self,
+        totals: &[PerChannel<DMatrix<f64>>],
+        ratios: &[PerChannel<f64>],
+    ) -> (DMatrix<f64>, DVector<f64>) {
+        let size = self.size();
+        let mut normal = DMatrix::zeros(size, size);
+        let mut right = DVector::zeros(size);
+        for (block, (total, ratio)) in self.blocks.iter().zip(totals.iter().zip(ratios)) {
+            let own = block.coefficients.len();
+            for channel in Channel::ALL {
+                let weight = ratio[channel].max(1.0).recip();
+                for (i, &row) in block.coefficients.iter().enumerate() {
+                    for (j, &column) in block.coefficients.iter().enumerate() {
+                        normal[(row, column)] += total[channel][(i, j)] * weight;
+                    }
+                    right[row] += total[channel][(i, own)] * weight;
+                }
+            }
+        }
+        for k in 0..size {
+            normal[(k, k)] += self.prior[k] + 1e-12 * normal[(k, k)];
+        }
+        (normal, right)
+    }
+}
+
+/// Coefficients, mean squares of the residuals that they leave by series, and their covariance.
+struct Minimum {
+    step: DVector<f64>,
+    ratios: Vec<PerChannel<f64>>,
+    covariance: DMatrix<f64>,
+}
+
+impl Block {
     /// Over all folds but one.
     fn sum(&self, excluded: Option<usize>) -> PerChannel<DMatrix<f64>> {
-        let size = self.size() + 1;
+        let size = self.coefficients.len() + 1;
         let mut total = PerChannel::from_fn(|_| DMatrix::zeros(size, size));
         for (_, part) in self
             .parts
@@ -173,49 +321,6 @@ impl Gram {
         kept.fold(PerChannel::default(), |sum, (_, count)| {
             PerChannel::from_fn(|channel| sum[channel] + count[channel])
         })
-    }
-
-    /// Coefficients, mean squares of the residual that they leave, and their covariance.
-    fn minimise(
-        &self,
-        total: &PerChannel<DMatrix<f64>>,
-        count: &PerChannel<f64>,
-    ) -> (DVector<f64>, PerChannel<f64>, DMatrix<f64>) {
-        let size = self.size();
-        let ratio_after = |step: &DVector<f64>| {
-            PerChannel::from_fn(|channel| {
-                left(&total[channel], step).max(0.0) / count[channel].max(1.0)
-            })
-        };
-        let mut step = DVector::zeros(size);
-        let mut ratio = ratio_after(&step);
-        let mut covariance = DMatrix::zeros(size, size);
-        for _ in 0..REWEIGHTINGS {
-            let mut normal = DMatrix::zeros(size, size);
-            let mut right = DVector::zeros(size);
-            for channel in Channel::ALL {
-                let weight = ratio[channel].max(1.0).recip();
-                normal += total[channel].view((0, 0), (size, size)) * weight;
-                right += total[channel].view((0, size), (size, 1)) * weight;
-            }
-            for k in 0..size {
-                normal[(k, k)] += self.prior[k] + 1e-12 * normal[(k, k)];
-            }
-            let Some(factor) = normal.cholesky() else {
-                break;
-            };
-            step = factor.solve(&right);
-            covariance = factor.inverse();
-            let next = ratio_after(&step);
-            let settled = Channel::ALL.into_iter().all(|channel| {
-                (next[channel].max(1.0) / ratio[channel].max(1.0) - 1.0).abs() < SETTLED
-            });
-            ratio = next;
-            if settled {
-                break;
-            }
-        }
-        (step, ratio, covariance)
     }
 }
 

@@ -14,6 +14,7 @@ mod evidence;
 mod fill;
 mod findings;
 mod fit;
+mod gauss_newton;
 mod gram;
 mod identify;
 mod lag;

@@ -3,7 +3,7 @@
 use nalgebra::Matrix3;
 
 use super::search::Search;
-use super::spec::{EffectSpec, ParameterSpec, Shape, Stage};
+use super::spec::{EffectSpec, Owner, ParameterSpec, Shape, Stage};
 use super::{Effect, EffectKind};
 use crate::{Channel, EffectError};
 
@@ -11,6 +11,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::AxisConvention,
     name: "axis_convention",
     stage: Stage::Sensor,
+    owner: Owner::Device,
     summary: "The device's axes are swapped or turned in sign: both channels are the simulated ones with axes exchanged.",
     remedy: "Map the driver's axes to the sensor's drawing.",
     parameters: &[ParameterSpec {

@@ -4,13 +4,14 @@ use super::EffectKind;
 use super::search::{
     Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, Rounding, Search, always,
 };
-use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use crate::Channel;
 
 pub(super) static ACCEL: EffectSpec = EffectSpec {
     kind: EffectKind::AccelBias,
     name: "accel_bias",
     stage: Stage::Linear,
+    owner: Owner::Session,
     summary: "A constant is added to the specific force: the residual has a mean in sensor axes that does not turn with the segment.",
     remedy: "Calibrate the accelerometer at rest in six positions and subtract the bias.",
     parameters: &[ParameterSpec {
@@ -50,6 +51,7 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
     kind: EffectKind::GyroBias,
     name: "gyro_bias",
     stage: Stage::Linear,
+    owner: Owner::Session,
     summary: "A constant is added to the angular velocity: the residual has a mean, also at rest.",
     remedy: "Average the gyroscope at rest and subtract the mean.",
     parameters: &[ParameterSpec {

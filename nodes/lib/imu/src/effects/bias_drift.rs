@@ -2,13 +2,14 @@
 
 use super::EffectKind;
 use super::search::{Dependence, FirstGuess, FittedSearch, Ordinary, Rounding, Search, always};
-use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use crate::Channel;
 
 pub(super) static ACCEL: EffectSpec = EffectSpec {
     kind: EffectKind::AccelBiasDrift,
     name: "accel_bias_drift",
     stage: Stage::Linear,
+    owner: Owner::Session,
     summary: "The accelerometer's bias grows with time: the residual's mean is a ramp that is zero at the epoch.",
     remedy: "Let the device warm up, compensate for temperature, or calibrate again during the session.",
     parameters: &[ParameterSpec {
@@ -40,6 +41,7 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
     kind: EffectKind::GyroBiasDrift,
     name: "gyro_bias_drift",
     stage: Stage::Linear,
+    owner: Owner::Session,
     summary: "The gyroscope's bias grows with time: the residual's mean is a ramp that is zero at the epoch.",
     remedy: "Let the device warm up, compensate for temperature, or average the gyroscope at rest again during the session.",
     parameters: &[ParameterSpec {

@@ -8,13 +8,14 @@ use super::EffectKind;
 use super::search::{
     Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, Search, always,
 };
-use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use crate::Channel;
 
 pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::ChannelDelay,
     name: "channel_delay",
     stage: Stage::Timing,
+    owner: Owner::Device,
     summary: "The gyroscope is late (positive) or early against the accelerometer under one stamp: its residual alone is proportional to its time derivative.",
     remedy: "Give both channels the same filter and output rate in the device's settings, or stamp them apart.",
     parameters: &[ParameterSpec {

@@ -5,13 +5,14 @@ use super::EffectKind;
 use super::search::{
     Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, Search, always,
 };
-use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use crate::Channel;
 
 pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::ClockDrift,
     name: "clock_drift",
     stage: Stage::Timing,
+    owner: Owner::Session,
     summary: "The IMU's clock runs fast (positive) or slow: the residual is proportional to the time derivative and grows with time.",
     remedy: "Discipline the clock (PTP, a common oscillator), or stretch the stamps by this rate.",
     parameters: &[ParameterSpec {

@@ -3,7 +3,7 @@
 use rand_chacha::ChaCha12Rng;
 
 use super::search::{ReadOff, ReadOffSearch, Search};
-use super::spec::{EffectSpec, ParameterSpec, Shape, Stage};
+use super::spec::{EffectSpec, Owner, ParameterSpec, Shape, Stage};
 use super::{Effect, EffectKind};
 use crate::{Channel, random};
 
@@ -11,6 +11,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::DroppedSamples,
     name: "dropped_samples",
     stage: Stage::Timing,
+    owner: Owner::Session,
     summary: "Messages are lost: the stamps have gaps of whole intervals, the readings that are there stay right.",
     remedy: "Find the loss (radio, queue sizes, bandwidth), or log on the device.",
     parameters: &[

@@ -1,7 +1,7 @@
 //! `gravity_convention`: what a device calls acceleration.
 
 use super::search::Search;
-use super::spec::{EffectSpec, ParameterSpec, Shape, Stage};
+use super::spec::{EffectSpec, Owner, ParameterSpec, Shape, Stage};
 use super::{Effect, EffectKind};
 use crate::{Channel, EffectError};
 
@@ -9,6 +9,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::GravityConvention,
     name: "gravity_convention",
     stage: Stage::Segment,
+    owner: Owner::Device,
     summary: "The device reports acceleration without gravity, or with gravity's sign turned: the residual is one or two g along the vertical.",
     remedy: "Switch the driver to specific force (+g upwards at rest, as REP-145 asks), or convert the readings.",
     parameters: &[ParameterSpec {

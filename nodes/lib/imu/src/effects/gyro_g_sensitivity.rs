@@ -4,13 +4,14 @@ use super::EffectKind;
 use super::search::{
     Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, Search, always,
 };
-use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use crate::Channel;
 
 pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::GyroGSensitivity,
     name: "gyro_g_sensitivity",
     stage: Stage::Sensor,
+    owner: Owner::Device,
     summary: "The gyroscope feels specific force: its residual is linear in the force, gravity included, so that it turns with the sensor.",
     remedy: "Calibrate the gyroscope at rest in six positions, or damp shocks at the mount.",
     parameters: &[ParameterSpec {

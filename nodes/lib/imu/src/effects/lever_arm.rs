@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::search::{FirstGuess, FittedSearch, Identifiability, Ordinary, Search, always};
-use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use super::{EffectKind, EffectSet};
 use crate::Channel;
 
@@ -11,6 +11,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::LeverArm,
     name: "lever_arm",
     stage: Stage::Segment,
+    owner: Owner::Device,
     summary: "The sensor sits away from the reference frame: the residual's specific force follows the square of the angular velocity and its derivative.",
     remedy: "Measure the sensor's position on its segment and enter it in the placement.",
     parameters: &[ParameterSpec {

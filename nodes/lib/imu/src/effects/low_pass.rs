@@ -2,7 +2,7 @@
 
 use super::residual_view::ResidualView;
 use super::search::{Dependence, FirstGuess, FittedSearch, Search};
-use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use super::{Effect, EffectKind, EffectSet};
 use crate::Channel;
 
@@ -10,6 +10,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::LowPass,
     name: "low_pass",
     stage: Stage::Sensor,
+    owner: Owner::Device,
     summary: "The device smooths both channels: fast motion is weaker and everything comes late by 0.225 / cutoff_hz.",
     remedy: "Raise the device's bandwidth setting, or put the same filter into the simulation.",
     parameters: &[ParameterSpec {

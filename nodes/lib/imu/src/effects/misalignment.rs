@@ -6,13 +6,14 @@ use super::EffectKind;
 use super::search::{
     Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, Search, always,
 };
-use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use crate::Channel;
 
 pub(super) static ACCEL: EffectSpec = EffectSpec {
     kind: EffectKind::AccelMisalignment,
     name: "accel_misalignment",
     stage: Stage::Linear,
+    owner: Owner::Device,
     summary: "The accelerometer's axes are not orthogonal: an axis' residual is proportional to what its neighbours read.",
     remedy: "Calibrate the accelerometer's cross-axis terms at rest in many positions.",
     parameters: &[ParameterSpec {
@@ -48,6 +49,7 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
     kind: EffectKind::GyroMisalignment,
     name: "gyro_misalignment",
     stage: Stage::Linear,
+    owner: Owner::Device,
     summary: "The gyroscope's axes are not orthogonal: an axis' residual is proportional to what its neighbours read.",
     remedy: "Calibrate the gyroscope's cross-axis terms on a turntable.",
     parameters: &[ParameterSpec {

@@ -91,7 +91,7 @@ pub use search::{
     Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, ReadOff, ReadOffSearch,
     Rounding, Search,
 };
-pub use spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+pub use spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 pub use spectral_line::strongest_line;
 pub use stages::{MeasurementInput, StagedReadings};
 pub use streaming::StreamingEffects;

@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::search::{
     Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, Search, always,
 };
-use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use super::{Effect, EffectKind};
 use crate::{Channel, EffectError};
 
@@ -16,6 +16,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::MountRotation,
     name: "mount_rotation",
     stage: Stage::Sensor,
+    owner: Owner::Device,
     summary: "The sensor's axes are turned against the reference frame's: both channels are the simulated vectors in other axes.",
     remedy: "Calibrate the sensor-to-segment rotation and enter it as the placement's mount.",
     parameters: &[ParameterSpec {

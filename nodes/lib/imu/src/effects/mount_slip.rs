@@ -8,13 +8,14 @@ use super::EffectKind;
 use super::search::{
     Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, Search, always,
 };
-use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use crate::Channel;
 
 pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::MountSlip,
     name: "mount_slip",
     stage: Stage::Sensor,
+    owner: Owner::Session,
     summary: "The sensor turned on its segment once: from that time on both channels read the simulated vectors in other axes.",
     remedy: "Fasten the sensor (wider strap, rigid plate), and calibrate the mount anew after the slip.",
     parameters: &[

@@ -2,7 +2,7 @@
 
 use super::residual_view::median;
 use super::search::{ReadOff, ReadOffSearch, Search};
-use super::spec::{EffectSpec, ParameterSpec, Shape, Stage};
+use super::spec::{EffectSpec, Owner, ParameterSpec, Shape, Stage};
 use super::{EffectKind, EffectSet};
 use crate::{Channel, PerChannel, Reading};
 
@@ -16,6 +16,7 @@ pub(super) static ACCEL: EffectSpec = EffectSpec {
     kind: EffectKind::AccelNoise,
     name: "accel_noise",
     stage: Stage::Digital,
+    owner: Owner::Device,
     summary: "The accelerometer scatters more than declared: white residual that no motion explains.",
     remedy: "State the true noise in the device file and the covariances, or use a quieter device or mode.",
     parameters: &[ParameterSpec {
@@ -38,6 +39,7 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
     kind: EffectKind::GyroNoise,
     name: "gyro_noise",
     stage: Stage::Digital,
+    owner: Owner::Device,
     summary: "The gyroscope scatters more than declared: white residual that no motion explains.",
     remedy: "State the true noise in the device file and the covariances, or use a quieter device or mode.",
     parameters: &[ParameterSpec {

@@ -1,7 +1,7 @@
 //! `accel_quantization`, `gyro_quantization`: the resolution of a sensor.
 
 use super::search::{ReadOff, ReadOffSearch, Search};
-use super::spec::{EffectSpec, ParameterSpec, Shape, Stage};
+use super::spec::{EffectSpec, Owner, ParameterSpec, Shape, Stage};
 use super::{EffectKind, EffectSet};
 use crate::{Channel, PerChannel};
 
@@ -15,6 +15,7 @@ pub(super) static ACCEL: EffectSpec = EffectSpec {
     kind: EffectKind::AccelQuantization,
     name: "accel_quantization",
     stage: Stage::Digital,
+    owner: Owner::Device,
     summary: "The accelerometer rounds to steps: all readings lie on a lattice, and the residual is as wide as a step.",
     remedy: "Choose a smaller range or a device with more bits.",
     parameters: &[ParameterSpec {
@@ -37,6 +38,7 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
     kind: EffectKind::GyroQuantization,
     name: "gyro_quantization",
     stage: Stage::Digital,
+    owner: Owner::Device,
     summary: "The gyroscope rounds to steps: all readings lie on a lattice, and the residual is as wide as a step.",
     remedy: "Choose a smaller range or a device with more bits.",
     parameters: &[ParameterSpec {

@@ -2,7 +2,7 @@
 //! frames nothing was seen.
 
 use super::search::{ReadOff, ReadOffSearch, Search};
-use super::spec::{EffectSpec, ParameterSpec, Shape, Stage};
+use super::spec::{EffectSpec, Owner, ParameterSpec, Shape, Stage};
 use super::{EffectKind, EffectSet};
 use crate::Channel;
 
@@ -10,6 +10,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::ReferenceInterpolation,
     name: "reference_interpolation",
     stage: Stage::Reference,
+    owner: Owner::Session,
     summary: "The reference was interpolated along straight lines between frames of a lower rate: its velocities jump at each frame, and its accelerations are spikes.",
     remedy: "Export the motion capture at its own rate, or keep only the frames of this rate.",
     parameters: &[ParameterSpec {

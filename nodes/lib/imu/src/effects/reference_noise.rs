@@ -5,13 +5,14 @@ use std::f64::consts::PI;
 
 use super::EffectKind;
 use super::search::{ReadOff, ReadOffSearch, Search};
-use super::spec::{EffectSpec, ParameterSpec, Shape, Stage};
+use super::spec::{EffectSpec, Owner, ParameterSpec, Shape, Stage};
 use crate::Channel;
 
 pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::ReferenceNoise,
     name: "reference_noise",
     stage: Stage::Reference,
+    owner: Owner::Session,
     summary: "The reference pose scatters from sample to sample; differentiated, the scatter leaves broadband residual in both channels.",
     remedy: "Improve the motion capture: more cameras in view, larger marker spacing, or smooth the reference before use.",
     parameters: &[

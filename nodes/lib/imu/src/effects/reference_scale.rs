@@ -1,7 +1,7 @@
 //! `reference_scale`: positions of the reference that are a little too large or too small.
 
 use super::search::{FirstGuess, FittedSearch, Identifiability, Ordinary, Search};
-use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use super::{Effect, EffectKind, EffectSet};
 use crate::Channel;
 
@@ -14,6 +14,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::ReferenceScale,
     name: "reference_scale",
     stage: Stage::Reference,
+    owner: Owner::Session,
     summary: "Positions of the reference are too large or too small: the residual's specific force is proportional to the acceleration, gravity left out.",
     remedy: "Calibrate the motion capture's scale, or divide the reference's positions by this factor.",
     parameters: &[ParameterSpec {

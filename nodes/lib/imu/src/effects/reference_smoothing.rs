@@ -3,13 +3,14 @@
 
 use super::EffectKind;
 use super::search::{ReadOff, ReadOffSearch, Search};
-use super::spec::{EffectSpec, ParameterSpec, Shape, Stage};
+use super::spec::{EffectSpec, Owner, ParameterSpec, Shape, Stage};
 use crate::Channel;
 
 pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::ReferenceSmoothing,
     name: "reference_smoothing",
     stage: Stage::Reference,
+    owner: Owner::Session,
     summary: "The reference was smoothed: fast motion that the IMU feels is missing from it, in step with the motion and above the cutoff.",
     remedy: "Export the motion capture unfiltered, or with a higher cutoff frequency.",
     parameters: &[ParameterSpec {

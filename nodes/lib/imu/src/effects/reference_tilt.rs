@@ -7,13 +7,14 @@ use nalgebra::Vector3;
 
 use super::EffectKind;
 use super::search::{FirstGuess, FittedSearch, Identifiability, Ordinary, Search, always};
-use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use crate::{Channel, GRAVITY_IN_WORLD};
 
 pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::ReferenceTilt,
     name: "reference_tilt",
     stage: Stage::Reference,
+    owner: Owner::Session,
     summary: "The reference's vertical is not gravity's: the residual's specific force is constant in the world and turns with the segment.",
     remedy: "Level the motion capture's world, or turn the reference by the inverse of this rotation.",
     parameters: &[ParameterSpec {

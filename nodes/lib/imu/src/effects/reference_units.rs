@@ -1,7 +1,7 @@
 //! `reference_units`: positions of the reference that are not in metres.
 
 use super::search::{ReadOff, ReadOffSearch, Search};
-use super::spec::{EffectSpec, ParameterSpec, Shape, Stage};
+use super::spec::{EffectSpec, Owner, ParameterSpec, Shape, Stage};
 use super::{EffectKind, EffectSet};
 use crate::Channel;
 
@@ -9,6 +9,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::ReferenceUnits,
     name: "reference_units",
     stage: Stage::Reference,
+    owner: Owner::Session,
     summary: "Positions of the reference are not in metres: the simulated acceleration is the measured one times a known factor, while gravity and angular velocity agree.",
     remedy: "Convert the reference's positions to metres.",
     parameters: &[ParameterSpec {

@@ -2,13 +2,14 @@
 
 use super::EffectKind;
 use super::search::{ReadOff, ReadOffSearch, Search};
-use super::spec::{EffectSpec, ParameterSpec, Shape, Stage};
+use super::spec::{EffectSpec, Owner, ParameterSpec, Shape, Stage};
 use crate::Channel;
 
 pub(super) static ACCEL: EffectSpec = EffectSpec {
     kind: EffectKind::AccelSaturation,
     name: "accel_saturation",
     stage: Stage::Digital,
+    owner: Owner::Device,
     summary: "The accelerometer clips: the residual appears where the simulated force exceeds the limit, and the readings stand still at it.",
     remedy: "Choose a larger range (g setting) of the accelerometer.",
     parameters: &[ParameterSpec {
@@ -31,6 +32,7 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
     kind: EffectKind::GyroSaturation,
     name: "gyro_saturation",
     stage: Stage::Digital,
+    owner: Owner::Device,
     summary: "The gyroscope clips: the residual appears where the simulated rate exceeds the limit, and the readings stand still at it.",
     remedy: "Choose a larger range (deg/s setting) of the gyroscope.",
     parameters: &[ParameterSpec {

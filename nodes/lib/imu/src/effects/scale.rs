@@ -1,7 +1,7 @@
 //! `accel_scale`, `gyro_scale`: gain of each axis.
 
 use super::search::{Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, Search};
-use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use super::{Effect, EffectKind, EffectSet};
 use crate::Channel;
 
@@ -12,6 +12,7 @@ pub(super) static ACCEL: EffectSpec = EffectSpec {
     kind: EffectKind::AccelScale,
     name: "accel_scale",
     stage: Stage::Linear,
+    owner: Owner::Device,
     summary: "The accelerometer's axes have gains: each axis' residual is proportional to what it reads.",
     remedy: "Calibrate the accelerometer's gains at rest in six positions.",
     parameters: &[ParameterSpec {
@@ -47,6 +48,7 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
     kind: EffectKind::GyroScale,
     name: "gyro_scale",
     stage: Stage::Linear,
+    owner: Owner::Device,
     summary: "The gyroscope's axes have gains: each axis' residual is proportional to what it reads.",
     remedy: "Calibrate the gyroscope's gains on a turntable or by turns of a known angle.",
     parameters: &[ParameterSpec {

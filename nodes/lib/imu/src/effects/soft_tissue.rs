@@ -2,7 +2,7 @@
 
 use super::residual_view::ResidualView;
 use super::search::{FirstGuess, FittedSearch, Search};
-use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use super::{Effect, EffectKind, EffectSet};
 use crate::Channel;
 
@@ -10,6 +10,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::SoftTissue,
     name: "soft_tissue",
     stage: Stage::Tissue,
+    owner: Owner::Device,
     summary: "The sensor rides on soft tissue: the specific force rings at the natural frequency after impacts and is damped above it.",
     remedy: "Move the sensor to where bone lies under the skin, tighten the strap, or make the sensor lighter.",
     parameters: &[

@@ -25,6 +25,15 @@ pub enum Stage {
     Digital,
 }
 
+/// Whose an effect is, where a device is recorded several times.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Owner {
+    /// The device's and its mount's: the same in all of its recordings.
+    Device,
+    /// A session's: its clock, its biases, its reference, what happens in it.
+    Session,
+}
+
 /// Form of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shape {
@@ -88,6 +97,8 @@ pub struct EffectSpec {
     pub name: &'static str,
     /// Where it acts.
     pub stage: Stage,
+    /// Whether it stays the same from one recording of a device to the next.
+    pub owner: Owner,
     /// What it is and what it leaves in a residual.
     pub summary: &'static str,
     /// What an engineer would do about it.

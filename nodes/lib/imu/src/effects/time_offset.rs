@@ -3,7 +3,7 @@
 use super::search::{
     Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, Search, always,
 };
-use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use super::{Effect, EffectKind, EffectSet};
 use crate::{Channel, EffectError};
 
@@ -11,6 +11,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::TimeOffset,
     name: "time_offset",
     stage: Stage::Timing,
+    owner: Owner::Session,
     summary: "The IMU's stamps are late (positive) or early: the residual of both channels is proportional to their time derivative.",
     remedy: "Synchronise the clocks (hardware trigger, PTP), or shift the IMU's stamps by this offset.",
     parameters: &[ParameterSpec {

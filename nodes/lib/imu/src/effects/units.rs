@@ -1,7 +1,7 @@
 //! `accel_units`, `gyro_units`: units of a driver.
 
 use super::search::{ReadOff, ReadOffSearch, Search};
-use super::spec::{EffectSpec, ParameterSpec, Shape, Stage};
+use super::spec::{EffectSpec, Owner, ParameterSpec, Shape, Stage};
 use super::{EffectKind, EffectSet};
 use crate::{Channel, PerChannel, STANDARD_GRAVITY};
 
@@ -15,6 +15,7 @@ pub(super) static ACCEL: EffectSpec = EffectSpec {
     kind: EffectKind::AccelUnits,
     name: "accel_units",
     stage: Stage::Digital,
+    owner: Owner::Device,
     summary: "The accelerometer is reported in other units: every reading is the simulated one times a known factor.",
     remedy: "Convert the driver's output to m/s2.",
     parameters: &[ParameterSpec {
@@ -37,6 +38,7 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
     kind: EffectKind::GyroUnits,
     name: "gyro_units",
     stage: Stage::Digital,
+    owner: Owner::Device,
     summary: "The gyroscope is reported in other units: every reading is the simulated one times a known factor.",
     remedy: "Convert the driver's output to rad/s.",
     parameters: &[ParameterSpec {

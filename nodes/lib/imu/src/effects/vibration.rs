@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use super::residual_view::ResidualView;
 use super::search::{FirstGuess, FittedSearch, Search, always};
-use super::spec::{EffectSpec, ParameterFit, ParameterSpec, Shape, Stage};
+use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use super::spectral_line::strongest_line;
 use super::wave::SpectralLine;
 use super::{Effect, EffectKind};
@@ -15,6 +15,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::Vibration,
     name: "vibration",
     stage: Stage::Timing,
+    owner: Owner::Session,
     summary: "Something vibrates at the sensor (a motor, a fan): the residual of one channel or both has a sharp line of one frequency.",
     remedy: "Find and damp the source, or mount the sensor on rubber.",
     parameters: &[

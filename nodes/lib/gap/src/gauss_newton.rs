@@ -1,0 +1,160 @@
+//! Gauss-Newton fits of sets of effects, of one recording or of several whose device is the same.
+
+use std::collections::BTreeMap;
+
+use cromosim_imu::{EffectKind, EffectSet, Owner};
+use nalgebra::DVector;
+
+use crate::fit::{Evaluated, Fit, FitModel, free_values, layout_of, stepped};
+use crate::gram::Gram;
+use crate::policy::search::{CONVERGED_NATS, FIT_STEPS};
+
+/// Part of a step below which a fit gives up halving it.
+const LEAST_PART: f64 = 1e-3;
+/// Factor on a step that did not help.
+const SHORTER: f64 = 0.3;
+
+impl FitModel<'_> {
+    /// Steps with halving from the values in `set`.
+    pub fn fit(&self, set: EffectSet) -> Fit {
+        self.fit_steps(set, FIT_STEPS)
+    }
+
+    /// As [`FitModel::fit`], with another limit on the steps: with 0 the values stay.
+    pub fn fit_steps(&self, set: EffectSet, steps: usize) -> Fit {
+        fit_together(&[self], vec![set], steps, |_| true).swap_remove(0)
+    }
+}
+
+/// Fits one set for each model. Values of effects that belong to the device are the same in all of
+/// them (and have to be so in `sets`), those of a session are each model's own; values of kinds that
+/// are not free stay.
+pub(crate) fn fit_together(
+    models: &[&FitModel],
+    sets: Vec<EffectSet>,
+    steps: usize,
+    is_free: impl Fn(EffectKind) -> bool,
+) -> Vec<Fit> {
+    let coefficients = Coefficients::new(&sets, is_free);
+    let evaluated = |sets: Vec<EffectSet>| -> Vec<Evaluated> {
+        let pairs = models.iter().zip(sets);
+        pairs.map(|(model, set)| model.evaluated(set)).collect()
+    };
+    let mut now = evaluated(sets);
+    let mut steps_left = steps;
+    loop {
+        let columns: Vec<Vec<Vec<f64>>> = models
+            .iter()
+            .zip(&now)
+            .zip(&coefficients.layouts)
+            .map(|((model, now), layout)| columns_of(model, now, layout))
+            .collect();
+        let solution = coefficients.gram(models, &now, &columns).solution();
+        let cost = total_cost(&now);
+        let is_last = steps_left == 0
+            || coefficients.prior.is_empty()
+            || cost + solution.trained < CONVERGED_NATS;
+        let mut part = if is_last { 0.0 } else { 1.0 };
+        let mut better = None;
+        while part > LEAST_PART && better.is_none() {
+            let next = evaluated(coefficients.stepped(&now, &solution.step, part));
+            better = (total_cost(&next) < cost).then_some(next);
+            part *= SHORTER;
+        }
+        if let Some(better) = better {
+            now = better;
+            steps_left -= 1;
+            continue;
+        }
+        let parts = solution.parts.into_iter().zip(coefficients.layouts);
+        return now
+            .into_iter()
+            .zip(columns)
+            .zip(parts)
+            .map(|((now, columns), (linear, layout))| Fit {
+                set: now.set,
+                layout,
+                prediction: now.prediction,
+                residual: now.residual,
+                columns,
+                linear,
+            })
+            .collect();
+    }
+}
+
+fn total_cost(all: &[Evaluated]) -> f64 {
+    all.iter().map(|one| one.cost).sum()
+}
+
+/// Columns of the values of a layout, which lists all values of an effect one after the other.
+fn columns_of(model: &FitModel, now: &Evaluated, layout: &[(EffectKind, usize)]) -> Vec<Vec<f64>> {
+    layout
+        .chunk_by(|a, b| a.0 == b.0)
+        .flat_map(|values| model.columns(&now.set, &now.prediction, values[0].0))
+        .collect()
+}
+
+/// The values that a fit moves, by model and all together.
+struct Coefficients {
+    /// Of each model: effect and index among its values.
+    layouts: Vec<Vec<(EffectKind, usize)>>,
+    /// Of each model: which coefficient each value of the layout is.
+    of_layouts: Vec<Vec<usize>>,
+    /// 1 / variance of the weak prior of each coefficient.
+    prior: Vec<f64>,
+}
+
+impl Coefficients {
+    fn new(sets: &[EffectSet], is_free: impl Fn(EffectKind) -> bool) -> Self {
+        let mut known = BTreeMap::new();
+        let (mut layouts, mut of_layouts, mut prior) = (Vec::new(), Vec::new(), Vec::new());
+        for (model, set) in sets.iter().enumerate() {
+            let (mut layout, mut own) = (Vec::new(), Vec::new());
+            for kind in set.iter().map(|effect| effect.kind()) {
+                let owner = match kind.spec().owner {
+                    Owner::Device => None,
+                    Owner::Session => Some(model),
+                };
+                let values = free_values(kind);
+                for (place, value) in layout_of(kind).zip(&values).filter(|_| is_free(kind)) {
+                    let coefficient = *known.entry((owner, place)).or_insert_with(|| {
+                        prior.push(value.prior_weight());
+                        prior.len() - 1
+                    });
+                    layout.push(place);
+                    own.push(coefficient);
+                }
+            }
+            layouts.push(layout);
+            of_layouts.push(own);
+        }
+        Self {
+            layouts,
+            of_layouts,
+            prior,
+        }
+    }
+
+    fn gram(&self, models: &[&FitModel], now: &[Evaluated], columns: &[Vec<Vec<f64>>]) -> Gram {
+        let one = |index: usize| {
+            let slices: Vec<&[f64]> = columns[index].iter().map(Vec::as_slice).collect();
+            let own = &self.of_layouts[index];
+            let prior = own.iter().map(|&k| self.prior[k]).collect();
+            let gram = models[index].gram(&slices, &now[index].residual, prior);
+            (gram, own.clone())
+        };
+        Gram::together((0..models.len()).map(one).collect(), self.prior.clone())
+    }
+
+    /// The sets with a part of a step.
+    fn stepped(&self, now: &[Evaluated], step: &DVector<f64>, part: f64) -> Vec<EffectSet> {
+        now.iter()
+            .zip(self.layouts.iter().zip(&self.of_layouts))
+            .map(|(now, (layout, own))| {
+                let step = step.select_rows(own);
+                stepped(&now.set, layout, &step, part)
+            })
+            .collect()
+    }
+}
