@@ -32,6 +32,7 @@ fn diagnosis() -> Diagnosis {
         after,
     };
     let placement = |verdict: &str| PlacementDiagnosis {
+        recordings: Vec::new(),
         verdict: verdict.to_owned(),
         gap: Gap {
             before: Metrics {
@@ -61,6 +62,7 @@ fn diagnosis() -> Diagnosis {
         },
     };
     let quiet = PlacementDiagnosis {
+        recordings: Vec::new(),
         causes: Vec::new(),
         ..placement("No gap beyond the declared noise.")
     };

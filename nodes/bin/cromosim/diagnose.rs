@@ -4,21 +4,19 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
-use cromosim_bag::BagReader;
 use cromosim_body::BodyModel;
 use cromosim_gap::{
     Cause, DiagnoseOptions, Diagnosis, Evidence, PlacementAnswer, PlacementDiagnosis, SCHEMA,
 };
 use cromosim_imu::{EffectKind, EffectsFile};
-use cromosim_recording::{RecordedPlacement, read_placements};
 use rayon::prelude::*;
 use serde::Deserialize;
 use serde_json::Value;
 
+use crate::diagnose_recordings::{OneRecording, Selected, file_names, select};
 use crate::progress::{self, Interrupt};
 
 /// The files in DIR.
@@ -37,13 +35,18 @@ The recording (MCAP, ROS 2) holds /reference/NAME (geometry_msgs/msg/PoseStamped
 /imu/NAME/data_raw (sensor_msgs/msg/Imu). DIR gets diagnosis.json, effects.yaml (for `cromosim simulate --reference RECORDING --effects`),
 report.html and diagnosis.rrd (for Rerun). The exit code is 0 when a diagnosis was made, whatever it says.
 
+Of several recordings, what is the device's or its mount's is fitted to all of them, while clock, biases and reference are each recording's own;
+DIR says of each how far its gap falls, also when it is left out of the fit. effects.yaml holds each session, and `simulate` takes that which a
+recording belongs to by its time.
+
 A config FILE, every line of it optional:
   placements: [wrist, ankle]     # only these
   without: [lever_arm]           # effects taken out of the library; --without replaces the list
   seed: 7                        # --seed wins")]
 pub struct Arguments {
-    /// The recording (.mcap, rosbag2 directory)
-    recording: PathBuf,
+    /// The recording (.mcap, rosbag2 directory); several of the same devices are diagnosed together
+    #[arg(required = true, value_name = "RECORDING")]
+    recordings: Vec<PathBuf>,
     /// The folder for the four files; is made where it is missing, and files of an earlier
     /// diagnosis in it are replaced
     #[arg(long, value_name = "DIR")]
@@ -72,33 +75,39 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .unwrap_or_default();
     let options = options(arguments, &config)?;
     check_folder(&arguments.out)?;
-    let reader = BagReader::open(&arguments.recording)?;
     let body = arguments.body.as_deref().map(BodyModel::read).transpose()?;
-    let (recorded, mut notes, mut failures) = select(&reader, body.as_ref(), &config.placements)?;
+    let Selected {
+        placements,
+        mut notes,
+        mut failures,
+    } = select(&arguments.recordings, body.as_ref(), &config.placements)?;
 
-    let results = diagnose_all(&recorded, &options);
+    let results = diagnose_all(&placements, &options);
     let mut answers = BTreeMap::new();
-    for (placement, result) in recorded.iter().zip(results) {
+    for ((name, recorded), result) in placements.iter().zip(results) {
         match result {
-            Ok(answer) => {
-                notes.extend(
-                    placement
-                        .notes
-                        .iter()
-                        .map(|note| format!("placement {}: {note}", placement.name)),
-                );
-                answers.insert(placement.name.clone(), answer);
+            Ok((answer, errors)) => {
+                failures.extend(errors);
+                let of_placement = |note: &String| format!("placement {name}: {note}");
+                let own = recorded.iter().flat_map(|one| &one.placement.notes);
+                notes.extend(own.map(of_placement));
+                answers.insert(name.clone(), answer);
             }
             Err(error) => failures.push(error),
         }
     }
     if answers.is_empty() {
-        bail!("{}: {}", arguments.recording.display(), failures.join("; "));
+        let files: Vec<String> = arguments
+            .recordings
+            .iter()
+            .map(|file| file.display().to_string())
+            .collect();
+        bail!("{}: {}", files.join(", "), failures.join("; "));
     }
     notes.iter().for_each(|note| eprintln!("warning: {note}"));
     failures
         .iter()
-        .for_each(|failure| eprintln!("error: {failure}; the other placements are diagnosed"));
+        .for_each(|failure| eprintln!("error: {failure}; the others are diagnosed"));
     let (diagnosis, effects, evidence) = split(answers);
     write(arguments, &diagnosis, &effects, &evidence)?;
     print(&diagnosis);
@@ -122,62 +131,52 @@ fn options(arguments: &Arguments, config: &Config) -> anyhow::Result<DiagnoseOpt
     })
 }
 
-/// Each placement on whatever core is free.
+/// Each placement on whatever core is free; with its answer what is wrong with some of its
+/// recordings.
 fn diagnose_all(
-    recorded: &[RecordedPlacement],
+    placements: &BTreeMap<String, Vec<OneRecording>>,
     options: &DiagnoseOptions,
-) -> Vec<Result<PlacementAnswer, String>> {
+) -> Vec<Result<(PlacementAnswer, Vec<String>), String>> {
     // Until the files are written a signal may end the process as it likes: there is nothing to
     // clear away.
-    let bar = progress::bar(recorded.len() as u64, "diagnosing, placements");
-    let diagnose = |placement: &RecordedPlacement| {
-        let answer =
-            cromosim_gap::diagnose(&placement.record(), options).map_err(|error| error.to_string());
+    let bar = progress::bar(placements.len() as u64, "diagnosing, placements");
+    let diagnose = |recorded: &Vec<OneRecording>| {
+        let answer = diagnose_placement(recorded, options);
         bar.inc(1);
         answer
     };
-    let results = recorded.par_iter().map(diagnose).collect();
+    let in_order: Vec<&Vec<OneRecording>> = placements.values().collect();
+    let results = in_order.into_par_iter().map(diagnose).collect();
     bar.finish_and_clear();
     results
 }
 
-/// The placements to diagnose, what a user should know of the others, and which cannot be read.
-fn select(
-    reader: &BagReader,
-    body: Option<&Arc<BodyModel>>,
-    only: &[String],
-) -> anyhow::Result<(Vec<RecordedPlacement>, Vec<String>, Vec<String>)> {
-    let file = reader.path().display();
-    let mut found = read_placements(reader, body)?;
-    let names: Vec<&str> = found.iter().map(|(name, _)| name.as_str()).collect();
-    if let Some(name) = only.iter().find(|name| !names.contains(&name.as_str())) {
-        bail!(
-            "{file}: placement `{name}` of the config: the recording has no such placement; it has {}",
-            names.join(", ")
-        );
+fn diagnose_placement(
+    recorded: &[OneRecording],
+    options: &DiagnoseOptions,
+) -> Result<(PlacementAnswer, Vec<String>), String> {
+    if let [alone] = recorded {
+        return match cromosim_gap::diagnose(&alone.placement.record(), options) {
+            Ok(answer) => Ok((answer, Vec::new())),
+            Err(error) => Err(error.to_string()),
+        };
     }
-    found.retain(|(name, _)| only.is_empty() || only.contains(name));
-    let (mut recorded, mut notes, mut failures) = (Vec::new(), Vec::new(), Vec::new());
-    for (name, placement) in found {
-        match placement {
-            Ok(placement) if placement.measured.is_empty() => {
-                notes.push(format!("placement {name}: no messages on /imu/{name}/data_raw (sensor_msgs/msg/Imu); skipped"));
-            }
-            Ok(placement) => recorded.push(placement),
-            Err(error) => failures.push(format!("placement {name}: {error}")),
-        }
+    let records: Vec<_> = recorded.iter().map(|one| one.placement.record()).collect();
+    let named: Vec<_> = recorded
+        .iter()
+        .map(|one| one.file.as_str())
+        .zip(&records)
+        .collect();
+    match cromosim_gap::diagnose_together(&named, options) {
+        Ok((answer, errors)) => Ok((
+            answer,
+            errors
+                .iter()
+                .map(|(file, error)| format!("{file}: {error}"))
+                .collect(),
+        )),
+        Err((file, error)) => Err(format!("{file}: {error}")),
     }
-    if recorded.is_empty() && failures.is_empty() {
-        bail!(
-            "{file}: no placement has both a reference and messages on /imu/NAME/data_raw (sensor_msgs/msg/Imu): {}",
-            if notes.is_empty() {
-                "there is none".to_owned()
-            } else {
-                notes.join("; ")
-            }
-        );
-    }
-    Ok((recorded, notes, failures))
 }
 
 fn split(
@@ -325,11 +324,7 @@ fn write(
 ) -> anyhow::Result<()> {
     let interrupt = Interrupt::watch()?;
     let folder = &arguments.out;
-    let recording = arguments
-        .recording
-        .file_name()
-        .unwrap_or_default()
-        .to_string_lossy();
+    let recording = file_names(&arguments.recordings).join(", ");
     let texts = [
         serde_json::to_string_pretty(diagnosis)? + "\n",
         effects.to_yaml(),
@@ -384,6 +379,19 @@ fn print(diagnosis: &Diagnosis) {
             println!(
                 "  {effect:<20} probability {probability:.2}, {share:5.1} % of the gap; {}",
                 parameters(cause)
+            );
+        }
+        for one in &placement.recordings {
+            let (gap, left_out) = (&one.gap, &one.left_out);
+            println!(
+                "  {}: {:.3} -> {:.3} m/s2 and {:.4} -> {:.4} rad/s; with the device as the other recordings show it {:.3} m/s2 and {:.4} rad/s",
+                one.recording,
+                gap.before.accel_rmse,
+                gap.after.accel_rmse,
+                gap.before.gyro_rmse,
+                gap.after.gyro_rmse,
+                left_out.accel_rmse,
+                left_out.gyro_rmse
             );
         }
     }

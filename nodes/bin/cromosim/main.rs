@@ -13,6 +13,7 @@ mod compare;
 mod convert;
 mod demo;
 mod diagnose;
+mod diagnose_recordings;
 #[cfg(feature = "view")]
 mod diagnose_view;
 mod evaluate;

@@ -79,6 +79,7 @@ pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()>
             declared_noise: device.declared_noise(),
             effects: device.effects().clone(),
             unexplained: PerChannel::default(),
+            other_sessions: Vec::new(),
         };
         effects.placements.insert(name.to_owned(), of_device);
     }

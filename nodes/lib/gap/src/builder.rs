@@ -1,115 +1,299 @@
 //! Findings put into the numbers and words of diagnosis.json.
 
-use cromosim_imu::{Effect, EffectSet, PerChannel, Reading};
+use std::collections::BTreeMap;
 
-use crate::diagnosis::{Cause, Gap, Metrics, PlacementDiagnosis, Unexplained};
+use cromosim_imu::{Effect, EffectKind, EffectSet, PerChannel, Reading};
+
+use crate::diagnosis::{
+    Cause, Gap, GapLocation, Metrics, PlacementDiagnosis, RecordingCause, RecordingDiagnosis,
+    Unexplained, Unidentifiable,
+};
 use crate::evidence::{Evidence, collect};
-use crate::findings::Findings;
+use crate::findings::{Findings, Unknown};
 use crate::identify::unidentifiable;
 use crate::location::locate;
 use crate::probability::probability_of;
+use crate::session::Session;
 use crate::shares::{Shares, shares};
 use crate::simulations::Simulations;
+use crate::together::reported_by_the_others;
 use crate::unexplained::unexplained_variances;
 use crate::words::{described, described_errors, unknown_cause, verdict};
 
-/// Everything a diagnosis is made of.
+/// Everything the diagnosis of a placement is made of.
 pub(crate) struct DiagnosisBuilder<'a> {
-    findings: &'a Findings<'a>,
-    simulations: Simulations<'a>,
+    findings: &'a [Findings<'a>],
+    /// By recording.
+    parts: Vec<Part<'a>>,
+    /// Of the recording with the most to explain.
+    heaviest: usize,
 }
 
-impl<'a> DiagnosisBuilder<'a> {
-    /// `raw` are the readings in the device's units, `covered` the axes of each to be compared;
-    /// `seed` is that of the simulated noise.
-    pub fn new(
-        findings: &'a Findings<'a>,
-        raw: &'a [Reading],
-        covered: &'a [[bool; 6]],
-        seed: u64,
-    ) -> Self {
-        Self {
-            findings,
-            simulations: Simulations::new(findings, raw, covered, seed),
-        }
-    }
+/// One recording.
+struct Part<'a> {
+    findings: &'a Findings<'a>,
+    simulations: Simulations<'a>,
+    /// Shares of the reported effects, in their order.
+    shares: Shares,
+    before_readings: Vec<Reading>,
+    after_readings: Vec<Reading>,
+    before: Metrics,
+    /// On time that was not fitted to.
+    after: Metrics,
+    /// Where the gap of the nominal simulation lies.
+    location: GapLocation,
+}
 
-    /// Diagnosis, curves, and the variance that stays unexplained.
-    pub fn build(&self) -> (PlacementDiagnosis, Evidence, PerChannel<f64>) {
-        let simulations = &self.simulations;
-        let reportable = &self.findings.reportable;
+impl<'a> Part<'a> {
+    fn new(findings: &'a Findings<'a>, session: &'a Session, seed: u64) -> Self {
+        let simulations = Simulations::new(findings, &session.raw, &session.covered, seed);
+        let reportable = &findings.reportable;
         let named: Vec<Effect> = reportable.iter().cloned().collect();
-        let shares = shares(self.findings, simulations, &named);
+        let shares = shares(findings, &simulations, &named);
         let nominal = EffectSet::new();
         let before_readings = simulations.simulate(&nominal);
         let before = simulations.metrics(&nominal, &before_readings);
-        let mut causes = self.causes(&named, &shares);
         let after_readings = simulations.simulate(reportable);
         let after = simulations.cross_validated_metrics(&after_readings);
+        let whitener = simulations.whitener(&nominal);
+        let white = simulations.whitened(&whitener, &before_readings);
+        Self {
+            location: locate(&white, &simulations.whole, &whitener),
+            findings,
+            simulations,
+            shares,
+            before_readings,
+            after_readings,
+            before,
+            after,
+        }
+    }
+
+    /// Number of messages that are compared.
+    fn samples(&self) -> f64 {
+        let covered = self.simulations.comparison.covered.iter();
+        covered.filter(|axes| axes.contains(&true)).count() as f64
+    }
+
+    /// Share of the recording's gap that an effect explains; 0 where it has none.
+    fn share(&self, kind: EffectKind) -> f64 {
+        let place = self.findings.reportable.iter();
+        let place = place
+            .zip(&self.shares.causes)
+            .find(|(effect, _)| effect.kind() == kind);
+        place.map_or(0.0, |(_, share)| *share)
+    }
+
+    /// Of the reported effects, those of some kinds.
+    fn only(&self, kinds: &[EffectKind]) -> EffectSet {
+        let reported = self.findings.reportable.iter();
+        reported
+            .filter(|effect| kinds.contains(&effect.kind()))
+            .fold(EffectSet::new(), |set, effect| set.with(effect.clone()))
+    }
+
+    fn under(&self, set: &EffectSet) -> Metrics {
+        self.simulations
+            .metrics(set, &self.simulations.simulate(set))
+    }
+
+    /// Values and standard errors of an effect, by the names of its parameters.
+    fn values(&self, effect: &Effect) -> [BTreeMap<String, serde_json::Value>; 2] {
+        let errors = self.findings.scored.fit.standard_errors(effect);
+        let rate_hz = self.simulations.whole.rate_hz;
+        let kind = effect.kind();
+        [
+            described(kind, effect.values()),
+            described_errors(kind, &errors, rate_hz),
+        ]
+    }
+}
+
+impl<'a> DiagnosisBuilder<'a> {
+    /// `seed` is that of the simulated noise.
+    pub fn new(findings: &'a [Findings<'a>], sessions: &'a [Session], seed: u64) -> Self {
+        let pairs = findings.iter().zip(sessions);
+        let parts: Vec<Part> = pairs
+            .map(|(findings, session)| Part::new(findings, session, seed))
+            .collect();
+        let heavier = |best: usize, other: usize| {
+            if parts[other].shares.total > parts[best].shares.total {
+                other
+            } else {
+                best
+            }
+        };
+        Self {
+            heaviest: (0..parts.len()).fold(0, heavier),
+            findings,
+            parts,
+        }
+    }
+
+    /// The diagnosis; `recordings` are the names of the recordings.
+    pub fn diagnosis(&self, recordings: &[&str]) -> PlacementDiagnosis {
+        let before = self.pooled(|part| part.before);
+        let after = self.pooled(|part| part.after);
+        let unexplained = self.weighted(|part| part.shares.unexplained);
+        let mut causes = self.causes();
         if let Some(last) = causes.last_mut() {
             last.after = after;
         }
         // What is predictable of the rest belongs to `unknown`; what is not even that stays
         // unexplained.
-        let unknown = self.findings.unknown.as_ref();
+        let unknown = self.unknown();
         let predictable = unknown.map_or(0.0, |unknown| unknown.predictable);
         if let Some(unknown) = unknown {
-            let share = shares.unexplained * predictable;
+            let share = unexplained * predictable;
             causes.push(unknown_cause(unknown, share, after));
             causes.sort_by(|a, b| b.gap_share.total_cmp(&a.gap_share));
         }
-        let whitener = simulations.whitener(&nominal);
-        let diagnosis = PlacementDiagnosis {
+        PlacementDiagnosis {
             verdict: verdict(&causes, &before, &after),
             gap: Gap { before, after },
-            location: locate(
-                &simulations.whitened(&whitener, &before_readings),
-                &simulations.whole,
-                &whitener,
-            ),
-            unidentifiable: unidentifiable(self.findings),
+            location: self.parts[self.heaviest].location.clone(),
+            unidentifiable: self.unidentifiable(),
             unexplained: Unexplained {
                 significant: unknown.is_some(),
-                share: shares.unexplained * (1.0 - predictable),
+                share: unexplained * (1.0 - predictable),
                 location: unknown
                     .map(|unknown| unknown.location.clone())
                     .unwrap_or_default(),
             },
             causes,
-        };
-        let comparison = &simulations.comparison;
-        let evidence = collect(self.findings, comparison, &before_readings, &after_readings);
-        let unexplained = unexplained_variances(self.findings, simulations, &after);
-        (diagnosis, evidence, unexplained)
+            recordings: if self.parts.len() > 1 {
+                (0..self.parts.len())
+                    .map(|index| self.recording(index, recordings[index]))
+                    .collect()
+            } else {
+                Vec::new()
+            },
+        }
+    }
+
+    /// The curves of the recording with the most to explain.
+    pub fn evidence(&self) -> Evidence {
+        let part = &self.parts[self.heaviest];
+        collect(
+            part.findings,
+            &part.simulations.comparison,
+            &part.before_readings,
+            &part.after_readings,
+        )
+    }
+
+    /// The variance that stays unexplained in each recording.
+    pub fn unexplained(&self) -> Vec<PerChannel<f64>> {
+        let of = |part: &Part| unexplained_variances(part.findings, &part.simulations, &part.after);
+        self.parts.iter().map(of).collect()
+    }
+
+    fn pooled(&self, of: impl Fn(&Part) -> Metrics) -> Metrics {
+        let parts: Vec<(f64, Metrics)> = self
+            .parts
+            .iter()
+            .map(|part| (part.samples(), of(part)))
+            .collect();
+        Metrics::pooled(&parts)
+    }
+
+    /// The mean of shares, each recording with what it has to explain.
+    fn weighted(&self, of: impl Fn(&Part) -> f64) -> f64 {
+        if let [alone] = self.parts.as_slice() {
+            return of(alone);
+        }
+        // Where nothing is to be explained, all count alike.
+        let weight = |part: &Part| part.shares.total.max(1e-9);
+        let total: f64 = self.parts.iter().map(weight).sum();
+        self.parts
+            .iter()
+            .map(|part| weight(part) * of(part))
+            .sum::<f64>()
+            / total
     }
 
     /// The named causes, the largest share first, each with what it and those above it leave.
-    fn causes(&self, named: &[Effect], shares: &Shares) -> Vec<Cause> {
-        let mut order: Vec<usize> = (0..named.len()).collect();
-        order.sort_by(|&a, &b| shares.causes[b].total_cmp(&shares.causes[a]));
-        let mut set = EffectSet::new();
-        order
+    fn causes(&self) -> Vec<Cause> {
+        let mut kinds: Vec<(EffectKind, f64)> = EffectKind::ALL
             .into_iter()
-            .map(|index| {
-                set.insert(named[index].clone());
-                let after = self
-                    .simulations
-                    .metrics(&set, &self.simulations.simulate(&set));
-                self.cause(&named[index], shares.causes[index], after)
-            })
-            .collect()
+            .filter(|kind| self.surest(*kind).is_some())
+            .map(|kind| (kind, self.weighted(|part| part.share(kind))))
+            .collect();
+        kinds.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let mut above = Vec::new();
+        let mut causes = Vec::new();
+        for (kind, gap_share) in kinds {
+            above.push(kind);
+            let after = self.pooled(|part| part.under(&part.only(&above)));
+            causes.extend(self.surest(kind).map(|(part, effect)| {
+                let [parameters, standard_errors] = part.values(effect);
+                Cause {
+                    effect: kind.name().to_owned(),
+                    probability: probability_of(part.findings, effect),
+                    parameters,
+                    standard_errors,
+                    gap_share,
+                    after,
+                }
+            }));
+        }
+        causes
     }
 
-    fn cause(&self, effect: &Effect, gap_share: f64, after: Metrics) -> Cause {
-        let errors = self.findings.scored.fit.standard_errors(effect);
-        let rate_hz = self.simulations.whole.rate_hz;
-        Cause {
-            effect: effect.kind().name().to_owned(),
-            probability: probability_of(self.findings, effect),
-            parameters: described(effect.kind(), effect.values()),
-            standard_errors: described_errors(effect.kind(), &errors, rate_hz),
-            gap_share,
-            after,
+    /// An effect in the recording that is the surest of it, of several such the last.
+    fn surest(&self, kind: EffectKind) -> Option<(&Part<'a>, &Effect)> {
+        let probability = |(part, effect): &(&Part, &Effect)| probability_of(part.findings, effect);
+        self.parts
+            .iter()
+            .filter_map(|part| Some((part, part.findings.reportable.get(kind)?)))
+            .max_by(|a, b| probability(a).total_cmp(&probability(b)))
+    }
+
+    /// What is unknown, as the recording shows it that has the most of it to explain.
+    fn unknown(&self) -> Option<&Unknown> {
+        self.parts
+            .iter()
+            .filter_map(|part| Some((part.shares.total, part.findings.unknown.as_ref()?)))
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(_, unknown)| unknown)
+    }
+
+    /// What none of the recordings can tell.
+    fn unidentifiable(&self) -> Vec<Unidentifiable> {
+        let mut lists = self.parts.iter().map(|part| unidentifiable(part.findings));
+        let first = lists.next().unwrap_or_default();
+        lists.fold(first, |mut common, list| {
+            common.retain(|one| list.contains(one));
+            common
+        })
+    }
+
+    fn recording(&self, index: usize, name: &str) -> RecordingDiagnosis {
+        let part = &self.parts[index];
+        let mut causes: Vec<RecordingCause> = part
+            .findings
+            .reportable
+            .iter()
+            .map(|effect| {
+                let [parameters, standard_errors] = part.values(effect);
+                RecordingCause {
+                    effect: effect.kind().name().to_owned(),
+                    parameters,
+                    standard_errors,
+                    gap_share: part.share(effect.kind()),
+                }
+            })
+            .collect();
+        causes.sort_by(|a, b| b.gap_share.total_cmp(&a.gap_share));
+        RecordingDiagnosis {
+            recording: name.to_owned(),
+            gap: Gap {
+                before: part.before,
+                after: part.after,
+            },
+            left_out: part.under(&reported_by_the_others(self.findings, index)),
+            location: part.location.clone(),
+            causes,
         }
     }
 }

@@ -36,6 +36,40 @@ pub struct PlacementDiagnosis {
     pub unidentifiable: Vec<Unidentifiable>,
     /// What no cause explains.
     pub unexplained: Unexplained,
+    /// Of each recording, where several were diagnosed together; the fields above then speak of all
+    /// of them (the location of the gap, what is unknown, and values that are a session's own, of one).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub recordings: Vec<RecordingDiagnosis>,
+}
+
+/// What is said of one of several recordings.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RecordingDiagnosis {
+    /// Its file.
+    pub recording: String,
+    /// How far measured and simulated lie apart.
+    pub gap: Gap,
+    /// The gap with the device's effects as the other recordings alone show them; what is the
+    /// session's own is fitted to it.
+    pub left_out: Metrics,
+    /// Where the gap of the nominal simulation lies.
+    #[serde(rename = "where")]
+    pub location: GapLocation,
+    /// Its causes, the largest share first.
+    pub causes: Vec<RecordingCause>,
+}
+
+/// A cause in one of several recordings.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RecordingCause {
+    /// The effect's name.
+    pub effect: String,
+    /// By name, in SI.
+    pub parameters: BTreeMap<String, Value>,
+    /// In the form of the parameters.
+    pub standard_errors: BTreeMap<String, Value>,
+    /// Share of this recording's gap.
+    pub gap_share: f64,
 }
 
 /// Before and after all named causes.
@@ -64,6 +98,30 @@ pub struct Metrics {
     pub gyro_wasserstein: f64,
     /// Negative log-likelihood, nats per sample of six values.
     pub nll_per_sample: f64,
+}
+
+impl Metrics {
+    /// Of several recordings together, each with its number of samples: of root mean squares the
+    /// root of the mean square, else the mean.
+    pub(crate) fn pooled(parts: &[(f64, Self)]) -> Self {
+        if let [(_, alone)] = parts {
+            return *alone;
+        }
+        let samples: f64 = parts.iter().map(|(samples, _)| samples).sum();
+        let mean = |of: &dyn Fn(&Self) -> f64| {
+            let sum: f64 = parts.iter().map(|(count, part)| count * of(part)).sum();
+            sum / samples.max(1.0)
+        };
+        Self {
+            accel_rmse: mean(&|part| part.accel_rmse.powi(2)).sqrt(),
+            gyro_rmse: mean(&|part| part.gyro_rmse.powi(2)).sqrt(),
+            accel_log_spectral_distance_db: mean(&|part| part.accel_log_spectral_distance_db),
+            gyro_log_spectral_distance_db: mean(&|part| part.gyro_log_spectral_distance_db),
+            accel_wasserstein: mean(&|part| part.accel_wasserstein),
+            gyro_wasserstein: mean(&|part| part.gyro_wasserstein),
+            nll_per_sample: mean(&|part| part.nll_per_sample),
+        }
+    }
 }
 
 /// Shares of the whitened squared residual beyond the predicted noise; each list adds up to 1.

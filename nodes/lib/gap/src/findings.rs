@@ -41,6 +41,15 @@ pub(crate) struct Unknown {
 }
 
 impl Findings<'_> {
+    /// Brings the reported effects to the values of the fit.
+    pub fn take_fitted_values(&mut self) {
+        for effect in self.scored.fit.set.iter() {
+            if self.reportable.contains(effect.kind()) {
+                self.reportable.insert(effect.clone());
+            }
+        }
+    }
+
     /// Declared white noise per sample in SI units; where unknown, the found one counts as
     /// declared.
     pub fn declared_sigma(&self, channel: Channel) -> f64 {

@@ -1,6 +1,7 @@
 //! The gap between simulated and real IMUs: where it lies, which effect causes it, how far it
 //! shrinks once that effect is added. README.md says how a diagnosis works, file by file.
 
+mod analysis;
 mod axes;
 mod builder;
 mod coarse_alignment;
@@ -17,6 +18,7 @@ mod fit;
 mod gauss_newton;
 mod gram;
 mod identify;
+mod joint_search;
 mod lag;
 mod library;
 mod location;
@@ -37,19 +39,21 @@ mod residual_regressions;
 mod screen;
 mod search;
 mod sensor_noise;
+mod session;
 mod shares;
 mod simulations;
 mod smoothing;
+mod together;
 mod trace;
 mod unexplained;
 mod unknown;
 mod whiten;
 mod words;
 
-pub use diagnose::{DiagnoseOptions, PlacementAnswer, diagnose};
+pub use diagnose::{DiagnoseOptions, OfRecording, PlacementAnswer, diagnose, diagnose_together};
 pub use diagnosis::{
-    Cause, Diagnosis, Gap, GapLocation, Interval, Metrics, PlacementDiagnosis, SCHEMA, Unexplained,
-    Unidentifiable,
+    Cause, Diagnosis, Gap, GapLocation, Interval, Metrics, PlacementDiagnosis, RecordingCause,
+    RecordingDiagnosis, SCHEMA, Unexplained, Unidentifiable,
 };
 pub use error::GapError;
 pub use evidence::{CoursePoint, Evidence, Spectra};

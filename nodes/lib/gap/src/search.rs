@@ -23,9 +23,16 @@ pub(crate) struct ScoredEffectSet {
     pub margins: Vec<(EffectKind, f64)>,
 }
 
-/// What a set costs. Coarse rounding and a smoothing whose shape is only guessed leave errors that
-/// are no white noise, and are fitted by many effects: everything costs more.
+/// What a set costs.
 fn price_of(model: &FitModel, set: &EffectSet) -> f64 {
+    set.iter()
+        .map(|effect| price_of_effect(model, effect.kind()))
+        .sum()
+}
+
+/// What an effect costs. Coarse rounding and a smoothing whose shape is only guessed leave errors
+/// that are no white noise, and are fitted by many effects: everything costs more.
+pub(crate) fn price_of_effect(model: &FitModel, kind: EffectKind) -> f64 {
     let steps = larger(model.basis.steps);
     let factor = (1.0 + steps / price::DOUBLING_STEPS)
         * if model.basis.undone_hz.is_some() {
@@ -33,15 +40,13 @@ fn price_of(model: &FitModel, set: &EffectSet) -> f64 {
         } else {
             1.0
         };
-    set.iter()
-        .map(|effect| match effect.kind().spec().search {
-            Search::Choice => price::EFFECT_NATS + price::CHOICE_NATS,
-            Search::Fitted(_) | Search::ReadOff(_) => {
-                let values = free_values(effect.kind()).len() as f64;
-                factor * (price::EFFECT_NATS + price::VALUE_NATS * values)
-            }
-        })
-        .sum()
+    match kind.spec().search {
+        Search::Choice => price::EFFECT_NATS + price::CHOICE_NATS,
+        Search::Fitted(_) | Search::ReadOff(_) => {
+            let values = free_values(kind).len() as f64;
+            factor * (price::EFFECT_NATS + price::VALUE_NATS * values)
+        }
+    }
 }
 
 /// The fitted set and its worth; what no such effect looks like is worth nothing, wherever it comes

@@ -15,6 +15,8 @@ pub(crate) struct Shares {
     /// Of each cause, in the order in which they were given.
     pub causes: Vec<f64>,
     pub unexplained: f64,
+    /// What is to be explained, nats.
+    pub total: f64,
 }
 
 /// Each effect's gain averaged over the orders in which the effects may be added, against what is
@@ -40,11 +42,13 @@ pub(crate) fn shares(findings: &Findings, simulations: &Simulations, causes: &[E
         return Shares {
             causes: vec![1.0 / count.max(1) as f64; count],
             unexplained: if count == 0 { 1.0 } else { 0.0 },
+            total: 0.0,
         };
     }
     Shares {
         causes: gains.iter().map(|gain| gain / total).collect(),
         unexplained: rest / total,
+        total,
     }
 }
 

@@ -74,10 +74,10 @@ pub use device::{Device, EMBEDDED_DEVICES};
 pub use effects::{
     DeclaredNoise, Dependence, Dropouts, Effect, EffectKind, EffectSet, EffectSpec, EffectsFile,
     FirstGuess, FittedSearch, GravityMode, GridTrace, Identifiability, MeasurementInput, Ordinary,
-    Owner, ParameterFit, ParameterSpec, PlacementEffects, ReadOff, ReadOffSearch, ResidualView,
-    Rounding, Search, SensorModel, Shape, SpectralLine, Stage, StagedReadings, StreamingEffects,
-    Wave, clipping_limit, lattice_spacing, length_factors, nearest_signed_permutation,
-    strongest_line, unit_factors, white_noise_density,
+    OtherSession, Owner, ParameterFit, ParameterSpec, PlacementEffects, ReadOff, ReadOffSearch,
+    ResidualView, Rounding, Search, SensorModel, Shape, SpectralLine, Stage, StagedReadings,
+    StreamingEffects, Wave, clipping_limit, lattice_spacing, length_factors,
+    nearest_signed_permutation, strongest_line, unit_factors, white_noise_density,
 };
 pub use error::{EffectError, ImuError, PlacementProblem};
 pub use mount::{MountedSensor, MountedSensors, SensorPose};

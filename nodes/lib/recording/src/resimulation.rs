@@ -124,8 +124,10 @@ impl Resimulation {
             declared_noise: declared(placement, rate_hz),
             effects: EffectSet::new(),
             unexplained: PerChannel::default(),
+            other_sessions: Vec::new(),
         };
         let effects = self.effects.placements.get(name).unwrap_or(&nominal);
+        let effects = &effects.in_session_of(stamps[0]);
         let (track, known) = self
             .track(placement, rate_hz, &effects.effects)
             .map_err(|error| error.at(name.clone()))?;

@@ -104,6 +104,7 @@ fn placement(verdict: &str, causes: Vec<Cause>, unexplained: Unexplained) -> Pla
         would_tell: "motion with 2 m/s2 or more on all axes".into(),
     }];
     PlacementDiagnosis {
+        recordings: Vec::new(),
         verdict: verdict.into(),
         gap,
         location,

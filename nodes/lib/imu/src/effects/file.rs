@@ -26,6 +26,10 @@ const SCHEMA: &str = "cromosim/effects/1";
 ///       - {effect: lever_arm, offset: [0.05, 0.0, -0.06]}
 ///       - {effect: time_offset, seconds: 0.021}
 ///     unexplained: {accel_variance: 0.0021, gyro_variance: 1.2e-5}   # where something is
+///     other_sessions:   # where several recordings were diagnosed together
+///       - epoch: 1690000000.0
+///         effects:
+///           - {effect: lever_arm, offset: [0.05, 0.0, -0.06]}
 /// ```
 /// Parameters stand in SI units, see [`super::EffectSpec::parameters`]; a matrix is a list of three
 /// rows.
@@ -47,6 +51,43 @@ pub struct PlacementEffects {
     /// Variance, mean over the axes, that readings have beyond all that is known of: (m/s2)2 and
     /// (rad/s)2. It goes into the covariances of messages, and is never drawn.
     pub unexplained: PerChannel<f64>,
+    /// What acts in other sessions of the same device.
+    pub other_sessions: Vec<OtherSession>,
+}
+
+/// Another session of a device.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OtherSession {
+    /// Its t0.
+    pub epoch: Stamp,
+    /// What acts in it.
+    pub effects: EffectSet,
+}
+
+impl PlacementEffects {
+    /// With the effects of the session that a recording belongs to, which begins at `start`: the
+    /// last that had begun by then, else the first; no other sessions are left.
+    #[must_use]
+    pub fn in_session_of(&self, start: Stamp) -> Self {
+        let own = (self.epoch, &self.effects);
+        let others = self.other_sessions.iter();
+        let sessions = || {
+            let others = others.clone().map(|other| (other.epoch, &other.effects));
+            others.chain(std::iter::once(own))
+        };
+        let (epoch, effects) = sessions()
+            .filter(|(epoch, _)| *epoch <= start)
+            .max_by_key(|(epoch, _)| *epoch)
+            .or_else(|| sessions().min_by_key(|(epoch, _)| *epoch))
+            .unwrap_or(own);
+        Self {
+            epoch,
+            declared_noise: self.declared_noise,
+            effects: effects.clone(),
+            unexplained: self.unexplained,
+            other_sessions: Vec::new(),
+        }
+    }
 }
 
 /// White noise densities, one-sided.
@@ -74,6 +115,15 @@ struct RawPlacement {
     effects: EffectSet,
     #[serde(default)]
     unexplained: RawUnexplained,
+    #[serde(default)]
+    other_sessions: Vec<RawSession>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawSession {
+    epoch: Seconds,
+    effects: EffectSet,
 }
 
 #[derive(Default, Deserialize)]
@@ -131,6 +181,14 @@ impl EffectsFile {
                         accelerometer: rest.accel_variance,
                         gyroscope: rest.gyro_variance,
                     },
+                    other_sessions: placement
+                        .other_sessions
+                        .into_iter()
+                        .map(|session| OtherSession {
+                            epoch: session.epoch.0,
+                            effects: session.effects,
+                        })
+                        .collect(),
                 },
             );
         }
@@ -177,9 +235,7 @@ impl EffectsFile {
                     ""
                 }
             );
-            for effect in &placement.effects {
-                let _ = writeln!(text, "      - {}", flow(effect));
-            }
+            write_effects(&mut text, "      ", &placement.effects);
             if placement.unexplained != PerChannel::default() {
                 let rest = placement.unexplained;
                 let (accel, gyro) = (number(rest.accelerometer), number(rest.gyroscope));
@@ -188,8 +244,35 @@ impl EffectsFile {
                     "    unexplained: {{accel_variance: {accel}, gyro_variance: {gyro}}}"
                 );
             }
+            write_sessions(&mut text, &placement.other_sessions);
         }
         text
+    }
+}
+
+fn write_sessions(text: &mut String, sessions: &[OtherSession]) {
+    if !sessions.is_empty() {
+        text.push_str("    other_sessions:\n");
+    }
+    for session in sessions {
+        let empty = if session.effects.is_empty() {
+            " []"
+        } else {
+            ""
+        };
+        // Writing to a string cannot fail.
+        let _ = write!(
+            text,
+            "      - epoch: {}\n        effects:{empty}\n",
+            decimal(session.epoch)
+        );
+        write_effects(text, "          ", &session.effects);
+    }
+}
+
+fn write_effects(text: &mut String, indent: &str, effects: &EffectSet) {
+    for effect in effects {
+        let _ = writeln!(text, "{indent}- {}", flow(effect));
     }
 }
 

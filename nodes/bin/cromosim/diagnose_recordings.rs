@@ -1,0 +1,132 @@
+//! Which placements of which recordings `cromosim diagnose` looks at.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use anyhow::bail;
+use cromosim_bag::BagReader;
+use cromosim_body::BodyModel;
+use cromosim_recording::{RecordedPlacement, read_placements};
+
+/// A placement in one recording.
+pub struct OneRecording {
+    /// Name of the file.
+    pub file: String,
+    /// What it holds of the placement.
+    pub placement: RecordedPlacement,
+}
+
+/// What is diagnosed, and what is not.
+#[derive(Default)]
+pub struct Selected {
+    /// Each placement's recordings, in the order in which they were given.
+    pub placements: BTreeMap<String, Vec<OneRecording>>,
+    /// What a user should know of the others.
+    pub notes: Vec<String>,
+    /// Which cannot be read.
+    pub failures: Vec<String>,
+}
+
+/// Names of files for people: without folders, where that tells them apart.
+pub fn file_names(files: &[PathBuf]) -> Vec<String> {
+    let short = |file: &Path| {
+        file.file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned()
+    };
+    let name = |file: &PathBuf| {
+        let own = short(file);
+        let same = files.iter().filter(|other| short(other) == own).count();
+        if same > 1 {
+            file.display().to_string()
+        } else {
+            own
+        }
+    };
+    files.iter().map(name).collect()
+}
+
+/// The placements of the recordings, or only those of a list.
+pub fn select(
+    files: &[PathBuf],
+    body: Option<&Arc<BodyModel>>,
+    only: &[String],
+) -> anyhow::Result<Selected> {
+    refuse_twice(files)?;
+    let mut selected = Selected::default();
+    let mut known: Vec<String> = Vec::new();
+    for (path, file) in files.iter().zip(file_names(files)) {
+        let of_file = |text: String| {
+            if files.len() > 1 {
+                format!("{file}: {text}")
+            } else {
+                text
+            }
+        };
+        for (name, placement) in read_placements(&BagReader::open(path)?, body)? {
+            known.push(name.clone());
+            if !only.is_empty() && !only.contains(&name) {
+                continue;
+            }
+            match placement {
+                Ok(placement) if placement.measured.is_empty() => selected.notes.push(of_file(format!(
+                    "placement {name}: no messages on /imu/{name}/data_raw (sensor_msgs/msg/Imu); skipped"
+                ))),
+                Ok(placement) => selected.placements.entry(name).or_default().push(OneRecording {
+                    file: file.clone(),
+                    placement,
+                }),
+                Err(error) => selected
+                    .failures
+                    .push(of_file(format!("placement {name}: {error}"))),
+            }
+        }
+    }
+    let all = list(files);
+    if let Some(name) = only.iter().find(|name| !known.contains(name)) {
+        known.sort();
+        known.dedup();
+        bail!(
+            "{all}: placement `{name}` of the config: the recording has no such placement; it has {}",
+            known.join(", ")
+        );
+    }
+    if selected.placements.is_empty() && selected.failures.is_empty() {
+        bail!(
+            "{all}: no placement has both a reference and messages on /imu/NAME/data_raw (sensor_msgs/msg/Imu): {}",
+            if selected.notes.is_empty() {
+                "there is none".to_owned()
+            } else {
+                selected.notes.join("; ")
+            }
+        );
+    }
+    Ok(selected)
+}
+
+/// The same recording given again would count as new evidence.
+fn refuse_twice(files: &[PathBuf]) -> anyhow::Result<()> {
+    let real: Vec<PathBuf> = files
+        .iter()
+        .map(|file| file.canonicalize().unwrap_or_else(|_| file.clone()))
+        .collect();
+    for (index, path) in real.iter().enumerate() {
+        if real[..index].contains(path) {
+            bail!(
+                "{}: given twice; give each recording once",
+                files[index].display()
+            );
+        }
+    }
+    Ok(())
+}
+
+fn list(files: &[PathBuf]) -> String {
+    let names: Vec<String> = files
+        .iter()
+        .map(|file| file.display().to_string())
+        .collect();
+    names.join(", ")
+}

@@ -1,0 +1,114 @@
+//! One recording of a placement, brought to where the search starts.
+
+use cromosim_imu::{Channel, EffectSet, PerChannel, ReadOff, Reading};
+use cromosim_spatial::{FrameGrid, KinematicTrack};
+
+use crate::coarse_alignment::CoarseAlignment;
+use crate::digital::{Digital, mask_clipped};
+use crate::error::GapError;
+use crate::library::Library;
+use crate::prepared::{PreparedPlacement, ReferenceReport};
+use crate::record::PlacementRecord;
+use crate::sensor_noise::declared_in_si;
+use crate::trace::trace;
+
+/// What the analysis of one recording starts from.
+#[derive(Clone, Debug)]
+pub(crate) struct Session {
+    pub prepared: PreparedPlacement,
+    /// The readings in the device's units.
+    pub raw: Vec<Reading>,
+    /// Which axes of each message are compared, clipped ones included.
+    pub covered: Vec<[bool; 6]>,
+    /// Sets of effects that the closed forms found, the best first.
+    pub starts: Vec<EffectSet>,
+    pub digital: PerChannel<Digital>,
+    /// Factors of the device's units.
+    pub units: PerChannel<f64>,
+    pub track: KinematicTrack,
+}
+
+impl Session {
+    /// With the closed forms' units of the device, or with given ones.
+    pub fn new(
+        record: &PlacementRecord,
+        library: &Library,
+        units: Option<PerChannel<f64>>,
+    ) -> Result<Self, GapError> {
+        let mut prepared = PreparedPlacement::new(record)?;
+        let raw = prepared.measured.clone();
+        let mut track = prepared.track(&prepared.estimate);
+        let alignment = CoarseAlignment::find(&prepared, &track);
+        let report = reference_report(record, &alignment, library);
+        if report.length_units != 1.0 || report.frames.is_some() {
+            prepared.restore_reference(&record.reference, report)?;
+            track = prepared.track(&prepared.estimate);
+        }
+        let digital =
+            PerChannel::from_fn(|channel| Digital::read_off(&prepared.measured, channel, library));
+        prepared.cover(alignment.lag_s)?;
+        let covered = prepared.usable.clone();
+        for channel in Channel::ALL {
+            mask_clipped(&mut prepared, channel, &digital[channel]);
+        }
+        let units = units.unwrap_or_else(|| allowed_units(&alignment, library));
+        bring_to_si(&mut prepared, units);
+        trace(|| {
+            eprintln!(
+                "{}: {alignment:?} {digital:?} {:?}",
+                prepared.name,
+                prepared.estimate.noise()
+            )
+        });
+        let starts = alignment.starts();
+        Ok(Self {
+            prepared,
+            raw,
+            covered,
+            starts: starts.iter().map(|set| library.restrict(set)).collect(),
+            digital,
+            units,
+            track,
+        })
+    }
+}
+
+/// Takes the factors of the device's units out of the readings and of what is declared for them.
+fn bring_to_si(prepared: &mut PreparedPlacement, units: PerChannel<f64>) {
+    for reading in &mut prepared.measured {
+        reading.specific_force /= units.accelerometer;
+        reading.angular_velocity /= units.gyroscope;
+    }
+    prepared.declared = declared_in_si(prepared, units);
+}
+
+/// Factors of the units that the library may name; 1 where it may not.
+fn allowed_units(alignment: &CoarseAlignment, library: &Library) -> PerChannel<f64> {
+    PerChannel::from_fn(|channel| {
+        if library.allows_read_off(ReadOff::UnitFactor(channel)) {
+            alignment.units[channel]
+        } else {
+            1.0
+        }
+    })
+}
+
+/// How the reference reports its poses, as far as the library may name it.
+fn reference_report(
+    record: &PlacementRecord,
+    alignment: &CoarseAlignment,
+    library: &Library,
+) -> ReferenceReport {
+    let nominal = ReferenceReport::default();
+    ReferenceReport {
+        length_units: if library.allows_read_off(ReadOff::ReferenceLength) {
+            alignment.length_units
+        } else {
+            nominal.length_units
+        },
+        frames: library
+            .allows_read_off(ReadOff::ReferenceFrames)
+            .then(|| FrameGrid::find(&record.reference))
+            .flatten(),
+    }
+}

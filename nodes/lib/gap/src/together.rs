@@ -1,0 +1,166 @@
+//! The recordings of one placement, analysed alone or together.
+
+use cromosim_imu::{Effect, EffectKind, EffectSet, Owner};
+
+use crate::analysis::Analysis;
+use crate::findings::Findings;
+use crate::fit::FitModel;
+use crate::gauss_newton::fit_together;
+use crate::joint_search::search_together;
+use crate::library::{Library, without_all};
+use crate::policy::search::FIT_STEPS;
+use crate::session::Session;
+use crate::unknown::{Suspects, detect_unmodelled_structure};
+
+/// What was found in each recording.
+pub(crate) fn analysed<'a>(sessions: &'a [Session], library: &'a Library) -> Vec<Findings<'a>> {
+    let analyses: Vec<Analysis<'a>> = sessions
+        .iter()
+        .map(|session| Analysis { session, library })
+        .collect();
+    if let [alone] = analyses.as_slice() {
+        return vec![alone.run()];
+    }
+    let (models, found): (Vec<_>, Vec<_>) = analyses.iter().map(Analysis::best_set).unzip();
+    let best = search_together(&models, &found);
+    let mut findings: Vec<Findings> = analyses
+        .iter()
+        .zip(models.into_iter().zip(best))
+        .map(|(analysis, (model, scored))| analysis.findings(model, scored))
+        .collect();
+    agree_on_device(&mut findings);
+    judge_rest(&mut findings);
+    findings
+}
+
+/// Whether so many of all recordings speak for the device.
+fn is_enough(count: usize, all: usize) -> bool {
+    count > 0 && 2 * count >= all
+}
+
+/// What is said of the device is said of all its recordings or of none: what half of them show. A
+/// value that is read off is the median of theirs.
+fn agree_on_device(findings: &mut [Findings]) {
+    let kinds = EffectKind::ALL.into_iter();
+    for kind in kinds.filter(|kind| kind.spec().owner == Owner::Device) {
+        let reported: Vec<Effect> = findings
+            .iter()
+            .filter_map(|one| one.reportable.get(kind).cloned())
+            .collect();
+        let agreed = is_enough(reported.len(), findings.len())
+            .then(|| median_effect(&reported))
+            .flatten();
+        for one in findings.iter_mut() {
+            match &agreed {
+                Some(effect) => {
+                    one.reportable.insert(effect.clone());
+                }
+                None => {
+                    one.reportable.remove(kind);
+                }
+            }
+        }
+    }
+}
+
+/// The effect whose first value is the median; fitted ones of a device are all the same.
+fn median_effect(effects: &[Effect]) -> Option<Effect> {
+    let mut sorted: Vec<&Effect> = effects.iter().collect();
+    sorted.sort_by(|a, b| {
+        let first = |effect: &Effect| effect.values().first().copied().unwrap_or_default();
+        first(a).total_cmp(&first(b))
+    });
+    sorted
+        .get(effects.len() / 2)
+        .map(|effect| Effect::clone(effect))
+}
+
+/// Looks for what no named effect explains, and takes out what only passes for it. Half of the
+/// recordings have to show it.
+fn judge_rest(findings: &mut [Findings]) {
+    for suspects in [Suspects::AllButCalibrations, Suspects::All] {
+        for one in findings.iter_mut() {
+            one.unknown = detect_unmodelled_structure(one, suspects);
+        }
+        let count = findings.iter().filter(|one| one.unknown.is_some()).count();
+        if !is_enough(count, findings.len()) {
+            findings.iter_mut().for_each(|one| one.unknown = None);
+            return;
+        }
+        remove_confounded_effects(findings);
+    }
+}
+
+/// Takes out the effects that only pass for what is unknown (of the device's, in half of the
+/// recordings), and fits the others again.
+fn remove_confounded_effects(findings: &mut [Findings]) {
+    let suspected: Vec<Vec<EffectKind>> = findings
+        .iter()
+        .map(|one| {
+            let unknown = one.unknown.as_ref();
+            unknown.map_or_else(Vec::new, |unknown| unknown.confounded_effects.clone())
+        })
+        .collect();
+    let is_out = |session: usize, kind: EffectKind| match kind.spec().owner {
+        Owner::Session => suspected[session].contains(&kind),
+        Owner::Device => {
+            let count = suspected.iter().filter(|own| own.contains(&kind)).count();
+            is_enough(count, suspected.len())
+        }
+    };
+    let mut sets = Vec::new();
+    for (session, one) in findings.iter_mut().enumerate() {
+        let out: Vec<EffectKind> = EffectKind::ALL
+            .into_iter()
+            .filter(|kind| is_out(session, *kind))
+            .collect();
+        one.reportable = without_all(&one.reportable, &out);
+        sets.push(without_all(&one.scored.fit.set, &out));
+    }
+    refit(findings, sets);
+}
+
+/// Fits other sets to all recordings.
+fn refit(findings: &mut [Findings], sets: Vec<EffectSet>) {
+    if findings
+        .iter()
+        .zip(&sets)
+        .all(|(one, set)| one.scored.fit.set == *set)
+    {
+        return;
+    }
+    let models: Vec<&FitModel> = findings.iter().map(|one| &one.model).collect();
+    let fits = fit_together(&models, sets, FIT_STEPS, |_| true);
+    for (one, fit) in findings.iter_mut().zip(fits) {
+        one.scored.fit = fit;
+        one.take_fitted_values();
+    }
+}
+
+/// What is reported of one recording where the device's values are those that all the others show:
+/// its session's values are fitted to it.
+pub(crate) fn reported_by_the_others(findings: &[Findings], index: usize) -> EffectSet {
+    let own = &findings[index];
+    let others = || findings.iter().enumerate().filter(|(k, _)| *k != index);
+    let models: Vec<&FitModel> = others().map(|(_, one)| &one.model).collect();
+    let sets = others()
+        .map(|(_, one)| one.scored.fit.set.clone())
+        .collect();
+    let of_others = fit_together(&models, sets, FIT_STEPS, |_| true);
+    let is_of_device = |kind: EffectKind| kind.spec().owner == Owner::Device;
+    let mut set = own.scored.fit.set.clone();
+    let device = of_others.first().into_iter().flat_map(|fit| fit.set.iter());
+    for effect in device.filter(|effect| is_of_device(effect.kind())) {
+        set.insert(effect.clone());
+    }
+    let fits = fit_together(&[&own.model], vec![set], FIT_STEPS, |kind| {
+        !is_of_device(kind)
+    });
+    let mut reported = own.reportable.clone();
+    for effect in fits.iter().flat_map(|fit| fit.set.iter()) {
+        if reported.contains(effect.kind()) {
+            reported.insert(effect.clone());
+        }
+    }
+    reported
+}
