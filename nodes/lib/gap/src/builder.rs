@@ -216,7 +216,7 @@ impl<'a> DiagnosisBuilder<'a> {
     fn causes(&self) -> Vec<Cause> {
         let mut kinds: Vec<(EffectKind, f64)> = EffectKind::ALL
             .into_iter()
-            .filter(|kind| self.surest(*kind).is_some())
+            .filter(|kind| self.last(*kind).is_some())
             .map(|kind| (kind, self.weighted(|part| part.share(kind))))
             .collect();
         kinds.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -225,11 +225,11 @@ impl<'a> DiagnosisBuilder<'a> {
         for (kind, gap_share) in kinds {
             above.push(kind);
             let after = self.pooled(|part| part.under(&part.only(&above)));
-            causes.extend(self.surest(kind).map(|(part, effect)| {
+            causes.extend(self.last(kind).map(|(part, effect)| {
                 let [parameters, standard_errors] = part.values(effect);
                 Cause {
                     effect: kind.name().to_owned(),
-                    probability: probability_of(part.findings, effect),
+                    probability: self.probability(kind),
                     parameters,
                     standard_errors,
                     gap_share,
@@ -240,13 +240,19 @@ impl<'a> DiagnosisBuilder<'a> {
         causes
     }
 
-    /// An effect in the recording that is the surest of it, of several such the last.
-    fn surest(&self, kind: EffectKind) -> Option<(&Part<'a>, &Effect)> {
-        let probability = |(part, effect): &(&Part, &Effect)| probability_of(part.findings, effect);
-        self.parts
-            .iter()
-            .filter_map(|part| Some((part, part.findings.reportable.get(kind)?)))
-            .max_by(|a, b| probability(a).total_cmp(&probability(b)))
+    /// An effect in the last recording that reports it, which is the one that effects.yaml is of.
+    fn last(&self, kind: EffectKind) -> Option<(&Part<'a>, &Effect)> {
+        let mut parts = self.parts.iter().rev();
+        parts.find_map(|part| Some((part, part.findings.reportable.get(kind)?)))
+    }
+
+    /// That an effect is there, as the recording says that is the surest of it.
+    fn probability(&self, kind: EffectKind) -> f64 {
+        let of = |part: &Part| {
+            let effect = part.findings.reportable.get(kind)?;
+            Some(probability_of(part.findings, effect))
+        };
+        self.parts.iter().filter_map(of).fold(0.0, f64::max)
     }
 
     /// What is unknown, as the recording shows it that has the most of it to explain.

@@ -117,6 +117,11 @@ pub(crate) fn layout_of(kind: EffectKind) -> impl Iterator<Item = (EffectKind, u
         .map(move |value| (kind, value.index))
 }
 
+/// Columns as [`FitModel::extended`] takes them.
+pub(crate) fn slices(columns: &[Vec<f64>]) -> Vec<&[f64]> {
+    columns.iter().map(Vec::as_slice).collect()
+}
+
 impl<'a> FitModel<'a> {
     pub fn new(
         prepared: &'a PreparedPlacement,
@@ -227,10 +232,11 @@ impl<'a> FitModel<'a> {
         &self,
         fit: &Fit,
         residual: &[f64],
-        extra: &[Vec<f64>],
+        extra: &[&[f64]],
         extra_prior: &[f64],
     ) -> Linear {
-        let slices: Vec<&[f64]> = fit.columns.iter().chain(extra).map(Vec::as_slice).collect();
+        let own = fit.columns.iter().map(Vec::as_slice);
+        let slices: Vec<&[f64]> = own.chain(extra.iter().copied()).collect();
         let prior = fit
             .set
             .iter()

@@ -4,7 +4,7 @@ use cromosim_imu::{Effect, EffectKind, Identifiability, Search};
 
 use crate::diagnosis::Unidentifiable;
 use crate::findings::Findings;
-use crate::fit::prior_weights;
+use crate::fit::{prior_weights, slices};
 use crate::screen::is_change;
 
 /// Effects of a size that would matter which stay within two standard errors here, or which cannot
@@ -41,7 +41,7 @@ fn largest_error(findings: &Findings, kind: EffectKind, test: &Identifiability) 
     }
     let set = fit.set.clone().with(Effect::neutral(kind));
     let columns = model.columns(&set, &fit.prediction, kind);
-    let linear = model.extended(fit, &fit.residual, &columns, &prior_weights(kind));
+    let linear = model.extended(fit, &fit.residual, &slices(&columns), &prior_weights(kind));
     let first = fit.layout.len();
     Some(
         (first..first + test.values)

@@ -4,6 +4,7 @@
 use cromosim_imu::{
     Channel, Effect, EffectKind, EffectSet, Ordinary, PerChannel, ReadOff, Rounding, Search,
 };
+use cromosim_spatial::PoseEstimate;
 
 use crate::digital::Digital;
 use crate::fit::FitModel;
@@ -50,10 +51,15 @@ pub(crate) fn reportable_effects(
     set
 }
 
-/// Whether the reference scatters so much that this is a cause.
+/// Whether the reference scatters so much that this is a cause. Frames too slow for the motion seem to
+/// scatter where the poses interpolated between them do not.
 fn is_reference_noisy(model: &FitModel) -> bool {
-    let noise = model.prepared.estimate.noise();
-    noise.position >= REFERENCE_NOISE.position || noise.rotation >= REFERENCE_NOISE.rotation
+    let prepared = model.prepared;
+    let is_noisy = |estimate: &PoseEstimate| {
+        let noise = estimate.noise();
+        noise.position >= REFERENCE_NOISE.position || noise.rotation >= REFERENCE_NOISE.rotation
+    };
+    is_noisy(&prepared.estimate) && prepared.interpolated.as_ref().is_none_or(is_noisy)
 }
 
 /// Factor on what is ordinary: what is fitted to a poor reference is that much poorer.

@@ -7,8 +7,9 @@ use nalgebra::Vector3;
 
 use crate::axes::{axes_of_channel, channel_of_axis, value_on_axis};
 use crate::findings::Findings;
-use crate::fit::Fit;
+use crate::fit::{Fit, slices};
 use crate::gram::Linear;
+use crate::policy::unknown::REGRESSION_NATS;
 
 /// Root mean square of a regressor, in units of the white noise, below which it is left out.
 const LEAST_MOTION: f64 = 0.02;
@@ -30,6 +31,8 @@ const CURVE_QUANTILES: [f64; 7] = [0.01, 0.15, 0.35, 0.5, 0.65, 0.85, 0.99];
 pub(crate) struct ResidualRegression {
     pub dependence: Dependence,
     pub channel: Channel,
+    /// Empty where it gains too little for anything to be judged beside it: those of a long recording
+    /// fill a gigabyte.
     pub columns: Vec<Vec<f64>>,
     /// Held-out gain beside the fit, nats, less the price of its columns.
     pub gain: f64,
@@ -63,7 +66,11 @@ pub(crate) fn residual_regressions(findings: &Findings) -> Vec<ResidualRegressio
             list.push(ResidualRegression {
                 dependence,
                 channel,
-                columns,
+                columns: if gain > REGRESSION_NATS {
+                    columns
+                } else {
+                    Vec::new()
+                },
                 gain,
             });
         }
@@ -117,9 +124,9 @@ pub(crate) fn with_regressions(
     fit: &Fit,
     families: &[&Vec<Vec<f64>>],
 ) -> Linear {
-    let columns: Vec<Vec<f64>> = families
+    let columns: Vec<&[f64]> = families
         .iter()
-        .flat_map(|columns| columns.iter().cloned())
+        .flat_map(|columns| slices(columns))
         .collect();
     let prior = vec![PRIOR_WEIGHT; columns.len()];
     findings

@@ -4,7 +4,7 @@ use cromosim_imu::{Effect, EffectKind, EffectSet, FirstGuess, PerChannel, Search
 use nalgebra::{Cholesky, DMatrix, Dyn, Matrix3, Vector3};
 
 use crate::axes::channel_of_axis;
-use crate::fit::{Fit, FitModel, layout_of, prior_weights, stepped};
+use crate::fit::{Fit, FitModel, layout_of, prior_weights, slices, stepped};
 use crate::gram::dot;
 use crate::prepared::Prediction;
 
@@ -70,11 +70,13 @@ fn candidate(model: &FitModel, fit: &Fit, starts: &[Effect]) -> Candidate {
             .collect()
     };
     let linear = if are_neutral {
-        model.extended(fit, &fit.residual, &columns(&fit.prediction), &prior)
+        let columns = columns(&fit.prediction);
+        model.extended(fit, &fit.residual, &slices(&columns), &prior)
     } else {
         let prediction = model.prepared.predict(&model.track, &set);
         let residual = model.residual(&prediction.readings);
-        model.extended(fit, &residual, &columns(&prediction), &prior)
+        let columns = columns(&prediction);
+        model.extended(fit, &residual, &slices(&columns), &prior)
     };
     let layout: Vec<_> = fit
         .layout

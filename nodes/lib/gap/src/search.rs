@@ -97,11 +97,8 @@ pub(crate) fn search(
     for _ in 0..most {
         let mut grown_sets: Vec<ScoredEffectSet> = Vec::new();
         for scored in &beam {
-            grown_sets.extend(grown(model, scored, library));
+            grow(model, scored, library, &mut grown_sets);
         }
-        sort(&mut grown_sets);
-        grown_sets.dedup_by(|a, b| names(&a.fit.set) == names(&b.fit.set));
-        grown_sets.truncate(BEAM);
         trace_grown(&grown_sets);
         let Some(first) = grown_sets.first() else {
             break;
@@ -134,12 +131,14 @@ fn candidates(model: &FitModel, fit: &Fit, library: &[EffectKind]) -> Vec<(f64, 
     candidates
 }
 
-/// The set with one more effect, for the candidates that promise most.
-fn grown(
+/// The set with one more effect, for the candidates that promise most. Only the best of all are kept
+/// in `grown_sets`: the series of a fit fill much memory.
+fn grow(
     model: &FitModel,
     scored: &ScoredEffectSet,
     library: &[EffectKind],
-) -> Vec<ScoredEffectSet> {
+    grown_sets: &mut Vec<ScoredEffectSet>,
+) {
     let candidates = candidates(model, &scored.fit, library);
     trace(|| {
         let list: Vec<String> = candidates
@@ -161,13 +160,18 @@ fn grown(
     let needed = (PART_OF_BEST_PREDICTION * best)
         .min(best - NEAR_BEST_NATS)
         .max(-MOST_LOSS_NATS);
-    candidates
-        .into_iter()
-        .take(REFITS)
-        .filter(|(predicted, _)| *predicted > scored.score + needed)
-        .map(|(_, candidate)| score(model, candidate.set))
-        .filter(|scored| scored.score > f64::NEG_INFINITY)
-        .collect()
+    for (predicted, candidate) in candidates.into_iter().take(REFITS) {
+        if predicted <= scored.score + needed {
+            continue;
+        }
+        let grown = score(model, candidate.set);
+        if grown.score > f64::NEG_INFINITY {
+            grown_sets.push(grown);
+            sort(grown_sets);
+            grown_sets.dedup_by(|a, b| names(&a.fit.set) == names(&b.fit.set));
+            grown_sets.truncate(BEAM);
+        }
+    }
 }
 
 /// Without the effects that do not earn their place beside the others.

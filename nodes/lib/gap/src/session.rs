@@ -55,9 +55,13 @@ impl Session {
         bring_to_si(&mut prepared, units);
         trace(|| {
             eprintln!(
-                "{}: {alignment:?} {digital:?} {:?}",
+                "{}: {alignment:?} {digital:?} {:?} {:?}",
                 prepared.name,
-                prepared.estimate.noise()
+                prepared.estimate.noise(),
+                prepared
+                    .interpolated
+                    .as_ref()
+                    .map(|estimate| estimate.noise())
             )
         });
         let starts = alignment.starts();
