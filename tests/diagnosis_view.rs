@@ -33,6 +33,7 @@ fn diagnosis() -> Diagnosis {
     };
     let placement = |verdict: &str| PlacementDiagnosis {
         recordings: Vec::new(),
+        calibration: Vec::new(),
         verdict: verdict.to_owned(),
         gap: Gap {
             before: Metrics {
@@ -63,6 +64,7 @@ fn diagnosis() -> Diagnosis {
     };
     let quiet = PlacementDiagnosis {
         recordings: Vec::new(),
+        calibration: Vec::new(),
         causes: Vec::new(),
         ..placement("No gap beyond the declared noise.")
     };

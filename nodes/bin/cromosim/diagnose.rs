@@ -9,7 +9,7 @@ use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use cromosim_body::BodyModel;
 use cromosim_gap::{
-    Cause, DiagnoseOptions, Diagnosis, Evidence, PlacementAnswer, PlacementDiagnosis, SCHEMA,
+    DiagnoseOptions, Diagnosis, Evidence, PlacementAnswer, PlacementDiagnosis, SCHEMA,
 };
 use cromosim_imu::{EffectKind, EffectsFile};
 use rayon::prelude::*;
@@ -378,7 +378,14 @@ fn print(diagnosis: &Diagnosis) {
                 (&cause.effect, cause.probability, 100.0 * cause.gap_share);
             println!(
                 "  {effect:<20} probability {probability:.2}, {share:5.1} % of the gap; {}",
-                parameters(cause)
+                parameters(&cause.effect, &cause.parameters, &cause.standard_errors)
+            );
+        }
+        for kept in &placement.calibration {
+            println!(
+                "  {:<20} no cause, but kept; {}",
+                kept.effect,
+                parameters(&kept.effect, &kept.parameters, &kept.standard_errors)
             );
         }
         for one in &placement.recordings {
@@ -398,8 +405,12 @@ fn print(diagnosis: &Diagnosis) {
 }
 
 /// `offset [0.0502, 0.0001, -0.0611] m +- [0.0003, 0.0003, 0.0003]`.
-fn parameters(cause: &Cause) -> String {
-    let specs = EffectKind::from_name(&cause.effect).map_or(&[][..], |kind| kind.spec().parameters);
+fn parameters(
+    effect: &str,
+    parameters: &BTreeMap<String, Value>,
+    standard_errors: &BTreeMap<String, Value>,
+) -> String {
+    let specs = EffectKind::from_name(effect).map_or(&[][..], |kind| kind.spec().parameters);
     let one = |(name, value): (&String, &Value)| {
         let unit = specs
             .iter()
@@ -410,19 +421,13 @@ fn parameters(cause: &Cause) -> String {
         } else {
             format!(" {unit}")
         };
-        let error = cause
-            .standard_errors
+        let error = standard_errors
             .get(name)
             .map(|error| format!(" +- {}", short(error, 2)))
             .unwrap_or_default();
         format!("{name} {}{unit}{error}", short(value, 4))
     };
-    cause
-        .parameters
-        .iter()
-        .map(one)
-        .collect::<Vec<_>>()
-        .join(", ")
+    parameters.iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
 /// Numbers with so many significant digits.

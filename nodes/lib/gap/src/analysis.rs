@@ -77,6 +77,7 @@ impl<'a> Analysis<'a> {
             digital: *digital,
             found_noise,
             reportable,
+            kept: None,
             library: self.library.clone(),
             unknown: None,
             is_mostly_explained,

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use cromosim_imu::{Effect, EffectKind, EffectSet, PerChannel, Reading};
 
 use crate::diagnosis::{
-    Cause, Gap, GapLocation, Metrics, PlacementDiagnosis, RecordingCause, RecordingDiagnosis,
-    Unexplained, Unidentifiable,
+    Cause, Gap, GapLocation, KeptCalibration, Metrics, PlacementDiagnosis, RecordingCause,
+    RecordingDiagnosis, Unexplained, Unidentifiable,
 };
 use crate::evidence::{Evidence, collect};
 use crate::findings::{Findings, Unknown};
@@ -53,7 +53,7 @@ impl<'a> Part<'a> {
         let nominal = EffectSet::new();
         let before_readings = simulations.simulate(&nominal);
         let before = simulations.metrics(&nominal, &before_readings);
-        let after_readings = simulations.simulate(reportable);
+        let after_readings = simulations.simulate(&findings.applied());
         let after = simulations.cross_validated_metrics(&after_readings);
         let whitener = simulations.whitener(&nominal);
         let white = simulations.whitened(&whitener, &before_readings);
@@ -152,6 +152,7 @@ impl<'a> DiagnosisBuilder<'a> {
             verdict: verdict(&causes, &before, &after),
             gap: Gap { before, after },
             location: self.parts[self.heaviest].location.clone(),
+            calibration: self.calibration(),
             unidentifiable: self.unidentifiable(),
             unexplained: Unexplained {
                 significant: unknown.is_some(),
@@ -262,6 +263,25 @@ impl<'a> DiagnosisBuilder<'a> {
             .filter_map(|part| Some((part.shares.total, part.findings.unknown.as_ref()?)))
             .max_by(|a, b| a.0.total_cmp(&b.0))
             .map(|(_, unknown)| unknown)
+    }
+
+    /// What is kept beside the causes, as the last recording has it.
+    fn calibration(&self) -> Vec<KeptCalibration> {
+        let Some(part) = self.parts.last() else {
+            return Vec::new();
+        };
+        let rate_hz = part.simulations.whole.rate_hz;
+        let described_one = |effect: &Effect| {
+            let fit = part.findings.kept.as_ref();
+            let errors = fit.map_or_else(Vec::new, |fit| fit.standard_errors(effect));
+            KeptCalibration {
+                effect: effect.kind().name().to_owned(),
+                parameters: described(effect.kind(), effect.values()),
+                standard_errors: described_errors(effect.kind(), &errors, rate_hz),
+            }
+        };
+        let kept = part.findings.kept_calibrations();
+        kept.iter().map(described_one).collect()
     }
 
     /// What none of the recordings can tell.

@@ -134,7 +134,7 @@ fn simulated_effects(findings: &[Findings], unexplained: &[PerChannel<f64>]) -> 
             accel_density: density(Channel::Accelerometer),
             gyro_density: density(Channel::Gyroscope),
         },
-        effects: last.reportable.clone(),
+        effects: last.applied(),
         unexplained: PerChannel::from_fn(|channel| {
             unexplained.iter().map(|own| own[channel]).sum::<f64>() / count
         }),
@@ -142,7 +142,7 @@ fn simulated_effects(findings: &[Findings], unexplained: &[PerChannel<f64>]) -> 
             .iter()
             .map(|one| OtherSession {
                 epoch: one.model.prepared.epoch,
-                effects: one.reportable.clone(),
+                effects: one.applied(),
             })
             .collect(),
     }

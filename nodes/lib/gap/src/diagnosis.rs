@@ -32,6 +32,10 @@ pub struct PlacementDiagnosis {
     pub location: GapLocation,
     /// By share of the gap, the largest first.
     pub causes: Vec<Cause>,
+    /// Calibrations that are no causes, but lower the gap on held-out time: effects.yaml holds them
+    /// beside the causes, and `gap.after` counts on them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub calibration: Vec<KeptCalibration>,
     /// What this motion cannot tell.
     pub unidentifiable: Vec<Unidentifiable>,
     /// What no cause explains.
@@ -169,6 +173,17 @@ pub struct Cause {
     pub gap_share: f64,
     /// With this cause and those above it.
     pub after: Metrics,
+}
+
+/// A calibration that is taken over without being a cause.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct KeptCalibration {
+    /// The effect's name.
+    pub effect: String,
+    /// By name, in SI.
+    pub parameters: BTreeMap<String, Value>,
+    /// In the form of the parameters.
+    pub standard_errors: BTreeMap<String, Value>,
 }
 
 /// An effect that this motion cannot show.

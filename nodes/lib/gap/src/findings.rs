@@ -4,7 +4,7 @@ use cromosim_imu::{Channel, EffectKind, EffectSet, PerChannel};
 
 use crate::diagnosis::GapLocation;
 use crate::digital::Digital;
-use crate::fit::FitModel;
+use crate::fit::{Fit, FitModel};
 use crate::library::Library;
 use crate::search::ScoredEffectSet;
 
@@ -17,6 +17,9 @@ pub(crate) struct Findings<'a> {
     pub found_noise: PerChannel<f64>,
     /// All named causes but `unknown`.
     pub reportable: EffectSet,
+    /// A fit of the named causes' values as they are, and of the calibrations that a simulation takes
+    /// over beside them; none where there are none.
+    pub kept: Option<Fit>,
     pub library: Library,
     /// What none of them explains.
     pub unknown: Option<Unknown>,
@@ -41,6 +44,43 @@ pub(crate) struct Unknown {
 }
 
 impl Findings<'_> {
+    /// The calibrations that are no causes, but are taken over all the same.
+    pub fn kept_calibrations(&self) -> EffectSet {
+        let fitted = self.kept.iter().flat_map(|fit| fit.set.iter());
+        fitted
+            .filter(|effect| !self.reportable.contains(effect.kind()))
+            .fold(EffectSet::new(), |set, effect| set.with(effect.clone()))
+    }
+
+    /// All that a simulation takes over: causes and calibrations.
+    pub fn applied(&self) -> EffectSet {
+        let kept = self.kept_calibrations();
+        kept.iter().fold(self.reportable.clone(), |set, effect| {
+            set.with(effect.clone())
+        })
+    }
+
+    /// The same with the values that a fit to all parts of time but one has.
+    pub fn applied_excluding_fold(&self, fold: usize) -> EffectSet {
+        let mut set = self.applied();
+        let named = self.scored.fit.excluding_fold(fold);
+        let kept = self.kept.as_ref().map(|fit| fit.excluding_fold(fold));
+        for kind in EffectKind::ALL {
+            if !set.contains(kind) {
+                continue;
+            }
+            let values = if self.reportable.contains(kind) {
+                named.get(kind)
+            } else {
+                kept.as_ref().and_then(|kept| kept.get(kind))
+            };
+            if let Some(effect) = values {
+                set.insert(effect.clone());
+            }
+        }
+        set
+    }
+
     /// Brings the reported effects to the values of the fit.
     pub fn take_fitted_values(&mut self) {
         for effect in self.scored.fit.set.iter() {

@@ -7,6 +7,7 @@ use cromosim_imu::{Channel, PerChannel};
 
 use crate::axes::{channel_of_axis, sum_over_channels};
 use crate::prepared::FOLDS;
+use crate::whiten::is_zero;
 
 /// Times that the channels' weights are taken from the residual of the step before.
 const REWEIGHTINGS: usize = 3;
@@ -87,6 +88,13 @@ impl Gram {
             .copied()
             .chain(std::iter::once(residual))
             .collect();
+        // Most columns change few axes.
+        let changes: Vec<[bool; 6]> = all
+            .iter()
+            .map(|column| {
+                std::array::from_fn(|axis| !is_zero(&column[axis * length..(axis + 1) * length]))
+            })
+            .collect();
         let nothing = PerChannel::from_fn(|_| DMatrix::zeros(size, size));
         let mut parts = vec![nothing; FOLDS];
         // Runs of one fold are contiguous: inner products over slices.
@@ -99,8 +107,8 @@ impl Gram {
             for axis in 0..6 {
                 let range = axis * length + from..axis * length + to;
                 let part = &mut parts[fold][channel_of_axis(axis)];
-                for i in 0..size {
-                    for j in 0..=i {
+                for i in (0..size).filter(|&i| changes[i][axis]) {
+                    for j in (0..=i).filter(|&j| changes[j][axis]) {
                         let (a, b) = (&all[i][range.clone()], &all[j][range.clone()]);
                         part[(i, j)] += dot(a, b);
                     }

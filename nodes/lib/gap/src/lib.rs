@@ -4,6 +4,7 @@
 mod analysis;
 mod axes;
 mod builder;
+mod calibration;
 mod coarse_alignment;
 mod confounding;
 mod correlation;
@@ -52,8 +53,8 @@ mod words;
 
 pub use diagnose::{DiagnoseOptions, OfRecording, PlacementAnswer, diagnose, diagnose_together};
 pub use diagnosis::{
-    Cause, Diagnosis, Gap, GapLocation, Interval, Metrics, PlacementDiagnosis, RecordingCause,
-    RecordingDiagnosis, SCHEMA, Unexplained, Unidentifiable,
+    Cause, Diagnosis, Gap, GapLocation, Interval, KeptCalibration, Metrics, PlacementDiagnosis,
+    RecordingCause, RecordingDiagnosis, SCHEMA, Unexplained, Unidentifiable,
 };
 pub use error::GapError;
 pub use evidence::{CoursePoint, Evidence, Spectra};

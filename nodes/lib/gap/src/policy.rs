@@ -184,6 +184,12 @@ pub(crate) mod confounded {
     pub const CHANGES_OVER_TIME: f64 = 1.5;
 }
 
+/// When a calibration that is no cause is kept all the same.
+pub(crate) mod calibration {
+    /// Most by which it may raise the norm of a channel's residual. No source.
+    pub const MOST_RISE: f64 = 1.002;
+}
+
 /// How sure a cause is.
 pub(crate) mod probability {
     /// Of the fitted effects that were certain by their margin, so many were right on withheld

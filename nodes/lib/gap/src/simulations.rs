@@ -176,19 +176,13 @@ impl<'a> Simulations<'a> {
     pub fn cross_validated_metrics(&self, after: &[Reading]) -> Metrics {
         let mut held_out = after.to_vec();
         for fold in 0..FOLDS {
-            let mut set = self.findings.reportable.clone();
-            for effect in self.findings.scored.fit.excluding_fold(fold).iter() {
-                if set.contains(effect.kind()) {
-                    set.insert(effect.clone());
-                }
-            }
-            let readings = self.simulate(&set);
+            let readings = self.simulate(&self.findings.applied_excluding_fold(fold));
             for (k, &entry) in self.whole.grid_index.iter().enumerate() {
                 if self.whole.fold(entry) == fold {
                     held_out[k] = readings[k];
                 }
             }
         }
-        self.metrics(&self.findings.reportable, &held_out)
+        self.metrics(&self.findings.applied(), &held_out)
     }
 }

@@ -3,6 +3,7 @@
 use cromosim_imu::{Effect, EffectKind, EffectSet, Owner};
 
 use crate::analysis::Analysis;
+use crate::calibration::keep_calibrations;
 use crate::findings::Findings;
 use crate::fit::FitModel;
 use crate::gauss_newton::fit_together;
@@ -19,7 +20,9 @@ pub(crate) fn analysed<'a>(sessions: &'a [Session], library: &'a Library) -> Vec
         .map(|session| Analysis { session, library })
         .collect();
     if let [alone] = analyses.as_slice() {
-        return vec![alone.run()];
+        let mut findings = vec![alone.run()];
+        keep_calibrations(&mut findings);
+        return findings;
     }
     let (models, found): (Vec<_>, Vec<_>) = analyses.iter().map(Analysis::best_set).unzip();
     let best = search_together(&models, &found);
@@ -30,6 +33,7 @@ pub(crate) fn analysed<'a>(sessions: &'a [Session], library: &'a Library) -> Vec
         .collect();
     agree_on_device(&mut findings);
     judge_rest(&mut findings);
+    keep_calibrations(&mut findings);
     findings
 }
 
@@ -156,7 +160,12 @@ pub(crate) fn reported_by_the_others(findings: &[Findings], index: usize) -> Eff
     let fits = fit_together(&[&own.model], vec![set], FIT_STEPS, |kind| {
         !is_of_device(kind)
     });
+    let of_session = |effect: &&Effect| !is_of_device(effect.kind());
+    let kept = own.kept_calibrations();
     let mut reported = own.reportable.clone();
+    kept.iter().filter(of_session).for_each(|effect| {
+        reported.insert(effect.clone());
+    });
     for effect in fits.iter().flat_map(|fit| fit.set.iter()) {
         if reported.contains(effect.kind()) {
             reported.insert(effect.clone());

@@ -14,7 +14,7 @@ pub(crate) fn unexplained_variances(
     simulations: &Simulations,
     after: &Metrics,
 ) -> PerChannel<f64> {
-    let set = &findings.reportable;
+    let set = &findings.applied();
     let of_reference = reference_variances(findings, simulations);
     PerChannel::from_fn(|channel| {
         let rmse = match channel {
@@ -30,7 +30,7 @@ pub(crate) fn unexplained_variances(
 /// What errors of the reference leave, mean over the compared readings and their axes: an error of
 /// the orientation turns a vector, by two thirds of its square over the axes.
 fn reference_variances(findings: &Findings, simulations: &Simulations) -> PerChannel<f64> {
-    let (whole, set) = (&simulations.whole, &findings.reportable);
+    let (whole, set) = (&simulations.whole, findings.applied());
     let estimate = &findings.model.basis.estimate;
     let variances = estimate.variances(&whole.stamps, 1.0, set.lever_arm().norm());
     PerChannel::from_fn(|channel| {

@@ -105,6 +105,7 @@ fn placement(verdict: &str, causes: Vec<Cause>, unexplained: Unexplained) -> Pla
     }];
     PlacementDiagnosis {
         recordings: Vec::new(),
+        calibration: Vec::new(),
         verdict: verdict.into(),
         gap,
         location,

@@ -235,6 +235,7 @@ mod tests {
     fn diagnosis(causes: Vec<Cause>) -> Diagnosis {
         let placement = PlacementDiagnosis {
             recordings: Vec::new(),
+            calibration: Vec::new(),
             verdict: String::new(),
             gap: Default::default(),
             location: Default::default(),

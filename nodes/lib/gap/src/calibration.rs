@@ -1,0 +1,116 @@
+//! The plain calibration (clock, mount, lever arm, biases): a simulation takes it over wherever it
+//! helps, whether it is named as a cause or not.
+
+use cromosim_imu::{Channel, Effect, EffectKind, EffectSet, PerChannel, Search};
+
+use crate::confounding::is_calibration;
+use crate::findings::Findings;
+use crate::fit::{Fit, FitModel};
+use crate::gauss_newton::fit_together;
+use crate::policy::calibration::MOST_RISE;
+use crate::policy::search::FIT_STEPS;
+use crate::search::price_of_effect;
+use crate::trace::{names, trace};
+
+/// Adds to each recording the calibrations that are no causes, but lower the gap on time that they
+/// were not fitted to: too small to be named, or beside something unknown that they might pass for.
+pub(crate) fn keep_calibrations(findings: &mut [Findings]) {
+    let candidates = candidates(findings);
+    if candidates.is_empty() {
+        return;
+    }
+    let models: Vec<FitModel> = findings.iter().map(beside_the_rest).collect();
+    let models: Vec<&FitModel> = models.iter().collect();
+    let is_free = |kind: EffectKind| candidates.contains(&kind);
+    let fitted = |sets: Vec<EffectSet>| fit_together(&models, sets, FIT_STEPS, is_free);
+    let mut best = fitted(findings.iter().map(named_and_fitted).collect());
+    let mut left = candidates.clone();
+    loop {
+        let with = |kind: &EffectKind| {
+            let sets = best
+                .iter()
+                .map(|fit| fit.set.clone().with(Effect::neutral(*kind)));
+            let fits = fitted(sets.collect());
+            let prices = models.iter().map(|model| price_of_effect(model, *kind));
+            let gain = held_out(&fits) - held_out(&best) - prices.fold(0.0, f64::max);
+            (gain, *kind, fits)
+        };
+        let next = left
+            .iter()
+            .map(with)
+            .filter(|(gain, _, fits)| *gain > 0.0 && lowers(&models, &best, fits))
+            .max_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((_, kind, fits)) = next else {
+            break;
+        };
+        left.retain(|other| *other != kind);
+        best = fits;
+    }
+    for (one, fit) in findings.iter_mut().zip(best) {
+        trace(|| {
+            eprintln!(
+                "kept beside {:?}: {:?}",
+                names(&one.reportable),
+                names(&fit.set)
+            )
+        });
+        one.kept = Some(fit);
+    }
+}
+
+/// Calibrations that may be kept: all of the library beside something unknown, else those that were
+/// fitted; less those that are causes anyway.
+fn candidates(findings: &[Findings]) -> Vec<EffectKind> {
+    let is_open = |kind: &EffectKind| {
+        let is_named = findings.iter().any(|one| one.reportable.contains(*kind));
+        let is_fitted =
+            |one: &Findings| one.unknown.is_some() || one.scored.fit.set.contains(*kind);
+        is_calibration(*kind) && !is_named && findings.iter().any(is_fitted)
+    };
+    let library = &findings[0].library;
+    library.fitted().into_iter().filter(is_open).collect()
+}
+
+/// The model whose noise covers what is left where something unknown is in it: else that pulls at
+/// the values, and its size passes for evidence.
+fn beside_the_rest<'a>(findings: &Findings<'a>) -> FitModel<'a> {
+    let model = &findings.model;
+    if findings.unknown.is_none() {
+        return model.clone();
+    }
+    let prepared = model.prepared;
+    let residual = prepared.residual(&findings.scored.fit.prediction.readings);
+    FitModel::new(
+        prepared,
+        model.track.clone(),
+        model.basis.clone(),
+        model.noise.covering(prepared, &residual),
+    )
+}
+
+/// The causes that the forward model of the fits knows.
+fn named_and_fitted(findings: &Findings) -> EffectSet {
+    let named = findings.reportable.iter();
+    named
+        .filter(|effect| !matches!(effect.kind().spec().search, Search::ReadOff(_)))
+        .fold(EffectSet::new(), |set, effect| set.with(effect.clone()))
+}
+
+fn held_out(fits: &[Fit]) -> f64 {
+    fits.iter().map(|fit| fit.linear.held_out).sum()
+}
+
+/// Whether no channel's residual rises from one fit to the other, over all recordings.
+fn lowers(models: &[&FitModel], from: &[Fit], to: &[Fit]) -> bool {
+    let squares = |fits: &[Fit]| {
+        let pairs = models.iter().zip(fits);
+        pairs.fold(PerChannel::<f64>::default(), |sum, (model, fit)| {
+            let norms = model.prepared.residual_norms(&fit.prediction.readings);
+            PerChannel::from_fn(|channel| sum[channel] + norms[channel].powi(2))
+        })
+    };
+    let (before, after) = (squares(from), squares(to));
+    Channel::ALL
+        .into_iter()
+        .all(|channel| after[channel] <= MOST_RISE.powi(2) * before[channel])
+}
