@@ -36,6 +36,8 @@ pub(crate) struct Fit {
     pub residual: Vec<f64>,
     /// Change of the whitened prediction per unit of each value.
     pub columns: Vec<Vec<f64>>,
+    /// Of these columns and the residual.
+    pub gram: Gram,
     pub linear: Linear,
 }
 
@@ -262,6 +264,20 @@ impl Fit {
     /// see.
     pub fn held_out_ratio(&self) -> PerChannel<f64> {
         self.linear.held_out_ratio
+    }
+
+    /// What one linear step says of the held-out log-likelihood without an effect.
+    pub fn held_out_without(&self, kind: EffectKind) -> f64 {
+        let Some(effect) = self.set.get(kind) else {
+            return self.linear.held_out;
+        };
+        let neutral = kind.spec().neutral();
+        let own = self.layout.iter().enumerate();
+        let (columns, moves): (Vec<usize>, Vec<f64>) = own
+            .filter(|(_, (other, _))| *other == kind)
+            .map(|(column, &(_, index))| (column, neutral[index] - effect.values()[index]))
+            .unzip();
+        self.gram.held_out_without(&columns, &moves)
     }
 
     /// The set as it would be fitted without one part of time.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use cromosim_imu::{EffectKind, EffectSet, Owner};
 use nalgebra::DVector;
 
-use crate::fit::{Evaluated, Fit, FitModel, free_values, layout_of, stepped};
+use crate::fit::{Evaluated, Fit, FitModel, free_values, layout_of, slices, stepped};
 use crate::gram::Gram;
 use crate::policy::search::{CONVERGED_NATS, FIT_STEPS};
 
@@ -49,7 +49,8 @@ pub(crate) fn fit_together(
             .zip(&coefficients.layouts)
             .map(|((model, now), layout)| columns_of(model, now, layout))
             .collect();
-        let solution = coefficients.gram(models, &now, &columns).solution();
+        let grams = coefficients.grams(models, &now, &columns);
+        let solution = coefficients.together(grams.clone()).solution();
         let cost = total_cost(&now);
         let is_last = steps_left == 0
             || coefficients.prior.is_empty()
@@ -69,14 +70,15 @@ pub(crate) fn fit_together(
         let parts = solution.parts.into_iter().zip(coefficients.layouts);
         return now
             .into_iter()
-            .zip(columns)
+            .zip(columns.into_iter().zip(grams))
             .zip(parts)
-            .map(|((now, columns), (linear, layout))| Fit {
+            .map(|((now, (columns, gram)), (linear, layout))| Fit {
                 set: now.set,
                 layout,
                 prediction: now.prediction,
                 residual: now.residual,
                 columns,
+                gram,
                 linear,
             })
             .collect();
@@ -136,15 +138,26 @@ impl Coefficients {
         }
     }
 
-    fn gram(&self, models: &[&FitModel], now: &[Evaluated], columns: &[Vec<Vec<f64>>]) -> Gram {
+    /// Of each model, with its own coefficients.
+    fn grams(
+        &self,
+        models: &[&FitModel],
+        now: &[Evaluated],
+        columns: &[Vec<Vec<f64>>],
+    ) -> Vec<Gram> {
         let one = |index: usize| {
-            let slices: Vec<&[f64]> = columns[index].iter().map(Vec::as_slice).collect();
-            let own = &self.of_layouts[index];
-            let prior = own.iter().map(|&k| self.prior[k]).collect();
-            let gram = models[index].gram(&slices, &now[index].residual, prior);
-            (gram, own.clone())
+            let prior = self.of_layouts[index]
+                .iter()
+                .map(|&k| self.prior[k])
+                .collect();
+            models[index].gram(&slices(&columns[index]), &now[index].residual, prior)
         };
-        Gram::together((0..models.len()).map(one).collect(), self.prior.clone())
+        (0..models.len()).map(one).collect()
+    }
+
+    fn together(&self, grams: Vec<Gram>) -> Gram {
+        let series = grams.into_iter().zip(self.of_layouts.iter().cloned());
+        Gram::together(series.collect(), self.prior.clone())
     }
 
     /// The sets with a part of a step.

@@ -155,6 +155,40 @@ impl Gram {
         self.prior.len()
     }
 
+    /// Held-out log-likelihood without some of one series' columns, after their coefficients were
+    /// moved by as much as `moves` says: no pass over the series is needed.
+    pub fn held_out_without(&self, columns: &[usize], moves: &[f64]) -> f64 {
+        let kept: Vec<usize> = (0..self.size()).filter(|k| !columns.contains(k)).collect();
+        let size = self.size() + 1;
+        let mut selection = DMatrix::zeros(size, kept.len() + 1);
+        for (new, &old) in kept.iter().enumerate() {
+            selection[(old, new)] = 1.0;
+        }
+        selection[(size - 1, kept.len())] = 1.0;
+        for (&column, change) in columns.iter().zip(moves) {
+            // The residual is measured less predicted.
+            selection[(column, kept.len())] = -change;
+        }
+        let blocks = self.blocks.iter().map(|block| Block {
+            coefficients: (0..kept.len()).collect(),
+            parts: block
+                .parts
+                .iter()
+                .map(|part| {
+                    PerChannel::from_fn(|channel| {
+                        selection.transpose() * &part[channel] * &selection
+                    })
+                })
+                .collect(),
+            counts: block.counts.clone(),
+        });
+        let without = Self {
+            blocks: blocks.collect(),
+            prior: kept.iter().map(|&k| self.prior[k]).collect(),
+        };
+        without.solve().held_out
+    }
+
     /// [`Gram::solution`] of one series.
     pub fn solve(&self) -> Linear {
         self.solution().parts.swap_remove(0)

@@ -20,6 +20,9 @@ pub(crate) mod search {
     pub const MOST_AT_FIRST: usize = 2;
     /// Most effects that each later search adds.
     pub const MOST: usize = 5;
+    /// Members from which on a set does not grow: what so many effects leave is of another kind, and
+    /// more of them only nibble at it. No source.
+    pub const MOST_MEMBERS: usize = 6;
     /// Searches after the first, each with the noise that the one before leaves.
     pub const ROUNDS: usize = 3;
     /// Most Gauss-Newton steps of a fit.
@@ -35,6 +38,9 @@ pub(crate) mod search {
     /// channel at the cost of the other stands in for something else, such as a low-pass for a
     /// gyroscope that is late.
     pub const MOST_RISE: f64 = 1.02;
+    /// Loss without a member, in units of its price, from which on no fit without it is made: one
+    /// linear step is not that far off. No source.
+    pub const SURE_PRICES: f64 = 5.0;
     /// And none that loses more than this, nats.
     pub const MOST_LOSS_NATS: f64 = 10.0;
 }

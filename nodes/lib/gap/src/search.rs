@@ -1,14 +1,14 @@
 //! The search for the smallest set of effects.
 
-use cromosim_imu::{Channel, EffectKind, EffectSet, Search};
+use cromosim_imu::{Channel, EffectKind, EffectSet, FirstGuess, Search};
 
 use crate::axes::{larger, sum_over_channels};
 use crate::fit::{Fit, FitModel, free_values};
 use crate::plausibility::{is_plausible, is_true_vibration};
 use crate::policy::price;
 use crate::policy::search::{
-    BEAM, EXCHANGES, MOST_LOSS_NATS, MOST_RISE, NEAR_BEST_NATS, PART_OF_BEST_PREDICTION, REFITS,
-    RIVALS,
+    BEAM, EXCHANGES, MOST_LOSS_NATS, MOST_MEMBERS, MOST_RISE, NEAR_BEST_NATS,
+    PART_OF_BEST_PREDICTION, REFITS, RIVALS, SURE_PRICES,
 };
 use crate::screen::{Candidate, screen, sharpen_change_point};
 use crate::trace::{names, trace};
@@ -95,6 +95,9 @@ pub(crate) fn search(
     let mut best = pruned(model, beam[0].clone());
     beam[0] = best.clone();
     for _ in 0..most {
+        if best.fit.set.len() >= MOST_MEMBERS {
+            break;
+        }
         let mut grown_sets: Vec<ScoredEffectSet> = Vec::new();
         for scored in &beam {
             grow(model, scored, library, &mut grown_sets);
@@ -174,6 +177,19 @@ fn grow(
     }
 }
 
+/// Whether an effect earns its place by so much that no fit without it is needed to see it: one
+/// linear step from its values to the neutral ones tells, where it begins at these.
+fn surely_earns_its_place(model: &FitModel, fit: &Fit, kind: EffectKind) -> bool {
+    let starts_neutral = matches!(
+        kind.spec().search,
+        Search::Fitted(search) if matches!(search.first_guess, FirstGuess::Neutral)
+    );
+    starts_neutral && {
+        let loss = fit.linear.held_out - fit.held_out_without(kind);
+        loss > SURE_PRICES * price_of_effect(model, kind)
+    }
+}
+
 /// Without the effects that do not earn their place beside the others.
 fn pruned(model: &FitModel, mut scored: ScoredEffectSet) -> ScoredEffectSet {
     loop {
@@ -181,6 +197,7 @@ fn pruned(model: &FitModel, mut scored: ScoredEffectSet) -> ScoredEffectSet {
             .fit
             .set
             .iter()
+            .filter(|effect| !surely_earns_its_place(model, &scored.fit, effect.kind()))
             .map(|effect| score(model, scored.fit.set.without(effect.kind())));
         let Some(best) = smaller.max_by(|a, b| a.score.total_cmp(&b.score)) else {
             return scored;
