@@ -217,6 +217,11 @@ fn settings_of_a_diagnosis() {
         &["diagnose", "good.mcap", "--out", "good.mcap/found"],
         &["good.mcap", "no folder"],
     );
+    refuses(
+        folder.path(),
+        &["diagnose", "good.mcap", "./good.mcap", "--out", "found"],
+        &["./good.mcap", "given twice"],
+    );
     // A folder in the place of a file: nothing is written, neither the other files nor temporary
     // ones.
     fs::create_dir_all(folder.path().join("taken/effects.yaml")).unwrap();

@@ -124,3 +124,37 @@ fn two_causes_are_found_on_one_of_two_placements_and_the_answer_is_the_same_each
     assert_eq!(only["placements"].as_object().unwrap().len(), 1);
     assert_eq!(only["placements"]["ankle"], found["placements"]["ankle"]);
 }
+
+/// Two sessions of one device: its lever arm is in both, each has a clock of its own, and a later
+/// recording is simulated with its session's.
+#[test]
+fn two_recordings_are_diagnosed_together() {
+    let folder = tempfile::tempdir().unwrap();
+    let late = |seconds: f64| format!("{LEVER_ARM}, {{effect: time_offset, seconds: {seconds}}}");
+    let (first, second) = (late(0.02), late(-0.03));
+    let of = |file: &str, seed, span, effects: &str| {
+        record(folder.path(), file, seed, span, &[("wrist", effects)]);
+    };
+    of("first.mcap", 1, (0.0, 40.0), &first);
+    of("check.mcap", 1, (50.0, 30.0), &first);
+    of("second.mcap", 7, (5000.0, 40.0), &second);
+    let files = ["first.mcap", "second.mcap"];
+    let said = succeed(
+        folder.path(),
+        &["diagnose", files[0], files[1], "--out", "found"],
+    );
+    let found = diagnosis(folder.path(), "found");
+    assert_eq!(
+        causes(&found, "wrist"),
+        set(&["lever_arm", "time_offset"]),
+        "{said}"
+    );
+    let report = fs::read_to_string(folder.path().join("found/report.html")).unwrap();
+    for (index, file) in files.into_iter().enumerate() {
+        let one = &found["placements"]["wrist"]["recordings"][index];
+        assert_eq!(one["recording"], file);
+        assert!(said.contains(&format!("{file}: ")), "{said}");
+        assert!(report.contains(&format!("<b>{file}</b>")));
+    }
+    promise_holds(folder.path(), "found", "check.mcap", "wrist");
+}

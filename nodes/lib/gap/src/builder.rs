@@ -173,14 +173,18 @@ impl<'a> DiagnosisBuilder<'a> {
     }
 
     /// The curves of the recording with the most to explain.
-    pub fn evidence(&self) -> Evidence {
+    pub fn evidence(&self, recordings: &[&str]) -> Evidence {
         let part = &self.parts[self.heaviest];
-        collect(
+        let curves = collect(
             part.findings,
             &part.simulations.comparison,
             &part.before_readings,
             &part.after_readings,
-        )
+        );
+        Evidence {
+            recording: recordings[self.heaviest].to_owned(),
+            ..curves
+        }
     }
 
     /// The variance that stays unexplained in each recording.

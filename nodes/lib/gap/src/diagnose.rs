@@ -115,7 +115,7 @@ fn answer(
     PlacementAnswer {
         diagnosis: builder.diagnosis(recordings),
         effects: simulated_effects(&findings, &unexplained),
-        evidence: builder.evidence(),
+        evidence: builder.evidence(recordings),
     }
 }
 

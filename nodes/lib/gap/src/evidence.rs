@@ -15,6 +15,8 @@ const SPECTRUM_S: f64 = 4.0;
 /// Curves of one placement. All series have one entry for each IMU message.
 #[derive(Clone, Debug, Default)]
 pub struct Evidence {
+    /// Of several recordings, the one that the curves are of: the one with the largest gap; else empty.
+    pub recording: String,
     /// Stamp of each message.
     pub stamps: Vec<Stamp>,
     /// Whether the reading was compared: false next to gaps in the reference, outside it, at
@@ -78,6 +80,7 @@ pub(crate) fn collect(
         units: PerChannel::from_fn(|channel| findings.reportable.unit_factor(channel)),
     };
     Evidence {
+        recording: String::new(),
         stamps: prepared.stamps.clone(),
         used: prepared
             .usable

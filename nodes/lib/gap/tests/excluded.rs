@@ -36,10 +36,22 @@ fn excluded_alone(kind: K, values: &[f64]) {
     let answer = excluded(kind, values);
     let diagnosis = &answer.diagnosis;
     assert_eq!(names(diagnosis), ["unknown"], "{}", diagnosis.verdict);
+    let applied: Vec<&str> = answer
+        .effects
+        .effects
+        .iter()
+        .map(|effect| effect.kind().name())
+        .collect();
+    let kept = diagnosis.calibration.iter();
+    let kept: Vec<&str> = kept.map(|kept| kept.effect.as_str()).collect();
+    assert_eq!(
+        applied, kept,
+        "a simulation takes over the plain calibration alone"
+    );
+    let (before, after) = (&diagnosis.gap.before, &diagnosis.gap.after);
     assert!(
-        answer.effects.effects.is_empty(),
-        "{:?}",
-        answer.effects.effects
+        after.accel_rmse <= 1.02 * before.accel_rmse && after.gyro_rmse <= 1.02 * before.gyro_rmse,
+        "{kept:?} make nothing worse: {before:?} to {after:?}"
     );
     let unknown = &diagnosis.causes[0];
     assert!(unknown.gap_share > 0.0);

@@ -6,6 +6,7 @@ mod figures;
 mod location;
 mod markup;
 mod page;
+mod recordings;
 mod state;
 #[cfg(test)]
 mod tests;

@@ -9,7 +9,7 @@ use cromosim_charts::{document, write_panels};
 use super::figures::{self, Window};
 use super::markup::change;
 use super::state::State;
-use super::{causes, location};
+use super::{causes, location, recordings};
 use crate::diagnosis::{Metrics, PlacementDiagnosis, UNKNOWN};
 use crate::evidence::Evidence;
 
@@ -84,6 +84,8 @@ fn write_placement(
     );
     page.push_str("<h3>Causes</h3>\n");
     causes::write_causes(page, placement);
+    recordings::write_calibration(page, placement);
+    recordings::write_recordings(page, placement);
     if let Some(evidence) = evidence.filter(|evidence| !evidence.stamps.is_empty()) {
         let window = figures::worst_window(evidence);
         write_curves(page, evidence, window);
@@ -118,8 +120,12 @@ fn legend(page: &mut String, entries: &[(&str, &str)]) {
 fn write_curves(page: &mut String, evidence: &Evidence, window: Window) {
     let _ = writeln!(
         page,
-        "<h3>Curves of the worst {} seconds</h3>",
-        trimmed(window.to - window.from, 2)
+        "<h3>Curves of the worst {} seconds{}</h3>",
+        trimmed(window.to - window.from, 2),
+        match evidence.recording.as_str() {
+            "" => String::new(),
+            recording => format!(", {}", escape(recording)),
+        }
     );
     let mut entries = vec![
         ("measured", "measured"),

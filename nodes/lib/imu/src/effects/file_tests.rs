@@ -13,7 +13,40 @@ placements:
       - {effect: gyro_g_sensitivity, matrix: [[0.001, 0.0, 0.0], [0.0, 0.0, 1.0e-9], [0.0, 0.0, 0.0]]}
       - {effect: gravity_convention, mode: removed}
     unexplained: {accel_variance: 0.0021, gyro_variance: 1.2e-5}
+    other_sessions:
+      - epoch: 1690000000.000000000
+        effects:
+          - {effect: lever_arm, offset: [0.05, 0.0, -0.06]}
+          - {effect: time_offset, seconds: 0.021}
+      - epoch: 1690009000.500000000
+        effects: []
 ";
+
+#[test]
+fn a_recording_takes_the_effects_of_its_session() {
+    let file = EffectsFile::parse(YAML, "effects.yaml").unwrap();
+    let wrist = &file.placements["wrist"];
+    let epoch_at = |seconds: i64| {
+        let start = Stamp::from_nanos(seconds * 1_000_000_000);
+        let own = wrist.in_session_of(start);
+        assert!(own.other_sessions.is_empty());
+        assert_eq!(own.unexplained, wrist.unexplained);
+        (own.epoch.nanos / 1_000_000_000, own.effects.len())
+    };
+    assert_eq!(
+        epoch_at(1_600_000_000),
+        (1_690_000_000, 2),
+        "before all of them: the first"
+    );
+    assert_eq!(
+        epoch_at(1_690_000_000),
+        (1_690_000_000, 2),
+        "at its very start"
+    );
+    assert_eq!(epoch_at(1_690_009_001), (1_690_009_000, 0));
+    assert_eq!(epoch_at(1_700_000_001), (1_700_000_000, 4));
+    assert_eq!(epoch_at(1_800_000_000), (1_700_000_000, 4));
+}
 
 fn refusal(text: &str) -> String {
     EffectsFile::parse(text, "effects.yaml")
