@@ -59,16 +59,24 @@ pub(crate) fn keep_calibrations(findings: &mut [Findings]) {
 }
 
 /// Calibrations that may be kept: all of the library beside something unknown, else those that were
-/// fitted; less those that are causes anyway.
+/// fitted; less those that are causes anyway. An offset of clocks beside an ordinary drift is that of
+/// this recording's middle: it says nothing of another recording, whose reference's clock begins anew.
 fn candidates(findings: &[Findings]) -> Vec<EffectKind> {
     let is_open = |kind: &EffectKind| {
         let is_named = findings.iter().any(|one| one.reportable.contains(*kind));
         let is_fitted =
             |one: &Findings| one.unknown.is_some() || one.scored.fit.set.contains(*kind);
-        is_calibration(*kind) && !is_named && findings.iter().any(is_fitted)
+        let is_of_drift = *kind == EffectKind::TimeOffset && findings.iter().any(drifts_ordinarily);
+        is_calibration(*kind) && !is_named && !is_of_drift && findings.iter().any(is_fitted)
     };
     let library = &findings[0].library;
     library.fitted().into_iter().filter(is_open).collect()
+}
+
+/// Whether clocks drift apart by no more than is ordinary.
+fn drifts_ordinarily(findings: &Findings) -> bool {
+    let drift = EffectKind::ClockDrift;
+    findings.scored.fit.set.contains(drift) && !findings.reportable.contains(drift)
 }
 
 /// The model whose noise covers what is left where something unknown is in it: else that pulls at
