@@ -152,6 +152,9 @@ pub(crate) mod unknown {
     pub const BAND: f64 = 12.0;
     /// Held-out gain of a regression, nats, likewise; without any effect none reached 0.
     pub const REGRESSION_NATS: f64 = 200.0;
+    /// Length of the recordings that [`REGRESSION_NATS`] was set on, s; in longer ones a regression has to
+    /// gain as much in each such stretch.
+    pub const USUAL_S: f64 = 60.0;
     /// Loudest two seconds against the median ones, where outliers are many.
     pub const BURST: f64 = 5.0;
     /// Share of values beyond five standard deviations that is many.

@@ -12,6 +12,7 @@ use crate::policy::probability::{MOST_UNKNOWN, NATS_PER_BAND, UNKNOWN_GAIN_NATS}
 use crate::policy::report::COARSE_STEPS;
 use crate::policy::unknown::{
     AXIS_SHARE, BAND, BURST, FROZEN, JITTER, OUTLIERS, REGRESSION_NATS, UNDONE_SMOOTHING_FACTOR,
+    USUAL_S,
 };
 use crate::prepared::PreparedPlacement;
 use crate::residual_regressions::{ResidualRegression, dependence_name, residual_regressions};
@@ -116,7 +117,8 @@ impl<'a> Structure<'a> {
         let strong: Vec<&ResidualRegression> = regressions
             .iter()
             .filter(|regression| {
-                regression.gain > REGRESSION_NATS * factor && !coarse(regression.channel)
+                let needed = REGRESSION_NATS * factor * longer_than_usual(findings);
+                regression.gain > needed && !coarse(regression.channel)
             })
             .collect();
         let noisy = |channel: Channel| {
@@ -194,6 +196,13 @@ impl<'a> Structure<'a> {
             .filter_map(EffectKind::read_off)
             .collect()
     }
+}
+
+/// Length of a recording over [`USUAL_S`], at least 1: what every model leaves gains in proportion to
+/// the time, however small it is.
+fn longer_than_usual(findings: &Findings) -> f64 {
+    let prepared = findings.model.prepared;
+    (prepared.length as f64 / prepared.rate_hz / USUAL_S).max(1.0)
 }
 
 impl ResidualDiagnostics {
