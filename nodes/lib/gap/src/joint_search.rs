@@ -7,7 +7,7 @@ use cromosim_imu::{Channel, Effect, EffectKind, EffectSet, Owner, PerChannel};
 
 use crate::fit::{Fit, FitModel};
 use crate::gauss_newton::fit_together;
-use crate::plausibility::{is_plausible, is_true_vibration};
+use crate::plausibility::is_sound;
 use crate::policy::price::LEAST_SHARE;
 use crate::policy::search::{FIT_STEPS, MOST_RISE};
 use crate::search::{ScoredEffectSet, excess, price_of_effect};
@@ -88,7 +88,7 @@ impl JointSearch<'_, '_> {
             .models
             .iter()
             .zip(&fits)
-            .all(|(model, fit)| is_plausible(&fit.set) && is_true_vibration(model, fit));
+            .all(|(model, fit)| is_sound(model, fit));
         let held_out: f64 = fits.iter().map(|fit| fit.linear.held_out).sum();
         let score = if is_sound {
             held_out - self.price(&fits)

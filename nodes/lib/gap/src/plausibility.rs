@@ -1,6 +1,6 @@
 //! Whether fitted effects look like what they are named after.
 
-use cromosim_imu::{Channel, EffectSet, PerChannel, Search, SpectralLine};
+use cromosim_imu::{Channel, EffectSet, PerChannel, Search, SpectralLine, Stage};
 use cromosim_spatial::Spectrum;
 
 use crate::fit::{Fit, FitModel};
@@ -9,19 +9,33 @@ use crate::policy::vibration::{
     SURROUNDINGS_HZ,
 };
 
+/// Whether fitted effects are what they are named after.
+pub(crate) fn is_sound(model: &FitModel, fit: &Fit) -> bool {
+    is_plausible(&fit.set)
+        && is_told_from_smoothing(model, &fit.set)
+        && is_true_vibration(model, fit)
+}
+
 /// Whether the fitted values are what such effects have: a filter that passes all motion, or a
 /// tissue stiffer than any, are no causes but the reference's own smoothing error in their disguise.
-pub(crate) fn is_plausible(set: &EffectSet) -> bool {
+fn is_plausible(set: &EffectSet) -> bool {
     set.iter().all(|effect| match effect.kind().spec().search {
         Search::Fitted(search) => (search.is_plausible)(effect, set),
         Search::Choice | Search::ReadOff(_) => true,
     })
 }
 
+/// Whether the set can be told from the shape of a smoothing of the reference that is undone: that is
+/// only guessed, and what is left of it looks like a tissue under the sensor.
+fn is_told_from_smoothing(model: &FitModel, set: &EffectSet) -> bool {
+    let mut stages = set.iter().map(|effect| effect.kind().spec().stage);
+    model.basis.undone_hz.is_none() || stages.all(|stage| stage != Stage::Tissue)
+}
+
 /// Whether a vibration in the set is more than motion that the reference does not resolve: strong
 /// against the white noise of a channel, faster than gait, a line there, and one sinusoid that takes
 /// most of the line away in each channel that has it.
-pub(crate) fn is_true_vibration(model: &FitModel, fit: &Fit) -> bool {
+fn is_true_vibration(model: &FitModel, fit: &Fit) -> bool {
     let Some((kind, line)) = fit
         .set
         .iter()

@@ -4,7 +4,7 @@ use cromosim_imu::{Channel, EffectKind, EffectSet, FirstGuess, Search};
 
 use crate::axes::{larger, sum_over_channels};
 use crate::fit::{Fit, FitModel, free_values};
-use crate::plausibility::{is_plausible, is_true_vibration};
+use crate::plausibility::is_sound;
 use crate::policy::price;
 use crate::policy::search::{
     BEAM, EXCHANGES, MOST_LOSS_NATS, MOST_MEMBERS, MOST_RISE, NEAR_BEST_NATS,
@@ -53,8 +53,7 @@ pub(crate) fn price_of_effect(model: &FitModel, kind: EffectKind) -> f64 {
 /// from.
 pub(crate) fn score(model: &FitModel, set: EffectSet) -> ScoredEffectSet {
     let fit = sharpen_change_point(model, model.fit(set));
-    let is_sound = is_plausible(&fit.set) && is_true_vibration(model, &fit);
-    let score = if is_sound {
+    let score = if is_sound(model, &fit) {
         fit.linear.held_out - price_of(model, &fit.set)
     } else {
         f64::NEG_INFINITY

@@ -153,5 +153,6 @@ fn comes_closer(model: &FitModel, plain: &ScoredEffectSet, undone: &ScoredEffect
     };
     let (undone, plain) = (norms(undone), norms(plain));
     let ratio = PerChannel::from_fn(|channel| undone[channel] / plain[channel].max(1e-30));
+    trace(|| eprintln!("  smoothing comes closer by {ratio:.3?}"));
     smaller(ratio) < CLOSER && larger(ratio) < NOT_FARTHER
 }
