@@ -9,14 +9,14 @@ use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use cromosim_body::BodyModel;
 use cromosim_gap::{
-    DiagnoseOptions, Diagnosis, Evidence, PlacementAnswer, PlacementDiagnosis, SCHEMA,
+    DiagnoseOptions, Diagnosis, Evidence, OfRecording, PlacementAnswer, PlacementDiagnosis, SCHEMA,
 };
 use cromosim_imu::{EffectKind, EffectsFile};
 use rayon::prelude::*;
 use serde::Deserialize;
 use serde_json::Value;
 
-use crate::diagnose_recordings::{OneRecording, Selected, file_names, select};
+use crate::diagnose_recordings::{OneRecording, Selected, file_names, of_recording, select};
 use crate::progress::{self, Interrupt};
 
 /// The files in DIR.
@@ -155,27 +155,16 @@ fn diagnose_placement(
     recorded: &[OneRecording],
     options: &DiagnoseOptions,
 ) -> Result<(PlacementAnswer, Vec<String>), String> {
-    if let [alone] = recorded {
-        return match cromosim_gap::diagnose(&alone.placement.record(), options) {
-            Ok(answer) => Ok((answer, Vec::new())),
-            Err(error) => Err(error.to_string()),
-        };
-    }
     let records: Vec<_> = recorded.iter().map(|one| one.placement.record()).collect();
     let named: Vec<_> = recorded
         .iter()
         .map(|one| one.file.as_str())
         .zip(&records)
         .collect();
+    let text = |(file, error): &OfRecording| of_recording(file, &error.to_string());
     match cromosim_gap::diagnose_together(&named, options) {
-        Ok((answer, errors)) => Ok((
-            answer,
-            errors
-                .iter()
-                .map(|(file, error)| format!("{file}: {error}"))
-                .collect(),
-        )),
-        Err((file, error)) => Err(format!("{file}: {error}")),
+        Ok((answer, errors)) => Ok((answer, errors.iter().map(text).collect())),
+        Err(error) => Err(text(&error)),
     }
 }
 

@@ -11,7 +11,7 @@ use cromosim_recording::{RecordedPlacement, read_placements};
 
 /// A placement in one recording.
 pub struct OneRecording {
-    /// Name of the file.
+    /// Name of the file among several; empty where there is one alone.
     pub file: String,
     /// What it holds of the placement.
     pub placement: RecordedPlacement,
@@ -48,6 +48,15 @@ pub fn file_names(files: &[PathBuf]) -> Vec<String> {
     files.iter().map(name).collect()
 }
 
+/// What is said of a recording, with its name where it has one.
+pub fn of_recording(file: &str, text: &str) -> String {
+    if file.is_empty() {
+        text.to_owned()
+    } else {
+        format!("{file}: {text}")
+    }
+}
+
 /// The placements of the recordings, or only those of a list.
 pub fn select(
     files: &[PathBuf],
@@ -57,14 +66,9 @@ pub fn select(
     refuse_twice(files)?;
     let mut selected = Selected::default();
     let mut known: Vec<String> = Vec::new();
-    for (path, file) in files.iter().zip(file_names(files)) {
-        let of_file = |text: String| {
-            if files.len() > 1 {
-                format!("{file}: {text}")
-            } else {
-                text
-            }
-        };
+    for (path, name) in files.iter().zip(file_names(files)) {
+        let file = if files.len() > 1 { name } else { String::new() };
+        let of_file = |text: String| of_recording(&file, &text);
         for (name, placement) in read_placements(&BagReader::open(path)?, body)? {
             known.push(name.clone());
             if !only.is_empty() && !only.contains(&name) {

@@ -5,8 +5,8 @@ use cromosim_imu::{Effect, EffectKind, EffectSet, ReadOff};
 use crate::confounding::is_calibration;
 use crate::findings::Findings;
 use crate::fit::FitModel;
-use crate::library::{Library, without_all};
-use crate::noise_updates::{first_model, with_updated_noise};
+use crate::library::Library;
+use crate::noise_updates::{first_model, with_rest_as_noise, with_updated_noise};
 use crate::policy::report::MOSTLY_EXPLAINED;
 use crate::policy::search::{MOST, MOST_AT_FIRST, ROUNDS};
 use crate::reportable::{Observations, is_ordinary, reportable_effects};
@@ -15,7 +15,6 @@ use crate::sensor_noise::{found_noise, is_white};
 use crate::session::Session;
 use crate::smoothing::try_smoothing;
 use crate::trace::{names, trace};
-use crate::unknown::{Suspects, detect_unmodelled_structure};
 
 /// The analysis of one recording with a library of effects.
 pub(crate) struct Analysis<'a> {
@@ -24,22 +23,6 @@ pub(crate) struct Analysis<'a> {
 }
 
 impl<'a> Analysis<'a> {
-    /// From the start to what was found, all by itself.
-    pub fn run(&self) -> Findings<'a> {
-        let (model, scored) = self.best_set();
-        let mut findings = self.findings(model, scored);
-        for suspects in [Suspects::AllButCalibrations, Suspects::All] {
-            findings.unknown = detect_unmodelled_structure(&findings, suspects);
-            let Some(unknown) = &findings.unknown else {
-                break;
-            };
-            let confounded = unknown.confounded_effects.clone();
-            remove_confounded_effects(&mut findings, &confounded);
-        }
-        refit_beside_unknown(&mut findings, &self.library.fitted());
-        findings
-    }
-
     /// The smallest set of effects, and the model of the noise that it was found with.
     pub fn best_set(&self) -> (FitModel<'a>, ScoredEffectSet) {
         let fitted = self.library.fitted();
@@ -121,43 +104,22 @@ impl<'a> Analysis<'a> {
     }
 }
 
-/// Takes out the effects that only pass for what is unknown, and fits the others again.
-fn remove_confounded_effects(findings: &mut Findings, confounded: &[EffectKind]) {
-    findings.reportable = without_all(&findings.reportable, confounded);
-    let fitted = without_all(&findings.scored.fit.set, confounded);
-    if fitted == findings.scored.fit.set {
-        return;
-    }
-    let margins = std::mem::take(&mut findings.scored.margins);
-    findings.scored = ScoredEffectSet {
-        margins,
-        ..score(&findings.model, fitted)
-    };
-    findings.take_fitted_values();
-}
-
 /// Fits once more, each frequency in units of what is left there: else what is unexplained pulls at
 /// the values. Calibrations that help then are taken up.
-fn refit_beside_unknown(findings: &mut Findings, fitted: &[EffectKind]) {
+pub(crate) fn refit_beside_unknown(findings: &mut Findings) {
     let Some(unknown) = &findings.unknown else {
         return;
     };
     if !findings.is_mostly_explained {
         return;
     }
-    let calibrations: Vec<EffectKind> = fitted
-        .iter()
-        .copied()
+    let calibrations: Vec<EffectKind> = findings
+        .library
+        .fitted()
+        .into_iter()
         .filter(|kind| is_calibration(*kind) && !unknown.confounded_effects.contains(kind))
         .collect();
-    let prepared = findings.model.prepared;
-    let residual = prepared.residual(&findings.scored.fit.prediction.readings);
-    let model = FitModel::new(
-        prepared,
-        findings.model.track.clone(),
-        findings.model.basis.clone(),
-        findings.model.noise.covering(prepared, &residual),
-    );
+    let model = with_rest_as_noise(&findings.model, &findings.scored);
     let set = &findings.scored.fit.set;
     let most = EffectKind::ALL
         .into_iter()

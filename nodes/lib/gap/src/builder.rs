@@ -10,6 +10,7 @@ use crate::diagnosis::{
 };
 use crate::evidence::{Evidence, collect};
 use crate::findings::{Findings, Unknown};
+use crate::fit::Fit;
 use crate::identify::unidentifiable;
 use crate::location::locate;
 use crate::probability::probability_of;
@@ -86,10 +87,8 @@ impl<'a> Part<'a> {
 
     /// Of the reported effects, those of some kinds.
     fn only(&self, kinds: &[EffectKind]) -> EffectSet {
-        let reported = self.findings.reportable.iter();
-        reported
-            .filter(|effect| kinds.contains(&effect.kind()))
-            .fold(EffectSet::new(), |set, effect| set.with(effect.clone()))
+        let reported = &self.findings.reportable;
+        reported.filtered(|effect| kinds.contains(&effect.kind()))
     }
 
     fn under(&self, set: &EffectSet) -> Metrics {
@@ -97,9 +96,9 @@ impl<'a> Part<'a> {
             .metrics(set, &self.simulations.simulate(set))
     }
 
-    /// Values and standard errors of an effect, by the names of its parameters.
-    fn values(&self, effect: &Effect) -> [BTreeMap<String, serde_json::Value>; 2] {
-        let errors = self.findings.scored.fit.standard_errors(effect);
+    /// Values of an effect and their standard errors in a fit, by the names of its parameters.
+    fn values(&self, effect: &Effect, fit: &Fit) -> [BTreeMap<String, serde_json::Value>; 2] {
+        let errors = fit.standard_errors(effect);
         let rate_hz = self.simulations.whole.rate_hz;
         let kind = effect.kind();
         [
@@ -231,7 +230,7 @@ impl<'a> DiagnosisBuilder<'a> {
             above.push(kind);
             let after = self.pooled(|part| part.under(&part.only(&above)));
             causes.extend(self.last(kind).map(|(part, effect)| {
-                let [parameters, standard_errors] = part.values(effect);
+                let [parameters, standard_errors] = part.values(effect, &part.findings.scored.fit);
                 Cause {
                     effect: kind.name().to_owned(),
                     probability: self.probability(kind),
@@ -271,17 +270,17 @@ impl<'a> DiagnosisBuilder<'a> {
 
     /// What is kept beside the causes, as the last recording has it.
     fn calibration(&self) -> Vec<KeptCalibration> {
-        let Some(part) = self.parts.last() else {
+        let last = self.parts.last();
+        let Some((part, fit)) = last.and_then(|part| Some((part, part.findings.kept.as_ref()?)))
+        else {
             return Vec::new();
         };
-        let rate_hz = part.simulations.whole.rate_hz;
         let described_one = |effect: &Effect| {
-            let fit = part.findings.kept.as_ref();
-            let errors = fit.map_or_else(Vec::new, |fit| fit.standard_errors(effect));
+            let [parameters, standard_errors] = part.values(effect, fit);
             KeptCalibration {
                 effect: effect.kind().name().to_owned(),
-                parameters: described(effect.kind(), effect.values()),
-                standard_errors: described_errors(effect.kind(), &errors, rate_hz),
+                parameters,
+                standard_errors,
             }
         };
         let kept = part.findings.kept_calibrations();
@@ -305,7 +304,7 @@ impl<'a> DiagnosisBuilder<'a> {
             .reportable
             .iter()
             .map(|effect| {
-                let [parameters, standard_errors] = part.values(effect);
+                let [parameters, standard_errors] = part.values(effect, &part.findings.scored.fit);
                 RecordingCause {
                     effect: effect.kind().name().to_owned(),
                     parameters,

@@ -1,15 +1,16 @@
 //! The plain calibration (clock, mount, lever arm, biases): a simulation takes it over wherever it
 //! helps, whether it is named as a cause or not.
 
-use cromosim_imu::{Channel, Effect, EffectKind, EffectSet, PerChannel, Search};
+use cromosim_imu::{Effect, EffectKind, EffectSet, Search};
 
 use crate::confounding::is_calibration;
 use crate::findings::Findings;
 use crate::fit::{Fit, FitModel};
 use crate::gauss_newton::fit_together;
+use crate::noise_updates::with_rest_as_noise;
 use crate::policy::calibration::MOST_RISE;
 use crate::policy::search::FIT_STEPS;
-use crate::search::price_of_effect;
+use crate::search::{price_of_effect, rises};
 use crate::trace::{names, trace};
 
 /// Adds to each recording the calibrations that are no causes, but lower the gap on time that they
@@ -19,7 +20,7 @@ pub(crate) fn keep_calibrations(findings: &mut [Findings]) {
     if candidates.is_empty() {
         return;
     }
-    let models: Vec<FitModel> = findings.iter().map(beside_the_rest).collect();
+    let models: Vec<FitModel> = findings.iter().map(model_of).collect();
     let models: Vec<&FitModel> = models.iter().collect();
     let is_free = |kind: EffectKind| candidates.contains(&kind);
     let fitted = |sets: Vec<EffectSet>| fit_together(&models, sets, FIT_STEPS, is_free);
@@ -38,7 +39,7 @@ pub(crate) fn keep_calibrations(findings: &mut [Findings]) {
         let next = left
             .iter()
             .map(with)
-            .filter(|(gain, _, fits)| *gain > 0.0 && lowers(&models, &best, fits))
+            .filter(|(gain, _, fits)| *gain > 0.0 && !rises(&models, &best, fits, MOST_RISE))
             .max_by(|a, b| a.0.total_cmp(&b.0));
         let Some((_, kind, fits)) = next else {
             break;
@@ -79,46 +80,21 @@ fn drifts_ordinarily(findings: &Findings) -> bool {
     findings.scored.fit.set.contains(drift) && !findings.reportable.contains(drift)
 }
 
-/// The model whose noise covers what is left where something unknown is in it: else that pulls at
-/// the values, and its size passes for evidence.
-fn beside_the_rest<'a>(findings: &Findings<'a>) -> FitModel<'a> {
-    let model = &findings.model;
-    if findings.unknown.is_none() {
-        return model.clone();
+/// Something unknown counts as noise: else it pulls at the values, and its size passes for evidence.
+fn model_of<'a>(findings: &Findings<'a>) -> FitModel<'a> {
+    match &findings.unknown {
+        Some(_) => with_rest_as_noise(&findings.model, &findings.scored),
+        None => findings.model.clone(),
     }
-    let prepared = model.prepared;
-    let residual = prepared.residual(&findings.scored.fit.prediction.readings);
-    FitModel::new(
-        prepared,
-        model.track.clone(),
-        model.basis.clone(),
-        model.noise.covering(prepared, &residual),
-    )
 }
 
 /// The causes that the forward model of the fits knows.
 fn named_and_fitted(findings: &Findings) -> EffectSet {
-    let named = findings.reportable.iter();
-    named
-        .filter(|effect| !matches!(effect.kind().spec().search, Search::ReadOff(_)))
-        .fold(EffectSet::new(), |set, effect| set.with(effect.clone()))
+    findings
+        .reportable
+        .filtered(|effect| !matches!(effect.kind().spec().search, Search::ReadOff(_)))
 }
 
 fn held_out(fits: &[Fit]) -> f64 {
     fits.iter().map(|fit| fit.linear.held_out).sum()
-}
-
-/// Whether no channel's residual rises from one fit to the other, over all recordings.
-fn lowers(models: &[&FitModel], from: &[Fit], to: &[Fit]) -> bool {
-    let squares = |fits: &[Fit]| {
-        let pairs = models.iter().zip(fits);
-        pairs.fold(PerChannel::<f64>::default(), |sum, (model, fit)| {
-            let norms = model.prepared.residual_norms(&fit.prediction.readings);
-            PerChannel::from_fn(|channel| sum[channel] + norms[channel].powi(2))
-        })
-    };
-    let (before, after) = (squares(from), squares(to));
-    Channel::ALL
-        .into_iter()
-        .all(|channel| after[channel] <= MOST_RISE.powi(2) * before[channel])
 }

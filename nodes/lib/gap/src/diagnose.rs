@@ -44,9 +44,10 @@ pub fn diagnose(
     record: &PlacementRecord,
     options: &DiagnoseOptions,
 ) -> Result<PlacementAnswer, GapError> {
-    let library = Library::without(&options.excluded);
-    let session = Session::new(record, &library, None)?;
-    Ok(answer(&[session], &[""], &library, options.seed))
+    match diagnose_together(&[("", record)], options) {
+        Ok((answer, _)) => Ok(answer),
+        Err((_, error)) => Err(error),
+    }
 }
 
 /// A recording's name, and what is wrong with it.

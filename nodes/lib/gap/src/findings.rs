@@ -46,48 +46,34 @@ pub(crate) struct Unknown {
 impl Findings<'_> {
     /// The calibrations that are no causes, but are taken over all the same.
     pub fn kept_calibrations(&self) -> EffectSet {
-        let fitted = self.kept.iter().flat_map(|fit| fit.set.iter());
-        fitted
-            .filter(|effect| !self.reportable.contains(effect.kind()))
-            .fold(EffectSet::new(), |set, effect| set.with(effect.clone()))
+        self.kept.as_ref().map_or_else(EffectSet::new, |fit| {
+            fit.set
+                .filtered(|effect| !self.reportable.contains(effect.kind()))
+        })
     }
 
     /// All that a simulation takes over: causes and calibrations.
     pub fn applied(&self) -> EffectSet {
-        let kept = self.kept_calibrations();
-        kept.iter().fold(self.reportable.clone(), |set, effect| {
-            set.with(effect.clone())
-        })
+        let mut set = self.reportable.clone();
+        set.extend(&self.kept_calibrations());
+        set
     }
 
     /// The same with the values that a fit to all parts of time but one has.
     pub fn applied_excluding_fold(&self, fold: usize) -> EffectSet {
-        let mut set = self.applied();
-        let named = self.scored.fit.excluding_fold(fold);
-        let kept = self.kept.as_ref().map(|fit| fit.excluding_fold(fold));
-        for kind in EffectKind::ALL {
-            if !set.contains(kind) {
-                continue;
-            }
-            let values = if self.reportable.contains(kind) {
-                named.get(kind)
-            } else {
-                kept.as_ref().and_then(|kept| kept.get(kind))
-            };
-            if let Some(effect) = values {
-                set.insert(effect.clone());
-            }
+        let mut kept = self.kept_calibrations();
+        if let Some(fit) = &self.kept {
+            kept.take_values_of(&fit.excluding_fold(fold));
         }
+        let mut set = self.reportable.clone();
+        set.take_values_of(&self.scored.fit.excluding_fold(fold));
+        set.extend(&kept);
         set
     }
 
     /// Brings the reported effects to the values of the fit.
     pub fn take_fitted_values(&mut self) {
-        for effect in self.scored.fit.set.iter() {
-            if self.reportable.contains(effect.kind()) {
-                self.reportable.insert(effect.clone());
-            }
-        }
+        self.reportable.take_values_of(&self.scored.fit.set);
     }
 
     /// Declared white noise per sample in SI units; where unknown, the found one counts as

@@ -3,14 +3,14 @@
 
 use std::collections::BTreeSet;
 
-use cromosim_imu::{Channel, Effect, EffectKind, EffectSet, Owner, PerChannel};
+use cromosim_imu::{Effect, EffectKind, EffectSet, Owner};
 
 use crate::fit::{Fit, FitModel};
 use crate::gauss_newton::fit_together;
 use crate::plausibility::is_sound;
 use crate::policy::price::LEAST_SHARE;
 use crate::policy::search::{FIT_STEPS, MOST_RISE};
-use crate::search::{ScoredEffectSet, excess, price_of_effect};
+use crate::search::{ScoredEffectSet, excess, price_of_effect, rises};
 use crate::trace::{names, trace};
 
 /// A member of the sets of several recordings.
@@ -45,22 +45,32 @@ pub(crate) fn search_together(
     let search = JointSearch {
         models: models.iter().collect(),
     };
+    if let [alone] = found {
+        return vec![alone.clone()];
+    }
+    let pruned_with = |device: &EffectSet| {
+        let with_own = |found: &ScoredEffectSet| {
+            let mut set = owned_by(Owner::Session, &found.fit.set);
+            set.extend(device);
+            set
+        };
+        search.pruned(search.scored(found.iter().map(with_own).collect()))
+    };
     let mut devices: Vec<EffectSet> = vec![of_device_in_any(found)];
-    for alone in found.iter().map(|found| of_device(&found.fit.set)) {
+    let (mut best, mut margins) = pruned_with(&devices[0]);
+    for found in found {
+        let alone = owned_by(Owner::Device, &found.fit.set);
         if devices.iter().all(|other| names(other) != names(&alone)) {
+            let other = pruned_with(&alone);
+            if other.0.score >= best.score {
+                (best, margins) = other;
+            }
             devices.push(alone);
         }
     }
-    let starts = devices.iter().map(|device| {
-        let with_own = |found: &ScoredEffectSet| merged(device, &of_session(&found.fit.set));
-        search.scored(found.iter().map(with_own).collect())
-    });
-    let (mut best, _) = starts
-        .map(|start| search.pruned(start))
-        .max_by(|a, b| a.0.score.total_cmp(&b.0.score))
-        .unwrap_or_else(|| search.pruned(search.scored(vec![EffectSet::new(); models.len()])));
-    best = search.with_effects_of_other_sessions(best);
-    let (best, margins) = search.pruned(best);
+    if let Some(better) = search.with_effects_of_other_sessions(&best) {
+        (best, margins) = search.pruned(better);
+    }
     let with_margins = |(session, fit): (usize, Fit)| ScoredEffectSet {
         fit,
         score: best.score,
@@ -121,6 +131,8 @@ impl JointSearch<'_, '_> {
             let without = |member: &Member| self.scored(sets_without(&now.fits, *member));
             let members = members(&now.fits);
             let smaller: Vec<JointFit> = members.iter().map(without).collect();
+            let does_harm =
+                |smaller: &JointFit| rises(&self.models, &smaller.fits, &now.fits, MOST_RISE);
             let best = smaller
                 .iter()
                 .enumerate()
@@ -128,7 +140,7 @@ impl JointSearch<'_, '_> {
             let worst_member = best
                 .filter(|(_, best)| best.score >= now.score)
                 .map(|(index, _)| index)
-                .or_else(|| smaller.iter().position(|smaller| self.rises(smaller, &now)));
+                .or_else(|| smaller.iter().position(does_harm));
             match worst_member {
                 Some(index) => now = smaller.into_iter().nth(index).unwrap_or(now),
                 None => {
@@ -141,57 +153,46 @@ impl JointSearch<'_, '_> {
         }
     }
 
-    /// What one session shows of its own may be in the others too, too weak to be found there alone.
-    fn with_effects_of_other_sessions(&self, mut now: JointFit) -> JointFit {
+    /// What one session shows of its own may be in the others too, too weak to be found there alone;
+    /// none where nothing is gained.
+    fn with_effects_of_other_sessions(&self, now: &JointFit) -> Option<JointFit> {
+        let mut better: Option<JointFit> = None;
         loop {
-            let left: f64 = self
-                .models
-                .iter()
-                .zip(&now.fits)
-                .map(|(model, fit)| excess(model, fit))
-                .sum();
-            let of_sessions: BTreeSet<EffectKind> = members(&now.fits)
-                .into_iter()
-                .filter_map(|member| match member {
-                    Member::Device(_) => None,
-                    Member::Session(_, kind) => Some(kind),
-                })
-                .collect();
-            let mut best: Option<JointFit> = None;
-            for session in 0..self.models.len() {
-                for &kind in &of_sessions {
-                    if now.fits[session].set.contains(kind) {
-                        continue;
-                    }
-                    let mut sets: Vec<EffectSet> =
-                        now.fits.iter().map(|fit| fit.set.clone()).collect();
-                    sets[session].insert(Effect::neutral(kind));
-                    let grown = self.scored(sets);
-                    if best.as_ref().is_none_or(|best| grown.score > best.score) {
-                        best = Some(grown);
-                    }
-                }
-            }
-            match best.filter(|best| best.score > now.score + LEAST_SHARE * left) {
-                Some(better) => now = better,
-                None => return now,
+            let now = better.as_ref().unwrap_or(now);
+            let pairs = self.models.iter().zip(&now.fits);
+            let left: f64 = pairs.map(|(model, fit)| excess(model, fit)).sum();
+            let best = self
+                .grown(now)
+                .max_by(|a, b| a.score.total_cmp(&b.score))
+                .filter(|best| best.score > now.score + LEAST_SHARE * left);
+            match best {
+                Some(best) => better = Some(best),
+                None => return better,
             }
         }
     }
 
-    /// Whether the residual of a channel, over all recordings, rises from one to the other.
-    fn rises(&self, from: &JointFit, to: &JointFit) -> bool {
-        let squares = |joint: &JointFit| {
-            let pairs = self.models.iter().zip(&joint.fits);
-            pairs.fold(PerChannel::<f64>::default(), |sum, (model, fit)| {
-                let norms = model.prepared.residual_norms(&fit.prediction.readings);
-                PerChannel::from_fn(|channel| sum[channel] + norms[channel].powi(2))
-            })
-        };
-        let (before, after) = (squares(from), squares(to));
-        Channel::ALL
+    /// The sets with one more effect in one session, of the kinds that other sessions have.
+    fn grown(&self, now: &JointFit) -> impl Iterator<Item = JointFit> {
+        let kinds: BTreeSet<EffectKind> = members(&now.fits)
             .into_iter()
-            .any(|channel| after[channel] > MOST_RISE.powi(2) * before[channel])
+            .filter_map(|member| match member {
+                Member::Device(_) => None,
+                Member::Session(_, kind) => Some(kind),
+            })
+            .collect();
+        let sessions = 0..self.models.len();
+        let places = sessions.flat_map(move |session| {
+            let kinds = kinds.clone().into_iter();
+            kinds.map(move |kind| (session, kind))
+        });
+        places
+            .filter(|(session, kind)| !now.fits[*session].set.contains(*kind))
+            .map(|(session, kind)| {
+                let mut sets: Vec<EffectSet> = now.fits.iter().map(|fit| fit.set.clone()).collect();
+                sets[session].insert(Effect::neutral(kind));
+                self.scored(sets)
+            })
     }
 }
 
@@ -218,27 +219,9 @@ fn sets_without(fits: &[Fit], member: Member) -> Vec<EffectSet> {
     fits.iter().enumerate().map(of).collect()
 }
 
-/// The effects of a set that are the device's.
-pub(crate) fn of_device(set: &EffectSet) -> EffectSet {
-    owned(set, Owner::Device)
-}
-
-/// The effects of a set that are the session's.
-fn of_session(set: &EffectSet) -> EffectSet {
-    owned(set, Owner::Session)
-}
-
-fn owned(set: &EffectSet, owner: Owner) -> EffectSet {
-    set.iter()
-        .filter(|effect| effect.kind().spec().owner == owner)
-        .fold(EffectSet::new(), |set, effect| set.with(effect.clone()))
-}
-
-/// Both sets; of a kind in both, the effect of `first`.
-pub(crate) fn merged(first: &EffectSet, second: &EffectSet) -> EffectSet {
-    first
-        .iter()
-        .fold(second.clone(), |set, effect| set.with(effect.clone()))
+/// The effects of a set that are the device's, or the session's.
+pub(crate) fn owned_by(owner: Owner, set: &EffectSet) -> EffectSet {
+    set.filtered(|effect| effect.kind().spec().owner == owner)
 }
 
 /// The device's effects of all recordings; of several the one with the largest margin.

@@ -43,7 +43,5 @@ impl Library {
 
 /// A set less several effects.
 pub(crate) fn without_all(set: &EffectSet, kinds: &[EffectKind]) -> EffectSet {
-    kinds
-        .iter()
-        .fold(set.clone(), |set, kind| set.without(*kind))
+    set.filtered(|effect| !kinds.contains(&effect.kind()))
 }

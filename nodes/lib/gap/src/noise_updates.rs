@@ -72,6 +72,21 @@ pub(crate) fn with_updated_noise<'a>(
     FitModel::new(prepared, model.track.clone(), basis, noise)
 }
 
+/// The model whose noise covers what a fitted set leaves, frequency by frequency.
+pub(crate) fn with_rest_as_noise<'a>(
+    model: &FitModel<'a>,
+    scored: &ScoredEffectSet,
+) -> FitModel<'a> {
+    let prepared = model.prepared;
+    let residual = prepared.residual(&scored.fit.prediction.readings);
+    FitModel::new(
+        prepared,
+        model.track.clone(),
+        model.basis.clone(),
+        model.noise.covering(prepared, &residual),
+    )
+}
+
 /// Shares of a reference's noise densities that an ordinary reference has.
 pub(crate) fn ordinary_share(found: PoseNoise) -> ReferenceShare {
     let share = |ordinary: f64, found: f64| (ordinary / found.max(1e-12)).powi(2).min(1.0);

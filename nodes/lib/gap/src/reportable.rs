@@ -33,12 +33,9 @@ pub(crate) fn reportable_effects(
     observations: &Observations,
     library: &Library,
 ) -> EffectSet {
-    let mut set = EffectSet::new();
-    for effect in fitted {
-        if !is_ordinary(effect, ordinary_factor(model)) && !is_rounding(effect, model) {
-            set.insert(effect.clone());
-        }
-    }
+    let mut set = fitted.filtered(|effect| {
+        !is_ordinary(effect, ordinary_factor(model)) && !is_rounding(effect, model)
+    });
     for kind in EffectKind::ALL {
         let Search::ReadOff(search) = kind.spec().search else {
             continue;

@@ -60,9 +60,8 @@ fn candidate(model: &FitModel, fit: &Fit, starts: &[Effect]) -> Candidate {
     let are_neutral = starts
         .iter()
         .all(|start| *start == Effect::neutral(start.kind()));
-    let set = starts
-        .iter()
-        .fold(fit.set.clone(), |set, start| set.with(start.clone()));
+    let mut set = fit.set.clone();
+    set.extend(starts);
     let prior: Vec<f64> = kinds().flat_map(prior_weights).collect();
     let columns = |prediction: &Prediction| -> Vec<Vec<f64>> {
         kinds()

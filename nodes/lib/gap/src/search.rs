@@ -1,6 +1,6 @@
 //! The search for the smallest set of effects.
 
-use cromosim_imu::{Channel, EffectKind, EffectSet, FirstGuess, Search};
+use cromosim_imu::{Channel, EffectKind, EffectSet, FirstGuess, PerChannel, Search};
 
 use crate::axes::{larger, sum_over_channels};
 use crate::fit::{Fit, FitModel, free_values};
@@ -229,7 +229,8 @@ pub(crate) fn exchanged(
             scored.margins.push((kind, scored.score - rival_score));
             let best_score = best.as_ref().map_or(scored.score, |best| best.score);
             best = rival.filter(|rival| rival.score > best_score).or(best);
-            if rises(model, &smaller.fit, &scored.fit) {
+            let [from, to] = [&smaller.fit, &scored.fit].map(std::slice::from_ref);
+            if rises(&[model], from, to, MOST_RISE) {
                 without_harm = Some(smaller);
             }
         }
@@ -268,13 +269,20 @@ fn best_rival(
         .max_by(|a, b| a.score.total_cmp(&b.score))
 }
 
-/// Whether the residual of a channel rises from one fit to another.
-fn rises(model: &FitModel, from: &Fit, to: &Fit) -> bool {
-    let norms = |fit: &Fit| model.prepared.residual_norms(&fit.prediction.readings);
-    let (before, after) = (norms(from), norms(to));
+/// Whether the norm of a channel's residual, over all recordings, rises by more than a factor from some
+/// fits to others.
+pub(crate) fn rises(models: &[&FitModel], from: &[Fit], to: &[Fit], most: f64) -> bool {
+    let squares = |fits: &[Fit]| {
+        let pairs = models.iter().zip(fits);
+        pairs.fold(PerChannel::<f64>::default(), |sum, (model, fit)| {
+            let norms = model.prepared.residual_norms(&fit.prediction.readings);
+            PerChannel::from_fn(|channel| sum[channel] + norms[channel].powi(2))
+        })
+    };
+    let (before, after) = (squares(from), squares(to));
     Channel::ALL
         .into_iter()
-        .any(|channel| after[channel] > MOST_RISE * before[channel])
+        .any(|channel| after[channel] > most.powi(2) * before[channel])
 }
 
 fn sort(scored_sets: &mut [ScoredEffectSet]) {

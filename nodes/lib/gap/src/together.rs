@@ -2,14 +2,15 @@
 
 use cromosim_imu::{Effect, EffectKind, EffectSet, Owner};
 
-use crate::analysis::Analysis;
+use crate::analysis::{Analysis, refit_beside_unknown};
 use crate::calibration::keep_calibrations;
 use crate::findings::Findings;
 use crate::fit::FitModel;
 use crate::gauss_newton::fit_together;
-use crate::joint_search::search_together;
+use crate::joint_search::{owned_by, search_together};
 use crate::library::{Library, without_all};
 use crate::policy::search::FIT_STEPS;
+use crate::screen::sharpen_change_point;
 use crate::session::Session;
 use crate::unknown::{Suspects, detect_unmodelled_structure};
 
@@ -19,11 +20,6 @@ pub(crate) fn analysed<'a>(sessions: &'a [Session], library: &'a Library) -> Vec
         .iter()
         .map(|session| Analysis { session, library })
         .collect();
-    if let [alone] = analyses.as_slice() {
-        let mut findings = vec![alone.run()];
-        keep_calibrations(&mut findings);
-        return findings;
-    }
     let (models, found): (Vec<_>, Vec<_>) = analyses.iter().map(Analysis::best_set).unzip();
     let best = search_together(&models, &found);
     let mut findings: Vec<Findings> = analyses
@@ -33,6 +29,9 @@ pub(crate) fn analysed<'a>(sessions: &'a [Session], library: &'a Library) -> Vec
         .collect();
     agree_on_device(&mut findings);
     judge_rest(&mut findings);
+    if let [alone] = findings.as_mut_slice() {
+        refit_beside_unknown(alone);
+    }
     keep_calibrations(&mut findings);
     findings
 }
@@ -134,7 +133,10 @@ fn refit(findings: &mut [Findings], sets: Vec<EffectSet>) {
         return;
     }
     let models: Vec<&FitModel> = findings.iter().map(|one| &one.model).collect();
-    let fits = fit_together(&models, sets, FIT_STEPS, |_| true);
+    let mut fits = fit_together(&models, sets, FIT_STEPS, |_| true);
+    if let [model] = models[..] {
+        fits = vec![sharpen_change_point(model, fits.swap_remove(0))];
+    }
     for (one, fit) in findings.iter_mut().zip(fits) {
         one.scored.fit = fit;
         one.take_fitted_values();
@@ -151,25 +153,16 @@ pub(crate) fn reported_by_the_others(findings: &[Findings], index: usize) -> Eff
         .map(|(_, one)| one.scored.fit.set.clone())
         .collect();
     let of_others = fit_together(&models, sets, FIT_STEPS, |_| true);
-    let is_of_device = |kind: EffectKind| kind.spec().owner == Owner::Device;
     let mut set = own.scored.fit.set.clone();
-    let device = of_others.first().into_iter().flat_map(|fit| fit.set.iter());
-    for effect in device.filter(|effect| is_of_device(effect.kind())) {
-        set.insert(effect.clone());
+    for other in &of_others {
+        set.extend(&owned_by(Owner::Device, &other.set));
     }
-    let fits = fit_together(&[&own.model], vec![set], FIT_STEPS, |kind| {
-        !is_of_device(kind)
-    });
-    let of_session = |effect: &&Effect| !is_of_device(effect.kind());
-    let kept = own.kept_calibrations();
+    let is_of_session = |kind: EffectKind| kind.spec().owner == Owner::Session;
+    let fits = fit_together(&[&own.model], vec![set], FIT_STEPS, is_of_session);
     let mut reported = own.reportable.clone();
-    kept.iter().filter(of_session).for_each(|effect| {
-        reported.insert(effect.clone());
-    });
-    for effect in fits.iter().flat_map(|fit| fit.set.iter()) {
-        if reported.contains(effect.kind()) {
-            reported.insert(effect.clone());
-        }
+    reported.extend(&owned_by(Owner::Session, &own.kept_calibrations()));
+    for fit in &fits {
+        reported.take_values_of(&fit.set);
     }
     reported
 }

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use cromosim_charts::text::{escape, percent};
 
 use super::markup::{bar, change};
-use super::text::{parameter, spec, summary};
+use super::text::{parameters, spec, summary};
 use crate::diagnosis::{Cause, Metrics, PlacementDiagnosis};
 
 /// One row a cause, the largest share first.
@@ -50,12 +50,8 @@ fn write_cause(page: &mut String, cause: &Cause, before: &Metrics) {
         );
     }
     page.push_str("</td><td class=\"values\">");
-    for (name, value) in &cause.parameters {
-        let _ = write!(
-            page,
-            "<div>{}</div>",
-            parameter(&cause.effect, name, value, cause.standard_errors.get(name))
-        );
+    for text in parameters(&cause.effect, &cause.parameters, &cause.standard_errors) {
+        let _ = write!(page, "<div>{text}</div>");
     }
     let _ = writeln!(
         page,

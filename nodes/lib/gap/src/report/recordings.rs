@@ -5,7 +5,7 @@ use std::fmt::Write;
 use cromosim_charts::text::{escape, significant};
 
 use super::markup::change;
-use super::text::parameter;
+use super::text::parameters;
 use crate::diagnosis::PlacementDiagnosis;
 
 /// One row a recording: how far its gap falls, also with the device as the others show it, and what
@@ -31,14 +31,8 @@ pub(super) fn write_recordings(page: &mut String, placement: &PlacementDiagnosis
             significant(left_out.gyro_rmse, 3)
         );
         for cause in &one.causes {
-            for (name, value) in &cause.parameters {
-                let error = cause.standard_errors.get(name);
-                let _ = write!(
-                    page,
-                    "<div>{}: {}</div>",
-                    escape(&cause.effect),
-                    parameter(&cause.effect, name, value, error)
-                );
+            for text in parameters(&cause.effect, &cause.parameters, &cause.standard_errors) {
+                let _ = write!(page, "<div>{}: {text}</div>", escape(&cause.effect));
             }
         }
         page.push_str("</td></tr>\n");
@@ -53,14 +47,8 @@ pub(super) fn write_calibration(page: &mut String, placement: &PlacementDiagnosi
     }
     page.push_str("<p class=\"note\">Kept, as they lower the gap without being its cause (too small, or not to be told from what is unknown):</p>\n<ul class=\"plain note\">");
     for kept in &placement.calibration {
-        for (name, value) in &kept.parameters {
-            let error = kept.standard_errors.get(name);
-            let _ = write!(
-                page,
-                "<li>{}: {}</li>",
-                escape(&kept.effect),
-                parameter(&kept.effect, name, value, error)
-            );
+        for text in parameters(&kept.effect, &kept.parameters, &kept.standard_errors) {
+            let _ = write!(page, "<li>{}: {text}</li>", escape(&kept.effect));
         }
     }
     page.push_str("</ul>\n");

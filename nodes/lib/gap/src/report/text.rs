@@ -1,5 +1,6 @@
 //! Effects and their parameters for people.
 
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use cromosim_charts::text::{decimals, escape, significant, trimmed};
@@ -34,9 +35,20 @@ fn unit(effect: &str, parameter: &str) -> &'static str {
     }
 }
 
+/// Each parameter of an effect as markup.
+pub(super) fn parameters(
+    effect: &str,
+    values: &BTreeMap<String, Value>,
+    standard_errors: &BTreeMap<String, Value>,
+) -> impl Iterator<Item = String> {
+    values
+        .iter()
+        .map(|(name, value)| parameter(effect, name, value, standard_errors.get(name)))
+}
+
 /// A parameter as markup: name, numbers with their standard errors, unit; also in degrees or
 /// milliseconds where people think in these.
-pub(super) fn parameter(effect: &str, name: &str, value: &Value, error: Option<&Value>) -> String {
+fn parameter(effect: &str, name: &str, value: &Value, error: Option<&Value>) -> String {
     let unit = unit(effect, name);
     let mut text = format!("<span class=\"name\">{}</span> ", escape(name));
     write_value(&mut text, value, error);

@@ -92,13 +92,28 @@ impl EffectSet {
     /// The set without a kind.
     #[must_use]
     pub fn without(&self, kind: EffectKind) -> Self {
+        self.filtered(|effect| effect.kind != kind)
+    }
+
+    /// The effects for which a condition holds.
+    #[must_use]
+    pub fn filtered(&self, condition: impl Fn(&Effect) -> bool) -> Self {
         Self(
             self.0
                 .iter()
-                .filter(|effect| effect.kind != kind)
+                .filter(|effect| condition(effect))
                 .cloned()
                 .collect(),
         )
+    }
+
+    /// Of the kinds that are in both sets, takes the values of the other.
+    pub fn take_values_of(&mut self, other: &Self) {
+        for effect in &mut self.0 {
+            if let Some(new) = other.get(effect.kind) {
+                effect.clone_from(new);
+            }
+        }
     }
 
     /// The set with an effect, which replaces that of its kind.
@@ -121,6 +136,15 @@ impl EffectSet {
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
+    }
+}
+
+/// Each replaces the one of its kind.
+impl<'a> Extend<&'a Effect> for EffectSet {
+    fn extend<T: IntoIterator<Item = &'a Effect>>(&mut self, effects: T) {
+        for effect in effects {
+            self.insert(effect.clone());
+        }
     }
 }
 
