@@ -29,6 +29,10 @@ const LEAST_LIKENESS_FOR_LENGTH: f64 = 0.5;
 /// Cost of a reference that is not in metres, in units of a slope's squared scatter; that of a device
 /// with other units or gravity, which is met more often, is 1.
 const UNUSUAL_LENGTH: f64 = 1.5;
+/// Scatter of the ratio of the measured and the predicted specific forces' root mean squares (natural
+/// logarithm): a filter, a smoothing or a mass on a spring changes it by a factor of two, units of
+/// either by ten and more.
+const LOUDNESS_SCATTER: f64 = 0.7;
 /// A scale is a known unit's factor when it is within 12 % of it (natural logarithm).
 const FACTOR_TOLERANCE: f64 = 0.12;
 
@@ -225,7 +229,8 @@ impl ForceSlopes {
             (ya * gg - yg * ag) / determinant,
             (yg * aa - ya * ag) / determinant,
         );
-        let lengths = if self.likeness() > LEAST_LIKENESS_FOR_LENGTH {
+        let likeness = self.likeness();
+        let lengths = if likeness > LEAST_LIKENESS_FOR_LENGTH {
             length_factors()
         } else {
             &length_factors()[..1]
@@ -233,8 +238,9 @@ impl ForceSlopes {
         let mut best = f64::INFINITY;
         let mut scales = self.at_rest();
         for &length in lengths {
-            // An acceleration that is small in the reference weighs little.
-            let weight = (aa / length.powi(2) / gg * 50.0).min(1.0);
+            // An acceleration that is small in the reference weighs little, and so does one that is
+            // not found again in the readings.
+            let weight = likeness * (aa / length.powi(2) / gg * 50.0).min(1.0);
             for &accel in unit_factors(Channel::Accelerometer) {
                 for gravity in GravityMode::ALL {
                     let is_device_unusual = accel != 1.0 || gravity != GravityMode::Kept;
@@ -243,6 +249,7 @@ impl ForceSlopes {
                     // Scatter of the slopes: 0.15 of gravity's, 0.4 of the acceleration's.
                     let cost = ((of_g / accel - gravity.factor()) / 0.15).powi(2)
                         + weight * ((of_a * length / accel - 1.0) / 0.4).powi(2)
+                        + (self.loudness(accel, gravity, length) / LOUDNESS_SCATTER).powi(2)
                         + unusual;
                     if cost < best {
                         best = cost;
@@ -256,6 +263,13 @@ impl ForceSlopes {
             }
         }
         scales
+    }
+
+    /// Natural logarithm of the ratio of the measured and the predicted root mean square.
+    fn loudness(&self, accel: f64, gravity: GravityMode, length: f64) -> f64 {
+        let (of_a, of_g) = (accel / length, accel * gravity.factor());
+        let predicted = of_a * of_a * self.aa + 2.0 * of_a * of_g * self.ag + of_g * of_g * self.gg;
+        0.5 * (self.yy.max(f64::MIN_POSITIVE) / predicted.max(f64::MIN_POSITIVE)).ln()
     }
 
     /// Without acceleration: gravity alone tells.

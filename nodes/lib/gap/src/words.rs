@@ -135,8 +135,73 @@ pub(crate) fn verdict(causes: &[Cause], before: &Metrics, after: &Metrics) -> St
         };
         text += &format!(", {words} {}", share(cause));
     }
+    let accel = course(before.accel_rmse, after.accel_rmse, 3);
+    let gyro = course(before.gyro_rmse, after.gyro_rmse, 4);
+    // Said once where both go the same way.
+    let gyro_word = if gyro.0 == accel.0 {
+        String::new()
+    } else {
+        format!(" {}", gyro.0)
+    };
     format!(
-        "{text}; the accelerometer's falls from {:.3} to {:.3} m/s2, the gyroscope's from {:.4} to {:.4} rad/s.",
-        before.accel_rmse, after.accel_rmse, before.gyro_rmse, after.gyro_rmse
+        "{text}; the accelerometer's {} {} m/s2, the gyroscope's{gyro_word} {} rad/s.",
+        accel.0, accel.1, gyro.1
     )
+}
+
+/// `("falls", "from 1.200 to 0.260")`: what people see at so many decimals.
+fn course(before: f64, after: f64, decimals: usize) -> (&'static str, String) {
+    let texts = [before, after].map(|value| format!("{value:.decimals$}"));
+    if texts[0] == texts[1] {
+        return ("stays", format!("at {}", texts[0]));
+    }
+    let word = if after < before { "falls" } else { "rises" };
+    (word, format!("from {} to {}", texts[0], texts[1]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn metrics(accel_rmse: f64, gyro_rmse: f64) -> Metrics {
+        Metrics {
+            accel_rmse,
+            gyro_rmse,
+            ..Metrics::default()
+        }
+    }
+
+    fn words(before: Metrics, after: Metrics) -> String {
+        let lever_arm = Cause {
+            effect: "lever_arm".to_owned(),
+            probability: 0.9,
+            parameters: BTreeMap::new(),
+            standard_errors: BTreeMap::new(),
+            gap_share: 0.93,
+            after,
+        };
+        let text = verdict(&[lever_arm], &before, &after);
+        text.split_once("; ").unwrap().1.to_owned()
+    }
+
+    #[test]
+    fn the_verdict_says_which_way_each_channel_goes() {
+        let cases = [
+            (
+                metrics(0.2, 0.02),
+                "the accelerometer's falls from 1.200 to 0.200 m/s2, the gyroscope's from 0.1000 to 0.0200 rad/s.",
+            ),
+            (
+                metrics(0.2, 0.2),
+                "the accelerometer's falls from 1.200 to 0.200 m/s2, the gyroscope's rises from 0.1000 to 0.2000 rad/s.",
+            ),
+            (
+                metrics(0.2, 0.10001),
+                "the accelerometer's falls from 1.200 to 0.200 m/s2, the gyroscope's stays at 0.1000 rad/s.",
+            ),
+        ];
+        for (after, expected) in cases {
+            assert_eq!(words(metrics(1.2, 0.1), after), expected);
+        }
+    }
 }
