@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use cromosim_imu::{Channel, PerChannel, STANDARD_GRAVITY};
-use cromosim_spatial::{FourierPair, PoseEstimate, Spectrum};
+use cromosim_spatial::{FourierPair, PoseEstimate, Spectrum, ZeroPhaseSmoothing};
 
 use crate::prepared::PreparedPlacement;
 
@@ -38,8 +38,8 @@ pub(crate) struct NoiseBasis {
     pub lever_arm_m: f64,
     /// Of the reference's motion.
     pub estimate: Arc<PoseEstimate>,
-    /// Cutoff of the reference's smoothing that the estimate undoes.
-    pub undone_hz: Option<f64>,
+    /// The reference's smoothing that the estimate undoes.
+    pub undone_smoothing: Option<ZeroPhaseSmoothing>,
     /// Mean square of the angular velocity, rad2/s2.
     pub rate_squared: f64,
     /// Mean square of the specific force, m2/s4.
@@ -66,7 +66,7 @@ impl NoiseBasis {
             sigma,
             lever_arm_m: 0.0,
             estimate: Arc::new(estimate),
-            undone_hz: None,
+            undone_smoothing: None,
             rate_squared: 0.0,
             force_squared: STANDARD_GRAVITY.powi(2),
             line_hz: None,

@@ -25,11 +25,15 @@ fn is_plausible(set: &EffectSet) -> bool {
     })
 }
 
-/// Whether the set can be told from the shape of a smoothing of the reference that is undone: that is
-/// only guessed, and what is left of it looks like a tissue under the sensor.
+/// Whether the set can be told from the shape of a smoothing of the reference, where one is undone.
 fn is_told_from_smoothing(model: &FitModel, set: &EffectSet) -> bool {
-    let mut stages = set.iter().map(|effect| effect.kind().spec().stage);
-    model.basis.undone_hz.is_none() || stages.all(|stage| stage != Stage::Tissue)
+    model.basis.undone_smoothing.is_none() || told_from_smoothing(set) == *set
+}
+
+/// The effects that can be told from the shape of a smoothing that is undone: that is only guessed, and
+/// what is left of it looks like a tissue under the sensor.
+pub(crate) fn told_from_smoothing(set: &EffectSet) -> EffectSet {
+    set.filtered(|effect| effect.kind().spec().stage != Stage::Tissue)
 }
 
 /// Whether a vibration in the set is more than motion that the reference does not resolve: strong

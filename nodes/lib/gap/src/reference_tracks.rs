@@ -7,7 +7,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use cromosim_imu::{EffectSet, ReadOff};
-use cromosim_spatial::{KinematicTrack, PoseEstimate};
+use cromosim_spatial::{KinematicTrack, PoseEstimate, ZeroPhaseSmoothing};
 
 use crate::fit::FitModel;
 
@@ -61,21 +61,21 @@ impl<'a> ReferenceTracks<'a> {
         let estimate = reported
             .filter(|_| !undone.interpolation)
             .unwrap_or(&prepared.estimate);
-        Arc::new(match basis.undone_hz.filter(|_| undone.smoothing) {
-            Some(cutoff_hz) => estimate.undoing(cutoff_hz),
+        Arc::new(match basis.undone_smoothing.filter(|_| undone.smoothing) {
+            Some(smoothing) => estimate.undoing(smoothing),
             None => estimate.clone(),
         })
     }
 
-    /// Cutoff of the smoothing that a set undoes, Hz.
-    pub fn undone_hz(&self, set: &EffectSet) -> Option<f64> {
-        let cutoff_hz = self.model.basis.undone_hz;
-        cutoff_hz.filter(|_| set.get_read_off(ReadOff::ReferenceSpectrum).is_some())
+    /// The smoothing that a set undoes.
+    pub fn undone_smoothing(&self, set: &EffectSet) -> Option<ZeroPhaseSmoothing> {
+        let undone = self.model.basis.undone_smoothing;
+        undone.filter(|_| set.get_read_off(ReadOff::ReferenceSpectrum).is_some())
     }
 
     fn undone(&self, set: &EffectSet) -> Undone {
         Undone {
-            smoothing: self.undone_hz(set).is_some(),
+            smoothing: self.undone_smoothing(set).is_some(),
             interpolation: self.model.prepared.interpolated.is_some()
                 && set.get_read_off(ReadOff::ReferenceFrames).is_some(),
         }
@@ -85,7 +85,7 @@ impl<'a> ReferenceTracks<'a> {
     fn is_that_of_analysis(&self, set: &EffectSet) -> bool {
         self.undone(set)
             == Undone {
-                smoothing: self.model.basis.undone_hz.is_some(),
+                smoothing: self.model.basis.undone_smoothing.is_some(),
                 interpolation: self.model.prepared.interpolated.is_some(),
             }
     }

@@ -63,7 +63,7 @@ fn is_reference_noisy(model: &FitModel) -> bool {
 fn ordinary_factor(model: &FitModel) -> f64 {
     if is_reference_noisy(model) {
         ORDINARY_BESIDE_REFERENCE_NOISE
-    } else if model.basis.undone_hz.is_some() {
+    } else if model.basis.undone_smoothing.is_some() {
         ORDINARY_BESIDE_SMOOTHING
     } else {
         1.0
@@ -165,7 +165,11 @@ fn read_off(model: &FitModel, observations: &Observations, from: ReadOff) -> Opt
             let noise = prepared.estimate.noise();
             is_reference_noisy(model).then(|| vec![noise.position, noise.rotation])
         }
-        ReadOff::ReferenceSpectrum => model.basis.undone_hz.map(|cutoff_hz| vec![cutoff_hz]),
+        ReadOff::ReferenceSpectrum => {
+            let smoothing = model.basis.undone_smoothing?;
+            let effect = Effect::reference_smoothing(&smoothing).ok()?;
+            Some(effect.values().to_vec())
+        }
     }
 }
 
@@ -177,7 +181,8 @@ fn excess_noise(model: &FitModel, observations: &Observations, channel: Channel)
     // Rounding adds step^2 / 12 of noise of its own.
     let beyond = observations.found_noise[channel].powi(2) - step * step / 12.0 - declared.powi(2);
     // What a smoothed reference lacks is broad enough to pass for noise.
-    let is_doubtful = model.basis.undone_hz.is_some() || prepared.missing.fraction > MANY_MISSING;
+    let is_doubtful =
+        model.basis.undone_smoothing.is_some() || prepared.missing.fraction > MANY_MISSING;
     let factor = if is_doubtful {
         DOUBTFUL_EXCESS_NOISE
     } else {

@@ -35,7 +35,7 @@ fn price_of(model: &FitModel, set: &EffectSet) -> f64 {
 pub(crate) fn price_of_effect(model: &FitModel, kind: EffectKind) -> f64 {
     let steps = larger(model.basis.steps);
     let factor = (1.0 + steps / price::DOUBLING_STEPS)
-        * if model.basis.undone_hz.is_some() {
+        * if model.basis.undone_smoothing.is_some() {
             price::UNDONE_SMOOTHING_FACTOR
         } else {
             1.0

@@ -97,7 +97,7 @@ impl<'a> Simulations<'a> {
         if reportable.get_read_off(scatter).is_some() && set.get_read_off(scatter).is_none() {
             basis.reference_share = ordinary_share(self.whole.estimate.noise());
         }
-        basis.undone_hz = self.tracks.undone_hz(set);
+        basis.undone_smoothing = self.tracks.undone_smoothing(set);
         basis.estimate = self.tracks.estimate(set);
         Whitener::new(
             &self.whole,

@@ -3,10 +3,12 @@
 use std::sync::Arc;
 
 use cromosim_imu::{EffectKind, EffectSet, PerChannel};
+use cromosim_spatial::{SmoothingKernel, ZeroPhaseSmoothing};
 
 use crate::axes::{larger, smaller, sum_over_channels};
 use crate::fit::FitModel;
 use crate::noise_model::NoiseModel;
+use crate::plausibility::told_from_smoothing;
 use crate::policy::smoothing::{
     BESIDE, CLOSER, LEAST_GAIN_NATS, LEAST_SHARE, NOT_FARTHER, SUSPICIOUS,
 };
@@ -15,10 +17,13 @@ use crate::trace::{names, trace};
 
 /// Cutoffs that are tried first, Hz. Beyond the last nothing is undone but noise.
 const CUTOFFS_HZ: [f64; 9] = [1.5, 2.0, 2.6, 3.4, 4.4, 5.7, 7.4, 9.6, 12.5];
-/// Factor between neighbouring cutoffs of the first refinement; each that follows has its root.
-const REFINEMENT: f64 = 1.12;
-/// Refinements of the best cutoff.
-const REFINEMENTS: usize = 4;
+/// A Gaussian's cutoffs that are tried first, as parts of the best one of Butterworth's filter: its half
+/// power lies below that one's half amplitude.
+const GAUSSIAN_PARTS: [f64; 3] = [0.55, 0.7, 0.85];
+/// Factors between the best cutoff and those next to it that tell the kernels apart.
+const COARSE: [f64; 2] = [1.12, 1.06];
+/// And those that refine the better kernel's.
+const FINE: [f64; 2] = [1.03, 1.015];
 
 /// The better of `model` and models in which a smoothing of the reference is undone, each with the
 /// best set of effects.
@@ -33,8 +38,9 @@ pub(crate) fn try_smoothing<'a>(
     }
     // Beside what was found without it, and alone.
     let mut sets: Vec<EffectSet> = starts.to_vec();
-    if !starts.contains(&scored.fit.set) {
-        sets.push(scored.fit.set.clone());
+    let found = told_from_smoothing(&scored.fit.set);
+    if !starts.contains(&found) {
+        sets.push(found);
     }
     let trial = Trial {
         plain: evidence(&model, &scored),
@@ -42,25 +48,26 @@ pub(crate) fn try_smoothing<'a>(
         start: &starts[0],
         sets: &sets,
     };
-    let Some(cutoff_hz) = trial.best_cutoff() else {
+    let Some(smoothing) = trial.best_smoothing() else {
         return (model, scored);
     };
-    let undone = with_undone_smoothing(&model, &starts[0], cutoff_hz);
+    let undone = with_undone_smoothing(&model, &starts[0], smoothing);
     // A cutoff that no motion reaches explains nothing; this search decides whether something
     // beside it does.
     let searched = search(&undone, &sets, library, BESIDE);
     let gained = evidence(&undone, &searched);
     trace(|| {
         eprintln!(
-            "  smoothing {cutoff_hz:.2} Hz with {:?}: {gained:.1}",
+            "  {smoothing:?} with {:?}: {gained:.1}",
             names(&searched.fit.set),
         )
     });
-    if cutoff_hz > CUTOFFS_HZ[CUTOFFS_HZ.len() - 1] {
+    if smoothing.cutoff_hz > CUTOFFS_HZ[CUTOFFS_HZ.len() - 1] {
         return (model, scored);
     }
     let needed = trial.plain + LEAST_GAIN_NATS + LEAST_SHARE * excess(&model, &scored.fit);
-    if gained > needed && comes_closer(&model, &scored, &searched) {
+    let beside = score(&model, searched.fit.set.clone());
+    if gained > needed && comes_closer(&model, &beside, &searched) {
         (undone, searched)
     } else {
         (model, scored)
@@ -78,29 +85,55 @@ struct Trial<'t, 'a> {
 }
 
 impl Trial<'_, '_> {
-    /// The cutoff with the most evidence, from the grid and around its best.
-    fn best_cutoff(&self) -> Option<f64> {
-        let mut best = CUTOFFS_HZ
-            .into_iter()
-            .filter_map(|cutoff_hz| self.evidence_at(cutoff_hz))
-            .max_by(|a, b| a.0.total_cmp(&b.0))?;
-        let mut factor = REFINEMENT;
-        for _ in 0..REFINEMENTS {
-            for cutoff_hz in [best.1 / factor, best.1 * factor] {
-                if let Some(other) = self.evidence_at(cutoff_hz)
-                    && other.0 > best.0
-                {
-                    best = other;
-                }
-            }
-            factor = f64::sqrt(factor);
-        }
-        Some(best.1)
+    /// The smoothing with the most evidence: Butterworth's from a grid, a Gaussian from around it,
+    /// the better one refined.
+    fn best_smoothing(&self) -> Option<ZeroPhaseSmoothing> {
+        let butterworth = self.best_of(SmoothingKernel::Butterworth, &CUTOFFS_HZ)?;
+        let parts = GAUSSIAN_PARTS.map(|part| part * butterworth.1.cutoff_hz);
+        let gaussian = self.best_of(SmoothingKernel::Gaussian, &parts)?;
+        let better = if gaussian.0 > butterworth.0 {
+            gaussian
+        } else {
+            butterworth
+        };
+        Some(self.refined(better, &FINE).1)
     }
 
-    /// Evidence of a cutoff with the best of the starting sets, nats, and the cutoff.
-    fn evidence_at(&self, cutoff_hz: f64) -> Option<(f64, f64)> {
-        let undone = with_undone_smoothing(self.model, self.start, cutoff_hz);
+    /// The cutoff with the most evidence, from some and around their best.
+    fn best_of(
+        &self,
+        kernel: SmoothingKernel,
+        cutoffs_hz: &[f64],
+    ) -> Option<(f64, ZeroPhaseSmoothing)> {
+        let best = cutoffs_hz
+            .iter()
+            .filter_map(|&cutoff_hz| self.evidence_of(ZeroPhaseSmoothing { cutoff_hz, kernel }))
+            .max_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(self.refined(best, &COARSE))
+    }
+
+    /// The best of a smoothing and those whose cutoffs lie on either side of it by some factors.
+    fn refined(
+        &self,
+        mut best: (f64, ZeroPhaseSmoothing),
+        factors: &[f64],
+    ) -> (f64, ZeroPhaseSmoothing) {
+        for factor in factors {
+            let middle = best.1;
+            for cutoff_hz in [middle.cutoff_hz / factor, middle.cutoff_hz * factor] {
+                let other = self.evidence_of(ZeroPhaseSmoothing {
+                    cutoff_hz,
+                    ..middle
+                });
+                best = other.filter(|other| other.0 > best.0).unwrap_or(best);
+            }
+        }
+        best
+    }
+
+    /// Evidence of a smoothing with the best of the starting sets, nats, and the smoothing.
+    fn evidence_of(&self, smoothing: ZeroPhaseSmoothing) -> Option<(f64, ZeroPhaseSmoothing)> {
+        let undone = with_undone_smoothing(self.model, self.start, smoothing);
         let found = self
             .sets
             .iter()
@@ -109,12 +142,12 @@ impl Trial<'_, '_> {
         let evidence = evidence(&undone, &found);
         trace(|| {
             eprintln!(
-                "  smoothing {cutoff_hz:.2} Hz: {evidence:.1} against {:.1} {:.2?}",
+                "  {smoothing:?}: {evidence:.1} against {:.1} {:.2?}",
                 self.plain,
                 found.fit.held_out_ratio()
             )
         });
-        Some((evidence, cutoff_hz))
+        Some((evidence, smoothing))
     }
 }
 
@@ -127,25 +160,25 @@ fn evidence(model: &FitModel, scored: &ScoredEffectSet) -> f64 {
         })
 }
 
-/// The model in which a smoothing of this cutoff is undone.
+/// The model in which a smoothing is undone.
 fn with_undone_smoothing<'a>(
     model: &FitModel<'a>,
     set: &EffectSet,
-    cutoff_hz: f64,
+    smoothing: ZeroPhaseSmoothing,
 ) -> FitModel<'a> {
     let prepared = model.prepared;
-    let estimate = prepared.estimate.undoing(cutoff_hz);
+    let estimate = prepared.estimate.undoing(smoothing);
     let track = prepared.track(&estimate);
     let residual = prepared.residual(&prepared.predict(&track, set).readings);
     let mut basis = model.basis.clone();
     basis.estimate = Arc::new(estimate);
-    basis.undone_hz = Some(cutoff_hz);
+    basis.undone_smoothing = Some(smoothing);
     let noise = NoiseModel::new(prepared, &basis, &residual);
     FitModel::new(prepared, track, basis, noise)
 }
 
-/// Whether the simulation itself comes closer in one channel, and in none moves away: what is
-/// undone must not cost more than it gives.
+/// Whether the simulation itself comes closer in one channel than with the same effects alone, and in
+/// none moves away: what is undone must not cost more than it gives.
 fn comes_closer(model: &FitModel, plain: &ScoredEffectSet, undone: &ScoredEffectSet) -> bool {
     let norms = |scored: &ScoredEffectSet| {
         let readings = &scored.fit.prediction.readings;

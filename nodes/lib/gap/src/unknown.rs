@@ -107,7 +107,7 @@ impl<'a> Structure<'a> {
         regressions: &'a [ResidualRegression],
     ) -> Self {
         let basis = &findings.model.basis;
-        let factor = if basis.undone_hz.is_some() {
+        let factor = if basis.undone_smoothing.is_some() {
             UNDONE_SMOOTHING_FACTOR
         } else {
             1.0

@@ -16,6 +16,9 @@ pub(crate) fn described(kind: EffectKind, values: &[f64]) -> BTreeMap<String, Va
     for parameter in kind.spec().parameters {
         let own = &values[first..first + parameter.shape.count()];
         first += parameter.shape.count();
+        if parameter.is_optional && own == parameter.neutral {
+            continue;
+        }
         let value = match parameter.shape {
             Shape::Scalar | Shape::Time => json!(own[0]),
             Shape::Vector3 => json!(own),

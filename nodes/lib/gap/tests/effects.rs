@@ -48,7 +48,7 @@ macro_rules! followed {
 }
 
 followed! {
-    reference_smoothing: ReferenceSmoothing [6.0] => [0.5, 0.7];
+    reference_smoothing: ReferenceSmoothing [6.0, 0.0] => [0.5, 0.7];
     reference_interpolation: ReferenceInterpolation [47.3] => [0.75, 0.6];
     reference_tilt: ReferenceTilt [0.04, -0.05, 0.0] => [0.5, KEPT];
     reference_scale: ReferenceScale [1.1] => [0.5, KEPT];
@@ -88,6 +88,14 @@ fn every_unit_of_length_is_known() {
     ] {
         found(&Scene::new(seed).with(K::ReferenceUnits, &[factor]));
     }
+}
+
+#[test]
+fn a_reference_that_was_smoothed_by_a_gaussian() {
+    followed(
+        &Scene::new(50).with(K::ReferenceSmoothing, &[4.5, 1.0]),
+        [0.5, 0.5],
+    );
 }
 
 #[test]

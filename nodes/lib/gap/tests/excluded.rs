@@ -96,6 +96,25 @@ excluded! {
     gravity_convention: GravityConvention [1.0];
 }
 
+/// Chords between frames are a smoothing (a triangle's, near a Gaussian's), and undoing one helps.
+#[test]
+fn reference_interpolation() {
+    let options = DiagnoseOptions {
+        excluded: vec![K::ReferenceInterpolation],
+        ..DiagnoseOptions::default()
+    };
+    let scene = Scene::new(seed_of(K::ReferenceInterpolation));
+    let record = scene.with(K::ReferenceInterpolation, &[24.0]).record();
+    let diagnosis = diagnose(&record, &options).unwrap().diagnosis;
+    assert_eq!(names(&diagnosis), ["reference_smoothing"]);
+    let (before, after) = (&diagnosis.gap.before, &diagnosis.gap.after);
+    assert!(
+        after.accel_rmse < 0.5 * before.accel_rmse && after.gyro_rmse < 0.5 * before.gyro_rmse,
+        "{}",
+        diagnosis.verdict
+    );
+}
+
 // Of these other effects explain a part.
 #[test]
 fn clock_drift() {
@@ -110,11 +129,6 @@ fn reference_tilt() {
 #[test]
 fn reference_units() {
     excluded(K::ReferenceUnits, &[1000.0]);
-}
-
-#[test]
-fn reference_interpolation() {
-    excluded(K::ReferenceInterpolation, &[24.0]);
 }
 
 #[test]

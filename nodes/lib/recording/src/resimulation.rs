@@ -4,10 +4,9 @@ use std::path::Path;
 
 use cromosim_bag::BagWriter;
 use cromosim_imu::{
-    DeclaredNoise, Differentiation, EffectKind, EffectSet, EffectsFile, ImuOptions,
-    KinematicSample, PerChannel, PlacementEffects, ReadingMapping, RecordedMotion, SampleVariance,
-    SensorFrame, SensorTrajectory, Trim, measure_recording, simulate_kinematics,
-    track_in_sensor_axes,
+    DeclaredNoise, Differentiation, EffectSet, EffectsFile, ImuOptions, KinematicSample,
+    PerChannel, PlacementEffects, ReadingMapping, RecordedMotion, SampleVariance, SensorFrame,
+    SensorTrajectory, Trim, measure_recording, simulate_kinematics, track_in_sensor_axes,
 };
 use cromosim_learned::{LearnedSimulator, MappingFile, SiteMotion};
 use cromosim_msgs::geometry_msgs::PoseStamped;
@@ -182,21 +181,19 @@ impl Resimulation {
         imu_rate_hz: f64,
         effects: &EffectSet,
     ) -> Result<(KinematicTrack, Known), RecordingError> {
-        let undone_hz = effects
-            .get(EffectKind::ReferenceSmoothing)
-            .and_then(|smoothing| smoothing.values().first().copied());
+        let undone = effects.reference_smoothing();
         let rate_hz = (2.0 * imu_rate_hz).max(200.0);
         let poses = own_frames(placement.poses(), effects);
         let Some(scheme) = self.scheme else {
             let estimate = PoseEstimate::fit(&poses.stamps, &poses.positions, &poses.rotations)
                 .map_err(|source| RecordingError::NotEstimated { source })?;
-            let estimate = undone_hz
-                .map(|cutoff_hz| estimate.undoing(cutoff_hz))
+            let estimate = undone
+                .map(|smoothing| estimate.undoing(smoothing))
                 .unwrap_or(estimate);
             let track = estimate.track_for(imu_rate_hz);
             return Ok((track, Known::Estimate(Box::new(estimate))));
         };
-        if undone_hz.is_some() {
+        if undone.is_some() {
             return Err(RecordingError::CannotUndo {
                 scheme: scheme.to_string(),
             });

@@ -5,13 +5,12 @@ use std::sync::Arc;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::gaps::fill_gaps;
-use crate::noise_floor::{
-    LARGEST_GAIN, LARGEST_REPORTED_GAIN, LARGEST_RISE, NoiseFloor, undoing_gain,
-};
+use crate::noise_floor::{LARGEST_GAIN, LARGEST_REPORTED_GAIN, LARGEST_RISE, NoiseFloor};
 use crate::pose_spectra::local_spectra;
 use crate::sample_grid::SampleGrid;
 use crate::segments::Segments;
-use crate::{FourierPair, KinematicTrack, SpatialError, Spectrum, Stamp, so3};
+use crate::zero_phase_smoothing::undoing_gain;
+use crate::{FourierPair, KinematicTrack, SpatialError, Spectrum, Stamp, ZeroPhaseSmoothing, so3};
 
 /// How far the poses are continued beyond their ends, s; no source.
 const LEAD_S: f64 = 1.5;
@@ -63,8 +62,8 @@ pub struct PoseEstimate {
     pub(crate) position: NoiseFloor,
     pub(crate) rotation: NoiseFloor,
     gaps: Vec<(Stamp, Stamp)>,
-    /// Cutoff of a smoothing that is undone.
-    undone_hz: Option<f64>,
+    /// A smoothing that is undone.
+    undone: Option<ZeroPhaseSmoothing>,
 }
 
 impl PoseEstimate {
@@ -148,7 +147,7 @@ impl PoseEstimate {
             position,
             rotation,
             gaps,
-            undone_hz: None,
+            undone: None,
         }
     }
 
@@ -194,20 +193,19 @@ impl PoseEstimate {
         (self.position.spectrum().clone(), rotation)
     }
 
-    /// The estimate with a zero-phase smoothing of the poses undone (second-order Butterworth of
-    /// this cutoff, forwards and backwards), up to a factor of 8.
+    /// The estimate with a smoothing of the poses undone, up to a factor of 32.
     #[must_use]
-    pub fn undoing(&self, cutoff_hz: f64) -> Self {
+    pub fn undoing(&self, smoothing: ZeroPhaseSmoothing) -> Self {
         let mut undone = self.clone();
-        undone.position = self.position.undoing(cutoff_hz, self.rate_hz);
-        undone.rotation = self.rotation.undoing(cutoff_hz, self.rate_hz);
+        undone.position = self.position.undoing(smoothing, self.rate_hz);
+        undone.rotation = self.rotation.undoing(smoothing, self.rate_hz);
         undone
             .position
-            .localise(&self.local[0], self.rate_hz, Some(cutoff_hz));
+            .localise(&self.local[0], self.rate_hz, Some(smoothing));
         undone
             .rotation
-            .localise(&self.local[1], self.rate_hz, Some(cutoff_hz));
-        undone.undone_hz = Some(cutoff_hz);
+            .localise(&self.local[1], self.rate_hz, Some(smoothing));
+        undone.undone = Some(smoothing);
         undone
     }
 
@@ -225,7 +223,7 @@ impl PoseEstimate {
     /// Share of the motion at a frequency that the estimate keeps, of position and of rotation, and
     /// the gain that undoes a smoothing.
     pub fn filter_at(&self, frequency_hz: f64) -> (f64, f64, f64) {
-        let gain = undoing_gain(frequency_hz, self.undone_hz, self.rate_hz);
+        let gain = undoing_gain(frequency_hz, self.undone, self.rate_hz);
         (
             self.position.filter_at(frequency_hz),
             self.rotation.filter_at(frequency_hz),
@@ -252,7 +250,7 @@ impl PoseEstimate {
             lead: self.lead,
             count,
         };
-        let gain = |hz: f64| undoing_gain(hz, self.undone_hz, self.rate_hz).min(LARGEST_GAIN);
+        let gain = |hz: f64| undoing_gain(hz, self.undone, self.rate_hz).min(LARGEST_GAIN);
         let derivatives = |channel: usize, orders: &[i32]| {
             let windows = if channel < 3 {
                 &self.position.windows

@@ -14,6 +14,11 @@ const LONGEST_GAP: usize = 600;
 /// make it singular; no source.
 const RIDGE: f64 = 1e-12;
 
+/// Densities below this part of the largest count as it: smoothed poses fall by sixteen decades, of which
+/// the ridge (as a part of the least) would leave those of the noise and take those of the motion, and
+/// the series would bend where the gap begins. No source.
+const LEAST_DENSITY: f64 = 1e-11;
+
 /// Replaces the entries in `gaps` by the likeliest ones, given the others and the series' spectrum
 /// S.
 ///
@@ -28,12 +33,16 @@ pub(crate) fn fill_gaps(
     rate_hz: f64,
 ) {
     let length = transform.length();
-    let least = spectrum
-        .density
-        .iter()
-        .copied()
-        .filter(|density| *density > 0.0)
-        .fold(f64::INFINITY, f64::min);
+    let positive = || {
+        spectrum
+            .density
+            .iter()
+            .copied()
+            .filter(|value| *value > 0.0)
+    };
+    let least = positive()
+        .fold(f64::INFINITY, f64::min)
+        .max(LEAST_DENSITY * positive().fold(0.0, f64::max));
     let mut kernel: Vec<Complex64> = (0..length)
         .map(|k| {
             let frequency_hz = k.min(length - k) as f64 * rate_hz / length as f64;

@@ -64,6 +64,7 @@ mod stamp;
 mod system;
 mod track;
 mod weight_search;
+mod zero_phase_smoothing;
 
 pub use adaptive::ExpectedNoise;
 pub use confidence::{
@@ -93,3 +94,4 @@ pub use stamp::Stamp;
 pub use system::SplineSystem;
 pub use track::KinematicTrack;
 pub use weight_search::WeightSearch;
+pub use zero_phase_smoothing::{SmoothingKernel, ZeroPhaseSmoothing};

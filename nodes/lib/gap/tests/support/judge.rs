@@ -117,8 +117,7 @@ pub fn cause(diagnosis: &PlacementDiagnosis, kind: EffectKind) -> &Cause {
 /// from 1) of the truth; 5 % where the answer states no standard error.
 pub fn values_are(diagnosis: &PlacementDiagnosis, truth: &Effect) {
     let cause = cause(diagnosis, truth.kind());
-    for parameter in truth.kind().spec().parameters {
-        let expected = truth.parameter(parameter.name).unwrap();
+    for (parameter, expected) in truth.written_parameters() {
         let found = numbers(&cause.parameters[parameter.name], parameter.shape);
         assert_eq!(found.len(), expected.len(), "{}", parameter.name);
         let errors = cause

@@ -5,7 +5,7 @@
 pub mod judge;
 pub mod motion;
 
-use std::f64::consts::{PI, SQRT_2};
+use std::f64::consts::{LN_2, PI, SQRT_2};
 use std::ops::Range;
 
 use cromosim_gap::{MeasuredImu, PlacementRecord, PoseSeries};
@@ -13,7 +13,7 @@ use cromosim_imu::{
     DeclaredNoise, Dropouts, Effect, EffectKind, EffectSet, MeasurementInput, PerChannel, Reading,
     SensorModel, Stage, normal_pair,
 };
-use cromosim_spatial::{Stamp, so3};
+use cromosim_spatial::{SmoothingKernel, Stamp, ZeroPhaseSmoothing, so3};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha12Rng;
@@ -134,8 +134,10 @@ impl Scene {
             .collect();
         let channel = |of: &dyn Fn(&motion::Instant) -> f64| {
             let series: Vec<f64> = instants.iter().map(of).collect();
-            self.value(EffectKind::ReferenceSmoothing, 0)
-                .map_or(series.clone(), |cutoff_hz| zero_phase(&series, cutoff_hz))
+            match self.effects.reference_smoothing() {
+                Some(smoothing) => smoothed(&series, &smoothing),
+                None => series,
+            }
         };
         let position = [0, 1, 2].map(|axis| channel(&|now| now.position[axis]));
         let rotation = [0, 1, 2, 3].map(|part| channel(&|now| now.world_from_segment.coords[part]));
@@ -234,13 +236,36 @@ fn normal_vector(random: &mut ChaCha12Rng) -> Vector3<f64> {
     Vector3::new(x, y, z)
 }
 
-/// Butterworth of second order, forth and back: `1 / (1 + (f / cutoff)^4)`.
-fn zero_phase(series: &[f64], cutoff_hz: f64) -> Vec<f64> {
-    let mut once = butterworth(series, cutoff_hz);
-    once.reverse();
-    let mut twice = butterworth(&once, cutoff_hz);
-    twice.reverse();
-    twice
+/// Without phase, settled on the first value or continued by it.
+fn smoothed(series: &[f64], smoothing: &ZeroPhaseSmoothing) -> Vec<f64> {
+    match smoothing.kernel {
+        SmoothingKernel::Butterworth => {
+            let mut once = butterworth(series, smoothing.cutoff_hz);
+            once.reverse();
+            let mut twice = butterworth(&once, smoothing.cutoff_hz);
+            twice.reverse();
+            twice
+        }
+        SmoothingKernel::Gaussian => gaussian(series, smoothing.cutoff_hz),
+    }
+}
+
+/// The mean of the samples around each, weighted by a bell whose transform has half of the power at the
+/// cutoff.
+fn gaussian(series: &[f64], cutoff_hz: f64) -> Vec<f64> {
+    let deviation = LN_2.sqrt() / (2.0 * PI * cutoff_hz) * REFERENCE_HZ;
+    let reach = (6.0 * deviation).ceil() as i64;
+    let weight = |k: i64| (-0.5 * (k as f64 / deviation).powi(2)).exp();
+    let total: f64 = (-reach..=reach).map(weight).sum();
+    let last = series.len() as i64 - 1;
+    let value = |k: i64| series[k.clamp(0, last) as usize];
+    let mean = |at: i64| {
+        (-reach..=reach)
+            .map(|k| weight(k) * value(at + k))
+            .sum::<f64>()
+            / total
+    };
+    (0..=last).map(mean).collect()
 }
 
 /// By the bilinear transform, settled on the first value.

@@ -19,6 +19,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         unit: "",
         shape: Shape::Matrix3,
         neutral: &[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        is_optional: false,
         lower: -1.0,
         upper: 1.0,
         fit: None,

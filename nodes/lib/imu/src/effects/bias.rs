@@ -19,6 +19,7 @@ pub(super) static ACCEL: EffectSpec = EffectSpec {
         unit: "m/s2",
         shape: Shape::Vector3,
         neutral: &[0.0; 3],
+        is_optional: false,
         lower: -100.0,
         upper: 100.0,
         fit: Some(ParameterFit {
@@ -59,6 +60,7 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
         unit: "rad/s",
         shape: Shape::Vector3,
         neutral: &[0.0; 3],
+        is_optional: false,
         lower: -100.0,
         upper: 100.0,
         fit: Some(ParameterFit {

@@ -17,6 +17,7 @@ pub(super) static ACCEL: EffectSpec = EffectSpec {
         unit: "m/s3",
         shape: Shape::Vector3,
         neutral: &[0.0; 3],
+        is_optional: false,
         lower: -10.0,
         upper: 10.0,
         fit: Some(ParameterFit {
@@ -49,6 +50,7 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
         unit: "rad/s2",
         shape: Shape::Vector3,
         neutral: &[0.0; 3],
+        is_optional: false,
         lower: -10.0,
         upper: 10.0,
         fit: Some(ParameterFit {

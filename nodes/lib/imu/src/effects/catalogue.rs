@@ -4,7 +4,7 @@ use std::fmt;
 
 use super::kind::with_effects;
 use super::search::{ReadOff, ReadOffSearch, Search};
-use super::{Effect, EffectKind, EffectSet, EffectSpec, axis_convention};
+use super::{Effect, EffectKind, EffectSet, EffectSpec, ParameterSpec, axis_convention};
 use crate::EffectError;
 
 macro_rules! table {
@@ -106,17 +106,27 @@ impl Effect {
         Self::new(self.kind(), values)
     }
 
+    /// Each parameter with its values.
+    pub fn parameters(&self) -> impl Iterator<Item = (&'static ParameterSpec, &[f64])> {
+        let mut rest = self.values();
+        self.kind().spec().parameters.iter().map(move |parameter| {
+            let (own, after) = rest.split_at(parameter.shape.count());
+            rest = after;
+            (parameter, own)
+        })
+    }
+
+    /// The parameters that files hold: an optional one only where it is not neutral.
+    pub fn written_parameters(&self) -> impl Iterator<Item = (&'static ParameterSpec, &[f64])> {
+        self.parameters()
+            .filter(|(parameter, values)| !parameter.is_optional || *values != parameter.neutral)
+    }
+
     /// The values of one parameter.
     pub fn parameter(&self, name: &str) -> Option<&[f64]> {
-        let mut first = 0;
-        for parameter in self.kind().spec().parameters {
-            let length = parameter.shape.count();
-            if parameter.name == name {
-                return self.values().get(first..first + length);
-            }
-            first += length;
-        }
-        None
+        self.parameters()
+            .find(|(parameter, _)| parameter.name == name)
+            .map(|(_, values)| values)
     }
 }
 

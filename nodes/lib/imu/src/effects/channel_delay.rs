@@ -23,6 +23,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         unit: "s",
         shape: Shape::Scalar,
         neutral: &[0.0],
+        is_optional: false,
         lower: -1.0,
         upper: 1.0,
         fit: Some(ParameterFit {

@@ -20,6 +20,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         unit: "1e-6",
         shape: Shape::Scalar,
         neutral: &[0.0],
+        is_optional: false,
         lower: -1e5,
         upper: 1e5,
         fit: Some(ParameterFit {

@@ -289,8 +289,7 @@ fn flow(effect: &Effect) -> String {
                 .join(", ")
         )
     };
-    for parameter in effect.kind().spec().parameters {
-        let values = effect.parameter(parameter.name).unwrap_or_default();
+    for (parameter, values) in effect.written_parameters() {
         let value = match parameter.shape {
             Shape::Scalar => values
                 .first()

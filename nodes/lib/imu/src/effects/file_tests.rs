@@ -48,6 +48,32 @@ fn a_recording_takes_the_effects_of_its_session() {
     assert_eq!(epoch_at(1_800_000_000), (1_700_000_000, 4));
 }
 
+#[test]
+fn an_optional_parameter_goes_without_saying_where_it_is_neutral() {
+    let text = |smoothing: &str| {
+        format!(
+            "schema: cromosim/effects/1\nplacements:\n  wrist:\n    epoch: 1700000000.000000000\n    \
+             declared_noise: {{accel_density: 0.0014, gyro_density: 1.2e-7}}\n    effects:\n      \
+             - {{effect: reference_smoothing, {smoothing}}}\n"
+        )
+    };
+    for (given, written) in [
+        ("cutoff_hz: 4.5", "cutoff_hz: 4.5"),
+        ("cutoff_hz: 4.5, kernel: butterworth", "cutoff_hz: 4.5"),
+        (
+            "cutoff_hz: 4.5, kernel: gaussian",
+            "cutoff_hz: 4.5, kernel: gaussian",
+        ),
+    ] {
+        let file = EffectsFile::parse(&text(given), "effects.yaml").unwrap();
+        assert_eq!(file.to_yaml(), text(written));
+    }
+    let refused = refusal(&text("cutoff_hz: 4.5, kernel: boxcar"));
+    assert!(refused.contains("butterworth, gaussian"), "{refused}");
+    let refused = refusal(&text("kernel: gaussian"));
+    assert!(refused.contains("cutoff_hz"), "{refused}");
+}
+
 fn refusal(text: &str) -> String {
     EffectsFile::parse(text, "effects.yaml")
         .unwrap_err()

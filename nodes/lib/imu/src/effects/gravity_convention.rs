@@ -18,6 +18,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         // What the contract asks for comes first, so that a neutral value exists.
         shape: Shape::Choice(&["kept", "removed", "negated"]),
         neutral: &[0.0],
+        is_optional: false,
         lower: 0.0,
         upper: 2.0,
         fit: None,

@@ -19,6 +19,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         unit: "(rad/s)/(m/s2)",
         shape: Shape::Matrix3,
         neutral: &[0.0; 9],
+        is_optional: false,
         lower: -10.0,
         upper: 10.0,
         fit: Some(ParameterFit {

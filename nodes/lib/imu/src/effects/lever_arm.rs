@@ -19,6 +19,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         unit: "m",
         shape: Shape::Vector3,
         neutral: &[0.0; 3],
+        is_optional: false,
         lower: -5.0,
         upper: 5.0,
         fit: Some(ParameterFit {

@@ -18,6 +18,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         unit: "Hz",
         shape: Shape::Scalar,
         neutral: &[1e4],
+        is_optional: false,
         lower: 0.1,
         upper: 1e4,
         fit: Some(ParameterFit {

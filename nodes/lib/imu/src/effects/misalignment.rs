@@ -21,6 +21,7 @@ pub(super) static ACCEL: EffectSpec = EffectSpec {
         unit: "",
         shape: Shape::Vector3,
         neutral: &[0.0; 3],
+        is_optional: false,
         lower: -1.0,
         upper: 1.0,
         fit: Some(ParameterFit {
@@ -57,6 +58,7 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
         unit: "",
         shape: Shape::Vector3,
         neutral: &[0.0; 3],
+        is_optional: false,
         lower: -1.0,
         upper: 1.0,
         fit: Some(ParameterFit {

@@ -24,6 +24,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         unit: "rad",
         shape: Shape::Vector3,
         neutral: &[0.0; 3],
+        is_optional: false,
         lower: -PI,
         upper: PI,
         fit: Some(ParameterFit {

@@ -24,6 +24,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
             unit: "s",
             shape: Shape::Time,
             neutral: &[0.0],
+            is_optional: false,
             lower: -1e10,
             upper: 1e10,
             fit: None,
@@ -33,6 +34,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
             unit: "rad",
             shape: Shape::Vector3,
             neutral: &[0.0; 3],
+            is_optional: false,
             lower: -PI,
             upper: PI,
             fit: Some(ParameterFit {

@@ -18,6 +18,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         unit: "Hz",
         shape: Shape::Scalar,
         neutral: &[1e5],
+        is_optional: false,
         lower: 0.1,
         upper: 1e5,
         fit: None,

@@ -22,6 +22,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         unit: "",
         shape: Shape::Scalar,
         neutral: &[1.0],
+        is_optional: false,
         lower: 0.01,
         upper: 100.0,
         fit: Some(ParameterFit {

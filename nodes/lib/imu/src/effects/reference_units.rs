@@ -17,6 +17,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         unit: "",
         shape: Shape::Scalar,
         neutral: &[1.0],
+        is_optional: false,
         lower: 1e-6,
         upper: 1e6,
         fit: None,

@@ -20,6 +20,7 @@ pub(super) static ACCEL: EffectSpec = EffectSpec {
         unit: "",
         shape: Shape::Vector3,
         neutral: &[1.0; 3],
+        is_optional: false,
         lower: 0.01,
         upper: 100.0,
         fit: Some(ParameterFit {
@@ -56,6 +57,7 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
         unit: "",
         shape: Shape::Vector3,
         neutral: &[1.0; 3],
+        is_optional: false,
         lower: 0.01,
         upper: 100.0,
         fit: Some(ParameterFit {

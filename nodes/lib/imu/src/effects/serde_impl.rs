@@ -48,17 +48,11 @@ impl Serialize for Written<'_> {
 
 impl Serialize for Effect {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let parameters = self.kind().spec().parameters;
+        let parameters: Vec<_> = self.written_parameters().collect();
         let mut map = serializer.serialize_map(Some(1 + parameters.len()))?;
         map.serialize_entry("effect", self.kind().name())?;
-        for parameter in parameters {
-            map.serialize_entry(
-                parameter.name,
-                &Written(
-                    parameter,
-                    self.parameter(parameter.name).unwrap_or_default(),
-                ),
-            )?;
+        for (parameter, values) in parameters {
+            map.serialize_entry(parameter.name, &Written(parameter, values))?;
         }
         map.end()
     }
@@ -212,11 +206,18 @@ fn parse(name: &str, fields: &[(String, Raw)]) -> Result<Effect, EffectError> {
     let mut values = Vec::with_capacity(spec.value_count());
     for parameter in spec.parameters {
         let mut given = fields.iter().filter(|(field, _)| field == parameter.name);
-        let (Some((field, raw)), None) = (given.next(), given.next()) else {
-            return Err(EffectError::NotOnce {
-                effect,
-                field: parameter.name,
-            });
+        let (field, raw) = match (given.next(), given.next()) {
+            (Some((field, raw)), None) => (field, raw),
+            (None, None) if parameter.is_optional => {
+                values.extend(parameter.neutral);
+                continue;
+            }
+            _ => {
+                return Err(EffectError::NotOnce {
+                    effect,
+                    field: parameter.name,
+                });
+            }
         };
         let malformed = |expected| match parameter.shape {
             Shape::Choice(words) => EffectError::NoChoice {

@@ -19,6 +19,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
             unit: "Hz",
             shape: Shape::Scalar,
             neutral: &[1e4],
+            is_optional: false,
             lower: 0.2,
             upper: 1e4,
             fit: Some(ParameterFit {
@@ -31,6 +32,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
             unit: "",
             shape: Shape::Scalar,
             neutral: &[0.3],
+            is_optional: false,
             lower: 0.001,
             upper: 2.0,
             fit: Some(ParameterFit {

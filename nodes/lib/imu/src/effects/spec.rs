@@ -71,6 +71,8 @@ pub struct ParameterSpec {
     pub shape: Shape,
     /// Values that change nothing (for a choice: its number).
     pub neutral: &'static [f64],
+    /// Whether files may leave it out, and do so where it is neutral.
+    pub is_optional: bool,
     /// Least value of each entry.
     pub lower: f64,
     /// Greatest value of each entry.

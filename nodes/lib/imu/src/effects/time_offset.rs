@@ -19,6 +19,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         unit: "s",
         shape: Shape::Scalar,
         neutral: &[0.0],
+        is_optional: false,
         lower: -10.0,
         upper: 10.0,
         fit: Some(ParameterFit {

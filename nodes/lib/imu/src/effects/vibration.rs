@@ -24,6 +24,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
             unit: "Hz",
             shape: Shape::Scalar,
             neutral: &[10.0],
+            is_optional: false,
             lower: 0.01,
             upper: 1e5,
             fit: Some(ParameterFit {
@@ -55,6 +56,7 @@ const fn amplitude(name: &'static str, unit: &'static str, prior_deviation: f64)
         unit,
         shape: Shape::Vector3,
         neutral: &[0.0; 3],
+        is_optional: false,
         lower: -1e3,
         upper: 1e3,
         fit: Some(ParameterFit {
@@ -71,6 +73,7 @@ const fn phase(name: &'static str) -> ParameterSpec {
         unit: "rad",
         shape: Shape::Vector3,
         neutral: &[0.0; 3],
+        is_optional: false,
         lower: -2.0 * TAU,
         upper: 2.0 * TAU,
         fit: Some(ParameterFit {
