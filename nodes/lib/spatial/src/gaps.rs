@@ -14,9 +14,9 @@ const LONGEST_GAP: usize = 600;
 /// make it singular; no source.
 const RIDGE: f64 = 1e-12;
 
-/// Densities below this part of the largest count as it: smoothed poses fall by sixteen decades, of which
-/// the ridge (as a part of the least) would leave those of the noise and take those of the motion, and
-/// the series would bend where the gap begins. No source.
+/// Densities below this part of the largest count as it: those of smoothed poses fall by sixteen decades,
+/// more than the ridge leaves room for, which would then pull at the motion and bend the series where
+/// the gap begins. No source.
 const LEAST_DENSITY: f64 = 1e-11;
 
 /// Replaces the entries in `gaps` by the likeliest ones, given the others and the series' spectrum
