@@ -32,7 +32,7 @@ pub(crate) fn unexplained_variances(
 fn reference_variances(findings: &Findings, simulations: &Simulations) -> PerChannel<f64> {
     let (whole, set) = (&simulations.whole, findings.applied());
     let estimate = &findings.model.basis.estimate;
-    let variances = estimate.variances(&whole.stamps, 1.0, set.lever_arm().norm());
+    let variances = set.reference_variances(estimate, 1.0, &whole.stamps);
     PerChannel::from_fn(|channel| {
         let of_sample = |(k, variance): (usize, &SampleVariance)| -> Option<f64> {
             whole.usable[k][crate::axes::axes_of_channel(channel).start].then(|| {

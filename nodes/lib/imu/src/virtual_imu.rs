@@ -9,7 +9,7 @@
 use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_msgs::std_msgs::Header;
 use cromosim_spatial::{KinematicTrack, Stamp};
-use nalgebra::UnitQuaternion;
+use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::{
     Channel, Covariances, DeclaredNoise, Device, Dropouts, EffectKind, ImuError, ImuSample,
@@ -183,8 +183,11 @@ pub fn measure_recording(
         frame_id,
     };
     let none = SampleVariance::default();
-    let message = |((stamp, reading), variance): ((&Stamp, &Reading), &SampleVariance)| {
-        let variance = &in_units(*variance, units);
+    let message = |(k, variance): (usize, &SampleVariance)| {
+        let (stamp, reading) = (&motion.stamps[k], &readings[k]);
+        let late = effects.effects.clock_uncertainty(*stamp - effects.epoch);
+        let variance = in_units(*variance, units);
+        let variance = &with_clock_errors(variance, late, k, motion.stamps, &readings);
         let lost = dropouts.as_mut().is_some_and(Dropouts::next_is_lost);
         let sample = ImuSample {
             stamp: *stamp,
@@ -194,11 +197,9 @@ pub fn measure_recording(
         };
         (!lost).then(|| output.messages(sample, variance).data_raw)
     };
-    Ok(motion
-        .stamps
-        .iter()
-        .zip(&readings)
-        .zip(motion.variances.iter().chain(std::iter::repeat(&none)))
+    let variances = motion.variances.iter().chain(std::iter::repeat(&none));
+    Ok((0..readings.len())
+        .zip(variances)
         .filter_map(message)
         .collect())
 }
@@ -227,6 +228,31 @@ fn in_units(variance: SampleVariance, units: PerChannel<f64>) -> SampleVariance 
     SampleVariance {
         acceleration: variance.acceleration * units.accelerometer.powi(2),
         angular_velocity: variance.angular_velocity * units.gyroscope.powi(2),
+        ..variance
+    }
+}
+
+/// What stamps that are `late` by this standard deviation (s) add to a reading's variances: the square of
+/// its change over time, from the readings around it, mean over the axes.
+fn with_clock_errors(
+    variance: SampleVariance,
+    late: f64,
+    k: usize,
+    stamps: &[Stamp],
+    readings: &[Reading],
+) -> SampleVariance {
+    let (from, to) = (k.saturating_sub(2), (k + 2).min(readings.len() - 1));
+    let seconds = stamps[to] - stamps[from];
+    if late == 0.0 || seconds <= 0.0 {
+        return variance;
+    }
+    let added = |of: fn(&Reading) -> Vector3<f64>| {
+        let change = (of(&readings[to]) - of(&readings[from])) / seconds;
+        late * late * change.norm_squared() / 3.0
+    };
+    SampleVariance {
+        acceleration: variance.acceleration + added(|reading| reading.specific_force),
+        angular_velocity: variance.angular_velocity + added(|reading| reading.angular_velocity),
         ..variance
     }
 }
@@ -264,3 +290,7 @@ impl Output {
         }
     }
 }
+
+#[cfg(test)]
+#[path = "virtual_imu_tests.rs"]
+mod tests;

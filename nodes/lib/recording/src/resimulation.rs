@@ -224,8 +224,7 @@ impl Known {
         match self {
             Self::Samples(samples) => variances_at(samples, stamps),
             Self::Estimate(estimate) => {
-                let arm_m = effects.lever_arm().norm();
-                estimate.variances(stamps, effects.length_factor(), arm_m)
+                effects.reference_variances(estimate, effects.length_factor(), stamps)
             }
         }
     }

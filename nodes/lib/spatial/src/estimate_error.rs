@@ -10,24 +10,30 @@ use crate::{PoseEstimate, SampleVariance, Stamp};
 /// Variances around one window's centre: of the value, and of its first and second derivative.
 type Variances = [f64; 3];
 
+/// How errors of poses come to a sensor.
+pub struct ErrorPath<'p> {
+    /// Of which units of the positions a metre has so many.
+    pub units_per_metre: f64,
+    /// From the poses' origin to the sensor, m.
+    pub lever_arm_m: f64,
+    /// Part of the power at a frequency (Hz) that the sensor passes, of the angular velocity and of
+    /// the acceleration.
+    pub passed: &'p dyn Fn(f64) -> [f64; 2],
+}
+
 impl PoseEstimate {
-    /// Variances, along or about each axis, that the poses' noise leaves in the kinematics of a point
-    /// `lever_arm_m` from the origin, at times in order; the positions are in units of which
-    /// `units_per_metre` are a metre.
+    /// Variances, along or about each axis, that the poses' noise leaves in what a sensor feels, at times
+    /// in order.
     ///
-    /// With N the noise's density and W a window's filter (see [`PoseEstimate`]) the n-th derivative
-    /// errs by `integral N W (2 pi f)^(2 n) df`; windows are cross-faded as the motion is. An error of
-    /// the angular acceleration moves the point by two thirds of its square times the arm's, mean
-    /// over directions. What the filter takes for noise though it is motion is not in it.
-    pub fn variances(
-        &self,
-        stamps: &[Stamp],
-        units_per_metre: f64,
-        lever_arm_m: f64,
-    ) -> Vec<SampleVariance> {
+    /// With N the noise's density, W a window's filter (see [`PoseEstimate`]) and P what the sensor passes
+    /// the n-th derivative errs by `integral N W P (2 pi f)^(2 n) df`; windows are cross-faded as the
+    /// motion is. An error of the angular acceleration moves the sensor by two thirds of its square times
+    /// the arm's, mean over directions. What the filter takes for noise though it is motion is not in it.
+    pub fn variances(&self, stamps: &[Stamp], path: &ErrorPath<'_>) -> Vec<SampleVariance> {
         let of_windows = |floor: &NoiseFloor| -> Vec<Variances> {
             let windows = floor.windows.iter();
-            windows.map(|filter| through(floor, filter)).collect()
+            let through = |filter| through(floor, filter, path.passed);
+            windows.map(through).collect()
         };
         let (positions, rotations) = (of_windows(&self.position), of_windows(&self.rotation));
         let at = |stamp: &Stamp| {
@@ -36,8 +42,8 @@ impl PoseEstimate {
             let [rotation, turning, spinning_up] =
                 faded(&rotations, place).map(|variance| variance / QUATERNION_PER_ROTVEC);
             SampleVariance {
-                acceleration: acceleration / units_per_metre.powi(2)
-                    + 2.0 / 3.0 * lever_arm_m.powi(2) * spinning_up,
+                acceleration: acceleration / path.units_per_metre.powi(2)
+                    + 2.0 / 3.0 * path.lever_arm_m.powi(2) * spinning_up,
                 angular_velocity: turning,
                 orientation: rotation,
             }
@@ -46,14 +52,15 @@ impl PoseEstimate {
     }
 }
 
-/// What a filter lets through of the noise.
-fn through(floor: &NoiseFloor, filter: &Filter) -> Variances {
+/// What a filter and a sensor let through of the noise.
+fn through(floor: &NoiseFloor, filter: &Filter, passed: &dyn Fn(f64) -> [f64; 2]) -> Variances {
     let mut sums = Variances::default();
     for (k, weight) in filter.weights.iter().enumerate() {
         let frequency_hz = k as f64 * filter.spacing_hz;
         let mut power = floor.noise_at(frequency_hz) * weight * filter.spacing_hz;
-        for sum in &mut sums {
-            *sum += power;
+        let [of_rate, of_acceleration] = passed(frequency_hz);
+        for (sum, passed) in sums.iter_mut().zip([1.0, of_rate, of_acceleration]) {
+            *sum += power * passed;
             power *= (TAU * frequency_hz).powi(2);
         }
     }

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::*;
-use crate::{Complex64, SmoothingKernel};
+use crate::{Complex64, ErrorPath, SmoothingKernel};
 
 /// Deterministic noise: sums of twelve uniform numbers.
 struct Normal(u64);
@@ -111,15 +111,29 @@ fn derivatives_err_as_much_as_is_stated() {
     let track = estimate.track(100.0);
     let inner = &stamps[100..5800];
     let stated: f64 = estimate
-        .variances(inner, 1.0, 0.0)
+        .variances(inner, &path(0.0, &|_| [1.0; 2]))
         .iter()
         .map(|variance| 3.0 * variance.acceleration)
         .sum();
     let ratio = acceleration_error(&track).powi(2) / (stated / inner.len() as f64);
     assert!((0.7..1.4).contains(&ratio), "{ratio}");
-    let [near, far] = [0.0, 0.1].map(|arm_m| estimate.variances(&stamps[300..301], 1.0, arm_m)[0]);
+    let at = |path: &ErrorPath| estimate.variances(&stamps[300..301], path)[0];
+    let [near, far] = [0.0, 0.1].map(|arm_m| at(&path(arm_m, &|_| [1.0; 2])));
     assert!(far.acceleration > near.acceleration);
     assert_eq!(far.angular_velocity, near.angular_velocity);
+    // Half of the power of the rate, a quarter of that of the acceleration.
+    let less = at(&path(0.1, &|_| [0.5, 0.25]));
+    assert_eq!(less.orientation, far.orientation);
+    assert!((less.angular_velocity / far.angular_velocity - 0.5).abs() < 1e-12);
+    assert!((less.acceleration / far.acceleration - 0.25).abs() < 1e-12);
+}
+
+fn path(lever_arm_m: f64, passed: &dyn Fn(f64) -> [f64; 2]) -> ErrorPath<'_> {
+    ErrorPath {
+        units_per_metre: 1.0,
+        lever_arm_m,
+        passed,
+    }
 }
 
 #[test]

@@ -75,6 +75,7 @@ pub use difference::{MAX_STENCIL, derivative_weights};
 pub use equations::LocalWeight;
 pub use error::SpatialError;
 pub use estimate::{PoseEstimate, PoseNoise};
+pub use estimate_error::ErrorPath;
 pub use fourth_differences::{
     MEDIAN_OF_SQUARE, ROUNDED_MEDIAN_OF_SQUARE, fourth_difference, white_noise_variance,
 };

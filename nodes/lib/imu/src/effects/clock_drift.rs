@@ -1,11 +1,11 @@
 //! `clock_drift`: the IMU's clock runs at another rate; with `time_offset` it makes stamps of true
 //! times.
 
-use super::EffectKind;
 use super::search::{
     Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, Search, always,
 };
 use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
+use super::{EffectKind, EffectSet};
 use crate::Channel;
 
 pub(super) static SPEC: EffectSpec = EffectSpec {
@@ -33,7 +33,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         first_guess: FirstGuess::Neutral,
         companion: None,
         is_plausible: always,
-        ordinary: Some(Ordinary::EachValue(30.0)),
+        ordinary: Some(Ordinary::EachValue(ORDINARY_PPM)),
         rounding: None,
         is_calibration: false,
         special_case_of: &[Dependence::DelayOverTime],
@@ -44,6 +44,22 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         }),
     }),
 };
+
+/// Up to this two clocks ordinarily drift apart.
+const ORDINARY_PPM: f64 = 30.0;
+
+impl EffectSet {
+    /// Standard deviation of the time that a known drift leaves so long after the epoch, s: it is that of
+    /// the device's clock against the diagnosed reference's, and another reference has another clock.
+    pub(crate) fn clock_uncertainty(&self, seconds: f64) -> f64 {
+        if self.contains(EffectKind::ClockDrift) {
+            // Evenly spread up to what is ordinary.
+            ORDINARY_PPM * 1e-6 / 3.0_f64.sqrt() * seconds.abs()
+        } else {
+            0.0
+        }
+    }
+}
 
 /// Stamps and true times: `stamp = t0 + (t - t0) (1 + ppm 1e-6) + seconds`.
 #[derive(Clone, Copy, Debug, PartialEq)]

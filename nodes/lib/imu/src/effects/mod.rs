@@ -44,6 +44,7 @@ mod mount_slip;
 mod noise;
 mod quantization;
 mod readout;
+mod reference_errors;
 mod reference_interpolation;
 mod reference_noise;
 mod reference_scale;
