@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use cromosim_imu::{Effect, EffectKind, EffectSet, PerChannel, Reading};
+use cromosim_imu::{Effect, EffectKind, EffectSet, Reading, UnexplainedErrors};
 
 use crate::diagnosis::{
     Cause, Gap, GapLocation, KeptCalibration, Metrics, PlacementDiagnosis, RecordingCause,
@@ -18,7 +18,7 @@ use crate::session::Session;
 use crate::shares::{Shares, shares};
 use crate::simulations::Simulations;
 use crate::together::reported_by_the_others;
-use crate::unexplained::unexplained_variances;
+use crate::unexplained::unexplained_errors;
 use crate::words::{described, described_errors, unknown_cause, verdict};
 
 /// Everything the diagnosis of a placement is made of.
@@ -186,9 +186,9 @@ impl<'a> DiagnosisBuilder<'a> {
         }
     }
 
-    /// The variance that stays unexplained in each recording.
-    pub fn unexplained(&self) -> Vec<PerChannel<f64>> {
-        let of = |part: &Part| unexplained_variances(part.findings, &part.simulations, &part.after);
+    /// How far the readings of each recording are off beyond all that is known of.
+    pub fn unexplained_errors(&self) -> Vec<UnexplainedErrors> {
+        let of = |part: &Part| unexplained_errors(part.findings, &part.simulations, &part.after);
         self.parts.iter().map(of).collect()
     }
 

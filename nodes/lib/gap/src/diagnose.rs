@@ -2,6 +2,7 @@
 
 use cromosim_imu::{
     Channel, DeclaredNoise, EffectKind, OtherSession, PerChannel, PlacementEffects,
+    UnexplainedErrors,
 };
 
 use crate::builder::DiagnosisBuilder;
@@ -112,7 +113,7 @@ fn answer(
         trace(|| eprintln!("{}: {:?}", one.model.prepared.name, names(&one.reportable)));
     }
     let builder = DiagnosisBuilder::new(&findings, sessions, seed);
-    let unexplained = builder.unexplained();
+    let unexplained = builder.unexplained_errors();
     PlacementAnswer {
         diagnosis: builder.diagnosis(recordings),
         effects: simulated_effects(&findings, &unexplained),
@@ -123,12 +124,17 @@ fn answer(
 /// What a simulation of the device takes: the named effects of the last recording (and those of the
 /// other sessions), the declared noise, where none is declared the one that was found, and what
 /// stayed unexplained in all of them.
-fn simulated_effects(findings: &[Findings], unexplained: &[PerChannel<f64>]) -> PlacementEffects {
+fn simulated_effects(findings: &[Findings], unexplained: &[UnexplainedErrors]) -> PlacementEffects {
     let (others, last) = findings.split_at(findings.len() - 1);
     let last = &last[0];
     let prepared = last.model.prepared;
     let density = |channel| last.declared_sigma(channel) / prepared.rate_hz.sqrt();
-    let count = unexplained.len() as f64;
+    let mean = |of: fn(&UnexplainedErrors) -> PerChannel<f64>| {
+        PerChannel::from_fn(|channel| {
+            let all = unexplained.iter().map(|own| of(own)[channel]);
+            all.sum::<f64>() / unexplained.len() as f64
+        })
+    };
     PlacementEffects {
         epoch: prepared.epoch,
         declared_noise: DeclaredNoise {
@@ -136,9 +142,10 @@ fn simulated_effects(findings: &[Findings], unexplained: &[PerChannel<f64>]) -> 
             gyro_density: density(Channel::Gyroscope),
         },
         effects: last.applied(),
-        unexplained: PerChannel::from_fn(|channel| {
-            unexplained.iter().map(|own| own[channel]).sum::<f64>() / count
-        }),
+        unexplained: UnexplainedErrors {
+            variance: mean(|own| own.variance),
+            reference_excess: mean(|own| own.reference_excess),
+        },
         other_sessions: others
             .iter()
             .map(|one| OtherSession {

@@ -140,6 +140,12 @@ pub(crate) mod report {
     /// Part of the gap's excess over noise (in log-likelihood) below which the unexplained rest is
     /// the smaller part.
     pub const MOSTLY_EXPLAINED: f64 = 0.5;
+    /// Part of what stays unexplained beside nothing `unknown` that goes with the reference's errors.
+    /// Chosen among 0, a half and 1 on the withheld cases of seed 35.
+    pub const REFERENCE_SHARE: f64 = 0.5;
+    /// Most that motion covered by the reference's errors is taken for, in units of the variance that
+    /// these leave; what is more has another source. No source.
+    pub const MOST_REFERENCE_EXCESS: f64 = 10.0;
     /// Factor on the standard errors of the normal equations: the predicted noise is stationary,
     /// that of real motion is not. From withheld cases.
     pub const STANDARD_ERROR_FACTOR: f64 = 1.12;

@@ -164,6 +164,8 @@ fn course(before: f64, after: f64, decimals: usize) -> (&'static str, String) {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
+
     use super::*;
 
     fn metrics(accel_rmse: f64, gyro_rmse: f64) -> Metrics {

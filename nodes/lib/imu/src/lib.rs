@@ -76,7 +76,7 @@ pub use effects::{
     FirstGuess, FittedSearch, GravityMode, GridTrace, Identifiability, MeasurementInput, Ordinary,
     OtherSession, Owner, ParameterFit, ParameterSpec, PlacementEffects, ReadOff, ReadOffSearch,
     ResidualView, Rounding, Search, SensorModel, Shape, SpectralLine, Stage, StagedReadings,
-    StreamingEffects, Wave, clipping_limit, lattice_spacing, length_factors,
+    StreamingEffects, UnexplainedErrors, Wave, clipping_limit, lattice_spacing, length_factors,
     nearest_signed_permutation, strongest_line, unit_factors, white_noise_density,
 };
 pub use error::{EffectError, ImuError, PlacementProblem};

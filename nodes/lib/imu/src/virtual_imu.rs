@@ -14,7 +14,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use crate::{
     Channel, Covariances, DeclaredNoise, Device, Dropouts, EffectKind, ImuError, ImuSample,
     KinematicSample, MeasurementInput, NoiseSource, PerChannel, PlacementEffects, Reading,
-    SampleVariance, SensorModel, StreamingEffects,
+    SampleVariance, SensorModel, StreamingEffects, UnexplainedErrors,
 };
 
 /// Changes a motion before it is measured: the place of learned networks.
@@ -186,7 +186,7 @@ pub fn measure_recording(
     let message = |(k, variance): (usize, &SampleVariance)| {
         let (stamp, reading) = (&motion.stamps[k], &readings[k]);
         let late = effects.effects.clock_uncertainty(*stamp - effects.epoch);
-        let variance = in_units(*variance, units);
+        let variance = in_units(with_excess(*variance, &effects.unexplained), units);
         let variance = &with_clock_errors(variance, late, k, motion.stamps, &readings);
         let lost = dropouts.as_mut().is_some_and(Dropouts::next_is_lost);
         let sample = ImuSample {
@@ -218,9 +218,19 @@ fn stated_variances(
             Channel::Gyroscope => noise.gyro_density,
         };
         let rounding = set.lsb(channel).powi(2) / 12.0;
-        let own = density.powi(2) * rate_hz + rounding + effects.unexplained[channel];
+        let own = density.powi(2) * rate_hz + rounding + effects.unexplained.variance[channel];
         own * set.unit_factor(channel).powi(2)
     })
+}
+
+/// What errors of the poses leave, motion that they cover included.
+fn with_excess(variance: SampleVariance, unexplained: &UnexplainedErrors) -> SampleVariance {
+    let excess = unexplained.reference_excess;
+    SampleVariance {
+        acceleration: variance.acceleration * (1.0 + excess.accelerometer),
+        angular_velocity: variance.angular_velocity * (1.0 + excess.gyroscope),
+        ..variance
+    }
 }
 
 /// What errors of the poses leave in readings in other units.

@@ -38,7 +38,7 @@ fn stated(effects: EffectSet, before_s: f64) -> Imu {
             gyro_density: 1e-4,
         },
         effects,
-        unexplained: PerChannel::default(),
+        unexplained: UnexplainedErrors::default(),
         other_sessions: Vec::new(),
     };
     let options = ImuOptions {

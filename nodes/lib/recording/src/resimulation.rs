@@ -5,8 +5,9 @@ use std::path::Path;
 use cromosim_bag::BagWriter;
 use cromosim_imu::{
     DeclaredNoise, Differentiation, EffectSet, EffectsFile, ImuOptions, KinematicSample,
-    PerChannel, PlacementEffects, ReadingMapping, RecordedMotion, SampleVariance, SensorFrame,
-    SensorTrajectory, Trim, measure_recording, simulate_kinematics, track_in_sensor_axes,
+    PlacementEffects, ReadingMapping, RecordedMotion, SampleVariance, SensorFrame,
+    SensorTrajectory, Trim, UnexplainedErrors, measure_recording, simulate_kinematics,
+    track_in_sensor_axes,
 };
 use cromosim_learned::{LearnedSimulator, MappingFile, SiteMotion};
 use cromosim_msgs::geometry_msgs::PoseStamped;
@@ -122,7 +123,7 @@ impl Resimulation {
             epoch: stamps[0],
             declared_noise: declared(placement, rate_hz),
             effects: EffectSet::new(),
-            unexplained: PerChannel::default(),
+            unexplained: UnexplainedErrors::default(),
             other_sessions: Vec::new(),
         };
         let effects = self.effects.placements.get(name).unwrap_or(&nominal);

@@ -25,7 +25,8 @@ const SCHEMA: &str = "cromosim/effects/1";
 ///     effects:
 ///       - {effect: lever_arm, offset: [0.05, 0.0, -0.06]}
 ///       - {effect: time_offset, seconds: 0.021}
-///     unexplained: {accel_variance: 0.0021, gyro_variance: 1.2e-5}   # where something is
+///     unexplained: {accel_variance: 0.0021, gyro_variance: 1.2e-5}   # where something is, and
+///     # accel_reference_excess, gyro_reference_excess, see [`UnexplainedErrors`]
 ///     other_sessions:   # where several recordings were diagnosed together
 ///       - epoch: 1690000000.0
 ///         effects:
@@ -48,11 +49,21 @@ pub struct PlacementEffects {
     pub declared_noise: DeclaredNoise,
     /// What acts beyond it.
     pub effects: EffectSet,
-    /// Variance, mean over the axes, that readings have beyond all that is known of: (m/s2)2 and
-    /// (rad/s)2. It goes into the covariances of messages, and is never drawn.
-    pub unexplained: PerChannel<f64>,
+    /// How far readings are off beyond all that is known of. It goes into the covariances of
+    /// messages, and is never drawn.
+    pub unexplained: UnexplainedErrors,
     /// What acts in other sessions of the same device.
     pub other_sessions: Vec<OtherSession>,
+}
+
+/// How far readings are off beyond the device's noise and the errors that a reference's noise leaves.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct UnexplainedErrors {
+    /// Variance, mean over the axes, whatever the reference: (m/s2)2 and (rad/s)2.
+    pub variance: PerChannel<f64>,
+    /// And as a part of the variance that the errors of a reference leave: for motion that they cover,
+    /// which a better reference shows.
+    pub reference_excess: PerChannel<f64>,
 }
 
 /// Another session of a device.
@@ -127,10 +138,12 @@ struct RawSession {
 }
 
 #[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, default)]
 struct RawUnexplained {
     accel_variance: f64,
     gyro_variance: f64,
+    accel_reference_excess: f64,
+    gyro_reference_excess: f64,
 }
 
 /// A decimal number of seconds, read to the nanosecond.
@@ -162,6 +175,8 @@ impl EffectsFile {
                 ("gyro_density", noise.gyro_density),
                 ("accel_variance", rest.accel_variance),
                 ("gyro_variance", rest.gyro_variance),
+                ("accel_reference_excess", rest.accel_reference_excess),
+                ("gyro_reference_excess", rest.gyro_reference_excess),
             ] {
                 if !(value >= 0.0 && value.is_finite()) {
                     return Err(ImuError::DeviceNumber {
@@ -177,9 +192,15 @@ impl EffectsFile {
                     epoch: placement.epoch.0,
                     declared_noise: noise,
                     effects: placement.effects,
-                    unexplained: PerChannel {
-                        accelerometer: rest.accel_variance,
-                        gyroscope: rest.gyro_variance,
+                    unexplained: UnexplainedErrors {
+                        variance: PerChannel {
+                            accelerometer: rest.accel_variance,
+                            gyroscope: rest.gyro_variance,
+                        },
+                        reference_excess: PerChannel {
+                            accelerometer: rest.accel_reference_excess,
+                            gyroscope: rest.gyro_reference_excess,
+                        },
                     },
                     other_sessions: placement
                         .other_sessions
@@ -236,17 +257,30 @@ impl EffectsFile {
                 }
             );
             write_effects(&mut text, "      ", &placement.effects);
-            if placement.unexplained != PerChannel::default() {
-                let rest = placement.unexplained;
-                let (accel, gyro) = (number(rest.accelerometer), number(rest.gyroscope));
-                let _ = writeln!(
-                    text,
-                    "    unexplained: {{accel_variance: {accel}, gyro_variance: {gyro}}}"
-                );
-            }
+            write_unexplained(&mut text, &placement.unexplained);
             write_sessions(&mut text, &placement.other_sessions);
         }
         text
+    }
+}
+
+/// Nothing where all is explained; of the two kinds those that are there.
+fn write_unexplained(text: &mut String, rest: &UnexplainedErrors) {
+    let kinds = [
+        ("variance", rest.variance),
+        ("reference_excess", rest.reference_excess),
+    ];
+    let there = kinds
+        .iter()
+        .filter(|(_, values)| *values != PerChannel::default());
+    let fields: Vec<String> = there
+        .map(|(name, values)| {
+            let (accel, gyro) = (number(values.accelerometer), number(values.gyroscope));
+            format!("accel_{name}: {accel}, gyro_{name}: {gyro}")
+        })
+        .collect();
+    if !fields.is_empty() {
+        let _ = writeln!(text, "    unexplained: {{{}}}", fields.join(", "));
     }
 }
 
