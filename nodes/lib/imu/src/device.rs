@@ -4,7 +4,8 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use crate::{DeclaredNoise, EffectSet, ImuError, Stage};
+use crate::effects::RawUnexplained;
+use crate::{DeclaredNoise, EffectSet, ImuError, Stage, UnexplainedErrors};
 
 const SCHEMA: &str = "cromosim/device/1";
 
@@ -32,9 +33,10 @@ pub const EMBEDDED_DEVICES: [(&str, &str); 3] = [
 /// effects:
 ///   - {effect: accel_bias, bias: [0.05, -0.03, 0.08]}
 ///   - {effect: gyro_bias, bias: [0.004, -0.006, 0.003]}
+/// unexplained: {accel_variance: 0.0021, gyro_variance: 1.2e-5}   # may be left out
 /// ```
-/// Densities are one-sided, (m/s2)/sqrt(Hz) and (rad/s)/sqrt(Hz); the list is that of an
-/// [`crate::EffectsFile`], without the effects of a reference. What depends on time is anchored at
+/// Densities are one-sided, (m/s2)/sqrt(Hz) and (rad/s)/sqrt(Hz); the list and what is unexplained are
+/// those of an [`crate::EffectsFile`], without the effects of a reference. What depends on time is anchored at
 /// the first sample.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Device {
@@ -42,6 +44,7 @@ pub struct Device {
     gyro_density: f64,
     orientation_stddev: f64,
     effects: EffectSet,
+    unexplained: UnexplainedErrors,
 }
 
 #[derive(Deserialize)]
@@ -51,6 +54,8 @@ struct RawDevice {
     declared_noise: RawNoise,
     #[serde(default)]
     effects: EffectSet,
+    #[serde(default)]
+    unexplained: RawUnexplained,
 }
 
 #[derive(Deserialize)]
@@ -70,6 +75,7 @@ impl Device {
             gyro_density: 0.0,
             orientation_stddev: 0.0,
             effects: EffectSet::new(),
+            unexplained: UnexplainedErrors::default(),
         }
     }
 
@@ -112,6 +118,7 @@ impl Device {
         ];
         if let Some((field, value)) = fields
             .into_iter()
+            .chain(raw.unexplained.fields())
             .find(|(_, value)| !(*value >= 0.0 && value.is_finite()))
         {
             return Err(ImuError::DeviceNumber {
@@ -135,6 +142,7 @@ impl Device {
             gyro_density,
             orientation_stddev,
             effects: raw.effects,
+            unexplained: raw.unexplained.into(),
         })
     }
 
@@ -204,6 +212,11 @@ impl Device {
     /// its covariance unknown.
     pub fn orientation_stddev(&self) -> f64 {
         self.orientation_stddev
+    }
+
+    /// How far its readings are off beyond all that is known of.
+    pub fn unexplained(&self) -> UnexplainedErrors {
+        self.unexplained
     }
 
     /// What the device does to readings beyond its declared noise.

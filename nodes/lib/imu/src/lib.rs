@@ -55,6 +55,7 @@ mod random;
 mod sample;
 mod schemes;
 mod simulate;
+mod stated_errors;
 mod stream;
 mod stream_adaptive;
 mod stream_spline;

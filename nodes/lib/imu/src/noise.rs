@@ -5,6 +5,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use rand_chacha::ChaCha12Rng;
 
 use crate::random::{normal_pair, stream};
+use crate::stated_errors::StatedErrors;
 use crate::{DeclaredNoise, Device, ImuError, PerChannel, Reading};
 
 /// Covariances of a sensor_msgs/Imu, row-major 3x3, as REP-145 reads them: all zero is unknown, -1
@@ -20,14 +21,14 @@ pub struct Covariances {
 }
 
 impl Covariances {
-    /// Those of a device read at a rate: variance of the white noise per sample, density^2 rate, on
-    /// the diagonals; a device without noise has unknown (zero) covariances. The orientation is
-    /// reported (`data`).
+    /// Those of a device read at a rate: on the diagonals the variance per sample of its white noise
+    /// (density^2 rate), its rounding (step^2 / 12) and what stays unexplained, in the units that it
+    /// reports; a device without any has unknown (zero) covariances. The orientation is reported
+    /// (`data`).
     pub fn for_device(device: &Device, rate_hz: f64) -> Self {
         Self {
             orientation: diagonal(device.orientation_stddev().powi(2)),
-            angular_velocity: diagonal(device.gyro_density().powi(2) * rate_hz),
-            linear_acceleration: diagonal(device.accel_density().powi(2) * rate_hz),
+            ..Self::white(StatedErrors::of_device(device, rate_hz).own)
         }
     }
 

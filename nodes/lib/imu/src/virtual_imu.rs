@@ -9,12 +9,13 @@
 use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_msgs::std_msgs::Header;
 use cromosim_spatial::{KinematicTrack, Stamp};
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::UnitQuaternion;
 
+use crate::stated_errors::{StatedErrors, with_clock_errors};
 use crate::{
-    Channel, Covariances, DeclaredNoise, Device, Dropouts, EffectKind, ImuError, ImuSample,
-    KinematicSample, MeasurementInput, NoiseSource, PerChannel, PlacementEffects, Reading,
-    SampleVariance, SensorModel, StreamingEffects, UnexplainedErrors,
+    Covariances, Device, Dropouts, EffectKind, ImuError, ImuSample, KinematicSample,
+    MeasurementInput, NoiseSource, PlacementEffects, Reading, SampleVariance, SensorModel,
+    StreamingEffects,
 };
 
 /// Changes a motion before it is measured: the place of learned networks.
@@ -73,6 +74,7 @@ struct Output {
 /// One placement's IMU: samples of its motion go in, in order of time, messages come out.
 pub struct VirtualImu {
     effects: StreamingEffects,
+    stated: StatedErrors,
     output: Output,
 }
 
@@ -89,6 +91,7 @@ impl VirtualImu {
             } else {
                 effects.without_noise()
             },
+            stated: StatedErrors::of_device(device, options.rate_hz),
             output: Output {
                 covariances: Covariances::for_device(device, options.rate_hz),
                 mapping: options.mapping,
@@ -100,7 +103,8 @@ impl VirtualImu {
     /// The messages of a sample; `None` where the device loses it.
     pub fn measure(&mut self, motion: &KinematicSample) -> Option<ImuMessages> {
         let sample = self.effects.step(motion)?;
-        Some(self.output.messages(sample, &motion.variance))
+        let variance = self.stated.of_motion(motion.variance);
+        Some(self.output.messages(sample, &variance))
     }
 
     /// Begins anew with the next sample, see [`StreamingEffects::reset`].
@@ -175,18 +179,17 @@ pub fn measure_recording(
     let mut dropouts = (noise && !motion.stamps_are_recorded)
         .then(|| Dropouts::new(losses, seed, &name))
         .flatten();
-    let units = PerChannel::from_fn(|channel| effects.effects.unit_factor(channel));
-    let variances = stated_variances(effects, &model.total_noise(&declared), rate_hz);
+    let stated = StatedErrors::new(&effects.effects, &declared, effects.unexplained, rate_hz);
     let output = Output {
         mapping,
-        covariances: Covariances::white(variances),
+        covariances: Covariances::white(stated.own),
         frame_id,
     };
     let none = SampleVariance::default();
     let message = |(k, variance): (usize, &SampleVariance)| {
         let (stamp, reading) = (&motion.stamps[k], &readings[k]);
         let late = effects.effects.clock_uncertainty(*stamp - effects.epoch);
-        let variance = in_units(with_excess(*variance, &effects.unexplained), units);
+        let variance = stated.of_motion(*variance);
         let variance = &with_clock_errors(variance, late, k, motion.stamps, &readings);
         let lost = dropouts.as_mut().is_some_and(Dropouts::next_is_lost);
         let sample = ImuSample {
@@ -202,69 +205,6 @@ pub fn measure_recording(
         .zip(variances)
         .filter_map(message)
         .collect())
-}
-
-/// Variances per sample and axis of what is the device's own: its white noise, its rounding (step^2
-/// / 12), and what stays unexplained; in the units that it reports.
-fn stated_variances(
-    effects: &PlacementEffects,
-    noise: &DeclaredNoise,
-    rate_hz: f64,
-) -> PerChannel<f64> {
-    let set = &effects.effects;
-    PerChannel::from_fn(|channel| {
-        let density = match channel {
-            Channel::Accelerometer => noise.accel_density,
-            Channel::Gyroscope => noise.gyro_density,
-        };
-        let rounding = set.lsb(channel).powi(2) / 12.0;
-        let own = density.powi(2) * rate_hz + rounding + effects.unexplained.variance[channel];
-        own * set.unit_factor(channel).powi(2)
-    })
-}
-
-/// What errors of the poses leave, motion that they cover included.
-fn with_excess(variance: SampleVariance, unexplained: &UnexplainedErrors) -> SampleVariance {
-    let excess = unexplained.reference_excess;
-    SampleVariance {
-        acceleration: variance.acceleration * (1.0 + excess.accelerometer),
-        angular_velocity: variance.angular_velocity * (1.0 + excess.gyroscope),
-        ..variance
-    }
-}
-
-/// What errors of the poses leave in readings in other units.
-fn in_units(variance: SampleVariance, units: PerChannel<f64>) -> SampleVariance {
-    SampleVariance {
-        acceleration: variance.acceleration * units.accelerometer.powi(2),
-        angular_velocity: variance.angular_velocity * units.gyroscope.powi(2),
-        ..variance
-    }
-}
-
-/// What stamps that are `late` by this standard deviation (s) add to a reading's variances: the square of
-/// its change over time, from the readings around it, mean over the axes.
-fn with_clock_errors(
-    variance: SampleVariance,
-    late: f64,
-    k: usize,
-    stamps: &[Stamp],
-    readings: &[Reading],
-) -> SampleVariance {
-    let (from, to) = (k.saturating_sub(2), (k + 2).min(readings.len() - 1));
-    let seconds = stamps[to] - stamps[from];
-    if late == 0.0 || seconds <= 0.0 {
-        return variance;
-    }
-    let added = |of: fn(&Reading) -> Vector3<f64>| {
-        let change = (of(&readings[to]) - of(&readings[from])) / seconds;
-        late * late * change.norm_squared() / 3.0
-    };
-    SampleVariance {
-        acceleration: variance.acceleration + added(|reading| reading.specific_force),
-        angular_velocity: variance.angular_velocity + added(|reading| reading.angular_velocity),
-        ..variance
-    }
 }
 
 impl Output {

@@ -1,9 +1,10 @@
 #![allow(clippy::unwrap_used)]
 
 use cromosim_spatial::KinematicTrack;
+use nalgebra::Vector3;
 
 use super::*;
-use crate::{Effect, EffectSet};
+use crate::{DeclaredNoise, Effect, EffectSet, UnexplainedErrors};
 
 /// Spins up by 2 rad/s2 about one axis, at 100 Hz.
 fn spinning_up() -> KinematicTrack {
@@ -65,5 +66,47 @@ fn a_drifting_clock_is_less_sure_the_longer_it_runs() {
     assert!(
         (later / expected - 1.0).abs() < 1e-6,
         "{later} rather than {expected}"
+    );
+}
+
+#[test]
+fn a_device_states_live_what_it_states_offline() {
+    let device = |rest: &str| {
+        let text = format!(
+            "schema: cromosim/device/1\ndeclared_noise: {{accel_density: 0.002, gyro_density: 1.0e-4}}\n\
+             effects:\n  - {{effect: accel_noise, density: 0.0015}}\n  - {{effect: accel_quantization, lsb: 0.06}}\n  \
+             - {{effect: accel_units, factor: 0.1}}\n{rest}"
+        );
+        Device::parse(&text, "watch.yaml").unwrap()
+    };
+    let variance = |device: &Device| Covariances::for_device(device, 100.0).linear_acceleration[0];
+    // In units of 10 m/s2: noise of both densities, and rounding.
+    let own = 0.0025_f64.powi(2) * 100.0 + 0.06_f64.powi(2) / 12.0;
+    let found = variance(&device(""));
+    assert!((found / (0.01 * own) - 1.0).abs() < 1e-12, "{found}");
+    let rest = "unexplained: {accel_variance: 0.0021, accel_reference_excess: 0.5}\n";
+    let found = variance(&device(rest));
+    assert!(
+        (found / (0.01 * (own + 0.0021)) - 1.0).abs() < 1e-12,
+        "{found}"
+    );
+    // Errors of the poses go with the excess, in the device's units.
+    let of_poses = SampleVariance {
+        acceleration: 0.04,
+        angular_velocity: 1e-4,
+        orientation: 0.0,
+    };
+    let stated = StatedErrors::of_device(&device(rest), 100.0).of_motion(of_poses);
+    assert!((stated.acceleration - 0.04 * 1.5 * 0.01).abs() < 1e-15);
+    assert_eq!(stated.angular_velocity, 1e-4);
+    let refused = Device::parse(
+        "schema: cromosim/device/1\ndeclared_noise: {accel_density: 0.0, gyro_density: 0.0}\n\
+         unexplained: {gyro_variance: -1.0}\n",
+        "watch.yaml",
+    );
+    let refused = refused.unwrap_err().to_string();
+    assert!(
+        refused.contains("watch.yaml") && refused.contains("gyro_variance"),
+        "{refused}"
     );
 }

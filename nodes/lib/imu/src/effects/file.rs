@@ -137,13 +137,41 @@ struct RawSession {
     effects: EffectSet,
 }
 
-#[derive(Default, Deserialize)]
+/// [`UnexplainedErrors`] as files have them.
+#[derive(Clone, Copy, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-struct RawUnexplained {
+pub(crate) struct RawUnexplained {
     accel_variance: f64,
     gyro_variance: f64,
     accel_reference_excess: f64,
     gyro_reference_excess: f64,
+}
+
+impl RawUnexplained {
+    /// Names and values, for checks.
+    pub(crate) fn fields(&self) -> [(&'static str, f64); 4] {
+        [
+            ("accel_variance", self.accel_variance),
+            ("gyro_variance", self.gyro_variance),
+            ("accel_reference_excess", self.accel_reference_excess),
+            ("gyro_reference_excess", self.gyro_reference_excess),
+        ]
+    }
+}
+
+impl From<RawUnexplained> for UnexplainedErrors {
+    fn from(raw: RawUnexplained) -> Self {
+        Self {
+            variance: PerChannel {
+                accelerometer: raw.accel_variance,
+                gyroscope: raw.gyro_variance,
+            },
+            reference_excess: PerChannel {
+                accelerometer: raw.accel_reference_excess,
+                gyroscope: raw.gyro_reference_excess,
+            },
+        }
+    }
 }
 
 /// A decimal number of seconds, read to the nanosecond.
@@ -170,14 +198,11 @@ impl EffectsFile {
         let mut placements = BTreeMap::new();
         for (name, placement) in raw.placements {
             let (noise, rest) = (placement.declared_noise, placement.unexplained);
-            for (field, value) in [
+            let densities = [
                 ("accel_density", noise.accel_density),
                 ("gyro_density", noise.gyro_density),
-                ("accel_variance", rest.accel_variance),
-                ("gyro_variance", rest.gyro_variance),
-                ("accel_reference_excess", rest.accel_reference_excess),
-                ("gyro_reference_excess", rest.gyro_reference_excess),
-            ] {
+            ];
+            for (field, value) in densities.into_iter().chain(rest.fields()) {
                 if !(value >= 0.0 && value.is_finite()) {
                     return Err(ImuError::DeviceNumber {
                         file: format!("{file}: placement `{name}`"),
@@ -192,16 +217,7 @@ impl EffectsFile {
                     epoch: placement.epoch.0,
                     declared_noise: noise,
                     effects: placement.effects,
-                    unexplained: UnexplainedErrors {
-                        variance: PerChannel {
-                            accelerometer: rest.accel_variance,
-                            gyroscope: rest.gyro_variance,
-                        },
-                        reference_excess: PerChannel {
-                            accelerometer: rest.accel_reference_excess,
-                            gyroscope: rest.gyro_reference_excess,
-                        },
-                    },
+                    unexplained: rest.into(),
                     other_sessions: placement
                         .other_sessions
                         .into_iter()

@@ -79,6 +79,7 @@ pub use crate::channel::Reading;
 pub use axis_convention::nearest_signed_permutation;
 pub use dropped_samples::Dropouts;
 pub use effect::{Effect, EffectSet};
+pub(crate) use file::RawUnexplained;
 pub use file::{DeclaredNoise, EffectsFile, OtherSession, PlacementEffects, UnexplainedErrors};
 pub use gravity_convention::GravityMode;
 pub use kind::EffectKind;

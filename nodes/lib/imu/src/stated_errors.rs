@@ -1,0 +1,90 @@
+//! What messages state of their errors, live and offline.
+
+use cromosim_spatial::Stamp;
+use nalgebra::Vector3;
+
+use crate::{
+    Channel, DeclaredNoise, Device, EffectSet, PerChannel, Reading, SampleVariance, SensorModel,
+    UnexplainedErrors,
+};
+
+/// How far the readings of a device may be off.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct StatedErrors {
+    /// Variances per sample and axis of what is the device's own, in the units that it reports: its
+    /// white noise, its rounding (step^2 / 12), and what stays unexplained.
+    pub own: PerChannel<f64>,
+    unexplained: UnexplainedErrors,
+    units: PerChannel<f64>,
+}
+
+impl StatedErrors {
+    /// Of a device with these effects beyond its declared noise, read at a rate.
+    pub fn new(
+        effects: &EffectSet,
+        declared: &DeclaredNoise,
+        unexplained: UnexplainedErrors,
+        rate_hz: f64,
+    ) -> Self {
+        let noise = SensorModel::new(effects, Stamp::default()).total_noise(declared);
+        let units = PerChannel::from_fn(|channel| effects.unit_factor(channel));
+        let own = PerChannel::from_fn(|channel| {
+            let density = match channel {
+                Channel::Accelerometer => noise.accel_density,
+                Channel::Gyroscope => noise.gyro_density,
+            };
+            let rounding = effects.lsb(channel).powi(2) / 12.0;
+            let si = density.powi(2) * rate_hz + rounding + unexplained.variance[channel];
+            si * units[channel].powi(2)
+        });
+        Self {
+            own,
+            unexplained,
+            units,
+        }
+    }
+
+    /// Of a device as its file describes it.
+    pub fn of_device(device: &Device, rate_hz: f64) -> Self {
+        let declared = device.declared_noise();
+        Self::new(device.effects(), &declared, device.unexplained(), rate_hz)
+    }
+
+    /// What errors of the poses leave (`variance`, in SI units), motion that they cover included, in the
+    /// units that the device reports.
+    pub fn of_motion(&self, variance: SampleVariance) -> SampleVariance {
+        let factor = PerChannel::from_fn(|channel| {
+            (1.0 + self.unexplained.reference_excess[channel]) * self.units[channel].powi(2)
+        });
+        SampleVariance {
+            acceleration: variance.acceleration * factor.accelerometer,
+            angular_velocity: variance.angular_velocity * factor.gyroscope,
+            ..variance
+        }
+    }
+}
+
+/// What stamps that are `late` by this standard deviation (s) add to a reading's variances: the square of
+/// its change over time, from the readings around it, mean over the axes.
+pub(crate) fn with_clock_errors(
+    variance: SampleVariance,
+    late: f64,
+    k: usize,
+    stamps: &[Stamp],
+    readings: &[Reading],
+) -> SampleVariance {
+    let (from, to) = (k.saturating_sub(2), (k + 2).min(readings.len() - 1));
+    let seconds = stamps[to] - stamps[from];
+    if late == 0.0 || seconds <= 0.0 {
+        return variance;
+    }
+    let added = |of: fn(&Reading) -> Vector3<f64>| {
+        let change = (of(&readings[to]) - of(&readings[from])) / seconds;
+        late * late * change.norm_squared() / 3.0
+    };
+    SampleVariance {
+        acceleration: variance.acceleration + added(|reading| reading.specific_force),
+        angular_velocity: variance.angular_velocity + added(|reading| reading.angular_velocity),
+        ..variance
+    }
+}
