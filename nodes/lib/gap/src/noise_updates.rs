@@ -1,7 +1,9 @@
 //! The model of a placement's noise, made from the residual of the best simulation so far.
 
+use std::sync::Arc;
+
 use cromosim_imu::{EffectSet, PerChannel, ReadOff, Reading, strongest_line};
-use cromosim_spatial::{KinematicTrack, PoseNoise};
+use cromosim_spatial::{KinematicTrack, PoseEstimate, PoseNoise};
 
 use crate::digital::Digital;
 use crate::fit::FitModel;
@@ -85,6 +87,23 @@ pub(crate) fn with_rest_as_noise<'a>(
         model.basis.clone(),
         model.noise.covering(prepared, &residual),
     )
+}
+
+/// The model with another estimate of the reference's motion, and the noise that a set leaves then.
+pub(crate) fn with_estimate<'a>(
+    model: &FitModel<'a>,
+    estimate: PoseEstimate,
+    set: &EffectSet,
+) -> FitModel<'a> {
+    let prepared = model.prepared;
+    let track = prepared.track(&estimate);
+    let residual = prepared.residual(&prepared.predict(&track, set).readings);
+    let basis = NoiseBasis {
+        estimate: Arc::new(estimate),
+        ..model.basis.clone()
+    };
+    let noise = NoiseModel::new(prepared, &basis, &residual);
+    FitModel::new(prepared, track, basis, noise)
 }
 
 /// Shares of a reference's noise densities that an ordinary reference has.

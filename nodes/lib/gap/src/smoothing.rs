@@ -1,13 +1,11 @@
 //! Whether the reference was smoothed before it came here.
 
-use std::sync::Arc;
-
 use cromosim_imu::{EffectKind, EffectSet, PerChannel};
 use cromosim_spatial::{SmoothingKernel, ZeroPhaseSmoothing};
 
 use crate::axes::{larger, smaller, sum_over_channels};
 use crate::fit::FitModel;
-use crate::noise_model::NoiseModel;
+use crate::noise_updates::with_estimate;
 use crate::plausibility::told_from_smoothing;
 use crate::policy::smoothing::{
     BESIDE, CLOSER, LEAST_GAIN_NATS, LEAST_SHARE, NOT_FARTHER, SUSPICIOUS,
@@ -166,15 +164,10 @@ fn with_undone_smoothing<'a>(
     set: &EffectSet,
     smoothing: ZeroPhaseSmoothing,
 ) -> FitModel<'a> {
-    let prepared = model.prepared;
-    let estimate = prepared.estimate.undoing(smoothing);
-    let track = prepared.track(&estimate);
-    let residual = prepared.residual(&prepared.predict(&track, set).readings);
-    let mut basis = model.basis.clone();
-    basis.estimate = Arc::new(estimate);
-    basis.undone_smoothing = Some(smoothing);
-    let noise = NoiseModel::new(prepared, &basis, &residual);
-    FitModel::new(prepared, track, basis, noise)
+    let estimate = model.prepared.estimate.undoing(smoothing);
+    let mut undone = with_estimate(model, estimate, set);
+    undone.basis.undone_smoothing = Some(smoothing);
+    undone
 }
 
 /// Whether the simulation itself comes closer in one channel than with the same effects alone, and in

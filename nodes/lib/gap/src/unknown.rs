@@ -5,14 +5,15 @@ use cromosim_imu::{Channel, EffectKind, PerChannel, ReadOff, Reading};
 use crate::axes::{any, axes_of_channel, larger, value_on_axis};
 use crate::confounding::{confounded_effects, is_calibration};
 use crate::findings::{Findings, Unknown};
-use crate::fit::Fit;
+use crate::fit::{Fit, FitModel};
 use crate::gram::dot;
 use crate::location::{bands, locate, summed_spectrum};
+use crate::noise_updates::with_estimate;
 use crate::policy::probability::{MOST_UNKNOWN, NATS_PER_BAND, UNKNOWN_GAIN_NATS};
 use crate::policy::report::COARSE_STEPS;
 use crate::policy::unknown::{
-    AXIS_SHARE, BAND, BURST, FROZEN, JITTER, OUTLIERS, REGRESSION_NATS, UNDONE_SMOOTHING_FACTOR,
-    USUAL_S,
+    AXIS_SHARE, BAND, BURST, FROZEN, JITTER, OUTLIERS, REGRESSION_NATS, STAYS,
+    UNDONE_SMOOTHING_FACTOR, USUAL_S,
 };
 use crate::prepared::PreparedPlacement;
 use crate::residual_regressions::{ResidualRegression, dependence_name, residual_regressions};
@@ -61,12 +62,14 @@ pub(crate) fn detect_unmodelled_structure(
     findings: &Findings,
     suspects: Suspects,
 ) -> Option<Unknown> {
-    let diagnostics = ResidualDiagnostics::new(findings);
+    let diagnostics = ResidualDiagnostics::new(&findings.model, &findings.scored.fit);
     let mut regressions = residual_regressions(findings);
     regressions.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     trace_regressions(&diagnostics, &regressions);
     let structure = Structure::new(findings, &diagnostics, &regressions);
-    if !structure.is_there() {
+    if !structure.is_there()
+        || (structure.is_loud_alone() && !is_loud_behind_wider_filters(findings, &diagnostics))
+    {
         return None;
     }
     let location = locate(
@@ -106,32 +109,20 @@ impl<'a> Structure<'a> {
         diagnostics: &'a ResidualDiagnostics,
         regressions: &'a [ResidualRegression],
     ) -> Self {
-        let basis = &findings.model.basis;
-        let factor = if basis.undone_smoothing.is_some() {
-            UNDONE_SMOOTHING_FACTOR
-        } else {
-            1.0
-        };
-        // Rounding errors of slow motion are no noise at all.
-        let coarse = |channel: Channel| basis.steps[channel] > COARSE_STEPS;
+        let model = &findings.model;
+        let factor = bar_factor(model);
         let strong: Vec<&ResidualRegression> = regressions
             .iter()
             .filter(|regression| {
                 let needed = REGRESSION_NATS * factor * longer_than_usual(findings);
-                regression.gain > needed && !coarse(regression.channel)
+                regression.gain > needed && !is_coarse(model, regression.channel)
             })
             .collect();
-        let noisy = |channel: Channel| {
-            !coarse(channel)
-                && (diagnostics.band[channel] > BAND * factor
-                    || (diagnostics.burst[channel] > BURST * factor
-                        && diagnostics.outliers[channel] > OUTLIERS))
-        };
         let stuck = PerChannel::from_fn(|channel| {
             diagnostics.frozen[channel] > FROZEN && findings.digital[channel].lsb.is_none()
         });
         let in_channel = PerChannel::from_fn(|channel| {
-            noisy(channel)
+            diagnostics.is_loud(model, channel)
                 || stuck[channel]
                 || strong
                     .iter()
@@ -151,6 +142,11 @@ impl<'a> Structure<'a> {
 
     fn is_there(&self) -> bool {
         self.in_stamps || any(self.in_channel)
+    }
+
+    /// Whether nothing but the size of the residual tells.
+    fn is_loud_alone(&self) -> bool {
+        !self.in_stamps && !any(self.stuck) && self.strong.is_empty()
     }
 
     fn depends_on(&self) -> &'static str {
@@ -205,36 +201,65 @@ fn longer_than_usual(findings: &Findings) -> f64 {
     (prepared.length as f64 / prepared.rate_hz / USUAL_S).max(1.0)
 }
 
+/// Factor on the bars beside a smoothing that is undone.
+fn bar_factor(model: &FitModel) -> f64 {
+    if model.basis.undone_smoothing.is_some() {
+        UNDONE_SMOOTHING_FACTOR
+    } else {
+        1.0
+    }
+}
+
+/// Rounding errors of slow motion are no noise at all.
+fn is_coarse(model: &FitModel, channel: Channel) -> bool {
+    model.basis.steps[channel] > COARSE_STEPS
+}
+
+/// Whether the residual stays loud where the reference is filtered less: what does not is the filters'
+/// own, which cut bursts off and ring where motion ends.
+fn is_loud_behind_wider_filters(findings: &Findings, before: &ResidualDiagnostics) -> bool {
+    let set = &findings.scored.fit.set;
+    let estimate = findings.model.basis.estimate.with_wider_filters();
+    let model = with_estimate(&findings.model, estimate, set);
+    let fit = model.fit_steps(set.clone(), 0);
+    let after = ResidualDiagnostics::new(&model, &fit);
+    trace(|| eprintln!("behind wider filters {after:.3?}"));
+    Channel::ALL.into_iter().any(|channel| {
+        let stays = |of: fn(&ResidualDiagnostics) -> PerChannel<f64>| {
+            of(&after)[channel] > STAYS * of(before)[channel]
+        };
+        after.is_loud(&model, channel) && (stays(|own| own.band) || stays(|own| own.burst))
+    })
+}
+
 impl ResidualDiagnostics {
-    fn new(findings: &Findings) -> Self {
-        let model = &findings.model;
+    fn new(model: &FitModel, fit: &Fit) -> Self {
         let prepared = model.prepared;
+        let count = model.whitener.count;
         Self {
-            band: PerChannel::from_fn(|channel| largest_band(findings, channel)),
+            band: PerChannel::from_fn(|channel| largest_band(model, fit, channel)),
             outliers: PerChannel::from_fn(|channel| {
-                outliers(
-                    &findings.scored.fit,
-                    prepared,
-                    channel,
-                    model.whitener.count[channel],
-                )
+                outliers(fit, prepared, channel, count[channel])
             }),
-            burst: PerChannel::from_fn(|channel| burst(findings, channel)),
+            burst: PerChannel::from_fn(|channel| burst(model, fit, channel)),
             frozen: PerChannel::from_fn(|channel| frozen(prepared, channel)),
             jitter: jitter(prepared),
         }
     }
+
+    /// Whether a band or a burst of a channel stands out of the noise.
+    fn is_loud(&self, model: &FitModel, channel: Channel) -> bool {
+        let factor = bar_factor(model);
+        !is_coarse(model, channel)
+            && (self.band[channel] > BAND * factor
+                || (self.burst[channel] > BURST * factor && self.outliers[channel] > OUTLIERS))
+    }
 }
 
 /// Largest mean square of a channel's whitened residual in a band; the lowest band is motion.
-fn largest_band(findings: &Findings, channel: Channel) -> f64 {
-    let model = &findings.model;
+fn largest_band(model: &FitModel, fit: &Fit, channel: Channel) -> f64 {
     let prepared = model.prepared;
-    let spectrum = summed_spectrum(
-        &findings.scored.fit.residual,
-        prepared,
-        axes_of_channel(channel),
-    );
+    let spectrum = summed_spectrum(&fit.residual, prepared, axes_of_channel(channel));
     let kept = model.whitener.count[channel] / (3.0 * prepared.length as f64);
     let level = |from: f64, to: f64| {
         let band = spectrum.band(from, to);
@@ -271,8 +296,8 @@ fn outliers(fit: &Fit, prepared: &PreparedPlacement, channel: Channel, count: f6
 }
 
 /// Mean square of the loudest two seconds of a channel over that of the median ones.
-fn burst(findings: &Findings, channel: Channel) -> f64 {
-    let prepared = findings.model.prepared;
+fn burst(model: &FitModel, fit: &Fit, channel: Channel) -> f64 {
+    let prepared = model.prepared;
     let step = ((2.0 * prepared.rate_hz) as usize).max(1);
     let mut blocks: Vec<f64> = (0..prepared.length / step)
         .filter_map(|block| {
@@ -280,11 +305,8 @@ fn burst(findings: &Findings, channel: Channel) -> f64 {
             for axis in axes_of_channel(channel) {
                 let range = axis * prepared.length + block * step
                     ..axis * prepared.length + (block + 1) * step;
-                sum += findings.scored.fit.residual[range]
-                    .iter()
-                    .map(|e| e * e)
-                    .sum::<f64>();
-                weight += findings.model.whitener.weight[axis][block * step..(block + 1) * step]
+                sum += fit.residual[range].iter().map(|e| e * e).sum::<f64>();
+                weight += model.whitener.weight[axis][block * step..(block + 1) * step]
                     .iter()
                     .map(|w| w * w)
                     .sum::<f64>();

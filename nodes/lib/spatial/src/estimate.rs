@@ -20,6 +20,8 @@ const LARGEST_LEAD: usize = 300;
 const LEAST_SERIES_PER_LEAD: usize = 4;
 /// Zeros after a series in its transforms, s, so that its ends do not meet. No source.
 const PADDING_S: f64 = 4.0;
+/// By how much wider filters pass more on either side of a frequency, Hz; no source.
+const WIDER_HZ: f64 = 0.5;
 /// Fewest poses that a spectrum is learnt from; no source.
 const FEWEST_POSES: usize = 16;
 /// Least rate of the kinematics that an IMU model starts from, Hz: it resolves all motion that poses
@@ -134,8 +136,8 @@ impl PoseEstimate {
         let (positions, quaternions) = coordinates.split_at_mut(3);
         lengthen(positions, lead, position.spectrum(), rate_hz);
         lengthen(quaternions, lead, rotation.spectrum(), rate_hz);
-        position.localise(&local[0], rate_hz, None);
-        rotation.localise(&local[1], rate_hz, None);
+        position.localise(&local[0], rate_hz, None, 0);
+        rotation.localise(&local[1], rate_hz, None, 0);
         let (start, count, gaps) = (grid.start, grid.count, grid.gap_stamps());
         Self {
             start,
@@ -196,17 +198,30 @@ impl PoseEstimate {
     /// The estimate with a smoothing of the poses undone, up to a factor of 32.
     #[must_use]
     pub fn undoing(&self, smoothing: ZeroPhaseSmoothing) -> Self {
-        let mut undone = self.clone();
-        undone.position = self.position.undoing(smoothing, self.rate_hz);
-        undone.rotation = self.rotation.undoing(smoothing, self.rate_hz);
-        undone
-            .position
-            .localise(&self.local[0], self.rate_hz, Some(smoothing));
-        undone
-            .rotation
-            .localise(&self.local[1], self.rate_hz, Some(smoothing));
-        undone.undone = Some(smoothing);
-        undone
+        self.filtered_anew(Some(smoothing), 0)
+    }
+
+    /// The estimate with filters that are half a hertz wider around each frequency that they pass: they let
+    /// more of the noise through, and ring less where motion begins and ends.
+    #[must_use]
+    pub fn with_wider_filters(&self) -> Self {
+        let reach = (WIDER_HZ / self.local[0][0].spacing_hz).ceil() as usize;
+        self.filtered_anew(self.undone, reach)
+    }
+
+    fn filtered_anew(&self, undone: Option<ZeroPhaseSmoothing>, reach: usize) -> Self {
+        let rate_hz = self.rate_hz;
+        let anew = |floor: &NoiseFloor, local: &[Spectrum]| {
+            let mut floor = floor.undoing(undone, rate_hz);
+            floor.localise(local, rate_hz, undone, reach);
+            floor
+        };
+        Self {
+            position: anew(&self.position, &self.local[0]),
+            rotation: anew(&self.rotation, &self.local[1]),
+            undone,
+            ..self.clone()
+        }
     }
 
     /// One-sided density per axis of the estimate's error at a frequency: position [m2/Hz],

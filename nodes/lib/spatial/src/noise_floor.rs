@@ -101,16 +101,11 @@ impl NoiseFloor {
         Self::from_spectra(spectra, rate_hz, None, largest_rise)
     }
 
-    /// The floor after a smoothing of the poses is undone. The noise is what was added after the
+    /// The floor anew, where a smoothing of the poses is undone. The noise is what was added after the
     /// smoothing, amplified, or what was there before, a plateau of the undone spectrum; whichever
     /// is more.
-    pub fn undoing(&self, smoothing: ZeroPhaseSmoothing, rate_hz: f64) -> Self {
-        Self::from_spectra(
-            self.spectra.clone(),
-            rate_hz,
-            Some(smoothing),
-            self.largest_rise,
-        )
+    pub fn undoing(&self, undone: Option<ZeroPhaseSmoothing>, rate_hz: f64) -> Self {
+        Self::from_spectra(self.spectra.clone(), rate_hz, undone, self.largest_rise)
     }
 
     fn from_spectra(
@@ -156,12 +151,14 @@ impl NoiseFloor {
 
     /// A filter for each window from its own spectrum; motion comes in bursts, and rests let noise
     /// through that the mean motion would hide. The band ends where three neighbours lie near the
-    /// noise; within it, lines that the long windows resolve keep their full height.
+    /// noise; within it, lines that the long windows resolve keep their full height; every frequency is
+    /// as open as those up to `reach` entries away.
     pub fn localise(
         &mut self,
         local: &[Spectrum],
         rate_hz: f64,
         undone: Option<ZeroPhaseSmoothing>,
+        reach: usize,
     ) {
         let mut mean = vec![0.0; self.filter.len()];
         self.windows = local
@@ -169,7 +166,7 @@ impl NoiseFloor {
             .map(|spectrum| {
                 let filter = Filter {
                     spacing_hz: spectrum.spacing_hz,
-                    weights: self.local_weights(spectrum, rate_hz, undone),
+                    weights: self.local_weights(spectrum, rate_hz, undone, reach),
                 };
                 for (k, sum) in mean.iter_mut().enumerate() {
                     *sum += filter.at(k as f64 * self.spacing_hz) / local.len() as f64;
@@ -186,6 +183,7 @@ impl NoiseFloor {
         spectrum: &Spectrum,
         rate_hz: f64,
         undone: Option<ZeroPhaseSmoothing>,
+        reach: usize,
     ) -> Vec<f64> {
         let gain2 = |hz: f64| undoing_gain(hz, undone, rate_hz).powi(2);
         let ratio: Vec<f64> = spectrum
@@ -229,7 +227,15 @@ impl NoiseFloor {
                 }
             }
         };
-        (0..bins).map(weight).collect()
+        let own: Vec<f64> = (0..bins).map(weight).collect();
+        if reach == 0 {
+            return own;
+        }
+        let widened = |k: usize| {
+            let around = &own[k.saturating_sub(reach)..(k + reach + 1).min(bins)];
+            around.iter().copied().fold(0.0, f64::max)
+        };
+        (0..bins).map(widened).collect()
     }
 
     /// Part of the motion at a frequency that the filter keeps, mean over the windows.
