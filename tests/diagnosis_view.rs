@@ -26,6 +26,7 @@ fn diagnosis() -> Diagnosis {
     let cause = |effect: &str, parameter: &str, value, share| Cause {
         effect: effect.to_owned(),
         probability: 0.97,
+        probability_by_margin: 0.97,
         parameters: BTreeMap::from([(parameter.to_owned(), value)]),
         standard_errors: BTreeMap::new(),
         gap_share: share,

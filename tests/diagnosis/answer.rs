@@ -159,6 +159,7 @@ pub fn contract(diagnosis: &Value) {
                 set(&[
                     "effect",
                     "probability",
+                    "probability_by_margin",
                     "parameters",
                     "standard_errors",
                     "gap_share",

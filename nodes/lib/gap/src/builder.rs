@@ -13,7 +13,7 @@ use crate::findings::{Findings, Unknown};
 use crate::fit::Fit;
 use crate::identify::unidentifiable;
 use crate::location::locate;
-use crate::probability::probability_of;
+use crate::probability::{calibrate, probability_of};
 use crate::session::Session;
 use crate::shares::{Shares, shares};
 use crate::simulations::Simulations;
@@ -147,6 +147,7 @@ impl<'a> DiagnosisBuilder<'a> {
             causes.push(unknown_cause(unknown, share, after));
             causes.sort_by(|a, b| b.gap_share.total_cmp(&a.gap_share));
         }
+        calibrate(&mut causes);
         PlacementDiagnosis {
             verdict: verdict(&causes, &before, &after),
             gap: Gap { before, after },
@@ -234,6 +235,7 @@ impl<'a> DiagnosisBuilder<'a> {
                 Cause {
                     effect: kind.name().to_owned(),
                     probability: self.probability(kind),
+                    probability_by_margin: self.probability(kind),
                     parameters,
                     standard_errors,
                     gap_share,

@@ -163,6 +163,10 @@ pub struct Cause {
     pub effect: String,
     /// That this cause is there.
     pub probability: f64,
+    /// The same by the margin over the best answer without it alone, see
+    /// `tests/withheld/calibrate.py`.
+    #[serde(default)]
+    pub probability_by_margin: f64,
     /// By name, in SI: number, list, rows of a matrix, or word. Of `unknown`: channel, axes,
     /// band_hz, intervals_s, depends_on.
     pub parameters: BTreeMap<String, Value>,

@@ -1,11 +1,14 @@
 //! How sure a cause is.
 
-use cromosim_imu::{Effect, Search};
+use cromosim_imu::{Effect, EffectKind, Search};
 
+use crate::diagnosis::{Cause, UNKNOWN};
 use crate::findings::Findings;
-use crate::policy::probability::{MARGIN_NATS, MOST, WITHOUT_MARGIN};
+use crate::policy::probability::{
+    Calibration, MARGIN_NATS, MOST, NAMED, OF_UNKNOWN, WITHOUT_MARGIN,
+};
 
-/// Probability that an effect named here is there.
+/// Probability that an effect named here is there, by its margin alone.
 ///
 /// From the margin m [nats] by which the set beats the best set without the effect: `0.95 (1 - 1 /
 /// (2 + m / 2))`. What is read off the readings (clipping, rounding, dropped messages, units) has
@@ -22,4 +25,45 @@ pub(crate) fn probability_of(findings: &Findings, effect: &Effect) -> f64 {
         (None, Search::ReadOff(search)) => search.probability,
         (None, Search::Fitted(_) | Search::Choice) => WITHOUT_MARGIN,
     }
+}
+
+/// References whose own errors pass for effects.
+const POOR_REFERENCES: [EffectKind; 3] = [
+    EffectKind::ReferenceNoise,
+    EffectKind::ReferenceSmoothing,
+    EffectKind::ReferenceInterpolation,
+];
+/// Least share of the gap that counts.
+const LEAST_SHARE: f64 = 1e-5;
+/// Causes beside one that count at most.
+const MOST_OTHERS: usize = 4;
+
+/// From what the margins say of each cause to what has come true of such causes: the log-odds
+/// `base + share log10(gap_share) + others (causes beside it) + poor_reference + margin (logit(p) -
+/// logit(0.95))`, the last where p, by the margin, is below 0.95.
+pub(crate) fn calibrate(causes: &mut [Cause]) {
+    let names: Vec<String> = causes.iter().map(|cause| cause.effect.clone()).collect();
+    for cause in causes {
+        let of: &Calibration = if cause.effect == UNKNOWN {
+            &OF_UNKNOWN
+        } else {
+            &NAMED
+        };
+        let is_beside = |kind: &EffectKind| {
+            kind.name() != cause.effect && names.iter().any(|name| name == kind.name())
+        };
+        let poor_reference = f64::from(u8::from(POOR_REFERENCES.iter().any(is_beside)));
+        let others = (names.len() - 1).min(MOST_OTHERS) as f64;
+        let by_margin = cause.probability_by_margin.clamp(1e-4, of.sure);
+        let log_odds = of.base
+            + of.share * cause.gap_share.max(LEAST_SHARE).log10()
+            + of.others * others
+            + of.poor_reference * poor_reference
+            + of.margin * (logit(by_margin) - logit(0.95));
+        cause.probability = 1.0 / (1.0 + (-log_odds).exp());
+    }
+}
+
+fn logit(probability: f64) -> f64 {
+    (probability / (1.0 - probability)).ln()
 }

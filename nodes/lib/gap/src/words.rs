@@ -70,6 +70,7 @@ pub(crate) fn unknown_cause(unknown: &Unknown, gap_share: f64, after: Metrics) -
     Cause {
         effect: UNKNOWN.to_owned(),
         probability: unknown.probability,
+        probability_by_margin: unknown.probability,
         parameters,
         standard_errors: BTreeMap::new(),
         gap_share,
@@ -180,6 +181,7 @@ mod tests {
         let lever_arm = Cause {
             effect: "lever_arm".to_owned(),
             probability: 0.9,
+            probability_by_margin: 0.9,
             parameters: BTreeMap::new(),
             standard_errors: BTreeMap::new(),
             gap_share: 0.93,

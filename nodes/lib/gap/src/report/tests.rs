@@ -42,6 +42,7 @@ fn cause(
     Cause {
         effect: effect.to_owned(),
         probability: 0.97,
+        probability_by_margin: 0.97,
         parameters,
         standard_errors,
         gap_share: share,

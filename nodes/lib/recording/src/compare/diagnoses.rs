@@ -225,6 +225,7 @@ mod tests {
         Cause {
             effect: effect.to_owned(),
             probability: 0.9,
+            probability_by_margin: 0.9,
             parameters: BTreeMap::from([("offset".to_owned(), json!([offset, 0.0, -0.06]))]),
             standard_errors: BTreeMap::from([("offset".to_owned(), json!([0.003, 0.001, 0.001]))]),
             gap_share: 0.7,

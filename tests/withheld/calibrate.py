@@ -1,0 +1,95 @@
+#!/usr/bin/env python3
+"""Probabilities from margins: fits the log-odds of `calibrate` in nodes/lib/gap/src/probability.rs to graded answers of some origins, and tests
+what the answers of others say.
+
+    python tests/withheld/calibrate.py --fit /tmp/building --test /tmp/scoring /tmp/mechanics
+
+Each folder is one that run.py has filled."""
+import argparse
+import json
+import os
+
+import numpy as np
+from scipy.optimize import minimize
+
+POOR_REFERENCES = {"reference_noise", "reference_smoothing", "reference_interpolation"}
+NAMES = ("base", "share", "others", "poor_reference", "margin")
+BINS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 1.0001)
+SURE_ODDS = np.log(0.95 / 0.05)
+
+
+def causes(folder):
+    """(effect, right, said, by margin, share, beside) of every cause in a folder of run.py."""
+    with open(os.path.join(folder, "grades.json")) as stream:
+        records = json.load(stream)
+    for record in records:
+        path = os.path.join(folder, f"{record['suite']}-results", record["case"], "diagnosis.json")
+        if not os.path.exists(path):
+            continue
+        with open(path) as stream:
+            placements = json.load(stream)["placements"]
+        for name, graded in record["placements"].items():
+            said = placements.get(name, {"causes": []})["causes"]
+            named = {cause["effect"] for cause in said}
+            for cause in said:
+                yield (cause["effect"], cause["effect"] in graded["hidden"], cause["probability"],
+                       cause.get("probability_by_margin", cause["probability"]), cause["gap_share"], named - {cause["effect"]})
+
+
+def regressors(cause):
+    effect, _, _, by_margin, share, beside = cause
+    most = 0.95 if effect != "unknown" else 0.9999
+    by_margin = min(max(by_margin, 1e-4), most)
+    # Beside others `unknown` is often wrong where the library knows all that was done, and hardly ever on real recordings.
+    others, poor = (min(len(beside), 4), bool(beside & POOR_REFERENCES)) if effect != "unknown" else (0, False)
+    return [1.0, np.log10(max(share, 1e-5)), others, float(poor), np.log(by_margin / (1 - by_margin)) - SURE_ODDS]
+
+
+def fitted(chosen):
+    """Logistic regression with a weak prior on all but the base."""
+    x, y = np.array([regressors(cause) for cause in chosen]), np.array([cause[1] for cause in chosen], float)
+
+    def cost(weights):
+        odds = x @ weights
+        return np.sum(np.logaddexp(0, -odds) * y + np.logaddexp(0, odds) * (1 - y)) + 0.5 * np.sum(weights[1:] ** 2)
+    return minimize(cost, np.zeros(x.shape[1])).x
+
+
+def table(title, said, right):
+    print(f"\n{title}\n\n| said probability | mean said | right | n |\n|---|---|---|---|")
+    error = 0.0
+    for low, high in zip(BINS, BINS[1:]):
+        inside = (said >= low) & (said < high)
+        if inside.any():
+            error += inside.mean() * abs(said[inside].mean() - right[inside].mean())
+            print(f"| {low:.2f}–{min(high, 1.0):.2f} | {said[inside].mean():.3f} | {right[inside].mean():.3f} | {inside.sum()} |")
+        else:
+            print(f"| {low:.2f}–{min(high, 1.0):.2f} | – | – | 0 |")
+    brier = np.mean((said - right) ** 2)
+    print(f"\nBrier score {brier:.4f} ({right.mean() * (1 - right.mean()):.4f} for always saying {right.mean():.3f}); expected calibration error {error:.4f}; {len(right)} causes.")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--fit", nargs="*", default=[], metavar="FOLDER")
+    parser.add_argument("--test", nargs="*", default=[], metavar="FOLDER")
+    options = parser.parse_args()
+    building = [cause for folder in options.fit for cause in causes(folder)]
+    weights = {}
+    for kind, is_unknown in (("NAMED", False), ("OF_UNKNOWN", True)):
+        chosen = [cause for cause in building if (cause[0] == "unknown") == is_unknown]
+        if chosen:
+            weights[is_unknown] = fitted(chosen)
+            print(kind, {name: round(float(weight), 2) for name, weight in zip(NAMES, weights[is_unknown])}, f"{len(chosen)} causes, {sum(not cause[1] for cause in chosen)} wrong")
+    for folder in options.test:
+        tested = list(causes(folder))
+        right = np.array([cause[1] for cause in tested], float)
+        table(f"{folder}: as said", np.array([cause[2] for cause in tested]), right)
+        table(f"{folder}: by the margin alone", np.array([cause[3] for cause in tested]), right)
+        if len(weights) == 2:
+            odds = np.array([regressors(cause) @ weights[cause[0] == "unknown"] for cause in tested])
+            table(f"{folder}: by this fit", 1 / (1 + np.exp(-odds)), right)
+
+
+if __name__ == "__main__":
+    main()
