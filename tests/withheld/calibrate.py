@@ -40,9 +40,10 @@ def regressors(cause):
     effect, _, _, by_margin, share, beside = cause
     most = 0.95 if effect != "unknown" else 0.9999
     by_margin = min(max(by_margin, 1e-4), most)
-    # Beside others `unknown` is often wrong where the library knows all that was done, and hardly ever on real recordings.
-    others, poor = (min(len(beside), 4), bool(beside & POOR_REFERENCES)) if effect != "unknown" else (0, False)
-    return [1.0, np.log10(max(share, 1e-5)), others, float(poor), np.log(by_margin / (1 - by_margin)) - SURE_ODDS]
+    # Where the library knows all that was done, a fourth cause is often wrong, and so is a small `unknown` beside others; on real recordings
+    # hardly ever. What only the generator makes so does not count.
+    others, poor = (min(len(beside), 2), bool(beside & POOR_REFERENCES)) if effect != "unknown" else (0, False)
+    return [1.0, np.log10(max(share, 1e-5 if effect != "unknown" else 1e-2)), others, float(poor), np.log(by_margin / (1 - by_margin)) - SURE_ODDS]
 
 
 def fitted(chosen):

@@ -33,10 +33,8 @@ const POOR_REFERENCES: [EffectKind; 3] = [
     EffectKind::ReferenceSmoothing,
     EffectKind::ReferenceInterpolation,
 ];
-/// Least share of the gap that counts.
-const LEAST_SHARE: f64 = 1e-5;
-/// Causes beside one that count at most.
-const MOST_OTHERS: usize = 4;
+/// Causes beside one that count at most: of more than three the generator of these answers never had.
+const MOST_OTHERS: usize = 2;
 
 /// From what the margins say of each cause to what has come true of such causes: the log-odds
 /// `base + share log10(gap_share) + others (causes beside it) + poor_reference + margin (logit(p) -
@@ -56,7 +54,7 @@ pub(crate) fn calibrate(causes: &mut [Cause]) {
         let others = (names.len() - 1).min(MOST_OTHERS) as f64;
         let by_margin = cause.probability_by_margin.clamp(1e-4, of.sure);
         let log_odds = of.base
-            + of.share * cause.gap_share.max(LEAST_SHARE).log10()
+            + of.share * cause.gap_share.max(of.least_share).log10()
             + of.others * others
             + of.poor_reference * poor_reference
             + of.margin * (logit(by_margin) - logit(0.95));
