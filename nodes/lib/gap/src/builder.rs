@@ -232,10 +232,11 @@ impl<'a> DiagnosisBuilder<'a> {
             let after = self.pooled(|part| part.under(&part.only(&above)));
             causes.extend(self.last(kind).map(|(part, effect)| {
                 let [parameters, standard_errors] = part.values(effect, &part.findings.scored.fit);
+                let by_margin = self.probability_by_margin(kind);
                 Cause {
                     effect: kind.name().to_owned(),
-                    probability: self.probability(kind),
-                    probability_by_margin: self.probability(kind),
+                    probability: by_margin,
+                    probability_by_margin: by_margin,
                     parameters,
                     standard_errors,
                     gap_share,
@@ -253,7 +254,7 @@ impl<'a> DiagnosisBuilder<'a> {
     }
 
     /// That an effect is there, as the recording says that is the surest of it.
-    fn probability(&self, kind: EffectKind) -> f64 {
+    fn probability_by_margin(&self, kind: EffectKind) -> f64 {
         let of = |part: &Part| {
             let effect = part.findings.reportable.get(kind)?;
             Some(probability_of(part.findings, effect))

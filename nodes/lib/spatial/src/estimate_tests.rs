@@ -161,6 +161,42 @@ fn holes_are_named_and_bridged() {
     assert!(error < 0.6, "{error}");
 }
 
+#[test]
+fn a_smoothing_is_undone() {
+    // Through the smoothing's own gain at the motion's frequencies.
+    let (stamps, mut positions, rotations) = poses(
+        PoseNoise {
+            position: 1e-6,
+            rotation: 1e-6,
+        },
+        100.0,
+        |_| true,
+    );
+    let smoothing = ZeroPhaseSmoothing {
+        cutoff_hz: 3.0,
+        kernel: SmoothingKernel::Butterworth,
+    };
+    let gain = |f: f64| 1.0 / smoothing.undoing_gain(f, 100.0);
+    assert!(smoothing.undoing_gain(3.9, 100.0) < LARGEST_GAIN);
+    for (k, position) in positions.iter_mut().enumerate() {
+        let t = k as f64 / 100.0;
+        let clean = motion(t).0;
+        let noise = *position - clean;
+        let rest = Vector3::new(0.0, 0.0, 1.0);
+        let swing = clean - rest;
+        *position =
+            rest + Vector3::new(
+                swing.x * gain(1.3),
+                swing.y * gain(2.6),
+                swing.z * gain(3.9),
+            ) + noise;
+    }
+    let estimate = PoseEstimate::fit(&stamps, &positions, &rotations).unwrap();
+    assert!(acceleration_error(&estimate.track(100.0)) > 5.0);
+    let error = acceleration_error(&estimate.undoing(smoothing).track(100.0));
+    assert!(error < 0.6, "{error}");
+}
+
 /// A motion of many frequencies up to 7 Hz with noise at all of them, as a smoothing reports it:
 /// position, and acceleration of the motion.
 fn many_frequencies(t: f64, gain: &dyn Fn(f64) -> f64) -> (Vector3<f64>, Vector3<f64>) {

@@ -1,4 +1,4 @@
-//! ZeroPhaseSmoothing of poses without phase, and the gain that undoes it.
+//! Smoothing of poses without phase, and the gain that undoes it.
 
 use std::f64::consts::{LN_2, PI};
 

@@ -14,17 +14,11 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
     summary: "The device smooths both channels: fast motion is weaker and everything comes late by 0.225 / cutoff_hz.",
     remedy: "Raise the device's bandwidth setting, or put the same filter into the simulation.",
     parameters: &[ParameterSpec {
-        name: "cutoff_hz",
-        unit: "Hz",
-        shape: Shape::Scalar,
-        neutral: &[1e4],
-        is_optional: false,
-        lower: 0.1,
-        upper: 1e4,
         fit: Some(ParameterFit {
             step: 1e-3,
             prior_deviation: 50.0,
         }),
+        ..CUTOFF
     }],
     channels: &Channel::ALL,
     search: Search::Fitted(FittedSearch {
@@ -37,6 +31,18 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         special_case_of: &[Dependence::DelayOverTime],
         identifiability: None,
     }),
+};
+
+/// The cutoff of a filter, as it is before any fit.
+pub(super) const CUTOFF: ParameterSpec = ParameterSpec {
+    name: "cutoff_hz",
+    unit: "Hz",
+    shape: Shape::Scalar,
+    neutral: &[1e4],
+    is_optional: false,
+    lower: 0.1,
+    upper: 1e4,
+    fit: None,
 };
 
 /// Damping ratio of the Butterworth filter: Q = 1/sqrt(2).

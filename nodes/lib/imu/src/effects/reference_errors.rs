@@ -2,7 +2,7 @@
 
 use cromosim_spatial::{ErrorPath, PoseEstimate, Stamp};
 
-use super::{EffectKind, EffectSet, low_pass};
+use super::{Effect, EffectKind, EffectSet, low_pass};
 use crate::SampleVariance;
 
 impl EffectSet {
@@ -14,13 +14,18 @@ impl EffectSet {
         units_per_metre: f64,
         stamps: &[Stamp],
     ) -> Vec<SampleVariance> {
-        let device = |hz: f64| {
-            self.get(EffectKind::LowPass)
-                .map_or(1.0, |effect| low_pass::response(effect.scalar(0), hz).0)
-        };
+        let (low_pass, tissue) = (
+            self.get(EffectKind::LowPass),
+            self.get(EffectKind::SoftTissue),
+        );
         let passed = |hz: f64| {
-            let rate = device(hz).powi(2);
-            [rate, rate * self.tissue_power(hz)]
+            let device = low_pass.map_or(1.0, |effect| {
+                low_pass::response(effect.scalar(0), hz).0.powi(2)
+            });
+            [
+                device,
+                device * tissue.map_or(1.0, |effect| tissue_power(effect, hz)),
+            ]
         };
         let path = ErrorPath {
             units_per_metre,
@@ -29,14 +34,12 @@ impl EffectSet {
         };
         estimate.variances(stamps, &path)
     }
+}
 
-    /// Part of a force's power at a frequency that comes through soft tissue:
-    /// `(1 + (2 z r)^2) / ((1 - r^2)^2 + (2 z r)^2)`, r the frequency over the natural one.
-    fn tissue_power(&self, hz: f64) -> f64 {
-        self.get(EffectKind::SoftTissue).map_or(1.0, |tissue| {
-            let ratio = hz / tissue.scalar(0);
-            let damping = (2.0 * tissue.scalar(1) * ratio).powi(2);
-            (1.0 + damping) / ((1.0 - ratio * ratio).powi(2) + damping)
-        })
-    }
+/// Part of a force's power at a frequency that comes through soft tissue:
+/// `(1 + (2 z r)^2) / ((1 - r^2)^2 + (2 z r)^2)`, r the frequency over the natural one.
+fn tissue_power(tissue: &Effect, hz: f64) -> f64 {
+    let ratio = hz / tissue.scalar(0);
+    let damping = (2.0 * tissue.scalar(1) * ratio).powi(2);
+    (1.0 + damping) / ((1.0 - ratio * ratio).powi(2) + damping)
 }

@@ -3,6 +3,7 @@
 
 use cromosim_spatial::{SmoothingKernel, ZeroPhaseSmoothing};
 
+use super::low_pass::CUTOFF;
 use super::search::{ReadOff, ReadOffSearch, Search};
 use super::spec::{EffectSpec, Owner, ParameterSpec, Shape, Stage};
 use super::{Effect, EffectKind, EffectSet};
@@ -16,16 +17,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
     summary: "The reference was smoothed: fast motion that the IMU feels is missing from it, in step with the motion and above the cutoff.",
     remedy: "Export the motion capture unfiltered, or with a higher cutoff frequency.",
     parameters: &[
-        ParameterSpec {
-            name: "cutoff_hz",
-            unit: "Hz",
-            shape: Shape::Scalar,
-            neutral: &[1e4],
-            is_optional: false,
-            lower: 0.1,
-            upper: 1e4,
-            fit: None,
-        },
+        CUTOFF,
         ParameterSpec {
             name: "kernel",
             unit: "",
