@@ -26,13 +26,20 @@ const LEAST_LIKENESS: f64 = 0.3;
 /// length: a turned mount or a poor reference halves a slope too, but not along with a good
 /// correlation.
 const LEAST_LIKENESS_FOR_LENGTH: f64 = 0.5;
-/// Cost of a reference that is not in metres, in units of a slope's squared scatter; that of a device
-/// with other units or gravity, which is met more often, is 1.
+/// Cost of a device with other units, and of one with other gravity, in units of a slope's squared
+/// scatter.
+const UNUSUAL_DEVICE: f64 = 1.0;
+/// Cost of a reference that is not in metres: it is met less often.
 const UNUSUAL_LENGTH: f64 = 1.5;
 /// Scatter of the ratio of the measured and the predicted specific forces' root mean squares (natural
 /// logarithm): a filter, a smoothing or a mass on a spring changes it by a factor of two, units of
 /// either by ten and more.
 const LOUDNESS_SCATTER: f64 = 0.7;
+/// Scatter of gravity's slope, in units of gravity, where the reference explains the readings.
+const GRAVITY_SCATTER: f64 = 0.15;
+/// Squared correlation with gravity's direction that what the reference does not explain (an effect
+/// beyond every formula, fast motion that a smoothing took away) may well have: it moves the slope.
+const CHANCE_LIKENESS: f64 = 0.2;
 /// A scale is a known unit's factor when it is within 12 % of it (natural logarithm).
 const FACTOR_TOLERANCE: f64 = 0.12;
 
@@ -230,6 +237,8 @@ impl ForceSlopes {
             (yg * aa - ya * ag) / determinant,
         );
         let likeness = self.likeness();
+        // Of what is measured, in units of gravity's power.
+        let unexplained = (self.yy - of_a * ya - of_g * yg).max(0.0) / gg;
         let lengths = if likeness > LEAST_LIKENESS_FOR_LENGTH {
             length_factors()
         } else {
@@ -242,12 +251,21 @@ impl ForceSlopes {
             // not found again in the readings.
             let weight = likeness * (aa / length.powi(2) / gg * 50.0).min(1.0);
             for &accel in unit_factors(Channel::Accelerometer) {
+                let scatter =
+                    GRAVITY_SCATTER.powi(2) + CHANCE_LIKENESS * unexplained / accel.powi(2);
                 for gravity in GravityMode::ALL {
-                    let is_device_unusual = accel != 1.0 || gravity != GravityMode::Kept;
-                    let unusual = f64::from(u8::from(is_device_unusual))
-                        + if length == 1.0 { 0.0 } else { UNUSUAL_LENGTH };
-                    // Scatter of the slopes: 0.15 of gravity's, 0.4 of the acceleration's.
-                    let cost = ((of_g / accel - gravity.factor()) / 0.15).powi(2)
+                    let unusual = [
+                        (accel != 1.0, UNUSUAL_DEVICE),
+                        (gravity != GravityMode::Kept, UNUSUAL_DEVICE),
+                        (length != 1.0, UNUSUAL_LENGTH),
+                    ];
+                    let unusual: f64 = unusual
+                        .iter()
+                        .filter(|(is, _)| *is)
+                        .map(|(_, cost)| cost)
+                        .sum();
+                    // Scatter of the acceleration's slope: 0.4.
+                    let cost = (of_g / accel - gravity.factor()).powi(2) / scatter
                         + weight * ((of_a * length / accel - 1.0) / 0.4).powi(2)
                         + (self.loudness(accel, gravity, length) / LOUDNESS_SCATTER).powi(2)
                         + unusual;
