@@ -171,11 +171,10 @@ def coverage_table(records):
     return lines + [f"| {effect} | {n} | {count} | {f'{100 * inside / count:.0f} %' if count else '–'} |" for effect, (n, count, inside) in sorted(tally.items())]
 
 
-def calibration_table(records):
-    lines = ["| said probability | mean said | right | n |", "|---|---|---|---|"]
-    causes = [cause for r in records for place in r["placements"].values() for cause in place["causes"] if cause["probability"] is not None]
-    said, right = (np.array([cause[key] for cause in causes], float) for key in ("probability", "right"))
-    error = 0.0
+def reliability(said, right):
+    """Bins, Brier score and expected calibration error of probabilities against outcomes."""
+    lines, error = ["| said probability | mean said | right | n |", "|---|---|---|---|"], 0.0
+    said, right = np.array(said, float), np.array(right, float)
     for low, high in zip(BINS, BINS[1:]):
         own = (said >= low) & (said < high)
         mean = f"{said[own].mean():.3f}" if own.any() else "–"
@@ -185,6 +184,12 @@ def calibration_table(records):
         brier, base = np.mean((said - right) ** 2), right.mean()
         lines += ["", f"Brier score {brier:.4f} ({base * (1 - base):.4f} for always saying {base:.3f}, the share that is right); "
                       f"expected calibration error {error:.4f} over these bins; {len(said)} causes."]
+    return lines
+
+
+def calibration_table(records):
+    causes = [cause for r in records for place in r["placements"].values() for cause in place["causes"] if cause["probability"] is not None]
+    lines = reliability(*([cause[key] for cause in causes] for key in ("probability", "right")))
     sums = [abs(place["share_sum"] - 1) for r in records for place in r["placements"].values() if place["share_sum"] is not None]
     if sums:
         lines += ["", f"Shares: |sum − 1| is {np.mean(sums):.4f} in the mean, {np.max(sums):.4f} at most, over {len(sums)} placements."]

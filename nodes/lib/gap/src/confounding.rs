@@ -4,27 +4,38 @@ use cromosim_imu::{Channel, Dependence, EffectKind, EffectSet, Search};
 
 use crate::findings::Findings;
 use crate::policy::confounded::{
-    CHANGES_OVER_TIME, MAIN_PART, NEARLY_ALL, OWN_GAIN, REGRESSIONS, STRONG_PART,
+    ALL_BUT_LITTLE, CHANGES_OVER_TIME, MAIN_PART, NEARLY_ALL, OWN_GAIN, REGRESSIONS, STRONG_PART,
 };
 use crate::residual_regressions::{ResidualRegression, with_regressions};
 use crate::search::score;
 use crate::trace::trace;
 
+/// What becomes of the fitted effects beside something unknown.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Judgement {
+    /// Only pass for it.
+    pub confounded: Vec<EffectKind>,
+    /// Stand beside it.
+    pub sound: Vec<EffectKind>,
+}
+
 /// The fitted effects that are confounded with what the strongest regressions describe, and the
-/// special cases of these. `strong` are those of `all` that tell, the strongest first.
-pub(crate) fn confounded_effects(
+/// special cases of these; and those that are not. `strong` are those of `all` that tell, the
+/// strongest first.
+pub(crate) fn judged_effects(
     findings: &Findings,
     strong: &[&ResidualRegression],
     all: &[ResidualRegression],
-) -> Vec<EffectKind> {
-    let (mut confounded, sound) = judged_members(findings, strong);
+) -> Judgement {
+    let mut judgement = judged_members(findings, strong);
+    let Judgement { confounded, sound } = &mut judgement;
     let most = strong.first().map_or(0.0, |regression| regression.gain);
     for regression in strong.iter().filter(|regression| {
         regression.gain > STRONG_PART * most && changes_over_time(regression, all)
     }) {
         confounded.extend(special_cases(regression).filter(|kind| !sound.contains(kind)));
     }
-    confounded
+    judgement
 }
 
 /// Whether an effect is one that every sensor has to be calibrated for.
@@ -60,12 +71,8 @@ fn special_cases(regression: &ResidualRegression) -> impl Iterator<Item = Effect
 }
 
 /// Fitted effects which beside the strongest regressions gain less than a tenth of what they gain
-/// without them; and calibrations that explain nearly all that the regressions in their place
-/// would.
-fn judged_members(
-    findings: &Findings,
-    strong: &[&ResidualRegression],
-) -> (Vec<EffectKind>, Vec<EffectKind>) {
+/// without them; and those that explain nearly all that the regressions in their place would.
+fn judged_members(findings: &Findings, strong: &[&ResidualRegression]) -> Judgement {
     let (model, fit) = (&findings.model, &findings.scored.fit);
     let chosen: Vec<&Vec<Vec<f64>>> = Channel::ALL
         .into_iter()
@@ -80,9 +87,9 @@ fn judged_members(
         })
         .map(|regression| &regression.columns)
         .collect();
-    let (mut confounded, mut sound) = (Vec::new(), Vec::new());
+    let mut judgement = Judgement::default();
     if chosen.is_empty() {
-        return (confounded, sound);
+        return judgement;
     }
     let together = with_regressions(findings, fit, &chosen).held_out;
     let nominal = score(model, EffectSet::new());
@@ -99,15 +106,17 @@ fn judged_members(
                 together - instead
             )
         });
-        if findings.is_mostly_explained
-            && is_calibration(kind)
-            && alone > NEARLY_ALL * gain_of_regressions
-        {
-            sound.push(kind);
+        let needed = if is_calibration(kind) {
+            NEARLY_ALL
+        } else {
+            ALL_BUT_LITTLE
+        };
+        if findings.is_mostly_explained && alone > needed * gain_of_regressions {
+            judgement.sound.push(kind);
         } else if alone < MAIN_PART * explained && together - instead < OWN_GAIN * alone {
             // What explains much of the gap by itself does not pass for what little is left.
-            confounded.push(kind);
+            judgement.confounded.push(kind);
         }
     }
-    (confounded, sound)
+    judgement
 }

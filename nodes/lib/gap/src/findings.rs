@@ -41,6 +41,8 @@ pub(crate) struct Unknown {
     pub predictable: f64,
     /// Fitted effects that only pass for it.
     pub confounded_effects: Vec<EffectKind>,
+    /// Those that stand beside it.
+    pub sound_effects: Vec<EffectKind>,
 }
 
 impl Findings<'_> {

@@ -5,7 +5,7 @@ use cromosim_spatial::KinematicTrack;
 use nalgebra::DVector;
 
 use crate::axes::{channel_of_axis, sum_over_channels, value_on_axis};
-use crate::gram::{Gram, Linear, channel_likelihood, dot};
+use crate::gram::{Gram, Linear, Series, channel_likelihood, dot};
 use crate::noise_model::{NoiseBasis, NoiseModel};
 use crate::policy::report::STANDARD_ERROR_FACTOR;
 use crate::prepared::{FOLDS, Prediction, PreparedPlacement};
@@ -194,14 +194,17 @@ impl<'a> FitModel<'a> {
 
     /// Normal equations of columns against a residual.
     pub fn gram(&self, columns: &[&[f64]], residual: &[f64], prior: Vec<f64>) -> Gram {
-        Gram::new(
+        Gram::new(&self.series(columns, residual), prior)
+    }
+
+    fn series<'s>(&'s self, columns: &'s [&'s [f64]], residual: &'s [f64]) -> Series<'s> {
+        Series {
             columns,
             residual,
-            self.prepared.length,
-            &self.folds,
-            &self.counts,
-            prior,
-        )
+            length: self.prepared.length,
+            fold_of: &self.folds,
+            counts: &self.counts,
+        }
     }
 
     fn cost(&self, residual: &[f64]) -> f64 {
@@ -229,14 +232,14 @@ impl<'a> FitModel<'a> {
         }
     }
 
-    /// How well columns beside those of a fit would do, in one linear step.
+    /// Normal equations of columns beside those of a fit, against its residual or another.
     pub fn extended(
         &self,
         fit: &Fit,
-        residual: &[f64],
+        residual: Option<&[f64]>,
         extra: &[&[f64]],
         extra_prior: &[f64],
-    ) -> Linear {
+    ) -> Gram {
         let own = fit.columns.iter().map(Vec::as_slice);
         let slices: Vec<&[f64]> = own.chain(extra.iter().copied()).collect();
         let prior = fit
@@ -245,7 +248,8 @@ impl<'a> FitModel<'a> {
             .flat_map(|effect| prior_weights(effect.kind()))
             .chain(extra_prior.iter().copied())
             .collect();
-        self.gram(&slices, residual, prior).solve()
+        let series = self.series(&slices, residual.unwrap_or(&fit.residual));
+        fit.gram.extended(&series, prior, residual.is_none())
     }
 }
 
@@ -268,6 +272,11 @@ impl Fit {
 
     /// What one linear step says of the held-out log-likelihood without an effect.
     pub fn held_out_without(&self, kind: EffectKind) -> f64 {
+        self.held_out_in_place_of(kind, &self.gram)
+    }
+
+    /// And what it says where the columns of a Gram matrix beside the fit's own stand in its place.
+    pub fn held_out_in_place_of(&self, kind: EffectKind, extended: &Gram) -> f64 {
         let Some(effect) = self.set.get(kind) else {
             return self.linear.held_out;
         };
@@ -277,7 +286,7 @@ impl Fit {
             .filter(|(_, (other, _))| *other == kind)
             .map(|(column, &(_, index))| (column, neutral[index] - effect.values()[index]))
             .unzip();
-        self.gram.held_out_without(&columns, &moves)
+        extended.held_out_without(&columns, &moves)
     }
 
     /// The set as it would be fitted without one part of time.

@@ -33,6 +33,18 @@ struct Block {
     counts: Vec<PerChannel<f64>>,
 }
 
+/// Columns and a residual over the flat whitened sample grid.
+pub(crate) struct Series<'a> {
+    pub columns: &'a [&'a [f64]],
+    pub residual: &'a [f64],
+    /// Entries an axis.
+    pub length: usize,
+    /// Which part of time an entry of the sample grid belongs to.
+    pub fold_of: &'a [usize],
+    /// Number of values compared, by part of time.
+    pub counts: &'a [PerChannel<f64>],
+}
+
 /// What a linear fit leaves.
 #[derive(Clone, Debug)]
 pub(crate) struct Linear {
@@ -72,16 +84,37 @@ pub(crate) fn channel_likelihood(count: f64, squares: f64) -> f64 {
 }
 
 impl Gram {
-    /// Of columns over the flat whitened sample grid; `fold_of` a sample grid entry, `length` entries an
-    /// axis. `counts` as in the whitener, by fold.
-    pub fn new(
-        columns: &[&[f64]],
-        residual: &[f64],
-        length: usize,
-        fold_of: &[usize],
-        counts: &[PerChannel<f64>],
+    pub fn new(series: &Series, prior: Vec<f64>) -> Self {
+        Self::beside(series, prior, |_, _| None)
+    }
+
+    /// [`Gram::new`] of the columns of this one (of one series) and more, without another pass over
+    /// those that it has; nor over the residual, where that is its own too.
+    pub fn extended(&self, series: &Series, prior: Vec<f64>, has_own_residual: bool) -> Self {
+        let (own, residual) = (self.size(), series.columns.len());
+        let known = |i: usize| match i {
+            i if i < own => Some(i),
+            i if i == residual && has_own_residual => Some(own),
+            _ => None,
+        };
+        Self::beside(series, prior, |i, j| {
+            Some((&self.blocks[0], (known(i)?, known(j)?)))
+        })
+    }
+
+    /// Inner products, but for those that a block holds already, and where.
+    fn beside<'a>(
+        series: &Series,
         prior: Vec<f64>,
+        known: impl Fn(usize, usize) -> Option<(&'a Block, (usize, usize))>,
     ) -> Self {
+        let Series {
+            columns,
+            residual,
+            length,
+            fold_of,
+            counts,
+        } = *series;
         let size = columns.len() + 1;
         let all: Vec<&[f64]> = columns
             .iter()
@@ -108,7 +141,7 @@ impl Gram {
                 let range = axis * length + from..axis * length + to;
                 let part = &mut parts[fold][channel_of_axis(axis)];
                 for i in (0..size).filter(|&i| changes[i][axis]) {
-                    for j in (0..=i).filter(|&j| changes[j][axis]) {
+                    for j in (0..=i).filter(|&j| changes[j][axis] && known(i, j).is_none()) {
                         let (a, b) = (&all[i][range.clone()], &all[j][range.clone()]);
                         part[(i, j)] += dot(a, b);
                     }
@@ -116,8 +149,13 @@ impl Gram {
             }
             from = to;
         }
-        for part in &mut parts {
+        for (fold, part) in parts.iter_mut().enumerate() {
             for channel in Channel::ALL {
+                for (i, j) in (0..size).flat_map(|i| (0..=i).map(move |j| (i, j))) {
+                    if let Some((block, place)) = known(i, j) {
+                        part[channel][(i, j)] = block.parts[fold][channel][place];
+                    }
+                }
                 part[channel].fill_upper_triangle_with_lower_triangle();
             }
         }

@@ -41,7 +41,9 @@ fn largest_error(findings: &Findings, kind: EffectKind, test: &Identifiability) 
     }
     let set = fit.set.clone().with(Effect::neutral(kind));
     let columns = model.columns(&set, &fit.prediction, kind);
-    let linear = model.extended(fit, &fit.residual, &slices(&columns), &prior_weights(kind));
+    let linear = model
+        .extended(fit, None, &slices(&columns), &prior_weights(kind))
+        .solve();
     let first = fit.layout.len();
     Some(
         (first..first + test.values)

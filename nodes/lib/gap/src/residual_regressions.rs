@@ -129,9 +129,7 @@ pub(crate) fn with_regressions(
         .flat_map(|columns| slices(columns))
         .collect();
     let prior = vec![PRIOR_WEIGHT; columns.len()];
-    findings
-        .model
-        .extended(fit, &fit.residual, &columns, &prior)
+    findings.model.extended(fit, None, &columns, &prior).solve()
 }
 
 /// Scaled to a root mean square of the axis' white noise.

@@ -5,7 +5,7 @@ use nalgebra::{Cholesky, DMatrix, Dyn, Matrix3, Vector3};
 
 use crate::axes::channel_of_axis;
 use crate::fit::{Fit, FitModel, layout_of, prior_weights, slices, stepped};
-use crate::gram::dot;
+use crate::gram::{Gram, dot};
 use crate::prepared::Prediction;
 
 /// Part of a recording at either end in which no change is looked for.
@@ -40,9 +40,7 @@ pub(crate) fn screen(
             .collect(),
         FirstGuess::ChangeOf(base) => change_point(model, fit, kind, base).into_iter().collect(),
     };
-    let together = search
-        .companion
-        .filter(|companion| library.contains(companion) && !fit.set.contains(*companion))
+    let together = companion(kind, fit, library)
         .map(|companion| [kind, companion].map(Effect::neutral))
         .map(|pair| candidate(model, fit, &pair));
     starts
@@ -56,37 +54,115 @@ pub(crate) fn screen(
 
 /// One linear step of the fit's own values and those of more effects, from where they start.
 fn candidate(model: &FitModel, fit: &Fit, starts: &[Effect]) -> Candidate {
-    let kinds = || starts.iter().map(Effect::kind);
     let are_neutral = starts
         .iter()
         .all(|start| *start == Effect::neutral(start.kind()));
     let mut set = fit.set.clone();
     set.extend(starts);
-    let prior: Vec<f64> = kinds().flat_map(prior_weights).collect();
-    let columns = |prediction: &Prediction| -> Vec<Vec<f64>> {
-        kinds()
-            .flat_map(|kind| model.columns(&set, prediction, kind))
-            .collect()
-    };
     let linear = if are_neutral {
-        let columns = columns(&fit.prediction);
-        model.extended(fit, &fit.residual, &slices(&columns), &prior)
+        beside(model, fit, &set, starts, None).solve()
     } else {
         let prediction = model.prepared.predict(&model.track, &set);
-        let residual = model.residual(&prediction.readings);
-        let columns = columns(&prediction);
-        model.extended(fit, &residual, &slices(&columns), &prior)
+        beside(model, fit, &set, starts, Some(&prediction)).solve()
     };
     let layout: Vec<_> = fit
         .layout
         .iter()
         .copied()
-        .chain(kinds().flat_map(layout_of))
+        .chain(starts.iter().flat_map(|start| layout_of(start.kind())))
         .collect();
     Candidate {
         set: stepped(&set, &layout, &linear.step, 1.0),
         predicted_gain: linear.held_out,
     }
+}
+
+/// Normal equations of the fit's own values and those of more effects of `set`, around what the fit
+/// predicts or around another prediction.
+fn beside(
+    model: &FitModel,
+    fit: &Fit,
+    set: &EffectSet,
+    starts: &[Effect],
+    prediction: Option<&Prediction>,
+) -> Gram {
+    let kinds = || starts.iter().map(Effect::kind);
+    let around = prediction.unwrap_or(&fit.prediction);
+    let columns: Vec<Vec<f64>> = kinds()
+        .flat_map(|kind| model.columns(set, around, kind))
+        .collect();
+    let prior: Vec<f64> = kinds().flat_map(prior_weights).collect();
+    let residual = prediction.map(|prediction| model.residual(&prediction.readings));
+    model.extended(fit, residual.as_deref(), &slices(&columns), &prior)
+}
+
+/// What one linear step around a fit says of effects outside it that stand in the place of a member:
+/// one pass over the library serves all members.
+pub(crate) struct Substitutes<'a> {
+    fit: &'a Fit,
+    /// Effects, alone or with their companion, with their columns beside the fit's.
+    beside: Vec<(Vec<EffectKind>, Gram)>,
+}
+
+impl<'a> Substitutes<'a> {
+    pub fn new(model: &FitModel, fit: &'a Fit, library: &[EffectKind]) -> Self {
+        let outside = library.iter().filter(|kind| !fit.set.contains(**kind));
+        let alone = outside.filter(|kind| starts_neutral(**kind));
+        let sets = alone.flat_map(|&kind| {
+            let together = companion(kind, fit, library).map(|other| vec![kind, other]);
+            std::iter::once(vec![kind]).chain(together)
+        });
+        let with_columns = |kinds: Vec<EffectKind>| {
+            let starts: Vec<Effect> = kinds.iter().copied().map(Effect::neutral).collect();
+            let mut set = fit.set.clone();
+            set.extend(&starts);
+            let gram = beside(model, fit, &set, &starts, None);
+            (kinds, gram)
+        };
+        Self {
+            fit,
+            beside: sets.map(with_columns).collect(),
+        }
+    }
+
+    /// What an effect, or it and its companion, gains in the place of a member, less its price; none
+    /// where only a fit of its own can tell.
+    pub fn gain(
+        &self,
+        member: EffectKind,
+        other: EffectKind,
+        price: impl Fn(EffectKind) -> f64,
+    ) -> Option<f64> {
+        if !starts_neutral(member) {
+            return None;
+        }
+        let without = self.fit.held_out_without(member);
+        let of_other = self.beside.iter().filter(|(kinds, _)| kinds[0] == other);
+        of_other
+            .map(|(kinds, gram)| {
+                let price: f64 = kinds.iter().map(|kind| price(*kind)).sum();
+                self.fit.held_out_in_place_of(member, gram) - without - price
+            })
+            .max_by(f64::total_cmp)
+    }
+}
+
+/// Whether a fit of the effect begins at its neutral values.
+pub(crate) fn starts_neutral(kind: EffectKind) -> bool {
+    matches!(
+        kind.spec().search,
+        Search::Fitted(search) if matches!(search.first_guess, FirstGuess::Neutral)
+    )
+}
+
+/// The effect that another is also tried together with, where it may be.
+fn companion(kind: EffectKind, fit: &Fit, library: &[EffectKind]) -> Option<EffectKind> {
+    let Search::Fitted(search) = kind.spec().search else {
+        return None;
+    };
+    search
+        .companion
+        .filter(|companion| library.contains(companion) && !fit.set.contains(*companion))
 }
 
 /// The effect `kind` that changes the values of `base` at the time at which this helps most: its

@@ -1,6 +1,6 @@
 //! The search for the smallest set of effects.
 
-use cromosim_imu::{Channel, EffectKind, EffectSet, FirstGuess, PerChannel, Search};
+use cromosim_imu::{Channel, EffectKind, EffectSet, PerChannel, Search};
 
 use crate::axes::{larger, sum_over_channels};
 use crate::fit::{Fit, FitModel, free_values};
@@ -8,9 +8,9 @@ use crate::plausibility::is_sound;
 use crate::policy::price;
 use crate::policy::search::{
     BEAM, EXCHANGES, MOST_LOSS_NATS, MOST_MEMBERS, MOST_RISE, NEAR_BEST_NATS,
-    PART_OF_BEST_PREDICTION, REFITS, RIVALS, SURE_PRICES,
+    PART_OF_BEST_PREDICTION, PART_OF_LOSS_AT_A_DISTANCE, REFITS, RIVALS, SURE_PRICES,
 };
-use crate::screen::{Candidate, screen, sharpen_change_point};
+use crate::screen::{Candidate, Substitutes, screen, sharpen_change_point, starts_neutral};
 use crate::trace::{names, trace};
 
 /// A fitted set and its worth.
@@ -179,11 +179,7 @@ fn grow(
 /// Whether an effect earns its place by so much that no fit without it is needed to see it: one
 /// linear step from its values to the neutral ones tells, where it begins at these.
 fn surely_earns_its_place(model: &FitModel, fit: &Fit, kind: EffectKind) -> bool {
-    let starts_neutral = matches!(
-        kind.spec().search,
-        Search::Fitted(search) if matches!(search.first_guess, FirstGuess::Neutral)
-    );
-    starts_neutral && {
+    starts_neutral(kind) && {
         let loss = fit.linear.held_out - fit.held_out_without(kind);
         loss > SURE_PRICES * price_of_effect(model, kind)
     }
@@ -220,18 +216,21 @@ pub(crate) fn exchanged(
         let mut best: Option<ScoredEffectSet> = None;
         let mut without_harm: Option<ScoredEffectSet> = None;
         scored.margins.clear();
+        let kept = scored.clone();
+        let substitutes = Substitutes::new(model, &kept.fit, library);
         for kind in members {
             let smaller = score(model, scored.fit.set.without(kind));
-            let rival = best_rival(model, &scored, &smaller, kind, library);
+            let rival = best_rival(model, &scored, &smaller, kind, library, &substitutes);
             let rival_score = rival
                 .as_ref()
                 .map_or(smaller.score, |rival| rival.score.max(smaller.score));
             scored.margins.push((kind, scored.score - rival_score));
             let best_score = best.as_ref().map_or(scored.score, |best| best.score);
             best = rival.filter(|rival| rival.score > best_score).or(best);
-            let [from, to] = [&smaller.fit, &scored.fit].map(std::slice::from_ref);
-            if rises(&[model], from, to, MOST_RISE) {
-                without_harm = Some(smaller);
+            if makes_worse(model, &smaller.fit, &scored.fit) {
+                without_harm = without_harm
+                    .filter(|other| other.score >= smaller.score)
+                    .or(Some(smaller));
             }
         }
         match (best, without_harm) {
@@ -247,18 +246,27 @@ pub(crate) fn exchanged(
     scored
 }
 
-/// The best of the sets in which another effect stands in the place of one member.
+/// The best of the sets in which another effect stands in the place of one member, and leaves neither
+/// channel worse off.
 fn best_rival(
     model: &FitModel,
     scored: &ScoredEffectSet,
     smaller: &ScoredEffectSet,
     member: EffectKind,
     library: &[EffectKind],
+    substitutes: &Substitutes,
 ) -> Option<ScoredEffectSet> {
+    let price = |kind| price_of_effect(model, kind);
+    // By the same linear step as the substitutes' gains.
+    let loss = scored.fit.linear.held_out - scored.fit.held_out_without(member) - price(member);
+    let may_stand_in = |other: EffectKind| {
+        let gain = substitutes.gain(member, other, price);
+        gain.is_none_or(|gain| gain >= PART_OF_LOSS_AT_A_DISTANCE * loss)
+    };
     let others: Vec<EffectKind> = library
         .iter()
         .copied()
-        .filter(|other| *other != member)
+        .filter(|other| *other != member && may_stand_in(*other))
         .collect();
     let needed = smaller.score + PART_OF_BEST_PREDICTION * (scored.score - smaller.score);
     candidates(model, &smaller.fit, &others)
@@ -266,7 +274,14 @@ fn best_rival(
         .take(RIVALS)
         .filter(|(predicted, _)| *predicted >= needed)
         .map(|(_, candidate)| score(model, candidate.set))
+        .filter(|rival| !makes_worse(model, &scored.fit, &rival.fit))
         .max_by(|a, b| a.score.total_cmp(&b.score))
+}
+
+/// Whether a channel's residual rises from one fit to another.
+fn makes_worse(model: &FitModel, from: &Fit, to: &Fit) -> bool {
+    let [from, to] = [from, to].map(std::slice::from_ref);
+    rises(&[model], from, to, MOST_RISE)
 }
 
 /// Whether the norm of a channel's residual, over all recordings, rises by more than a factor from some

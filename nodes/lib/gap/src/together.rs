@@ -81,7 +81,7 @@ fn median_effect(effects: &[Effect]) -> Option<Effect> {
 /// Looks for what no named effect explains, and takes out what only passes for it. Half of the
 /// recordings have to show it.
 fn judge_rest(findings: &mut [Findings]) {
-    for suspects in [Suspects::AllButCalibrations, Suspects::All] {
+    for suspects in [Suspects::Others, Suspects::All] {
         for one in findings.iter_mut() {
             one.unknown = detect_unmodelled_structure(one, suspects);
         }

@@ -3,7 +3,7 @@
 use cromosim_imu::{Channel, EffectKind, PerChannel, ReadOff, Reading};
 
 use crate::axes::{any, axes_of_channel, larger, value_on_axis};
-use crate::confounding::{confounded_effects, is_calibration};
+use crate::confounding::{Judgement, is_calibration, judged_effects};
 use crate::findings::{Findings, Unknown};
 use crate::fit::{Fit, FitModel};
 use crate::gram::dot;
@@ -25,7 +25,8 @@ use crate::trace::trace;
 pub(crate) enum Suspects {
     /// All but the calibrations: these stand in for each other and for filters, and are judged once
     /// the others are gone.
-    AllButCalibrations,
+    Others,
+    /// Calibrations too; what stood beside the unknown before is not judged anew.
     All,
 }
 
@@ -87,11 +88,19 @@ pub(crate) fn detect_unmodelled_structure(
     let predictable = structure.strong.first().map_or(0.5, |regression| {
         (regression.gain / excess).clamp(0.05, 1.0)
     });
-    let mut confounded_effects = confounded_effects(findings, &structure.strong, &regressions);
-    confounded_effects.extend(structure.confounded_read_off());
-    if suspects == Suspects::AllButCalibrations {
-        confounded_effects.retain(|kind| !is_calibration(*kind));
-    }
+    let Judgement {
+        mut confounded,
+        sound,
+    } = judged_effects(findings, &structure.strong, &regressions);
+    confounded.extend(structure.confounded_read_off());
+    let stood = |kind: &EffectKind| {
+        let before = findings.unknown.as_ref();
+        before.is_some_and(|unknown| unknown.sound_effects.contains(kind))
+    };
+    confounded.retain(|kind| match suspects {
+        Suspects::Others => !is_calibration(*kind),
+        Suspects::All => is_calibration(*kind) || !stood(kind),
+    });
     Some(Unknown {
         predictable,
         location,
@@ -99,7 +108,8 @@ pub(crate) fn detect_unmodelled_structure(
         axes,
         depends_on: structure.depends_on(),
         probability: structure.probability(),
-        confounded_effects,
+        confounded_effects: confounded,
+        sound_effects: sound,
     })
 }
 
