@@ -11,7 +11,8 @@ use std::path::{Path, PathBuf};
 use common::shared_data;
 use cromosim_body::{BodyModel, ShapedBody};
 use cromosim_imu::{
-    ImuSample, MountedSensor, PlacementSet, Scheme, SensorTrajectory, Trim, simulate_kinematics,
+    Differentiation, ImuSample, MountedSensor, PlacementSet, Scheme, SensorTrajectory, Trim,
+    simulate_kinematics,
 };
 use cromosim_motion::{BvhClip, MotionOptions, SmplMotion, retarget};
 use cromosim_recording::datasets::parse_skeleton_npz;
@@ -42,6 +43,15 @@ fn clips(data: &Path) -> Vec<PathBuf> {
     paths
 }
 
+fn without_blend(path: &Path) -> BvhClip {
+    let name = path.display().to_string();
+    let clip = parse_skeleton_npz(File::open(path).unwrap(), &name)
+        .unwrap()
+        .clip;
+    let blend = (BLEND_S * clip.rate_hz()).round() as usize;
+    cut(&clip, blend..clip.frame_count())
+}
+
 /// Frames of a clip as a clip of its own.
 fn cut(clip: &BvhClip, frames: std::ops::Range<usize>) -> BvhClip {
     let values = frames
@@ -55,8 +65,8 @@ fn cut(clip: &BvhClip, frames: std::ops::Range<usize>) -> BvhClip {
     )
 }
 
-/// Readings of the demo's placements, by the default scheme.
-fn simulated(clip: &BvhClip, trim: Trim) -> Vec<Vec<Reading>> {
+/// Readings of the demo's placements.
+fn simulated(clip: &BvhClip, by: Differentiation, trim: Trim) -> Vec<Vec<Reading>> {
     let options = MotionOptions {
         keep_lead_in: true,
         ..MotionOptions::default()
@@ -66,7 +76,7 @@ fn simulated(clip: &BvhClip, trim: Trim) -> Vec<Vec<Reading>> {
     let placements = PlacementSet::demo();
     let series = placements.placements().iter().map(|placement| {
         let mounted = MountedSensor::new(&body, placement).unwrap();
-        readings(&trajectory(&mounted, &motion), trim)
+        readings(&trajectory(&mounted, &motion), by, trim)
     });
     series.collect()
 }
@@ -78,9 +88,9 @@ fn trajectory(mounted: &MountedSensor, motion: &SmplMotion) -> SensorTrajectory 
     mounted.trajectory(&stamps, &motion.frames).unwrap()
 }
 
-fn readings(trajectory: &SensorTrajectory, trim: Trim) -> Vec<Reading> {
+fn readings(trajectory: &SensorTrajectory, by: Differentiation, trim: Trim) -> Vec<Reading> {
     let stamps = uniform_stamps(trajectory.start(), trajectory.end(), RATE_HZ).unwrap();
-    let samples = simulate_kinematics(trajectory, Scheme::default(), &stamps).unwrap();
+    let samples = simulate_kinematics(trajectory, by, &stamps).unwrap();
     let span = trim.span(&samples).unwrap();
     let inside = samples.iter().filter(|sample| span.contains(&sample.stamp));
     inside
@@ -131,15 +141,12 @@ fn readings_do_not_depend_on_where_a_clip_begins_and_ends() {
     };
     let (mut shares, mut peaks) = ([Vec::new(), Vec::new()], Vec::new());
     let (mut trimmed_s, mut longest_s) = (0.0, 0.0_f64);
+    let by = Differentiation::from(Scheme::default());
     let paths = clips(&data);
     for path in &paths {
-        let name = path.display().to_string();
-        let clip = parse_skeleton_npz(File::open(path).unwrap(), &name)
-            .unwrap()
-            .clip;
+        let (name, clip) = (path.display().to_string(), without_blend(path));
         let frames = |seconds: f64| (seconds * clip.rate_hz()).round() as usize;
-        let clip = cut(&clip, frames(BLEND_S)..clip.frame_count());
-        let ends = simulated(&clip, Trim::Uncertain);
+        let ends = simulated(&clip, by, Trim::Uncertain);
         let whole_s = (clip.frame_count() - 1) as f64 / clip.rate_hz();
         for readings in &ends {
             let gone_s = whole_s - (readings.len() - 1) as f64 / RATE_HZ;
@@ -154,12 +161,12 @@ fn readings_do_not_depend_on_where_a_clip_begins_and_ends() {
         if spare_s < CUT_S {
             continue;
         }
-        let whole = simulated(&clip, Trim::Seconds(0.0));
+        let whole = simulated(&clip, by, Trim::Seconds(0.0));
         for part in [0.25, 0.75] {
             let start_s = (spare_s * part / STEP_S).floor() * STEP_S;
             let first = frames(start_s);
             let own = cut(&clip, first..first + frames(CUT_S));
-            for (whole, cut) in whole.iter().zip(simulated(&own, Trim::Seconds(0.0))) {
+            for (whole, cut) in whole.iter().zip(simulated(&own, by, Trim::Seconds(0.0))) {
                 let left_out = (LEFT_OUT_S * RATE_HZ) as usize;
                 let inside = left_out..cut.len() - left_out;
                 let start = (start_s * RATE_HZ).round() as usize;
@@ -194,5 +201,34 @@ fn readings_do_not_depend_on_where_a_clip_begins_and_ends() {
             shares.len()
         );
         assert!(median < 0.02 && most < 0.05, "{channel}: {median} {most}");
+    }
+}
+
+#[test]
+fn a_fixed_bandwidth_does_not_jolt_at_the_ends() {
+    let Some(data) = shared_data() else {
+        return;
+    };
+    let clips: Vec<BvhClip> = clips(&data)
+        .iter()
+        .map(|path| without_blend(path))
+        .collect();
+    for bandwidth_hz in [2.0, 4.0, 6.0, 10.0] {
+        let by = Differentiation::Bandwidth(bandwidth_hz);
+        let [kept, trimmed] = [Trim::Seconds(0.0), Trim::Uncertain].map(|trim| {
+            let series = clips.iter().flat_map(|clip| simulated(clip, by, trim));
+            let peaks: Vec<f64> = series.map(|readings| end_peak(&readings)).collect();
+            let jolts = peaks.iter().filter(|peak| **peak > 1.3).count();
+            (peaks.len(), jolts, quantile(peaks, 1.0))
+        });
+        // Noise that is as large farther inside is trimmed at neither.
+        let ((count, before, _), (_, after, worst)) = (kept, trimmed);
+        println!(
+            "{bandwidth_hz} Hz: series, jolts at an end, worst: {kept:?}; ends left out: {trimmed:?}"
+        );
+        assert!(
+            before >= 10 && after * 200 <= count && worst < 1.5,
+            "{bandwidth_hz} Hz"
+        );
     }
 }

@@ -65,6 +65,38 @@ fn the_embedded_walk_becomes_a_bag() {
     assert_eq!(reader.metadata("cromosim").unwrap()["seed"], "0");
 }
 
+/// The uncertain ends go with `--bandwidth` as they go with a scheme, and how much is said.
+#[test]
+fn a_fixed_bandwidth_leaves_out_its_ends() {
+    let folder = tempfile::tempdir().unwrap();
+    let simulate = |out: &str, trim: &[&str]| {
+        let mut arguments = vec!["simulate", "--bandwidth", "6", "--no-noise", "--out", out];
+        arguments.extend(trim);
+        let said = succeed(folder.path(), &arguments);
+        let reader = BagReader::open(&folder.path().join(out)).unwrap();
+        let count = reader.read::<Imu>("/imu/head/data_raw").unwrap().len();
+        let metadata = reader.metadata("cromosim").unwrap();
+        (said, count, metadata["trimmed_s.head"].clone())
+    };
+    let (said, whole, gone) = simulate("whole.mcap", &["--trim", "0"]);
+    assert_eq!((whole, gone.as_str()), (1001, "start 0.000, end 0.000"));
+    assert!(!said.contains("left out"), "{said}");
+    let (said, count, gone) = simulate("walk.mcap", &[]);
+    assert!(
+        said.contains("at the end left out as uncertain (--trim 0 keeps them)"),
+        "{said}"
+    );
+    let [start, end]: [f64; 2] = ["start ", "end "].map(|side| {
+        let (_, rest) = gone.split_once(side).unwrap();
+        rest.split(',').next().unwrap().parse().unwrap()
+    });
+    assert!(
+        (0.02..=0.25).contains(&start) && (0.02..=0.25).contains(&end),
+        "{gone}"
+    );
+    assert_eq!(whole - count, ((start + end) * 100.0).round() as usize);
+}
+
 /// Specific force along the world's z axis: third row of world_from_sensor times the reading.
 fn world_z(imu: &Imu) -> f64 {
     let world_from_sensor: nalgebra::UnitQuaternion<f64> = imu.orientation.try_into().unwrap();

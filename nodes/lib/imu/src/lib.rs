@@ -46,6 +46,7 @@ mod channel;
 mod device;
 pub mod effects;
 mod error;
+mod low_pass_error;
 mod mount;
 mod noise;
 mod placement;

@@ -5,6 +5,7 @@ use std::fmt;
 use cromosim_spatial::{PoseSmoothing, PoseTimes, Stamp, derivative_weights, so3};
 use nalgebra::{Isometry3, Vector3};
 
+use crate::low_pass_error;
 use crate::schemes::StencilScheme;
 use crate::schemes::spline::{self, SplineVariance};
 use crate::uncertainty::{FrameWeights, any_error};
@@ -92,23 +93,29 @@ pub fn simulate_kinematics_on(
     differentiation: impl Into<Differentiation>,
     output: &[Stamp],
 ) -> Result<Vec<KinematicSample>, ImuError> {
-    let smoothing = match differentiation.into() {
-        Differentiation::Bandwidth(bandwidth_hz) => {
-            let highest_hz = 0.5 / times.system().interval();
-            if !(bandwidth_hz > 0.0 && bandwidth_hz <= highest_hz) {
-                return Err(ImuError::Bandwidth {
-                    bandwidth_hz,
-                    highest_hz,
-                });
-            }
-            PoseSmoothing::cutoff_hz(bandwidth_hz)
+    let bandwidth_hz = match differentiation.into() {
+        Differentiation::Bandwidth(bandwidth_hz) => bandwidth_hz,
+        Differentiation::Scheme(scheme) => {
+            return match scheme.stencil() {
+                Some(stencil) => Ok(by_differences(trajectory, stencil, output)),
+                None => {
+                    let smoothing = scheme.smoothing(trajectory.source());
+                    by_spline(times, trajectory, smoothing, output)
+                }
+            };
         }
-        Differentiation::Scheme(scheme) => match scheme.stencil() {
-            Some(stencil) => return Ok(by_differences(trajectory, stencil, output)),
-            None => scheme.smoothing(trajectory.source()),
-        },
     };
-    by_spline(times, trajectory, smoothing, output)
+    let highest_hz = 0.5 / times.system().interval();
+    if !(bandwidth_hz > 0.0 && bandwidth_hz <= highest_hz) {
+        return Err(ImuError::Bandwidth {
+            bandwidth_hz,
+            highest_hz,
+        });
+    }
+    let smoothing = PoseSmoothing::cutoff_hz(bandwidth_hz);
+    let mut samples = by_spline(times, trajectory, smoothing, output)?;
+    low_pass_error::state(times, trajectory, bandwidth_hz, &mut samples)?;
+    Ok(samples)
 }
 
 fn by_spline(

@@ -58,6 +58,22 @@ impl<const C: usize, const L: usize> AdaptiveFit<C, L> {
         Ok(Self::of(constant, weights, noise, solution.finish()))
     }
 
+    /// Standard deviation of each sample's noise, unit, as [`AdaptiveFit::learn`] learns it.
+    pub(crate) fn learn_noise(
+        equations: &SplineEquations,
+        mut values: Vec<[f64; C]>,
+        channels: [usize; L],
+        expected: [ExpectedNoise; L],
+    ) -> Result<Vec<[f64; L]>, SpatialError> {
+        equations.check(&values)?;
+        centre(&mut values);
+        let series = Series::new(equations, values, channels);
+        let mut solution = LocalSolution::default();
+        let learnt = Adaptation::learn(equations, &series, expected, &mut solution)?;
+        let noise = learnt.into_noise().into_iter();
+        Ok(noise.map(|variances| variances.map(f64::sqrt)).collect())
+    }
+
     /// As [`AdaptiveFit::learn`], for a window that has moved by `dropped` samples since
     /// `adaptation` was learnt; made where there is none.
     pub(crate) fn follow(

@@ -275,6 +275,30 @@ impl PoseSpline {
         Ok(Self::of_lanes(times, &fit))
     }
 
+    /// Standard deviations of each pose's noise along and about each axis, m and rad, as
+    /// [`PoseSmoothing::adaptive`] learns them; none of too few poses.
+    ///
+    /// # Errors
+    /// As [`SmoothingSpline::fit`].
+    pub fn noise_of(
+        times: &PoseTimes,
+        world_from_body: &[Isometry3<f64>],
+        source: PoseSource,
+    ) -> Result<Option<Vec<[f64; 2]>>, SpatialError> {
+        if world_from_body.len() < FEWEST_ADAPTIVE {
+            return Ok(None);
+        }
+        let noise = AdaptiveFit::learn_noise(
+            &times.system.equations,
+            pose_channels(world_from_body),
+            CHANNELS,
+            source.expected(),
+        )?;
+        let of_turns =
+            |[position, quaternion]: [f64; 2]| [position, quaternion / QUATERNION_PER_ROTVEC];
+        Ok(Some(noise.into_iter().map(of_turns).collect()))
+    }
+
     fn of_lanes(times: &PoseTimes, fit: &AdaptiveFit<8, 2>) -> Self {
         Self {
             times: times.clone(),
