@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use common::{shared_data, succeed};
+use common::{refuses, root, shared_data, succeed};
 
 /// Frames at 120 Hz and samples at 100 Hz that last 0.05 s: cuts begin at multiples of both.
 const FRAMES: usize = 6;
@@ -180,6 +180,50 @@ fn a_part_has_the_readings_of_the_whole() {
             assert!(share < 1e-3, "{placement}: {share}");
         }
     }
+}
+
+/// Of several people, who come and go at times of their own, each is differentiated before the window is
+/// cut out of their common clock.
+#[test]
+fn a_part_of_several_people_has_the_readings_of_the_whole() {
+    let file = root().join("nodes/lib/motion/tests/data/poses/chain_wham.pkl");
+    let file = file.to_str().unwrap();
+    let read = |options: &[&str]| {
+        let folder = tempfile::tempdir().unwrap();
+        let all = [&["--person", "all", "--trim", "0"], options].concat();
+        simulated(folder.path(), file, &all)
+    };
+    let whole = read(&[]);
+    // One is there from 0 to 2 s, the other from 0.2 to 1.833 s.
+    for (start, seconds) in [("0.5", "0.8"), ("1", "10"), ("0", "0.7")] {
+        let start_s: f64 = start.parse().unwrap();
+        let parts = read(&["--start", start, "--duration", seconds]);
+        assert_eq!(parts.len(), whole.len());
+        for (name, part) in parts {
+            let begins_s = if name.contains("person_3") { 0.2 } else { 0.0 };
+            let gone_s = f64::max(start_s - begins_s, 0.0);
+            let same = &whole[&name][(gone_s * 100.0).round() as usize..];
+            for columns in [0..3, 3..6] {
+                let share = difference(&same[..part.len()], &part, columns);
+                assert!(share < 1e-3, "{name} from {start} s: {share}");
+            }
+        }
+    }
+    // Who has one frame in the window is left out of it.
+    let late = read(&["--start", "1.82"]);
+    assert!(late.len() == 5 && late.keys().all(|name| name.contains("person_0")));
+    let folder = tempfile::tempdir().unwrap();
+    for (start, duration) in [("5", "1"), ("0.51", "0.02")] {
+        let window = ["--person", "all", "--start", start, "--duration", duration];
+        let arguments = [&["simulate", file, "--out", "x.mcap"], &window[..]].concat();
+        let there = "there are 0 from 0.000 to 2.000 s, 3 from 0.200 to 1.833 s";
+        refuses(
+            folder.path(),
+            &arguments,
+            &["chain_wham.pkl", &format!("start_s is {start}"), there],
+        );
+    }
+    assert!(!folder.path().join("x.mcap").exists());
 }
 
 #[test]

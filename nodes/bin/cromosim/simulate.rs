@@ -13,7 +13,9 @@ use cromosim_imu::{
     SensorTrajectory, Trim, VirtualImu, measure_all, simulate_kinematics_on,
 };
 use cromosim_learned::{LearnedSimulator, MappingFile, Patch, SiteMotion, scheme_for_networks};
-use cromosim_motion::{MotionOptions, SmplMotion, embedded_walk, read_motion_for, read_people};
+use cromosim_motion::{
+    MotionOptions, SmplMotion, embedded_walk, read_motion_for, read_people_whole,
+};
 use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_msgs::std_msgs::Header;
 use cromosim_recording::{
@@ -161,7 +163,7 @@ impl Setup {
     fn read(&self, path: Option<&PathBuf>) -> anyhow::Result<Vec<PlayedPerson>> {
         let several = self.motion.asks_for_several();
         Ok(match path {
-            Some(path) if several => read_people(path, &self.model, &self.motion)?
+            Some(path) if several => read_people_whole(path, &self.model, &self.motion)?
                 .into_iter()
                 .map(PlayedPerson::of_several)
                 .collect(),

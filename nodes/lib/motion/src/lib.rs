@@ -54,8 +54,9 @@ pub use markers::{
 pub use motion::{SmplMotion, continuous, slerp};
 pub use options::{MotionOptions, RestChoice};
 pub use poses::{
-    CameraPoses, MAX_POSES, Person, PoseAxes, PoseFile, PoseFormat, PoseReport, PoseTrack,
-    PoseView, RateOrigin, ShapeChoice, ShapeOrigin, VIDEO_RATE_HZ, open_poses, read_people,
+    CameraPoses, MAX_POSES, Person, PersonPart, PoseAxes, PoseFile, PoseFormat, PoseReport,
+    PoseTrack, PoseView, RateOrigin, ShapeChoice, ShapeOrigin, VIDEO_RATE_HZ, open_poses,
+    read_people, read_people_whole,
 };
 pub use read::{read_motion, read_motion_for};
 pub use report::RetargetReport;

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use cromosim_bag::{BagReader, BagWriter, write_imu_csv};
 use cromosim_imu::ImuMessages;
-use cromosim_motion::{MotionError, Person, SmplMotion};
+use cromosim_motion::{MotionError, PersonPart, SmplMotion};
 use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_spatial::Stamp;
@@ -65,35 +65,33 @@ impl PlayedPerson {
         start_s: f64,
         duration_s: Option<f64>,
     ) -> Result<Self, MotionError> {
-        let part = motion.part(start_s, duration_s)?;
+        let frames = motion.part(start_s, duration_s)?;
+        Ok(Self::of_frames(motion, frames, 0.0))
+    }
+
+    /// One of several people, in the part that is asked for, as [`PlayedPerson::part`].
+    pub fn of_several(PersonPart { person, frames }: PersonPart) -> Self {
+        let begins_s = person.time_of(*frames.start());
+        Self {
+            label: person.label,
+            body_id: person.name,
+            ..Self::of_frames(&person.motion, frames, begins_s)
+        }
+    }
+
+    /// These frames, the first of which stands at `begins_s`, with those beside them.
+    fn of_frames(motion: &SmplMotion, frames: RangeInclusive<usize>, begins_s: f64) -> Self {
         let beside = (BESIDE_S * motion.rate_hz) as usize;
-        let first = part.start().saturating_sub(beside);
-        let last = (part.end() + beside).min(motion.frames.len().saturating_sub(1));
+        let first = frames.start().saturating_sub(beside);
+        let last = (frames.end() + beside).min(motion.frames.len().saturating_sub(1));
         let motion = motion.of_frames(first..=last);
-        let lead = part.start() - first;
-        Ok(Self {
-            stamps: stamps(&motion, -(lead as f64) / motion.rate_hz),
-            played: lead..=part.end() - first,
+        let lead = frames.start() - first;
+        Self {
+            stamps: stamps(&motion, begins_s - lead as f64 / motion.rate_hz),
+            played: lead..=frames.end() - first,
             motion,
             label: String::new(),
             body_id: "0".to_owned(),
-        })
-    }
-
-    /// One of several people.
-    pub fn of_several(person: Person) -> Self {
-        let Person {
-            name,
-            label,
-            begins_s,
-            motion,
-        } = person;
-        Self {
-            stamps: stamps(&motion, begins_s),
-            played: 0..=motion.frames.len().saturating_sub(1),
-            motion,
-            label,
-            body_id: name,
         }
     }
 

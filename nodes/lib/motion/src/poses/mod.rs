@@ -43,7 +43,7 @@ pub use file::PoseFile;
 pub use format::{MAX_POSES, PoseFormat, PoseView, VIDEO_RATE_HZ};
 pub use io::open_poses;
 pub(crate) use io::read_poses;
-pub use people::{Person, read_people};
+pub use people::{Person, PersonPart, read_people, read_people_whole};
 pub use report::{PoseReport, RateOrigin, ShapeOrigin};
 pub use shape::ShapeChoice;
 pub(crate) use shape::skeleton_betas;

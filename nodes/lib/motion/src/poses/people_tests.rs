@@ -36,25 +36,42 @@ fn a_window_of_the_common_clock_cuts_everybody() {
             duration_s,
             ..Default::default()
         };
-        within(&motion, arrives_s, &options).map(|part| {
-            part.map(|(begins_s, part)| (begins_s, part.frames.len(), part.frames[0].clone()))
-        })
+        let mut person = person("7", &[]);
+        (person.begins_s, person.motion) = (arrives_s - start_s, motion.clone());
+        let parts = within(Path::new("walk.pkl"), vec![person], &options)?;
+        let PersonPart { person, frames } = &parts[0];
+        let first = person.motion.frames[*frames.start()].clone();
+        Ok::<_, MotionError>((
+            person.time_of(*frames.start()),
+            frames.clone().count(),
+            first,
+        ))
     };
     let rate_hz = motion.rate_hz;
     let frames = |seconds: f64| (seconds * rate_hz).round() as usize + 1;
     // There already: cut at the window's start; between two frames, the next one.
-    let (begins_s, count, first) = cut(0.5, 1.0, None).unwrap().unwrap();
+    let (begins_s, count, first) = cut(0.5, 1.0, None).unwrap();
     assert!((begins_s, count) == (0.0, frames(0.5)) && first == motion.frames[frames(0.5) - 1]);
-    let (begins_s, _, first) = cut(0.0, 0.5 + 0.25 / rate_hz, None).unwrap().unwrap();
+    let (begins_s, _, first) = cut(0.0, 0.5 + 0.25 / rate_hz, None).unwrap();
     assert!((begins_s - 0.75 / rate_hz).abs() < 1e-9 && first == motion.frames[frames(0.5)]);
     // Still to come: later by so much, and with what is left of the window.
-    assert_eq!(
-        cut(2.0, 0.5, Some(2.0))
-            .unwrap()
-            .map(|(begins_s, count, _)| (begins_s, count)),
-        Some((1.5, frames(0.5)))
-    );
-    assert_eq!(cut(2.0, 0.5, Some(1.0)).unwrap(), None);
-    // Gone.
-    assert!(cut(0.0, 1.5, None).is_err());
+    let (begins_s, count, _) = cut(2.0, 0.5, Some(2.0)).unwrap();
+    assert_eq!((begins_s, count), (1.5, frames(0.5)));
+    // Still to come after the window, gone before it, between two frames of it.
+    for (arrives_s, start_s, duration_s) in [
+        (2.0, 0.5, Some(1.0)),
+        (0.0, 1.5, None),
+        (0.0, 0.25 / rate_hz, Some(0.5 / rate_hz)),
+    ] {
+        let said = cut(arrives_s, start_s, duration_s).unwrap_err().to_string();
+        let there = format!("7 from {arrives_s:.3} to {:.3} s", arrives_s + 1.0);
+        assert!(
+            said.contains("at least two frames") && said.contains(&there),
+            "{said}"
+        );
+        assert!(said.contains(&format!("start_s is {start_s}")), "{said}");
+    }
+    for (start_s, duration_s) in [(-1.0, None), (0.0, Some(0.0)), (f64::NAN, None)] {
+        assert!(cut(0.0, start_s, duration_s).is_err());
+    }
 }
