@@ -155,3 +155,22 @@ fn check_foreign_readers(
         assert!(output.status.success(), "{}", text(&output));
     }
 }
+
+#[test]
+fn the_demo_says_where_poses_come_from() {
+    in_private_network("demo::the_demo_says_where_poses_come_from", || {
+        let folder = tempfile::tempdir().unwrap();
+        let amass = root().join("nodes/lib/motion/tests/data/poses/chain_amass.npz");
+        demo(
+            folder.path(),
+            &["--motion", amass.to_str().unwrap(), "--no-viewer"],
+        );
+        let log = |node: &str| {
+            let path = folder.path().join(format!("cromosim-demo/logs/{node}.log"));
+            fs::read_to_string(path).unwrap()
+        };
+        let (imu, replay) = (log("virtual_imu"), log("replay"));
+        assert!(imu.contains("adaptive_spline of fitted poses"), "{imu}");
+        assert!(replay.contains("pose_source:=fitted"), "{replay}");
+    });
+}

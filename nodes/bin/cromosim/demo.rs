@@ -13,6 +13,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 use cromosim_body::ShapedBody;
 use cromosim_imu::{Device, MountedSensors, PlacementSet};
+use cromosim_spatial::PoseSource;
 
 use crate::progress::Interrupt;
 use crate::{body, progress, summary};
@@ -229,12 +230,12 @@ fn clear(folder: &Path, ours: impl Fn(&str) -> bool) -> anyhow::Result<()> {
 
 /// Runs the demo and prints what it made.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let duration = arguments.check()?;
+    let (duration, source) = arguments.check()?;
     let places = Places::prepare(&arguments.out)?;
     let stop = Interrupt::watch()?;
 
     // Listeners first, so that nobody misses the beginning.
-    let mut nodes = arguments.listeners(&places)?;
+    let mut nodes = arguments.listeners(&places, source)?;
     for node in &mut nodes {
         node.wait_ready(&stop)?;
     }
@@ -271,9 +272,9 @@ fn play(replay: &mut NodeProcess, duration: f64, stop: &Interrupt) -> anyhow::Re
 }
 
 impl Arguments {
-    /// Seconds that the demo will play. Finds what is wrong with the input before any process
+    /// Seconds that the demo will play, and where their poses come from. Finds what is wrong with the input before any process
     /// starts.
-    fn check(&self) -> anyhow::Result<f64> {
+    fn check(&self) -> anyhow::Result<(f64, PoseSource)> {
         if let Some(seconds) = self.duration
             && !(seconds.is_finite() && seconds > 0.0)
         {
@@ -292,10 +293,11 @@ impl Arguments {
             }
         }
         let whole = motion.duration_s();
-        Ok(self.duration.map_or(whole, |seconds| seconds.min(whole)))
+        let seconds = self.duration.map_or(whole, |seconds| seconds.min(whole));
+        Ok((seconds, motion.source()))
     }
 
-    fn listeners(&self, places: &Places) -> anyhow::Result<Vec<NodeProcess>> {
+    fn listeners(&self, places: &Places, source: PoseSource) -> anyhow::Result<Vec<NodeProcess>> {
         let viewers = i64::from(!self.no_viewer);
         let path = |path: &Path| -> anyhow::Result<String> {
             Ok(quoted(&std::path::absolute(path)?.display().to_string()))
@@ -327,6 +329,7 @@ impl Arguments {
         let mut imu = parameters(&[
             ("seed", self.seed.to_string()),
             ("ready_subscriptions", listeners.to_string()),
+            ("pose_source", source.name().to_owned()),
         ]);
         if let Some(file) = &self.placements {
             imu.push(("placements", path(file)?));

@@ -9,7 +9,7 @@ use cromosim_motion::{
 };
 use cromosim_msgs::cromosim_msgs::SmplPose;
 use cromosim_recording::{FIRST_STAMP, MessageHeader, smpl_pose, stamp_of_frame};
-use cromosim_spatial::Stamp;
+use cromosim_spatial::{PoseSource, Stamp};
 
 use crate::config::Config;
 
@@ -179,8 +179,12 @@ impl Track {
             .how_read()
             .map(|report| format!("; {report}"))
             .unwrap_or_default();
+        let source = match motion.source() {
+            PoseSource::Tracked => "",
+            PoseSource::Fitted => "; fitted to markers: virtual_imu needs pose_source:=fitted",
+        };
         format!(
-            "{} on {}: {} frames at {:.2} Hz, {:.2} s{report}",
+            "{} on {}: {} frames at {:.2} Hz, {:.2} s{report}{source}",
             motion.name,
             self.topic,
             motion.frames.len(),

@@ -16,7 +16,7 @@ use cromosim_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue
 use cromosim_msgs::geometry_msgs::{PoseStamped, TransformStamped};
 use cromosim_msgs::std_msgs::Header;
 use cromosim_msgs::tf2_msgs::TFMessage;
-use cromosim_spatial::Stamp;
+use cromosim_spatial::{PoseSource, Stamp};
 use nalgebra::Isometry3;
 
 use crate::config::Config;
@@ -53,6 +53,9 @@ pub enum Refusal {
     /// Networks or a mapping that cannot be used.
     #[error(transparent)]
     Learned(#[from] LearnedError),
+    /// A source of poses that there is not.
+    #[error("parameter 'pose_source': `{0}`; expected tracked, fitted or nothing")]
+    Source(String),
     /// A mapping for other placements.
     #[error("mapping {file}: it names {known}, none of the placements")]
     Unmapped {
@@ -85,6 +88,7 @@ pub struct VirtualImuNode {
     /// At most, s; 0 without, and before the rate of the states is known.
     networks_delay: f64,
     mapping: MappingFile,
+    source: PoseSource,
 }
 
 #[derive(Default)]
@@ -122,6 +126,7 @@ impl VirtualImuNode {
             Some(LearnedSimulator::find(Path::new(&config.learned))?)
         };
         let mapping = read_mapping(&config.mapping, &placements)?;
+        let source = pose_source(&config.pose_source)?;
         let mut node = Self {
             config,
             model,
@@ -139,6 +144,7 @@ impl VirtualImuNode {
             live: None,
             networks_delay: 0.0,
             mapping,
+            source,
         };
         node.imus = node.fresh_imus()?;
         node.live = node.fresh_networks()?;
@@ -264,14 +270,16 @@ impl VirtualImuNode {
         for placement in &self.placements {
             let options = StreamOptions {
                 longest_gap: self.config.gap_seconds,
+                source: self.source,
                 ..StreamOptions::resampled(state_rate_hz, placement.rate_hz())
             };
             let stream = StreamingImu::new(placement.scheme(), options)?;
             let delay = stream.delay_seconds().max(self.networks_delay);
             log::info!(
-                "{}: {} at {} Hz, delay {delay:.4} s",
+                "{}: {} of {} poses at {} Hz, delay {delay:.4} s",
                 placement.name(),
                 placement.scheme(),
+                self.source.name(),
                 placement.rate_hz()
             );
             self.streams.push(stream);
@@ -457,4 +465,14 @@ fn median_rate(states: &[(Stamp, BodyPose, PoseStd)]) -> f64 {
     intervals
         .get(intervals.len() / 2)
         .map_or(f64::NAN, |interval| interval.recip())
+}
+
+fn pose_source(name: &str) -> Result<PoseSource, Refusal> {
+    if name.is_empty() {
+        return Ok(PoseSource::default());
+    }
+    PoseSource::ALL
+        .into_iter()
+        .find(|source| source.name() == name)
+        .ok_or_else(|| Refusal::Source(name.to_owned()))
 }

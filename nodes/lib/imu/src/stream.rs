@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use cromosim_spatial::{SpatialError, Stamp};
+use cromosim_spatial::{PoseSource, SpatialError, Stamp};
 
 use crate::schemes::StencilScheme;
 use crate::simulate::{at_frame, between_frames, stencil_variance};
@@ -20,15 +20,19 @@ pub struct StreamOptions {
     /// A pause longer than this (s) between frames ends the series; another begins, and no sample
     /// is made up in between.
     pub longest_gap: f64,
+    /// Where the poses come from: what noise the adaptive spline expects of them.
+    pub source: PoseSource,
 }
 
 impl StreamOptions {
-    /// Samples at `output_rate_hz` from frames at `input_rate_hz`; series end at pauses of 0.5 s.
+    /// Samples at `output_rate_hz` from frames at `input_rate_hz`; series end at pauses of 0.5 s, and
+    /// poses are tracked.
     pub fn resampled(input_rate_hz: f64, output_rate_hz: f64) -> Self {
         Self {
             input_rate_hz,
             output_rate_hz,
             longest_gap: 0.5,
+            source: PoseSource::Tracked,
         }
     }
 }
@@ -226,7 +230,11 @@ impl StreamingImu {
         let due: Vec<Stamp> = self.pending.drain(..count).collect();
         let Some(stencil) = self.scheme.stencil() else {
             return match self.scheme {
-                Scheme::AdaptiveSpline => self.adaptive_lag.sample(&self.window, &due, released),
+                Scheme::AdaptiveSpline => {
+                    let source = self.options.source;
+                    self.adaptive_lag
+                        .sample(&self.window, source, &due, released)
+                }
                 _ => self.fixed_lag.sample(&self.window, &due, released),
             };
         };

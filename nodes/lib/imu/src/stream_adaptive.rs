@@ -19,10 +19,11 @@ pub(crate) struct AdaptiveLag {
 }
 
 impl AdaptiveLag {
-    /// Samples at stamps within `kept`, by a spline over its last frames.
+    /// Samples at stamps within `kept`, by a spline over its last frames, whose poses come from there.
     pub(crate) fn sample(
         &mut self,
         kept: &[SensorFrame],
+        source: PoseSource,
         due: &[Stamp],
         samples: &mut Vec<KinematicSample>,
     ) -> Result<(), ImuError> {
@@ -37,8 +38,6 @@ impl AdaptiveLag {
             Some(times) => times,
             None => PoseTimes::new(&stamps)?,
         };
-        // Messages do not say where poses come from.
-        let source = PoseSource::Tracked;
         let learnt = (&mut self.learnt, dropped);
         let spline = PoseSpline::fit_following(&times, &poses, source, learnt)?;
         self.stamps = stamps;

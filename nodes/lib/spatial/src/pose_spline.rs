@@ -67,6 +67,17 @@ pub enum PoseSource {
 }
 
 impl PoseSource {
+    /// All sources.
+    pub const ALL: [Self; 2] = [Self::Tracked, Self::Fitted];
+
+    /// The name in parameters.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tracked => "tracked",
+            Self::Fitted => "fitted",
+        }
+    }
+
     /// The noise of position, m, and of a quaternion's component.
     ///
     /// Tracked: of the size that optical capture has, 0.3 mm and 0.1 degrees; the count was chosen
