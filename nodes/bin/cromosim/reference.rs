@@ -6,7 +6,9 @@ use std::path::Path;
 use anyhow::bail;
 use cromosim_bag::{BagOptions, BagReader, BagSummary, BagWriter, Compression};
 use cromosim_body::BodyModel;
-use cromosim_imu::{Device, EffectsFile, Placement, PlacementEffects, Scheme, UnexplainedErrors};
+use cromosim_imu::{
+    Device, EffectsFile, Placement, PlacementEffects, Scheme, TextureSegment, UnexplainedErrors,
+};
 use cromosim_learned::{LearnedSimulator, scheme_for_networks};
 use cromosim_recording::rigid::{RigidContent, parse_rigid};
 use cromosim_recording::{
@@ -96,6 +98,9 @@ pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()>
     let how = Resimulation {
         scheme: Some(scheme),
         trim: arguments.trim()?,
+        texture: arguments
+            .texture()?
+            .map(|texture| texture.or(TextureSegment::Held)),
         effects,
         learned,
         mapping,

@@ -9,8 +9,9 @@ use anyhow::{Context, bail};
 use cromosim_bag::{BagOptions, BagWriter, Compression};
 use cromosim_body::{BodyModel, ShapedBody};
 use cromosim_imu::{
-    Device, Differentiation, ImuOptions, MountedSensor, MountedSensors, PlacementSet, PoseStd,
-    SensorTrajectory, Trim, VirtualImu, measure_all, simulate_kinematics_on,
+    Device, Differentiation, DrawnTexture, ImuOptions, KinematicSample, MountedSensor,
+    MountedSensors, PlacementSet, PoseStd, SensorTrajectory, TextureSegment, Trim, VirtualImu,
+    add_texture, measure_all, simulate_kinematics_on,
 };
 use cromosim_learned::{LearnedSimulator, MappingFile, Patch, SiteMotion, scheme_for_networks};
 use cromosim_motion::{
@@ -27,7 +28,7 @@ use indicatif::ProgressBar;
 use rayon::prelude::*;
 
 use crate::progress::Interrupt;
-use crate::simulate_arguments::Arguments;
+use crate::simulate_arguments::{Arguments, TextureOn};
 use crate::simulated_quality::{quality_entries, quality_line};
 use crate::{body, progress};
 
@@ -39,6 +40,7 @@ struct Setup {
     motion: MotionOptions,
     bandwidth_hz: Option<f64>,
     trim: Trim,
+    texture: Option<TextureOn>,
     seed: u64,
     noise: bool,
     pose_error_correlation_s: f64,
@@ -144,6 +146,7 @@ impl Setup {
             motion: arguments.motion.options()?,
             bandwidth_hz: arguments.bandwidth,
             trim: arguments.trim()?,
+            texture: arguments.texture()?,
             seed: arguments.seed,
             noise: !arguments.no_noise,
             pose_error_correlation_s: arguments.pose_error_correlation,
@@ -264,8 +267,11 @@ impl Setup {
             None => placement.scheme().into(),
         };
         let mut motion = simulate_kinematics_on(times, trajectory, by, &output)?;
-        let (quality, span) = Quality::of(&motion, self.trim).ok_or(RecordingError::AllTrimmed)?;
+        let (mut quality, span) =
+            Quality::of(&motion, self.trim).ok_or(RecordingError::AllTrimmed)?;
         motion.retain(|sample| span.contains(&sample.stamp));
+        let whose = person.frame(name);
+        quality.texture = self.draw_texture(&mut motion, mounted, &whose)?;
         let mut correction = match &self.learned {
             Some(networks) => {
                 let patch = Patch::new(shaped, mounted.site())?;
@@ -289,6 +295,24 @@ impl Setup {
             messages: messages.collect(),
             quality,
         })
+    }
+
+    /// Draws what is asked for above what the motion resolves.
+    fn draw_texture(
+        &self,
+        motion: &mut [KinematicSample],
+        mounted: &MountedSensor,
+        whose: &str,
+    ) -> anyhow::Result<Option<DrawnTexture>> {
+        let Some(texture) = self.texture else {
+            return Ok(None);
+        };
+        let segment = texture.or(TextureSegment::of_joint(mounted.joint()));
+        let drawn = add_texture(motion, segment, (self.seed, whose));
+        let drawn = drawn.ok_or_else(|| RecordingError::NoBandwidth {
+            placement: whose.to_owned(),
+        })?;
+        Ok(Some(drawn))
     }
 
     /// What a bag says about how it was made.

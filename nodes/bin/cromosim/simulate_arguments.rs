@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use anyhow::{Context, bail};
 use clap::Args;
-use cromosim_imu::{Differentiation, MAX_RATE_HZ, Scheme, Trim};
+use cromosim_imu::{Differentiation, MAX_RATE_HZ, Scheme, TextureSegment, Trim};
 use cromosim_recording::convert::ReadOptions;
 
 use crate::motion_arguments::MotionArguments;
@@ -64,6 +64,17 @@ pub struct Arguments {
         allow_negative_numbers = true
     )]
     pub trim: String,
+    /// Draw onto the readings, above what the poses resolve, what real IMUs show there: impacts, tremor,
+    /// soft tissue. --texture alone goes by each placement's segment (a --rigid body counts as held);
+    /// --texture=SEGMENT is foot, shank, thigh, trunk, head, arm or held
+    #[arg(
+        long,
+        value_name = "SEGMENT",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = AUTO
+    )]
+    pub texture: Option<String>,
     /// Messages per second rather than the placements' own rate, Hz
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub rate: Option<f64>,
@@ -109,6 +120,25 @@ pub struct Arguments {
 
 /// The default of `--trim`.
 const AUTO: &str = "auto";
+
+/// What `--texture` draws.
+#[derive(Clone, Copy, Debug)]
+pub enum TextureOn {
+    /// What each placement's own segment shows.
+    ItsSegment,
+    /// What this one shows, wherever the placement is.
+    Segment(TextureSegment),
+}
+
+impl TextureOn {
+    /// The segment, where that of the placement is `own`.
+    pub fn or(self, own: TextureSegment) -> TextureSegment {
+        match self {
+            Self::ItsSegment => own,
+            Self::Segment(segment) => segment,
+        }
+    }
+}
 
 /// What is simulated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -182,6 +212,9 @@ impl Arguments {
         if self.bandwidth.is_some() && self.learned.is_some() {
             bail!("--learned corrects what a scheme estimates, not a --bandwidth; leave one out");
         }
+        if self.texture.is_some() && self.learned.is_some() {
+            bail!("--learned corrects what --texture draws anew; leave one out");
+        }
         if self.device.is_some() && self.effects.is_some() {
             bail!("--device and --effects both say what errs; give one of them");
         }
@@ -215,6 +248,24 @@ impl Arguments {
         }
     }
 
+    /// What `--texture` says; none where it was not given.
+    ///
+    /// # Errors
+    /// An unknown segment.
+    pub fn texture(&self) -> anyhow::Result<Option<TextureOn>> {
+        let Some(name) = &self.texture else {
+            return Ok(None);
+        };
+        if name == AUTO {
+            return Ok(Some(TextureOn::ItsSegment));
+        }
+        let names = TextureSegment::ALL.map(TextureSegment::name);
+        match names.iter().position(|known| known == name) {
+            Some(number) => Ok(Some(TextureOn::Segment(TextureSegment::ALL[number]))),
+            None => bail!("--texture={name}: expected {} or nothing", names.join(", ")),
+        }
+    }
+
     /// The options that were given and that not every mode takes, with the modes that do.
     fn given(&self) -> anyhow::Result<Vec<(&'static str, &'static [&'static str])>> {
         const MOTION_FILES: &[&str] = &["motion files"];
@@ -239,6 +290,7 @@ impl Arguments {
             (self.device.is_some(), "--device", RIGID_BODIES),
             (self.effects.is_some(), "--effects", RECORDINGS),
             (self.trim != AUTO, "--trim", NOT_REFERENCE),
+            (self.texture.is_some(), "--texture", NOT_REFERENCE),
             (self.learned.is_some(), "--learned", NOT_REFERENCE),
             (self.mapping.is_some(), "--mapping", NOT_REFERENCE),
             (self.body.is_some(), "--body", NOT_RIGID),

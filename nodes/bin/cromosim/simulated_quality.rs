@@ -22,15 +22,32 @@ pub fn quality_entries(name: &str, quality: &Quality) -> Vec<(String, String)> {
         format!("trimmed_s.{name}"),
         format!("start {start:.3}, end {end:.3}"),
     );
-    bandwidth.into_iter().chain([trimmed]).collect()
+    let texture = quality.texture.map(|texture| {
+        let from = texture.from;
+        (
+            format!("texture.{name}"),
+            format!(
+                "segment {}, drawn: specific force from {:.1} Hz, angular velocity from {:.1} Hz on",
+                texture.segment.name(),
+                from.acceleration_hz,
+                from.angular_velocity_hz
+            ),
+        )
+    });
+    bandwidth
+        .into_iter()
+        .chain([trimmed])
+        .chain(texture)
+        .collect()
 }
 
 /// The end of a summary: the range of the placements' bandwidths, and the most that was left out.
 pub fn quality_line(placements: impl Iterator<Item = Quality>) -> String {
-    let (mut bandwidths, mut trimmed) = (Vec::new(), [0.0_f64; 2]);
+    let (mut bandwidths, mut trimmed, mut is_drawn) = (Vec::new(), [0.0_f64; 2], false);
     for quality in placements {
         let [start, end] = quality.trimmed_s;
         bandwidths.extend(quality.bandwidth);
+        is_drawn |= quality.texture.is_some();
         trimmed = [trimmed[0].max(start), trimmed[1].max(end)];
     }
     let mut line = String::new();
@@ -52,6 +69,9 @@ pub fn quality_line(placements: impl Iterator<Item = Quality>) -> String {
             range(|bandwidth| bandwidth.acceleration_hz),
             range(|bandwidth| bandwidth.angular_velocity_hz)
         );
+    }
+    if is_drawn {
+        line += "; above, texture is drawn (--texture)";
     }
     if trimmed != [0.0; 2] {
         line += &format!(

@@ -60,6 +60,7 @@ mod stated_errors;
 mod stream;
 mod stream_adaptive;
 mod stream_spline;
+mod texture;
 mod trajectory;
 mod trim;
 mod uncertainty;
@@ -94,6 +95,7 @@ pub use sample::{
 pub use schemes::Scheme;
 pub use simulate::{Differentiation, simulate, simulate_kinematics, simulate_kinematics_on};
 pub use stream::{StreamOptions, StreamingImu};
+pub use texture::{DrawnTexture, TextureSegment, add_texture};
 pub use trajectory::{SensorFrame, SensorTrajectory};
 pub use trim::{LONGEST_TRIM_S, Trim, median_bandwidth};
 pub use virtual_imu::{

@@ -116,6 +116,14 @@ pub enum RecordingError {
     /// Ends that leave nothing.
     #[error("--trim leaves nothing of the motion; give less")]
     AllTrimmed,
+    /// Nothing says above which frequency texture is to be drawn.
+    #[error(
+        "{placement}: --texture needs a scheme that says up to which frequency it resolves the motion: adaptive_spline, spline or --bandwidth"
+    )]
+    NoBandwidth {
+        /// The placement.
+        placement: String,
+    },
     /// Two sides of a comparison that share nothing.
     #[error("{what} in common: A has {a}; B has {b}")]
     NothingInCommon {

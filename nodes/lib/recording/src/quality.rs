@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use cromosim_imu::{Bandwidth, KinematicSample, Trim, median_bandwidth};
+use cromosim_imu::{Bandwidth, DrawnTexture, KinematicSample, Trim, median_bandwidth};
 use cromosim_spatial::Stamp;
 
 /// What the samples of one placement are good for.
@@ -12,6 +12,8 @@ pub struct Quality {
     pub bandwidth: Option<Bandwidth>,
     /// What was left out at the beginning and at the end, s.
     pub trimmed_s: [f64; 2],
+    /// What was drawn above the bandwidth; none unless asked for.
+    pub texture: Option<DrawnTexture>,
 }
 
 impl Quality {
@@ -22,6 +24,7 @@ impl Quality {
         let quality = Self {
             bandwidth: median_bandwidth(motion),
             trimmed_s: [*span.start() - first, last - *span.end()],
+            texture: None,
         };
         Some((quality, span))
     }

@@ -1,13 +1,14 @@
 //! The IMUs of a recording again, from its reference motion.
 
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use cromosim_bag::BagWriter;
 use cromosim_imu::{
     DeclaredNoise, Differentiation, EffectSet, EffectsFile, ImuOptions, KinematicSample,
     PlacementEffects, ReadingMapping, RecordedMotion, SampleVariance, SensorFrame,
-    SensorTrajectory, Trim, UnexplainedErrors, measure_recording, simulate_kinematics,
-    track_in_sensor_axes,
+    SensorTrajectory, TextureSegment, Trim, UnexplainedErrors, add_texture, measure_recording,
+    simulate_kinematics, track_in_sensor_axes,
 };
 use cromosim_learned::{LearnedSimulator, MappingFile, SiteMotion};
 use cromosim_msgs::geometry_msgs::PoseStamped;
@@ -29,6 +30,8 @@ pub struct Resimulation {
     pub trim: Trim,
     /// What errs at each placement; those that it does not name stay nominal.
     pub effects: EffectsFile,
+    /// Draws texture above what the poses resolve, as an IMU on this segment shows it.
+    pub texture: Option<TextureSegment>,
     /// Networks that correct the kinematics; they need a scheme, and do nothing to a bandwidth.
     pub learned: Option<LearnedSimulator>,
     /// Maps readings last, at the placements that it names.
@@ -133,9 +136,8 @@ impl Resimulation {
             .map_err(|error| error.at(name.clone()))?;
         let stamps_are_recorded = !placement.measured.is_empty();
         let mut quality = Quality::default();
-        if let (Known::Samples(samples), false) = (&known, stamps_are_recorded) {
-            let (found, span) =
-                Quality::of(samples, self.trim).ok_or(RecordingError::AllTrimmed)?;
+        if let (Known::Samples(_, found), false) = (&known, stamps_are_recorded) {
+            let (found, span) = found.clone().ok_or(RecordingError::AllTrimmed)?;
             quality = found;
             stamps.retain(|stamp| span.contains(stamp));
         }
@@ -202,19 +204,33 @@ impl Resimulation {
         let units = effects.length_factor();
         let trajectory = trajectory_in_metres(&poses, units)?;
         let networks = self.learned.as_ref();
-        let (mut track, samples) = differentiated(&trajectory, scheme, rate_hz, networks)?;
+        let (mut samples, rate_hz) = differentiated(&trajectory, scheme, rate_hz, networks)?;
+        let mut quality = Quality::of(&samples, self.trim);
+        if let Some(segment) = self.texture {
+            let drawn = add_texture(&mut samples, segment, (self.seed, &placement.name));
+            let drawn = drawn.ok_or_else(|| RecordingError::NoBandwidth {
+                placement: placement.name.clone(),
+            })?;
+            if let Some((quality, _)) = &mut quality {
+                quality.texture = Some(drawn);
+            }
+        }
+        let mut track = track_in_sensor_axes(&samples, rate_hz);
         // The effects take the units back.
         for acceleration in &mut track.acceleration_in_segment {
             *acceleration *= units;
         }
-        Ok((track, Known::Samples(samples)))
+        Ok((track, Known::Samples(samples, quality)))
     }
 }
 
 /// What is known of the errors of a motion.
 enum Known {
-    /// Samples of a scheme, with their variances.
-    Samples(Vec<KinematicSample>),
+    /// Samples of a scheme, with their variances; what they are good for, and when.
+    Samples(
+        Vec<KinematicSample>,
+        Option<(Quality, RangeInclusive<Stamp>)>,
+    ),
     /// Of positions in the reference's own units.
     Estimate(Box<PoseEstimate>),
 }
@@ -223,7 +239,7 @@ impl Known {
     /// What the errors leave at the stamps.
     fn variances(&self, stamps: &[Stamp], effects: &EffectSet) -> Vec<SampleVariance> {
         match self {
-            Self::Samples(samples) => variances_at(samples, stamps),
+            Self::Samples(samples, _) => variances_at(samples, stamps),
             Self::Estimate(estimate) => {
                 effects.reference_variances(estimate, effects.length_factor(), stamps)
             }
@@ -255,13 +271,14 @@ fn trajectory_in_metres(
     )?)
 }
 
-/// The motion by a scheme and what networks add to it, on a grid from the first frame to the last.
+/// The motion by a scheme and what networks add to it, on a grid from the first frame to the last, and its
+/// rate, Hz.
 fn differentiated(
     trajectory: &SensorTrajectory,
     scheme: Differentiation,
     least_rate_hz: f64,
     networks: Option<&LearnedSimulator>,
-) -> Result<(KinematicTrack, Vec<KinematicSample>), RecordingError> {
+) -> Result<(Vec<KinematicSample>, f64), RecordingError> {
     let (start, seconds) = (trajectory.start(), trajectory.end() - trajectory.start());
     // A whole number of intervals, so that the grid ends where the reference does.
     let rate_hz = (seconds * least_rate_hz).ceil().max(1.0) / seconds;
@@ -270,7 +287,7 @@ fn differentiated(
     if let (Some(networks), Differentiation::Scheme(scheme)) = (networks, scheme) {
         motion = networks.correct(&SiteMotion::rigid(trajectory, scheme)?, &motion)?;
     }
-    Ok((track_in_sensor_axes(&motion, rate_hz), motion))
+    Ok((motion, rate_hz))
 }
 
 /// The variances of the samples that follow the stamps; none without samples.
