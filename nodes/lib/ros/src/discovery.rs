@@ -5,13 +5,14 @@ use std::net::{IpAddr, Ipv4Addr};
 use rustdds::{DomainParticipant, DomainParticipantBuilder};
 
 use crate::error::{RosError, RosResult, dds};
+use crate::loopback::Sockets;
 
 /// How far a node looks for peers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum DiscoveryRange {
-    /// Nowhere: the node stays alone.
+    /// Nowhere: the node stays alone. As for packets, the same as `Localhost`.
     Off,
-    /// On this machine: no packet leaves it. The suite's default.
+    /// On this machine: no packet leaves it, none of another host is taken. The suite's default.
     Localhost,
     /// In the local network, by multicast on all its interfaces.
     Subnet,
@@ -109,9 +110,25 @@ impl Network {
             DiscoveryRange::Localhost => builder.with_only_networks([Ipv4Addr::LOCALHOST]),
             DiscoveryRange::Subnet | DiscoveryRange::SystemDefault => builder,
         };
-        builder
-            .build()
-            .map_err(|error| dds(format!("join DDS domain {}", self.domain_id), error))
+        let keeps_here = matches!(self.range, DiscoveryRange::Off | DiscoveryRange::Localhost);
+        let sockets = if keeps_here {
+            Sockets::on_loopback()
+        } else {
+            Sockets::everywhere()
+        };
+        let doing = || format!("join DDS domain {}", self.domain_id);
+        // All of its sockets are bound when this returns.
+        let participant = builder.build().map_err(|error| dds(doing(), error))?;
+        if keeps_here && !sockets.were_kept() {
+            let problem = "its sockets cannot be kept to this machine; \
+                           ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET talks to the network";
+            // Sockets are tied to a device by other calls elsewhere.
+            if cfg!(target_os = "linux") {
+                return Err(dds(doing(), problem));
+            }
+            log::warn!("packets of other hosts are not refused on this system");
+        }
+        Ok(participant)
     }
 }
 

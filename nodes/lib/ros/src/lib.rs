@@ -12,7 +12,7 @@
 //!
 //! | what | why |
 //! |---|---|
-//! | the participant's builder | ros2-client's options cannot keep it to this machine |
+//! | the participant's builder | ros2-client's options cannot keep it to this machine (nor RustDDS's wholly: `loopback.rs`) |
 //! | publishers | ros2-client's hide `wait_for_acknowledgments`: the last messages of a process that ends would be lost |
 //! | sending `ros_discovery_info` | ros2-client's `Node` announces only endpoints that it made, and never takes dropped ones back |
 //! | subscriptions, services, their clients | only `Node` makes them, and its announcement would contradict ours, in which publishers are |
@@ -48,6 +48,7 @@ mod discovery;
 mod error;
 mod graph;
 mod logging;
+mod loopback;
 mod names;
 mod node;
 mod node_options;
