@@ -1,8 +1,9 @@
 //! Parameters of the nodes, and bags.
 
 use std::fs;
+use std::process::Command;
 
-use crate::common::succeed;
+use crate::common::{CROMOSIM, succeed};
 use crate::refuses;
 
 #[test]
@@ -99,6 +100,58 @@ fn parameters_of_nodes() {
         &["node", "replay", "--speed", "3"],
         &["--speed", "--help"],
     );
+}
+
+/// Nothing starts that would talk in the clear where that is forbidden.
+#[test]
+fn security_that_cannot_be_had() {
+    let folder = tempfile::tempdir().unwrap();
+    let said = |variables: &[(&str, &str)], arguments: &[&str]| {
+        let mut command = Command::new(CROMOSIM);
+        command.args(arguments).current_dir(folder.path());
+        for variable in ["ENABLE", "STRATEGY", "KEYSTORE", "ENCLAVE_OVERRIDE"] {
+            command.env_remove(format!("ROS_SECURITY_{variable}"));
+        }
+        let output = command.envs(variables.iter().copied()).output().unwrap();
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        (output.status.code(), error)
+    };
+    let (on, enforce) = (
+        ("ROS_SECURITY_ENABLE", "true"),
+        ("ROS_SECURITY_STRATEGY", "Enforce"),
+    );
+    let recorder = ["node", "recorder"];
+    let check = ["node", "recorder", "--check-config"];
+    let nowhere = ("ROS_SECURITY_KEYSTORE", "nowhere");
+    let cases: [(&[(&str, &str)], &[&str], &str); 5] = [
+        (&[on, enforce], &recorder, "Enforce: "),
+        (&[on, enforce, nowhere], &check, "Enforce: "),
+        (&[on, enforce], &["demo", "--no-viewer"], "Enforce: "),
+        (
+            &[("ROS_SECURITY_ENABLE", "yes")],
+            &check,
+            "expected true or false",
+        ),
+        (
+            &[on, ("ROS_SECURITY_STRATEGY", "enforce")],
+            &check,
+            "expected Enforce or Permissive",
+        ),
+    ];
+    for (variables, arguments, expected) in cases {
+        let (code, error) = said(variables, arguments);
+        assert_eq!(code, Some(2), "{variables:?}: {error}");
+        assert_eq!(
+            error.trim_end().lines().count(),
+            1,
+            "{variables:?}: {error}"
+        );
+        assert!(error.contains(expected), "{variables:?}: {error}");
+    }
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    let (code, warning) = said(&[on], &check);
+    assert_eq!(code, Some(0), "{warning}");
+    assert!(warning.contains("messages are in the clear"), "{warning}");
 }
 
 #[test]

@@ -14,6 +14,7 @@ use clap::Args;
 use cromosim_body::ShapedBody;
 use cromosim_imu::{Device, MountedSensors, PlacementSet};
 use cromosim_spatial::PoseSource;
+use cromosim_ros::{Network, RosArgs, Security};
 
 use crate::progress::Interrupt;
 use crate::{body, progress, summary};
@@ -280,6 +281,9 @@ impl Arguments {
         {
             bail!("--duration {seconds}: expected a positive number of seconds");
         }
+        // What the nodes would refuse.
+        Network::from_env()?;
+        Security::from_env(&RosArgs::default())?;
         let model = body::model(self.body.as_deref())?;
         let motion = match &self.motion {
             Some(path) => cromosim_motion::read_motion_for(path, &model, &Default::default())?,

@@ -24,6 +24,8 @@ pub struct RosArgs {
     pub log_levels: LogLevels,
     /// False with `--disable-rosout-logs`.
     pub rosout: bool,
+    /// The enclave whose keys the node has, where security is enabled; none: `/`.
+    pub enclave: Option<String>,
     remaps: Vec<Remap>,
     overrides: Vec<Override>,
 }
@@ -92,7 +94,11 @@ impl RosArgs {
                     .set(&text)
                     .map_err(|problem| wrong(&format!("--log-level {text}"), problem))
             }
-            "-e" | "--enclave" | "--log-config-file" | "--log-file-name" => value().map(drop),
+            "-e" | "--enclave" => {
+                self.enclave = Some(value()?);
+                Ok(())
+            }
+            "--log-config-file" | "--log-file-name" => value().map(drop),
             "--disable-rosout-logs" => {
                 self.rosout = false;
                 Ok(())
@@ -236,6 +242,7 @@ mod tests {
         let args = RosArgs::parse(line).unwrap();
         assert_eq!(args.rest, ["a", "b"]);
         assert!(!args.rosout);
+        assert_eq!(args.enclave.as_deref(), Some("/enclave"));
         let node = args.node_name("n").unwrap();
         assert_eq!(args.resolve(&node, "x").unwrap(), "/y");
         assert_eq!(args.resolve(&node, "z").unwrap(), "/z");

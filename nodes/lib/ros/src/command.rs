@@ -134,7 +134,7 @@ fn help<C: NodeConfig>(name: &str, about: &str) -> String {
     }
     text += "  use_sim_time [false]\n      Take the time from /clock.\n  qos_overrides./TOPIC.publisher.depth (or .subscription; depth, reliability, durability, history)\n      Quality of service of a topic.\n\n";
     text += "Remaps: -r from:=to for topics, -r __node:=NAME, -r __ns:=/NAMESPACE\n";
-    text += "Environment: ROS_DOMAIN_ID; ROS_AUTOMATIC_DISCOVERY_RANGE (OFF, LOCALHOST, SUBNET, SYSTEM_DEFAULT; here LOCALHOST unless set); ROS_LOCALHOST_ONLY";
+    text += "Environment: ROS_DOMAIN_ID; ROS_AUTOMATIC_DISCOVERY_RANGE (OFF, LOCALHOST, SUBNET, SYSTEM_DEFAULT; here LOCALHOST unless set); ROS_LOCALHOST_ONLY; ROS_SECURITY_ENABLE, ROS_SECURITY_STRATEGY, ROS_SECURITY_KEYSTORE, ROS_SECURITY_ENCLAVE_OVERRIDE";
     text
 }
 

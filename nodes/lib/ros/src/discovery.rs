@@ -6,6 +6,7 @@ use rustdds::{DomainParticipant, DomainParticipantBuilder};
 
 use crate::error::{RosError, RosResult, dds};
 use crate::loopback::Sockets;
+use crate::security::Security;
 
 /// How far a node looks for peers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -101,7 +102,7 @@ impl Network {
     }
 
     /// Made by RustDDS's builder: ros2-client's options know the domain only, not the networks.
-    pub(crate) fn participant(self) -> RosResult<DomainParticipant> {
+    pub(crate) fn participant(self, security: &Security) -> RosResult<DomainParticipant> {
         let builder = DomainParticipantBuilder::new(self.domain_id);
         let builder = match self.range {
             DiscoveryRange::Off => builder
@@ -110,6 +111,7 @@ impl Network {
             DiscoveryRange::Localhost => builder.with_only_networks([Ipv4Addr::LOCALHOST]),
             DiscoveryRange::Subnet | DiscoveryRange::SystemDefault => builder,
         };
+        let builder = security.protect(builder)?;
         let keeps_here = matches!(self.range, DiscoveryRange::Off | DiscoveryRange::Localhost);
         let sockets = if keeps_here {
             Sockets::on_loopback()

@@ -72,6 +72,12 @@ pub enum RosError {
         /// What it may be.
         expected: &'static str,
     },
+    /// Messages must be secured and cannot be.
+    #[error("ROS_SECURITY_ENABLE=true with ROS_SECURITY_STRATEGY=Enforce: {problem}")]
+    Security {
+        /// What is missing.
+        problem: String,
+    },
     /// A name of a node, topic, service or type that ROS 2 does not allow.
     #[error("name '{name}': {problem}")]
     Name {

@@ -58,6 +58,7 @@ impl Node {
             name,
             parameters,
             network,
+            security,
             shutdown,
             args,
             parameter_services,
@@ -66,7 +67,12 @@ impl Node {
             parameters.get(USE_SIM_TIME).unwrap_or(false),
             shutdown.clone(),
         );
-        let core = Arc::new(Core::new(name, network.participant()?, clock, shutdown)?);
+        let core = Arc::new(Core::new(
+            name,
+            network.participant(&security)?,
+            clock,
+            shutdown,
+        )?);
         let thread = spawn_thread(&core, &parameters)?;
         let services = if parameter_services {
             serve_parameters(&core, &parameters)?

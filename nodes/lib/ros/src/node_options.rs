@@ -5,6 +5,7 @@ use crate::discovery::Network;
 use crate::error::RosResult;
 use crate::names::NodeName;
 use crate::parameter::Parameters;
+use crate::security::Security;
 use crate::shutdown::Shutdown;
 
 /// What a node is started with. Everything is checked before DDS is touched, so `--check-config`
@@ -17,6 +18,8 @@ pub struct NodeOptions {
     pub parameters: Parameters,
     /// The domain, and how far the node looks for peers.
     pub network: Network,
+    /// How its messages are protected.
+    pub security: Security,
     /// What ends it.
     pub shutdown: Shutdown,
     /// The command line, for remaps.
@@ -36,11 +39,13 @@ impl NodeOptions {
         let name = args.node_name(default_name)?;
         parameters.apply(args, &name)?;
         let network = Network::from_env()?;
+        let security = Security::from_env(args)?;
         let (parameters, args) = (parameters.clone(), args.clone());
         Ok(Self {
             name,
             parameters,
             network,
+            security,
             shutdown: Shutdown::new(),
             args,
             parameter_services: true,
