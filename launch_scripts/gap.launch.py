@@ -10,9 +10,17 @@ from launch.actions import DeclareLaunchArgument, ExecuteProcess, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 
 
+def died(event, context):
+    """Ends the launch, with an error, where a node ends that was not told to."""
+    if event.returncode == 0 and context.is_shutdown:
+        return None
+    # launch's own Shutdown would end it with exit code 0.
+    raise RuntimeError(f"{event.process_name} has ended with exit code {event.returncode}, and the launch with it")
+
+
 def node(name, *arguments):
     """One node of the suite, with its arguments after --ros-args."""
-    return ExecuteProcess(cmd=["cromosim", "node", name, "--ros-args", *arguments], name=name, output="screen")
+    return ExecuteProcess(cmd=["cromosim", "node", name, "--ros-args", *arguments], name=name, output="screen", on_exit=died)
 
 
 def nodes(context):

@@ -9,12 +9,20 @@ from launch.actions import DeclareLaunchArgument, ExecuteProcess
 from launch.substitutions import LaunchConfiguration
 
 
+def died(event, context):
+    """Ends the launch, with an error, where a node ends that was not told to."""
+    if event.returncode == 0 and context.is_shutdown:
+        return None
+    # launch's own Shutdown would end it with exit code 0.
+    raise RuntimeError(f"{event.process_name} has ended with exit code {event.returncode}, and the launch with it")
+
+
 def node(name, *parameters):
     """One node of the suite; parameters are lists that make `name:=value`."""
     command = ["cromosim", "node", name, "--ros-args"]
     for parameter in parameters:
         command += ["-p", parameter]
-    return ExecuteProcess(cmd=command, name=name, output="screen")
+    return ExecuteProcess(cmd=command, name=name, output="screen", on_exit=died)
 
 
 def generate_launch_description():
