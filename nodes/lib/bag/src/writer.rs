@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::io::BufWriter;
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use cromosim_msgs::RosMessage;
@@ -65,7 +65,14 @@ impl BagWriter {
         let parent = parent_of(path);
         let create = || io_error(path, "create");
         let (file, place) = match (single, options.live) {
-            (true, true) => (File::create(path).map_err(create())?, Place::LiveFile),
+            (true, true) if options.replace => {
+                (File::create(path).map_err(create())?, Place::LiveFile)
+            }
+            // Of two that begin at once, one finds the other's.
+            (true, true) => (
+                File::create_new(path).map_err(taken(path))?,
+                Place::LiveFile,
+            ),
             (true, false) => {
                 let (file, temporary) = temporary(path)
                     .tempfile_in(parent)
@@ -74,8 +81,10 @@ impl BagWriter {
                 (file, Place::TemporaryFile(temporary))
             }
             (false, true) => {
-                remove_bag(path)?;
-                fs::create_dir(path).map_err(create())?;
+                if options.replace {
+                    remove_bag(path)?;
+                }
+                fs::create_dir(path).map_err(taken(path))?;
                 (
                     File::create(path.join(&file_name)).map_err(create())?,
                     Place::LiveDirectory,
@@ -228,7 +237,11 @@ impl BagWriter {
         match place {
             Place::LiveFile => {}
             Place::LiveDirectory => {
-                fs::write(target.join("metadata.yaml"), metadata).map_err(finish())?
+                // Whole or not there, whenever the process is killed.
+                let path = target.join("metadata.yaml");
+                let mut file = temporary(&path).tempfile_in(&target).map_err(finish())?;
+                file.write_all(metadata.as_bytes()).map_err(finish())?;
+                file.persist(&path).map_err(|error| finish()(error.error))?;
             }
             Place::TemporaryFile(temporary) if options.replace => {
                 temporary
@@ -254,6 +267,16 @@ impl BagWriter {
 
     fn placed<V>(&self, result: Result<V, BagError>) -> Result<V, BagError> {
         result.map_err(|error| placed(error, self.options.live, &self.target))
+    }
+}
+
+/// Says of a new file or directory that its name is taken.
+fn taken(path: &Path) -> impl FnOnce(std::io::Error) -> BagError {
+    let create = io_error(path, "create");
+    let path = path.to_owned();
+    move |error| match error.kind() {
+        std::io::ErrorKind::AlreadyExists => BagError::Exists { path },
+        _ => create(error),
     }
 }
 

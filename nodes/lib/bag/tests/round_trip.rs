@@ -276,3 +276,29 @@ fn csv_holds_the_numbers_without_loss() {
     assert_eq!(rows[2][..5], ["1700000000010000000", "", "", "", ""]);
     assert_eq!(rows[2][8].parse::<f64>().unwrap(), 0.01_f64.sin());
 }
+
+#[test]
+fn of_two_that_begin_at_once_one_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for round in 0..100 {
+        for name in [format!("bag{round}"), format!("bag{round}.mcap")] {
+            let path = folder.path().join(name);
+            let both = std::sync::Barrier::new(2);
+            let begin = || {
+                both.wait();
+                BagWriter::create(&path, LIVE)
+            };
+            let (one, other) = std::thread::scope(|scope| {
+                let other = scope.spawn(begin);
+                (begin(), other.join().unwrap())
+            });
+            let (begun, refused): (Vec<_>, Vec<_>) =
+                [one, other].into_iter().partition(Result::is_ok);
+            assert_eq!(begun.len(), 1, "{}", path.display());
+            let refusal = refused.into_iter().next().unwrap().err().unwrap();
+            assert!(matches!(refusal, BagError::Exists { .. }), "{refusal}");
+            begun.into_iter().next().unwrap().unwrap().finish().unwrap();
+            BagReader::open(&path).unwrap();
+        }
+    }
+}
