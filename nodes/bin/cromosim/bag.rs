@@ -1,12 +1,14 @@
 //! `cromosim bag`: mend bags, export from them.
 
 use std::fs::File;
-use std::io::{BufWriter, Write, stdout};
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Subcommand;
 use cromosim_bag::{BagReader, recover, write_imu_csv};
+
+use crate::output::{output, remark, say};
 
 /// Commands on bags.
 #[derive(Subcommand)]
@@ -39,19 +41,19 @@ pub fn run(command: &Command) -> anyhow::Result<()> {
         Command::Recover { bag, out } => {
             let out = out.clone().unwrap_or_else(|| recovered_name(bag));
             let recovery = recover(bag, &out)?;
-            println!(
+            say!(
                 "{}: {} messages kept, {} bytes lost",
                 out.display(),
                 recovery.messages_kept(),
                 recovery.bytes_lost
-            );
+            )?;
             for damage in &recovery.damages {
-                println!(
+                say!(
                     "  {}, byte {}: {}",
                     damage.path.display(),
                     damage.at,
                     damage.reason
-                );
+                )?;
             }
         }
         Command::Csv { bag, topic, out } => {
@@ -64,12 +66,12 @@ pub fn run(command: &Command) -> anyhow::Result<()> {
                     let rows = write_imu_csv(&reader, topic, &mut file, path)?;
                     file.flush()
                         .with_context(|| format!("{}: cannot be written", path.display()))?;
-                    eprintln!("{}: {rows} rows", path.display());
+                    remark!("{}: {rows} rows", path.display());
                 }
                 None => drop(write_imu_csv(
                     &reader,
                     topic,
-                    stdout().lock(),
+                    output(),
                     Path::new("standard output"),
                 )?),
             }

@@ -9,6 +9,8 @@ use anyhow::{Context, bail};
 use clap::Subcommand;
 use cromosim_body::{BodyModel, ShapedBody, write_obj};
 
+use crate::output::say;
+
 /// Commands on bodies.
 #[derive(Subcommand)]
 pub enum Command {
@@ -65,6 +67,6 @@ pub fn run(command: &Command) -> anyhow::Result<()> {
             out.display()
         ),
     }
-    println!("{}", out.display());
+    say!("{}", out.display())?;
     Ok(())
 }

@@ -11,6 +11,8 @@ use cromosim_bag::BagReader;
 use cromosim_gap::{Diagnosis, SCHEMA};
 use cromosim_recording::compare::{compare_diagnoses, compare_recordings};
 
+use crate::output::{print, say};
+
 /// Say what differs between two diagnoses, or between the IMUs of two recordings
 #[derive(Args)]
 pub struct Arguments {
@@ -41,7 +43,7 @@ impl Side {
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let (a, b) = (open(&arguments.a)?, open(&arguments.b)?);
-    println!("A  {}\nB  {}", arguments.a.display(), arguments.b.display());
+    say!("A  {}\nB  {}", arguments.a.display(), arguments.b.display())?;
     let found = match (&a, &b) {
         (Side::Diagnosis(a), Side::Diagnosis(b)) => compare_diagnoses(a, b)?,
         (Side::Recording(a), Side::Recording(b)) => compare_recordings(a, b)?,
@@ -55,7 +57,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
             )
         }
     };
-    print!("{}", found.text);
+    print(format_args!("{}", found.text))?;
     if let Some(path) = &arguments.out {
         let text =
             serde_json::to_string_pretty(&found.json).context("what was found is no JSON")? + "\n";

@@ -10,6 +10,7 @@ use cromosim_recording::datasets::DatasetFiles;
 
 use crate::body;
 use crate::motion_arguments::MotionArguments;
+use crate::output::{remark, say};
 
 /// Convert a motion, a trajectory of a rigid body, an IMU series or a recording into another format
 #[derive(Args)]
@@ -137,8 +138,10 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         imu: arguments.imu.clone(),
         replace: arguments.force,
     })?;
-    converted.notes.iter().for_each(|note| eprintln!("{note}"));
-    println!(
+    for note in &converted.notes {
+        remark!("{note}");
+    }
+    say!(
         "{}: {} of {} {}",
         arguments.out.display(),
         target.describe(),
@@ -148,6 +151,6 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         } else {
             "rows"
         }
-    );
+    )?;
     Ok(())
 }

@@ -17,6 +17,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use crate::diagnose_recordings::{OneRecording, Selected, file_names, of_recording, select};
+use crate::output::{remark, say};
 use crate::progress::{self, Interrupt};
 
 /// The files in DIR.
@@ -104,15 +105,16 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
             .collect();
         bail!("{}: {}", files.join(", "), failures.join("; "));
     }
-    notes.iter().for_each(|note| eprintln!("warning: {note}"));
-    failures
-        .iter()
-        .for_each(|failure| eprintln!("error: {failure}; the others are diagnosed"));
+    for note in &notes {
+        remark!("warning: {note}");
+    }
+    for failure in &failures {
+        remark!("error: {failure}; the others are diagnosed");
+    }
     let (diagnosis, effects, evidence) = split(answers);
     write(arguments, &diagnosis, &effects, &evidence)?;
-    print(&diagnosis);
-    print_files(&arguments.out);
-    Ok(())
+    print(&diagnosis)?;
+    print_files(&arguments.out)
 }
 
 /// What is taken out of the library, and the seed: the command line wins over the file.
@@ -342,44 +344,45 @@ fn write(
 }
 
 /// Which files were written.
-fn print_files(folder: &Path) {
+fn print_files(folder: &Path) -> anyhow::Result<()> {
     let folder = folder.display();
     if cfg!(feature = "view") {
-        println!("\n{folder}: {}", FILES.join(", "));
+        say!("\n{folder}: {}", FILES.join(", "))?;
     } else {
-        println!(
+        say!(
             "\n{folder}: {}; {} is left out, as this cromosim was built without its feature `view`",
             FILES[..3].join(", "),
             FILES[3]
-        );
+        )?;
     }
+    Ok(())
 }
 
 /// What was found, for people.
-fn print(diagnosis: &Diagnosis) {
+fn print(diagnosis: &Diagnosis) -> anyhow::Result<()> {
     for (name, placement) in &diagnosis.placements {
         let PlacementDiagnosis {
             verdict, causes, ..
         } = placement;
-        println!("{name}: {verdict}");
+        say!("{name}: {verdict}")?;
         for cause in causes {
             let (effect, probability, share) =
                 (&cause.effect, cause.probability, 100.0 * cause.gap_share);
-            println!(
+            say!(
                 "  {effect:<20} probability {probability:.2}, {share:5.1} % of the gap; {}",
                 parameters(&cause.effect, &cause.parameters, &cause.standard_errors)
-            );
+            )?;
         }
         for kept in &placement.calibration {
-            println!(
+            say!(
                 "  {:<20} no cause, but kept; {}",
                 kept.effect,
                 parameters(&kept.effect, &kept.parameters, &kept.standard_errors)
-            );
+            )?;
         }
         for one in &placement.recordings {
             let (gap, left_out) = (&one.gap, &one.left_out);
-            println!(
+            say!(
                 "  {}: {:.3} -> {:.3} m/s2 and {:.4} -> {:.4} rad/s; with the device as the other recordings show it {:.3} m/s2 and {:.4} rad/s",
                 one.recording,
                 gap.before.accel_rmse,
@@ -388,9 +391,10 @@ fn print(diagnosis: &Diagnosis) {
                 gap.after.gyro_rmse,
                 left_out.accel_rmse,
                 left_out.gyro_rmse
-            );
+            )?;
         }
     }
+    Ok(())
 }
 
 /// `offset [0.0502, 0.0001, -0.0611] m +- [0.0003, 0.0003, 0.0003]`.

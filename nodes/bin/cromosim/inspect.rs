@@ -17,6 +17,7 @@ use cromosim_recording::rigid::RigidFormat;
 
 use crate::body;
 use crate::motion_arguments::MotionArguments;
+use crate::output::say;
 
 /// Say what is in a file
 #[derive(Args)]
@@ -39,18 +40,18 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let model = body::model(arguments.body.as_deref())?;
     for path in &arguments.files {
         match inspect(path, &model, &options)? {
-            Inspection::Bag(reader) => print_bag(path, &reader),
-            Inspection::Recording(format, recording) => print_recording(path, format, &recording),
-            Inspection::Rigid(rigid) => print_rigid(path, &rigid),
-            Inspection::Body(body) => print_body(path, &body),
-            Inspection::Poses(poses) => print_poses(path, &poses),
-            Inspection::Motion(motion) => print_motion(path, &motion),
+            Inspection::Bag(reader) => print_bag(path, &reader)?,
+            Inspection::Recording(format, recording) => print_recording(path, format, &recording)?,
+            Inspection::Rigid(rigid) => print_rigid(path, &rigid)?,
+            Inspection::Body(body) => print_body(path, &body)?,
+            Inspection::Poses(poses) => print_poses(path, &poses)?,
+            Inspection::Motion(motion) => print_motion(path, &motion)?,
         }
     }
     Ok(())
 }
 
-fn print_rigid(path: &Path, rigid: &RigidInspection) {
+fn print_rigid(path: &Path, rigid: &RigidInspection) -> anyhow::Result<()> {
     let kind = match rigid.format {
         RigidFormat::Tum => "trajectory (TUM)",
         RigidFormat::EurocGroundTruth => "trajectory (EuRoC ground truth)",
@@ -61,32 +62,37 @@ fn print_rigid(path: &Path, rigid: &RigidInspection) {
     let rate = rigid
         .median_rate_hz
         .map_or_else(String::new, |rate| format!(" at {rate:.3} Hz (median)"));
-    println!(
+    say!(
         "{}: {kind}, {} rows{rate}, {:.3} s from {:.6} s on",
         path.display(),
         rigid.rows,
         rigid.duration_s,
         rigid.first.as_seconds()
-    );
+    )?;
     match rigid.extent {
-        RigidExtent::Path(length) => println!("  path of {length:.2} m"),
+        RigidExtent::Path(length) => say!("  path of {length:.2} m")?,
         RigidExtent::Means {
             specific_force,
             angular_velocity,
-        } => println!(
+        } => say!(
             "  mean specific force {specific_force:.3} m/s2, mean angular velocity {angular_velocity:.4} rad/s"
-        ),
+        )?,
     }
+    Ok(())
 }
 
-fn print_recording(path: &Path, format: DatasetFormat, recording: &DatasetRecording) {
+fn print_recording(
+    path: &Path,
+    format: DatasetFormat,
+    recording: &DatasetRecording,
+) -> anyhow::Result<()> {
     let many = if recording.imus.len() == 1 { "" } else { "s" };
-    println!(
+    say!(
         "{}: recording of {format}, {} IMU{many} at {:.3} Hz",
         path.display(),
         recording.imus.len(),
         recording.rate_hz
-    );
+    )?;
     for imu in &recording.imus {
         let stamps = &imu.series.stamps;
         let seconds = stamps
@@ -103,11 +109,11 @@ fn print_recording(path: &Path, format: DatasetFormat, recording: &DatasetRecord
         } else {
             String::new()
         };
-        println!(
+        say!(
             "  {}: {} readings, {seconds:.3} s{reference}{left_out}",
             imu.placement,
             stamps.len()
-        );
+        )?;
     }
     let mut lengths: BTreeMap<&str, f64> = BTreeMap::new();
     for span in &recording.activities {
@@ -118,37 +124,39 @@ fn print_recording(path: &Path, format: DatasetFormat, recording: &DatasetRecord
         let lengths: Vec<String> = lengths
             .map(|(activity, seconds)| format!("{activity} {seconds:.1} s"))
             .collect();
-        println!("  {}", lengths.join(", "));
+        say!("  {}", lengths.join(", "))?;
     }
+    Ok(())
 }
 
-fn print_bag(path: &Path, reader: &BagReader) {
+fn print_bag(path: &Path, reader: &BagReader) -> anyhow::Result<()> {
     let summary = reader.summary();
-    println!(
+    say!(
         "{}: bag, {} messages, {:.3} s",
         path.display(),
         summary.message_count(),
         summary.duration()
-    );
+    )?;
     let names = summary.topics.iter().map(|counted| &counted.topic.name);
     let width = names.map(String::len).max().unwrap_or(0);
     for counted in &summary.topics {
         let (name, rate) = (&counted.topic.name, summary.rate(&counted.topic.name));
         let rate = rate.map_or_else(String::new, |rate| format!("{rate:9.2} Hz"));
-        println!(
+        say!(
             "  {name:width$}  {:8} {rate:12}  {}",
-            counted.message_count, counted.topic.type_name
-        );
+            counted.message_count,
+            counted.topic.type_name
+        )?;
     }
     for attachment in reader.attachments() {
-        println!(
+        say!(
             "  attachment {} ({} bytes)",
             attachment.name,
             attachment.content.len()
-        );
+        )?;
     }
     for (name, values) in reader.metadata_records() {
-        println!(
+        say!(
             "  metadata {name}: {}",
             values
                 .keys()
@@ -156,16 +164,17 @@ fn print_bag(path: &Path, reader: &BagReader) {
                 .cloned()
                 .collect::<Vec<_>>()
                 .join(", ")
-        );
+        )?;
         // Of single placements.
         for (key, value) in values.iter().filter(|(key, _)| key.contains('.')) {
-            println!("    {key}: {value}");
+            say!("    {key}: {value}")?;
         }
     }
+    Ok(())
 }
 
-fn print_body(path: &Path, body: &BodyInspection) {
-    println!(
+fn print_body(path: &Path, body: &BodyInspection) -> anyhow::Result<()> {
+    say!(
         "{}: body {}, {} vertices, {} triangles, {} joints, {} betas, gender {}, {:.3} m tall",
         path.display(),
         body.id,
@@ -175,36 +184,38 @@ fn print_body(path: &Path, body: &BodyInspection) {
         body.betas,
         body.gender.map_or("not stated", |gender| gender.name()),
         body.height_m
-    );
+    )?;
+    Ok(())
 }
 
-fn print_poses(path: &Path, poses: &PosesInspection) {
+fn print_poses(path: &Path, poses: &PosesInspection) -> anyhow::Result<()> {
     let people = match poses.people.len() {
         1 => "one person".to_owned(),
         count => format!("{count} people"),
     };
-    println!(
+    say!(
         "{}: motion, {} in SMPL's joints, {people}",
         path.display(),
         poses.format
-    );
+    )?;
     for person in &poses.people {
-        println!("  {}", person_line(person));
+        say!("  {}", person_line(person))?;
     }
     match &poses.motion {
         Ok(motion) => {
             if let Some(report) = &motion.poses {
-                println!(
+                say!(
                     "  played: person {}, {:.3} s at {:.4} Hz, {report}",
                     report.person,
                     motion.duration_s(),
                     motion.rate_hz
-                );
+                )?;
             }
-            println!("  {}", extent(motion));
+            say!("  {}", extent(motion))?;
         }
-        Err(error) => println!("  not played as it is: {error}"),
+        Err(error) => say!("  not played as it is: {error}")?,
     }
+    Ok(())
 }
 
 fn person_line(person: &PersonInspection) -> String {
@@ -245,32 +256,33 @@ fn person_line(person: &PersonInspection) -> String {
     )
 }
 
-fn print_motion(path: &Path, motion: &SmplMotion) {
-    println!(
+fn print_motion(path: &Path, motion: &SmplMotion) -> anyhow::Result<()> {
+    say!(
         "{}: motion, {} frames at {:.4} Hz, {:.3} s",
         path.display(),
         motion.frames.len(),
         motion.rate_hz,
         motion.duration_s()
-    );
+    )?;
     if let Some(report) = &motion.report {
-        println!("  {report}");
-        println!(
+        say!("  {report}")?;
+        say!(
             "  betas {:.2?}, bone lengths within {:.1} mm (RMS)",
             report.betas,
             1e3 * report.bone_length_rms_m
-        );
+        )?;
     }
     if let Some(report) = &motion.markers {
-        println!("  {report}");
-        println!("  betas {:.2?}", report.betas);
+        say!("  {report}")?;
+        say!("  betas {:.2?}", report.betas)?;
         for (what, labels) in [("absent", &report.absent), ("unknown", &report.unknown)] {
             if !labels.is_empty() {
-                println!("  {what}: {}", labels.join(", "));
+                say!("  {what}: {}", labels.join(", "))?;
             }
         }
     }
-    println!("  {}", extent(motion));
+    say!("  {}", extent(motion))?;
+    Ok(())
 }
 
 /// How far the pelvis goes.

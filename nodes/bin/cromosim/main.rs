@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
+use output::remark;
 use simulate_arguments::Mode;
 
 mod bag;
@@ -21,6 +22,7 @@ mod inspect;
 mod map;
 mod motion_arguments;
 mod node;
+mod output;
 mod progress;
 mod reference;
 mod simulate;
@@ -101,7 +103,7 @@ fn completion(shell: Shell, out: Option<PathBuf>) -> anyhow::Result<()> {
     match out {
         Some(path) => std::fs::write(&path, script)
             .map_err(|error| anyhow::anyhow!("{}: cannot be written: {error}", path.display())),
-        None => std::io::Write::write_all(&mut std::io::stdout(), &script).map_err(Into::into),
+        None => output::print(format_args!("{}", String::from_utf8_lossy(&script))),
     }
 }
 
@@ -132,8 +134,9 @@ fn main() -> ExitCode {
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
+        Err(error) if output::nobody_reads(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {}", one_line(&error));
+            remark!("error: {}", one_line(&error));
             ExitCode::from(2)
         }
     }

@@ -6,6 +6,8 @@ use anyhow::bail;
 use clap::Args;
 use cromosim_evaluation::fit_mapping;
 
+use crate::output::say;
+
 /// Fit a distribution mapping (by ranks, per channel and placement) from a simulated to a measured
 /// recording
 #[derive(Args)]
@@ -33,6 +35,6 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let file = fit_mapping(&arguments.simulated, &arguments.measured)?;
     file.write(&arguments.out)?;
     let names: Vec<&str> = file.placements.keys().map(String::as_str).collect();
-    println!("{out}: {}", names.join(", "));
+    say!("{out}: {}", names.join(", "))?;
     Ok(())
 }

@@ -3,6 +3,8 @@
 
 use clap::Args;
 
+use crate::output::say;
+
 /// Run one node in this process; what follows the name is the node's own, `--ros-args` included
 #[derive(Args)]
 #[command(disable_help_flag = true, disable_version_flag = true)]
@@ -31,9 +33,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
             "this cromosim was built without the feature `view`; build it with default features to get the viewer"
         ),
         "--help" | "-h" => {
-            println!(
+            say!(
                 "Usage: cromosim node <replay|smpl_state|virtual_imu|recorder|viewer|gap_monitor> [--help] [--check-config] [--ros-args ...]"
-            );
+            )?;
             Ok(())
         }
         other => anyhow::bail!(

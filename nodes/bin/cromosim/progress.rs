@@ -8,6 +8,8 @@ use anyhow::bail;
 use cromosim_evaluation::Observer;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use crate::output::say;
+
 /// A bar of `steps` steps on standard error; invisible where that is no terminal.
 pub fn bar(steps: u64, doing: &str) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(steps), ProgressDrawTarget::stderr_with_hz(8));
@@ -94,7 +96,8 @@ impl Observer for Terminal {
     }
 
     fn note(&self, line: &str) {
-        println!("{line}");
+        // What it says in the end tells of an output that cannot be written.
+        let _ = say!("{line}");
     }
 
     fn interrupted(&self) -> bool {

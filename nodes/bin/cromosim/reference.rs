@@ -17,6 +17,7 @@ use cromosim_recording::{
 };
 use rayon::prelude::*;
 
+use crate::output::say;
 use crate::progress::{self, Interrupt};
 use crate::simulate::read_mapping;
 use crate::simulate_arguments::Arguments;
@@ -54,15 +55,14 @@ pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
         false,
         arguments,
     )?;
-    println!(
+    say!(
         "{}: {} messages of {} placements, from the reference in {}",
         arguments.out.display(),
         summary.message_count(),
         recorded.len(),
         recording.display()
-    );
-    print_notes(&recorded, &without_stamps);
-    Ok(())
+    )?;
+    print_notes(&recorded, &without_stamps)
 }
 
 /// Runs `simulate --rigid TRAJECTORY`: the trajectory is the reference of one placement.
@@ -114,13 +114,13 @@ pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()>
         true,
         arguments,
     )?;
-    println!(
+    say!(
         "{}: {} messages of {name}, along {}{}",
         arguments.out.display(),
         summary.message_count(),
         trajectory.display(),
         quality_line(simulated.iter().map(|placement| placement.quality))
-    );
+    )?;
     Ok(())
 }
 
@@ -138,7 +138,7 @@ fn given_effects(
 }
 
 /// What a user should know of the placements, and which of them were left out.
-fn print_notes(recorded: &[RecordedPlacement], without_stamps: &[String]) {
+fn print_notes(recorded: &[RecordedPlacement], without_stamps: &[String]) -> anyhow::Result<()> {
     for placement in recorded {
         for line in placement
             .notes
@@ -146,15 +146,16 @@ fn print_notes(recorded: &[RecordedPlacement], without_stamps: &[String]) {
             .cloned()
             .chain(outside_reference(placement))
         {
-            println!("  {}: {line}", placement.name);
+            say!("  {}: {line}", placement.name)?;
         }
     }
     if !without_stamps.is_empty() {
-        println!(
+        say!(
             "  {}: no messages on /imu/NAME/data_raw to take the stamps from; left out (--rate HZ takes them in)",
             without_stamps.join(", ")
-        );
+        )?;
     }
+    Ok(())
 }
 
 /// A trajectory as the reference of one placement.

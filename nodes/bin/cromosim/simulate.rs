@@ -27,6 +27,7 @@ use cromosim_spatial::{PoseTimes, Stamp, uniform_stamps};
 use indicatif::ProgressBar;
 use rayon::prelude::*;
 
+use crate::output::{remark, say};
 use crate::progress::Interrupt;
 use crate::simulate_arguments::{Arguments, TextureOn};
 use crate::simulated_quality::{quality_entries, quality_line};
@@ -60,7 +61,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         let bar = progress::bar(steps as u64, "simulating, placements");
         let line = simulate_one(&setup, &people, &arguments.out, &bar);
         bar.finish_and_clear();
-        println!("{}", line?);
+        say!("{}", line?)?;
         return Ok(());
     }
     fs::create_dir_all(&arguments.out)
@@ -80,14 +81,12 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         })
         .collect();
     bar.finish_and_clear();
-    let mut failed = 0;
+    let failed = results.iter().filter(|result| result.is_err()).count();
+    let mut said = Ok(());
     for result in &results {
         match result {
-            Ok(line) => println!("{line}"),
-            Err(error) => {
-                eprintln!("error: {error:#}");
-                failed += 1;
-            }
+            Ok(line) => said = said.and_then(|()| say!("{line}")),
+            Err(error) => remark!("error: {error:#}"),
         }
     }
     if failed > 0 {
@@ -96,7 +95,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
             results.len()
         );
     }
-    Ok(())
+    said
 }
 
 /// OUT/NAME.mcap for every motion; two motions of one name would overwrite each other.

@@ -7,6 +7,8 @@ use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_msgs::{RosMessage, cromosim_msgs::SmplState};
 use cromosim_spatial::Stamp;
 
+use crate::output::say;
+
 /// Latencies of the IMU messages of a live run, s, sorted.
 struct Latency {
     /// From the stamp of a sample to its publication: the scheme's delay included.
@@ -118,40 +120,44 @@ pub fn print(bag: &Path, recording: Option<&Path>) -> anyhow::Result<()> {
         .max()
         .unwrap_or(5)
         .max(5);
-    println!(
+    say!(
         "{:width$}  {:>8}  {:>9}  type",
-        "topic", "messages", "rate, Hz"
-    );
+        "topic",
+        "messages",
+        "rate, Hz"
+    )?;
     for counted in topics {
         let rate = active_rate(&reader, &counted.topic.name)?
             .map_or_else(|| "-".to_owned(), |rate| format!("{rate:.2}"));
-        println!(
+        say!(
             "{:width$}  {:8}  {rate:>9}  {}",
-            counted.topic.name, counted.message_count, counted.topic.type_name
-        );
+            counted.topic.name,
+            counted.message_count,
+            counted.topic.type_name
+        )?;
     }
-    println!(
+    say!(
         "{} messages in {:.2} s",
         summary.message_count(),
         summary.duration()
-    );
+    )?;
     if let Some(latency) = latency(&reader)? {
         let ms = |sorted: &[f64], fraction| 1e3 * quantile(sorted, fraction);
-        println!(
+        say!(
             "latency from SmplState to Imu: p50 {:.2} ms, p99 {:.2} ms; age of an Imu message when published, the scheme's delay included: p50 {:.1} ms, p99 {:.1} ms",
             ms(&latency.beyond_state, 0.5),
             ms(&latency.beyond_state, 0.99),
             ms(&latency.age, 0.5),
             ms(&latency.age, 0.99)
-        );
+        )?;
     }
-    println!("bag        {}", bag.display());
+    say!("bag        {}", bag.display())?;
     if let Some(recording) = recording {
-        println!(
+        say!(
             "recording  {}   (open it: rerun {})",
             recording.display(),
             recording.display()
-        );
+        )?;
     }
     Ok(())
 }

@@ -12,6 +12,7 @@ use cromosim_learned::train::Engine;
 use cromosim_learned::{Network, Quantity};
 
 use crate::body;
+use crate::output::{print, say};
 use crate::progress::Terminal;
 
 /// Train the accelerometer's and the gyroscope's network
@@ -57,7 +58,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     };
     let pairs = training_pairs(&config.data, config.training.seed, &data, &terminal)?;
     for line in data_summary(&pairs) {
-        println!("{line}");
+        say!("{line}")?;
     }
     if arguments.check {
         return Ok(());
@@ -75,8 +76,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     run.keep_configuration(&arguments.config)?;
     let networks = learn(&run, engine.as_mut(), &terminal)?;
     let scores = run.finish(networks)?;
-    println!("{}: weights and card.md", arguments.out.display());
-    print!("{scores}");
+    say!("{}: weights and card.md", arguments.out.display())?;
+    print(format_args!("{scores}"))?;
     Ok(())
 }
 
@@ -95,10 +96,10 @@ fn learn(
                 best_step,
                 best_loss,
             } => {
-                println!(
+                say!(
                     "{}: {steps} steps, best validation loss {best_loss:.5} after step {best_step}",
                     quantity.name()
-                );
+                )?;
                 networks.push(network);
             }
             Learnt::Interrupted { checkpoint } => bail!(

@@ -18,6 +18,7 @@ use nalgebra::{UnitQuaternion, Vector2, Vector3};
 use crate::body;
 use crate::convert::Format;
 use crate::motion_arguments::MotionArguments;
+use crate::output::say;
 
 /// Place in-place poses of a video in the world, by keypoints, depth maps and cameras
 #[derive(Args)]
@@ -130,13 +131,13 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         replace: arguments.force,
     };
     write_motion(&placed.motion, &model, &file, &arguments.out)?;
-    println!(
+    say!(
         "{}: {} of {} frames",
         arguments.out.display(),
         target.describe(),
         placed.motion.frames.len()
-    );
-    println!("  {}", placed.report);
+    )?;
+    say!("  {}", placed.report)?;
     Ok(())
 }
 

@@ -7,6 +7,7 @@ use cromosim_evaluation::{DataFolder, FidelityOptions, Protocol, evaluate_fideli
 
 use super::folders::{data_folder, refuse_existing};
 use crate::body;
+use crate::output::{print, say};
 use crate::progress::Terminal;
 
 /// How far simulators are from measured IMUs, on people and positions that no network has seen
@@ -57,10 +58,10 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     };
     let report = evaluate_fidelity(&protocol, &options, &terminal)?.report()?;
     report.write(&arguments.out)?;
-    print!("{}", report.tables);
-    println!(
+    print(format_args!("{}", report.tables))?;
+    say!(
         "{}: report.html, tables.md, results.json, pictures",
         arguments.out.display()
-    );
+    )?;
     Ok(())
 }

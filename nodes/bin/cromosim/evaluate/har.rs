@@ -9,6 +9,7 @@ use cromosim_learned::LearnedSimulator;
 
 use super::folders::{data_folder, refuse_existing};
 use crate::body;
+use crate::output::{print, say};
 use crate::progress::Terminal;
 
 /// Files that are written beside the report.
@@ -85,12 +86,12 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let mut report = results.report()?;
     report.texts.push(("elapsed.json", elapsed.json()?));
     report.write(&arguments.out)?;
-    print!("{}", report.tables);
-    println!(
+    print(format_args!("{}", report.tables))?;
+    say!(
         "{}: report.html, pictures, {}; {:.0} s",
         arguments.out.display(),
         FILES.join(", "),
         elapsed.seconds
-    );
+    )?;
     Ok(())
 }

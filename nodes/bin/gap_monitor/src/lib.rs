@@ -81,7 +81,7 @@ pub fn run(arguments: &[String]) -> anyhow::Result<()> {
     let name = node.name().to_string();
     let bell = Bell::new();
     node.shutdown().ring_at_request(&bell);
-    println!("ready");
+    cromosim_ros::say_ready();
     while !node.shutdown().is_requested() {
         listeners.drain(&node, &mut logic);
         if schedule.is_due() {

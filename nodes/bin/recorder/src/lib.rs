@@ -43,7 +43,7 @@ pub fn run(arguments: &[String]) -> anyhow::Result<()> {
     };
     node.ring_at_graph_change(&recording.bell);
     node.shutdown().ring_at_request(&recording.bell);
-    println!("ready");
+    cromosim_ros::say_ready();
     let outcome = recording.run(&mut logic, config.flush_seconds);
     // Whatever happened: what is in the bag stays, and is closed where that is possible.
     let finished = logic.finish();

@@ -59,7 +59,7 @@ pub fn run(arguments: &[String]) -> anyhow::Result<()> {
             config.ready_subscriptions
         );
     }
-    println!("ready");
+    cromosim_ros::say_ready();
     let bell = Bell::new();
     node.shutdown().ring_at_request(&bell);
     // A moment of lead, so that the first message is not late already.

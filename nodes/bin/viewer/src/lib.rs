@@ -159,7 +159,7 @@ pub fn run(arguments: &[String]) -> anyhow::Result<()> {
     let mut logic = ViewerNode::new(config, model, recording)?;
     let (node, _) = prepared.start()?;
     let mut listeners = Listeners::new(&node)?;
-    println!("ready");
+    cromosim_ros::say_ready();
     let outcome = listen(&node, &mut listeners, &mut logic);
     let finished = logic.finish();
     outcome?;

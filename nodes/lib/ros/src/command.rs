@@ -1,5 +1,6 @@
 //! What every node's program does before it runs: help, parameters, checks.
 
+use std::io::{ErrorKind, Write, stdout};
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
@@ -76,7 +77,7 @@ pub fn prepare<C: NodeConfig, E: From<RosError>>(
     let args = RosArgs::parse(arguments.iter().cloned())?;
     let has = |flag: &str| args.rest.iter().any(|argument| argument == flag);
     if has("--help") || has("-h") {
-        println!("{}", help::<C>(name, about));
+        print_line(&help::<C>(name, about))?;
         return Ok(None);
     }
     let check_only = has("--check-config");
@@ -104,10 +105,27 @@ pub fn prepare<C: NodeConfig, E: From<RosError>>(
     let config: C = parameters.config()?;
     check(&config)?;
     if check_only {
-        println!("{}: the configuration is valid", options.name);
+        print_line(&format!("{}: the configuration is valid", options.name))?;
         return Ok(None);
     }
     Ok(Some(Prepared { config, options }))
+}
+
+/// A line on standard output. That nobody reads it (`--help | head -1`) is no fault.
+fn print_line(line: &str) -> RosResult<()> {
+    match writeln!(stdout(), "{line}") {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(RosError::Argument {
+            place: "standard output".to_owned(),
+            problem: format!("cannot be written: {error}"),
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// Prints the line `ready` on standard output, for whoever started the process; a node runs on where
+/// nobody is there to read it.
+pub fn say_ready() {
+    let _ = writeln!(stdout(), "ready");
 }
 
 /// `r#loop` -> `loop`.
@@ -152,7 +170,7 @@ pub fn announce_ready(node: &Node, publishers: &[&RawPublisher], subscriptions: 
         };
         while !watched.shutdown().is_requested() {
             if connected() || watched.wait_for_graph(Duration::from_secs(3600), connected) {
-                println!("ready");
+                say_ready();
                 return;
             }
         }

@@ -1,6 +1,7 @@
 //! Log lines on the screen as ROS 2 writes them, and on `/rosout`.
 
 use std::collections::BTreeMap;
+use std::io::Write;
 use std::sync::{Arc, Mutex, OnceLock, Weak};
 
 use log::{Level, LevelFilter, Log, Metadata, Record};
@@ -112,7 +113,9 @@ impl Log for Logger {
             .map_or_else(|| record.target().to_owned(), |rosout| rosout.node.clone());
         let now = system_now().nanos;
         let level = record.level();
-        eprintln!(
+        // A node works on where nobody reads its log.
+        let _ = writeln!(
+            std::io::stderr().lock(),
             "[{level}] [{}.{:09}] [{name}]: {}",
             now / 1_000_000_000,
             now % 1_000_000_000,
