@@ -19,6 +19,7 @@ pub mod cromosim_msgs;
 mod definition;
 pub mod diagnostic_msgs;
 pub mod geometry_msgs;
+mod printable;
 pub mod rosbag2_interfaces;
 pub mod rosgraph_msgs;
 pub mod sensor_msgs;
@@ -31,6 +32,7 @@ pub use definition::{
     Arity, Element, Field, FieldType, MessageType, Part, RosElement, RosField, RosMessage,
     RosService,
 };
+pub use printable::printable;
 
 /// Every message type of this crate, the halves of services included, by name: for recorders that
 /// meet a type at run time.

@@ -6,4 +6,6 @@ mod chain;
 #[path = "../common/mod.rs"]
 mod common;
 mod demo;
+mod faults;
+mod launch;
 mod process;

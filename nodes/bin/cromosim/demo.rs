@@ -2,14 +2,15 @@
 //! machine.
 
 use std::fs::{self, File};
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Write};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, ChildStderr, Command, Stdio};
 use std::sync::mpsc::{self, Receiver};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use cromosim_body::ShapedBody;
 use cromosim_imu::{Device, MountedSensors, PlacementSet};
@@ -56,12 +57,15 @@ pub struct Arguments {
     no_viewer: bool,
 }
 
-/// A node in its own process; ended, at the latest, when this is dropped.
+/// A node in its own process; ended, at the latest, when this is dropped, or when this process ends:
+/// the node's standard input ends with it.
 struct NodeProcess {
     name: &'static str,
     child: Child,
     log: PathBuf,
     ready: Receiver<()>,
+    /// Reads to the end what the node says, and gives its last line.
+    said: Option<JoinHandle<String>>,
 }
 
 impl NodeProcess {
@@ -75,16 +79,16 @@ impl NodeProcess {
             File::create(&log).with_context(|| format!("{}: cannot be written", log.display()))?;
         let mut command =
             Command::new(std::env::current_exe().context("the path of this program is unknown")?);
-        command.args(["node", name, "--ros-args"]);
+        command.args(["node", name, "--end-with-stdin", "--ros-args"]);
         for (key, value) in parameters {
             command.arg("-p").arg(format!("{key}:={value}"));
         }
         // A group of its own: Ctrl-C reaches the demo alone, which ends the nodes in their order.
         command.process_group(0);
         let mut child = command
-            .stdin(Stdio::null())
+            .stdin(Stdio::piped())
             .stdout(Stdio::piped())
-            .stderr(file)
+            .stderr(Stdio::piped())
             .spawn()
             .with_context(|| format!("{name} cannot be started"))?;
         let (sender, ready) = mpsc::channel();
@@ -98,11 +102,13 @@ impl NodeProcess {
                 }
             });
         }
+        let said = child.stderr.take().map(|stderr| keep_log(stderr, file));
         Ok(Self {
             name,
             child,
             log,
             ready,
+            said,
         })
     }
 
@@ -113,35 +119,38 @@ impl NodeProcess {
             match self.ready.recv_timeout(Duration::from_millis(50)) {
                 Ok(()) => return Ok(()),
                 Err(mpsc::RecvTimeoutError::Timeout) if Instant::now() < until => {}
-                Err(_) => bail!(
-                    "{} is not ready after {PATIENCE:?}: {}",
-                    self.name,
-                    self.last_words()
-                ),
+                Err(_) => return Err(self.failed(&format!("is not ready after {PATIENCE:?}"))),
             }
-            if self.child.try_wait()?.is_some() {
-                bail!("{} ended early: {}", self.name, self.last_words());
-            }
+            self.check_running()?;
             if stop.is_set() {
                 bail!("interrupted before the motion began");
             }
         }
     }
 
-    /// The last line of the node's log.
-    fn last_words(&self) -> String {
-        let text = fs::read_to_string(&self.log).unwrap_or_default();
-        let last = text
-            .lines()
-            .rev()
-            .find(|line| !line.trim().is_empty())
-            .unwrap_or("it said nothing")
-            .to_owned();
-        format!("{last} (log: {})", self.log.display())
+    /// What went wrong, with what the node said last; it is killed where it still runs.
+    fn failed(&mut self, how: &str) -> anyhow::Error {
+        let _ = self.child.kill();
+        let last = self.said.take().and_then(|said| said.join().ok());
+        let last = last.filter(|line| !line.is_empty());
+        let last = last.unwrap_or_else(|| "it said nothing".to_owned());
+        anyhow!("{} {how}: {last} (log: {})", self.name, self.log.display())
+    }
+
+    /// An error where the node has ended.
+    fn check_running(&mut self) -> anyhow::Result<()> {
+        if self.child.try_wait()?.is_some() {
+            return Err(self.failed("ended early"));
+        }
+        Ok(())
     }
 
     /// SIGINT, as a user's Ctrl-C: the node closes its files.
-    fn interrupt(&self) {
+    fn interrupt(&mut self) {
+        if !matches!(self.child.try_wait(), Ok(None)) {
+            // Its number may be another process's by now.
+            return;
+        }
         let pid = self.child.id().to_string();
         let _ = Command::new("kill").args(["-INT", &pid]).status();
     }
@@ -153,25 +162,33 @@ impl NodeProcess {
                 return if status.success() {
                     Ok(())
                 } else {
-                    bail!("{} failed: {}", self.name, self.last_words())
+                    Err(self.failed("failed"))
                 };
             }
             std::thread::sleep(Duration::from_millis(10));
         }
-        bail!(
-            "{} did not end within {PATIENCE:?} and was killed: {}",
-            self.name,
-            self.last_words()
-        )
+        Err(self.failed(&format!("did not end within {PATIENCE:?} and was killed")))
     }
+}
+
+/// Writes a node's lines to its log, as far as the disk takes them, and gives the last one.
+fn keep_log(stderr: ChildStderr, mut file: File) -> JoinHandle<String> {
+    std::thread::spawn(move || {
+        let mut last = String::new();
+        for line in BufReader::new(stderr).split(b'\n').map_while(Result::ok) {
+            let line = String::from_utf8_lossy(&line);
+            let _ = writeln!(file, "{line}");
+            if !line.trim().is_empty() {
+                last = line.into_owned();
+            }
+        }
+        last
+    })
 }
 
 impl Drop for NodeProcess {
     /// The demo failed: the node may still close its files, and is killed where it does not.
     fn drop(&mut self) {
-        if !matches!(self.child.try_wait(), Ok(None)) {
-            return;
-        }
         self.interrupt();
         let until = Instant::now() + LAST_MOMENT;
         while Instant::now() < until && matches!(self.child.try_wait(), Ok(None)) {
@@ -241,22 +258,30 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         node.wait_ready(&stop)?;
     }
     let mut replay = NodeProcess::start("replay", &arguments.replay_parameters(), &places.logs)?;
-    let outcome = play(&mut replay, duration, &stop);
-    std::thread::sleep(DRAIN);
     // Upstream first: whoever records closes last.
     nodes.reverse();
+    if let Err(error) = play(&mut replay, &mut nodes, duration, &stop) {
+        // All together: nobody need hear the others out any more.
+        nodes.iter_mut().for_each(NodeProcess::interrupt);
+        return Err(error);
+    }
+    std::thread::sleep(DRAIN);
     for node in &mut nodes {
         node.interrupt();
         node.finish()?;
     }
-    outcome?;
     summary::print(
         &places.bag,
         (!arguments.no_viewer).then_some(&*places.recording),
     )
 }
 
-fn play(replay: &mut NodeProcess, duration: f64, stop: &Interrupt) -> anyhow::Result<()> {
+fn play(
+    replay: &mut NodeProcess,
+    nodes: &mut [NodeProcess],
+    duration: f64,
+    stop: &Interrupt,
+) -> anyhow::Result<()> {
     replay.wait_ready(stop)?;
     let bar = progress::bar((duration * 10.0).ceil() as u64, "playing, 0.1 s");
     let begun = Instant::now();
@@ -265,6 +290,7 @@ fn play(replay: &mut NodeProcess, duration: f64, stop: &Interrupt) -> anyhow::Re
             replay.interrupt();
             break;
         }
+        nodes.iter_mut().try_for_each(NodeProcess::check_running)?;
         bar.set_position((begun.elapsed().as_secs_f64() * 10.0) as u64);
         std::thread::sleep(Duration::from_millis(20));
     }

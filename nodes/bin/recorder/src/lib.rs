@@ -10,6 +10,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use cromosim_ros::{Bell, Clock, Endpoint, Node, Periodic, RawSubscription, prepare};
+use cromosim_spatial::Stamp;
 
 pub use config::Config;
 pub use node::{PLACEMENTS_ATTACHMENT, RecorderNode};
@@ -35,6 +36,9 @@ pub fn run(arguments: &[String]) -> anyhow::Result<()> {
     let (node, _) = prepared.start()?;
     logic.resolve_names(|name| node.resolve(name))?;
     log::info!("records into {}", path.display());
+    if node.clock().is_simulated() {
+        log::info!("use_sim_time: waits for /clock, and takes the time from it");
+    }
     let mut recording = Recording {
         bell: Bell::new(),
         subscriptions: BTreeMap::new(),
@@ -142,9 +146,19 @@ impl Recording<'_> {
         Ok(())
     }
 
+    /// Writes what has come. While a simulated clock has not said anything, it stays in the queues.
     fn drain(&self, logic: &mut RecorderNode) -> anyhow::Result<()> {
+        let clock = self.node.clock();
+        if clock.is_simulated() && clock.now() <= Stamp::default() {
+            return Ok(());
+        }
         for (topic, subscription) in &self.subscriptions {
-            while let Some(received) = subscription.try_recv()? {
+            while let Some(mut received) = subscription.try_recv()? {
+                if clock.is_simulated() {
+                    received.received_stamp = clock.now();
+                    // The sender's is the system's time.
+                    received.source_stamp = None;
+                }
                 logic.record(topic, &received)?;
             }
         }

@@ -22,8 +22,8 @@ node_config! {
         pub start_seconds: f64 = 0.0,
         /// Play so many seconds; 0: to the end.
         pub duration_seconds: f64 = 0.0,
-        /// Publish /clock so often, Hz, and stamp messages with the recording's time; 0: no /clock,
-        /// and stamps are those of now.
+        /// Publish /clock so often, Hz, and stamp messages with the recording's time; a bag's own
+        /// /clock is left out then. 0: no /clock, and stamps are those of now.
         pub clock_rate_hz: f64 = 0.0,
         /// Wait for `~/resume` before the first message.
         pub start_paused: bool = false,
@@ -62,8 +62,9 @@ node_config! {
         pub body_id: String = "0".to_owned(),
         /// Frame of the root pose.
         pub frame_id: String = "world".to_owned(),
-        /// The node is ready, and begins, when `smpl/pose` has so many subscriptions.
-        pub ready_subscriptions: i64 = 0,
+        /// The node is ready, and begins, when every topic has so many subscriptions; -1: when
+        /// somebody listens to any, and nobody new has come for half a second; 0: at once.
+        pub ready_subscriptions: i64 = -1,
         /// Begin after so many seconds even where subscriptions are missing.
         pub ready_timeout_seconds: f64 = 10.0,
     }

@@ -44,21 +44,13 @@ pub fn run(arguments: &[String]) -> anyhow::Result<()> {
     for line in source.describe().lines() {
         log::info!("{line}");
     }
-    let outlet = Outlet::new(&node, &source)?;
+    let outlet = Outlet::new(&node, &source, config.clock_rate_hz > 0.0)?;
     let clock = if config.clock_rate_hz > 0.0 {
         Some(node.clock_publisher()?)
     } else {
         None
     };
-    let connected = |count| {
-        outlet.wait_for_subscriptions(count, Duration::from_secs_f64(config.ready_timeout_seconds))
-    };
-    if !connected(usize::try_from(config.ready_subscriptions).unwrap_or(0)) {
-        log::warn!(
-            "begins without the {} subscriptions it waited for",
-            config.ready_subscriptions
-        );
-    }
+    wait_for_listeners(&node, &config, &outlet);
     cromosim_ros::say_ready();
     let bell = Bell::new();
     node.shutdown().ring_at_request(&bell);
@@ -85,6 +77,27 @@ pub fn run(arguments: &[String]) -> anyhow::Result<()> {
     ended
 }
 
+/// So that nobody misses the beginning.
+fn wait_for_listeners(node: &Node, config: &Config, outlet: &Outlet) {
+    let seconds = config.ready_timeout_seconds;
+    let timeout = Duration::from_secs_f64(seconds);
+    match usize::try_from(config.ready_subscriptions) {
+        Ok(0) => {}
+        Ok(count) => {
+            if !outlet.wait_for_subscriptions(count, timeout) {
+                log::warn!("begins without the {count} subscriptions it waited for");
+            }
+        }
+        Err(_) => {
+            log::info!("waits for whoever listens, at most {seconds} s (ready_timeout_seconds)");
+            match outlet.wait_for_listeners(node, timeout) {
+                (0, _) => log::warn!("begins although nobody listens"),
+                (heard, all) => log::info!("begins; {heard} of {all} topics are listened to"),
+            }
+        }
+    }
+}
+
 fn check(config: &Config) -> anyhow::Result<()> {
     anyhow::ensure!(
         config.rate.is_finite() && config.rate > 0.0,
@@ -104,6 +117,11 @@ fn check(config: &Config) -> anyhow::Result<()> {
             "parameter '{name}': expected 0 or more, found {value}"
         );
     }
+    let subscriptions = config.ready_subscriptions;
+    anyhow::ensure!(
+        subscriptions >= -1,
+        "parameter 'ready_subscriptions': expected -1 or more, found {subscriptions}"
+    );
     let patience = config.ready_timeout_seconds;
     anyhow::ensure!(
         patience <= 86_400.0,

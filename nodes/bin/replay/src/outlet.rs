@@ -1,7 +1,7 @@
 //! Where what is played goes.
 
 use std::collections::BTreeMap;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use cromosim_bag::{QosProfile, Topic};
 use cromosim_msgs::cromosim_msgs::SmplPose;
@@ -11,6 +11,10 @@ use cromosim_ros::{
 
 use crate::source::{Item, Source};
 
+/// Time for whoever listens to one topic to find the others; also for peers, which match a little
+/// later than this side.
+const QUIET: Duration = Duration::from_millis(500);
+
 /// The publishers of a run.
 pub struct Outlet {
     /// One a person.
@@ -19,11 +23,12 @@ pub struct Outlet {
 }
 
 impl Outlet {
-    /// Publishers for everything that the source holds.
+    /// Publishers for everything that the source holds, but for `/clock` where `own_clock` says that
+    /// there is another.
     ///
     /// # Errors
     /// What DDS refuses.
-    pub fn new(node: &Node, source: &Source) -> Result<Self, RosError> {
+    pub fn new(node: &Node, source: &Source, own_clock: bool) -> Result<Self, RosError> {
         match source {
             Source::Motion(motion) => {
                 let poses = motion
@@ -46,6 +51,10 @@ impl Outlet {
                         .as_ref()
                         .is_some_and(|wanted| !wanted.contains(&topic.name))
                     {
+                        continue;
+                    }
+                    if own_clock && topic.name == "/clock" {
+                        log::info!("leaves the bag's /clock out: clock_rate_hz publishes one");
                         continue;
                     }
                     topics.insert(
@@ -74,6 +83,26 @@ impl Outlet {
             || self
                 .publishers()
                 .all(|publisher| publisher.wait_for_subscriptions(count, timeout))
+    }
+
+    /// Waits until somebody listens, and nobody new has come for a while; at most `timeout`. Counts
+    /// the topics that are listened to, and all.
+    pub fn wait_for_listeners(&self, node: &Node, timeout: Duration) -> (usize, usize) {
+        let until = Instant::now() + timeout;
+        let counts = || self.publishers().map(RawPublisher::subscription_count);
+        let mut known = 0;
+        loop {
+            let left = until.saturating_duration_since(Instant::now());
+            let patience = if known == 0 { left } else { left.min(QUIET) };
+            if !node.wait_for_graph(patience, || counts().sum::<usize>() != known) {
+                break;
+            }
+            known = counts().sum();
+        }
+        (
+            counts().filter(|&count| count > 0).count(),
+            counts().count(),
+        )
     }
 
     /// Waits until what was published has been received, as far as subscriptions are reliable.

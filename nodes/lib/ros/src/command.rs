@@ -49,15 +49,20 @@ pub struct Prepared<C> {
     /// The configuration.
     pub config: C,
     options: NodeOptions,
+    ends_with_stdin: bool,
 }
 
 impl<C> Prepared<C> {
-    /// Starts the node; SIGINT and SIGTERM end it.
+    /// Starts the node; SIGINT and SIGTERM end it, and `--end-with-stdin` where that is given.
     ///
     /// # Errors
     /// As [`Node::start`].
     pub fn start(self) -> RosResult<(Node, C)> {
-        let options = self.options.shutdown(&Shutdown::on_signals()?);
+        let shutdown = Shutdown::on_signals()?;
+        if self.ends_with_stdin {
+            shutdown.request_at_end_of_input()?;
+        }
+        let options = self.options.shutdown(&shutdown);
         Ok((Node::start(options)?, self.config))
     }
 }
@@ -80,12 +85,8 @@ pub fn prepare<C: NodeConfig, E: From<RosError>>(
         print_line(&help::<C>(name, about))?;
         return Ok(None);
     }
-    let check_only = has("--check-config");
-    if let Some(unknown) = args
-        .rest
-        .iter()
-        .find(|argument| *argument != "--check-config")
-    {
+    let known = |argument: &str| matches!(argument, "--check-config" | "--end-with-stdin");
+    if let Some(unknown) = args.rest.iter().find(|argument| !known(argument)) {
         let problem =
             "not known here; parameters go after --ros-args as -p NAME:=VALUE (see --help)"
                 .to_owned();
@@ -104,11 +105,15 @@ pub fn prepare<C: NodeConfig, E: From<RosError>>(
     let options = NodeOptions::new(name, &args, &parameters)?;
     let config: C = parameters.config()?;
     check(&config)?;
-    if check_only {
+    if has("--check-config") {
         print_line(&format!("{}: the configuration is valid", options.name))?;
         return Ok(None);
     }
-    Ok(Some(Prepared { config, options }))
+    Ok(Some(Prepared {
+        config,
+        options,
+        ends_with_stdin: has("--end-with-stdin"),
+    }))
 }
 
 /// A line on standard output. That nobody reads it (`--help | head -1`) is no fault.
@@ -143,7 +148,7 @@ fn help<C: NodeConfig>(name: &str, about: &str) -> String {
         value.split_whitespace().collect::<Vec<_>>().join(" ")
     };
     let mut text = format!(
-        "{about}\n\nUsage: cromosim node {name} [--check-config] [--ros-args [-p NAME:=VALUE]... [--params-file FILE]... [-r FROM:=TO]... \
+        "{about}\n\nUsage: cromosim node {name} [--check-config] [--end-with-stdin] [--ros-args [-p NAME:=VALUE]... [--params-file FILE]... [-r FROM:=TO]... \
          [--log-level LEVEL]]\n\nParameters [default]:\n"
     );
     for (field, about) in C::ABOUT {
@@ -151,6 +156,8 @@ fn help<C: NodeConfig>(name: &str, about: &str) -> String {
         text += &format!("  {field} [{}]\n      {}\n", shown(field), about.trim());
     }
     text += "  use_sim_time [false]\n      Take the time from /clock.\n  qos_overrides./TOPIC.publisher.depth (or .subscription; depth, reliability, durability, history)\n      Quality of service of a topic.\n\n";
+    text +=
+        "--end-with-stdin: end when standard input does, as when the process that holds it dies\n";
     text += "Remaps: -r from:=to for topics, -r __node:=NAME, -r __ns:=/NAMESPACE\n";
     text += "Environment: ROS_DOMAIN_ID; ROS_AUTOMATIC_DISCOVERY_RANGE (OFF, LOCALHOST, SUBNET, SYSTEM_DEFAULT; here LOCALHOST unless set); ROS_LOCALHOST_ONLY; ROS_SECURITY_ENABLE, ROS_SECURITY_STRATEGY, ROS_SECURITY_KEYSTORE, ROS_SECURITY_ENCLAVE_OVERRIDE";
     text

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::sync::{Arc, Mutex, OnceLock, Weak};
 
+use cromosim_msgs::printable;
 use log::{Level, LevelFilter, Log, Metadata, Record};
 use ros2_client::{Log as LogMessage, ROSTime};
 
@@ -113,13 +114,13 @@ impl Log for Logger {
             .map_or_else(|| record.target().to_owned(), |rosout| rosout.node.clone());
         let now = system_now().nanos;
         let level = record.level();
-        // A node works on where nobody reads its log.
+        // A node works on where nobody reads its log. Names in a line may be other nodes'.
         let _ = writeln!(
             std::io::stderr().lock(),
             "[{level}] [{}.{:09}] [{name}]: {}",
             now / 1_000_000_000,
             now % 1_000_000_000,
-            record.args()
+            printable(&record.args().to_string())
         );
         // What DDS says about sending must not be sent by DDS.
         let of_dds = ["rustdds", "ros2_client"]

@@ -2,12 +2,16 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, Weak};
+use std::time::Duration;
 
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
 use crate::error::{RosError, RosResult};
 use crate::wake::{Bell, lock};
+
+/// After the first signal. As long as launch waits before it sends SIGTERM.
+const REPEATS_IGNORED: Duration = Duration::from_secs(5);
 
 /// A request to end, seen by every loop that sleeps on a [`Bell`] of this crate.
 ///
@@ -29,8 +33,9 @@ impl Shutdown {
         Self::default()
     }
 
-    /// The process's own request, made by the first SIGINT or SIGTERM; a second signal ends the
-    /// process at once.
+    /// The process's own request, made by the first SIGINT or SIGTERM. Further ones end the process
+    /// at once, but within five seconds they are ignored: a terminal and a launcher both send
+    /// theirs, and files have to be closed.
     ///
     /// # Errors
     /// Where the system refuses signal handlers.
@@ -42,6 +47,28 @@ impl Shutdown {
             .map_err(|problem| RosError::Argument {
                 place: "signal handlers".into(),
                 problem,
+            })
+    }
+
+    /// The request is made when standard input ends: with the process that holds its other end,
+    /// however that one ends.
+    ///
+    /// # Errors
+    /// Where the system refuses a thread.
+    pub(crate) fn request_at_end_of_input(&self) -> RosResult<()> {
+        let requester = self.clone();
+        let watch = move || {
+            let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
+            log::info!("standard input has ended: ending");
+            requester.request();
+        };
+        let thread = std::thread::Builder::new().name("stdin".into());
+        thread
+            .spawn(watch)
+            .map(drop)
+            .map_err(|error| RosError::Argument {
+                place: "--end-with-stdin".into(),
+                problem: error.to_string(),
             })
     }
 
@@ -81,12 +108,9 @@ impl Shutdown {
 
 fn install() -> std::io::Result<Shutdown> {
     let shutdown = Shutdown::new();
-    let second_ends = Arc::new(AtomicBool::new(false));
+    let next_ends = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM] {
-        // In this order: the first signal finds the flag unset and sets it, the second finds it
-        // set.
-        signal_hook::flag::register_conditional_default(signal, Arc::clone(&second_ends))?;
-        signal_hook::flag::register(signal, Arc::clone(&second_ends))?;
+        signal_hook::flag::register_conditional_default(signal, Arc::clone(&next_ends))?;
     }
     let mut signals = Signals::new([SIGINT, SIGTERM])?;
     let requester = shutdown.clone();
@@ -103,6 +127,8 @@ fn install() -> std::io::Result<Shutdown> {
                     }
                 );
                 requester.request();
+                std::thread::sleep(REPEATS_IGNORED);
+                next_ends.store(true, Ordering::SeqCst);
             }
         })?;
     Ok(shutdown)
