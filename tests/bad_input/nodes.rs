@@ -123,7 +123,8 @@ fn security_that_cannot_be_had() {
     let recorder = ["node", "recorder"];
     let check = ["node", "recorder", "--check-config"];
     let nowhere = ("ROS_SECURITY_KEYSTORE", "nowhere");
-    let cases: [(&[(&str, &str)], &[&str], &str); 5] = [
+    type Case<'a> = (&'a [(&'a str, &'a str)], &'a [&'a str], &'a str);
+    let cases: [Case<'_>; 5] = [
         (&[on, enforce], &recorder, "Enforce: "),
         (&[on, enforce, nowhere], &check, "Enforce: "),
         (&[on, enforce], &["demo", "--no-viewer"], "Enforce: "),
