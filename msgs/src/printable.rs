@@ -12,7 +12,8 @@ fn steers(character: char) -> bool {
         '\u{2066}'..='\u{2069}',
         '\u{feff}'..='\u{feff}',
     ];
-    character.is_control() || ORDER.iter().any(|range| range.contains(&character))
+    character.is_control() && character != '\t'
+        || ORDER.iter().any(|range| range.contains(&character))
 }
 
 /// The text as a terminal may show it, on one line: a name from a file or another node could else
@@ -44,7 +45,7 @@ mod tests {
             printable(hostile),
             r"/imu\u{1b}[2J\u{1b}]0;title\u{7}\r\nx\u{9b}31m\u{7f}\u{202e}\u{2066}"
         );
-        let (every, all) = ('\0'..=char::MAX, "Zoë Ω 人 \\u{1b}");
+        let (every, all) = ('\0'..=char::MAX, "Zoë Ω\t人 \\u{1b}");
         let every: String = every.collect();
         assert!(!printable(&every).chars().any(steers));
         assert!(matches!(printable(all), Cow::Borrowed(text) if text == all));

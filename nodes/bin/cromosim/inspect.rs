@@ -8,6 +8,7 @@ use clap::Args;
 use cromosim_bag::BagReader;
 use cromosim_body::Joint;
 use cromosim_motion::{PoseAxes, SmplMotion};
+use cromosim_msgs::printable;
 use cromosim_recording::datasets::{DatasetFormat, DatasetRecording};
 use cromosim_recording::inspect::{
     BodyInspection, Inspection, PersonInspection, PosesInspection, RigidExtent, RigidInspection,
@@ -137,37 +138,40 @@ fn print_bag(path: &Path, reader: &BagReader) -> anyhow::Result<()> {
         summary.message_count(),
         summary.duration()
     )?;
-    let names = summary.topics.iter().map(|counted| &counted.topic.name);
-    let width = names.map(String::len).max().unwrap_or(0);
+    let names = summary.topics.iter();
+    let widths = names.map(|counted| printable(&counted.topic.name).chars().count());
+    let width = widths.max().unwrap_or(0);
     for counted in &summary.topics {
         let (name, rate) = (&counted.topic.name, summary.rate(&counted.topic.name));
+        let (name, type_name) = (printable(name), printable(&counted.topic.type_name));
         let rate = rate.map_or_else(String::new, |rate| format!("{rate:9.2} Hz"));
         say!(
             "  {name:width$}  {:8} {rate:12}  {}",
             counted.message_count,
-            counted.topic.type_name
+            type_name
         )?;
     }
     for attachment in reader.attachments() {
         say!(
             "  attachment {} ({} bytes)",
-            attachment.name,
+            printable(&attachment.name),
             attachment.content.len()
         )?;
     }
     for (name, values) in reader.metadata_records() {
         say!(
-            "  metadata {name}: {}",
+            "  metadata {}: {}",
+            printable(name),
             values
                 .keys()
                 .filter(|key| !key.contains('.'))
-                .cloned()
+                .map(|key| printable(key))
                 .collect::<Vec<_>>()
                 .join(", ")
         )?;
         // Of single placements.
         for (key, value) in values.iter().filter(|(key, _)| key.contains('.')) {
-            say!("    {key}: {value}")?;
+            say!("    {}: {}", printable(key), printable(value))?;
         }
     }
     Ok(())
@@ -247,7 +251,7 @@ fn person_line(person: &PersonInspection) -> String {
     };
     format!(
         "person {}: {} frames{}, {rate}, gender {}, {up}{trajectory}, {} betas of {}{betas}",
-        person.person,
+        printable(&person.person),
         person.frames,
         ids.unwrap_or_default(),
         person.gender.map_or("not stated", |gender| gender.name()),

@@ -5,6 +5,7 @@ use std::fmt;
 use std::io::{self, ErrorKind, Write};
 
 use anyhow::Context;
+use cromosim_msgs::printable;
 
 /// Whoever read standard output has gone away (`cromosim inspect walk.mcap | head -1`): nothing is
 /// wrong, and nobody is left to be told.
@@ -55,14 +56,21 @@ impl Write for Output {
     }
 }
 
-/// Prints, at once.
+/// Text as a terminal may show it, line by line: names in it may come from files and other nodes.
+pub fn safe(text: fmt::Arguments<'_>) -> String {
+    let text = text.to_string();
+    let lines: Vec<_> = text.split('\n').map(printable).collect();
+    lines.join("\n")
+}
+
+/// Prints, at once, what a terminal may show.
 ///
 /// # Errors
 /// One line that names standard output; [`nobody_reads`] knows a closed pipe.
 pub fn print(text: fmt::Arguments<'_>) -> anyhow::Result<()> {
     let mut output = output();
     output
-        .write_fmt(text)
+        .write_all(safe(text).as_bytes())
         .and_then(|()| output.flush())
         .context("standard output: cannot be written")
 }
@@ -78,10 +86,8 @@ pub(crate) use say;
 /// A line on standard error, beside what a command is for: where it cannot be written, work goes on.
 macro_rules! remark {
     ($($text:tt)*) => {{
-        let _ = std::io::Write::write_fmt(
-            &mut std::io::stderr().lock(),
-            format_args!("{}\n", format_args!($($text)*)),
-        );
+        let text = $crate::output::safe(format_args!("{}\n", format_args!($($text)*)));
+        let _ = std::io::Write::write_all(&mut std::io::stderr().lock(), text.as_bytes());
     }};
 }
 pub(crate) use remark;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use cromosim_bag::{BagReader, Selection};
 use cromosim_msgs::sensor_msgs::Imu;
-use cromosim_msgs::{RosMessage, cromosim_msgs::SmplState};
+use cromosim_msgs::{RosMessage, cromosim_msgs::SmplState, printable};
 use cromosim_spatial::Stamp;
 
 use crate::output::say;
@@ -116,7 +116,7 @@ pub fn print(bag: &Path, recording: Option<&Path>) -> anyhow::Result<()> {
     topics.sort_by(|one, other| one.topic.name.cmp(&other.topic.name));
     let width = topics
         .iter()
-        .map(|counted| counted.topic.name.len())
+        .map(|counted| printable(&counted.topic.name).chars().count())
         .max()
         .unwrap_or(5)
         .max(5);
@@ -131,9 +131,9 @@ pub fn print(bag: &Path, recording: Option<&Path>) -> anyhow::Result<()> {
             .map_or_else(|| "-".to_owned(), |rate| format!("{rate:.2}"));
         say!(
             "{:width$}  {:8}  {rate:>9}  {}",
-            counted.topic.name,
+            printable(&counted.topic.name),
             counted.message_count,
-            counted.topic.type_name
+            printable(&counted.topic.type_name)
         )?;
     }
     say!(

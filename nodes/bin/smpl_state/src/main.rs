@@ -7,7 +7,7 @@ fn main() -> ExitCode {
     match cromosim_smpl_state::run(&arguments) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            cromosim_ros::say_error(format_args!("{error:#}"));
             ExitCode::from(2)
         }
     }

@@ -3,6 +3,7 @@
 use std::io::{ErrorKind, Write, stdout};
 use std::time::{Duration, Instant};
 
+use cromosim_msgs::printable;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -185,6 +186,15 @@ pub fn announce_ready(node: &Node, publishers: &[&RawPublisher], subscriptions: 
     if let Err(error) = std::thread::Builder::new().name("ready".into()).spawn(wait) {
         log::error!("cannot watch the connections: {error}");
     }
+}
+
+/// What a node's program says of its end before it exits with code 2; names in it are made printable.
+pub fn say_error(error: impl std::fmt::Display) {
+    let _ = writeln!(
+        std::io::stderr(),
+        "error: {}",
+        printable(&error.to_string())
+    );
 }
 
 /// What is done again and again at a rate, in a loop that waits for messages.

@@ -70,7 +70,7 @@ mod wake;
 
 pub use args::RosArgs;
 pub use clock::Clock;
-pub use command::{NodeConfig, Periodic, Prepared, announce_ready, prepare, say_ready};
+pub use command::{NodeConfig, Periodic, Prepared, announce_ready, prepare, say_error, say_ready};
 pub use discovery::{DiscoveryRange, Network};
 pub use error::{RosError, RosResult};
 pub use graph::{Endpoint, TopicInfo};

@@ -99,6 +99,13 @@ pub fn init_logging(levels: &LogLevels) {
     }
 }
 
+/// As ROS 2 writes it. Names in the text may be other nodes'.
+fn line(level: Level, now: i64, name: &str, text: &str) -> String {
+    let (seconds, nanos) = (now / 1_000_000_000, now % 1_000_000_000);
+    let text = printable(text);
+    format!("[{level}] [{seconds}.{nanos:09}] [{name}]: {text}")
+}
+
 impl Log for Logger {
     fn enabled(&self, metadata: &Metadata<'_>) -> bool {
         metadata.level() <= lock(&self.levels).for_target(metadata.target())
@@ -114,14 +121,9 @@ impl Log for Logger {
             .map_or_else(|| record.target().to_owned(), |rosout| rosout.node.clone());
         let now = system_now().nanos;
         let level = record.level();
-        // A node works on where nobody reads its log. Names in a line may be other nodes'.
-        let _ = writeln!(
-            std::io::stderr().lock(),
-            "[{level}] [{}.{:09}] [{name}]: {}",
-            now / 1_000_000_000,
-            now % 1_000_000_000,
-            printable(&record.args().to_string())
-        );
+        // A node works on where nobody reads its log.
+        let text = line(level, now, &name, &record.args().to_string());
+        let _ = writeln!(std::io::stderr().lock(), "{text}");
         // What DDS says about sending must not be sent by DDS.
         let of_dds = ["rustdds", "ros2_client"]
             .iter()
@@ -185,6 +187,15 @@ impl Rosout {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+
+    #[test]
+    fn names_in_a_line_cannot_steer_the_terminal() {
+        let hostile = "shows /imu\u{1b}[2J\n[ERROR] [0.0] [recorder]: stopped";
+        assert_eq!(
+            line(Level::Info, 1_500_000_000, "viewer", hostile),
+            r"[INFO] [1.500000000] [viewer]: shows /imu\u{1b}[2J\n[ERROR] [0.0] [recorder]: stopped"
+        );
+    }
 
     #[test]
     fn levels_are_for_all_or_for_a_target() {
