@@ -1,6 +1,8 @@
 //! Messages as bytes: the one type that crosses DDS here. Typed publishers and subscriptions encode
 //! and decode around it.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use byteorder::{BigEndian, LittleEndian};
 use rustdds::bytes::Bytes;
 use rustdds::no_key::{
@@ -150,6 +152,10 @@ pub(crate) fn stamp_from_dds(timestamp: Timestamp) -> Option<Stamp> {
     Some(Stamp::from_nanos(seconds * 1_000_000_000 + nanos))
 }
 
+/// RustDDS 0.15.1 cannot take apart an encrypted payload whose length is no multiple of four, so a
+/// process that encrypts fills its own up with zeros. Readers of CDR do not look behind the fields.
+pub(crate) static FILLED_UP: AtomicBool = AtomicBool::new(false);
+
 /// Passes bytes through DDS untouched.
 pub(crate) struct RawAdapter;
 
@@ -222,7 +228,11 @@ impl SerializerAdapter<RawMessage> for RawAdapter {
     }
 
     fn to_bytes(value: &RawMessage) -> Result<Bytes, Never> {
-        Ok(Bytes::copy_from_slice(&value.bytes[HEADER_LENGTH..]))
+        let mut bytes = value.bytes[HEADER_LENGTH..].to_vec();
+        if FILLED_UP.load(Ordering::Relaxed) {
+            bytes.resize(bytes.len().next_multiple_of(4), 0);
+        }
+        Ok(bytes.into())
     }
 }
 

@@ -2,11 +2,15 @@
 //! `--enclave`.
 
 use std::path::{Path, PathBuf};
+#[cfg(feature = "security")]
+use std::sync::atomic::Ordering;
 
 use rustdds::DomainParticipantBuilder;
 
 use crate::args::RosArgs;
 use crate::error::{RosError, RosResult};
+#[cfg(feature = "security")]
+use crate::raw::FILLED_UP;
 
 /// What `ros2 security create_enclave` puts into an enclave's folder.
 const FILES: [&str; 6] = [
@@ -81,6 +85,17 @@ impl Security {
     ) -> RosResult<DomainParticipantBuilder> {
         match self {
             Self::Clear => Ok(builder),
+            #[cfg(feature = "security")]
+            Self::Enclave(folder) => {
+                // Keys made by `ros2 security` have no password.
+                let password = String::new();
+                let files = rustdds::DomainParticipantSecurityConfigFiles::with_ros_default_names(
+                    folder, password,
+                );
+                FILLED_UP.store(true, Ordering::Relaxed);
+                Ok(builder.builtin_security(files))
+            }
+            #[cfg(not(feature = "security"))]
             Self::Enclave(folder) => Err(RosError::Security {
                 problem: format!("{}: {NOT_BUILT}", folder.display()),
             }),
