@@ -14,8 +14,8 @@ use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use cromosim_body::ShapedBody;
 use cromosim_imu::{Device, MountedSensors, PlacementSet};
-use cromosim_spatial::PoseSource;
 use cromosim_ros::{Network, RosArgs, Security};
+use cromosim_spatial::PoseSource;
 
 use crate::progress::Interrupt;
 use crate::{body, progress, summary};
