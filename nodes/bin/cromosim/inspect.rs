@@ -216,6 +216,7 @@ fn print_poses(path: &Path, poses: &PosesInspection) -> anyhow::Result<()> {
                 )?;
             }
             say!("  {}", extent(motion))?;
+            print_oddities(motion)?;
         }
         Err(error) => say!("  not played as it is: {error}")?,
     }
@@ -286,6 +287,13 @@ fn print_motion(path: &Path, motion: &SmplMotion) -> anyhow::Result<()> {
         }
     }
     say!("  {}", extent(motion))?;
+    print_oddities(motion)
+}
+
+fn print_oddities(motion: &SmplMotion) -> anyhow::Result<()> {
+    for oddity in motion.oddities() {
+        say!("  {oddity}")?;
+    }
     Ok(())
 }
 

@@ -21,7 +21,7 @@ use crate::output::say;
 use crate::progress::{self, Interrupt};
 use crate::simulate::read_mapping;
 use crate::simulate_arguments::Arguments;
-use crate::simulated_quality::{quality_entries, quality_line};
+use crate::simulated_quality::{quality_entries, quality_line, unlikely, warn};
 
 /// Runs `simulate --reference RECORDING`.
 pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
@@ -114,6 +114,7 @@ pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()>
         true,
         arguments,
     )?;
+    warn(trajectory, &recorded[0].notes);
     say!(
         "{}: {} messages of {name}, along {}{}",
         arguments.out.display(),
@@ -168,11 +169,15 @@ fn rigid_placement(trajectory: &Path, name: &str) -> anyhow::Result<RecordedPlac
             trajectory.display()
         );
     };
+    let oddities = poses.trajectory.oddities();
+    if let Some(impossible) = oddities.iter().find(|odd| odd.is_impossible()) {
+        bail!("{}: {impossible}", trajectory.display());
+    }
     Ok(RecordedPlacement {
         name: name.to_owned(),
         frames: poses.trajectory.frames(),
         measured: Vec::new(),
-        notes: Vec::new(),
+        notes: oddities.iter().map(ToString::to_string).collect(),
     })
 }
 
@@ -273,6 +278,9 @@ fn write(
         if simulated.quality.bandwidth.is_some() {
             metadata.extend(quality_entries(&placement.name, &simulated.quality));
         }
+    }
+    if with_references {
+        metadata.extend(unlikely(recorded.iter().flat_map(|one| one.notes.clone())));
     }
     let mut bag = BagWriter::create(&arguments.out, options)?;
     bag.write_metadata("cromosim", metadata)?;

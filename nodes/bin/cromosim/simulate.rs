@@ -11,7 +11,7 @@ use cromosim_body::{BodyModel, ShapedBody};
 use cromosim_imu::{
     Device, Differentiation, DrawnTexture, ImuOptions, KinematicSample, MountedSensor,
     MountedSensors, PlacementSet, PoseStd, SensorTrajectory, TextureSegment, Trim, VirtualImu,
-    add_texture, measure_all, simulate_kinematics_on,
+    add_texture, measure_all, point_oddity, simulate_kinematics_on,
 };
 use cromosim_learned::{LearnedSimulator, MappingFile, Patch, SiteMotion, scheme_for_networks};
 use cromosim_motion::{
@@ -30,7 +30,7 @@ use rayon::prelude::*;
 use crate::output::{remark, say};
 use crate::progress::Interrupt;
 use crate::simulate_arguments::{Arguments, TextureOn};
-use crate::simulated_quality::{quality_entries, quality_line};
+use crate::simulated_quality::{quality_entries, quality_line, unlikely, warn};
 use crate::{body, progress};
 
 /// What is the same for all motions of a call.
@@ -314,6 +314,25 @@ impl Setup {
         Ok(Some(drawn))
     }
 
+    /// What is unlikely of people and placements; the readers have refused what is impossible.
+    fn oddities(&self, people: &[PlayedPerson]) -> anyhow::Result<Vec<String>> {
+        let mut oddities = Vec::new();
+        for person in people {
+            let who = if person.label.is_empty() {
+                String::new()
+            } else {
+                format!("{}: ", person.label)
+            };
+            let odd = person.motion.oddities().into_iter();
+            oddities.extend(odd.map(|odd| format!("{who}{odd}")));
+        }
+        for placement in self.placements.placements() {
+            let odd = point_oddity(&self.model, placement)?;
+            oddities.extend(odd.map(|odd| format!("placement {}: {odd}", placement.name())));
+        }
+        Ok(oddities)
+    }
+
     /// What a bag says about how it was made.
     fn metadata(&self, motion: &SmplMotion) -> BTreeMap<String, String> {
         let entry = |key: &str, value: String| (key.to_owned(), value);
@@ -409,6 +428,8 @@ fn simulate_one(
         };
         metadata.extend(simulated.iter().flat_map(quality));
     }
+    let oddities = setup.oddities(people)?;
+    metadata.extend(unlikely(oddities.iter().cloned()));
     bag.write_metadata("cromosim", metadata)?;
     bag.attach(
         "placements.yaml",
@@ -423,6 +444,7 @@ fn simulate_one(
             write_people_csv(out, folder, person, simulated)?;
         }
     }
+    bar.suspend(|| warn(Path::new(&motion.name), &oddities));
     let last = last_played(people).map_or(0.0, |last| last - FIRST_STAMP);
     let placements = setup.placements.placements().len();
     let who = if people.len() > 1 {

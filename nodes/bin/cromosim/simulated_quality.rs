@@ -1,7 +1,11 @@
 //! What simulated readings are good for, as bags and summaries say it.
 
+use std::path::Path;
+
 use cromosim_imu::Bandwidth;
 use cromosim_recording::Quality;
+
+use crate::output::remark;
 
 /// Entries of a bag's metadata about one placement: `bandwidth_hz.NAME` and `trimmed_s.NAME`.
 pub fn quality_entries(name: &str, quality: &Quality) -> Vec<(String, String)> {
@@ -80,4 +84,18 @@ pub fn quality_line(placements: impl Iterator<Item = Quality>) -> String {
         );
     }
     line
+}
+
+/// An entry of a bag's metadata: how many things are unlikely of what it was made from, and which.
+pub fn unlikely(oddities: impl Iterator<Item = String>) -> Option<(String, String)> {
+    let oddities: Vec<String> = oddities.collect();
+    let counted = format!("{}: {}", oddities.len(), oddities.join("; "));
+    (!oddities.is_empty()).then(|| ("unlikely".to_owned(), counted))
+}
+
+/// The same for whoever waits at the terminal, in one line.
+pub fn warn(source: &Path, oddities: &[String]) {
+    if !oddities.is_empty() {
+        remark!("warning: {}: {}", source.display(), oddities.join("; "));
+    }
 }

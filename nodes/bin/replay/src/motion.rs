@@ -183,8 +183,10 @@ impl Track {
             PoseSource::Tracked => "",
             PoseSource::Fitted => "; fitted to markers: virtual_imu needs pose_source:=fitted",
         };
+        let oddities = motion.oddities();
+        let odd: String = oddities.iter().map(|odd| format!("; {odd}")).collect();
         format!(
-            "{} on {}: {} frames at {:.2} Hz, {:.2} s{report}{source}",
+            "{} on {}: {} frames at {:.2} Hz, {:.2} s{report}{source}{odd}",
             motion.name,
             self.topic,
             motion.frames.len(),

@@ -74,6 +74,15 @@ impl BodyModel {
         })
     }
 
+    /// How far `point` (model frame, T-pose, m) is from `site` on the mean shape, m.
+    ///
+    /// # Errors
+    /// [`BodyError::UnknownTriangle`] for a site of another body.
+    pub fn distance_to_site(&self, point: Vector3<f64>, site: &Site) -> Result<f64, BodyError> {
+        let corners = self.corners(site.triangle)?;
+        Ok((point_at(&corners, &site.barycentrics, &self.template) - point).norm())
+    }
+
     /// The vertices of `site`'s triangle, counter-clockwise seen from outside.
     ///
     /// # Errors

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use cromosim_body::BodyError;
+use cromosim_spatial::plausible::Oddity;
 use cromosim_spatial::{SpatialError, Stamp};
 use thiserror::Error;
 
@@ -64,6 +65,16 @@ pub enum ImuError {
         placement: String,
         /// Why.
         source: Box<BodyError>,
+    },
+    /// A number that no placement has.
+    #[error("placement `{placement}`: {field}: {oddity}")]
+    Impossible {
+        /// The placement's name.
+        placement: String,
+        /// The field.
+        field: &'static str,
+        /// What, and why.
+        oddity: Box<Oddity>,
     },
     /// A triangle without area cannot carry a sensor.
     #[error("placement `{placement}`: triangle {triangle} has no area; choose a neighbour")]
@@ -260,4 +271,7 @@ pub enum PlacementProblem {
     /// A rotation that is none.
     #[error("{0}")]
     NotARotation(SpatialError),
+    /// A number that no placement has.
+    #[error("{0}")]
+    Impossible(Oddity),
 }

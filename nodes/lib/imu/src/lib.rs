@@ -83,7 +83,7 @@ pub use effects::{
     nearest_signed_permutation, strongest_line, unit_factors, white_noise_density,
 };
 pub use error::{EffectError, ImuError, PlacementProblem};
-pub use mount::{MountedSensor, MountedSensors, SensorPose};
+pub use mount::{MountedSensor, MountedSensors, SensorPose, point_oddity};
 pub use noise::{Covariances, NoiseSource};
 pub use placement::{Follow, MAX_RATE_HZ, Placement, SiteChoice};
 pub use placement_file::PlacementSet;

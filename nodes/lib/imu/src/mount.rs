@@ -1,7 +1,8 @@
 //! Sensors on a body of one shape.
 
-use cromosim_body::{BodyPose, Joint, ShapedBody, Site, VertexSubset};
+use cromosim_body::{BodyModel, BodyPose, Joint, ShapedBody, Site, VertexSubset};
 use cromosim_spatial::Stamp;
+use cromosim_spatial::plausible::{Oddity, POINT_FROM_SKIN};
 use nalgebra::{Isometry3, Matrix2, Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use crate::{Follow, ImuError, Placement, PoseStd, SensorFrame, SensorTrajectory, SiteChoice};
@@ -56,7 +57,8 @@ impl MountedSensor {
     /// Mounts a placement.
     ///
     /// # Errors
-    /// [`ImuError::Site`] for a site that this body does not have, [`ImuError::FlatTriangle`].
+    /// [`ImuError::Site`] for a site that this body does not have, [`ImuError::FlatTriangle`],
+    /// [`ImuError::Impossible`] for a point far off the skin.
     pub fn new(body: &ShapedBody, placement: &Placement) -> Result<Self, ImuError> {
         let refuse = |source| ImuError::Site {
             placement: placement.name().to_owned(),
@@ -72,6 +74,13 @@ impl MountedSensor {
             SiteChoice::NearestTo(point) => model.nearest_site(*point),
         }
         .map_err(refuse)?;
+        if let Some(oddity) = point_oddity(model, placement)?.filter(Oddity::is_impossible) {
+            return Err(ImuError::Impossible {
+                placement: placement.name().to_owned(),
+                field: "point",
+                oddity: Box::new(oddity),
+            });
+        }
         let vertices = model.triangle(&site).map_err(refuse)?;
         let subset = body.subset(&vertices).map_err(refuse)?;
         let corners = vertices.map(|vertex| body.rest_vertices()[vertex as usize]);
@@ -183,6 +192,25 @@ impl MountedSensor {
             normal_in_world,
             triangle_in_world: corners,
         }
+    }
+}
+
+/// What is odd about the point that a placement gives for its site; `None` also for other sites.
+///
+/// # Errors
+/// [`ImuError::Site`] for a point that is not finite.
+pub fn point_oddity(model: &BodyModel, placement: &Placement) -> Result<Option<Oddity>, ImuError> {
+    let SiteChoice::NearestTo(point) = placement.site() else {
+        return Ok(None);
+    };
+    let site = model.nearest_site(*point);
+    let distance = site.and_then(|site| model.distance_to_site(*point, &site));
+    match distance {
+        Ok(distance) => Ok(POINT_FROM_SKIN.judge(distance, "")),
+        Err(source) => Err(ImuError::Site {
+            placement: placement.name().to_owned(),
+            source: Box::new(source),
+        }),
     }
 }
 

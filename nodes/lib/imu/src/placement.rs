@@ -1,5 +1,6 @@
 //! Where a sensor sits: configured intent.
 
+use cromosim_spatial::plausible::MOUNT_ANGLE;
 use cromosim_spatial::so3;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
@@ -303,7 +304,10 @@ impl RawRotation {
                 },
             ));
         }
-        Ok(so3::exp(&rotvec))
+        match MOUNT_ANGLE.judge(rotvec.norm(), "") {
+            Some(oddity) => Err(("mount.rotvec", PlacementProblem::Impossible(oddity))),
+            None => Ok(so3::exp(&rotvec)),
+        }
     }
 }
 

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use cromosim_arrays::ArraysError;
 use cromosim_body::BodyError;
+use cromosim_spatial::plausible::Oddity;
 
 /// An error of this crate: one line that names the file, the place and what to do.
 #[derive(Debug, thiserror::Error)]
@@ -292,6 +293,14 @@ pub enum MotionError {
         frame: usize,
         /// Which quantity.
         what: &'static str,
+    },
+    /// Nobody can move so, or be so.
+    #[error("{name}: {oddity}")]
+    Impossible {
+        /// The motion.
+        name: String,
+        /// What, where and why.
+        oddity: Box<Oddity>,
     },
     /// A file of arrays that cannot be read, or an array in it that does not suit.
     #[error(transparent)]

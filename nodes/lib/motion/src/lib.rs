@@ -30,6 +30,7 @@ mod format;
 mod markers;
 mod motion;
 mod options;
+mod plausibility;
 mod poses;
 mod read;
 mod report;

@@ -21,7 +21,8 @@ const MAX_BYTES: u64 = 4 << 30;
 /// its content ([`MotionFormat::of`]), not by its name's ending. BVH and ASF/AMC are retargeted; an
 /// AMC file takes its skeleton from [`MotionOptions::skeleton`] or from the ASF file beside it. To
 /// C3D and TRC a body is fitted ([`fit_markers`]). SMPL parameters are packed as npz, pickle,
-/// joblib, torch or npy and told by their keys.
+/// joblib, torch or npy and told by their keys. What nobody can do is refused
+/// ([`cromosim_spatial::plausible`]); [`SmplMotion::oddities`] says what is only unlikely.
 ///
 /// # Errors
 /// One line that names the file and the place: unreadable, no motion file, wrong content
@@ -40,7 +41,9 @@ pub fn read_motion_for(
     options: &MotionOptions,
 ) -> Result<SmplMotion, MotionError> {
     if let Some(motion) = read_poses(path, body, options)? {
-        return motion.slice(options.start_s, options.duration_s);
+        return motion
+            .slice(options.start_s, options.duration_s)?
+            .possible();
     }
     let bytes = read_bytes(path)?;
     let name = path.display().to_string();
@@ -69,7 +72,9 @@ pub fn read_motion_for(
             })
         }
     }?;
-    motion.slice(options.start_s, options.duration_s)
+    motion
+        .slice(options.start_s, options.duration_s)?
+        .possible()
 }
 
 fn of_markers(

@@ -88,3 +88,37 @@ fn labels_name_frames_and_the_clip_can_be_retargeted() {
     let report = motion.report.unwrap();
     assert!(report.bone_direction_median_deg < 1.0, "{report}");
 }
+
+/// What nobody can do is refused, so no real clip may look so.
+#[test]
+fn no_real_clip_is_beyond_what_people_can_do() {
+    let Some(folder) = shared_data("mocap_cmu_har") else {
+        return;
+    };
+    let body = BodyModel::embedded();
+    let options = MotionOptions {
+        keep_lead_in: true,
+        ..MotionOptions::default()
+    };
+    let others = folder.parent().unwrap().join("mocap_cmu");
+    let files = [folder, others].map(|folder| std::fs::read_dir(folder).unwrap());
+    let (mut clips, mut odd) = (0, Vec::new());
+    for entry in files.into_iter().flatten() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|ending| ending != "npz") {
+            continue;
+        }
+        let name = path.display().to_string();
+        let labelled = parse_skeleton_npz(File::open(&path).unwrap(), &name).unwrap();
+        clips += 1;
+        for oddity in retarget(&labelled.clip, &body, &options)
+            .unwrap()
+            .oddities()
+        {
+            assert!(!oddity.is_impossible(), "{name}: {oddity}");
+            odd.push(format!("{name}: {oddity}"));
+        }
+    }
+    println!("{clips} clips, {} warnings: {odd:#?}", odd.len());
+    assert!(clips >= 50 && odd.len() <= 5, "{clips}: {odd:#?}");
+}

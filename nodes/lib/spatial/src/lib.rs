@@ -12,6 +12,7 @@
 //! - [`PoseEstimate`]: a motion from noisy poses, its noise learnt from them, with derivatives and
 //!   their error; [`KinematicTrack`] is what it gives.
 //! - [`FrameGrid`]: the frames between which poses were interpolated along straight chords.
+//! - [`plausible`]: what bodies and sensors cannot do, in one table.
 //! - [`derivative_weights`]: finite-difference stencils on any times; [`uniform_stamps`]: output
 //!   grids.
 //!
@@ -52,6 +53,7 @@ mod kinks;
 mod local_spline;
 mod noise_floor;
 mod noise_shape;
+pub mod plausible;
 mod pose_series;
 mod pose_spectra;
 mod pose_spline;

@@ -10,8 +10,8 @@ use nalgebra::Vector3;
 
 use super::track::{PoseAxes, PoseTrack, Rotations};
 use super::values::{
-    Budget, RATES_HZ, RATES_TEXT, SHARED_JOINTS, betas, body_angles, frame_count, gender, numbers,
-    rotations_from_axis_angles, rotations_from_root_and_body, vectors, wrong,
+    Budget, RATES_HZ, RATES_TEXT, SHARED_JOINTS, betas, body_angles, check_angles, frame_count,
+    gender, numbers, rotations_from_axis_angles, rotations_from_root_and_body, vectors, wrong,
 };
 use crate::MotionError;
 
@@ -108,19 +108,18 @@ fn poses<R: Read + Seek>(
         };
         budget.take(key, count)?;
         let rows = numbers(&entry, &[None, None], "(N, 156)")?;
+        let joints = if width == 72 { 24 } else { SHARED_JOINTS };
+        check_angles(&entry, &rows.values, width, 0..=joints - 1)?;
         return Ok((
-            rotations_from_axis_angles(
-                &rows.values,
-                width,
-                if width == 72 { 24 } else { SHARED_JOINTS },
-            ),
+            rotations_from_axis_angles(&rows.values, width, joints),
             width,
         ));
     }
-    let root = container.at("root_orient")?;
-    let count = frame_count(&root);
+    let orient = container.at("root_orient")?;
+    let count = frame_count(&orient);
     budget.take("root_orient", count)?;
-    let root = numbers(&root, &[Some(count), Some(3)], "(N, 3)")?;
+    let root = numbers(&orient, &[Some(count), Some(3)], "(N, 3)")?;
+    check_angles(&orient, &root.values, 3, 0..=0)?;
     let body = body_angles(&container.at("pose_body")?, count)?;
     Ok((
         rotations_from_root_and_body(&root.values, &body.values),

@@ -7,7 +7,7 @@ use cromosim_arrays::{Array, Container};
 use cromosim_body::ShapeSpace;
 
 use super::track::{PoseAxes, PoseTrack};
-use super::values::{Budget, frame_count, numbers, rotations_from_axis_angles};
+use super::values::{Budget, check_angles, frame_count, numbers, rotations_from_axis_angles};
 use crate::MotionError;
 
 /// Frames per second of DIP-IMU's arrays, Hz.
@@ -20,6 +20,7 @@ pub(super) fn track<R: Read + Seek>(
     let pose = container.at("gt")?;
     budget.take(pose.key(), frame_count(&pose))?;
     let rows = numbers(&pose, &[None, Some(72)], "(N, 72)")?;
+    check_angles(&pose, &rows.values, 72, 0..=23)?;
     Ok(PoseTrack {
         person: "0".to_owned(),
         gender: None,

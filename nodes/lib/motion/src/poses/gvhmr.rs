@@ -9,7 +9,8 @@ use nalgebra::Vector3;
 use super::format::PoseView;
 use super::track::{PoseAxes, PoseTrack};
 use super::values::{
-    Budget, betas, body_angles, frame_count, numbers, rotations_from_root_and_body, vectors,
+    Budget, betas, body_angles, check_angles, frame_count, numbers, rotations_from_root_and_body,
+    vectors,
 };
 use crate::MotionError;
 
@@ -26,7 +27,9 @@ pub(super) fn track(
     let orient = parameters.at("global_orient")?;
     let count = frame_count(&orient);
     budget.take(orient.key(), count)?;
-    let orient = numbers(&orient, &[None, Some(3)], "(N, 3)")?;
+    let key = orient;
+    let orient = numbers(&key, &[None, Some(3)], "(N, 3)")?;
+    check_angles(&key, &orient.values, 3, 0..=0)?;
     let body = body_angles(&parameters.at("body_pose")?, count)?;
     let (trans, axes) = match view {
         PoseView::Camera => (None, PoseAxes::Camera),

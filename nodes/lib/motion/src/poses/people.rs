@@ -139,6 +139,9 @@ fn within(
         );
         return Err(wrong("start_s", start_s, expected));
     }
+    for PersonPart { person, frames } in &parts {
+        person.motion.of_frames(frames.clone()).possible()?;
+    }
     Ok(parts)
 }
 

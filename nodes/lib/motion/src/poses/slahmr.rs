@@ -9,7 +9,7 @@ use cromosim_body::ShapeSpace;
 use nalgebra::Vector3;
 
 use super::track::{PoseAxes, PoseTrack};
-use super::values::{Budget, numbers, rotations_from_root_and_body, wrong};
+use super::values::{Budget, check_angles, numbers, rotations_from_root_and_body, wrong};
 use crate::MotionError;
 
 /// More people than any video shows.
@@ -63,6 +63,7 @@ impl Video {
             _ => vec![Some(people), Some(frames), Some(width)],
         };
         let orients = numbers(&root, &expected(3), "(P, T, 3)")?;
+        check_angles(&root, &orients.values, 3, 0..=0)?;
         let text = format!("({people}, {frames}, 3)");
         let trans = numbers(&container.at("trans")?, &expected(3), &text)?;
         let bodies = container.at("pose_body")?;
@@ -71,7 +72,9 @@ impl Video {
         } else {
             [&expected(21)[..], &[Some(3)]].concat()
         };
-        let bodies = numbers(&bodies, &wide, &format!("({people}, {frames}, 63)"))?;
+        let key = bodies;
+        let bodies = numbers(&key, &wide, &format!("({people}, {frames}, 63)"))?;
+        check_angles(&key, &bodies.values, 63, 1..=21)?;
         Ok(Self {
             people,
             frames,

@@ -1,9 +1,11 @@
 //! What the formats have in common: checked numbers, rotations, betas.
 
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use cromosim_arrays::{Array, ArraysError, Entry, Value};
 use cromosim_body::{Gender, JOINT_COUNT};
+use cromosim_spatial::plausible::{JOINT_ANGLE, PELVIS_ANGLE};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use super::format::MAX_POSES;
@@ -126,6 +128,30 @@ pub(super) fn vectors(entry: &Entry, count: usize) -> Result<Vec<Vector3<f64>>, 
         .collect())
 }
 
+/// Refuses rotation vectors that no joint has: rows of `width` numbers, three for each of `joints`
+/// of SMPL and then what is not looked at.
+pub(super) fn check_angles(
+    entry: &Entry,
+    rows: &[f64],
+    width: usize,
+    joints: RangeInclusive<usize>,
+) -> Result<(), MotionError> {
+    for (frame, row) in rows.chunks_exact(width.max(1)).enumerate() {
+        for (joint, vector) in joints.clone().zip(row.chunks_exact(3)) {
+            let bound = if joint == 0 {
+                &PELVIS_ANGLE
+            } else {
+                &JOINT_ANGLE
+            };
+            let angle = Vector3::from_column_slice(vector).norm();
+            if let Some(oddity) = bound.judge(angle, format!("frame {frame}, joint {joint}")) {
+                return Err(wrong(entry, oddity.to_string()));
+            }
+        }
+    }
+    Ok(())
+}
+
 /// From rows of axis times angle (rad, three numbers a joint) the rotations of the first `joints`;
 /// identity for the rest of SMPL's.
 pub(super) fn rotations_from_axis_angles(
@@ -161,7 +187,9 @@ pub(super) fn body_angles(entry: &Entry, count: usize) -> Result<Array<f64>, Mot
     } else {
         &[Some(count), Some(63)]
     };
-    numbers(entry, expected, &format!("({count}, 63)"))
+    let body = numbers(entry, expected, &format!("({count}, 63)"))?;
+    check_angles(entry, &body.values, 63, 1..=21)?;
+    Ok(body)
 }
 
 /// From rotation matrices one after the other, each row by row.

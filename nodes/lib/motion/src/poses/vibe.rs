@@ -6,7 +6,8 @@ use cromosim_body::ShapeSpace;
 
 use super::track::{PoseAxes, PoseTrack};
 use super::values::{
-    Budget, betas, frame_count, frame_ids, gender, numbers, rotations_from_axis_angles,
+    Budget, betas, check_angles, frame_count, frame_ids, gender, numbers,
+    rotations_from_axis_angles,
 };
 use crate::MotionError;
 
@@ -24,6 +25,7 @@ pub(super) fn in_camera(
     let count = frame_count(&pose);
     budget.take(pose.key(), count)?;
     let rows = numbers(&pose, &[None, Some(72)], "(N, 72)")?;
+    check_angles(&pose, &rows.values, 72, 0..=23)?;
     Ok(PoseTrack {
         person: person.key().to_owned(),
         gender: gender(person.get("gender").as_ref()),

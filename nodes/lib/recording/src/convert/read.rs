@@ -60,7 +60,14 @@ pub fn read_content(
     }
     let model = options.body.clone().unwrap_or_else(BodyModel::embedded);
     let motion = read_motion_for(path, &model, &options.motion)?;
-    Ok(Content::Motion(Box::new(motion)).into())
+    let notes = motion.oddities();
+    Ok(Read {
+        notes: notes
+            .iter()
+            .map(|oddity| format!("warning: {}: {oddity}", path.display()))
+            .collect(),
+        content: Content::Motion(Box::new(motion)),
+    })
 }
 
 fn refuse_motion_settings(

@@ -2,6 +2,7 @@
 
 use cromosim_imu::{Reading, SensorFrame};
 use cromosim_spatial::Stamp;
+use cromosim_spatial::plausible::{Oddity, RIGID_SPEED};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 /// Poses of one rigid body. All lists have the same length; stamps increase.
@@ -28,6 +29,21 @@ impl PoseTrajectory {
         self.stamps.push(stamp);
         self.positions.push(position);
         self.rotations.push(rotation);
+    }
+
+    /// What is odd about how it moves.
+    pub fn oddities(&self) -> Vec<Oddity> {
+        let pairs = self.stamps.windows(2).zip(self.positions.windows(2));
+        let speeds = pairs.map(|(stamps, positions)| {
+            (positions[1] - positions[0]).norm() / (stamps[1] - stamps[0])
+        });
+        let fastest = speeds
+            .enumerate()
+            .max_by(|(_, one), (_, other)| one.total_cmp(other));
+        let judged = fastest.and_then(|(row, speed)| {
+            RIGID_SPEED.judge(speed, format!("poses {} and {}", row + 1, row + 2))
+        });
+        judged.into_iter().collect()
     }
 
     /// The poses as frames of a sensor that is the body.
