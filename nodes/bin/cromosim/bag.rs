@@ -1,13 +1,11 @@
 //! `cromosim bag`: mend bags, export from them.
 
-use std::fs::File;
-use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
 use clap::Subcommand;
 use cromosim_bag::{BagReader, recover, write_imu_csv};
 
+use crate::files::write_whole;
 use crate::output::{output, remark, say};
 
 /// Commands on bags.
@@ -32,6 +30,9 @@ pub enum Command {
         /// Where to; default: standard output
         #[arg(long)]
         out: Option<PathBuf>,
+        /// Replace OUT where it exists
+        #[arg(long)]
+        force: bool,
     },
 }
 
@@ -56,16 +57,18 @@ pub fn run(command: &Command) -> anyhow::Result<()> {
                 )?;
             }
         }
-        Command::Csv { bag, topic, out } => {
+        Command::Csv {
+            bag,
+            topic,
+            out,
+            force,
+        } => {
             let reader = BagReader::open(bag)?;
             match out {
                 Some(path) => {
-                    let file = File::create(path)
-                        .with_context(|| format!("{}: cannot be written", path.display()))?;
-                    let mut file = BufWriter::new(file);
-                    let rows = write_imu_csv(&reader, topic, &mut file, path)?;
-                    file.flush()
-                        .with_context(|| format!("{}: cannot be written", path.display()))?;
+                    let rows = write_whole(path, *force, |file| {
+                        Ok(write_imu_csv(&reader, topic, file, path)?)
+                    })?;
                     remark!("{}: {rows} rows", path.display());
                 }
                 None => drop(write_imu_csv(

@@ -1,7 +1,5 @@
 //! `cromosim body`: bodies out of the program.
 
-use std::fs::File;
-use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -9,6 +7,7 @@ use anyhow::{Context, bail};
 use clap::Subcommand;
 use cromosim_body::{BodyModel, ShapedBody, write_obj};
 
+use crate::files::{refuse_existing, write_whole};
 use crate::output::say;
 
 /// Commands on bodies.
@@ -24,22 +23,23 @@ pub enum Command {
         /// Shape coefficients of the mesh, separated by commas
         #[arg(long, value_delimiter = ',', allow_hyphen_values = true)]
         betas: Vec<f64>,
+        /// Replace OUT where it exists
+        #[arg(long)]
+        force: bool,
     },
 }
 
 /// The mesh at rest, model frame: x left, y up, z forward.
-fn export_obj(out: &Path, model: &Arc<BodyModel>, betas: &[f64]) -> anyhow::Result<()> {
+fn obj(model: &Arc<BodyModel>, betas: &[f64]) -> anyhow::Result<Vec<u8>> {
     let shaped = ShapedBody::new(model.clone(), betas)?;
     let vertices: Vec<[f32; 3]> = shaped
         .rest_vertices()
         .iter()
         .map(|vertex| vertex.map(|metres| metres as f32).into())
         .collect();
-    let cannot = || format!("{}: cannot be written", out.display());
-    let mut file = BufWriter::new(File::create(out).with_context(cannot)?);
-    write_obj(&mut file, &vertices, model.faces())
-        .and_then(|()| file.flush())
-        .with_context(cannot)
+    let mut text = Vec::new();
+    write_obj(&mut text, &vertices, model.faces()).context("the mesh cannot be written")?;
+    Ok(text)
 }
 
 /// The model of the file that `--body` names, where it does.
@@ -54,19 +54,29 @@ pub fn model(path: Option<&Path>) -> anyhow::Result<Arc<BodyModel>> {
 
 /// Runs the command.
 pub fn run(command: &Command) -> anyhow::Result<()> {
-    let Command::Export { out, body, betas } = command;
+    let Command::Export {
+        out,
+        body,
+        betas,
+        force,
+    } = command;
+    refuse_existing(out, *force)?;
     let model = model(body.as_deref())?;
-    match out.extension().and_then(|ending| ending.to_str()) {
-        Some("npz") if betas.is_empty() => model.write_npz(out)?,
+    let bytes = match out.extension().and_then(|ending| ending.to_str()) {
+        Some("npz") if betas.is_empty() => model.to_npz()?,
         Some("npz") => {
             bail!("--betas shapes a mesh; an npz holds the whole model, which has every shape")
         }
-        Some("obj") => export_obj(out, &model, betas)?,
+        Some("obj") => obj(&model, betas)?,
         _ => bail!(
             "{}: the ending says what to write: .npz (model) or .obj (mesh)",
             out.display()
         ),
-    }
+    };
+    write_whole(out, *force, |file| {
+        file.write_all(&bytes)
+            .with_context(|| format!("{}: cannot be written", out.display()))
+    })?;
     say!("{}", out.display())?;
     Ok(())
 }

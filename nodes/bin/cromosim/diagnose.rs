@@ -112,8 +112,11 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         remark!("error: {failure}; the others are diagnosed");
     }
     let (diagnosis, effects, evidence) = split(answers);
-    write(arguments, &diagnosis, &effects, &evidence)?;
-    print(&diagnosis)?;
+    // What was found is said even where its files cannot be written.
+    let written = write(arguments, &diagnosis, &effects, &evidence);
+    let said = print(&diagnosis);
+    written?;
+    said?;
     print_files(&arguments.out)
 }
 

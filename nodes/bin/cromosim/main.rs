@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use anyhow::Context;
 use clap::{CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
 use output::remark;
@@ -18,6 +19,7 @@ mod diagnose_recordings;
 #[cfg(feature = "view")]
 mod diagnose_view;
 mod evaluate;
+mod files;
 mod inspect;
 mod map;
 mod motion_arguments;
@@ -94,15 +96,20 @@ enum Command {
         /// Write to this file rather than to standard output
         #[arg(long)]
         out: Option<PathBuf>,
+        /// Replace the file where it exists
+        #[arg(long)]
+        force: bool,
     },
 }
 
-fn completion(shell: Shell, out: Option<PathBuf>) -> anyhow::Result<()> {
+fn completion(shell: Shell, out: Option<PathBuf>, force: bool) -> anyhow::Result<()> {
     let mut script = Vec::new();
     clap_complete::generate(shell, &mut Cli::command(), "cromosim", &mut script);
     match out {
-        Some(path) => std::fs::write(&path, script)
-            .map_err(|error| anyhow::anyhow!("{}: cannot be written: {error}", path.display())),
+        Some(path) => files::write_whole(&path, force, |file| {
+            file.write_all(&script)
+                .with_context(|| format!("{}: cannot be written", path.display()))
+        }),
         None => output::print(format_args!("{}", String::from_utf8_lossy(&script))),
     }
 }
@@ -130,7 +137,7 @@ fn main() -> ExitCode {
         Command::Bag { command } => bag::run(&command),
         Command::Body { command } => body::run(&command),
         Command::Node(arguments) => node::run(&arguments),
-        Command::Completion { shell, out } => completion(shell, out),
+        Command::Completion { shell, out, force } => completion(shell, out, force),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,7 +1,6 @@
 //! Bodies to files: SMPL npz and Wavefront OBJ.
 
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Cursor, Write};
 use std::path::Path;
 
 use cromosim_arrays::NpzWriter;
@@ -9,24 +8,29 @@ use cromosim_arrays::NpzWriter;
 use crate::{BodyError, BodyModel, JOINT_COUNT, Joint};
 
 impl BodyModel {
-    /// Writes the model with SMPL's keys, so that other SMPL software reads it: v_template,
-    /// shapedirs, posedirs, J_regressor, weights, kintree_table, f, J, bs_style, bs_type, and
-    /// gender where known. Arrays are float32 where that is exact, else float64; posedirs are
-    /// float32. The same model gives the same bytes.
+    /// Writes [`Self::to_npz`].
     ///
     /// # Errors
     /// [`BodyError::Write`].
     pub fn write_npz(&self, path: &Path) -> Result<(), BodyError> {
-        let written = File::create(path).and_then(|file| self.write_npz_to(BufWriter::new(file)));
+        let written = self.to_npz().and_then(|bytes| std::fs::write(path, bytes));
         written.map_err(|source| BodyError::Write {
             path: path.to_owned(),
             source,
         })
     }
 
-    fn write_npz_to(&self, writer: BufWriter<File>) -> io::Result<()> {
+    /// The model's file with SMPL's keys, so that other SMPL software reads it: v_template,
+    /// shapedirs, posedirs, J_regressor, weights, kintree_table, f, J, bs_style, bs_type, and
+    /// gender where known. Arrays are float32 where that is exact, else float64; posedirs are
+    /// float32. The same model gives the same bytes.
+    ///
+    /// # Errors
+    /// What the archive says.
+    pub fn to_npz(&self) -> io::Result<Vec<u8>> {
         let count = self.vertex_count();
-        let mut npz = NpzWriter::new(writer);
+        // In memory: an archive that breaks off in a file says so on standard error as well.
+        let mut npz = NpzWriter::new(Cursor::new(Vec::new()));
         npz.floats("v_template", &[count, 3], &flat(&self.template))?;
         npz.floats(
             "shapedirs",
@@ -75,7 +79,7 @@ impl BodyModel {
         if let Some(gender) = self.gender {
             npz.text("gender", gender.name())?;
         }
-        npz.finish()?.flush()
+        Ok(npz.finish()?.into_inner())
     }
 
     /// posedirs (V, 3, 207) with their zeros.

@@ -135,7 +135,7 @@ pub enum RecordingError {
         b: String,
     },
     /// A file that is there already.
-    #[error("{}: exists already; --force replaces it", path.display())]
+    #[error("{}: exists already; give another name, or --force to replace it", path.display())]
     Exists {
         /// The file.
         path: PathBuf,

@@ -1,7 +1,7 @@
-//! Reading files whose size nobody has promised.
+//! Reading files whose size nobody has promised, and writing files whole or not at all.
 
-use std::fs::File;
-use std::io::Read;
+use std::fs::{self, File};
+use std::io::{self, BufWriter, ErrorKind, Read, Write};
 use std::path::Path;
 
 use crate::RecordingError;
@@ -43,4 +43,84 @@ fn read_first(path: &Path, count: u64) -> Result<Vec<u8>, RecordingError> {
             source,
         })?;
     Ok(bytes)
+}
+
+/// Whether a file or folder would be lost if `path` were written. Devices and pipes are written
+/// into, and nothing of them is lost.
+pub fn is_in_the_way(path: &Path) -> bool {
+    fs::symlink_metadata(path).is_ok() && !is_device(path)
+}
+
+fn is_device(path: &Path) -> bool {
+    fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
+}
+
+/// Writes a file under a temporary name beside its own, and gives it its name once it is complete.
+///
+/// # Errors
+/// [`RecordingError::Write`]; [`RecordingError::Exists`] where it is not to be replaced.
+pub fn write_file(path: &Path, bytes: &[u8], replace: bool) -> Result<(), RecordingError> {
+    write_file_with(path, replace, |file| {
+        file.write_all(bytes).map_err(cannot_write(path))
+    })
+}
+
+/// As [`write_file`], of what `write` writes; nothing is left of a file that it gives up.
+///
+/// # Errors
+/// As [`write_file`], and what `write` says.
+pub fn write_file_with<V, E: From<RecordingError>>(
+    path: &Path,
+    replace: bool,
+    write: impl FnOnce(&mut dyn Write) -> Result<V, E>,
+) -> Result<V, E> {
+    let cannot = cannot_write(path);
+    if is_device(path) {
+        let mut device = File::options().write(true).open(path).map_err(&cannot)?;
+        return write(&mut device);
+    }
+    // Where a link leads, not the link, is replaced.
+    let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let folder = place
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
+    let name = place.file_name().unwrap_or_default().to_string_lossy();
+    let mut builder = tempfile::Builder::new();
+    #[cfg(unix)]
+    let everybody = <fs::Permissions as std::os::unix::fs::PermissionsExt>::from_mode(0o666);
+    #[cfg(unix)]
+    builder.permissions(everybody);
+    let mut temporary = builder
+        .prefix(&format!(".{name}."))
+        .suffix(".partial")
+        .tempfile_in(folder)
+        .map_err(&cannot)?;
+    let mut buffered = BufWriter::new(temporary.as_file_mut());
+    let value = write(&mut buffered)?;
+    buffered.flush().map_err(&cannot)?;
+    drop(buffered);
+    let persisted = if replace {
+        temporary.persist(&place)
+    } else {
+        temporary.persist_noclobber(&place)
+    };
+    match persisted {
+        Ok(_) => Ok(value),
+        Err(error) if error.error.kind() == ErrorKind::AlreadyExists => {
+            Err(RecordingError::Exists {
+                path: path.to_owned(),
+            }
+            .into())
+        }
+        Err(error) => Err(cannot(error.error).into()),
+    }
+}
+
+fn cannot_write(path: &Path) -> impl Fn(io::Error) -> RecordingError {
+    let path = path.to_owned();
+    move |source| RecordingError::Write {
+        path: path.clone(),
+        source,
+    }
 }

@@ -37,7 +37,7 @@ pub(crate) use bag_file::MCAP_MAGIC;
 pub use bag_file::{is_bag, write_as_bag};
 pub use body::body_for_bag;
 pub use error::RecordingError;
-pub use file::{read_head, read_whole};
+pub use file::{is_in_the_way, read_head, read_whole, write_file, write_file_with};
 pub use messages::{FIRST_STAMP, MessageHeader, smpl_pose, smpl_state, stamp_of_frame};
 pub use placement::{RecordedPlacement, read_placements, read_poses};
 pub use played::{PlayedPerson, SimulatedPlacement, write_people, write_people_csv};

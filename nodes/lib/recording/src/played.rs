@@ -11,7 +11,7 @@ use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_spatial::Stamp;
 
-use crate::{MessageHeader, Quality, RecordingError, smpl_state, stamp_of_frame};
+use crate::{MessageHeader, Quality, RecordingError, smpl_state, stamp_of_frame, write_file_with};
 
 /// One person of a motion file.
 pub struct PlayedPerson {
@@ -239,12 +239,10 @@ pub fn write_people_csv(
     };
     for placement in simulated {
         let path = folder.join(format!("{stem}{label}_{}.csv", placement.name));
-        let file = fs::File::create(&path).map_err(|source| RecordingError::Write {
-            path: path.clone(),
-            source,
-        })?;
         let topic = person.topic(&format!("imu/{}/data", placement.name));
-        write_imu_csv(&reader, &topic, std::io::BufWriter::new(file), &path)?;
+        write_file_with(&path, true, |file| {
+            Ok::<_, RecordingError>(write_imu_csv(&reader, &topic, file, &path)?)
+        })?;
     }
     Ok(())
 }

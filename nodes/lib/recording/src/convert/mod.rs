@@ -27,7 +27,7 @@ pub use conversion::{Conversion, Converted};
 pub use options::{Followed, ReadOptions};
 pub use read::read_content;
 pub use target::Target;
-pub use write::{MotionFile, write_file, write_motion};
+pub use write::{MotionFile, write_motion};
 
 /// Reads the input and writes it in the target's form. `out` takes its name when it is complete.
 ///

@@ -1,8 +1,7 @@
 //! Content in a target's form, in a file that takes its name when it is complete.
 
 use std::collections::BTreeMap;
-use std::fs;
-use std::io::{Cursor, Write};
+use std::io::Cursor;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -20,7 +19,7 @@ use crate::rigid::{
 };
 use crate::{
     MessageHeader, PlacementTrace, RecordingError, activities_csv, first_stamp,
-    seconds_to_first_stamp, smpl_pose, stamp_of_frame, write_traces,
+    seconds_to_first_stamp, smpl_pose, stamp_of_frame, write_file, write_traces,
 };
 
 /// Writes the content in the conversion's form; `imu` stands beside a trajectory in a bag.
@@ -212,38 +211,4 @@ fn create_bag(
     metadata.extend(model.map(|model| entry("body", model.id())));
     bag.write_metadata("cromosim", metadata)?;
     Ok(bag)
-}
-
-/// Writes a file under a temporary name beside its own, and gives it its name once it is complete.
-///
-/// # Errors
-/// [`RecordingError::Write`]; also where it exists and is not to be replaced.
-pub fn write_file(path: &Path, bytes: &[u8], replace: bool) -> Result<(), RecordingError> {
-    let cannot = |source| RecordingError::Write {
-        path: path.to_owned(),
-        source,
-    };
-    let folder = path
-        .parent()
-        .filter(|folder| !folder.as_os_str().is_empty())
-        .unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    #[cfg(unix)]
-    let everybody = <fs::Permissions as std::os::unix::fs::PermissionsExt>::from_mode(0o666);
-    #[cfg(unix)]
-    builder.permissions(everybody);
-    let mut temporary = builder
-        .prefix(".convert.")
-        .tempfile_in(folder)
-        .map_err(cannot)?;
-    temporary
-        .write_all(bytes)
-        .and_then(|()| temporary.flush())
-        .map_err(cannot)?;
-    let persisted = if replace {
-        temporary.persist(path)
-    } else {
-        temporary.persist_noclobber(path)
-    };
-    persisted.map(drop).map_err(|error| cannot(error.error))
 }

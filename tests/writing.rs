@@ -1,0 +1,116 @@
+//! Files that commands write: whole or not at all, and nothing is replaced without `--force`.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use common::{CROMOSIM, root, text};
+
+/// Runs `cromosim` where no file can grow beyond so many KiB, as on a disk that is nearly full.
+fn on_a_small_disk(folder: &Path, kibibytes: u32, arguments: &[&str]) -> Output {
+    // The signal that comes with the limit is ignored; what is left is an error of writing.
+    let script = format!("trap '' XFSZ; ulimit -f {kibibytes}; exec \"$0\" \"$@\"");
+    Command::new("bash")
+        .args(["-c", &script, CROMOSIM])
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .unwrap()
+}
+
+/// Names of all files in a folder, hidden ones as well.
+fn listing(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).unwrap();
+    let mut names: Vec<String> = entries
+        .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn what_cannot_be_written_whole_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let bag = root().join("bags/walk").display().to_string();
+    let session = root().join("bags/gap/session").display().to_string();
+    let commands: [&[&str]; 7] = [
+        &[
+            "bag",
+            "csv",
+            &bag,
+            "/imu/head/data_raw",
+            "--out",
+            "head.csv",
+        ],
+        &["body", "export", "body.npz"],
+        &["body", "export", "body.obj"],
+        &["convert", &bag, "walk.bvh"],
+        &["simulate", "--out", "walk.mcap"],
+        &["completion", "bash", "--out", "completion"],
+        &["diagnose", &session, "--out", "diagnosis"],
+    ];
+    for arguments in commands {
+        let output = on_a_small_disk(folder.path(), 4, arguments);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(
+            output.status.code(),
+            Some(2),
+            "{arguments:?}: {}",
+            text(&output)
+        );
+        assert_eq!(said.trim_end().lines().count(), 1, "{arguments:?}: {said}");
+        assert!(said.contains("File too large"), "{arguments:?}: {said}");
+        assert_eq!(listing(folder.path()), [""; 0], "{arguments:?}");
+    }
+}
+
+#[test]
+fn a_diagnosis_that_cannot_be_written_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let session = root().join("bags/gap/session").display().to_string();
+    let output = on_a_small_disk(folder.path(), 4, &["diagnose", &session, "--out", "d"]);
+    assert_eq!(output.status.code(), Some(2));
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(
+        said.contains("right_wrist: ") && said.contains("time_offset"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_signal_leaves_nothing_half_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let motion = folder.path().join("walk.mcap");
+    let motion = motion.display().to_string();
+    common::succeed(
+        folder.path(),
+        &["simulate", "--rate", "20000", "--out", &motion],
+    );
+    let before = listing(folder.path());
+    let mut child = Command::new(CROMOSIM)
+        .args([
+            "bag",
+            "csv",
+            &motion,
+            "/imu/head/data_raw",
+            "--out",
+            "head.csv",
+        ])
+        .current_dir(folder.path())
+        .spawn()
+        .unwrap();
+    // Once the file under its temporary name is there.
+    while listing(folder.path()) == before && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    let kill = Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status()
+        .unwrap();
+    let status = child.wait().unwrap();
+    assert!(kill.success() && status.code() == Some(2), "{status}");
+    assert_eq!(listing(folder.path()), before);
+}
