@@ -3,22 +3,25 @@
 use std::path::{Path, PathBuf};
 
 use clap::Subcommand;
-use cromosim_bag::{BagReader, recover, write_imu_csv};
+use cromosim_bag::{BagReader, Recovery, recover_over, write_imu_csv};
 
-use crate::files::write_whole;
+use crate::files::{refuse_existing, write_whole};
 use crate::output::{output, remark, say};
 
 /// Commands on bags.
 #[derive(Subcommand)]
 pub enum Command {
-    /// Mend a bag whose recorder was killed, or a file that was cut: everything up to the damage is
-    /// kept
+    /// Mend a bag whose recorder was killed, or a file that was cut: all that is sound is
+    /// kept, and what is missing is said
     Recover {
         /// The unfinished .mcap file or rosbag2 directory; it is left as it is
         bag: PathBuf,
         /// The mended copy; default: the name with `_recovered`
         #[arg(long)]
         out: Option<PathBuf>,
+        /// Replace OUT where it exists
+        #[arg(long)]
+        force: bool,
     },
     /// Write the samples of an Imu topic as CSV: stamp, orientation, angular velocity (rad/s),
     /// specific force (m/s2)
@@ -39,23 +42,12 @@ pub enum Command {
 /// Runs the command.
 pub fn run(command: &Command) -> anyhow::Result<()> {
     match command {
-        Command::Recover { bag, out } => {
+        Command::Recover { bag, out, force } => {
             let out = out.clone().unwrap_or_else(|| recovered_name(bag));
-            let recovery = recover(bag, &out)?;
-            say!(
-                "{}: {} messages kept, {} bytes lost",
-                out.display(),
-                recovery.messages_kept(),
-                recovery.bytes_lost
-            )?;
-            for damage in &recovery.damages {
-                say!(
-                    "  {}, byte {}: {}",
-                    damage.path.display(),
-                    damage.at,
-                    damage.reason
-                )?;
+            if !in_place(bag, &out) {
+                refuse_existing(&out, *force)?;
             }
+            print_recovery(&out, &recover_over(bag, &out, *force)?)?;
         }
         Command::Csv {
             bag,
@@ -79,6 +71,43 @@ pub fn run(command: &Command) -> anyhow::Result<()> {
                 )?),
             }
         }
+    }
+    Ok(())
+}
+
+/// Whether a bag is mended where it is.
+fn in_place(bag: &Path, out: &Path) -> bool {
+    let both = bag.canonicalize().ok().zip(out.canonicalize().ok());
+    both.is_some_and(|(bag, out)| bag == out)
+}
+
+fn print_recovery(out: &Path, recovery: &Recovery) -> anyhow::Result<()> {
+    let missing = match recovery.messages_lost {
+        Some(count) => format!("{count} messages missing"),
+        None => "no index says how many are missing".to_owned(),
+    };
+    say!(
+        "{}: {} messages kept, {missing}, {} bytes lost",
+        out.display(),
+        recovery.messages_kept(),
+        recovery.bytes_lost
+    )?;
+    for damage in &recovery.damages {
+        let span = damage.span.map_or_else(String::new, |[from, to]| {
+            format!(
+                ", recorded from {:.3} to {:.3} s ({:.3} s)",
+                from.as_seconds(),
+                to.as_seconds(),
+                to - from
+            )
+        });
+        say!(
+            "  {}, byte {}: {}; {} bytes{span}",
+            damage.path.display(),
+            damage.at,
+            damage.reason,
+            damage.bytes
+        )?;
     }
     Ok(())
 }

@@ -2,16 +2,20 @@
 
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
+
+use cromosim_spatial::Stamp;
 
 use crate::chunk::{ChunkHeader, HEADER_AT_MOST, inner_records, unpack};
 use crate::contents::{Channels, MessageHead, read_metadata};
 use crate::error::{BagError, io_error};
 use crate::metadata::Information;
+use crate::resync::{Index, Search, chunk_length};
 use crate::stream::{Compression, StreamWriter};
 use crate::summary::BagSummary;
 use crate::walk::{Fields, HEADER_BYTES, RecordAt, Step, Walker, op, parse_attachment, stamp};
-use crate::writer::{is_single_file, name_of, parent_of, temporary};
+use crate::writer::{is_single_file, name_of, parent_of, remove_bag, temporary};
 
 /// What [`recover`] found and kept.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -23,6 +27,8 @@ pub struct Recovery {
     pub bytes_lost: u64,
     /// The damage, in order; empty where the bag was whole, or lacked its end alone.
     pub damages: Vec<Damage>,
+    /// Messages that the bag held and the mended one does not; unknown where its index is gone.
+    pub messages_lost: Option<u64>,
 }
 
 /// A place where a bag is damaged.
@@ -32,6 +38,11 @@ pub struct Damage {
     pub path: PathBuf,
     /// Start of the damaged record, bytes from the start of the file.
     pub at: u64,
+    /// Bytes of it from which nothing could be taken.
+    pub bytes: u64,
+    /// When the first and the last message of what is missing were recorded, where a header or the
+    /// index says so.
+    pub span: Option<[Stamp; 2]>,
     /// What is wrong.
     pub reason: String,
 }
@@ -46,6 +57,8 @@ impl Recovery {
         self.summary.add(&other.summary);
         self.bytes_lost += other.bytes_lost;
         self.damages.extend(other.damages);
+        let both = self.messages_lost.zip(other.messages_lost);
+        self.messages_lost = both.map(|(one, other)| one + other);
     }
 }
 
@@ -53,20 +66,34 @@ impl Recovery {
 /// itself.
 ///
 /// For a directory, every `.mcap` file in it is mended and `metadata.yaml` made anew. Whole chunks
-/// whose checksum fails are left out; of a cut chunk, the messages that are whole are kept.
-/// `output` appears only when it is complete.
+/// whose checksum fails are left out; of a cut chunk, the messages that are whole are kept. Where a
+/// record's header is damaged, it goes on at the next sound record. `output` appears only when it is
+/// complete.
 ///
 /// # Errors
 /// [`BagError::NotMcap`] where not even the start of a bag is there, [`BagError::NoMetadata`] for a
 /// directory without `.mcap` files, [`BagError::Exists`] where `output` is another bag,
 /// [`BagError::Io`].
 pub fn recover(path: &Path, output: &Path) -> Result<Recovery, BagError> {
+    recover_over(path, output, false)
+}
+
+/// As [`recover`]; with `replace`, in place of a file or a bag directory at `output`.
+///
+/// # Errors
+/// As [`recover`].
+pub fn recover_over(path: &Path, output: &Path, replace: bool) -> Result<Recovery, BagError> {
     let found = fs::canonicalize(path).map_err(io_error(path, "open"))?;
     let in_place = fs::canonicalize(output).is_ok_and(|there| there == found);
     if !in_place && fs::symlink_metadata(output).is_ok() {
-        return Err(BagError::Exists {
-            path: output.to_owned(),
-        });
+        if !replace || output.is_dir() != found.is_dir() {
+            return Err(BagError::Exists {
+                path: output.to_owned(),
+            });
+        }
+        if output.is_dir() {
+            remove_bag(output)?;
+        }
     }
     if found.is_dir() {
         recover_directory(path, output, in_place)
@@ -100,7 +127,11 @@ fn recover_directory(path: &Path, output: &Path, in_place: bool) -> Result<Recov
     if !in_place {
         fs::create_dir(output).map_err(io_error(output, "create"))?;
     }
-    let (mut all, mut summaries) = (Recovery::default(), Vec::new());
+    let mut all = Recovery {
+        messages_lost: Some(0),
+        ..Recovery::default()
+    };
+    let mut summaries = Vec::new();
     for file in &files {
         let one = recover_file(file, &output.join(name_of(file)))?;
         summaries.push((name_of(file), one.summary.clone()));
@@ -134,36 +165,33 @@ fn recover_file(path: &Path, output: &Path) -> Result<Recovery, BagError> {
         .tempfile_in(parent_of(output))
         .map_err(io_error(output, "create"))?
         .into_parts();
-    let (compression, channels) = preview(path)?;
+    let Preview {
+        compression,
+        channels,
+        index,
+        loose_messages,
+    } = preview(path)?;
     let mut rescue = Rescue {
         path: path.to_owned(),
         writer: StreamWriter::new(BufWriter::new(file), output, compression)?,
         channels,
+        index,
+        search: Search::new(loose_messages),
+        doubtful: None,
         recovery: Recovery::default(),
         data_ended: false,
     };
-    loop {
-        let step = walker.step().map_err(io_error(path, "read"))?;
-        match step {
-            Step::Whole(record) => rescue.whole(record, &mut walker)?,
-            Step::Cut(record) => rescue.cut(record, &mut walker)?,
-            Step::Ragged(at) => rescue.lose(
-                at,
-                walker.size() - at,
-                "the file ends in the middle of a record",
-            ),
-            Step::Finished | Step::Ended => {}
-        }
-        if !matches!(step, Step::Whole(_)) {
-            break;
-        }
-    }
+    while rescue.step(&mut walker)? {}
     let Rescue {
         writer,
         mut recovery,
+        index,
         ..
     } = rescue;
     let (_, summary) = writer.finish(&name_of(output))?;
+    recovery.messages_lost = index
+        .messages
+        .map(|held| held.saturating_sub(summary.message_count()));
     temporary
         .persist(output)
         .map_err(|error| io_error(output, "write")(error.error))?;
@@ -171,21 +199,30 @@ fn recover_file(path: &Path, output: &Path) -> Result<Recovery, BagError> {
     Ok(recovery)
 }
 
-/// What a first look at a file tells: how it is packed, and the channels that its index repeats, in
-/// case the chunk that defines them is damaged.
-fn preview(path: &Path) -> Result<(Compression, Channels), BagError> {
+/// What a first look at a file tells: how it is packed, and what its index repeats, in case the
+/// chunk that defines it is damaged.
+struct Preview {
+    compression: Compression,
+    channels: Channels,
+    index: Index,
+    loose_messages: bool,
+}
+
+fn preview(path: &Path) -> Result<Preview, BagError> {
     let input = File::open(path).map_err(io_error(path, "open"))?;
     let (mut compression, mut channels) = (None, Channels::default());
+    let mut loose_messages = false;
     let Some(mut walker) = Walker::new(input).map_err(io_error(path, "read"))? else {
-        return Ok((Compression::None, channels));
+        return Err(BagError::NotMcap {
+            path: path.to_owned(),
+        });
     };
-    loop {
-        let step = walker.step().map_err(io_error(path, "read"))?;
-        let (Step::Whole(record) | Step::Cut(record)) = step else {
-            break;
-        };
+    let index = Index::read(&mut walker, &mut channels).map_err(io_error(path, "read"))?;
+    while let Step::Whole(record) | Step::Cut(record) =
+        walker.step().map_err(io_error(path, "read"))?
+    {
         match record.opcode {
-            op::CHUNK if compression.is_none() => {
+            op::CHUNK => {
                 let head = walker
                     .read_body(record, HEADER_AT_MOST)
                     .map_err(io_error(path, "read"))?;
@@ -197,20 +234,19 @@ fn preview(path: &Path) -> Result<(Compression, Channels), BagError> {
                     Compression::None
                 });
             }
-            op::SCHEMA | op::CHANNEL => {
-                let body = walker
-                    .read_body(record, u64::MAX)
-                    .map_err(io_error(path, "read"))?;
-                // What is wrong with it is said when the data are taken over.
-                let _ = channels.take(record.opcode, &body);
-            }
+            op::MESSAGE => loose_messages = true,
             _ => {}
         }
-        if matches!(step, Step::Cut(_)) {
+        if compression.is_some() || loose_messages || record.end() > walker.size() {
             break;
         }
     }
-    Ok((compression.unwrap_or_default(), channels))
+    Ok(Preview {
+        compression: compression.unwrap_or_default(),
+        channels,
+        index,
+        loose_messages,
+    })
 }
 
 /// Takes records over from a damaged file.
@@ -218,25 +254,175 @@ struct Rescue {
     path: PathBuf,
     writer: StreamWriter<BufWriter<File>>,
     channels: Channels,
+    index: Index,
+    search: Search,
+    /// Start of the record before, where its length may be damaged.
+    doubtful: Option<u64>,
     recovery: Recovery,
     /// What follows the data is index, which is made anew: no loss.
     data_ended: bool,
 }
 
 impl Rescue {
-    fn lose(&mut self, at: u64, bytes: u64, reason: &str) {
+    /// Takes the next record over, or finds the way again behind damage; `false` at the end.
+    fn step(&mut self, walker: &mut Walker<File>) -> Result<bool, BagError> {
+        let path = self.path.clone();
+        let read = || io_error(&path, "read");
+        let (record, whole) = match walker.step().map_err(read())? {
+            Step::Whole(record) => (record, true),
+            Step::Cut(record) => (record, false),
+            Step::Ragged(at) => {
+                let reason = "the file ends in the middle of a record";
+                self.lose(at..walker.size(), None, reason);
+                return Ok(false);
+            }
+            Step::Finished | Step::Ended => return Ok(false),
+        };
+        let known = self
+            .search
+            .continues(walker, record.start)
+            .map_err(read())?;
+        let follows = whole
+            && self
+                .search
+                .continues(walker, record.end())
+                .map_err(read())?;
+        let is_chunk = record.opcode == op::CHUNK;
+        if whole && is_chunk && !self.claims_a_chunk(record, walker)? {
+            // Either of the two lengths is damaged; what follows tells which.
+            if let Some(end) = self.of_chunk(record, walker)? {
+                let own = self.search.row_begins(walker, end).map_err(read())?;
+                walker.go_to(if own { end } else { record.end() });
+                return Ok(true);
+            }
+        }
+        let hidden = !is_chunk && self.hides_a_chunk(record, walker)?;
+        if whole && known && !hidden && (follows || !is_chunk) {
+            // Where nothing can follow, either its length is damaged or the next record.
+            self.doubtful = (!follows).then_some(record.start);
+            self.whole(record, walker)?;
+            return Ok(true);
+        }
+        self.of_damaged_header(record, whole, walker)
+    }
+
+    /// A record whose kind or length is not what was written, or the last one of a file that was
+    /// cut: goes on behind it where its content shows how long it is, else at the next sound one.
+    fn of_damaged_header(
+        &mut self,
+        record: RecordAt,
+        whole: bool,
+        walker: &mut Walker<File>,
+    ) -> Result<bool, BagError> {
+        if let Some(end) = self.of_chunk(record, walker)? {
+            walker.go_to(end);
+            return Ok(true);
+        }
+        let from = self.doubtful.take().unwrap_or(record.start);
+        let found = self
+            .search
+            .next_sound(walker, from + 1)
+            .map_err(io_error(&self.path, "read"))?;
+        let reason = "a record whose header is damaged";
+        match found {
+            Some(next) => {
+                let start = if next < record.start {
+                    from
+                } else {
+                    record.start
+                };
+                self.lose(start..next, None, reason);
+                walker.go_to(next);
+                Ok(true)
+            }
+            None if whole => {
+                self.lose(record.start..walker.size(), None, reason);
+                Ok(false)
+            }
+            None => {
+                self.cut(record, walker)?;
+                Ok(false)
+            }
+        }
+    }
+
+    /// Whether a record whose kind is damaged has the form of a chunk.
+    fn hides_a_chunk(&self, record: RecordAt, walker: &mut Walker<File>) -> Result<bool, BagError> {
+        let index_or_unknown = matches!(
+            record.opcode,
+            op::MESSAGE_INDEX | op::CHUNK_INDEX | op::SUMMARY_OFFSET | op::PRIVATE..
+        );
+        Ok(index_or_unknown && !self.data_ended && self.claims_a_chunk(record, walker)?)
+    }
+
+    /// Whether a record is as long as a chunk's header in it says.
+    fn claims_a_chunk(
+        &self,
+        record: RecordAt,
+        walker: &mut Walker<File>,
+    ) -> Result<bool, BagError> {
+        let head = walker
+            .read_body(record, HEADER_AT_MOST)
+            .map_err(io_error(&self.path, "read"))?;
+        Ok(chunk_length(&head) == Some(record.length))
+    }
+
+    /// Where a chunk ends that begins here whatever its record's header says: one whose checksum
+    /// is right, which is taken over, or one as long as its own header says, which is not.
+    fn of_chunk(
+        &mut self,
+        record: RecordAt,
+        walker: &mut Walker<File>,
+    ) -> Result<Option<u64>, BagError> {
+        let as_chunk = |length| RecordAt {
+            opcode: op::CHUNK,
+            length,
+            ..record
+        };
+        let path = self.path.clone();
+        let read = || io_error(&path, "read");
+        if record.body() >= walker.size() {
+            return Ok(None);
+        }
+        let head = walker
+            .read_body(as_chunk(HEADER_AT_MOST), HEADER_AT_MOST)
+            .map_err(read())?;
+        let own = chunk_length(&head).map(as_chunk);
+        let Some(chunk) = own.filter(|chunk| chunk.end() <= walker.size()) else {
+            return Ok(None);
+        };
+        let body = walker.read_body(chunk, u64::MAX).map_err(read())?;
+        let unpacked = unpack(&body);
+        match unpacked.fault {
+            None => self.inner(chunk, &unpacked.records)?,
+            Some(_) if chunk == record => self.whole(record, walker)?,
+            Some(_) => return Ok(None),
+        }
+        Ok(Some(chunk.end()))
+    }
+
+    /// Notes that a part of the file is lost, which was recorded in `span`, or as the index says.
+    fn lose(&mut self, part: Range<u64>, span: Option<[Stamp; 2]>, reason: &str) {
+        let bytes = part.end - part.start;
+        let span = span.or_else(|| self.index.span(part.clone()));
+        self.lose_bytes(part.start, bytes, span, reason);
+    }
+
+    fn lose_bytes(&mut self, at: u64, bytes: u64, span: Option<[Stamp; 2]>, reason: &str) {
         if !self.data_ended {
             self.recovery.bytes_lost += bytes;
             self.recovery.damages.push(Damage {
                 path: self.path.clone(),
                 at,
+                bytes,
+                span,
                 reason: reason.to_owned(),
             });
         }
     }
 
     fn lose_record(&mut self, record: RecordAt, reason: &str) {
-        self.lose(record.start, HEADER_BYTES + record.length, reason);
+        self.lose(record.start..record.end(), None, reason);
     }
 
     fn whole(&mut self, record: RecordAt, walker: &mut Walker<File>) -> Result<(), BagError> {
@@ -255,7 +441,14 @@ impl Rescue {
                 let unpacked = unpack(&body);
                 match unpacked.fault {
                     None => self.inner(record, &unpacked.records)?,
-                    Some(reason) => self.lose_record(record, &reason),
+                    Some(reason) => {
+                        let header = ChunkHeader::take(&mut Fields(&body));
+                        let claimed =
+                            header.map(|header| [header.start_time, header.end_time].map(stamp));
+                        let part = record.start..record.end();
+                        let span = self.index.span(part.clone()).or(claimed);
+                        self.lose(part, span, &reason);
+                    }
                 }
             }
             op::ATTACHMENT => match parse_attachment(&body) {
@@ -282,11 +475,8 @@ impl Rescue {
     fn cut(&mut self, record: RecordAt, walker: &mut Walker<File>) -> Result<(), BagError> {
         let there = walker.size() - record.start;
         if record.opcode != op::CHUNK {
-            self.lose(
-                record.start,
-                there,
-                "the file ends in the middle of a record",
-            );
+            let part = record.start..walker.size();
+            self.lose(part, None, "the file ends in the middle of a record");
             return Ok(());
         }
         let body = walker
@@ -303,14 +493,16 @@ impl Rescue {
         } else {
             (unpacked.records.len() - used) as u64
         };
-        self.lose(record.start, lost, "the file ends in the middle of a chunk");
+        let reason = "the file ends in the middle of a chunk";
+        self.lose_bytes(record.start, lost, None, reason);
         Ok(())
     }
 
     fn inner(&mut self, chunk: RecordAt, records: &[u8]) -> Result<(), BagError> {
         for inner in inner_records(records) {
             if let Some(reason) = self.take(inner.opcode, inner.body)? {
-                self.lose(chunk.start, HEADER_BYTES + inner.body.len() as u64, &reason);
+                let bytes = HEADER_BYTES + inner.body.len() as u64;
+                self.lose_bytes(chunk.start, bytes, None, &reason);
             }
         }
         Ok(())

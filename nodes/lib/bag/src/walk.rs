@@ -6,15 +6,23 @@ use cromosim_spatial::Stamp;
 
 /// Record kinds of the MCAP specification.
 pub(crate) mod op {
+    pub(crate) const HEADER: u8 = 0x01;
     pub(crate) const FOOTER: u8 = 0x02;
     pub(crate) const SCHEMA: u8 = 0x03;
     pub(crate) const CHANNEL: u8 = 0x04;
     pub(crate) const MESSAGE: u8 = 0x05;
     pub(crate) const CHUNK: u8 = 0x06;
+    pub(crate) const MESSAGE_INDEX: u8 = 0x07;
+    pub(crate) const CHUNK_INDEX: u8 = 0x08;
     pub(crate) const ATTACHMENT: u8 = 0x09;
+    pub(crate) const ATTACHMENT_INDEX: u8 = 0x0a;
     pub(crate) const STATISTICS: u8 = 0x0b;
     pub(crate) const METADATA: u8 = 0x0c;
+    pub(crate) const METADATA_INDEX: u8 = 0x0d;
+    pub(crate) const SUMMARY_OFFSET: u8 = 0x0e;
     pub(crate) const DATA_END: u8 = 0x0f;
+    /// From here on kinds are anybody's own.
+    pub(crate) const PRIVATE: u8 = 0x80;
 }
 
 /// Bytes before a record's body: its kind and its length.
@@ -35,8 +43,19 @@ pub(crate) struct RecordAt {
 }
 
 impl RecordAt {
+    /// A record's first nine bytes, or more, that stand at `start`.
+    pub(crate) fn parse(header: &[u8], start: u64) -> Self {
+        let mut length = [0; 8];
+        length.copy_from_slice(&header[1..HEADER_BYTES as usize]);
+        Self {
+            opcode: header[0],
+            start,
+            length: u64::from_le_bytes(length),
+        }
+    }
+
     pub(crate) fn body(self) -> u64 {
-        self.start + HEADER_BYTES
+        self.start.saturating_add(HEADER_BYTES)
     }
 
     /// Where the next record starts.
@@ -120,13 +139,7 @@ impl<R: Read + Seek> Walker<R> {
         }
         let mut header = [0; HEADER_BYTES as usize];
         self.read_at(start, &mut header)?;
-        let mut length = [0; 8];
-        length.copy_from_slice(&header[1..]);
-        let record = RecordAt {
-            opcode: header[0],
-            start,
-            length: u64::from_le_bytes(length),
-        };
+        let record = RecordAt::parse(&header, start);
         if record.end() > self.size {
             return Ok(Step::Cut(record));
         }
@@ -148,6 +161,26 @@ impl<R: Read + Seek> Walker<R> {
         let mut body = vec![0; length as usize];
         self.read_at(record.body(), &mut body)?;
         Ok(body)
+    }
+
+    /// The header that stands at `at`, which lies in the file.
+    pub(crate) fn record_at(&mut self, at: u64) -> io::Result<RecordAt> {
+        let mut header = [0; HEADER_BYTES as usize];
+        self.read_at(at, &mut header)?;
+        Ok(RecordAt::parse(&header, at))
+    }
+
+    /// Bytes that lie in the file.
+    pub(crate) fn read_range(&mut self, at: u64, length: u64) -> io::Result<Vec<u8>> {
+        let mut bytes = vec![0; length as usize];
+        self.read_at(at, &mut bytes)?;
+        Ok(bytes)
+    }
+
+    /// Goes on at a record that begins at `at`.
+    pub(crate) fn go_to(&mut self, at: u64) {
+        self.position = at;
+        self.footer_seen = false;
     }
 
     fn read_at(&mut self, at: u64, bytes: &mut [u8]) -> io::Result<()> {

@@ -400,7 +400,7 @@ fn is_bag_directory(path: &Path) -> Result<bool, BagError> {
 }
 
 /// Removes a bag directory, where there is one; refuses to remove any other.
-fn remove_bag(path: &Path) -> Result<(), BagError> {
+pub(crate) fn remove_bag(path: &Path) -> Result<(), BagError> {
     if !path.exists() {
         return Ok(());
     }

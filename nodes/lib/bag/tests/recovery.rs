@@ -362,3 +362,109 @@ fn no_damage_makes_reading_or_mending_panic() {
         }
     }
 }
+
+/// Four chunks of 25 samples each, and where each chunk's record begins.
+fn four_chunks(path: &Path, options: BagOptions) -> Vec<usize> {
+    let mut writer = BagWriter::create(path, options).unwrap();
+    for index in 0..100 {
+        writer
+            .write("/imu/left_wrist/data_raw", stamp(index), &imu(index))
+            .unwrap();
+        if index % 25 == 24 {
+            writer.flush().unwrap();
+        }
+    }
+    writer.finish().unwrap();
+    let (bytes, mut at, mut chunks) = (fs::read(path).unwrap(), 8, Vec::new());
+    while bytes[at] != 0x0f {
+        if bytes[at] == 0x06 {
+            chunks.push(at);
+        }
+        at += 9 + u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap()) as usize;
+    }
+    assert_eq!(chunks.len(), 4);
+    chunks
+}
+
+/// How many samples a bag holds; each is what was written at its time.
+fn sound_samples(path: &Path) -> i64 {
+    let reader = BagReader::open(path).unwrap();
+    let messages = reader.messages(&Selection::default()).unwrap();
+    let mut count = 0;
+    for message in messages {
+        let message = message.unwrap();
+        let index = (message.log_time.nanos - stamp(0).nanos) / 10_000_000;
+        let found: cromosim_msgs::sensor_msgs::Imu = message.decode().unwrap();
+        assert_eq!(found, imu(index));
+        count += 1;
+    }
+    count
+}
+
+#[test]
+fn whatever_byte_of_a_chunks_header_is_flipped_the_other_chunks_are_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, mended) = (
+        folder.path().join("bad.mcap"),
+        folder.path().join("mended.mcap"),
+    );
+    for options in [PLAIN, ZSTD] {
+        let chunks = four_chunks(&path, options);
+        let whole = fs::read(&path).unwrap();
+        for (chunk, &start) in chunks.iter().enumerate() {
+            // Kind and length of the record, times, sizes, checksum and compression of the chunk.
+            for place in 0..9 + 40 {
+                for flipped in [0x01, 0x40, 0xff] {
+                    let mut bytes = whole.clone();
+                    bytes[start + place] ^= flipped;
+                    fs::write(&path, &bytes).unwrap();
+                    let _ = fs::remove_file(&mended);
+                    let recovery = recover(&path, &mended).unwrap();
+                    let case = format!("chunk {chunk}, byte {place}, {flipped:#x}: {recovery:?}");
+                    let kept = sound_samples(&mended);
+                    assert!(kept == 75 || kept == 100, "{kept}, {case}");
+                    assert_eq!(recovery.messages_lost, Some(100 - kept as u64), "{case}");
+                    assert_eq!(recovery.damages.is_empty(), kept == 100, "{case}");
+                    if let Some(damage) = recovery.damages.first() {
+                        assert_eq!(damage.at, start as u64, "{case}");
+                        assert!(damage.bytes > 25, "{case}");
+                        let span = [25 * chunk, 25 * chunk + 24].map(|index| stamp(index as i64));
+                        assert_eq!(damage.span, Some(span), "{case}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn without_an_index_the_way_is_found_again_as_well() {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, mended) = (
+        folder.path().join("killed.mcap"),
+        folder.path().join("mended.mcap"),
+    );
+    let chunks = four_chunks(&path, PLAIN);
+    let mut bytes = fs::read(&path).unwrap();
+    // Killed in the last chunk; and a length in the second is damaged.
+    bytes.truncate(chunks[3] + 10 * SAMPLE_BYTES as usize);
+    bytes[chunks[1] + 5] ^= 0x08;
+    fs::write(&path, &bytes).unwrap();
+    let recovery = recover(&path, &mended).unwrap();
+    let kept = sound_samples(&mended);
+    assert!((84..=85).contains(&kept), "{kept}: {recovery:?}");
+    assert_eq!(recovery.messages_lost, None);
+    assert_eq!(recovery.damages.len(), 1, "{recovery:?}");
+    // Of a chunk whose content is damaged too, the others are kept.
+    bytes[chunks[1] + 3000] ^= 0x08;
+    fs::write(&path, &bytes).unwrap();
+    fs::remove_file(&mended).unwrap();
+    let recovery = recover(&path, &mended).unwrap();
+    assert_eq!(sound_samples(&mended), kept - 25, "{recovery:?}");
+    assert_eq!(recovery.damages[0].at, chunks[1] as u64);
+    let lost = (chunks[2] - chunks[1]) as u64;
+    assert!(
+        recovery.damages[0].bytes.abs_diff(lost) < 2000,
+        "{recovery:?}"
+    );
+}
