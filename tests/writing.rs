@@ -114,3 +114,113 @@ fn a_signal_leaves_nothing_half_written() {
     assert!(kill.success() && status.code() == Some(2), "{status}");
     assert_eq!(listing(folder.path()), before);
 }
+
+#[test]
+fn nothing_is_replaced_without_force() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let path = |name: &str| root().join(name).display().to_string();
+    let (walk, session) = (path("bags/walk"), path("bags/gap/session"));
+    let walk_file = path("bags/walk/walk_0.mcap");
+    common::succeed(here, &["simulate", "--out", "s.mcap"]);
+    common::succeed(here, &["convert", &walk, "w.tum", "--site", "left_watch"]);
+    // What is there already, and the command that would replace it.
+    let cases: [(&str, &[&str]); 13] = [
+        ("simulated.mcap", &["simulate", "--out", "simulated.mcap"]),
+        (
+            "again.mcap",
+            &["simulate", "--reference", &session, "--out", "again.mcap"],
+        ),
+        (
+            "rigid.mcap",
+            &[
+                "simulate",
+                "--rigid",
+                "w.tum",
+                "--rate",
+                "50",
+                "--out",
+                "rigid.mcap",
+            ],
+        ),
+        (
+            "csv/new_head.csv",
+            &["simulate", "--out", "new.mcap", "--csv", "csv"],
+        ),
+        (
+            "diagnosis/effects.yaml",
+            &["diagnose", &session, "--out", "diagnosis"],
+        ),
+        (
+            "compared.json",
+            &["compare", &walk, &walk, "--out", "compared.json"],
+        ),
+        ("walk.bvh", &["convert", &walk, "walk.bvh"]),
+        (
+            "map.yaml",
+            &[
+                "map",
+                "--simulated",
+                "s.mcap",
+                "--measured",
+                &walk,
+                "--out",
+                "map.yaml",
+            ],
+        ),
+        (
+            "fidelity/results.json",
+            &["evaluate", "fidelity", "--out", "fidelity"],
+        ),
+        (
+            "head.csv",
+            &[
+                "bag",
+                "csv",
+                &walk,
+                "/imu/head/data_raw",
+                "--out",
+                "head.csv",
+            ],
+        ),
+        (
+            "mended.mcap",
+            &["bag", "recover", &walk_file, "--out", "mended.mcap"],
+        ),
+        ("body.obj", &["body", "export", "body.obj"]),
+        ("done", &["completion", "bash", "--out", "done"]),
+    ];
+    common::succeed(here, &["convert", &walk, "w.bvh"]);
+    for (name, arguments) in cases {
+        let place = here.join(name);
+        fs::create_dir_all(place.parent().unwrap()).unwrap();
+        fs::write(&place, "mine").unwrap();
+        let before = listing(here);
+        let said = ["exists already", "--force", name];
+        common::refuses(here, arguments, &said);
+        assert_eq!(fs::read_to_string(&place).unwrap(), "mine", "{arguments:?}");
+        assert_eq!(listing(here), before, "{arguments:?}");
+        // An evaluation takes minutes, and needs data.
+        if arguments[0] != "evaluate" {
+            common::succeed(here, &[arguments, &["--force"]].concat());
+            assert_ne!(fs::read(&place).unwrap(), b"mine", "{arguments:?}");
+        }
+    }
+    // A device is written into, and stays one.
+    common::succeed(
+        here,
+        &[
+            "bag",
+            "csv",
+            &walk,
+            "/imu/head/data_raw",
+            "--out",
+            "/dev/null",
+        ],
+    );
+    assert!(!Path::new("/dev/null").is_file());
+    // A demo takes the place of the one before it in its own folder alone.
+    fs::create_dir_all(here.join("mine/bag")).unwrap();
+    let demo = ["demo", "--duration", "0.1", "--out", "mine"];
+    common::refuses(here, &demo, &["mine/bag", "exists already", "--force"]);
+}

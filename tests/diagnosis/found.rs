@@ -60,6 +60,7 @@ fn a_lever_arm_is_found_and_the_promise_holds() {
             "found",
             "--without",
             "lever_arm",
+            "--force",
         ],
     );
     let without = diagnosis(folder.path(), "found");

@@ -475,7 +475,7 @@ def evaluate(name, how, file, cromosim, out):
         diagnosis, effects = folder / "diagnosis", folder / "diagnosis" / "effects.yaml"
         for old in (diagnosis / "diagnosis.json", effects, folder / "nominal.mcap", folder / "after.mcap"):
             old.unlink(missing_ok=True)  # an old answer must not pass for a new one
-        row["diagnosed"], row["diagnose_seconds"] = run([cromosim, "diagnose", folder / "fit.mcap", "--out", diagnosis], log)
+        row["diagnosed"], row["diagnose_seconds"] = run([cromosim, "diagnose", folder / "fit.mcap", "--out", diagnosis, "--force"], log)
         base = [cromosim, "simulate", "--reference", folder / "check.mcap", "--no-noise", "--force"]
         if run([*base, "--out", folder / "nominal.mcap"], log)[0]:
             series["nominal"] = simulated(folder / "nominal.mcap", trial)

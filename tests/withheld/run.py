@@ -16,7 +16,7 @@ import tables
 def diagnose(cromosim, recordings, out, without=None):
     """One diagnosis of one recording or several; time.txt gets wall and processor seconds, log.txt what was printed."""
     os.makedirs(out, exist_ok=True)
-    command = [cromosim, "diagnose", *recordings, "--out", out] + (["--without", without] if without else [])
+    command = [cromosim, "diagnose", *recordings, "--out", out, "--force"] + (["--without", without] if without else [])
     with open(os.path.join(out, "log.txt"), "w") as log:
         begin = time.monotonic()
         child = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT)

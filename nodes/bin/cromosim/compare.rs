@@ -11,6 +11,7 @@ use cromosim_bag::BagReader;
 use cromosim_gap::{Diagnosis, SCHEMA};
 use cromosim_recording::compare::{compare_diagnoses, compare_recordings};
 
+use crate::files::{refuse_existing, write_whole};
 use crate::output::{print, say};
 
 /// Say what differs between two diagnoses, or between the IMUs of two recordings
@@ -23,6 +24,9 @@ pub struct Arguments {
     /// Write what is found to this file too, as JSON
     #[arg(long, value_name = "FILE.json")]
     out: Option<PathBuf>,
+    /// Replace FILE.json where it exists
+    #[arg(long, requires = "out")]
+    force: bool,
 }
 
 /// What one side is.
@@ -42,8 +46,10 @@ impl Side {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    if let Some(path) = &arguments.out {
+        refuse_existing(path, arguments.force)?;
+    }
     let (a, b) = (open(&arguments.a)?, open(&arguments.b)?);
-    say!("A  {}\nB  {}", arguments.a.display(), arguments.b.display())?;
     let found = match (&a, &b) {
         (Side::Diagnosis(a), Side::Diagnosis(b)) => compare_diagnoses(a, b)?,
         (Side::Recording(a), Side::Recording(b)) => compare_recordings(a, b)?,
@@ -57,12 +63,16 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
             )
         }
     };
-    print(format_args!("{}", found.text))?;
     if let Some(path) = &arguments.out {
         let text =
             serde_json::to_string_pretty(&found.json).context("what was found is no JSON")? + "\n";
-        fs::write(path, text).with_context(|| format!("{}: cannot be written", path.display()))?;
+        write_whole(path, arguments.force, |file| {
+            file.write_all(text.as_bytes())
+                .with_context(|| format!("{}: cannot be written", path.display()))
+        })?;
     }
+    say!("A  {}\nB  {}", arguments.a.display(), arguments.b.display())?;
+    print(format_args!("{}", found.text))?;
     Ok(())
 }
 

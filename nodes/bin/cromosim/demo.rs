@@ -17,6 +17,7 @@ use cromosim_imu::{Device, MountedSensors, PlacementSet};
 use cromosim_ros::{Network, RosArgs, Security};
 use cromosim_spatial::PoseSource;
 
+use crate::files::refuse_existing;
 use crate::progress::Interrupt;
 use crate::{body, progress, summary};
 
@@ -26,6 +27,8 @@ const PATIENCE: Duration = Duration::from_secs(15);
 const DRAIN: Duration = Duration::from_millis(1500);
 /// What a node has for closing its files once the demo has failed.
 const LAST_MOMENT: Duration = Duration::from_secs(3);
+/// Where a demo goes that was given no folder.
+const DEFAULT_OUT: &str = "cromosim-demo";
 const READY: &str = "ready";
 
 /// Arguments of `cromosim demo`.
@@ -43,9 +46,13 @@ pub struct Arguments {
     /// Sensor placements (YAML) rather than left_wrist, right_ankle, pelvis, sternum and head
     #[arg(long, value_name = "FILE")]
     placements: Option<PathBuf>,
-    /// Where the bag, the Rerun recording and the logs go
-    #[arg(long, value_name = "DIR", default_value = "cromosim-demo")]
-    out: PathBuf,
+    /// Where the bag, the Rerun recording and the logs go [default: cromosim-demo, where each demo
+    /// takes the place of the one before]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Replace what an earlier demo left in DIR
+    #[arg(long)]
+    force: bool,
     /// Seed of the sensor noise
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(i64).range(0..))]
     seed: i64,
@@ -207,13 +214,20 @@ struct Places {
 }
 
 impl Places {
-    /// Clears what an earlier demo left, and nothing else.
-    fn prepare(out: &Path) -> anyhow::Result<Self> {
+    /// Clears what an earlier demo left, and nothing else; of a folder that the user named, only
+    /// with `force`.
+    fn prepare(given: Option<&Path>, force: bool) -> anyhow::Result<Self> {
+        let out = given.unwrap_or(Path::new(DEFAULT_OUT));
         let places = Self {
             bag: out.join("bag"),
             recording: out.join("demo.rrd"),
             logs: out.join("logs"),
         };
+        if given.is_some() {
+            for path in [&places.bag, &places.recording] {
+                refuse_existing(path, force)?;
+            }
+        }
         clear(&places.bag, |name| {
             name == "metadata.yaml" || name.ends_with(".mcap")
         })?;
@@ -249,7 +263,7 @@ fn clear(folder: &Path, ours: impl Fn(&str) -> bool) -> anyhow::Result<()> {
 /// Runs the demo and prints what it made.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let (duration, source) = arguments.check()?;
-    let places = Places::prepare(&arguments.out)?;
+    let places = Places::prepare(arguments.out.as_deref(), arguments.force)?;
     let stop = Interrupt::watch()?;
 
     // Listeners first, so that nobody misses the beginning.

@@ -17,6 +17,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use crate::diagnose_recordings::{OneRecording, Selected, file_names, of_recording, select};
+use crate::files::refuse_existing;
 use crate::output::{remark, say};
 use crate::progress::{self, Interrupt};
 
@@ -48,10 +49,12 @@ pub struct Arguments {
     /// The recording (.mcap, rosbag2 directory); several of the same devices are diagnosed together
     #[arg(required = true, value_name = "RECORDING")]
     recordings: Vec<PathBuf>,
-    /// The folder for the four files; is made where it is missing, and files of an earlier
-    /// diagnosis in it are replaced
+    /// The folder for the four files; is made where it is missing
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Replace the files of an earlier diagnosis in DIR
+    #[arg(long)]
+    force: bool,
     /// Settings (YAML), see below with --help
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
@@ -75,7 +78,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .transpose()?
         .unwrap_or_default();
     let options = options(arguments, &config)?;
-    check_folder(&arguments.out)?;
+    check_folder(&arguments.out, arguments.force)?;
     let body = arguments.body.as_deref().map(BodyModel::read).transpose()?;
     let Selected {
         placements,
@@ -224,7 +227,7 @@ fn effect(name: &str, place: &str) -> anyhow::Result<EffectKind> {
 }
 
 /// Says before the work what would stop its files after it.
-fn check_folder(folder: &Path) -> anyhow::Result<()> {
+fn check_folder(folder: &Path, force: bool) -> anyhow::Result<()> {
     if let Some(file) = folder
         .ancestors()
         .find(|place| place.exists())
@@ -245,7 +248,9 @@ fn check_folder(folder: &Path) -> anyhow::Result<()> {
             "{}: is a folder and cannot be replaced by a file",
             path.display()
         ),
-        None => Ok(()),
+        None => FILES
+            .iter()
+            .try_for_each(|name| refuse_existing(&folder.join(name), force)),
     }
 }
 

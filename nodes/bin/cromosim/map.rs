@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use anyhow::bail;
 use clap::Args;
 use cromosim_evaluation::fit_mapping;
 
+use crate::files::refuse_existing;
 use crate::output::say;
 
 /// Fit a distribution mapping (by ranks, per channel and placement) from a simulated to a measured
@@ -29,9 +29,7 @@ pub struct Arguments {
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let out = arguments.out.display();
-    if arguments.out.exists() && !arguments.force {
-        bail!("{out}: exists already; give another name, or --force to replace it");
-    }
+    refuse_existing(&arguments.out, arguments.force)?;
     let file = fit_mapping(&arguments.simulated, &arguments.measured)?;
     file.write(&arguments.out)?;
     let names: Vec<&str> = file.placements.keys().map(String::as_str).collect();

@@ -17,6 +17,7 @@ use cromosim_recording::{
 };
 use rayon::prelude::*;
 
+use crate::files::refuse_existing;
 use crate::output::say;
 use crate::progress::{self, Interrupt};
 use crate::simulate::read_mapping;
@@ -33,6 +34,7 @@ pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
             arguments.out.display()
         );
     }
+    refuse_existing(&arguments.out, arguments.force)?;
     let scheme = arguments.differentiation()?;
     let reader = BagReader::open(recording)?;
     let body = arguments.body.as_deref().map(BodyModel::read).transpose()?;
@@ -67,6 +69,7 @@ pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
 
 /// Runs `simulate --rigid TRAJECTORY`: the trajectory is the reference of one placement.
 pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()> {
+    refuse_existing(&arguments.out, arguments.force)?;
     let scheme = arguments.differentiation()?;
     let name = arguments.placement.as_deref().unwrap_or("body");
     if let Err((_, problem)) = Placement::at_site(name, "left_watch", 1.0) {

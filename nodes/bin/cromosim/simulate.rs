@@ -20,13 +20,14 @@ use cromosim_motion::{
 use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_msgs::std_msgs::Header;
 use cromosim_recording::{
-    FIRST_STAMP, PlayedPerson, Quality, RecordingError, SimulatedPlacement, reading_mapping,
-    write_people, write_people_csv,
+    FIRST_STAMP, PlayedPerson, Quality, RecordingError, SimulatedPlacement, csv_file,
+    reading_mapping, write_people, write_people_csv,
 };
 use cromosim_spatial::{PoseTimes, Stamp, uniform_stamps};
 use indicatif::ProgressBar;
 use rayon::prelude::*;
 
+use crate::files::refuse_existing;
 use crate::output::{remark, say};
 use crate::progress::Interrupt;
 use crate::simulate_arguments::{Arguments, TextureOn};
@@ -314,6 +315,21 @@ impl Setup {
         Ok(Some(drawn))
     }
 
+    /// The CSV files of a bag, where they are asked for.
+    fn csv_files(&self, people: &[PlayedPerson], out: &Path) -> Vec<PathBuf> {
+        let of_person = |folder: &Path, person: &PlayedPerson| -> Vec<PathBuf> {
+            let names = names(&self.placements).into_iter();
+            names
+                .map(|name| csv_file(out, folder, person, name))
+                .collect()
+        };
+        let folder = self.csv.iter();
+        folder
+            .flat_map(|folder| people.iter().map(|person| of_person(folder, person)))
+            .flatten()
+            .collect()
+    }
+
     /// What is unlikely of people and placements; the readers have refused what is impossible.
     fn oddities(&self, people: &[PlayedPerson]) -> anyhow::Result<Vec<String>> {
         let mut oddities = Vec::new();
@@ -410,6 +426,10 @@ fn simulate_one(
     out: &Path,
     bar: &ProgressBar,
 ) -> anyhow::Result<String> {
+    refuse_existing(out, setup.force)?;
+    for path in setup.csv_files(people, out) {
+        refuse_existing(&path, setup.force)?;
+    }
     let simulated = people
         .iter()
         .map(|person| setup.simulate(person, bar))
@@ -441,7 +461,7 @@ fn simulate_one(
     let summary = bag.finish()?;
     if let Some(folder) = &setup.csv {
         for (person, simulated) in people.iter().zip(&simulated) {
-            write_people_csv(out, folder, person, simulated)?;
+            write_people_csv(out, folder, person, simulated, setup.force)?;
         }
     }
     bar.suspend(|| warn(Path::new(&motion.name), &oddities));

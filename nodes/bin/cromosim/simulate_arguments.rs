@@ -113,7 +113,7 @@ pub struct Arguments {
     /// that it names
     #[arg(long, value_name = "FILE", help_heading = NETWORKS)]
     pub mapping: Option<PathBuf>,
-    /// Replace OUT where it exists
+    /// Replace OUT, and the CSV files of --csv, where they exist
     #[arg(long)]
     pub force: bool,
 }

@@ -17,6 +17,7 @@ use nalgebra::{UnitQuaternion, Vector2, Vector3};
 
 use crate::body;
 use crate::convert::Format;
+use crate::files::refuse_existing;
 use crate::motion_arguments::MotionArguments;
 use crate::output::say;
 
@@ -100,12 +101,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
             target.describe()
         );
     }
-    if arguments.out.exists() && !arguments.force {
-        bail!(
-            "{}: exists already; --force replaces it",
-            arguments.out.display()
-        );
-    }
+    refuse_existing(&arguments.out, arguments.force)?;
     let options = options(arguments)?;
     let motion_options = arguments.motion.options()?;
     let model = body::model(arguments.body.as_deref())?;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use cromosim_evaluation::{DataFolder, FidelityOptions, Protocol, evaluate_fidelity};
 
-use super::folders::{data_folder, refuse_existing};
+use super::folders::{data_folder, refuse_results};
 use crate::body;
 use crate::output::{print, say};
 use crate::progress::Terminal;
@@ -46,7 +46,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Some(path) => Protocol::read(path)?,
         None => Protocol::embedded()?,
     };
-    refuse_existing(&arguments.out, &["results.json"], arguments.force)?;
+    refuse_results(&arguments.out, &["results.json"], arguments.force)?;
     let terminal = Terminal::watch()?;
     let options = FidelityOptions {
         data: DataFolder {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::bail;
+use crate::files::refuse_existing;
 
 /// The folder with the third-party data: what is given, else CROMOSIM_DATA, else ../shared/data.
 pub fn data_folder(given: Option<&Path>) -> PathBuf {
@@ -14,13 +14,7 @@ pub fn data_folder(given: Option<&Path>) -> PathBuf {
 }
 
 /// Refuses a folder that holds results already, unless `force`.
-pub fn refuse_existing(out: &Path, names: &[&str], force: bool) -> anyhow::Result<()> {
-    let mut existing = names.iter().map(|name| out.join(name));
-    if let Some(path) = existing.find(|path| path.exists() && !force) {
-        bail!(
-            "{}: exists already; give another --out, or --force to replace it",
-            path.display()
-        );
-    }
-    Ok(())
+pub fn refuse_results(out: &Path, names: &[&str], force: bool) -> anyhow::Result<()> {
+    let mut places = names.iter().map(|name| out.join(name));
+    places.try_for_each(|path| refuse_existing(&path, force))
 }

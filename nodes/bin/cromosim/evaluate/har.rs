@@ -7,7 +7,7 @@ use clap::Args;
 use cromosim_evaluation::{Activities, ActivityOptions, evaluate_activities};
 use cromosim_learned::LearnedSimulator;
 
-use super::folders::{data_folder, refuse_existing};
+use super::folders::{data_folder, refuse_results};
 use crate::body;
 use crate::output::{print, say};
 use crate::progress::Terminal;
@@ -62,7 +62,7 @@ pub struct Arguments {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    refuse_existing(&arguments.out, &FILES, arguments.force)?;
+    refuse_results(&arguments.out, &FILES, arguments.force)?;
     let terminal = Terminal::watch()?;
     let options = ActivityOptions {
         data: data_folder(arguments.data.as_deref()),

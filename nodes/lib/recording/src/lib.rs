@@ -40,7 +40,7 @@ pub use error::RecordingError;
 pub use file::{is_in_the_way, read_head, read_whole, write_file, write_file_with};
 pub use messages::{FIRST_STAMP, MessageHeader, smpl_pose, smpl_state, stamp_of_frame};
 pub use placement::{RecordedPlacement, read_placements, read_poses};
-pub use played::{PlayedPerson, SimulatedPlacement, write_people, write_people_csv};
+pub use played::{PlayedPerson, SimulatedPlacement, csv_file, write_people, write_people_csv};
 pub use quality::Quality;
 pub use resimulation::{
     Resimulated, Resimulation, outside_reference, read_effects, reading_mapping, with_stamps,

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::ops::RangeInclusive;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use cromosim_bag::{BagReader, BagWriter, write_imu_csv};
 use cromosim_imu::ImuMessages;
@@ -215,8 +215,18 @@ fn topics(person: &PlayedPerson, simulated: &[SimulatedPlacement]) -> Vec<(Strin
     simulated.iter().map(both).collect()
 }
 
-/// DIR/NAME_PLACEMENT.csv with the samples of `data`; of several people
-/// NAME_person_ID_PLACEMENT.csv. They are read back from the bag.
+/// DIR/NAME_PLACEMENT.csv; of several people NAME_person_ID_PLACEMENT.csv.
+pub fn csv_file(bag: &Path, folder: &Path, person: &PlayedPerson, placement: &str) -> PathBuf {
+    let stem = bag.file_stem().unwrap_or_default().to_string_lossy();
+    let label = if person.label.is_empty() {
+        String::new()
+    } else {
+        format!("_{}", person.label)
+    };
+    folder.join(format!("{stem}{label}_{placement}.csv"))
+}
+
+/// [`csv_file`] of each placement with the samples of `data`. They are read back from the bag.
 ///
 /// # Errors
 /// Where the folder or a file cannot be written, or the bag cannot be read.
@@ -225,22 +235,17 @@ pub fn write_people_csv(
     folder: &Path,
     person: &PlayedPerson,
     simulated: &[SimulatedPlacement],
+    replace: bool,
 ) -> Result<(), RecordingError> {
     fs::create_dir_all(folder).map_err(|source| RecordingError::Make {
         path: folder.to_owned(),
         source,
     })?;
     let reader = BagReader::open(bag)?;
-    let stem = bag.file_stem().unwrap_or_default().to_string_lossy();
-    let label = if person.label.is_empty() {
-        String::new()
-    } else {
-        format!("_{}", person.label)
-    };
     for placement in simulated {
-        let path = folder.join(format!("{stem}{label}_{}.csv", placement.name));
+        let path = csv_file(bag, folder, person, &placement.name);
         let topic = person.topic(&format!("imu/{}/data", placement.name));
-        write_file_with(&path, true, |file| {
+        write_file_with(&path, replace, |file| {
             Ok::<_, RecordingError>(write_imu_csv(&reader, &topic, file, &path)?)
         })?;
     }
