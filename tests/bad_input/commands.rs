@@ -236,3 +236,48 @@ fn options_of_another_mode_of_simulate() {
         &["--device", "--effects"],
     );
 }
+
+/// A named pipe into which nobody writes: reading it would wait for ever.
+#[test]
+fn pipes_are_refused_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let pipe = folder.path().join("pipe");
+    let made = std::process::Command::new("mkfifo")
+        .arg(&pipe)
+        .status()
+        .unwrap();
+    assert!(made.success());
+    let commands: [&[&str]; 14] = [
+        &["inspect", "pipe"],
+        &["convert", "pipe", "o.bvh"],
+        &["simulate", "pipe", "--out", "o.mcap"],
+        &["simulate", "--placements", "pipe", "--out", "o.mcap"],
+        &["simulate", "--body", "pipe", "--out", "o.mcap"],
+        &["simulate", "--mapping", "pipe", "--out", "o.mcap"],
+        &[
+            "simulate", "--rigid", "pipe", "--rate", "50", "--out", "o.mcap",
+        ],
+        &["simulate", "--reference", "pipe", "--out", "o.mcap"],
+        &["diagnose", "pipe", "--out", "o"],
+        &["diagnose", "pipe", "--out", "o", "--config", "pipe"],
+        &["compare", "pipe", "pipe"],
+        &["bag", "csv", "pipe", "/imu/head/data_raw"],
+        &["bag", "recover", "pipe"],
+        &["train", "pipe", "--out", "o"],
+    ];
+    for arguments in commands {
+        let output = std::process::Command::new("timeout")
+            .args(["60", crate::common::CROMOSIM])
+            .args(arguments)
+            .current_dir(folder.path())
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+        assert!(
+            said.contains("pipe: ") && said.contains("a pipe or device"),
+            "{arguments:?}: {said}"
+        );
+        assert_eq!(said.trim_end().lines().count(), 1, "{said}");
+    }
+}

@@ -1,7 +1,6 @@
 //! `cromosim compare A B`: what differs between two diagnoses, or between the IMUs of two
 //! recordings.
 
-use std::fs::{self, File};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -87,7 +86,7 @@ fn open(path: &Path) -> anyhow::Result<Side> {
         };
     }
     let mut head = Vec::new();
-    File::open(path)
+    cromosim_spatial::open_file(path)
         .and_then(|file| file.take(64).read_to_end(&mut head))
         .with_context(|| format!("{}: cannot be read", path.display()))?;
     match head.iter().find(|byte| !byte.is_ascii_whitespace()) {
@@ -98,8 +97,8 @@ fn open(path: &Path) -> anyhow::Result<Side> {
 }
 
 fn read_diagnosis(path: &Path) -> anyhow::Result<Side> {
-    let text =
-        fs::read_to_string(path).with_context(|| format!("{}: cannot be read", path.display()))?;
+    let text = cromosim_spatial::read_text(path)
+        .with_context(|| format!("{}: cannot be read", path.display()))?;
     let diagnosis: Diagnosis =
         serde_json::from_str(&text).with_context(|| format!("{}: no diagnosis", path.display()))?;
     ensure!(

@@ -203,7 +203,7 @@ struct Config {
 
 impl Config {
     fn read(file: &Path) -> anyhow::Result<Self> {
-        let text = fs::read_to_string(file)
+        let text = cromosim_spatial::read_text(file)
             .with_context(|| format!("{}: cannot be read", file.display()))?;
         Self::parse(&text).with_context(|| file.display().to_string())
     }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{Context, bail};
-use cromosim_bag::{BagOptions, BagWriter, Compression};
+use cromosim_bag::{BagOptions, BagSummary, BagWriter, Compression};
 use cromosim_body::{BodyModel, ShapedBody};
 use cromosim_imu::{
     Device, Differentiation, DrawnTexture, ImuOptions, KinematicSample, MountedSensor,
@@ -420,6 +420,38 @@ fn last_played(people: &[PlayedPerson]) -> Option<Stamp> {
     people.iter().filter_map(last).max()
 }
 
+fn write_bag(
+    setup: &Setup,
+    people: &[PlayedPerson],
+    simulated: &[Vec<SimulatedPlacement>],
+    oddities: &[String],
+    out: &Path,
+) -> anyhow::Result<BagSummary> {
+    let options = BagOptions {
+        compression: Compression::Zstd,
+        replace: setup.force,
+        ..BagOptions::default()
+    };
+    let mut bag = BagWriter::create(out, options)?;
+    let mut metadata = setup.metadata(&people[0].motion);
+    for (person, simulated) in people.iter().zip(simulated) {
+        let quality = |placement: &SimulatedPlacement| {
+            quality_entries(&person.frame(&placement.name), &placement.quality)
+        };
+        metadata.extend(simulated.iter().flat_map(quality));
+    }
+    metadata.extend(unlikely(oddities.iter().cloned()));
+    bag.write_metadata("cromosim", metadata)?;
+    bag.attach(
+        "placements.yaml",
+        "application/yaml",
+        FIRST_STAMP,
+        setup.placements.to_yaml().as_bytes(),
+    )?;
+    write_people(&mut bag, people, simulated, || setup.interrupt.check())?;
+    Ok(bag.finish()?)
+}
+
 fn simulate_one(
     setup: &Setup,
     people: &[PlayedPerson],
@@ -434,36 +466,14 @@ fn simulate_one(
         .iter()
         .map(|person| setup.simulate(person, bar))
         .collect::<anyhow::Result<Vec<_>>>()?;
-    let motion = &people[0].motion;
-    let options = BagOptions {
-        compression: Compression::Zstd,
-        replace: setup.force,
-        ..BagOptions::default()
-    };
-    let mut bag = BagWriter::create(out, options)?;
-    let mut metadata = setup.metadata(motion);
-    for (person, simulated) in people.iter().zip(&simulated) {
-        let quality = |placement: &SimulatedPlacement| {
-            quality_entries(&person.frame(&placement.name), &placement.quality)
-        };
-        metadata.extend(simulated.iter().flat_map(quality));
-    }
     let oddities = setup.oddities(people)?;
-    metadata.extend(unlikely(oddities.iter().cloned()));
-    bag.write_metadata("cromosim", metadata)?;
-    bag.attach(
-        "placements.yaml",
-        "application/yaml",
-        FIRST_STAMP,
-        setup.placements.to_yaml().as_bytes(),
-    )?;
-    write_people(&mut bag, people, &simulated, || setup.interrupt.check())?;
-    let summary = bag.finish()?;
+    let summary = write_bag(setup, people, &simulated, &oddities, out)?;
     if let Some(folder) = &setup.csv {
         for (person, simulated) in people.iter().zip(&simulated) {
             write_people_csv(out, folder, person, simulated, setup.force)?;
         }
     }
+    let motion = &people[0].motion;
     bar.suspend(|| warn(Path::new(&motion.name), &oddities));
     let last = last_played(people).map_or(0.0, |last| last - FIRST_STAMP);
     let placements = setup.placements.placements().len();

@@ -10,6 +10,7 @@ use crate::ArraysError;
 use crate::blob::Blob;
 use crate::entry::Entry;
 use crate::error::invalid;
+use crate::file::open_file;
 use crate::format::{Format, first_bytes};
 use crate::inflate::{inflated, unzipped};
 use crate::limits::{Budget, Limits};
@@ -41,7 +42,7 @@ impl Container<BufReader<std::fs::File>> {
     /// # Errors
     /// Any [`ArraysError`] but those of accessors.
     pub fn open(path: &Path) -> Result<Self, ArraysError> {
-        let file = std::fs::File::open(path).map_err(|source| ArraysError::Open {
+        let file = open_file(path).map_err(|source| ArraysError::Open {
             path: path.to_owned(),
             source,
         })?;
@@ -74,6 +75,9 @@ impl<R: Read + Seek> Container<R> {
             path: path.to_owned(),
             source,
         };
+        let bytes = reader.seek(SeekFrom::End(0)).map_err(cannot_read)?;
+        reader.rewind().map_err(cannot_read)?;
+        let limits = limits.of_file(bytes);
         let path: Arc<Path> = Arc::from(path);
         let Some(format) = Format::detect(&mut reader).map_err(cannot_read)? else {
             let start = first_bytes(&mut reader).map_err(cannot_read)?;

@@ -45,6 +45,7 @@ mod container;
 mod dtype;
 mod entry;
 mod error;
+mod file;
 mod format;
 mod inflate;
 mod limits;

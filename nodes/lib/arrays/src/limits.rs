@@ -24,6 +24,25 @@ impl Default for Limits {
     }
 }
 
+/// Any file may take so many bytes once it is decoded, and [`DECODED_FACTOR`] times its own size: a
+/// small file that asks for gigabytes is no honest one. Packed arrays of estimates shrink to a
+/// third, empty ones to a thousandth, which the floor leaves room for; a pickled float has nine
+/// bytes and takes 160 here, of an integer below 256 two bytes take as much.
+const DECODED_FLOOR: u64 = 64 << 20;
+/// See [`DECODED_FLOOR`].
+const DECODED_FACTOR: u64 = 64;
+
+impl Limits {
+    /// The same, but no more than a file of so many bytes may take.
+    pub(crate) fn of_file(self, bytes: u64) -> Self {
+        let most = DECODED_FLOOR.saturating_add(DECODED_FACTOR.saturating_mul(bytes));
+        Self {
+            decoded_bytes: self.decoded_bytes.min(most),
+            ..self
+        }
+    }
+}
+
 /// Elements of the largest array that accessors hand out as numbers: 2 GiB of float64.
 pub const ELEMENTS_LIMIT: usize = 1 << 28;
 
@@ -68,7 +87,7 @@ impl Budget {
 
     pub fn too_much(&self) -> String {
         format!(
-            "the content takes more than the {} bytes allowed; raise Limits::decoded_bytes if the file is sound",
+            "the content takes more than the {} bytes that a file of this size may take; save what is needed of it as npz",
             self.limits.decoded_bytes
         )
     }

@@ -12,6 +12,7 @@ use crate::array::Array;
 use crate::blob::Blob;
 use crate::entry::Entry;
 use crate::error::invalid;
+use crate::file::open_file;
 use crate::limits::{Budget, Limits};
 use crate::npy::{self, HEADER_BYTES_LIMIT, NpyHeader};
 
@@ -30,7 +31,7 @@ impl NpzReader<BufReader<std::fs::File>> {
     /// # Errors
     /// [`ArraysError::Open`], [`ArraysError::Archive`].
     pub fn open(path: &Path) -> Result<Self, ArraysError> {
-        let file = std::fs::File::open(path).map_err(|source| ArraysError::Open {
+        let file = open_file(path).map_err(|source| ArraysError::Open {
             path: path.to_owned(),
             source,
         })?;

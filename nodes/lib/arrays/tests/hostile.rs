@@ -518,3 +518,28 @@ fn tensors_repeat_their_storage_within_bounds() {
             .contains("contiguous copy")
     );
 }
+
+#[test]
+fn a_small_file_takes_no_gigabytes() {
+    // Two million objects of one byte each: hundreds of bytes each once they are objects.
+    let objects = [b"(".to_vec(), b"N".repeat(2_000_000), b"l.".to_vec()].concat();
+    let error = read(objects).unwrap_err().to_string();
+    assert!(error.contains("a file of this size"), "{error}");
+    // 200 MB of zeros, packed a thousandfold.
+    let mut writer = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::best());
+    writer.write_all(b"\x80\x03B\x00\xc2\xeb\x0b").unwrap();
+    writer.write_all(&vec![0; 200_000_000]).unwrap();
+    writer.write_all(b".").unwrap();
+    let error = read(writer.finish().unwrap()).unwrap_err().to_string();
+    assert!(error.contains("a file of this size"), "{error}");
+    // What real tools write of honest content: a long list of small integers, and of numbers.
+    let small = [b"(".to_vec(), b"K\x07".repeat(400_000), b"l.".to_vec()].concat();
+    assert!(read(small).is_ok());
+    let numbers = [
+        b"(".to_vec(),
+        b"G\x40\x09\x21\xfb\x54\x44\x2d\x18".repeat(2_000_000),
+        b"l.".to_vec(),
+    ]
+    .concat();
+    assert!(read(numbers).is_ok());
+}

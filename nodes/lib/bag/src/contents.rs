@@ -194,7 +194,7 @@ fn read_statistics(body: &[u8]) -> Option<Statistics> {
 impl Contents {
     /// Walks over a file.
     pub(crate) fn read(path: &Path) -> Result<Self, BagError> {
-        let file = File::open(path).map_err(io_error(path, "open"))?;
+        let file = cromosim_spatial::open_file(path).map_err(io_error(path, "open"))?;
         let mut walker = Walker::new(file)
             .map_err(io_error(path, "read"))?
             .ok_or_else(|| BagError::NotMcap {

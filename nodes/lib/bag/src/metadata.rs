@@ -1,6 +1,5 @@
 //! rosbag2's own record of what a bag holds: `metadata.yaml`, and the same inside the MCAP file.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -155,7 +154,7 @@ struct ReadInformation {
 /// The MCAP files of a bag directory, in the order of its `metadata.yaml`.
 pub(crate) fn files_of(directory: &Path) -> Result<Vec<PathBuf>, BagError> {
     let path = directory.join("metadata.yaml");
-    let text = match fs::read_to_string(&path) {
+    let text = match cromosim_spatial::read_text(&path) {
         Ok(text) => text,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
             return Err(BagError::NoMetadata {

@@ -313,7 +313,7 @@ struct FileMessages<'a> {
 impl<'a> FileMessages<'a> {
     fn new(contents: &'a Contents, selection: &Selection) -> Result<Self, BagError> {
         let path = &contents.path;
-        let file = File::open(path).map_err(io_error(path, "open"))?;
+        let file = cromosim_spatial::open_file(path).map_err(io_error(path, "open"))?;
         let walker = Walker::new(file)
             .map_err(io_error(path, "read"))?
             .ok_or_else(|| BagError::NotMcap { path: path.clone() })?;

@@ -155,7 +155,7 @@ fn recover_directory(path: &Path, output: &Path, in_place: bool) -> Result<Recov
 }
 
 fn recover_file(path: &Path, output: &Path) -> Result<Recovery, BagError> {
-    let input = File::open(path).map_err(io_error(path, "open"))?;
+    let input = cromosim_spatial::open_file(path).map_err(io_error(path, "open"))?;
     let mut walker = Walker::new(input)
         .map_err(io_error(path, "read"))?
         .ok_or_else(|| BagError::NotMcap {
@@ -209,7 +209,7 @@ struct Preview {
 }
 
 fn preview(path: &Path) -> Result<Preview, BagError> {
-    let input = File::open(path).map_err(io_error(path, "open"))?;
+    let input = cromosim_spatial::open_file(path).map_err(io_error(path, "open"))?;
     let (mut compression, mut channels) = (None, Channels::default());
     let mut loose_messages = false;
     let Some(mut walker) = Walker::new(input).map_err(io_error(path, "read"))? else {

@@ -27,7 +27,7 @@ impl BodyModel {
     /// Every [`BodyError`] that names a path: a file that is cut short, lacks a key, holds wrong
     /// shapes, NaN, or indices out of range.
     pub fn read(path: &Path) -> Result<Arc<Self>, BodyError> {
-        let file = std::fs::File::open(path).map_err(|source| {
+        let file = cromosim_spatial::open_file(path).map_err(|source| {
             BodyError::Arrays(ArraysError::Open {
                 path: path.to_owned(),
                 source,

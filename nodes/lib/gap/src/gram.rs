@@ -83,6 +83,24 @@ pub(crate) fn channel_likelihood(count: f64, squares: f64) -> f64 {
     -0.5 * count * (q.ln() + ratio / q)
 }
 
+/// Puts what a block holds already in its place, and mirrors.
+fn take_known<'a>(
+    parts: &mut [PerChannel<DMatrix<f64>>],
+    known: impl Fn(usize, usize) -> Option<(&'a Block, (usize, usize))>,
+) {
+    for (fold, part) in parts.iter_mut().enumerate() {
+        for channel in Channel::ALL {
+            let size = part[channel].nrows();
+            for (i, j) in (0..size).flat_map(|i| (0..=i).map(move |j| (i, j))) {
+                if let Some((block, place)) = known(i, j) {
+                    part[channel][(i, j)] = block.parts[fold][channel][place];
+                }
+            }
+            part[channel].fill_upper_triangle_with_lower_triangle();
+        }
+    }
+}
+
 impl Gram {
     pub fn new(series: &Series, prior: Vec<f64>) -> Self {
         Self::beside(series, prior, |_, _| None)
@@ -149,16 +167,7 @@ impl Gram {
             }
             from = to;
         }
-        for (fold, part) in parts.iter_mut().enumerate() {
-            for channel in Channel::ALL {
-                for (i, j) in (0..size).flat_map(|i| (0..=i).map(move |j| (i, j))) {
-                    if let Some((block, place)) = known(i, j) {
-                        part[channel][(i, j)] = block.parts[fold][channel][place];
-                    }
-                }
-                part[channel].fill_upper_triangle_with_lower_triangle();
-            }
-        }
+        take_known(&mut parts, &known);
         let block = Block {
             coefficients: (0..columns.len()).collect(),
             parts,

@@ -96,7 +96,7 @@ impl PlacementSet {
     /// # Errors
     /// As [`PlacementSet::parse`], and [`ImuError::Unreadable`].
     pub fn read(path: &Path) -> Result<Self, ImuError> {
-        let text = std::fs::read_to_string(path).map_err(|source| ImuError::Unreadable {
+        let text = cromosim_spatial::read_text(path).map_err(|source| ImuError::Unreadable {
             file: path.to_owned(),
             source,
         })?;

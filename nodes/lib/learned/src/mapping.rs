@@ -271,7 +271,7 @@ impl MappingFile {
     /// # Errors
     /// As [`MappingFile::parse`], and [`LearnedError::Read`].
     pub fn read(path: &Path) -> Result<Self, LearnedError> {
-        let text = std::fs::read_to_string(path).map_err(|source| LearnedError::Read {
+        let text = cromosim_spatial::read_text(path).map_err(|source| LearnedError::Read {
             path: path.to_owned(),
             source,
         })?;

@@ -85,7 +85,7 @@ pub(crate) fn read_bounded(path: &Path, copies: u64) -> Result<Vec<u8>, LearnedE
         source,
     };
     let most = copies * 4 * MOST_PARAMETERS + MOST_HEADER;
-    let file = File::open(path).map_err(read)?;
+    let file = cromosim_spatial::open_file(path).map_err(read)?;
     let found = file.metadata().map_err(read)?.len();
     if found > most {
         return Err(LearnedError::FileTooLarge {

@@ -109,7 +109,7 @@ impl MotionOptions {
                 known: embedded.into_iter().map(|map| map.name).collect(),
             });
         }
-        let yaml = std::fs::read_to_string(path).map_err(|source| MotionError::Read {
+        let yaml = cromosim_spatial::read_text(path).map_err(|source| MotionError::Read {
             path: path.to_owned(),
             source,
         })?;
@@ -135,7 +135,7 @@ impl MotionOptions {
                 known,
             });
         }
-        let yaml = std::fs::read_to_string(path).map_err(|source| MotionError::Read {
+        let yaml = cromosim_spatial::read_text(path).map_err(|source| MotionError::Read {
             path: path.to_owned(),
             source,
         })?;

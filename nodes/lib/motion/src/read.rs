@@ -1,6 +1,5 @@
 //! From a file to a motion, by the file's content.
 
-use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -156,7 +155,7 @@ fn read_bytes(path: &Path) -> Result<Vec<u8>, MotionError> {
         path: path.to_owned(),
         source,
     };
-    let file = File::open(path).map_err(unreadable)?;
+    let file = cromosim_spatial::open_file(path).map_err(unreadable)?;
     let bytes = file.metadata().map_err(unreadable)?.len();
     if bytes > MAX_BYTES {
         return Err(MotionError::TooLarge {
@@ -165,7 +164,7 @@ fn read_bytes(path: &Path) -> Result<Vec<u8>, MotionError> {
             limit: MAX_BYTES,
         });
     }
-    // A pipe or device says that it has no bytes: the limit holds for what comes out of it, too.
+    // A file may grow while it is read.
     let mut content = Vec::new();
     file.take(MAX_BYTES + 1)
         .read_to_end(&mut content)

@@ -1,6 +1,5 @@
 //! Files that are played and read like bags though they are none.
 
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
@@ -19,7 +18,7 @@ pub(crate) const MCAP_MAGIC: [u8; 5] = *b"\x89MCAP";
 pub fn is_bag(path: &Path) -> bool {
     let mut magic = [0; MCAP_MAGIC.len()];
     !path.is_file()
-        || File::open(path)
+        || cromosim_spatial::open_file(path)
             .and_then(|mut file| file.read_exact(&mut magic))
             .is_err()
         || magic == MCAP_MAGIC

@@ -36,7 +36,7 @@ pub fn read_head(path: &Path) -> Result<Vec<u8>, RecordingError> {
 
 fn read_first(path: &Path, count: u64) -> Result<Vec<u8>, RecordingError> {
     let mut bytes = Vec::new();
-    File::open(path)
+    cromosim_spatial::open_file(path)
         .and_then(|file| file.take(count).read_to_end(&mut bytes))
         .map_err(|source| RecordingError::Read {
             path: path.to_owned(),

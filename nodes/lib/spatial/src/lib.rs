@@ -43,6 +43,7 @@ mod equations;
 mod error;
 mod estimate;
 mod estimate_error;
+mod file;
 mod fourth_differences;
 mod frame_grid;
 mod gaps;
@@ -78,6 +79,7 @@ pub use equations::LocalWeight;
 pub use error::SpatialError;
 pub use estimate::{PoseEstimate, PoseNoise};
 pub use estimate_error::ErrorPath;
+pub use file::{open_file, read_text};
 pub use fourth_differences::{
     MEDIAN_OF_SQUARE, ROUNDED_MEDIAN_OF_SQUARE, fourth_difference, white_noise_variance,
 };

@@ -2,7 +2,6 @@
 //! by the parsers.
 
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -205,7 +204,7 @@ fn read(path: &Path) -> Result<Vec<u8>, VideoError> {
         source,
     };
     let mut bytes = Vec::new();
-    File::open(path)
+    cromosim_spatial::open_file(path)
         .map_err(unreadable)?
         .take(MAX_BYTES + 1)
         .read_to_end(&mut bytes)

@@ -74,7 +74,7 @@ impl Protocol {
     /// # Errors
     /// A file that cannot be read, or that is not sound.
     pub fn read(path: &Path) -> Result<Self, EvaluationError> {
-        let text = std::fs::read_to_string(path).map_err(|source| EvaluationError::Read {
+        let text = cromosim_spatial::read_text(path).map_err(|source| EvaluationError::Read {
             path: path.to_owned(),
             source,
         })?;

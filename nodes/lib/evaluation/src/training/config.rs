@@ -68,7 +68,7 @@ impl TrainingConfig {
     /// A file that cannot be read, or that is not sound.
     pub fn read(path: &Path) -> Result<Self, EvaluationError> {
         let file = || path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|source| EvaluationError::Read {
+        let text = cromosim_spatial::read_text(path).map_err(|source| EvaluationError::Read {
             path: path.to_owned(),
             source,
         })?;

@@ -1,6 +1,5 @@
 //! Motions out of files, skeleton clips with labels among them.
 
-use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -88,7 +87,7 @@ pub(crate) fn name_of_file(path: &Path) -> String {
 }
 
 fn parse_skeleton(path: &Path) -> Result<LabelledClip, EvaluationError> {
-    let file = File::open(path).map_err(|source| EvaluationError::Read {
+    let file = cromosim_spatial::open_file(path).map_err(|source| EvaluationError::Read {
         path: path.to_owned(),
         source,
     })?;

@@ -1,6 +1,5 @@
 //! Opening pose files, and what lies beside them.
 
-use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -23,8 +22,8 @@ pub fn open_poses(path: &Path, view: PoseView) -> Result<Option<PoseFile>, Motio
         path: path.to_owned(),
         source,
     };
-    let file = File::open(path).map_err(unreadable)?;
-    // A pipe's first bytes cannot be read twice.
+    let file = cromosim_spatial::open_file(path).map_err(unreadable)?;
+    // A directory has no bytes at all.
     if !file.metadata().map_err(unreadable)?.is_file() {
         return Ok(None);
     }

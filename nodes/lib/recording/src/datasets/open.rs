@@ -240,7 +240,7 @@ fn realworld(
 }
 
 fn open(path: &Path) -> Result<File, RigidError> {
-    File::open(path).map_err(|source| RigidError::Read {
+    cromosim_spatial::open_file(path).map_err(|source| RigidError::Read {
         path: path.to_owned(),
         source,
     })

@@ -121,7 +121,7 @@ pub(crate) fn read_params_file(path: &Path) -> RosResult<Vec<Override>> {
         line,
         problem,
     };
-    let text = std::fs::read_to_string(path).map_err(|error| wrong(None, error.to_string()))?;
+    let text = cromosim_spatial::read_text(path).map_err(|error| wrong(None, error.to_string()))?;
     let not_yaml = |error: serde_norway::Error| {
         wrong(
             error.location().map(|place| place.line()),
