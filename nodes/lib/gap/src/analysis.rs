@@ -13,7 +13,8 @@ use crate::reportable::{Observations, is_ordinary, reportable_effects};
 use crate::search::{ScoredEffectSet, excess, exchanged, score, score_as_it_is, search};
 use crate::sensor_noise::{found_noise, is_white};
 use crate::session::Session;
-use crate::smoothing::try_smoothing;
+use crate::smoothing::{try_smoothing, with_undone_smoothing};
+use crate::thinned::{is_folded, thinned};
 use crate::trace::{names, trace};
 
 /// The analysis of one recording with a library of effects.
@@ -23,8 +24,13 @@ pub(crate) struct Analysis<'a> {
 }
 
 impl<'a> Analysis<'a> {
-    /// The smallest set of effects, and the model of the noise that it was found with.
+    /// The smallest set of effects, and the model of the noise that it was found with. Readings at a
+    /// high rate are searched at a lower one, and what is found is fitted to all of them.
     pub fn best_set(&self) -> (FitModel<'a>, ScoredEffectSet) {
+        let thinned = thinned(self.session);
+        if let Some(refined) = thinned.and_then(|session| self.refined(&session)) {
+            return refined;
+        }
         let fitted = self.library.fitted();
         let (model, scored) = self.searched(&fitted);
         let scored = exchanged(&model, scored, &fitted);
@@ -67,9 +73,45 @@ impl<'a> Analysis<'a> {
         }
     }
 
-    /// The first search, a smoothing of the reference where one is believed, and rounds of search,
-    /// each with the noise that the one before leaves.
-    fn searched(&self, fitted: &[EffectKind]) -> (FitModel<'a>, ScoredEffectSet) {
+    /// The best set of the thinned recording, fitted to the whole one; none where it is not sound
+    /// there, or where a line may be a vibration that is another one in the thinned recording.
+    fn refined(&self, thinned: &Session) -> Option<(FitModel<'a>, ScoredEffectSet)> {
+        let searched = Analysis {
+            session: thinned,
+            library: self.library,
+        };
+        let (coarse, found) = searched.best_set();
+        let mut model = self.first_model();
+        let digital = &self.session.digital;
+        if let Some(smoothing) = coarse.basis.undone_smoothing {
+            model = with_undone_smoothing(&model, &self.session.starts[0], smoothing);
+        }
+        let scored = score(&model, found.fit.set);
+        model = with_updated_noise(&model, &scored, digital, self.library);
+        let scored = score(&model, scored.fit.set);
+        trace_scored("at the full rate", &scored);
+        let margins = found.margins;
+        let is_sound = scored.score.is_finite() && !self.holds_folded_line(&model, &scored);
+        is_sound.then_some((model, ScoredEffectSet { margins, ..scored }))
+    }
+
+    /// Whether an effect that is a line of the spectrum earns a place, whose line is another one in the
+    /// thinned recording.
+    fn holds_folded_line(&self, model: &FitModel, scored: &ScoredEffectSet) -> bool {
+        let is_line = |kind: &EffectKind| Effect::neutral(*kind).spectral_line().is_some();
+        let lines: Vec<EffectKind> = self.library.fitted().into_iter().filter(is_line).collect();
+        let is_folded = |hz: f64| is_folded(self.session, hz);
+        model.basis.line_hz.is_some_and(is_folded) && {
+            let found = search(model, std::slice::from_ref(&scored.fit.set), &lines, 1);
+            found
+                .fit
+                .set
+                .iter()
+                .any(|effect| lines.contains(&effect.kind()))
+        }
+    }
+
+    fn first_model(&self) -> FitModel<'a> {
         let Session {
             prepared,
             starts,
@@ -78,14 +120,23 @@ impl<'a> Analysis<'a> {
             track,
             ..
         } = self.session;
-        let mut model = first_model(
+        first_model(
             prepared,
             track.clone(),
             &starts[0],
             digital,
             *units,
             self.library,
-        );
+        )
+    }
+
+    /// The first search, a smoothing of the reference where one is believed, and rounds of search,
+    /// each with the noise that the one before leaves.
+    fn searched(&self, fitted: &[EffectKind]) -> (FitModel<'a>, ScoredEffectSet) {
+        let Session {
+            starts, digital, ..
+        } = self.session;
+        let mut model = self.first_model();
         let mut scored = search(&model, starts, fitted, MOST_AT_FIRST);
         trace_scored("first", &scored);
         if self.library.allows_read_off(ReadOff::ReferenceSpectrum) {

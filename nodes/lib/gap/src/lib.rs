@@ -44,6 +44,7 @@ mod session;
 mod shares;
 mod simulations;
 mod smoothing;
+mod thinned;
 mod together;
 mod trace;
 mod unexplained;

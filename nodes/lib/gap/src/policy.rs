@@ -8,6 +8,9 @@
 
 /// The size of the search for the smallest set of effects.
 pub(crate) mod search {
+    /// Rate to which readings are thinned for the search, at least, Hz: motion of people and of things
+    /// in their hands is below 20 Hz, and costs are in proportion to the rate.
+    pub const SEARCH_HZ: f64 = 90.0;
     /// Sets that are followed at once.
     pub const BEAM: usize = 2;
     /// Candidates of each set that are fitted.

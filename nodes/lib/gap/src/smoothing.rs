@@ -159,7 +159,7 @@ fn evidence(model: &FitModel, scored: &ScoredEffectSet) -> f64 {
 }
 
 /// The model in which a smoothing is undone.
-fn with_undone_smoothing<'a>(
+pub(crate) fn with_undone_smoothing<'a>(
     model: &FitModel<'a>,
     set: &EffectSet,
     smoothing: ZeroPhaseSmoothing,

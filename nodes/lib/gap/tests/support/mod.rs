@@ -60,6 +60,7 @@ pub struct Scene {
     /// Of all noise.
     pub seed: u64,
     pub seconds: f64,
+    pub imu_hz: f64,
     /// Stamp of the first IMU message.
     pub start: Stamp,
     /// What depends on time is anchored here: the start of the device's first recording.
@@ -78,6 +79,7 @@ impl Scene {
             effects: EffectSet::new(),
             seed,
             seconds: 60.0,
+            imu_hz: IMU_HZ,
             start,
             epoch: start,
             declared: PerChannel {
@@ -202,16 +204,16 @@ impl Scene {
         let device: Vec<Effect> = self.effects.iter().filter(is_device).cloned().collect();
         let device = EffectSet::try_from(device).unwrap();
         let model = SensorModel::new(&device, self.epoch);
-        let stamps: Vec<Stamp> = (0..(self.seconds * IMU_HZ) as usize)
-            .map(|k| self.start.plus_seconds(k as f64 / IMU_HZ))
+        let stamps: Vec<Stamp> = (0..(self.seconds * self.imu_hz) as usize)
+            .map(|k| self.start.plus_seconds(k as f64 / self.imu_hz))
             .collect();
         let track = self
             .motion
             .track(self.start, -MARGIN_S, self.seconds + MARGIN_S, GRID_HZ);
         let beyond = model.total_noise(&DeclaredNoise::default());
         let sigma = [
-            SIGMA[0].hypot(beyond.accel_density * IMU_HZ.sqrt()),
-            SIGMA[1].hypot(beyond.gyro_density * IMU_HZ.sqrt()),
+            SIGMA[0].hypot(beyond.accel_density * self.imu_hz.sqrt()),
+            SIGMA[1].hypot(beyond.gyro_density * self.imu_hz.sqrt()),
         ];
         let mut random = ChaCha12Rng::seed_from_u64(self.seed ^ 0xdece);
         let readings = model.measure(MeasurementInput::Motion(&track), &stamps, |readings| {
