@@ -2,9 +2,9 @@
 """Probabilities from margins: fits the log-odds of `calibrate` in nodes/lib/gap/src/probability.rs to graded answers of some origins, and tests
 what the answers of others say.
 
-    python tests/withheld/calibrate.py --fit /tmp/building --test /tmp/scoring /tmp/mechanics
+    python tests/withheld/calibrate.py --fit /tmp/building /tmp/injected --test /tmp/scoring /tmp/mechanics
 
-Each folder is one that run.py has filled."""
+Each folder is one that run.py or inject.py has filled."""
 import argparse
 import json
 import os
@@ -13,13 +13,40 @@ import numpy as np
 from scipy.optimize import minimize
 
 POOR_REFERENCES = {"reference_noise", "reference_smoothing", "reference_interpolation"}
-NAMES = ("base", "share", "others", "poor_reference", "margin")
+CALIBRATIONS = {"time_offset", "mount_rotation", "lever_arm", "accel_bias", "gyro_bias"}
+NAMES = ("base", "share", "others", "poor_reference", "takes_up_unknown", "margin")
 BINS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 1.0001)
 SURE_ODDS = np.log(0.95 / 0.05)
 
 
 def causes(folder):
-    """(effect, right, said, by margin, share, beside) of every cause in a folder of run.py."""
+    """(effect, right, said, by margin, share, beside) of every cause in a folder that can be judged."""
+    return of_real(folder) if os.path.exists(os.path.join(folder, "injected.json")) else of_generated(folder)
+
+
+def judged(said, right):
+    named = {cause["effect"] for cause in said}
+    for cause in said:
+        yield (cause["effect"], right(cause["effect"]), cause["probability"], cause.get("probability_by_margin", cause["probability"]), cause["gap_share"], named - {cause["effect"]})
+
+
+def of_real(folder):
+    """In a folder of inject.py: the causes that the window did not have before; right is what was put in."""
+    with open(os.path.join(folder, "injected.json")) as stream:
+        records = json.load(stream)
+    for record in records:
+        if "named" not in record:
+            continue
+        with open(os.path.join(folder, f"{record['index']:03d}", "hidden", "diagnosis.json")) as stream:
+            placements = json.load(stream)["placements"]
+        for placement in placements.values():
+            for cause in judged(placement["causes"], lambda effect: effect == record["effect"]):
+                if cause[0] not in record["base"]:
+                    yield cause
+
+
+def of_generated(folder):
+    """In a folder of run.py."""
     with open(os.path.join(folder, "grades.json")) as stream:
         records = json.load(stream)
     for record in records:
@@ -30,10 +57,7 @@ def causes(folder):
             placements = json.load(stream)["placements"]
         for name, graded in record["placements"].items():
             said = placements.get(name, {"causes": []})["causes"]
-            named = {cause["effect"] for cause in said}
-            for cause in said:
-                yield (cause["effect"], cause["effect"] in graded["hidden"], cause["probability"],
-                       cause.get("probability_by_margin", cause["probability"]), cause["gap_share"], named - {cause["effect"]})
+            yield from judged(said, lambda effect: effect in graded["hidden"])
 
 
 def regressors(cause):
@@ -43,7 +67,9 @@ def regressors(cause):
     # Where the library knows all that was done, a fourth cause is often wrong, and so is a small `unknown` beside others; on real recordings
     # hardly ever. What only the generator makes so does not count.
     others, poor = (min(len(beside), 2), bool(beside & POOR_REFERENCES)) if effect != "unknown" else (0, False)
-    return [1.0, np.log10(max(share, 1e-5 if effect != "unknown" else 1e-2)), others, float(poor), np.log(by_margin / (1 - by_margin)) - SURE_ODDS]
+    # What nobody knows is taken up by calibrations.
+    takes_up = effect in CALIBRATIONS and "unknown" in beside
+    return [1.0, np.log10(max(share, 1e-5 if effect != "unknown" else 1e-2)), others, float(poor), float(takes_up), np.log(by_margin / (1 - by_margin)) - SURE_ODDS]
 
 
 def fitted(chosen):

@@ -301,8 +301,8 @@ def main():
             records.append(judge(done.result()))
             print(f"{len(records)} of {len(waiting)}: {records[-1]['effect']}", file=sys.stderr, flush=True)
     print(report(records))
-    if given.json:
-        given.json.write_text(json.dumps(records, indent=1))
+    for path in filter(None, (given.out / "injected.json", given.json)):
+        path.write_text(json.dumps(records, indent=1))
 
 
 if __name__ == "__main__":
