@@ -9,6 +9,7 @@ use clap::Args;
 use cromosim_bag::BagReader;
 use cromosim_gap::{Diagnosis, SCHEMA};
 use cromosim_recording::compare::{compare_diagnoses, compare_recordings};
+use cromosim_recording::open_recording;
 
 use crate::files::{refuse_existing, write_whole};
 use crate::output::{print, say};
@@ -20,6 +21,9 @@ pub struct Arguments {
     a: PathBuf,
     /// Another of the same kind
     b: PathBuf,
+    /// The namespace (/robot1, or that of a person) of the recordings' topics, where they are in several
+    #[arg(long, value_name = "NAME")]
+    namespace: Option<String>,
     /// Write what is found to this file too, as JSON
     #[arg(long, value_name = "FILE.json")]
     out: Option<PathBuf>,
@@ -48,7 +52,11 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if let Some(path) = &arguments.out {
         refuse_existing(path, arguments.force)?;
     }
-    let (a, b) = (open(&arguments.a)?, open(&arguments.b)?);
+    let namespace = arguments.namespace.as_deref();
+    let (a, b) = (
+        open(&arguments.a, namespace)?,
+        open(&arguments.b, namespace)?,
+    );
     let found = match (&a, &b) {
         (Side::Diagnosis(a), Side::Diagnosis(b)) => compare_diagnoses(a, b)?,
         (Side::Recording(a), Side::Recording(b)) => compare_recordings(a, b)?,
@@ -76,13 +84,14 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
 }
 
 /// Opens a side by its content.
-fn open(path: &Path) -> anyhow::Result<Side> {
+fn open(path: &Path, namespace: Option<&str>) -> anyhow::Result<Side> {
+    let recording = || Ok(Side::Recording(open_recording(path, namespace)?.0));
     if path.is_dir() {
         let file = path.join("diagnosis.json");
         return if file.is_file() {
             read_diagnosis(&file)
         } else {
-            Ok(Side::Recording(BagReader::open(path)?))
+            recording()
         };
     }
     let mut head = Vec::new();
@@ -92,7 +101,7 @@ fn open(path: &Path) -> anyhow::Result<Side> {
     match head.iter().find(|byte| !byte.is_ascii_whitespace()) {
         None => bail!("{}: the file is empty", path.display()),
         Some(b'{') => read_diagnosis(path),
-        Some(_) => Ok(Side::Recording(BagReader::open(path)?)),
+        Some(_) => recording(),
     }
 }
 

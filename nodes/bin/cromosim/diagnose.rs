@@ -61,6 +61,9 @@ pub struct Arguments {
     /// Take an effect out of the library; may be given again
     #[arg(long, value_name = "EFFECT")]
     without: Vec<String>,
+    /// The namespace (/robot1, or that of a person) of the recordings' topics, where they are in several
+    #[arg(long, value_name = "NAME")]
+    namespace: Option<String>,
     /// Body model (npz or pickle) of a recording of SMPL states, rather than the embedded one
     #[arg(long, value_name = "FILE")]
     body: Option<PathBuf>,
@@ -84,7 +87,12 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         placements,
         mut notes,
         mut failures,
-    } = select(&arguments.recordings, body.as_ref(), &config.placements)?;
+    } = select(
+        &arguments.recordings,
+        body.as_ref(),
+        &config.placements,
+        arguments.namespace.as_deref(),
+    )?;
 
     let results = diagnose_all(&placements, &options);
     let mut answers = BTreeMap::new();

@@ -5,9 +5,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::bail;
-use cromosim_bag::BagReader;
 use cromosim_body::BodyModel;
-use cromosim_recording::{RecordedPlacement, read_placements};
+use cromosim_recording::{RecordedPlacement, open_recording, read_placements};
 
 /// A placement in one recording.
 pub struct OneRecording {
@@ -62,6 +61,7 @@ pub fn select(
     files: &[PathBuf],
     body: Option<&Arc<BodyModel>>,
     only: &[String],
+    namespace: Option<&str>,
 ) -> anyhow::Result<Selected> {
     refuse_twice(files)?;
     let mut selected = Selected::default();
@@ -69,7 +69,8 @@ pub fn select(
     for (path, name) in files.iter().zip(file_names(files)) {
         let file = if files.len() > 1 { name } else { String::new() };
         let of_file = |text: String| of_recording(&file, &text);
-        for (name, placement) in read_placements(&BagReader::open(path)?, body)? {
+        let (reader, _) = open_recording(path, namespace)?;
+        for (name, placement) in read_placements(&reader, body)? {
             known.push(name.clone());
             if !only.is_empty() && !only.contains(&name) {
                 continue;

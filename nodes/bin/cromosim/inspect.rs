@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use cromosim_bag::BagReader;
+use cromosim_bag::{BagReader, Cadence};
 use cromosim_body::Joint;
 use cromosim_motion::{PoseAxes, SmplMotion};
 use cromosim_msgs::printable;
@@ -19,6 +19,11 @@ use cromosim_recording::rigid::RigidFormat;
 use crate::body;
 use crate::motion_arguments::MotionArguments;
 use crate::output::say;
+
+/// Part of a bag's time below which a topic's own span is said.
+const MOST_OF_BAG: f64 = 0.98;
+/// Jitter from which on it is said, as a part of the interval.
+const LEAST_JITTER: f64 = 0.005;
 
 /// Say what is in a file
 #[derive(Args)]
@@ -138,17 +143,20 @@ fn print_bag(path: &Path, reader: &BagReader) -> anyhow::Result<()> {
         summary.message_count(),
         summary.duration()
     )?;
+    let cadences = reader.cadences()?;
     let names = summary.topics.iter();
     let widths = names.map(|counted| printable(&counted.topic.name).chars().count());
     let width = widths.max().unwrap_or(0);
     for counted in &summary.topics {
-        let (name, rate) = (&counted.topic.name, summary.rate(&counted.topic.name));
-        let (name, type_name) = (printable(name), printable(&counted.topic.type_name));
-        let rate = rate.map_or_else(String::new, |rate| format!("{rate:9.2} Hz"));
+        let cadence = cadences.get(&counted.topic.name);
+        let name = printable(&counted.topic.name);
+        let type_name = printable(&counted.topic.type_name);
+        let rate = cadence.map_or_else(String::new, |own| format!("{:9.2} Hz", own.rate_hz));
+        let regularity =
+            cadence.map_or_else(String::new, |own| regularity(own, summary.duration()));
         say!(
-            "  {name:width$}  {:8} {rate:12}  {}",
-            counted.message_count,
-            type_name
+            "  {name:width$}  {:8} {rate:12}  {type_name}{regularity}",
+            counted.message_count
         )?;
     }
     for attachment in reader.attachments() {
@@ -175,6 +183,23 @@ fn print_bag(path: &Path, reader: &BagReader) -> anyhow::Result<()> {
         }
     }
     Ok(())
+}
+
+/// What is not even about a topic's intervals, where anything is.
+fn regularity(cadence: &Cadence, bag_s: f64) -> String {
+    let mut said = Vec::new();
+    if cadence.span_s < MOST_OF_BAG * bag_s {
+        said.push(format!("spans {:.3} s", cadence.span_s));
+    }
+    if cadence.jitter_s * cadence.rate_hz > LEAST_JITTER {
+        said.push(format!("jitter {:.2} ms", 1e3 * cadence.jitter_s));
+    }
+    if cadence.gaps > 0 {
+        let many = if cadence.gaps == 1 { "gap" } else { "gaps" };
+        let longest = cadence.longest_gap_s;
+        said.push(format!("{} {many} of up to {longest:.3} s", cadence.gaps));
+    }
+    said.iter().map(|part| format!(", {part}")).collect()
 }
 
 fn print_body(path: &Path, body: &BodyInspection) -> anyhow::Result<()> {

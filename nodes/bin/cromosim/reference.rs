@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::bail;
-use cromosim_bag::{BagOptions, BagReader, BagSummary, BagWriter, Compression};
+use cromosim_bag::{BagOptions, BagSummary, BagWriter, Compression};
 use cromosim_body::BodyModel;
 use cromosim_imu::{
     Device, EffectsFile, Placement, PlacementEffects, Scheme, TextureSegment, UnexplainedErrors,
@@ -12,8 +12,8 @@ use cromosim_imu::{
 use cromosim_learned::{LearnedSimulator, scheme_for_networks};
 use cromosim_recording::rigid::{RigidContent, parse_rigid};
 use cromosim_recording::{
-    RecordedPlacement, Resimulated, Resimulation, outside_reference, read_effects, read_placements,
-    read_whole, with_stamps, write_resimulated,
+    RecordedPlacement, Resimulated, Resimulation, open_recording, outside_reference, read_effects,
+    read_placements, read_whole, with_stamps, write_resimulated,
 };
 use rayon::prelude::*;
 
@@ -36,7 +36,7 @@ pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
     }
     refuse_existing(&arguments.out, arguments.force)?;
     let scheme = arguments.differentiation()?;
-    let reader = BagReader::open(recording)?;
+    let (reader, namespace) = open_recording(recording, arguments.namespace.as_deref())?;
     let body = arguments.body.as_deref().map(BodyModel::read).transpose()?;
     let recorded = read_placements(&reader, body.as_ref())?
         .into_iter()
@@ -54,7 +54,10 @@ pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
         metadata(recording, &how, arguments),
         &recorded,
         &simulated,
-        false,
+        Written {
+            references: false,
+            namespace: &namespace,
+        },
         arguments,
     )?;
     say!(
@@ -71,7 +74,7 @@ pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
 pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()> {
     refuse_existing(&arguments.out, arguments.force)?;
     let scheme = arguments.differentiation()?;
-    let name = arguments.placement.as_deref().unwrap_or("body");
+    let name = arguments.name_of_rigid()?.unwrap_or("body");
     if let Err((_, problem)) = Placement::at_site(name, "left_watch", 1.0) {
         bail!("--placement {name}: {problem}");
     }
@@ -114,7 +117,10 @@ pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()>
         metadata(trajectory, &how, arguments),
         &recorded,
         &simulated,
-        true,
+        Written {
+            references: true,
+            namespace: "",
+        },
         arguments,
     )?;
     warn(trajectory, &recorded[0].notes);
@@ -202,6 +208,13 @@ fn simulate_all(
     results.into_iter().collect()
 }
 
+/// What is written beside the samples, and where.
+#[derive(Clone, Copy)]
+struct Written<'a> {
+    references: bool,
+    namespace: &'a str,
+}
+
 fn metadata(
     recording: &Path,
     how: &Resimulation,
@@ -269,7 +282,7 @@ fn write(
     mut metadata: BTreeMap<String, String>,
     recorded: &[RecordedPlacement],
     simulated: &[Resimulated],
-    with_references: bool,
+    written: Written,
     arguments: &Arguments,
 ) -> anyhow::Result<BagSummary> {
     let options = BagOptions {
@@ -282,14 +295,19 @@ fn write(
             metadata.extend(quality_entries(&placement.name, &simulated.quality));
         }
     }
-    if with_references {
+    if written.references {
         metadata.extend(unlikely(recorded.iter().flat_map(|one| one.notes.clone())));
     }
     let mut bag = BagWriter::create(&arguments.out, options)?;
     bag.write_metadata("cromosim", metadata)?;
     let interrupt = Interrupt::watch()?;
-    write_resimulated(&mut bag, recorded, simulated, with_references, || {
-        interrupt.check()
-    })?;
+    write_resimulated(
+        &mut bag,
+        recorded,
+        simulated,
+        written.references,
+        written.namespace,
+        || interrupt.check(),
+    )?;
     Ok(bag.finish()?)
 }

@@ -123,7 +123,11 @@ fn output_names(motions: &[PathBuf], out: &Path) -> anyhow::Result<Vec<PathBuf>>
 impl Setup {
     fn new(arguments: &Arguments) -> anyhow::Result<Self> {
         let file = arguments.placements.as_deref();
-        let placements = file.map_or_else(|| Ok(PlacementSet::demo()), PlacementSet::read)?;
+        let placements = match file {
+            Some(path) => PlacementSet::read(path)?,
+            None if arguments.placement.is_empty() => PlacementSet::demo(),
+            None => PlacementSet::at_sites(&arguments.placement, "--placement")?,
+        };
         let given = arguments.differentiation()?;
         let placements = placements.map(|placement| {
             let rate_hz = arguments.rate.unwrap_or(placement.rate_hz());

@@ -15,6 +15,7 @@ const MOTIONS: &str = "Options of motion files";
 const RIGID: &str = "Options of --rigid";
 const RECORDED: &str = "Options of --reference and --rigid";
 const NETWORKS: &str = "Options of motion files and --rigid";
+const REFERENCES: &str = "Options of --reference";
 const BODIES: &str = "Options of motion files and --reference";
 
 /// Simulate IMUs from motion files, or again from a recording's reference
@@ -25,13 +26,17 @@ pub struct Arguments {
     /// Re-simulate the IMUs of this recording from its reference motion instead
     #[arg(long, value_name = "RECORDING")]
     pub reference: Option<PathBuf>,
+    /// The namespace (/robot1) of the recording's topics, where they are in several
+    #[arg(long, value_name = "NAME", help_heading = REFERENCES)]
+    pub namespace: Option<String>,
     /// Simulate an IMU on a rigid body (robot, prop) that moves along this trajectory (TUM, EuRoC
     /// or CSV) instead
     #[arg(long, value_name = "FILE")]
     pub rigid: Option<PathBuf>,
-    /// The placement's name, in /imu/NAME/data_raw [default: body]
-    #[arg(long, value_name = "NAME", help_heading = RIGID)]
-    pub placement: Option<String>,
+    /// A placement at a named site (cromosim body sites), such as left_wrist=left_watch, at 100 Hz; may be
+    /// given again. With --rigid the name alone, in /imu/NAME/data_raw [default: body]
+    #[arg(long, value_name = "NAME=SITE", help_heading = NETWORKS)]
+    pub placement: Vec<String>,
     /// A device's name or file, for its noise and effects; default: an ideal sensor
     #[arg(long, value_name = "DEVICE", help_heading = RIGID)]
     pub device: Option<String>,
@@ -206,6 +211,16 @@ impl Arguments {
                 );
             }
         }
+        if mode == Mode::Motions
+            && let Some(given) = self.placement.iter().find(|given| !given.contains('='))
+        {
+            bail!(
+                "--placement {given}: expected NAME=SITE, such as left_wrist=left_watch; `cromosim body sites` lists the sites"
+            );
+        }
+        if !self.placement.is_empty() && self.placements.is_some() {
+            bail!("--placement and --placements both say where sensors are; give one of them");
+        }
         if self.bandwidth.is_some() && self.scheme.is_some() {
             bail!("--bandwidth takes the place of --scheme; give one of them");
         }
@@ -222,6 +237,21 @@ impl Arguments {
             bail!("--rigid needs --rate HZ: the messages of the IMU per second");
         }
         Ok(mode)
+    }
+
+    /// The name that `--placement` gives the IMU of a rigid body.
+    ///
+    /// # Errors
+    /// More than a name.
+    pub fn name_of_rigid(&self) -> anyhow::Result<Option<&str>> {
+        match self.placement.as_slice() {
+            [] => Ok(None),
+            [name] if !name.contains('=') => Ok(Some(name)),
+            given => bail!(
+                "--placement {}: a rigid body has one IMU and no sites; give its name alone",
+                given.join(" ")
+            ),
+        }
     }
 
     /// What `--scheme` or `--bandwidth` say; none where neither was given.
@@ -270,6 +300,7 @@ impl Arguments {
     fn given(&self) -> anyhow::Result<Vec<(&'static str, &'static [&'static str])>> {
         const MOTION_FILES: &[&str] = &["motion files"];
         const RIGID_BODIES: &[&str] = &["--rigid"];
+        const OF_REFERENCE: &[&str] = &["--reference"];
         const RECORDINGS: &[&str] = &["--reference", "--rigid"];
         const NOT_REFERENCE: &[&str] = &["motion files", "--rigid"];
         const NOT_RIGID: &[&str] = &["motion files", "--reference"];
@@ -286,7 +317,8 @@ impl Arguments {
                 "--pose-error-correlation",
                 MOTION_FILES,
             ),
-            (self.placement.is_some(), "--placement", RIGID_BODIES),
+            (!self.placement.is_empty(), "--placement", NOT_REFERENCE),
+            (self.namespace.is_some(), "--namespace", OF_REFERENCE),
             (self.device.is_some(), "--device", RIGID_BODIES),
             (self.effects.is_some(), "--effects", RECORDINGS),
             (self.trim != AUTO, "--trim", NOT_REFERENCE),

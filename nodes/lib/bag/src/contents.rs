@@ -1,6 +1,6 @@
 //! What one MCAP file holds, found by walking over it once: it needs no index and trusts none.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -161,6 +161,8 @@ pub(crate) struct Contents {
     pub(crate) attachments: Vec<Attachment>,
     pub(crate) metadata: Vec<(String, BTreeMap<String, String>)>,
     pub(crate) summary: BagSummary,
+    /// Channels outside the namespace that is looked at.
+    pub(crate) hidden: BTreeSet<u16>,
 }
 
 /// Message counts and times as the file's statistics say them.
@@ -208,6 +210,7 @@ impl Contents {
             attachments: Vec::new(),
             metadata: Vec::new(),
             summary: BagSummary::default(),
+            hidden: BTreeSet::new(),
         };
         let mut statistics = None;
         loop {

@@ -9,6 +9,7 @@
 //! `ros2msg` text. The same calls give the same bytes: times come from the caller, and compression
 //! uses one thread.
 
+mod cadence;
 pub mod cdr;
 mod chunk;
 mod contents;
@@ -25,6 +26,7 @@ mod topic;
 mod walk;
 mod writer;
 
+pub use cadence::Cadence;
 pub use csv::write_imu_csv;
 pub use error::BagError;
 pub use qos::{QosProfile, QosTime};

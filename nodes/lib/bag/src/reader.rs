@@ -125,6 +125,37 @@ impl BagReader {
         })
     }
 
+    /// The bag as it is seen from within a namespace, such as `/robot1`: its topic `/robot1/imu/wrist/data`
+    /// is `/imu/wrist/data`, and what is outside is not there. Times stay those of the whole bag.
+    #[must_use]
+    pub fn within(mut self, namespace: &str) -> Self {
+        let prefix = format!("/{}", namespace.trim_matches('/'));
+        let inside = |topic: &Topic| -> Option<Arc<Topic>> {
+            let name = topic.name.strip_prefix(&prefix)?;
+            name.starts_with('/').then(|| {
+                Arc::new(Topic {
+                    name: name.to_owned(),
+                    ..topic.clone()
+                })
+            })
+        };
+        for contents in &mut self.files {
+            for (channel, topic) in &mut contents.channels.topics {
+                match inside(topic) {
+                    Some(seen) => *topic = seen,
+                    None => {
+                        contents.hidden.insert(*channel);
+                    }
+                }
+            }
+        }
+        self.summary.topics.retain_mut(|counted| {
+            let seen = inside(&counted.topic);
+            seen.map(|topic| counted.topic = topic).is_some()
+        });
+        self
+    }
+
     /// The path that was opened.
     pub fn path(&self) -> &Path {
         &self.path
@@ -392,6 +423,9 @@ impl<'a> FileMessages<'a> {
         let mut fields = Fields(body);
         let head = MessageHead::take(&mut fields)
             .ok_or_else(|| corrupt("a message without a whole header".to_owned()))?;
+        if self.contents.hidden.contains(&head.channel) {
+            return Ok(());
+        }
         let topic = self.contents.channels.topics.get(&head.channel);
         let topic = topic
             .ok_or_else(|| corrupt(format!("a message of the unknown channel {}", head.channel)))?;

@@ -38,16 +38,6 @@ impl BagSummary {
         self.time_range.map_or(0.0, |(start, end)| end - start)
     }
 
-    /// Mean rate of a topic over the bag's time range, Hz; none for fewer than two messages.
-    pub fn rate(&self, topic: &str) -> Option<f64> {
-        let count = self
-            .topics
-            .iter()
-            .find(|counted| counted.topic.name == topic)?
-            .message_count;
-        (count > 1 && self.duration() > 0.0).then(|| (count - 1) as f64 / self.duration())
-    }
-
     /// Counts `count` messages of a topic; topics of one name and type are one.
     pub(crate) fn count(&mut self, topic: &Arc<Topic>, count: u64) {
         let same = |counted: &&mut CountedTopic| {

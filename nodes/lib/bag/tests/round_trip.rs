@@ -44,7 +44,9 @@ fn files_and_directories_give_back_what_was_written() {
         let reader = BagReader::open(&path).unwrap();
         assert_eq!(reader.summary().message_count(), 6600);
         assert_eq!(reader.summary().time_range, Some((stamp(0), stamp(5999))));
-        assert!((reader.summary().rate("/imu/left_wrist/data_raw").unwrap() - 100.0).abs() < 1e-9);
+        let cadence = reader.cadences().unwrap()["/imu/left_wrist/data_raw"];
+        assert!((cadence.rate_hz - 100.0).abs() < 1e-9);
+        assert_eq!((cadence.gaps, cadence.span_s), (0, 59.99));
         assert_eq!(
             reader.attachment("placements.yaml"),
             Some(b"placements: []\n".as_slice())

@@ -12,6 +12,9 @@ const SCHEMA: &str = "cromosim/placements/1";
 const DEMO: &str = include_str!("../../../../config/placements/demo.yaml");
 const FULL17: &str = include_str!("../../../../config/placements/full17.yaml");
 
+/// Rate of placements that no file describes, Hz.
+const DEFAULT_RATE_HZ: f64 = 100.0;
+
 /// Placements of distinct names, in the file's order.
 ///
 /// ```yaml
@@ -87,6 +90,33 @@ impl PlacementSet {
                 field,
                 problem: PlacementProblem::Missing,
             });
+        }
+        Ok(Self { placements })
+    }
+
+    /// Placements at named sites with the defaults at 100 Hz, each given as `NAME=SITE`, such as
+    /// `left_wrist=left_watch`; `option` names what gave them in errors.
+    ///
+    /// # Errors
+    /// [`ImuError::Placement`] for what is no such pair, a name that is no ROS name, and two of one
+    /// name. Whether a body has the site is known once it is mounted there.
+    pub fn at_sites(pairs: &[String], option: &str) -> Result<Self, ImuError> {
+        let mut placements: Vec<Placement> = Vec::new();
+        for pair in pairs {
+            let refuse = |(field, problem)| ImuError::Placement {
+                file: option.to_owned(),
+                placement: pair.clone(),
+                field,
+                problem,
+            };
+            let (name, site) = pair
+                .split_once('=')
+                .ok_or_else(|| refuse(("site", PlacementProblem::Missing)))?;
+            let placement = Placement::at_site(name, site, DEFAULT_RATE_HZ).map_err(refuse)?;
+            if placements.iter().any(|other| other.name() == name) {
+                return Err(refuse(("name", PlacementProblem::Duplicate)));
+            }
+            placements.push(placement);
         }
         Ok(Self { placements })
     }

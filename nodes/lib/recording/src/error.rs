@@ -47,6 +47,14 @@ pub enum RecordingError {
         /// The bag.
         path: PathBuf,
     },
+    /// A namespace that has no recording, or the need to choose one.
+    #[error("{}: {reason}", path.display())]
+    Namespace {
+        /// The bag.
+        path: PathBuf,
+        /// The namespaces that there are.
+        reason: String,
+    },
     /// A topic without messages.
     #[error("{}: {topic} holds no message", path.display())]
     NoMessage {

@@ -351,11 +351,14 @@ pub fn write_resimulated<E: From<RecordingError>>(
     recorded: &[RecordedPlacement],
     simulated: &[Resimulated],
     with_references: bool,
+    namespace: &str,
     check: impl Fn() -> Result<(), E>,
 ) -> Result<(), E> {
     let topics: Vec<[String; 2]> = recorded
         .iter()
-        .map(|placement| ["imu", "reference"].map(|kind| topic(kind, &placement.name)))
+        .map(|placement| {
+            ["imu", "reference"].map(|kind| namespace.to_owned() + &topic(kind, &placement.name))
+        })
         .collect();
     for (nanos, is_sample, number, index) in in_order_of_time(recorded, simulated, with_references)
     {
