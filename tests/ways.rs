@@ -142,3 +142,55 @@ fn placements_are_given_without_a_file() {
     refuses(here, &both, &["--placement and --placements"]);
     assert!(!here.join("b.mcap").exists());
 }
+
+#[test]
+fn what_has_a_name_is_listed() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let lists: [(&[&str], &[&str], usize); 8] = [
+        (&["body", "sites"], &["left_watch", "sternum"], 68),
+        (&["list", "sites"], &["left_watch", "sternum"], 68),
+        (
+            &["diagnose", "--list-effects"],
+            &["lever_arm: offset [m]"],
+            70,
+        ),
+        (&["list", "effects"], &["gyro_bias: bias [rad/s]"], 70),
+        (&["list", "schemes"], &["adaptive_spline", "richardson"], 6),
+        (&["list", "devices"], &["ideal", "consumer_mems"], 3),
+        (&["list", "models"], &["motion_capture_60", "video"], 5),
+        (&["list", "nodes"], &["virtual_imu", "gap_monitor"], 6),
+    ];
+    for (arguments, words, least) in lists {
+        let said = succeed(here, arguments);
+        for word in words {
+            assert!(said.contains(word), "{arguments:?}: {word} in {said}");
+        }
+        assert!(said.lines().count() >= least, "{arguments:?}: {said}");
+    }
+    // Nothing is left without --out and recordings.
+    refuses_usage(here, &["diagnose", "--out", "d"], "RECORDING");
+    refuses_usage(here, &["diagnose", "a.mcap"], "--out");
+}
+
+#[test]
+fn names_are_completed_by_the_shell() {
+    let folder = tempfile::tempdir().unwrap();
+    for shell in ["bash", "zsh", "fish"] {
+        let script = succeed(folder.path(), &["completion", shell]);
+        let names = ["left_watch", "gyro_g_sensitivity", "adaptive_spline"];
+        for name in names
+            .iter()
+            .chain(&["consumer_mems", "virtual_imu", "shank"])
+        {
+            assert!(script.contains(name), "{shell}: {name}");
+        }
+    }
+}
+
+/// The command line itself is refused.
+fn refuses_usage(folder: &Path, arguments: &[&str], word: &str) {
+    let output = common::cromosim_in(folder, arguments);
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+    assert!(common::text(&output).contains(word), "{arguments:?}");
+}

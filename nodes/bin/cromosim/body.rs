@@ -8,6 +8,7 @@ use clap::Subcommand;
 use cromosim_body::{BodyModel, ShapedBody, write_obj};
 
 use crate::files::{refuse_existing, write_whole};
+use crate::list;
 use crate::output::say;
 
 /// Commands on bodies.
@@ -26,6 +27,12 @@ pub enum Command {
         /// Replace OUT where it exists
         #[arg(long)]
         force: bool,
+    },
+    /// List the named sites of the skin, with their bones and places
+    Sites {
+        /// Body model as npz or pickle rather than the embedded one
+        #[arg(long, value_name = "FILE")]
+        body: Option<PathBuf>,
     },
 }
 
@@ -54,14 +61,20 @@ pub fn model(path: Option<&Path>) -> anyhow::Result<Arc<BodyModel>> {
 
 /// Runs the command.
 pub fn run(command: &Command) -> anyhow::Result<()> {
-    let Command::Export {
-        out,
-        body,
-        betas,
-        force,
-    } = command;
-    refuse_existing(out, *force)?;
-    let model = model(body.as_deref())?;
+    match command {
+        Command::Export {
+            out,
+            body,
+            betas,
+            force,
+        } => export(out, body.as_deref(), betas, *force),
+        Command::Sites { body } => list::sites(&model(body.as_deref())?),
+    }
+}
+
+fn export(out: &Path, body: Option<&Path>, betas: &[f64], force: bool) -> anyhow::Result<()> {
+    refuse_existing(out, force)?;
+    let model = model(body)?;
     let bytes = match out.extension().and_then(|ending| ending.to_str()) {
         Some("npz") if betas.is_empty() => model.to_npz()?,
         Some("npz") => {
@@ -73,7 +86,7 @@ pub fn run(command: &Command) -> anyhow::Result<()> {
             out.display()
         ),
     };
-    write_whole(out, *force, |file| {
+    write_whole(out, force, |file| {
         file.write_all(&bytes)
             .with_context(|| format!("{}: cannot be written", out.display()))
     })?;

@@ -9,7 +9,9 @@ use cromosim_recording::convert::{Conversion, Followed, ReadOptions, Target, con
 use cromosim_recording::datasets::DatasetFiles;
 
 use crate::body;
+use crate::list;
 use crate::motion_arguments::MotionArguments;
+use crate::named::Named;
 use crate::output::{remark, say};
 
 /// Convert a motion, a trajectory of a rigid body, an IMU series or a recording into another format
@@ -28,10 +30,10 @@ pub struct Arguments {
     #[arg(long)]
     force: bool,
     /// Of a motion: the trajectory of this joint (SMPL's name)
-    #[arg(long, value_name = "NAME", conflicts_with = "site")]
+    #[arg(long, value_name = "NAME", conflicts_with = "site", hide_possible_values = true, value_parser = Named(list::joint_names))]
     joint: Option<String>,
     /// Of a motion: the trajectory of a sensor at this named site of the skin
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", hide_possible_values = true, value_parser = Named(list::site_names))]
     site: Option<String>,
     /// Of a bag: the topic to take (SmplState, SmplPose, PoseStamped, TFMessage or Imu); needed
     /// where there are several

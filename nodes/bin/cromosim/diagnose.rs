@@ -18,6 +18,8 @@ use serde_json::Value;
 
 use crate::diagnose_recordings::{OneRecording, Selected, file_names, of_recording, select};
 use crate::files::refuse_existing;
+use crate::list;
+use crate::named::Named;
 use crate::output::{remark, say};
 use crate::progress::{self, Interrupt};
 
@@ -47,11 +49,14 @@ A config FILE, every line of it optional:
   seed: 7                        # --seed wins")]
 pub struct Arguments {
     /// The recording (.mcap, rosbag2 directory); several of the same devices are diagnosed together
-    #[arg(required = true, value_name = "RECORDING")]
+    #[arg(required_unless_present = "list_effects", value_name = "RECORDING")]
     recordings: Vec<PathBuf>,
     /// The folder for the four files; is made where it is missing
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
+    #[arg(long, value_name = "DIR", required_unless_present = "list_effects")]
+    out: Option<PathBuf>,
+    /// List the effects of the library with their parameters, and do nothing else
+    #[arg(long, exclusive = true)]
+    list_effects: bool,
     /// Replace the files of an earlier diagnosis in DIR
     #[arg(long)]
     force: bool,
@@ -59,7 +64,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// Take an effect out of the library; may be given again
-    #[arg(long, value_name = "EFFECT")]
+    #[arg(long, value_name = "EFFECT", hide_possible_values = true, value_parser = Named(list::effect_names))]
     without: Vec<String>,
     /// The namespace (/robot1, or that of a person) of the recordings' topics, where they are in several
     #[arg(long, value_name = "NAME")]
@@ -74,6 +79,9 @@ pub struct Arguments {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let Some(out) = &arguments.out else {
+        return list::effects();
+    };
     let config = arguments
         .config
         .as_deref()
@@ -81,7 +89,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .transpose()?
         .unwrap_or_default();
     let options = options(arguments, &config)?;
-    check_folder(&arguments.out, arguments.force)?;
+    check_folder(out, arguments.force)?;
     let body = arguments.body.as_deref().map(BodyModel::read).transpose()?;
     let Selected {
         placements,
@@ -124,11 +132,11 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let (diagnosis, effects, evidence) = split(answers);
     // What was found is said even where its files cannot be written.
-    let written = write(arguments, &diagnosis, &effects, &evidence);
+    let written = write(out, &arguments.recordings, &diagnosis, &effects, &evidence);
     let said = print(&diagnosis);
     written?;
     said?;
-    print_files(&arguments.out)
+    print_files(out)
 }
 
 /// What is taken out of the library, and the seed: the command line wins over the file.
@@ -324,14 +332,14 @@ impl Drop for Staged {
 }
 
 fn write(
-    arguments: &Arguments,
+    folder: &Path,
+    recordings: &[PathBuf],
     diagnosis: &Diagnosis,
     effects: &EffectsFile,
     evidence: &BTreeMap<String, Evidence>,
 ) -> anyhow::Result<()> {
     let interrupt = Interrupt::watch()?;
-    let folder = &arguments.out;
-    let recording = file_names(&arguments.recordings).join(", ");
+    let recording = file_names(recordings).join(", ");
     let texts = [
         serde_json::to_string_pretty(diagnosis)? + "\n",
         effects.to_yaml(),

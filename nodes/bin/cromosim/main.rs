@@ -21,8 +21,10 @@ mod diagnose_view;
 mod evaluate;
 mod files;
 mod inspect;
+mod list;
 mod map;
 mod motion_arguments;
+mod named;
 mod node;
 mod output;
 mod progress;
@@ -81,10 +83,15 @@ enum Command {
         #[command(subcommand)]
         command: bag::Command,
     },
-    /// Work on bodies: export the model or a mesh
+    /// Work on bodies: export the model or a mesh, list its sites
     Body {
         #[command(subcommand)]
         command: body::Command,
+    },
+    /// List the names that commands and files take: sites, effects, schemes, devices, models, nodes
+    List {
+        #[command(subcommand)]
+        command: list::Command,
     },
     /// Run one node in this process: replay, smpl_state, virtual_imu, recorder, viewer or
     /// gap_monitor
@@ -136,6 +143,7 @@ fn main() -> ExitCode {
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Bag { command } => bag::run(&command),
         Command::Body { command } => body::run(&command),
+        Command::List { command } => list::run(&command),
         Command::Node(arguments) => node::run(&arguments),
         Command::Completion { shell, out, force } => completion(shell, out, force),
     };

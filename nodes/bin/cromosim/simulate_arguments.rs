@@ -8,7 +8,9 @@ use clap::Args;
 use cromosim_imu::{Differentiation, MAX_RATE_HZ, Scheme, TextureSegment, Trim};
 use cromosim_recording::convert::ReadOptions;
 
+use crate::list;
 use crate::motion_arguments::MotionArguments;
+use crate::named::Named;
 
 // Headings of the help: what an option goes with.
 const MOTIONS: &str = "Options of motion files";
@@ -38,7 +40,13 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME=SITE", help_heading = NETWORKS)]
     pub placement: Vec<String>,
     /// A device's name or file, for its noise and effects; default: an ideal sensor
-    #[arg(long, value_name = "DEVICE", help_heading = RIGID)]
+    #[arg(
+        long,
+        value_name = "DEVICE",
+        help_heading = RIGID,
+        hide_possible_values = true,
+        value_parser = Named(list::device_names)
+    )]
     pub device: Option<String>,
     /// The effects of each placement (YAML, as a diagnosis writes
     /// them) rather than the nominal simulation
@@ -54,7 +62,7 @@ pub struct Arguments {
     /// Derivative scheme for every placement: adaptive_spline, spline, richardson, triangle,
     /// normal_tracking or second_difference; default: the placements' own, adaptive_spline where
     /// they name none. With --reference the default is the estimate that a diagnosis uses
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", hide_possible_values = true, value_parser = Named(list::scheme_names))]
     pub scheme: Option<String>,
     /// Pass what is below this frequency, Hz, whatever the motion, rather than what the poses
     /// resolve: a low-pass without delay in place of a scheme
@@ -77,7 +85,9 @@ pub struct Arguments {
         value_name = "SEGMENT",
         num_args = 0..=1,
         require_equals = true,
-        default_missing_value = AUTO
+        default_missing_value = AUTO,
+        hide_possible_values = true,
+        value_parser = Named(list::texture_names)
     )]
     pub texture: Option<String>,
     /// Messages per second rather than the placements' own rate, Hz

@@ -85,12 +85,12 @@ pub enum ImuError {
         triangle: u32,
     },
     /// An unknown scheme.
-    #[error(
-        "unknown scheme `{name}`; known are richardson, normal_tracking, triangle, spline, second_difference"
-    )]
+    #[error("unknown scheme `{name}`; known are {known}")]
     UnknownScheme {
         /// The name given.
         name: String,
+        /// The names that there are.
+        known: String,
     },
     /// A device that is neither embedded nor a file.
     #[error("unknown device `{name}`; known are {known}, or give the path of a .yaml file")]

@@ -179,7 +179,7 @@ impl Machine<'_> {
                 .budget
                 .opcodes
                 .checked_sub(searched)
-                .ok_or("more attributes than Limits::opcodes allows")?;
+                .ok_or("more attributes of an object than are read; the file may be damaged")?;
         }
         let built = match self.node(object).clone() {
             Node::NewArray => self.numpy_array(state)?,

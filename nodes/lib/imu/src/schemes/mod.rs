@@ -63,6 +63,22 @@ impl Scheme {
         }
     }
 
+    /// What it does, in a line.
+    pub fn summary(self) -> &'static str {
+        match self {
+            Self::Richardson => {
+                "extrapolated central differences over five frames; O(h^4), loudest on jitter"
+            }
+            Self::NormalTracking => {
+                "the paper's baseline: the turning of the skin's normal alone; O(h^2)"
+            }
+            Self::Triangle => "central differences of the skin triangle's rotation; O(h^2)",
+            Self::Spline => "smoothing quintic splines, one smoothing for the whole motion",
+            Self::AdaptiveSpline => "splines that smooth rest much and bursts little; the default",
+            Self::SecondDifference => "plain differences of position and rotation; O(h^2)",
+        }
+    }
+
     /// How a spline smooths by this scheme.
     pub(crate) fn smoothing(self, source: PoseSource) -> PoseSmoothing {
         match self {
@@ -135,6 +151,7 @@ impl FromStr for Scheme {
             .find(|scheme| scheme.name() == name)
             .ok_or_else(|| ImuError::UnknownScheme {
                 name: name.to_owned(),
+                known: Self::ALL.map(Self::name).join(", "),
             })
     }
 }
