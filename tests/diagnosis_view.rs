@@ -34,6 +34,7 @@ fn diagnosis() -> Diagnosis {
     };
     let placement = |verdict: &str| PlacementDiagnosis {
         recordings: Vec::new(),
+        clock_jumps: Vec::new(),
         calibration: Vec::new(),
         verdict: verdict.to_owned(),
         gap: Gap {
@@ -65,6 +66,7 @@ fn diagnosis() -> Diagnosis {
     };
     let quiet = PlacementDiagnosis {
         recordings: Vec::new(),
+        clock_jumps: Vec::new(),
         calibration: Vec::new(),
         causes: Vec::new(),
         ..placement("No gap beyond the declared noise.")

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod answer;
+mod clock_jumps;
 #[path = "../common/mod.rs"]
 mod common;
 mod found;

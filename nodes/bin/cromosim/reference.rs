@@ -187,6 +187,7 @@ fn rigid_placement(trajectory: &Path, name: &str) -> anyhow::Result<RecordedPlac
         frames: poses.trajectory.frames(),
         measured: Vec::new(),
         notes: oddities.iter().map(ToString::to_string).collect(),
+        set_back: Vec::new(),
     })
 }
 

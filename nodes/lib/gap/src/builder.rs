@@ -169,6 +169,7 @@ impl<'a> DiagnosisBuilder<'a> {
             } else {
                 Vec::new()
             },
+            clock_jumps: Vec::new(),
         }
     }
 

@@ -1,12 +1,15 @@
 //! A placement's diagnosis, from its records to the answer.
 
+use std::borrow::Cow;
+
 use cromosim_imu::{
     Channel, DeclaredNoise, EffectKind, OtherSession, PerChannel, PlacementEffects,
     UnexplainedErrors,
 };
 
 use crate::builder::DiagnosisBuilder;
-use crate::diagnosis::PlacementDiagnosis;
+use crate::clock_jumps::{Parts, parts};
+use crate::diagnosis::{ClockJump, PlacementDiagnosis};
 use crate::error::GapError;
 use crate::evidence::Evidence;
 use crate::findings::Findings;
@@ -15,6 +18,7 @@ use crate::record::PlacementRecord;
 use crate::session::Session;
 use crate::together::analysed;
 use crate::trace::{names, trace};
+use crate::words::jumps_in_words;
 
 /// Settings of a diagnosis.
 #[derive(Clone, Debug, Default)]
@@ -62,32 +66,83 @@ pub type OfRecording<'r> = (&'r str, GapError);
 /// # Errors
 /// The first recording's name and [`GapError`] where none can be compared.
 pub fn diagnose_together<'r>(
-    recordings: &[(&'r str, &PlacementRecord)],
+    recordings: &[(&'r str, &'r PlacementRecord)],
     options: &DiagnoseOptions,
 ) -> Result<(PlacementAnswer, Vec<OfRecording<'r>>), OfRecording<'r>> {
     let library = Library::without(&options.excluded);
+    let (cut, jumps) = in_parts(recordings);
     let (mut sessions, mut kept, mut errors) = (Vec::new(), Vec::new(), Vec::new());
-    for (name, record) in recordings {
-        match Session::new(record, &library, None) {
+    for part in &cut {
+        match Session::new(&part.record, &library, None) {
             Ok(session) => {
                 sessions.push(session);
-                kept.push((*name, *record));
+                kept.push(part);
             }
-            Err(error) => errors.push((*name, error)),
+            Err(error) => errors.push((part.recording, error)),
         }
     }
     if sessions.is_empty() {
         return Err(errors.swap_remove(0));
     }
     let units = commonest_units(&sessions);
-    for (session, (name, record)) in sessions.iter_mut().zip(&kept) {
+    for (session, part) in sessions.iter_mut().zip(&kept) {
         if session.units != units {
-            *session =
-                Session::new(record, &library, Some(units)).map_err(|error| (*name, error))?;
+            *session = Session::new(&part.record, &library, Some(units))
+                .map_err(|error| (part.recording, error))?;
         }
     }
-    let names: Vec<&str> = kept.iter().map(|(name, _)| *name).collect();
-    Ok((answer(&sessions, &names, &library, options.seed), errors))
+    let names: Vec<&str> = kept.iter().map(|part| part.name.as_str()).collect();
+    let mut answer = answer(&sessions, &names, &library, options.seed);
+    if !jumps.is_empty() {
+        let verdict = &answer.diagnosis.verdict;
+        answer.diagnosis.verdict = format!("{}; {verdict}", jumps_in_words(&jumps));
+    }
+    answer.diagnosis.clock_jumps = jumps;
+    Ok((answer, errors))
+}
+
+/// A recording, or a part of it with one clock.
+struct Part<'r> {
+    recording: &'r str,
+    /// The recording's name, and which part.
+    name: String,
+    record: Cow<'r, PlacementRecord>,
+}
+
+/// Takes recordings apart where a clock jumps.
+fn in_parts<'r>(recordings: &[(&'r str, &'r PlacementRecord)]) -> (Vec<Part<'r>>, Vec<ClockJump>) {
+    let (mut cut, mut all) = (Vec::new(), Vec::new());
+    for &(recording, record) in recordings {
+        let Parts { parts, jumps } = parts(record);
+        let of_recording = |jump| ClockJump {
+            recording: recording.to_owned(),
+            ..jump
+        };
+        let set_back = record.set_back.iter().cloned();
+        all.extend(jumps.into_iter().chain(set_back).map(of_recording));
+        let Some(parts) = parts else {
+            cut.push(Part {
+                recording,
+                name: recording.to_owned(),
+                record: Cow::Borrowed(record),
+            });
+            continue;
+        };
+        let count = parts.len();
+        for (index, record) in parts.into_iter().enumerate() {
+            let which = format!("part {}", index + 1);
+            cut.push(Part {
+                recording,
+                name: match (recording.is_empty(), count) {
+                    (_, 1) => recording.to_owned(),
+                    (true, _) => which,
+                    (false, _) => format!("{recording}, {which}"),
+                },
+                record: Cow::Owned(record),
+            });
+        }
+    }
+    (cut, all)
 }
 
 /// The device's units that most of the recordings show; of several, those of the first.

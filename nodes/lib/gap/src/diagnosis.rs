@@ -44,6 +44,28 @@ pub struct PlacementDiagnosis {
     /// of them (the location of the gap, what is unknown, and values that are a session's own, of one).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub recordings: Vec<RecordingDiagnosis>,
+    /// Where stamps go on somewhere else; what lies between is diagnosed in parts, which
+    /// `recordings` holds.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub clock_jumps: Vec<ClockJump>,
+}
+
+/// A clock that was set, or stamps that it never had.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ClockJump {
+    /// Whose: `imu`, `reference`.
+    pub clock: String,
+    /// The last stamp before it, s.
+    pub at: f64,
+    /// How far the stamps jump beyond what was due, s.
+    pub by: f64,
+    /// Messages (of a reference: poses) after it, up to the next one.
+    pub messages: usize,
+    /// Whether these are diagnosed, the jump undone; else they are left out.
+    pub diagnosed: bool,
+    /// The recording, where there are several.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub recording: String,
 }
 
 /// What is said of one of several recordings.

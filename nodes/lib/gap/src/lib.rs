@@ -5,6 +5,8 @@ mod analysis;
 mod axes;
 mod builder;
 mod calibration;
+mod clock_jumps;
+mod clock_runs;
 mod coarse_alignment;
 mod confounding;
 mod correlation;
@@ -33,10 +35,12 @@ mod policy;
 mod prepared;
 mod probability;
 mod record;
+mod reference_jumps;
 mod reference_tracks;
 pub mod report;
 mod reportable;
 mod residual_regressions;
+mod same_motion;
 mod screen;
 mod search;
 mod sensor_noise;
@@ -54,8 +58,8 @@ mod words;
 
 pub use diagnose::{DiagnoseOptions, OfRecording, PlacementAnswer, diagnose, diagnose_together};
 pub use diagnosis::{
-    Cause, Diagnosis, Gap, GapLocation, Interval, KeptCalibration, Metrics, PlacementDiagnosis,
-    RecordingCause, RecordingDiagnosis, SCHEMA, Unexplained, Unidentifiable,
+    Cause, ClockJump, Diagnosis, Gap, GapLocation, Interval, KeptCalibration, Metrics,
+    PlacementDiagnosis, RecordingCause, RecordingDiagnosis, SCHEMA, Unexplained, Unidentifiable,
 };
 pub use error::GapError;
 pub use evidence::{CoursePoint, Evidence, Spectra};

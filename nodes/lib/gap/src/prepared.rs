@@ -16,6 +16,11 @@ const LEAST_OVERLAP_S: f64 = 4.0;
 const LEAST_MESSAGES: usize = 50;
 /// Most entries of a sample grid: stamps that span more are taken for broken (55 hours at 100 Hz).
 const MOST_ENTRIES: usize = 20_000_000;
+/// Most entries for each message beyond the first [`FREE_ENTRIES`]: memory grows with what was
+/// measured, whatever its stamps are.
+const MOST_ENTRIES_A_MESSAGE: usize = 64;
+/// Half an hour at 100 Hz.
+const FREE_ENTRIES: usize = 200_000;
 /// What is left out at the reference's ends, s.
 const END_S: f64 = 1.0;
 /// What is left out on either side of a gap in the reference, s.
@@ -142,7 +147,8 @@ impl PreparedPlacement {
             messages: stamps.len(),
             needed: LEAST_MESSAGES,
         })?;
-        if grid.length > MOST_ENTRIES {
+        let most = FREE_ENTRIES + MOST_ENTRIES_A_MESSAGE * stamps.len();
+        if grid.length > most.min(MOST_ENTRIES) {
             return Err(GapError::NoOverlap {
                 placement: name,
                 overlap_s: 0.0,

@@ -4,6 +4,8 @@ use cromosim_imu::{PerChannel, Reading};
 pub use cromosim_spatial::PoseSeries;
 use cromosim_spatial::Stamp;
 
+use crate::diagnosis::ClockJump;
+
 /// One placement of a recording.
 #[derive(Clone, Debug, Default)]
 pub struct PlacementRecord {
@@ -13,6 +15,9 @@ pub struct PlacementRecord {
     pub reference: PoseSeries,
     /// What the IMU read.
     pub imu: MeasuredImu,
+    /// Where the reference's clock was set back over time that it had been through: these poses are
+    /// left out of `reference`.
+    pub set_back: Vec<ClockJump>,
 }
 
 /// What a real IMU sent, in the order of its messages; both lists have the same length.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use cromosim_imu::{EffectKind, Shape};
 use serde_json::{Value, json};
 
-use crate::diagnosis::{Cause, Interval, Metrics, UNKNOWN};
+use crate::diagnosis::{Cause, ClockJump, Interval, Metrics, UNKNOWN};
 use crate::findings::Unknown;
 use crate::policy::unknown::{BAND_SHARE, INTERVAL_SHARE};
 
@@ -161,6 +161,31 @@ fn course(before: f64, after: f64, decimals: usize) -> (&'static str, String) {
     }
     let word = if after < before { "falls" } else { "rises" };
     (word, format!("from {} to {}", texts[0], texts[1]))
+}
+
+/// `clock_jump: the IMU's clock jumps by 3600.0 s at 1700000025.0 s`, the first three.
+pub(crate) fn jumps_in_words(jumps: &[ClockJump]) -> String {
+    let one = |jump: &ClockJump| {
+        let (whose, what) = if jump.clock == "imu" {
+            ("IMU", "messages")
+        } else {
+            ("reference", "poses")
+        };
+        let left_out = if jump.diagnosed {
+            String::new()
+        } else {
+            format!(" ({} {what} left out)", jump.messages)
+        };
+        format!(
+            "the {whose}'s stamps jump by {:.3} s at {:.3} s{left_out}",
+            jump.by, jump.at
+        )
+    };
+    let mut list: Vec<String> = jumps.iter().take(3).map(one).collect();
+    if jumps.len() > 3 {
+        list.push(format!("and {} times more", jumps.len() - 3));
+    }
+    format!("clock_jump: {}", list.join(", "))
 }
 
 #[cfg(test)]

@@ -30,6 +30,7 @@ mod namespace;
 mod placement;
 mod played;
 mod quality;
+mod reference_parts;
 mod resimulation;
 pub mod rigid;
 mod trace;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use cromosim_bag::BagReader;
 use cromosim_body::{BodyModel, BodyPose, ShapedBody};
-use cromosim_gap::{MeasuredImu, PlacementRecord, PoseSeries};
+use cromosim_gap::{ClockJump, MeasuredImu, PlacementRecord, PoseSeries};
 use cromosim_imu::{
     Channel, MountedSensors, PerChannel, PlacementSet, Reading, SensorFrame, SensorTrajectory,
 };
@@ -15,6 +15,13 @@ use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_spatial::Stamp;
 
 use crate::{RecordingError, body_for_bag};
+
+/// Stamps of a reference that go back further were set back, s: messages overtake each other by less.
+const SET_BACK_S: f64 = 1.0;
+/// Stamps that go on so much later may be those of a clock that was set, s.
+const SET_ON_S: f64 = 10.0;
+/// Earlier stretches of one clock that are looked at: work stays bounded whatever the stamps are.
+const MOST_SPANS: usize = 8;
 
 /// A placement of a recording: its reference, and its real IMU where there is one.
 #[derive(Clone, Debug)]
@@ -27,6 +34,9 @@ pub struct RecordedPlacement {
     pub measured: Vec<Imu>,
     /// What was left out of the reference, a sentence each.
     pub notes: Vec<String>,
+    /// Where the reference's clock was set back over time that it had been through; these poses are
+    /// left out.
+    pub set_back: Vec<ClockJump>,
 }
 
 /// The placements of a bag that have a reference, by name, each on its own: what is wrong with one
@@ -62,9 +72,14 @@ pub fn read_placements(
             .collect());
     }
     let read = |name: String| {
-        let mut notes = Vec::new();
-        let recorded = read_poses(reader, &format!("/reference/{name}"), &mut notes)
-            .and_then(|frames| with_imu(reader, name.clone(), frames, notes));
+        let (mut notes, mut set_back) = (Vec::new(), Vec::new());
+        let topic = format!("/reference/{name}");
+        let recorded = read_poses_and_jumps(reader, &topic, &mut notes, &mut set_back)
+            .and_then(|frames| with_imu(reader, name.clone(), frames, notes))
+            .map(|placement| RecordedPlacement {
+                set_back,
+                ..placement
+            });
         (name, recorded)
     };
     Ok(references.into_iter().map(read).collect())
@@ -106,6 +121,7 @@ fn with_imu(
         frames,
         measured: measured.into_iter().map(|(_, message)| message).collect(),
         notes,
+        set_back: Vec::new(),
     })
 }
 
@@ -119,31 +135,23 @@ pub fn read_poses(
     topic: &str,
     notes: &mut Vec<String>,
 ) -> Result<Vec<SensorFrame>, RecordingError> {
+    read_poses_and_jumps(reader, topic, notes, &mut Vec::new())
+}
+
+fn read_poses_and_jumps(
+    reader: &BagReader,
+    topic: &str,
+    notes: &mut Vec<String>,
+    set_back: &mut Vec<ClockJump>,
+) -> Result<Vec<SensorFrame>, RecordingError> {
     let messages = reader.read::<PoseStamped>(topic)?;
     let count = messages.len();
     let mut frames = Vec::with_capacity(count);
     for (_, message) in messages {
-        let stamp = Stamp::from_nanos(message.header.stamp.nanos());
-        let (p, q) = (&message.pose.position, &message.pose.orientation);
-        // What motion capture writes while it sees nothing.
-        if ![p.x, p.y, p.z, q.x, q.y, q.z, q.w]
-            .iter()
-            .all(|value| value.is_finite())
-        {
-            continue;
-        }
-        let world_from_sensor = message
-            .pose
-            .try_into()
-            .map_err(|source| RecordingError::Pose {
-                path: reader.path().to_owned(),
-                topic: topic.to_owned(),
-                seconds: stamp.as_seconds(),
-                source,
-            })?;
-        frames.push(SensorFrame::new(stamp, world_from_sensor));
+        frames.extend(frame(&message, reader, topic)?);
     }
     let finite = frames.len();
+    *set_back = leave_out_set_back(&mut frames);
     if finite < count {
         notes.push(format!(
             "{} of {count} reference poses are NaN or infinite and left out",
@@ -157,15 +165,90 @@ pub fn read_poses(
             count,
         });
     }
+    let sound = frames.len();
+    if sound < finite {
+        notes.push(format!(
+            "{} reference poses are stamped with time that others before them had been through: the reference's clock was set back; they are left out",
+            finite - sound
+        ));
+    }
     frames.sort_by_key(|frame| frame.stamp);
     frames.dedup_by_key(|frame| frame.stamp);
-    if frames.len() < finite {
+    if frames.len() < sound {
         notes.push(format!(
             "{} reference poses repeat a stamp and are left out",
-            finite - frames.len()
+            sound - frames.len()
         ));
     }
     Ok(frames)
+}
+
+/// The pose of a message; none where it is no number: what motion capture writes while it sees
+/// nothing.
+fn frame(
+    message: &PoseStamped,
+    reader: &BagReader,
+    topic: &str,
+) -> Result<Option<SensorFrame>, RecordingError> {
+    let stamp = Stamp::from_nanos(message.header.stamp.nanos());
+    let (p, q) = (&message.pose.position, &message.pose.orientation);
+    if ![p.x, p.y, p.z, q.x, q.y, q.z, q.w]
+        .iter()
+        .all(|value| value.is_finite())
+    {
+        return Ok(None);
+    }
+    let pose = message.pose.try_into();
+    let world_from_sensor = pose.map_err(|source| RecordingError::Pose {
+        path: reader.path().to_owned(),
+        topic: topic.to_owned(),
+        seconds: stamp.as_seconds(),
+        source,
+    })?;
+    Ok(Some(SensorFrame::new(stamp, world_from_sensor)))
+}
+
+/// Takes poses out, in the order in which they came, whose clock was set back over time that it had
+/// been through: between the poses of that time they would be another motion.
+fn leave_out_set_back(frames: &mut Vec<SensorFrame>) -> Vec<ClockJump> {
+    let mut spans: Vec<[Stamp; 2]> = Vec::new();
+    let mut jumps: Vec<ClockJump> = Vec::new();
+    let (mut jump_s, mut period_s) = ((Stamp::default(), 0.0), 0.0);
+    frames.retain(|frame| {
+        let stamp = frame.stamp;
+        match spans.last_mut() {
+            Some(span) if (-SET_BACK_S..=SET_ON_S).contains(&(stamp - span[1])) => {
+                if stamp > span[1] {
+                    period_s = stamp - span[1];
+                    span[1] = stamp;
+                }
+            }
+            last => {
+                let by_s = |span: &[Stamp; 2]| stamp - span[1].plus_seconds(period_s);
+                jump_s = last.map_or(jump_s, |span| (span[1], by_s(span)));
+                spans.push([stamp; 2]);
+            }
+        }
+        let before = spans.iter().rev().skip(1).take(MOST_SPANS);
+        let was_through = |span: &[Stamp; 2]| (span[0]..=span[1]).contains(&stamp);
+        if !before.into_iter().any(was_through) {
+            return true;
+        }
+        let (at, by) = (jump_s.0.as_seconds(), jump_s.1);
+        match jumps.last_mut() {
+            Some(jump) if jump.at == at && jump.by == by => jump.messages += 1,
+            _ => jumps.push(ClockJump {
+                clock: "reference".to_owned(),
+                at,
+                by,
+                messages: 1,
+                diagnosed: false,
+                recording: String::new(),
+            }),
+        }
+        false
+    });
+    jumps
 }
 
 /// The sites' poses from the bag's states and its attachment `placements.yaml`.
@@ -290,6 +373,7 @@ impl RecordedPlacement {
                 readings: self.measured.iter().map(reading).collect(),
                 declared: self.declared(),
             },
+            set_back: self.set_back.clone(),
         }
     }
 }

@@ -19,6 +19,7 @@ use cromosim_spatial::{
 };
 use nalgebra::Isometry3;
 
+use crate::reference_parts::parts;
 use crate::{Quality, RecordedPlacement, RecordingError};
 
 /// How the IMUs of a recording are simulated again.
@@ -119,6 +120,32 @@ impl Resimulation {
     /// # Errors
     /// Without stamps and rate, and where the reference's motion cannot be estimated.
     pub fn simulate(&self, placement: &RecordedPlacement) -> Result<Resimulated, RecordingError> {
+        let Some(parts) = parts(placement) else {
+            return self.simulate_part(placement, &placement.name);
+        };
+        let mut messages = vec![Imu::default(); placement.measured.len()];
+        for (index, (part, places)) in parts.iter().enumerate() {
+            let noise_of = match index {
+                0 => placement.name.clone(),
+                _ => format!("{}, part {}", placement.name, index + 1),
+            };
+            let simulated = self.simulate_part(part, &noise_of)?.messages;
+            for (place, message) in places.iter().zip(simulated) {
+                messages[*place] = message;
+            }
+        }
+        Ok(Resimulated {
+            messages,
+            quality: Quality::default(),
+        })
+    }
+
+    /// `noise_of` names the noise.
+    fn simulate_part(
+        &self,
+        placement: &RecordedPlacement,
+        noise_of: &str,
+    ) -> Result<Resimulated, RecordingError> {
         let name = &placement.name;
         let mut stamps = self.stamps(placement)?;
         let rate_hz = mean_rate(&stamps);
@@ -150,7 +177,7 @@ impl Resimulation {
         let options = ImuOptions {
             rate_hz,
             seed: self.seed,
-            name: name.clone(),
+            name: noise_of.to_owned(),
             noise: self.noise,
             frame_id: placement.measured.first().map_or_else(
                 || format!("{name}_imu"),

@@ -117,6 +117,7 @@ impl Scene {
             name: "wrist".to_owned(),
             reference: self.reference(),
             imu: self.imu(),
+            set_back: Vec::new(),
         }
     }
 
