@@ -224,3 +224,31 @@ fn nothing_is_replaced_without_force() {
     let demo = ["demo", "--duration", "0.1", "--out", "mine"];
     common::refuses(here, &demo, &["mine/bag", "exists already", "--force"]);
 }
+
+/// What 1.7 million messages would not fit into where they were all made before any is written.
+#[test]
+fn many_samples_take_little_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    let placements = root().join("config/placements/full17.yaml");
+    let output = Command::new("sh")
+        .args(["-c", "ulimit -v 500000 && exec \"$@\"", "sh"])
+        .arg(CROMOSIM)
+        .args([
+            "simulate",
+            "--rate",
+            "5000",
+            "--out",
+            "many.mcap",
+            "--placements",
+        ])
+        .arg(placements)
+        // Each thread reserves addresses.
+        .env("RAYON_NUM_THREADS", "2")
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", text(&output));
+    assert!(text(&output).contains("17 placements"), "{}", text(&output));
+    // What was put aside is gone.
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+}

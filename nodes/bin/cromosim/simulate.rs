@@ -9,19 +9,17 @@ use anyhow::{Context, bail};
 use cromosim_bag::{BagOptions, BagSummary, BagWriter, Compression};
 use cromosim_body::{BodyModel, ShapedBody};
 use cromosim_imu::{
-    Device, Differentiation, DrawnTexture, ImuOptions, KinematicSample, MountedSensor,
-    MountedSensors, PlacementSet, PoseStd, SensorTrajectory, TextureSegment, Trim, VirtualImu,
-    add_texture, measure_all, point_oddity, simulate_kinematics_on,
+    Device, Differentiation, DrawnTexture, ImuOptions, KinematicSample, MotionCorrection,
+    MountedSensor, MountedSensors, PlacementSet, PoseStd, SensorTrajectory, TextureSegment, Trim,
+    VirtualImu, add_texture, point_oddity, simulate_kinematics_on,
 };
 use cromosim_learned::{LearnedSimulator, MappingFile, Patch, SiteMotion, scheme_for_networks};
 use cromosim_motion::{
     MotionOptions, SmplMotion, embedded_walk, read_motion_for, read_people_whole,
 };
-use cromosim_msgs::geometry_msgs::PoseStamped;
-use cromosim_msgs::std_msgs::Header;
 use cromosim_recording::{
-    FIRST_STAMP, PlayedPerson, Quality, RecordingError, SimulatedPlacement, csv_file,
-    reading_mapping, write_people, write_people_csv,
+    FIRST_STAMP, MotionSpill, PlayedPerson, Quality, RecordingError, SimulatedPerson,
+    SimulatedPlacement, csv_file, reading_mapping, write_people, write_people_csv,
 };
 use cromosim_spatial::{PoseTimes, Stamp, uniform_stamps};
 use indicatif::ProgressBar;
@@ -51,6 +49,27 @@ struct Setup {
     learned: Option<LearnedSimulator>,
     mapping: MappingFile,
     interrupt: Interrupt,
+}
+
+/// Bytes of samples that a motion's placements may keep in memory until they are written.
+const IN_MEMORY: usize = 128 << 20;
+
+/// Where samples are put aside.
+struct Aside {
+    /// Bytes a placement.
+    in_memory: usize,
+    folder: PathBuf,
+}
+
+impl Aside {
+    /// Where the output has to have room anyway.
+    fn beside(out: &Path, placements: usize) -> Self {
+        let folder = out.parent().filter(|parent| !parent.as_os_str().is_empty());
+        Self {
+            in_memory: IN_MEMORY / placements.max(1),
+            folder: folder.unwrap_or(Path::new(".")).to_owned(),
+        }
+    }
 }
 
 /// Runs `simulate MOTIONS`.
@@ -200,8 +219,9 @@ impl Setup {
     fn simulate(
         &self,
         person: &PlayedPerson,
+        aside: &Aside,
         bar: &ProgressBar,
-    ) -> anyhow::Result<Vec<SimulatedPlacement>> {
+    ) -> anyhow::Result<SimulatedPerson> {
         let PlayedPerson { motion, stamps, .. } = person;
         let shaped = ShapedBody::new(self.model.clone(), &motion.betas)?;
         let sites = MountedSensors::new(&shaped, self.placements.placements())?;
@@ -217,30 +237,31 @@ impl Setup {
             .iter()
             .map(|&confidence| PoseStd::from_confidence(confidence, self.pose_error_correlation_s))
             .collect();
-        let trajectories: Vec<SensorTrajectory> = sites
-            .trajectories(stamps, &motion.frames)?
-            .into_iter()
-            .map(|trajectory| {
-                trajectory
-                    .with_pose_stds(&stds)
-                    .from_source(motion.source())
-            })
-            .collect();
         let times = PoseTimes::new(stamps)?;
         bar.inc(1);
-        let one = |(index, trajectory): (usize, &SensorTrajectory)| {
+        let one = |index: usize| {
             self.interrupt.check()?;
-            let simulated = self.simulate_placement(
-                person,
-                (&shaped, &sites.sensors()[index]),
-                index,
-                trajectory,
-                &times,
-            );
+            // Poses of one placement at a time: those of all would be most of a long motion's memory.
+            let alone = &self.placements.placements()[index..=index];
+            let trajectories = MountedSensors::new(&shaped, alone)?;
+            let trajectories = trajectories.trajectories(stamps, &motion.frames)?;
+            let trajectory = trajectories
+                .into_iter()
+                .next()
+                .context("a placement has a trajectory")?
+                .with_pose_stds(&stds)
+                .from_source(motion.source());
+            let mounted = (&shaped, &sites.sensors()[index]);
+            let simulated =
+                self.simulate_placement(person, mounted, index, (&trajectory, &times), aside);
             bar.inc(1);
             simulated
         };
-        trajectories.par_iter().enumerate().map(one).collect()
+        let placements = (0..sites.sensors().len()).into_par_iter().map(one);
+        Ok(SimulatedPerson {
+            placements: placements.collect::<anyhow::Result<_>>()?,
+            sites,
+        })
     }
 
     fn simulate_placement(
@@ -248,8 +269,8 @@ impl Setup {
         person: &PlayedPerson,
         (shaped, mounted): (&ShapedBody, &MountedSensor),
         index: usize,
-        trajectory: &SensorTrajectory,
-        times: &PoseTimes,
+        (trajectory, times): (&SensorTrajectory, &PoseTimes),
+        aside: &Aside,
     ) -> anyhow::Result<SimulatedPlacement> {
         let (placement, device) = (&self.placements.placements()[index], &self.devices[index]);
         let (name, rate_hz) = (placement.name(), placement.rate_hz());
@@ -265,7 +286,7 @@ impl Setup {
             frame_id: person.frame(&format!("{name}_imu")),
             mapping: reading_mapping(&self.mapping, name),
         };
-        let mut imu = [VirtualImu::new(device, options)?];
+        let imu = VirtualImu::new(device, options)?;
         let by = match self.bandwidth_hz {
             Some(bandwidth_hz) => Differentiation::Bandwidth(bandwidth_hz),
             None => placement.scheme().into(),
@@ -276,27 +297,19 @@ impl Setup {
         motion.retain(|sample| span.contains(&sample.stamp));
         let whose = person.frame(name);
         quality.texture = self.draw_texture(&mut motion, mounted, &whose)?;
-        let mut correction = match &self.learned {
-            Some(networks) => {
-                let patch = Patch::new(shaped, mounted.site())?;
-                let poses = person.motion.frames.iter();
-                let points: Vec<_> = poses.map(|pose| patch.points(pose)).collect();
-                let seen = SiteMotion::new(trajectory, placement.scheme(), &points)?;
-                Some(networks.correction(seen))
-            }
-            None => None,
-        };
-        let messages = measure_all(&mut imu, vec![motion], correction.as_mut())?;
-        let messages = messages.into_iter().map(|(_, messages)| messages);
-        let played = &trajectory.frames()[person.played.clone()];
-        let reference = played.iter().map(|frame| PoseStamped {
-            header: Header::new(frame.stamp.nanos, "world"),
-            pose: frame.world_from_sensor.into(),
-        });
+        let mut motion = [motion];
+        if let Some(networks) = &self.learned {
+            let patch = Patch::new(shaped, mounted.site())?;
+            let poses = person.motion.frames.iter();
+            let points: Vec<_> = poses.map(|pose| patch.points(pose)).collect();
+            let seen = SiteMotion::new(trajectory, placement.scheme(), &points)?;
+            networks.correction(seen).correct(&mut motion)?;
+        }
+        let [motion] = motion;
         Ok(SimulatedPlacement {
             name: name.to_owned(),
-            reference: reference.collect(),
-            messages: messages.collect(),
+            motion: MotionSpill::new(&motion, aside.in_memory, &aside.folder)?,
+            imu,
             quality,
         })
     }
@@ -427,7 +440,7 @@ fn last_played(people: &[PlayedPerson]) -> Option<Stamp> {
 fn write_bag(
     setup: &Setup,
     people: &[PlayedPerson],
-    simulated: &[Vec<SimulatedPlacement>],
+    simulated: &mut [SimulatedPerson],
     oddities: &[String],
     out: &Path,
 ) -> anyhow::Result<BagSummary> {
@@ -438,11 +451,11 @@ fn write_bag(
     };
     let mut bag = BagWriter::create(out, options)?;
     let mut metadata = setup.metadata(&people[0].motion);
-    for (person, simulated) in people.iter().zip(simulated) {
+    for (person, simulated) in people.iter().zip(simulated.iter()) {
         let quality = |placement: &SimulatedPlacement| {
             quality_entries(&person.frame(&placement.name), &placement.quality)
         };
-        metadata.extend(simulated.iter().flat_map(quality));
+        metadata.extend(simulated.placements.iter().flat_map(quality));
     }
     metadata.extend(unlikely(oddities.iter().cloned()));
     bag.write_metadata("cromosim", metadata)?;
@@ -466,15 +479,16 @@ fn simulate_one(
     for path in setup.csv_files(people, out) {
         refuse_existing(&path, setup.force)?;
     }
-    let simulated = people
+    let aside = Aside::beside(out, people.len() * setup.placements.placements().len());
+    let mut simulated = people
         .iter()
-        .map(|person| setup.simulate(person, bar))
+        .map(|person| setup.simulate(person, &aside, bar))
         .collect::<anyhow::Result<Vec<_>>>()?;
     let oddities = setup.oddities(people)?;
-    let summary = write_bag(setup, people, &simulated, &oddities, out)?;
+    let summary = write_bag(setup, people, &mut simulated, &oddities, out)?;
     if let Some(folder) = &setup.csv {
-        for (person, simulated) in people.iter().zip(&simulated) {
-            write_people_csv(out, folder, person, simulated, setup.force)?;
+        for person in people {
+            write_people_csv(out, folder, person, &names(&setup.placements), setup.force)?;
         }
     }
     let motion = &people[0].motion;
@@ -494,7 +508,7 @@ fn simulate_one(
         quality_line(
             simulated
                 .iter()
-                .flatten()
+                .flat_map(|person| &person.placements)
                 .map(|placement| placement.quality)
         )
     ))

@@ -32,7 +32,7 @@ pub use error::BagError;
 pub use qos::{QosProfile, QosTime};
 pub use reader::{BagReader, Message, Messages, Selection};
 pub use recover::{Damage, Recovery, recover, recover_over};
-pub use stream::{Compression, StreamWriter, TopicId};
+pub use stream::{Compression, StreamWriter, TopicId, payload_of};
 pub use summary::{BagSummary, CountedTopic};
 pub use topic::Topic;
 pub use walk::Attachment;

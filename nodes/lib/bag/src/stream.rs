@@ -149,12 +149,7 @@ impl<W: Write + Seek> StreamWriter<W> {
             Some(&id) if self.summary.topics[id.0].topic.type_name == M::TYPE_NAME => id,
             _ => self.add_topic(&Topic::for_message::<M>(topic))?,
         };
-        let payload = cdr::encode(message).map_err(|reason| BagError::Encode {
-            topic: topic.to_owned(),
-            type_name: M::TYPE_NAME,
-            reason,
-        })?;
-        self.write_payload(id, &payload, stamp, stamp)
+        self.write_payload(id, &payload_of(topic, message)?, stamp, stamp)
     }
 
     /// Writes a message that is encoded already: `payload` is CDR with its four header bytes.
@@ -309,6 +304,19 @@ impl<W: Write + Seek> StreamWriter<W> {
             .map_err(crate::error::io_error(&self.label, "write"))?;
         Ok((output, summary))
     }
+}
+
+/// What [`StreamWriter::write`] makes of a message before it writes it: for those that encode on
+/// several threads.
+///
+/// # Errors
+/// [`BagError::Encode`].
+pub fn payload_of<M: RosMessage>(topic: &str, message: &M) -> Result<Vec<u8>, BagError> {
+    cdr::encode(message).map_err(|reason| BagError::Encode {
+        topic: topic.to_owned(),
+        type_name: M::TYPE_NAME,
+        reason,
+    })
 }
 
 /// A time as the file holds it; `whose` is named in the error.

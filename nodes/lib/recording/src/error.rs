@@ -164,6 +164,14 @@ pub enum RecordingError {
         /// The reason.
         source: std::io::Error,
     },
+    /// The operating system refuses the place where samples are put aside.
+    #[error("{}: samples cannot be put aside there: {source}", folder.display())]
+    PutAside {
+        /// The folder of the output.
+        folder: PathBuf,
+        /// The reason.
+        source: std::io::Error,
+    },
     /// A file, or a topic in it, that does not suit what is asked of it.
     #[error("{}: {problem}", path.display())]
     Unsuitable {

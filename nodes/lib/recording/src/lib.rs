@@ -26,7 +26,9 @@ mod error;
 mod file;
 pub mod inspect;
 mod messages;
+mod motion_spill;
 mod namespace;
+mod people_bag;
 mod placement;
 mod played;
 mod quality;
@@ -41,9 +43,11 @@ pub use body::body_for_bag;
 pub use error::RecordingError;
 pub use file::{is_in_the_way, read_head, read_whole, write_file, write_file_with};
 pub use messages::{FIRST_STAMP, MessageHeader, smpl_pose, smpl_state, stamp_of_frame};
+pub use motion_spill::MotionSpill;
 pub use namespace::open_recording;
+pub use people_bag::write_people;
 pub use placement::{RecordedPlacement, read_placements, read_poses};
-pub use played::{PlayedPerson, SimulatedPlacement, csv_file, write_people, write_people_csv};
+pub use played::{PlayedPerson, SimulatedPerson, SimulatedPlacement, csv_file, write_people_csv};
 pub use quality::Quality;
 pub use resimulation::{
     Resimulated, Resimulation, outside_reference, read_effects, reading_mapping, with_stamps,

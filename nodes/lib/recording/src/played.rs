@@ -1,16 +1,16 @@
-//! The people of a motion, and their messages in a bag.
+//! The people of a motion, and what is simulated of them.
 
 use std::fs;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
-use cromosim_bag::{BagReader, BagWriter, write_imu_csv};
-use cromosim_imu::ImuMessages;
+use cromosim_bag::{BagReader, write_imu_csv};
+use cromosim_imu::{MountedSensors, VirtualImu};
 use cromosim_motion::{MotionError, PersonPart, SmplMotion};
 use cromosim_msgs::cromosim_msgs::SmplState;
-use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_spatial::Stamp;
 
+use crate::motion_spill::MotionSpill;
 use crate::{MessageHeader, Quality, RecordingError, smpl_state, stamp_of_frame, write_file_with};
 
 /// One person of a motion file.
@@ -31,12 +31,20 @@ pub struct PlayedPerson {
 pub struct SimulatedPlacement {
     /// The placement's name.
     pub name: String,
-    /// `world_from_sensor` at each of the motion's frames.
-    pub reference: Vec<PoseStamped>,
-    /// Each sample, in the two forms of REP-145.
-    pub messages: Vec<ImuMessages>,
+    /// What the IMU goes through.
+    pub motion: MotionSpill,
+    /// It makes the messages, in the two forms of REP-145, as they are written.
+    pub imu: VirtualImu,
     /// What they are good for.
     pub quality: Quality,
+}
+
+/// A person's placements.
+pub struct SimulatedPerson {
+    /// For the references: where they are at each of the motion's frames.
+    pub sites: MountedSensors,
+    /// In the order of `sites`.
+    pub placements: Vec<SimulatedPlacement>,
 }
 
 /// Poses on either side of a part that are differentiated with it, s: several times what neighbours
@@ -105,11 +113,11 @@ impl PlayedPerson {
     }
 
     /// The name of a topic.
-    fn topic(&self, name: &str) -> String {
+    pub(crate) fn topic(&self, name: &str) -> String {
         format!("/{}", self.frame(name))
     }
 
-    fn state(&self, frame: usize) -> SmplState {
+    pub(crate) fn state(&self, frame: usize) -> SmplState {
         let header = MessageHeader {
             stamp: self.stamps[frame],
             frame_id: "world",
@@ -123,96 +131,6 @@ fn stamps(motion: &SmplMotion, begins_s: f64) -> Vec<Stamp> {
     (0..motion.frames.len())
         .map(|frame| stamp_of_frame(motion, frame, begins_s))
         .collect()
-}
-
-/// A message that is to be written, with its topics.
-enum Scheduled<'a> {
-    State(&'a PlayedPerson, usize),
-    Reference(&'a str, &'a PoseStamped),
-    Sample(&'a [String; 2], &'a ImuMessages),
-}
-
-/// Writes the messages in order of time; of one time each person's state first, then each
-/// placement's.
-///
-/// # Errors
-/// Of `check`, which is called before each message, and of the bag.
-pub fn write_people<E: From<RecordingError>>(
-    bag: &mut BagWriter,
-    people: &[PlayedPerson],
-    simulated: &[Vec<SimulatedPlacement>],
-    check: impl Fn() -> Result<(), E>,
-) -> Result<(), E> {
-    let topics: Vec<Vec<(String, [String; 2])>> = people
-        .iter()
-        .zip(simulated)
-        .map(|(person, simulated)| topics(person, simulated))
-        .collect();
-    let states: Vec<String> = people
-        .iter()
-        .map(|person| person.topic("smpl/state"))
-        .collect();
-    let mut schedule: Vec<(i64, usize, Scheduled)> = Vec::new();
-    for (number, (person, simulated)) in people.iter().zip(simulated).enumerate() {
-        schedule.extend(
-            person
-                .stamps
-                .iter()
-                .enumerate()
-                .filter(|(frame, _)| person.played.contains(frame))
-                .map(|(frame, stamp)| (stamp.nanos, number, Scheduled::State(person, frame))),
-        );
-        for (placement, (reference, samples)) in simulated.iter().zip(&topics[number]) {
-            let references = placement.reference.iter();
-            schedule.extend(references.map(|message| {
-                (
-                    message.header.stamp.nanos(),
-                    number,
-                    Scheduled::Reference(reference, message),
-                )
-            }));
-            schedule.extend(placement.messages.iter().map(|messages| {
-                (
-                    messages.data_raw.header.stamp.nanos(),
-                    number,
-                    Scheduled::Sample(samples, messages),
-                )
-            }));
-        }
-    }
-    schedule.sort_by_key(|(nanos, ..)| *nanos);
-    for (nanos, number, message) in schedule {
-        check()?;
-        write_one(bag, &states[number], Stamp::from_nanos(nanos), message)?;
-    }
-    Ok(())
-}
-
-fn write_one(
-    bag: &mut BagWriter,
-    states: &str,
-    stamp: Stamp,
-    message: Scheduled<'_>,
-) -> Result<(), RecordingError> {
-    match message {
-        Scheduled::State(person, frame) => bag.write(states, stamp, &person.state(frame))?,
-        Scheduled::Reference(topic, message) => bag.write(topic, stamp, message)?,
-        Scheduled::Sample([raw_topic, full_topic], messages) => {
-            bag.write(raw_topic, stamp, &messages.data_raw)?;
-            bag.write(full_topic, stamp, &messages.data)?;
-        }
-    }
-    Ok(())
-}
-
-/// Of each placement: of its reference; of `data_raw` and `data`.
-fn topics(person: &PlayedPerson, simulated: &[SimulatedPlacement]) -> Vec<(String, [String; 2])> {
-    let both = |placement: &SimulatedPlacement| {
-        let name = &placement.name;
-        let imu = ["data_raw", "data"].map(|ending| person.topic(&format!("imu/{name}/{ending}")));
-        (person.topic(&format!("reference/{name}")), imu)
-    };
-    simulated.iter().map(both).collect()
 }
 
 /// DIR/NAME_PLACEMENT.csv; of several people NAME_person_ID_PLACEMENT.csv.
@@ -234,7 +152,7 @@ pub fn write_people_csv(
     bag: &Path,
     folder: &Path,
     person: &PlayedPerson,
-    simulated: &[SimulatedPlacement],
+    placements: &[&str],
     replace: bool,
 ) -> Result<(), RecordingError> {
     fs::create_dir_all(folder).map_err(|source| RecordingError::Make {
@@ -242,9 +160,9 @@ pub fn write_people_csv(
         source,
     })?;
     let reader = BagReader::open(bag)?;
-    for placement in simulated {
-        let path = csv_file(bag, folder, person, &placement.name);
-        let topic = person.topic(&format!("imu/{}/data", placement.name));
+    for placement in placements {
+        let path = csv_file(bag, folder, person, placement);
+        let topic = person.topic(&format!("imu/{placement}/data"));
         write_file_with(&path, replace, |file| {
             Ok::<_, RecordingError>(write_imu_csv(&reader, &topic, file, &path)?)
         })?;
