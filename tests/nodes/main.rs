@@ -8,4 +8,7 @@ mod common;
 mod demo;
 mod faults;
 mod launch;
+mod other_host;
 mod process;
+#[path = "../../nodes/lib/ros/tests/stranger/mod.rs"]
+mod stranger;

@@ -1,4 +1,5 @@
 //! Node processes, and a node of the test itself that observes them.
+#![allow(dead_code)]
 
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -16,14 +17,32 @@ pub struct Process(Child);
 
 impl Process {
     pub fn start(folder: &Path, arguments: &[&str]) -> Self {
+        Self::start_with(folder, arguments, &environment())
+    }
+
+    /// As [`Self::start`], with environment variables of the test's own.
+    pub fn start_with(folder: &Path, arguments: &[&str], variables: &[(&str, String)]) -> Self {
         let mut command = Command::new(CROMOSIM);
         command
             .args(arguments)
             .current_dir(folder)
-            .envs(environment())
+            .envs(variables.iter().map(|(name, value)| (name, value)))
             .stdin(Stdio::null())
             .stdout(Stdio::null());
         Self(command.spawn().unwrap())
+    }
+
+    pub fn id(&self) -> u32 {
+        self.0.id()
+    }
+
+    /// Whether it has ended, and well; false while it runs.
+    pub fn has_succeeded(&mut self) -> bool {
+        let status = self.0.try_wait().unwrap();
+        status.is_some_and(|status| {
+            assert!(status.success(), "{status}");
+            true
+        })
     }
 
     pub fn signal(&self, signal: &str) {
