@@ -8,7 +8,6 @@ use clap::Subcommand;
 use cromosim_body::{BodyModel, ShapedBody, write_obj};
 
 use crate::files::{refuse_existing, write_whole};
-use crate::list;
 use crate::output::say;
 
 /// Commands on bodies.
@@ -68,8 +67,26 @@ pub fn run(command: &Command) -> anyhow::Result<()> {
             betas,
             force,
         } => export(out, body.as_deref(), betas, *force),
-        Command::Sites { body } => list::sites(&model(body.as_deref())?),
+        Command::Sites { body } => sites(&model(body.as_deref())?),
     }
+}
+
+/// Names, their bones, and where they are on the body at rest.
+pub fn sites(model: &Arc<BodyModel>) -> anyhow::Result<()> {
+    let shaped = ShapedBody::new(model.clone(), &[])?;
+    say!("point in the model frame at rest (x left, y up, z forward), m")?;
+    for name in model.site_names() {
+        let site = model.site(name)?;
+        let at = shaped.site_in_model(&site)?;
+        say!(
+            "  {name:26} {:14} {:6.3} {:6.3} {:6.3}",
+            site.joint.name(),
+            at.x,
+            at.y,
+            at.z
+        )?;
+    }
+    Ok(())
 }
 
 fn export(out: &Path, body: Option<&Path>, betas: &[f64], force: bool) -> anyhow::Result<()> {

@@ -1,7 +1,6 @@
 //! `cromosim list`: the names that commands and files take.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use clap::Subcommand;
 use cromosim_body::{BodyModel, Joint};
@@ -9,8 +8,23 @@ use cromosim_imu::{Device, EMBEDDED_DEVICES, EffectKind, Scheme, TextureSegment}
 use cromosim_learned::LearnedSimulator;
 
 use crate::body;
-use crate::node::NODES;
 use crate::output::say;
+
+/// The nodes, and what they do.
+const NODES: [(&str, &str); 6] = [
+    ("replay", "plays motion files, bags and IMU series"),
+    (
+        "smpl_state",
+        "turns joint rotations into states of the body",
+    ),
+    ("virtual_imu", "sends what IMUs on the moving body measure"),
+    ("recorder", "writes topics to a bag"),
+    ("viewer", "shows body, IMUs and diagnostics in Rerun"),
+    (
+        "gap_monitor",
+        "says live how far real IMUs are from simulated ones, and why",
+    ),
+];
 
 /// What is listed.
 #[derive(Subcommand)]
@@ -36,31 +50,13 @@ pub enum Command {
 /// Runs the command.
 pub fn run(command: &Command) -> anyhow::Result<()> {
     match command {
-        Command::Sites { body } => sites(&body::model(body.as_deref())?),
+        Command::Sites { body } => body::sites(&body::model(body.as_deref())?),
         Command::Effects => effects(),
         Command::Schemes => schemes(),
         Command::Devices => devices(),
         Command::Models => models(),
         Command::Nodes => nodes(),
     }
-}
-
-/// Names, their bones, and where they are on the body at rest.
-pub fn sites(model: &Arc<BodyModel>) -> anyhow::Result<()> {
-    let shaped = cromosim_body::ShapedBody::new(model.clone(), &[])?;
-    say!("point in the model frame at rest (x left, y up, z forward), m")?;
-    for name in model.site_names() {
-        let site = model.site(name)?;
-        let at = shaped.site_in_model(&site)?;
-        say!(
-            "  {name:26} {:14} {:6.3} {:6.3} {:6.3}",
-            site.joint.name(),
-            at.x,
-            at.y,
-            at.z
-        )?;
-    }
-    Ok(())
 }
 
 /// Names, parameters with their units, and what they are.

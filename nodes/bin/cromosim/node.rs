@@ -7,22 +7,6 @@ use crate::list;
 use crate::named::Named;
 use crate::output::say;
 
-/// The nodes, and what they do.
-pub const NODES: [(&str, &str); 6] = [
-    ("replay", "plays motion files, bags and IMU series"),
-    (
-        "smpl_state",
-        "turns joint rotations into states of the body",
-    ),
-    ("virtual_imu", "sends what IMUs on the moving body measure"),
-    ("recorder", "writes topics to a bag"),
-    ("viewer", "shows body, IMUs and diagnostics in Rerun"),
-    (
-        "gap_monitor",
-        "says live how far real IMUs are from simulated ones, and why",
-    ),
-];
-
 /// Run one node in this process; what follows the name is the node's own, `--ros-args` included
 #[derive(Args)]
 #[command(disable_help_flag = true, disable_version_flag = true)]

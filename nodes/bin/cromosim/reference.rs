@@ -117,10 +117,7 @@ pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()>
         metadata(trajectory, &how, arguments),
         &recorded,
         &simulated,
-        Written {
-            references: true,
-            namespace: "",
-        },
+        Written::WITH_REFERENCES,
         arguments,
     )?;
     warn(trajectory, &recorded[0].notes);
@@ -214,6 +211,13 @@ fn simulate_all(
 struct Written<'a> {
     references: bool,
     namespace: &'a str,
+}
+
+impl Written<'_> {
+    const WITH_REFERENCES: Self = Written {
+        references: true,
+        namespace: "",
+    };
 }
 
 fn metadata(

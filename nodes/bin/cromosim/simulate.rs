@@ -3,73 +3,36 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use anyhow::{Context, bail};
 use cromosim_bag::{BagOptions, BagSummary, BagWriter, Compression};
-use cromosim_body::{BodyModel, ShapedBody};
-use cromosim_imu::{
-    Device, Differentiation, DrawnTexture, ImuOptions, KinematicSample, MotionCorrection,
-    MountedSensor, MountedSensors, PlacementSet, PoseStd, SensorTrajectory, TextureSegment, Trim,
-    VirtualImu, add_texture, point_oddity, simulate_kinematics_on,
-};
-use cromosim_learned::{LearnedSimulator, MappingFile, Patch, SiteMotion, scheme_for_networks};
+use cromosim_imu::{PlacementSet, point_oddity};
+use cromosim_learned::{LearnedSimulator, MappingFile};
 use cromosim_motion::{
     MotionOptions, SmplMotion, embedded_walk, read_motion_for, read_people_whole,
 };
 use cromosim_recording::{
-    FIRST_STAMP, MotionSpill, PlayedPerson, Quality, RecordingError, SimulatedPerson,
-    SimulatedPlacement, csv_file, reading_mapping, write_people, write_people_csv,
+    Aside, FIRST_STAMP, PlayedPerson, SimulatedPerson, SimulatedPlacement, Simulation,
+    SimulationOptions, csv_file, write_people, write_people_csv,
 };
-use cromosim_spatial::{PoseTimes, Stamp, uniform_stamps};
+use cromosim_spatial::Stamp;
 use indicatif::ProgressBar;
 use rayon::prelude::*;
 
 use crate::files::refuse_existing;
 use crate::output::{remark, say};
 use crate::progress::Interrupt;
-use crate::simulate_arguments::{Arguments, TextureOn};
+use crate::simulate_arguments::Arguments;
 use crate::simulated_quality::{quality_entries, quality_line, unlikely, warn};
 use crate::{body, progress};
 
 /// What is the same for all motions of a call.
 struct Setup {
-    model: Arc<BodyModel>,
-    placements: PlacementSet,
-    devices: Vec<Device>,
+    simulation: Simulation,
     motion: MotionOptions,
-    bandwidth_hz: Option<f64>,
-    trim: Trim,
-    texture: Option<TextureOn>,
-    seed: u64,
-    noise: bool,
-    pose_error_correlation_s: f64,
     force: bool,
     csv: Option<PathBuf>,
-    learned: Option<LearnedSimulator>,
-    mapping: MappingFile,
     interrupt: Interrupt,
-}
-
-/// Bytes of samples that a motion's placements may keep in memory until they are written.
-const IN_MEMORY: usize = 128 << 20;
-
-/// Where samples are put aside.
-struct Aside {
-    /// Bytes a placement.
-    in_memory: usize,
-    folder: PathBuf,
-}
-
-impl Aside {
-    /// Where the output has to have room anyway.
-    fn beside(out: &Path, placements: usize) -> Self {
-        let folder = out.parent().filter(|parent| !parent.as_os_str().is_empty());
-        Self {
-            in_memory: IN_MEMORY / placements.max(1),
-            folder: folder.unwrap_or(Path::new(".")).to_owned(),
-        }
-    }
 }
 
 /// Runs `simulate MOTIONS`.
@@ -77,7 +40,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let setup = Setup::new(arguments)?;
     if arguments.motions.len() <= 1 {
         let people = setup.read(arguments.motions.first())?;
-        let steps = people.len() * (setup.placements.placements().len() + 1);
+        let steps = people.len() * (setup.simulation.placements().placements().len() + 1);
         let bar = progress::bar(steps as u64, "simulating, placements");
         let line = simulate_one(&setup, &people, &arguments.out, &bar);
         bar.finish_and_clear();
@@ -147,41 +110,28 @@ impl Setup {
             None if arguments.placement.is_empty() => PlacementSet::demo(),
             None => PlacementSet::at_sites(&arguments.placement, "--placement")?,
         };
-        let given = arguments.differentiation()?;
-        let placements = placements.map(|placement| {
-            let rate_hz = arguments.rate.unwrap_or(placement.rate_hz());
-            let scheme = match given {
-                Some(Differentiation::Scheme(scheme)) => scheme,
-                None if arguments.learned.is_some() => scheme_for_networks(placement.scheme()),
-                _ => placement.scheme(),
-            };
-            placement.with_rate_hz(rate_hz).with_scheme(scheme)
-        });
         let folder = file.and_then(Path::parent).unwrap_or(Path::new("."));
-        let devices = placements
-            .placements()
-            .iter()
-            .map(|placement| Device::resolve(placement.device(), folder))
-            .collect::<Result<_, _>>()?;
-        Ok(Self {
-            model: body::model(arguments.body.as_deref())?,
-            devices,
-            motion: arguments.motion.options()?,
-            bandwidth_hz: arguments.bandwidth,
+        let options = SimulationOptions {
+            rate_hz: arguments.rate,
+            differentiation: arguments.differentiation()?,
             trim: arguments.trim()?,
             texture: arguments.texture()?,
             seed: arguments.seed,
             noise: !arguments.no_noise,
             pose_error_correlation_s: arguments.pose_error_correlation,
-            force: arguments.force,
-            csv: arguments.csv.clone(),
             learned: arguments
                 .learned
                 .as_deref()
                 .map(LearnedSimulator::find)
                 .transpose()?,
             mapping: read_mapping(arguments.mapping.as_deref(), &names(&placements))?,
-            placements,
+        };
+        let model = body::model(arguments.body.as_deref())?;
+        Ok(Self {
+            simulation: Simulation::new(model, placements, folder, options)?,
+            motion: arguments.motion.options()?,
+            force: arguments.force,
+            csv: arguments.csv.clone(),
             interrupt: Interrupt::watch()?,
         })
     }
@@ -189,17 +139,19 @@ impl Setup {
     fn read(&self, path: Option<&PathBuf>) -> anyhow::Result<Vec<PlayedPerson>> {
         let several = self.motion.asks_for_several();
         Ok(match path {
-            Some(path) if several => read_people_whole(path, &self.model, &self.motion)?
-                .into_iter()
-                .map(PlayedPerson::of_several)
-                .collect(),
+            Some(path) if several => {
+                read_people_whole(path, self.simulation.model(), &self.motion)?
+                    .into_iter()
+                    .map(PlayedPerson::of_several)
+                    .collect()
+            }
             Some(path) => {
                 let whole = MotionOptions {
                     start_s: 0.0,
                     duration_s: None,
                     ..self.motion.clone()
                 };
-                let motion = read_motion_for(path, &self.model, &whole)?;
+                let motion = read_motion_for(path, self.simulation.model(), &whole)?;
                 vec![self.part(&motion)?]
             }
             None if several => {
@@ -215,127 +167,21 @@ impl Setup {
         Ok(PlayedPerson::part(motion, start_s, duration_s)?)
     }
 
-    /// All placements of a person, each on whatever core is free.
     fn simulate(
         &self,
         person: &PlayedPerson,
         aside: &Aside,
         bar: &ProgressBar,
     ) -> anyhow::Result<SimulatedPerson> {
-        let PlayedPerson { motion, stamps, .. } = person;
-        let shaped = ShapedBody::new(self.model.clone(), &motion.betas)?;
-        let sites = MountedSensors::new(&shaped, self.placements.placements())?;
-        let played = person.played.clone().count();
-        if played < 2 {
-            bail!(
-                "{}: {played} frame is no motion; at least 2 are needed",
-                motion.name
-            );
-        }
-        let confidences = motion.confidence.as_deref().unwrap_or_default();
-        let stds: Vec<PoseStd> = confidences
-            .iter()
-            .map(|&confidence| PoseStd::from_confidence(confidence, self.pose_error_correlation_s))
-            .collect();
-        let times = PoseTimes::new(stamps)?;
-        bar.inc(1);
-        let one = |index: usize| {
-            self.interrupt.check()?;
-            // Poses of one placement at a time: those of all would be most of a long motion's memory.
-            let alone = &self.placements.placements()[index..=index];
-            let trajectories = MountedSensors::new(&shaped, alone)?;
-            let trajectories = trajectories.trajectories(stamps, &motion.frames)?;
-            let trajectory = trajectories
-                .into_iter()
-                .next()
-                .context("a placement has a trajectory")?
-                .with_pose_stds(&stds)
-                .from_source(motion.source());
-            let mounted = (&shaped, &sites.sensors()[index]);
-            let simulated =
-                self.simulate_placement(person, mounted, index, (&trajectory, &times), aside);
-            bar.inc(1);
-            simulated
-        };
-        let placements = (0..sites.sensors().len()).into_par_iter().map(one);
-        Ok(SimulatedPerson {
-            placements: placements.collect::<anyhow::Result<_>>()?,
-            sites,
-        })
-    }
-
-    fn simulate_placement(
-        &self,
-        person: &PlayedPerson,
-        (shaped, mounted): (&ShapedBody, &MountedSensor),
-        index: usize,
-        (trajectory, times): (&SensorTrajectory, &PoseTimes),
-        aside: &Aside,
-    ) -> anyhow::Result<SimulatedPlacement> {
-        let (placement, device) = (&self.placements.placements()[index], &self.devices[index]);
-        let (name, rate_hz) = (placement.name(), placement.rate_hz());
-        let [start, end] = [person.played.start(), person.played.end()]
-            .map(|frame| trajectory.frames()[*frame].stamp);
-        let output = uniform_stamps(start, end, rate_hz)?;
-        let options = ImuOptions {
-            rate_hz,
-            seed: self.seed,
-            // Several people's devices err each on its own, as those of nodes with a prefix do.
-            name: person.frame(name),
-            noise: self.noise,
-            frame_id: person.frame(&format!("{name}_imu")),
-            mapping: reading_mapping(&self.mapping, name),
-        };
-        let imu = VirtualImu::new(device, options)?;
-        let by = match self.bandwidth_hz {
-            Some(bandwidth_hz) => Differentiation::Bandwidth(bandwidth_hz),
-            None => placement.scheme().into(),
-        };
-        let mut motion = simulate_kinematics_on(times, trajectory, by, &output)?;
-        let (mut quality, span) =
-            Quality::of(&motion, self.trim).ok_or(RecordingError::AllTrimmed)?;
-        motion.retain(|sample| span.contains(&sample.stamp));
-        let whose = person.frame(name);
-        quality.texture = self.draw_texture(&mut motion, mounted, &whose)?;
-        let mut motion = [motion];
-        if let Some(networks) = &self.learned {
-            let patch = Patch::new(shaped, mounted.site())?;
-            let poses = person.motion.frames.iter();
-            let points: Vec<_> = poses.map(|pose| patch.points(pose)).collect();
-            let seen = SiteMotion::new(trajectory, placement.scheme(), &points)?;
-            networks.correction(seen).correct(&mut motion)?;
-        }
-        let [motion] = motion;
-        Ok(SimulatedPlacement {
-            name: name.to_owned(),
-            motion: MotionSpill::new(&motion, aside.in_memory, &aside.folder)?,
-            imu,
-            quality,
-        })
-    }
-
-    /// Draws what is asked for above what the motion resolves.
-    fn draw_texture(
-        &self,
-        motion: &mut [KinematicSample],
-        mounted: &MountedSensor,
-        whose: &str,
-    ) -> anyhow::Result<Option<DrawnTexture>> {
-        let Some(texture) = self.texture else {
-            return Ok(None);
-        };
-        let segment = texture.or(TextureSegment::of_joint(mounted.joint()));
-        let drawn = add_texture(motion, segment, (self.seed, whose));
-        let drawn = drawn.ok_or_else(|| RecordingError::NoBandwidth {
-            placement: whose.to_owned(),
-        })?;
-        Ok(Some(drawn))
+        let check = || self.interrupt.check();
+        self.simulation
+            .simulate(person, aside, check, || bar.inc(1))
     }
 
     /// The CSV files of a bag, where they are asked for.
     fn csv_files(&self, people: &[PlayedPerson], out: &Path) -> Vec<PathBuf> {
         let of_person = |folder: &Path, person: &PlayedPerson| -> Vec<PathBuf> {
-            let names = names(&self.placements).into_iter();
+            let names = names(self.simulation.placements()).into_iter();
             names
                 .map(|name| csv_file(out, folder, person, name))
                 .collect()
@@ -359,8 +205,8 @@ impl Setup {
             let odd = person.motion.oddities().into_iter();
             oddities.extend(odd.map(|odd| format!("{who}{odd}")));
         }
-        for placement in self.placements.placements() {
-            let odd = point_oddity(&self.model, placement)?;
+        for placement in self.simulation.placements().placements() {
+            let odd = point_oddity(self.simulation.model(), placement)?;
             oddities.extend(odd.map(|odd| format!("placement {}: {odd}", placement.name())));
         }
         Ok(oddities)
@@ -379,20 +225,24 @@ impl Setup {
                     |name| name.to_string_lossy().into_owned(),
                 ),
             ),
-            entry("body", self.model.id().to_owned()),
-            entry("seed", self.seed.to_string()),
-            entry("noise", self.noise.to_string()),
-            entry("placements", self.placements.to_yaml()),
+            entry("body", self.simulation.model().id().to_owned()),
+            entry("seed", self.simulation.options().seed.to_string()),
+            entry("noise", self.simulation.options().noise.to_string()),
+            entry("placements", self.simulation.placements().to_yaml()),
             entry(
                 "learned",
-                self.learned
+                self.simulation
+                    .options()
+                    .learned
                     .as_ref()
                     .map_or("none", |networks| networks.input().name())
                     .to_owned(),
             ),
             entry(
                 "mapping",
-                self.mapping
+                self.simulation
+                    .options()
+                    .mapping
                     .placements
                     .keys()
                     .cloned()
@@ -463,7 +313,7 @@ fn write_bag(
         "placements.yaml",
         "application/yaml",
         FIRST_STAMP,
-        setup.placements.to_yaml().as_bytes(),
+        setup.simulation.placements().to_yaml().as_bytes(),
     )?;
     write_people(&mut bag, people, simulated, || setup.interrupt.check())?;
     Ok(bag.finish()?)
@@ -479,7 +329,10 @@ fn simulate_one(
     for path in setup.csv_files(people, out) {
         refuse_existing(&path, setup.force)?;
     }
-    let aside = Aside::beside(out, people.len() * setup.placements.placements().len());
+    let aside = Aside::beside(
+        out,
+        people.len() * setup.simulation.placements().placements().len(),
+    );
     let mut simulated = people
         .iter()
         .map(|person| setup.simulate(person, &aside, bar))
@@ -488,13 +341,19 @@ fn simulate_one(
     let summary = write_bag(setup, people, &mut simulated, &oddities, out)?;
     if let Some(folder) = &setup.csv {
         for person in people {
-            write_people_csv(out, folder, person, &names(&setup.placements), setup.force)?;
+            write_people_csv(
+                out,
+                folder,
+                person,
+                &names(&setup.simulation.placements()),
+                setup.force,
+            )?;
         }
     }
     let motion = &people[0].motion;
     bar.suspend(|| warn(Path::new(&motion.name), &oddities));
     let last = last_played(people).map_or(0.0, |last| last - FIRST_STAMP);
-    let placements = setup.placements.placements().len();
+    let placements = setup.simulation.placements().placements().len();
     let who = if people.len() > 1 {
         format!("{} people, ", people.len())
     } else {

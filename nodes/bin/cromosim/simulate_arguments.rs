@@ -6,6 +6,7 @@ use std::str::FromStr;
 use anyhow::{Context, bail};
 use clap::Args;
 use cromosim_imu::{Differentiation, MAX_RATE_HZ, Scheme, TextureSegment, Trim};
+use cromosim_recording::TextureOn;
 use cromosim_recording::convert::ReadOptions;
 
 use crate::list;
@@ -136,25 +137,6 @@ pub struct Arguments {
 /// The default of `--trim`.
 const AUTO: &str = "auto";
 
-/// What `--texture` draws.
-#[derive(Clone, Copy, Debug)]
-pub enum TextureOn {
-    /// What each placement's own segment shows.
-    ItsSegment,
-    /// What this one shows, wherever the placement is.
-    Segment(TextureSegment),
-}
-
-impl TextureOn {
-    /// The segment, where that of the placement is `own`.
-    pub fn or(self, own: TextureSegment) -> TextureSegment {
-        match self {
-            Self::ItsSegment => own,
-            Self::Segment(segment) => segment,
-        }
-    }
-}
-
 /// What is simulated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode<'a> {
@@ -228,6 +210,15 @@ impl Arguments {
                 "--placement {given}: expected NAME=SITE, such as left_wrist=left_watch; `cromosim body sites` lists the sites"
             );
         }
+        self.refuse_rivals()?;
+        if matches!(mode, Mode::Rigid(_)) && self.rate.is_none() {
+            bail!("--rigid needs --rate HZ: the messages of the IMU per second");
+        }
+        Ok(mode)
+    }
+
+    /// Options of which one alone can be followed.
+    fn refuse_rivals(&self) -> anyhow::Result<()> {
         if !self.placement.is_empty() && self.placements.is_some() {
             bail!("--placement and --placements both say where sensors are; give one of them");
         }
@@ -243,10 +234,7 @@ impl Arguments {
         if self.device.is_some() && self.effects.is_some() {
             bail!("--device and --effects both say what errs; give one of them");
         }
-        if matches!(mode, Mode::Rigid(_)) && self.rate.is_none() {
-            bail!("--rigid needs --rate HZ: the messages of the IMU per second");
-        }
-        Ok(mode)
+        Ok(())
     }
 
     /// The name that `--placement` gives the IMU of a rigid body.

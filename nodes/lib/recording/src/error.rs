@@ -121,6 +121,14 @@ pub enum RecordingError {
         /// The scheme.
         scheme: String,
     },
+    /// A part of a motion that nothing can be differentiated in.
+    #[error("{name}: {frames} frame is no motion; at least 2 are needed")]
+    NoMotion {
+        /// The motion.
+        name: String,
+        /// Frames that are played.
+        frames: usize,
+    },
     /// Ends that leave nothing.
     #[error("--trim leaves nothing of the motion; give less")]
     AllTrimmed,

@@ -11,7 +11,8 @@
 //! - [`convert`](mod@convert) reads any file and writes any format; [`inspect`](mod@inspect) says
 //!   what is in a file; [`compare`](mod@compare) says how two recordings or diagnoses differ.
 //! - [`Resimulation`] gives the messages of its IMUs again, from the reference motion.
-//! - [`PlayedPerson`] and [`SimulatedPlacement`] are what a simulation of a motion file writes.
+//! - [`Simulation`] gives the IMUs of a moving person, a [`PlayedPerson`]; these and
+//!   [`SimulatedPlacement`] are what a simulation of a motion file writes.
 //! - [`smpl_pose`] and [`smpl_state`] fill a message from a motion's frame.
 //!
 //! Nothing here needs a ROS node: offline commands, training and evaluation read recordings by
@@ -35,6 +36,7 @@ mod quality;
 mod reference_parts;
 mod resimulation;
 pub mod rigid;
+mod simulation;
 mod trace;
 
 pub(crate) use bag_file::MCAP_MAGIC;
@@ -53,6 +55,7 @@ pub use resimulation::{
     Resimulated, Resimulation, outside_reference, read_effects, reading_mapping, with_stamps,
     write_resimulated,
 };
+pub use simulation::{Aside, Simulation, SimulationOptions, TextureOn};
 pub use trace::{
     PlacementTrace, activities_csv, first_stamp, seconds_to_first_stamp, write_traces,
 };

@@ -264,12 +264,7 @@ impl Samples<'_> {
         if let Some(messages) = self.pending.take() {
             return Ok(Some(messages));
         }
-        while let Some(sample) = self.placement.motion.next_sample()? {
-            if let Some(messages) = self.placement.imu.measure(&sample) {
-                return Ok(Some(messages));
-            }
-        }
-        Ok(None)
+        self.placement.next_messages()
     }
 }
 

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use cromosim_bag::{BagReader, write_imu_csv};
-use cromosim_imu::{MountedSensors, VirtualImu};
+use cromosim_imu::{ImuMessages, MountedSensors, VirtualImu};
 use cromosim_motion::{MotionError, PersonPart, SmplMotion};
 use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_spatial::Stamp;
@@ -37,6 +37,30 @@ pub struct SimulatedPlacement {
     pub imu: VirtualImu,
     /// What they are good for.
     pub quality: Quality,
+}
+
+impl SimulatedPlacement {
+    /// The messages of the samples that were not taken yet and that the device does not lose.
+    ///
+    /// # Errors
+    /// [`RecordingError::PutAside`] where what was put aside is lost.
+    pub fn messages(&mut self) -> Result<Vec<ImuMessages>, RecordingError> {
+        let mut messages = Vec::new();
+        while let Some(next) = self.next_messages()? {
+            messages.push(next);
+        }
+        Ok(messages)
+    }
+
+    /// The messages of the next sample that the device does not lose; none after the last.
+    pub(crate) fn next_messages(&mut self) -> Result<Option<ImuMessages>, RecordingError> {
+        while let Some(sample) = self.motion.next_sample()? {
+            if let Some(messages) = self.imu.measure(&sample) {
+                return Ok(Some(messages));
+            }
+        }
+        Ok(None)
+    }
 }
 
 /// A person's placements.

@@ -1,0 +1,295 @@
+//! Virtual IMUs of a moving person, whole motions at once.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use cromosim_body::{BodyModel, ShapedBody};
+use cromosim_imu::{
+    Device, Differentiation, DrawnTexture, ImuOptions, KinematicSample, MotionCorrection,
+    MountedSensor, MountedSensors, PlacementSet, PoseStd, SensorTrajectory, TextureSegment, Trim,
+    VirtualImu, add_texture, simulate_kinematics_on,
+};
+use cromosim_learned::{LearnedSimulator, MappingFile, Patch, SiteMotion, scheme_for_networks};
+use cromosim_spatial::{PoseTimes, uniform_stamps};
+use rayon::prelude::*;
+
+use crate::motion_spill::MotionSpill;
+use crate::{
+    PlayedPerson, Quality, RecordingError, SimulatedPerson, SimulatedPlacement, reading_mapping,
+};
+
+/// Bytes of samples that a motion's placements may keep in memory until they are written.
+const IN_MEMORY: usize = 128 << 20;
+
+/// Where samples are put aside until they are read.
+#[derive(Clone, Debug)]
+pub struct Aside {
+    /// Bytes a placement that stay in memory.
+    in_memory: usize,
+    folder: PathBuf,
+}
+
+impl Aside {
+    /// Where the output has to have room anyway, what is more than 128 MiB of all placements.
+    pub fn beside(out: &Path, placements: usize) -> Self {
+        let folder = out.parent().filter(|parent| !parent.as_os_str().is_empty());
+        Self {
+            in_memory: IN_MEMORY / placements.max(1),
+            folder: folder.unwrap_or(Path::new(".")).to_owned(),
+        }
+    }
+
+    /// All in memory.
+    pub fn in_memory() -> Self {
+        Self {
+            in_memory: usize::MAX,
+            folder: PathBuf::new(),
+        }
+    }
+}
+
+/// Which texture is drawn.
+#[derive(Clone, Copy, Debug)]
+pub enum TextureOn {
+    /// What each placement's own segment shows.
+    ItsSegment,
+    /// What this one shows, wherever the placement is.
+    Segment(TextureSegment),
+}
+
+impl TextureOn {
+    /// The segment, where that of the placement is `own`.
+    pub fn or(self, own: TextureSegment) -> TextureSegment {
+        match self {
+            Self::ItsSegment => own,
+            Self::Segment(segment) => segment,
+        }
+    }
+}
+
+/// How a [`Simulation`] differs from what the placements say, and what follows the kinematics.
+#[derive(Default)]
+pub struct SimulationOptions {
+    /// Messages per second in place of the placements' own, Hz.
+    pub rate_hz: Option<f64>,
+    /// How every placement is differentiated; none: by its own scheme.
+    pub differentiation: Option<Differentiation>,
+    /// What is left out at the ends.
+    pub trim: Trim,
+    /// Draws texture above what the poses resolve.
+    pub texture: Option<TextureOn>,
+    /// Of the noise.
+    pub seed: u64,
+    /// Whether the random part of the errors is there.
+    pub noise: bool,
+    /// How long errors of the poses hold, s; 0: new with each pose.
+    pub pose_error_correlation_s: f64,
+    /// Networks that correct the kinematics.
+    pub learned: Option<LearnedSimulator>,
+    /// Maps readings last, at the placements that it names.
+    pub mapping: MappingFile,
+}
+
+/// Placements with their devices on a body, ready for any number of motions.
+pub struct Simulation {
+    model: Arc<BodyModel>,
+    placements: PlacementSet,
+    devices: Vec<Device>,
+    options: SimulationOptions,
+}
+
+impl Simulation {
+    /// Of these placements on this body; files of devices are relative to `folder`.
+    ///
+    /// # Errors
+    /// A device that is no embedded one's name and no file of one.
+    pub fn new(
+        model: Arc<BodyModel>,
+        placements: PlacementSet,
+        folder: &Path,
+        options: SimulationOptions,
+    ) -> Result<Self, RecordingError> {
+        let placements = placements.map(|placement| {
+            let rate_hz = options.rate_hz.unwrap_or(placement.rate_hz());
+            let scheme = match options.differentiation {
+                Some(Differentiation::Scheme(scheme)) => scheme,
+                None if options.learned.is_some() => scheme_for_networks(placement.scheme()),
+                _ => placement.scheme(),
+            };
+            placement.with_rate_hz(rate_hz).with_scheme(scheme)
+        });
+        let devices = placements
+            .placements()
+            .iter()
+            .map(|placement| Device::resolve(placement.device(), folder))
+            .collect::<Result<_, _>>()?;
+        Ok(Self {
+            model,
+            placements,
+            devices,
+            options,
+        })
+    }
+
+    /// With this device at the placement of that name, whatever the placement says.
+    #[must_use]
+    pub fn with_device(mut self, placement: &str, device: &Device) -> Self {
+        let placements = self.placements.placements().iter();
+        for (at, own) in placements.zip(&mut self.devices) {
+            if at.name() == placement {
+                own.clone_from(device);
+            }
+        }
+        self
+    }
+
+    /// The body.
+    pub fn model(&self) -> &Arc<BodyModel> {
+        &self.model
+    }
+
+    /// The placements as they are simulated.
+    pub fn placements(&self) -> &PlacementSet {
+        &self.placements
+    }
+
+    /// The rest.
+    pub fn options(&self) -> &SimulationOptions {
+        &self.options
+    }
+
+    /// All placements of a person, in their order, each on whatever core is free. `check` is called
+    /// before each placement and may give up; `advance` after the trajectories and each placement.
+    ///
+    /// # Errors
+    /// Of `check`, and what the placements, networks or the motion cannot do.
+    pub fn simulate<E: From<RecordingError> + Send>(
+        &self,
+        person: &PlayedPerson,
+        aside: &Aside,
+        check: impl Fn() -> Result<(), E> + Sync,
+        advance: impl Fn() + Sync,
+    ) -> Result<SimulatedPerson, E> {
+        let PlayedPerson { motion, stamps, .. } = person;
+        let shaped =
+            ShapedBody::new(self.model.clone(), &motion.betas).map_err(RecordingError::from)?;
+        let sites = MountedSensors::new(&shaped, self.placements.placements())
+            .map_err(RecordingError::from)?;
+        let played = person.played.clone().count();
+        if played < 2 {
+            let name = motion.name.clone();
+            return Err(RecordingError::NoMotion {
+                name,
+                frames: played,
+            }
+            .into());
+        }
+        let times = PoseTimes::new(stamps).map_err(RecordingError::from)?;
+        advance();
+        let one = |index: usize| {
+            check()?;
+            let trajectory = self.trajectory(person, &shaped, index)?;
+            let mounted = (&shaped, &sites.sensors()[index]);
+            let simulated =
+                self.simulate_placement(person, mounted, index, (&trajectory, &times), aside);
+            advance();
+            Ok(simulated?)
+        };
+        let placements = (0..sites.sensors().len()).into_par_iter().map(one);
+        Ok(SimulatedPerson {
+            placements: placements.collect::<Result<_, E>>()?,
+            sites,
+        })
+    }
+
+    /// Of one placement at a time: the poses of all would be most of a long motion's memory.
+    fn trajectory(
+        &self,
+        person: &PlayedPerson,
+        shaped: &ShapedBody,
+        index: usize,
+    ) -> Result<SensorTrajectory, RecordingError> {
+        let motion = &person.motion;
+        let confidences = motion.confidence.as_deref().unwrap_or_default();
+        let correlation_s = self.options.pose_error_correlation_s;
+        let stds: Vec<PoseStd> = confidences
+            .iter()
+            .map(|&confidence| PoseStd::from_confidence(confidence, correlation_s))
+            .collect();
+        let alone = &self.placements.placements()[index..=index];
+        let mounted = MountedSensors::new(shaped, alone)?;
+        let mut trajectories = mounted.trajectories(&person.stamps, &motion.frames)?;
+        Ok(trajectories
+            .swap_remove(0)
+            .with_pose_stds(&stds)
+            .from_source(motion.source()))
+    }
+
+    fn simulate_placement(
+        &self,
+        person: &PlayedPerson,
+        (shaped, mounted): (&ShapedBody, &MountedSensor),
+        index: usize,
+        (trajectory, times): (&SensorTrajectory, &PoseTimes),
+        aside: &Aside,
+    ) -> Result<SimulatedPlacement, RecordingError> {
+        let (placement, device) = (&self.placements.placements()[index], &self.devices[index]);
+        let (name, rate_hz) = (placement.name(), placement.rate_hz());
+        let [start, end] = [person.played.start(), person.played.end()]
+            .map(|frame| trajectory.frames()[*frame].stamp);
+        let output = uniform_stamps(start, end, rate_hz)?;
+        let options = ImuOptions {
+            rate_hz,
+            seed: self.options.seed,
+            // Several people's devices err each on its own, as those of nodes with a prefix do.
+            name: person.frame(name),
+            noise: self.options.noise,
+            frame_id: person.frame(&format!("{name}_imu")),
+            mapping: reading_mapping(&self.options.mapping, name),
+        };
+        let imu = VirtualImu::new(device, options)?;
+        let by = match self.options.differentiation {
+            Some(by @ Differentiation::Bandwidth(_)) => by,
+            _ => placement.scheme().into(),
+        };
+        let mut motion = simulate_kinematics_on(times, trajectory, by, &output)?;
+        let (mut quality, span) =
+            Quality::of(&motion, self.options.trim).ok_or(RecordingError::AllTrimmed)?;
+        motion.retain(|sample| span.contains(&sample.stamp));
+        let whose = person.frame(name);
+        quality.texture = self.draw_texture(&mut motion, mounted, &whose)?;
+        let mut motion = [motion];
+        if let Some(networks) = &self.options.learned {
+            let patch = Patch::new(shaped, mounted.site())?;
+            let poses = person.motion.frames.iter();
+            let points: Vec<_> = poses.map(|pose| patch.points(pose)).collect();
+            let seen = SiteMotion::new(trajectory, placement.scheme(), &points)?;
+            networks.correction(seen).correct(&mut motion)?;
+        }
+        let [motion] = motion;
+        Ok(SimulatedPlacement {
+            name: name.to_owned(),
+            motion: MotionSpill::new(&motion, aside.in_memory, &aside.folder)?,
+            imu,
+            quality,
+        })
+    }
+
+    /// Draws what is asked for above what the motion resolves.
+    fn draw_texture(
+        &self,
+        motion: &mut [KinematicSample],
+        mounted: &MountedSensor,
+        whose: &str,
+    ) -> Result<Option<DrawnTexture>, RecordingError> {
+        let Some(texture) = self.options.texture else {
+            return Ok(None);
+        };
+        let segment = texture.or(TextureSegment::of_joint(mounted.joint()));
+        let drawn = add_texture(motion, segment, (self.options.seed, whose));
+        let drawn = drawn.ok_or_else(|| RecordingError::NoBandwidth {
+            placement: whose.to_owned(),
+        })?;
+        Ok(Some(drawn))
+    }
+}
