@@ -11,8 +11,9 @@ use crate::output::{output, remark, say};
 /// Commands on bags.
 #[derive(Subcommand)]
 pub enum Command {
-    /// Mend a bag whose recorder was killed, or a file that was cut: all that is sound is
-    /// kept, and what is missing is said
+    /// Mend a bag whose recorder was killed, or a file that was cut
+    ///
+    /// All that is sound is kept, and what is missing is said
     Recover {
         /// The unfinished .mcap file or rosbag2 directory; it is left as it is
         bag: PathBuf,
@@ -23,8 +24,9 @@ pub enum Command {
         #[arg(long)]
         force: bool,
     },
-    /// Write the samples of an Imu topic as CSV: stamp, orientation, angular velocity (rad/s),
-    /// specific force (m/s2)
+    /// Write the samples of an Imu topic as CSV
+    ///
+    /// Stamp, orientation, angular velocity (rad/s), specific force (m/s2)
     Csv {
         /// A .mcap file or a rosbag2 directory
         bag: PathBuf,

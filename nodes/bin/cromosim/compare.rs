@@ -17,7 +17,9 @@ use crate::output::{print, say};
 /// Say what differs between two diagnoses, or between the IMUs of two recordings
 #[derive(Args)]
 pub struct Arguments {
-    /// A diagnosis (diagnosis.json, or the folder of one) or a recording (.mcap, rosbag2 directory)
+    /// A diagnosis or a recording
+    ///
+    /// diagnosis.json, or the folder of one; .mcap, or a rosbag2 directory
     a: PathBuf,
     /// Another of the same kind
     b: PathBuf,

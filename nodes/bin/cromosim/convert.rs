@@ -14,14 +14,23 @@ use crate::motion_arguments::MotionArguments;
 use crate::named::Named;
 use crate::output::{remark, say};
 
+// Headings of the help: what an option goes with.
+const MOTIONS: &str = "Of a motion";
+const BAGS: &str = "Of a bag";
+const INTO_BAGS: &str = "Into a bag";
+const DATA_SETS: &str = "Of a data set";
+
 /// Convert a motion, a trajectory of a rigid body, an IMU series or a recording into another format
 #[derive(Args)]
 pub struct Arguments {
-    /// A motion, a trajectory (TUM, EuRoC, CSV), an IMU series (EuRoC, CSV), a recording of a data
-    /// set (BROAD, TotalCapture, PAMAP2, RealWorld, phone and watch) or a bag; its content tells
+    /// A motion, a trajectory, an IMU series, a data set's recording or a bag
+    ///
+    /// Trajectories are TUM, EuRoC or CSV, IMU series EuRoC or CSV, data sets BROAD, TotalCapture,
+    /// PAMAP2, RealWorld, phone and watch; the file's content tells
     input: PathBuf,
-    /// What to write; the ending decides where --to does not: .npz, .bvh, .trc, .tum or .txt, .csv,
-    /// .mcap
+    /// What to write: .npz, .bvh, .trc, .tum or .txt, .csv, .mcap
+    ///
+    /// The ending decides where --to does not
     out: PathBuf,
     /// The format to write
     #[arg(long, value_enum, value_name = "FORMAT")]
@@ -29,41 +38,61 @@ pub struct Arguments {
     /// Replace OUT where it exists
     #[arg(long)]
     force: bool,
-    /// Of a motion: the trajectory of this joint (SMPL's name)
-    #[arg(long, value_name = "NAME", conflicts_with = "site", hide_possible_values = true, value_parser = Named(list::joint_names))]
+    /// The trajectory of this joint (SMPL's name)
+    #[arg(
+        long,
+        value_name = "NAME",
+        conflicts_with = "site",
+        help_heading = MOTIONS,
+        hide_possible_values = true,
+        value_parser = Named(list::joint_names)
+    )]
     joint: Option<String>,
-    /// Of a motion: the trajectory of a sensor at this named site of the skin
-    #[arg(long, value_name = "NAME", hide_possible_values = true, value_parser = Named(list::site_names))]
+    /// The trajectory of a sensor at this named site of the skin
+    #[arg(
+        long,
+        value_name = "NAME",
+        help_heading = MOTIONS,
+        hide_possible_values = true,
+        value_parser = Named(list::site_names)
+    )]
     site: Option<String>,
-    /// Of a bag: the topic to take (SmplState, SmplPose, PoseStamped, TFMessage or Imu); needed
-    /// where there are several
-    #[arg(long, value_name = "TOPIC")]
+    /// The topic to take; needed where there are several
+    ///
+    /// Of type SmplState, SmplPose, PoseStamped, TFMessage or Imu
+    #[arg(long, value_name = "TOPIC", help_heading = BAGS)]
     topic: Option<String>,
-    /// Of a bag's TF: the frame whose motion to take
-    #[arg(long, value_name = "FRAME")]
+    /// Of its TF: the frame whose motion to take
+    #[arg(long, value_name = "FRAME", help_heading = BAGS)]
     frame: Option<String>,
-    /// Of a bag's TF: the frame that stands still; default: the root of the tree
-    #[arg(long, value_name = "FRAME", requires = "frame")]
+    /// Of its TF: the frame that stands still; default: the tree's root
+    #[arg(long, value_name = "FRAME", requires = "frame", help_heading = BAGS)]
     fixed_frame: Option<String>,
-    /// Into a bag: name of the placement in /reference/NAME and /imu/NAME/data_raw; default: body,
-    /// or as the data set says
-    #[arg(long, value_name = "NAME")]
+    /// Name of the placement; default: body, or the data set's
+    ///
+    /// As in /reference/NAME and /imu/NAME/data_raw
+    #[arg(long, value_name = "NAME", help_heading = INTO_BAGS)]
     name: Option<String>,
-    /// Into a bag: the IMU series (EuRoC, CSV) that was measured along the trajectory
-    #[arg(long, value_name = "FILE")]
+    /// The IMU series that was measured along the trajectory
+    ///
+    /// EuRoC or CSV
+    #[arg(long, value_name = "FILE", help_heading = INTO_BAGS)]
     imu: Option<PathBuf>,
-    /// Body model as npz or pickle rather than the embedded one
-    #[arg(long, value_name = "FILE")]
+    /// Body model (npz or pickle) rather than the embedded one
+    #[arg(long, value_name = "FILE", help_heading = MOTIONS)]
     body: Option<PathBuf>,
-    /// Of a data set: this placement alone
-    #[arg(long, value_name = "NAME")]
+    /// This placement alone
+    #[arg(long, value_name = "NAME", help_heading = DATA_SETS)]
     placement: Option<String>,
-    /// Of TotalCapture: the folder of gt_skel_gbl_pos.txt and gt_skel_gbl_ori.txt; default: looked
-    /// for beside the file
-    #[arg(long, value_name = "DIR")]
+    /// Of TotalCapture: the folder of the reference's two files
+    ///
+    /// gt_skel_gbl_pos.txt and gt_skel_gbl_ori.txt; default: looked for beside the file
+    #[arg(long, value_name = "DIR", help_heading = DATA_SETS)]
     reference: Option<PathBuf>,
-    /// Of RealWorld: the gyroscope's zip; default: the one beside the accelerometer's
-    #[arg(long, value_name = "FILE")]
+    /// Of RealWorld: the gyroscope's zip
+    ///
+    /// Default: the one beside the accelerometer's
+    #[arg(long, value_name = "FILE", help_heading = DATA_SETS)]
     gyroscope: Option<PathBuf>,
     #[command(flatten)]
     motion: MotionArguments,

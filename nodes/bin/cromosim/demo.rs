@@ -30,33 +30,54 @@ const LAST_MOMENT: Duration = Duration::from_secs(3);
 /// Where a demo goes that was given no folder.
 const DEFAULT_OUT: &str = "cromosim-demo";
 const READY: &str = "ready";
+/// Heading of the help.
+const PLAYED: &str = "What is played";
 
 /// Arguments of `cromosim demo`.
 #[derive(Args)]
 pub struct Arguments {
-    /// Play this motion file from its beginning to its end rather than 10 s of the embedded walk
-    #[arg(long, value_name = "FILE")]
+    /// Play this motion file, rather than 10 s of the embedded walk
+    ///
+    /// From its beginning to its end
+    #[arg(long, value_name = "FILE", help_heading = PLAYED)]
     motion: Option<PathBuf>,
     /// Stop after so many seconds of the motion
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        allow_negative_numbers = true,
+        help_heading = PLAYED
+    )]
     duration: Option<f64>,
-    /// Body model (SMPL, SMPL-H, SMPL-X; npz or pickle) for all nodes rather than the embedded one
-    #[arg(long, value_name = "FILE")]
+    /// Body model (npz or pickle) rather than the embedded one
+    ///
+    /// SMPL, SMPL-H or SMPL-X, for all nodes
+    #[arg(long, value_name = "FILE", help_heading = PLAYED)]
     body: Option<PathBuf>,
-    /// Sensor placements (YAML) rather than left_wrist, right_ankle, pelvis, sternum and head
-    #[arg(long, value_name = "FILE")]
+    /// Where on the body the sensors are (YAML); default: five places
+    ///
+    /// Without, left_wrist, right_ankle, pelvis, sternum and head
+    #[arg(long, value_name = "FILE", help_heading = PLAYED)]
     placements: Option<PathBuf>,
-    /// Where the bag, the Rerun recording and the logs go [default: cromosim-demo, where each demo
-    /// takes the place of the one before]
+    /// Where bag, Rerun recording and logs go [default: cromosim-demo]
+    ///
+    /// There each demo takes the place of the one before
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Replace what an earlier demo left in DIR
     #[arg(long)]
     force: bool,
     /// Seed of the sensor noise
-    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(i64).range(0..))]
+    #[arg(
+        long,
+        default_value_t = 0,
+        value_parser = clap::value_parser!(i64).range(0..),
+        help_heading = PLAYED
+    )]
     seed: i64,
-    /// Wait until so many more subscriptions than the demo's own listen to every IMU
+    /// Wait for so many more subscriptions to every IMU
+    ///
+    /// More than the demo's own
     #[arg(long, value_name = "N", default_value_t = 0)]
     listeners: u32,
     /// Leave the viewer out: no .rrd

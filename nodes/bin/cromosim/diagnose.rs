@@ -31,6 +31,9 @@ const FILES: [&str; 4] = [
     "diagnosis.rrd",
 ];
 
+/// Heading of the help.
+const SEARCH: &str = "What is searched";
+
 /// Say which effects separate a recording's real IMUs from their simulation, and how far the gap
 /// falls with them
 #[derive(Args)]
@@ -48,7 +51,9 @@ A config FILE, every line of it optional:
   without: [lever_arm]           # effects taken out of the library; --without replaces the list
   seed: 7                        # --seed wins")]
 pub struct Arguments {
-    /// The recording (.mcap, rosbag2 directory); several of the same devices are diagnosed together
+    /// The recording: .mcap, or rosbag2 directory
+    ///
+    /// Several of the same devices are diagnosed together
     #[arg(required_unless_present = "list_effects", value_name = "RECORDING")]
     recordings: Vec<PathBuf>,
     /// The folder for the four files; is made where it is missing
@@ -61,19 +66,31 @@ pub struct Arguments {
     #[arg(long)]
     force: bool,
     /// Settings (YAML), see below with --help
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = SEARCH)]
     config: Option<PathBuf>,
     /// Take an effect out of the library; may be given again
-    #[arg(long, value_name = "EFFECT", hide_possible_values = true, value_parser = Named(list::effect_names))]
+    #[arg(
+        long,
+        value_name = "EFFECT",
+        help_heading = SEARCH,
+        hide_possible_values = true,
+        value_parser = Named(list::effect_names)
+    )]
     without: Vec<String>,
-    /// The namespace (/robot1, or that of a person) of the recordings' topics, where they are in several
-    #[arg(long, value_name = "NAME")]
+    /// The namespace of the recordings' topics, where there are several
+    ///
+    /// /robot1, or that of a person
+    #[arg(long, value_name = "NAME", help_heading = SEARCH)]
     namespace: Option<String>,
-    /// Body model (npz or pickle) of a recording of SMPL states, rather than the embedded one
-    #[arg(long, value_name = "FILE")]
+    /// Body model (npz or pickle) of a recording of SMPL states
+    ///
+    /// Rather than the embedded one
+    #[arg(long, value_name = "FILE", help_heading = SEARCH)]
     body: Option<PathBuf>,
-    /// Seed of the noise in comparisons with the noisy simulation [default: 0]
-    #[arg(long)]
+    /// Seed of the noise in comparisons [default: 0]
+    ///
+    /// With the noisy simulation
+    #[arg(long, help_heading = SEARCH)]
     seed: Option<u64>,
 }
 

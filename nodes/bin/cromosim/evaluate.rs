@@ -9,10 +9,11 @@ mod har;
 /// Evaluations.
 #[derive(Subcommand)]
 pub enum Command {
-    /// How far simulators are from measured IMUs, on people and positions that no network has seen
+    /// How far simulators are from measured IMUs
+    ///
+    /// On people and positions that no network has seen
     Fidelity(fidelity::Arguments),
-    /// Recognition of activities: does a classifier learn from virtual IMUs what it needs on real
-    /// ones?
+    /// Does a classifier of activities learn from virtual IMUs what it needs on real ones?
     Har(Box<har::Arguments>),
 }
 

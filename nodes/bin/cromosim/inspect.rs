@@ -28,12 +28,16 @@ const LEAST_JITTER: f64 = 0.005;
 /// Say what is in a file
 #[derive(Args)]
 pub struct Arguments {
+    /// Motions, bodies, trajectories, IMU series, recordings or bags
+    ///
     /// Motion (BVH, ASF/AMC, C3D, TRC, AMASS, video estimates), body (SMPL npz or pickle),
     /// trajectory or IMU series (TUM, EuRoC, CSV), recording of a data set (BROAD, TotalCapture,
     /// PAMAP2, RealWorld, phone and watch), or bag (.mcap, rosbag2 directory)
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// Body model (npz or pickle) that motions are read for, rather than the embedded one
+    /// Body model (npz or pickle) that motions are read for
+    ///
+    /// Rather than the embedded one
     #[arg(long, value_name = "FILE")]
     body: Option<PathBuf>,
     #[command(flatten)]

@@ -51,14 +51,17 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Play a motion through the five nodes over DDS on this machine; leaves a bag and a Rerun
-    /// recording
+    /// Play a motion through the five nodes over DDS on this machine
+    ///
+    /// Leaves a bag and a Rerun recording
     Demo(demo::Arguments),
-    /// Simulate IMUs from motion files, or again from a recording's reference; offline, on all
-    /// cores
+    /// Simulate IMUs from motion files, or again from a recording's reference
+    ///
+    /// Offline, on all cores
     Simulate(Box<simulate_arguments::Arguments>),
-    /// Say which effects separate a recording's real IMUs from their simulation, and how far the
-    /// gap falls with them
+    /// Say which effects separate a recording's real IMUs from their simulation
+    ///
+    /// And how far the gap falls with them
     Diagnose(diagnose::Arguments),
     /// Say what differs between two diagnoses, or between the IMUs of two recordings
     Compare(compare::Arguments),
@@ -70,8 +73,9 @@ enum Command {
     Train(train::Arguments),
     /// Fit a distribution mapping from simulated to real IMUs
     Map(map::Arguments),
-    /// Measure what simulated IMUs are worth: against measured ones, and on the recognition of
-    /// activities
+    /// Measure what simulated IMUs are worth
+    ///
+    /// Against measured ones, and on the recognition of activities
     Evaluate {
         #[command(subcommand)]
         command: evaluate::Command,
@@ -88,13 +92,12 @@ enum Command {
         #[command(subcommand)]
         command: body::Command,
     },
-    /// List the names that commands and files take: sites, effects, schemes, devices, models, nodes
+    /// List names: sites, effects, schemes, devices, models, nodes
     List {
         #[command(subcommand)]
         command: list::Command,
     },
-    /// Run one node in this process: replay, smpl_state, virtual_imu, recorder, viewer or
-    /// gap_monitor
+    /// Run one node: replay, smpl_state, virtual_imu, recorder, viewer or gap_monitor
     Node(node::Arguments),
     /// Print a shell's completion script
     Completion {

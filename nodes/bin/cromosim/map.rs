@@ -8,17 +8,22 @@ use cromosim_evaluation::fit_mapping;
 use crate::files::refuse_existing;
 use crate::output::say;
 
-/// Fit a distribution mapping (by ranks, per channel and placement) from a simulated to a measured
-/// recording
+/// Fit a distribution mapping from a simulated to a measured recording
+///
+/// By ranks, per channel and placement
 #[derive(Args)]
 pub struct Arguments {
     /// The recording with the simulated IMUs
     #[arg(long, value_name = "RECORDING")]
     simulated: PathBuf,
-    /// The recording with the real IMUs; need be neither the same motion nor as long
+    /// The recording with the real IMUs
+    ///
+    /// Need be neither the same motion nor as long
     #[arg(long, value_name = "RECORDING")]
     measured: PathBuf,
-    /// The file to write (YAML), for `simulate --mapping` and virtual_imu's parameter `mapping`
+    /// The file to write (YAML), for `simulate --mapping`
+    ///
+    /// And for virtual_imu's parameter `mapping`
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// Replace FILE where it exists

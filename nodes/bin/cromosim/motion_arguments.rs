@@ -6,15 +6,26 @@ use anyhow::bail;
 use clap::Args;
 use cromosim_motion::{MotionOptions, ShapeChoice, UpAxis};
 
-/// Options of reading motion files.
+/// Options of reading motion files. `-h` shows those that any file may need, `--help` all.
 #[derive(Args)]
+#[command(next_help_heading = "Motion files")]
 pub struct MotionArguments {
     /// Up axis of the motion files: auto, x, y or z
-    #[arg(long, default_value = "auto")]
+    #[arg(
+        long,
+        value_name = "AXIS",
+        default_value = "auto",
+        hide_short_help = true
+    )]
     up_axis: String,
     /// Metres of one unit of the motion files; default: found out from the skeleton's size, or as
     /// the file says
-    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
+    #[arg(
+        long,
+        value_name = "METRES",
+        allow_negative_numbers = true,
+        hide_short_help = true
+    )]
     unit: Option<f64>,
     /// Begin so many seconds after the motion's beginning
     #[arg(
@@ -28,31 +39,43 @@ pub struct MotionArguments {
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     duration: Option<f64>,
     /// An AMC file's skeleton (ASF) rather than the one beside it
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", hide_short_help = true)]
     skeleton: Option<PathBuf>,
     /// Frames per second of a motion file that does not say it (AMC: 120 where absent; video
     /// estimates: 30), Hz
-    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    #[arg(
+        long,
+        value_name = "HZ",
+        allow_negative_numbers = true,
+        hide_short_help = true
+    )]
     motion_rate: Option<f64>,
     /// Which marker is where: plug_in_gait, or a YAML file
-    #[arg(long, value_name = "SET")]
+    #[arg(long, value_name = "SET", hide_short_help = true)]
     marker_set: Option<String>,
     /// Whose markers are taken, where the labels name several people
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", hide_short_help = true)]
     subject: Option<String>,
     /// Take markers to be stuck exactly where the marker set says, instead of about a centimetre
     /// around it
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     placements_as_given: bool,
-    /// Which person of a file of several; default: who is in it for the longest time. `simulate`
-    /// also takes all, or names with commas between: topics and frames then begin with person_NAME
+    /// Which person of a file of several; default: who is in it longest
+    ///
+    /// `simulate` also takes all, or names with commas between: topics and frames then begin with
+    /// person_NAME
     #[arg(long, value_name = "NAME")]
     person: Option<String>,
     /// Where the body's shape comes from: detect, file, fit (to bone lengths) or mean
-    #[arg(long, default_value = "detect", value_parser = ["detect", "file", "fit", "mean"])]
+    #[arg(
+        long,
+        default_value = "detect",
+        value_parser = ["detect", "file", "fit", "mean"],
+        hide_short_help = true
+    )]
     shape: String,
     /// The body file that the motion's betas are for, to fit another body to that person's bones
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", hide_short_help = true)]
     source_body: Option<PathBuf>,
 }
 

@@ -36,7 +36,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         ),
         "--help" | "-h" => {
             say!(
-                "Usage: cromosim node <replay|smpl_state|virtual_imu|recorder|viewer|gap_monitor> [--help] [--check-config] [--ros-args ...]"
+                "Usage: cromosim node <replay|smpl_state|virtual_imu|recorder|viewer|gap_monitor>\n           [-h | --help] [--check-config] [--ros-args ...]"
             )?;
             Ok(())
         }

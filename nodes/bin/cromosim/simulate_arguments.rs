@@ -13,61 +13,83 @@ use crate::list;
 use crate::motion_arguments::MotionArguments;
 use crate::named::Named;
 
-// Headings of the help: what an option goes with.
-const MOTIONS: &str = "Options of motion files";
-const RIGID: &str = "Options of --rigid";
-const RECORDED: &str = "Options of --reference and --rigid";
-const NETWORKS: &str = "Options of motion files and --rigid";
-const REFERENCES: &str = "Options of --reference";
-const BODIES: &str = "Options of motion files and --reference";
+// Headings of the help.
+const INPUT: &str = "What moves";
+const SENSORS: &str = "Sensors";
+const READINGS: &str = "How readings are made";
 
 /// Simulate IMUs from motion files, or again from a recording's reference
 #[derive(Args)]
 pub struct Arguments {
     /// Motion files (BVH, ASF/AMC, C3D, TRC); none: the embedded walk
     pub motions: Vec<PathBuf>,
-    /// Re-simulate the IMUs of this recording from its reference motion instead
-    #[arg(long, value_name = "RECORDING")]
+    /// Simulate the IMUs of this recording again, from its reference motion
+    #[arg(long, value_name = "RECORDING", help_heading = INPUT)]
     pub reference: Option<PathBuf>,
-    /// The namespace (/robot1) of the recording's topics, where they are in several
-    #[arg(long, value_name = "NAME", help_heading = REFERENCES)]
+    /// The namespace of the recording's topics, where there are several
+    ///
+    /// Such as /robot1; with --reference
+    #[arg(long, value_name = "NAME", help_heading = INPUT)]
     pub namespace: Option<String>,
-    /// Simulate an IMU on a rigid body (robot, prop) that moves along this trajectory (TUM, EuRoC
-    /// or CSV) instead
-    #[arg(long, value_name = "FILE")]
+    /// Simulate an IMU on a rigid body along this trajectory
+    ///
+    /// A robot or a prop; the trajectory is TUM, EuRoC or CSV
+    #[arg(long, value_name = "FILE", help_heading = INPUT)]
     pub rigid: Option<PathBuf>,
-    /// A placement at a named site (cromosim body sites), such as left_wrist=left_watch, at 100 Hz; may be
-    /// given again. With --rigid the name alone, in /imu/NAME/data_raw [default: body]
-    #[arg(long, value_name = "NAME=SITE", help_heading = NETWORKS)]
+    /// A placement at a named site, such as left_wrist=left_watch
+    ///
+    /// At 100 Hz; may be given again; `cromosim body sites` lists the sites. With --rigid the name alone, as in
+    /// /imu/NAME/data_raw [default: body]
+    #[arg(long, value_name = "NAME=SITE", help_heading = SENSORS)]
     pub placement: Vec<String>,
-    /// A device's name or file, for its noise and effects; default: an ideal sensor
+    /// With --rigid: a device's name or file; default: an ideal sensor
+    ///
+    /// Its noise and effects are what errs
     #[arg(
         long,
         value_name = "DEVICE",
-        help_heading = RIGID,
+        help_heading = SENSORS,
         hide_possible_values = true,
         value_parser = Named(list::device_names)
     )]
     pub device: Option<String>,
-    /// The effects of each placement (YAML, as a diagnosis writes
-    /// them) rather than the nominal simulation
-    #[arg(long, value_name = "FILE", help_heading = RECORDED)]
+    /// With --reference or --rigid: the effects of each placement (YAML)
+    ///
+    /// As a diagnosis writes them, rather than the nominal simulation
+    #[arg(long, value_name = "FILE", help_heading = SENSORS)]
     pub effects: Option<PathBuf>,
-    /// The bag to write (.mcap, or a rosbag2 directory); with several motions a directory for one
-    /// .mcap each
+    /// The bag to write: .mcap, or a rosbag2 directory
+    ///
+    /// With several motions a directory for one .mcap each
     #[arg(long, value_name = "OUT")]
     pub out: PathBuf,
-    /// Sensor placements (YAML) rather than left_wrist, right_ankle, pelvis, sternum and head
-    #[arg(long, value_name = "FILE", help_heading = MOTIONS)]
+    /// Where on the body the sensors are (YAML); default: five places
+    ///
+    /// Without, left_wrist, right_ankle, pelvis, sternum and head; of motion files
+    #[arg(long, value_name = "FILE", help_heading = SENSORS)]
     pub placements: Option<PathBuf>,
-    /// Derivative scheme for every placement: adaptive_spline, spline, richardson, triangle,
-    /// normal_tracking or second_difference; default: the placements' own, adaptive_spline where
-    /// they name none. With --reference the default is the estimate that a diagnosis uses
-    #[arg(long, value_name = "NAME", hide_possible_values = true, value_parser = Named(list::scheme_names))]
+    /// Derivative scheme for every placement, such as spline
+    ///
+    /// adaptive_spline, spline, richardson, triangle, normal_tracking or second_difference; default:
+    /// the placements' own, adaptive_spline where they name none. With --reference the default is
+    /// the estimate that a diagnosis uses
+    #[arg(
+        long,
+        value_name = "NAME",
+        help_heading = READINGS,
+        hide_possible_values = true,
+        value_parser = Named(list::scheme_names)
+    )]
     pub scheme: Option<String>,
     /// Pass what is below this frequency, Hz, whatever the motion, rather than what the poses
     /// resolve: a low-pass without delay in place of a scheme
-    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    #[arg(
+        long,
+        value_name = "HZ",
+        allow_negative_numbers = true,
+        help_heading = READINGS,
+        hide_short_help = true
+    )]
     pub bandwidth: Option<f64>,
     /// Leave out so many seconds at either end; auto: as many as are far more uncertain than the
     /// middle, at most 0.25
@@ -75,34 +97,39 @@ pub struct Arguments {
         long,
         value_name = "auto|SECONDS",
         default_value = "auto",
-        allow_negative_numbers = true
+        allow_negative_numbers = true,
+        help_heading = READINGS,
+        hide_short_help = true
     )]
     pub trim: String,
-    /// Draw onto the readings, above what the poses resolve, what real IMUs show there: impacts, tremor,
-    /// soft tissue. --texture alone goes by each placement's segment (a --rigid body counts as held);
-    /// --texture=SEGMENT is foot, shank, thigh, trunk, head, arm or held
+    /// Draw what real IMUs show beyond what the poses resolve
+    ///
+    /// Impacts, tremor, soft tissue. --texture alone goes by each placement's segment (a --rigid body
+    /// counts as held); --texture=SEGMENT is foot, shank, thigh, trunk, head, arm or held
     #[arg(
         long,
         value_name = "SEGMENT",
         num_args = 0..=1,
         require_equals = true,
         default_missing_value = AUTO,
+        help_heading = READINGS,
         hide_possible_values = true,
         value_parser = Named(list::texture_names)
     )]
     pub texture: Option<String>,
-    /// Messages per second rather than the placements' own rate, Hz
-    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    /// Messages per second, rather than the placements' own rate
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true, help_heading = SENSORS)]
     pub rate: Option<f64>,
-    /// Body model as npz or pickle rather than the embedded one; with --reference that of the
-    /// recording's SMPL states
-    #[arg(long, value_name = "FILE", help_heading = BODIES)]
+    /// Body model (npz or pickle) rather than the embedded one
+    ///
+    /// With --reference that of the recording's SMPL states
+    #[arg(long, value_name = "FILE", help_heading = INPUT)]
     pub body: Option<PathBuf>,
     /// Seed of the sensor noise
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, help_heading = SENSORS, hide_short_help = true)]
     pub seed: u64,
     /// Leave out the random part of the sensor errors
-    #[arg(long)]
+    #[arg(long, help_heading = SENSORS)]
     pub no_noise: bool,
     /// How long errors of the poses hold, for the covariances that follow from a motion's
     /// confidence, s; 0: new with each pose
@@ -111,27 +138,31 @@ pub struct Arguments {
         value_name = "SECONDS",
         default_value_t = 0.0,
         allow_negative_numbers = true,
-        help_heading = MOTIONS
+        help_heading = READINGS,
+        hide_short_help = true
     )]
     pub pose_error_correlation: f64,
-    /// Write the samples of each placement as CSV into this directory too
-    #[arg(long, value_name = "DIR", help_heading = MOTIONS)]
+    /// Write each placement's samples as CSV into this directory too
+    #[arg(long, value_name = "DIR")]
     pub csv: Option<PathBuf>,
-    #[command(flatten, next_help_heading = MOTIONS)]
-    pub motion: MotionArguments,
-    /// Networks (motion_capture, motion_capture_60, video, streaming, streaming_video, or a folder
-    /// that `cromosim train` wrote) that correct acceleration and angular velocity before the
-    /// device's effects; the scheme is then spline unless --scheme or the placements name another
-    /// than the default, as in training
-    #[arg(long, value_name = "MODEL", help_heading = NETWORKS)]
-    pub learned: Option<PathBuf>,
-    /// A distribution mapping (a file that `cromosim map` wrote), applied last to the placements
-    /// that it names
-    #[arg(long, value_name = "FILE", help_heading = NETWORKS)]
-    pub mapping: Option<PathBuf>,
     /// Replace OUT, and the CSV files of --csv, where they exist
     #[arg(long)]
     pub force: bool,
+    #[command(flatten)]
+    pub motion: MotionArguments,
+    /// Networks that correct the readings, such as motion_capture
+    ///
+    /// motion_capture, motion_capture_60, video, streaming, streaming_video, or a folder that
+    /// `cromosim train` wrote. They correct acceleration and angular velocity before the device's
+    /// effects; the scheme is then spline unless --scheme or the placements name another than the
+    /// default, as in training. Not with --reference
+    #[arg(long, value_name = "MODEL", help_heading = READINGS)]
+    pub learned: Option<PathBuf>,
+    /// Map distributions as a file of `cromosim map` says
+    ///
+    /// Applied last, to the placements that it names. Not with --reference
+    #[arg(long, value_name = "FILE", help_heading = READINGS)]
+    pub mapping: Option<PathBuf>,
 }
 
 /// The default of `--trim`.

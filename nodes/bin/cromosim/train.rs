@@ -20,17 +20,20 @@ use crate::progress::Terminal;
 pub struct Arguments {
     /// What to learn from and how (YAML, schema cromosim/training/1)
     config: PathBuf,
-    /// The folder to write the model into: weights (safetensors), card.md, history and checkpoints
+    /// The folder to write the model into
+    ///
+    /// Weights (safetensors), card.md, history and checkpoints
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Where the configuration's files are looked for; default: the folder of the configuration
+    /// Where the configuration's files are; default: its own folder
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Body model (SMPL, SMPL-H, SMPL-X; npz or pickle) that motions are played on, rather than the
-    /// embedded one
+    /// Body model (npz or pickle) that motions are played on
+    ///
+    /// SMPL, SMPL-H or SMPL-X, rather than the embedded one
     #[arg(long, value_name = "FILE")]
     body: Option<PathBuf>,
-    /// Begin anew where DIR holds a training already, rather than go on with it
+    /// Begin anew, rather than go on with the training in DIR
     #[arg(long)]
     force: bool,
     /// Say what would be learned from, and stop

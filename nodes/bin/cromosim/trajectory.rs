@@ -21,57 +21,75 @@ use crate::files::refuse_existing;
 use crate::motion_arguments::MotionArguments;
 use crate::output::say;
 
+/// Heading of the help.
+const VIDEO: &str = "The video";
+
 /// Place in-place poses of a video in the world, by keypoints, depth maps and cameras
 #[derive(Args)]
+#[command(
+    override_usage = "cromosim trajectory [OPTIONS] --keypoints <DIR> --depth <DIR> --cameras <DIR>\n           --depth-encoding <WHAT> --camera-axes <AXES> --image <WxH> <POSES> <OUT>"
+)]
 #[command(group = clap::ArgGroup::new("size").args(["body_height", "scale"]).multiple(false))]
 pub struct Arguments {
-    /// The in-place poses: what VIBE, PHALP, WHAM, GVHMR or TRAM wrote; or any motion whose root
-    /// orientation is that against a level camera which looks along the world's y axis
+    /// The in-place poses: what VIBE, PHALP, WHAM, GVHMR or TRAM wrote
+    ///
+    /// Or any motion whose root orientation is that against a level camera which looks along the
+    /// world's y axis
     poses: PathBuf,
-    /// The motion to write; the ending decides where --to does not: .npz, .bvh, .trc, or .mcap,
-    /// which keeps the frames' confidence
+    /// The motion to write: .npz, .bvh, .trc, or .mcap
+    ///
+    /// The ending decides where --to does not; .mcap keeps the frames' confidence
     out: PathBuf,
     /// The format to write: amass, bvh, trc or bag
-    #[arg(long, value_enum, value_name = "FORMAT")]
+    #[arg(long, value_enum, value_name = "FORMAT", hide_possible_values = true)]
     to: Option<Format>,
     /// Folder of OpenPose's *_keypoints.json (BODY_25)
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = VIDEO)]
     keypoints: PathBuf,
     /// Folder of depth maps, frame_NNNNNN.raw, .npy or .png
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = VIDEO)]
     depth: PathBuf,
     /// Folder of cameras, frame_NNNNNN.npz
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = VIDEO)]
     cameras: PathBuf,
-    /// What the depth maps hold; Robust CVD's hold disparity
-    #[arg(long, value_parser = ["depth", "disparity"])]
+    /// What the maps hold
+    ///
+    /// Robust CVD's hold disparity
+    #[arg(long, value_name = "WHAT", value_parser = ["depth", "disparity"], help_heading = VIDEO)]
     depth_encoding: String,
-    /// Which way the cameras' axes point: y down and z forward (opencv), or y up and z backward
-    /// (opengl)
-    #[arg(long, value_parser = ["opencv", "opengl"])]
+    /// Which way the cameras' axes point
+    ///
+    /// y down and z forward (opencv), or y up and z backward (opengl)
+    #[arg(long, value_name = "AXES", value_parser = ["opencv", "opengl"], help_heading = VIDEO)]
     camera_axes: String,
     /// Width and height of the video, in which the keypoints are, px
-    #[arg(long, value_name = "WxH", value_parser = size)]
+    #[arg(long, value_name = "WxH", value_parser = size, help_heading = VIDEO)]
     image: [usize; 2],
-    /// Width and height of the image that the intrinsics are for, px; default: the video's
-    #[arg(long, value_name = "WxH", value_parser = size)]
+    /// Size of the image that the intrinsics are for, px
+    ///
+    /// Default: the video's
+    #[arg(long, value_name = "WxH", value_parser = size, help_heading = VIDEO)]
     camera_image: Option<[usize; 2]>,
-    /// Width and height of depth maps without a header, px
-    #[arg(long, value_name = "WxH", value_parser = size)]
+    /// Size of depth maps without a header, px
+    #[arg(long, value_name = "WxH", value_parser = size, help_heading = VIDEO)]
     plain_depth: Option<[usize; 2]>,
     /// Number of the first frame in the files' names
-    #[arg(long, value_name = "NUMBER", default_value_t = 0)]
+    #[arg(long, value_name = "NUMBER", default_value_t = 0, help_heading = VIDEO)]
     first_number: usize,
-    /// Whether the root moves: depth (the paper's CROMOSim), or none (its Lite)
-    #[arg(long, value_parser = ["depth", "none"], default_value = "depth")]
+    /// Whether the root moves
+    ///
+    /// depth (the paper's CROMOSim), or none (its Lite)
+    #[arg(long, value_name = "HOW", value_parser = ["depth", "none"], default_value = "depth")]
     trajectory: String,
-    /// The person's standing height, m: gives the scale of depth maps and cameras
+    /// The person's standing height, m: gives the scale
+    ///
+    /// Of depth maps and cameras
     #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
     body_height: Option<f64>,
-    /// Metres per unit of depth maps and cameras; 1 where they are metric
+    /// Metres per unit of depth maps and cameras; 1: metric
     #[arg(long, value_name = "FACTOR", allow_negative_numbers = true)]
     scale: Option<f64>,
-    /// Body model as npz or pickle rather than the embedded one
+    /// Body model (npz or pickle) rather than the embedded one
     #[arg(long, value_name = "FILE")]
     body: Option<PathBuf>,
     /// Replace OUT where it exists

@@ -13,26 +13,33 @@ use crate::progress::Terminal;
 /// How far simulators are from measured IMUs, on people and positions that no network has seen
 #[derive(Args)]
 pub struct Arguments {
-    /// The folder to write report.html, its pictures as PNG, tables.md and results.json into
+    /// The folder to write the report into
+    ///
+    /// report.html, its pictures as PNG, tables.md and results.json
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// What is compared (YAML, schema cromosim/fidelity/1) rather than
-    /// config/evaluation/fidelity.yaml
+    /// What is compared (YAML)
+    ///
+    /// Schema cromosim/fidelity/1, rather than config/evaluation/fidelity.yaml
     #[arg(long, value_name = "FILE")]
     protocol: Option<PathBuf>,
-    /// Where the protocol's files are looked for; default: CROMOSIM_DATA, else ../shared/data
+    /// Where its files are; default: CROMOSIM_DATA, else ../shared/data
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Folders of models that `cromosim train` wrote, by the protocol's names, rather than the
-    /// models that come with the suite
+    /// Folder of models that `cromosim train` wrote
+    ///
+    /// By the protocol's names, rather than the models that come with the suite
     #[arg(long, value_name = "DIR")]
     models: Option<PathBuf>,
-    /// Body model (SMPL, SMPL-H, SMPL-X; npz or pickle) that motions are played on, rather than the
-    /// embedded one
+    /// Body model (npz or pickle) that motions are played on
+    ///
+    /// SMPL, SMPL-H or SMPL-X, rather than the embedded one
     #[arg(long, value_name = "FILE")]
     body: Option<PathBuf>,
-    /// Draw one person and device for each motion and site; of rigid bodies, one IMU of each known
-    /// motion and two recordings
+    /// Draw little, to show that all of it runs
+    ///
+    /// One person and device for each motion and site; of rigid bodies, one IMU of each known motion
+    /// and two recordings
     #[arg(long)]
     quick: bool,
     /// Replace what is in DIR

@@ -15,44 +15,57 @@ use crate::progress::Terminal;
 /// Files that are written beside the report.
 const FILES: [&str; 3] = ["results.json", "tables.md", "elapsed.json"];
 
-/// Train a classifier of activities on real, virtual and mixed IMU data, and test it on real people
-/// held out one by one
+/// Heading of the help.
+const DATA: &str = "Whom and what it learns from";
+
+/// Train a classifier of activities on real, virtual and mixed IMU data
+///
+/// And test it on real people held out one by one
 #[derive(Args)]
 pub struct Arguments {
-    /// The folder to write report.html, its pictures as PNG, tables.md, results.json and
-    /// elapsed.json into
+    /// The folder to write the report into
+    ///
+    /// report.html, its pictures as PNG, tables.md, results.json and elapsed.json
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// The folder that holds har_spsw and mocap_cmu_har; default: the environment's CROMOSIM_DATA,
-    /// else ../shared/data
-    #[arg(long, value_name = "DIR")]
+    /// The folder that holds har_spsw and mocap_cmu_har
+    ///
+    /// Default: the environment's CROMOSIM_DATA, else ../shared/data
+    #[arg(long, value_name = "DIR", help_heading = DATA)]
     data: Option<PathBuf>,
-    /// Recordings of real people, rather than DIR/har_spsw: of PAMAP2 (one file a person),
-    /// RealWorld (accelerometer's zips, one folder a person), or phone and watch
-    #[arg(long, value_name = "FILE", num_args = 1..)]
+    /// Recordings of real people, rather than DIR/har_spsw
+    ///
+    /// Of PAMAP2 (one file a person), RealWorld (accelerometer's zips, one folder a person), or phone
+    /// and watch
+    #[arg(long, value_name = "FILE", num_args = 1.., help_heading = DATA)]
     real: Vec<PathBuf>,
     /// Labelled skeleton clips (npz), rather than DIR/mocap_cmu_har
-    #[arg(long, value_name = "FILE", num_args = 1..)]
+    #[arg(long, value_name = "FILE", num_args = 1.., help_heading = DATA)]
     motions: Vec<PathBuf>,
-    /// Which class an activity counts as (YAML: {sitting: SEATED, ...}); default: the five of the
-    /// virtual side, by their usual names
-    #[arg(long, value_name = "FILE")]
+    /// Which class an activity counts as (YAML)
+    ///
+    /// {sitting: SEATED, ...}; default: the five of the virtual side, by their usual names
+    #[arg(long, value_name = "FILE", help_heading = DATA)]
     activities: Option<PathBuf>,
-    /// Networks for the learned simulator: motion_capture, or a folder that `cromosim train` wrote;
-    /// without, it is left out
-    #[arg(long, value_name = "MODEL")]
+    /// Networks for the learned simulator, such as motion_capture
+    ///
+    /// Or a folder that `cromosim train` wrote; without, it is left out
+    #[arg(long, value_name = "MODEL", help_heading = DATA)]
     learned: Option<PathBuf>,
-    /// Body model (SMPL, SMPL-H, SMPL-X; npz or pickle) that motions are played on, rather than the
-    /// embedded one
-    #[arg(long, value_name = "FILE")]
+    /// Body model (npz or pickle) that motions are played on
+    ///
+    /// SMPL, SMPL-H or SMPL-X, rather than the embedded one
+    #[arg(long, value_name = "FILE", help_heading = DATA)]
     body: Option<PathBuf>,
     /// Take clips named atypical (dribbling, uneven ground), too
-    #[arg(long)]
+    #[arg(long, help_heading = DATA)]
     atypical: bool,
     /// Seed of everything that is drawn
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Three people, one seed, few steps: shows that all of it runs, in less than a minute
+    /// Draw little, to show that all of it runs
+    ///
+    /// Three people, one seed, few steps; less than a minute
     #[arg(long)]
     quick: bool,
     /// Replace results that are there

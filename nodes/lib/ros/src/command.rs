@@ -16,6 +16,10 @@ use crate::parameter::Parameters;
 use crate::publisher::RawPublisher;
 use crate::shutdown::Shutdown;
 
+/// Columns of the screen that `-h` fits, and how many of them names may push descriptions away.
+const SCREEN_COLUMNS: usize = 100;
+const MAX_FIELD_COLUMNS: usize = 36;
+
 /// The parameters of a node as a struct; [`node_config!`](crate::node_config) makes one.
 pub trait NodeConfig: Default + Serialize + DeserializeOwned {
     /// Name and description of every parameter, in the struct's order.
@@ -68,8 +72,8 @@ impl<C> Prepared<C> {
     }
 }
 
-/// Reads a node's command line: `--help` prints what it takes, `--check-config` checks and prints
-/// the configuration; both give `None`. `check` finds what is wrong beyond types: files that are
+/// Reads a node's command line: `--help` prints what it takes, `-h` so much of that as fits a screen,
+/// `--check-config` checks and prints the configuration; all give `None`. `check` finds what is wrong beyond types: files that are
 /// not there, values out of range.
 ///
 /// # Errors
@@ -82,8 +86,12 @@ pub fn prepare<C: NodeConfig, E: From<RosError>>(
 ) -> Result<Option<Prepared<C>>, E> {
     let args = RosArgs::parse(arguments.iter().cloned())?;
     let has = |flag: &str| args.rest.iter().any(|argument| argument == flag);
-    if has("--help") || has("-h") {
+    if has("--help") {
         print_line(&help::<C>(name, about))?;
+        return Ok(None);
+    }
+    if has("-h") {
+        print_line(&short_help::<C>(name, about))?;
         return Ok(None);
     }
     let known = |argument: &str| matches!(argument, "--check-config" | "--end-with-stdin");
@@ -139,7 +147,8 @@ fn plain(field: &str) -> &str {
     field.trim_start_matches("r#")
 }
 
-fn help<C: NodeConfig>(name: &str, about: &str) -> String {
+/// Name, default and description of every parameter.
+fn parameters<C: NodeConfig>() -> Vec<(&'static str, String, &'static str)> {
     let defaults = serde_norway::to_value(C::default()).unwrap_or_default();
     let shown = |field: &str| {
         let value = defaults
@@ -148,13 +157,61 @@ fn help<C: NodeConfig>(name: &str, about: &str) -> String {
             .unwrap_or_default();
         value.split_whitespace().collect::<Vec<_>>().join(" ")
     };
+    let of = |&(field, about): &(&'static str, &'static str)| {
+        let field = plain(field);
+        (field, shown(field), about.trim())
+    };
+    C::ABOUT.iter().map(of).collect()
+}
+
+/// A line for each parameter, none wider than the screen.
+fn short_help<C: NodeConfig>(name: &str, about: &str) -> String {
+    let mut rows: Vec<(String, &str)> = parameters::<C>()
+        .into_iter()
+        .map(|(field, default, about)| (format!("{field} [{default}]"), about))
+        .collect();
+    rows.push((
+        "use_sim_time [false]".to_owned(),
+        "Take the time from /clock.",
+    ));
+    let widths = rows.iter().map(|(field, _)| field.chars().count());
+    let width = widths.filter(|width| *width <= MAX_FIELD_COLUMNS).max();
+    let width = width.unwrap_or(0);
+    let mut lines = vec![
+        about.to_owned(),
+        String::new(),
+        format!(
+            "Usage: cromosim node {name} [--check-config] [--ros-args [-p NAME:=VALUE]... ...]"
+        ),
+        String::new(),
+        "Parameters [default]:".to_owned(),
+    ];
+    lines.extend(
+        rows.iter()
+            .map(|(field, about)| format!("  {field:width$}  {about}")),
+    );
+    lines.push(String::new());
+    lines.push("All of it, with remaps, QoS and environment: --help".to_owned());
+    let lines = lines.iter().map(|line| first_columns(line));
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+/// The line, cut where the screen ends.
+fn first_columns(line: &str) -> String {
+    if line.chars().count() <= SCREEN_COLUMNS {
+        return line.to_owned();
+    }
+    let kept: String = line.chars().take(SCREEN_COLUMNS - 1).collect();
+    format!("{}…", kept.trim_end())
+}
+
+fn help<C: NodeConfig>(name: &str, about: &str) -> String {
     let mut text = format!(
         "{about}\n\nUsage: cromosim node {name} [--check-config] [--end-with-stdin] [--ros-args [-p NAME:=VALUE]... [--params-file FILE]... [-r FROM:=TO]... \
          [--log-level LEVEL]]\n\nParameters [default]:\n"
     );
-    for (field, about) in C::ABOUT {
-        let field = plain(field);
-        text += &format!("  {field} [{}]\n      {}\n", shown(field), about.trim());
+    for (field, default, about) in parameters::<C>() {
+        text += &format!("  {field} [{default}]\n      {about}\n");
     }
     text += "  use_sim_time [false]\n      Take the time from /clock.\n  qos_overrides./TOPIC.publisher.depth (or .subscription; depth, reliability, durability, history)\n      Quality of service of a topic.\n\n";
     text +=
@@ -281,6 +338,21 @@ mod tests {
             let text = prepared(&arguments).err().unwrap().to_string();
             assert!(text.contains(expected), "{text}");
         }
+    }
+
+    #[test]
+    fn short_help_has_a_line_for_every_parameter_and_fits_a_screen() {
+        let about = "long ".repeat(40);
+        let text = short_help::<Config>("test", &about);
+        let has = |begin: &str| text.lines().filter(|line| line.starts_with(begin)).count();
+        assert_eq!(
+            (has("  rate_hz [100.0]  "), has("  loop [false]  ")),
+            (1, 1)
+        );
+        assert!(
+            text.lines().all(|line| line.chars().count() <= 100) && text.contains("long…\n"),
+            "{text}"
+        );
     }
 
     #[test]
