@@ -7,6 +7,7 @@ use cromosim_bag::{BagReader, Recovery, recover_over, write_imu_csv};
 
 use crate::files::{refuse_existing, write_whole};
 use crate::output::{output, remark, say};
+use crate::progress::working;
 
 /// Commands on bags.
 #[derive(Subcommand)]
@@ -49,7 +50,8 @@ pub fn run(command: &Command) -> anyhow::Result<()> {
             if !in_place(bag, &out) {
                 refuse_existing(&out, *force)?;
             }
-            print_recovery(&out, &recover_over(bag, &out, *force)?)?;
+            let recovery = working("mending", || recover_over(bag, &out, *force))?;
+            print_recovery(&out, &recovery)?;
         }
         Command::Csv {
             bag,

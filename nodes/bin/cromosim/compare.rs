@@ -13,6 +13,7 @@ use cromosim_recording::open_recording;
 
 use crate::files::{refuse_existing, write_whole};
 use crate::output::{print, say};
+use crate::progress::working;
 
 /// Say what differs between two diagnoses, or between the IMUs of two recordings
 #[derive(Args)]
@@ -61,7 +62,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     );
     let found = match (&a, &b) {
         (Side::Diagnosis(a), Side::Diagnosis(b)) => compare_diagnoses(a, b)?,
-        (Side::Recording(a), Side::Recording(b)) => compare_recordings(a, b)?,
+        (Side::Recording(a), Side::Recording(b)) => {
+            working("comparing", || compare_recordings(a, b))?
+        }
         _ => {
             bail!(
                 "{} is {} and {} is {}; two of a kind can be compared",

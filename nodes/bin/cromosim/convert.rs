@@ -13,6 +13,7 @@ use crate::list;
 use crate::motion_arguments::MotionArguments;
 use crate::named::Named;
 use crate::output::{remark, say};
+use crate::progress::working;
 
 // Headings of the help: what an option goes with.
 const MOTIONS: &str = "Of a motion";
@@ -161,14 +162,15 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         },
         name: arguments.name.clone(),
     };
-    let converted = convert(&Conversion {
+    let conversion = Conversion {
         input: arguments.input.clone(),
         out: arguments.out.clone(),
         target,
         options,
         imu: arguments.imu.clone(),
         replace: arguments.force,
-    })?;
+    };
+    let converted = working("converting", || convert(&conversion))?;
     for note in &converted.notes {
         remark!("{note}");
     }

@@ -318,7 +318,10 @@ fn play(
     stop: &Interrupt,
 ) -> anyhow::Result<()> {
     replay.wait_ready(stop)?;
-    let bar = progress::bar((duration * 10.0).ceil() as u64, "playing, 0.1 s");
+    let bar = progress::bar(
+        (duration * 10.0).ceil() as u64,
+        "playing, tenths of a second",
+    );
     let begun = Instant::now();
     while replay.child.try_wait()?.is_none() {
         if stop.is_set() {

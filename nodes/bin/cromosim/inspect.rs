@@ -19,6 +19,7 @@ use cromosim_recording::rigid::RigidFormat;
 use crate::body;
 use crate::motion_arguments::MotionArguments;
 use crate::output::say;
+use crate::progress::working;
 
 /// Part of a bag's time below which a topic's own span is said.
 const MOST_OF_BAG: f64 = 0.98;
@@ -49,7 +50,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let options = arguments.motion.options()?;
     let model = body::model(arguments.body.as_deref())?;
     for path in &arguments.files {
-        match inspect(path, &model, &options)? {
+        let doing = format!("reading {}", path.display());
+        match working(&doing, || inspect(path, &model, &options))? {
             Inspection::Bag(reader) => print_bag(path, &reader)?,
             Inspection::Recording(format, recording) => print_recording(path, format, &recording)?,
             Inspection::Rigid(rigid) => print_rigid(path, &rigid)?,

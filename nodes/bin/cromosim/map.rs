@@ -7,6 +7,7 @@ use cromosim_evaluation::fit_mapping;
 
 use crate::files::refuse_existing;
 use crate::output::say;
+use crate::progress::working;
 
 /// Fit a distribution mapping from a simulated to a measured recording
 ///
@@ -35,7 +36,9 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let out = arguments.out.display();
     refuse_existing(&arguments.out, arguments.force)?;
-    let file = fit_mapping(&arguments.simulated, &arguments.measured)?;
+    let file = working("fitting a mapping", || {
+        fit_mapping(&arguments.simulated, &arguments.measured)
+    })?;
     file.write(&arguments.out)?;
     let names: Vec<&str> = file.placements.keys().map(String::as_str).collect();
     say!("{out}: {}", names.join(", "))?;

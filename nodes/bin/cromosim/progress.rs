@@ -1,24 +1,102 @@
 //! Progress on work that takes longer than a second, and its end by a signal.
 
+use std::io::{IsTerminal, stderr};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread;
 use std::time::Duration;
 
 use anyhow::bail;
 use cromosim_evaluation::Observer;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle, WeakProgressBar};
 
-use crate::output::say;
+use crate::output::{remark, say};
 
-/// A bar of `steps` steps on standard error; invisible where that is no terminal.
+/// Work that is done within this time shows no progress.
+const SHORT: Duration = Duration::from_secs(1);
+/// How often a line tells of the work where standard error is no terminal.
+const LINE_EVERY: Duration = Duration::from_secs(10);
+/// From so many seconds on a time is told in minutes.
+const IN_MINUTES_S: f64 = 120.0;
+
+/// A bar of `steps` steps on standard error, with the time left; a line every ten seconds where that
+/// is no terminal. Shown once the work has taken a second.
 pub fn bar(steps: u64, doing: &str) -> ProgressBar {
-    let bar = ProgressBar::with_draw_target(Some(steps), ProgressDrawTarget::stderr_with_hz(8));
-    if let Ok(style) = ProgressStyle::with_template("{msg:24} {wide_bar:.cyan} {pos}/{len} {eta}") {
+    shown(
+        ProgressBar::with_draw_target(Some(steps), ProgressDrawTarget::hidden()),
+        doing,
+        "{msg:24} {wide_bar:.cyan} {pos}/{len}, {eta} left",
+    )
+}
+
+/// Does work whose length nobody knows; as [`bar`], with the time gone.
+pub fn working<T>(doing: &str, work: impl FnOnce() -> T) -> T {
+    let spinner = shown(
+        ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden()),
+        doing,
+        "{spinner} {msg}, {elapsed}",
+    );
+    let done = work();
+    spinner.finish_and_clear();
+    done
+}
+
+fn shown(bar: ProgressBar, doing: &str, template: &str) -> ProgressBar {
+    if let Ok(style) = ProgressStyle::with_template(template) {
         bar.set_style(style);
     }
     bar.set_message(doing.to_owned());
-    bar.enable_steady_tick(Duration::from_millis(500));
+    let watched = bar.downgrade();
+    if stderr().is_terminal() {
+        thread::spawn(move || draw(&watched));
+    } else {
+        thread::spawn(move || tell(&watched, LINE_EVERY, |line| remark!("{line}")));
+    }
     bar
+}
+
+/// Shows the bar where the work goes on after a second.
+fn draw(bar: &WeakProgressBar) {
+    thread::sleep(SHORT);
+    if let Some(bar) = bar.upgrade().filter(|bar| !bar.is_finished()) {
+        bar.set_draw_target(ProgressDrawTarget::stderr_with_hz(8));
+        bar.enable_steady_tick(Duration::from_millis(500));
+    }
+}
+
+/// Tells of the work, again and again, until it is done.
+fn tell(bar: &WeakProgressBar, every: Duration, say: impl Fn(String)) {
+    loop {
+        thread::sleep(every);
+        let Some(bar) = bar.upgrade().filter(|bar| !bar.is_finished()) else {
+            return;
+        };
+        let gone = bar.elapsed().as_secs_f64();
+        say(line(&bar.message(), bar.position(), bar.length(), gone));
+    }
+}
+
+/// `simulating, placements: 3 of 17, 12 s gone, about 56 s left`.
+fn line(doing: &str, done: u64, steps: Option<u64>, gone_s: f64) -> String {
+    let gone = format!("{} gone", time(gone_s));
+    let Some(steps) = steps else {
+        return format!("{doing}: {gone}");
+    };
+    let left = if done == 0 {
+        "time left not known yet".to_owned()
+    } else {
+        let left = gone_s / done as f64 * steps.saturating_sub(done) as f64;
+        format!("about {} left", time(left))
+    };
+    format!("{doing}: {done} of {steps}, {gone}, {left}")
+}
+
+fn time(seconds: f64) -> String {
+    if seconds < IN_MINUTES_S {
+        format!("{seconds:.0} s")
+    } else {
+        format!("{:.0} min", seconds / 60.0)
+    }
 }
 
 /// Set by SIGINT and SIGTERM, so that work can stop where nothing is left half-written.
@@ -102,5 +180,48 @@ impl Observer for Terminal {
 
     fn interrupted(&self) -> bool {
         self.interrupt.is_set()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_tell_what_is_done_and_how_long_it_takes() {
+        let told = |done, gone_s| line("diagnosing, placements", done, Some(17), gone_s);
+        assert_eq!(
+            told(3, 12.0),
+            "diagnosing, placements: 3 of 17, 12 s gone, about 56 s left"
+        );
+        assert_eq!(
+            told(0, 10.0),
+            "diagnosing, placements: 0 of 17, 10 s gone, time left not known yet"
+        );
+        assert_eq!(
+            told(2, 60.0),
+            "diagnosing, placements: 2 of 17, 60 s gone, about 8 min left"
+        );
+        assert_eq!(line("fitting", 0, None, 130.0), "fitting: 2 min gone");
+    }
+
+    #[test]
+    fn work_is_told_of_until_it_is_done() {
+        let bar = ProgressBar::with_draw_target(Some(4), ProgressDrawTarget::hidden());
+        bar.set_message("working");
+        bar.inc(2);
+        let watched = bar.downgrade();
+        let (sender, told) = std::sync::mpsc::channel();
+        let teller = thread::spawn(move || {
+            tell(&watched, Duration::from_millis(20), |line| {
+                let _ = sender.send(line);
+            });
+        });
+        for _ in 0..2 {
+            let line = told.recv().unwrap_or_default();
+            assert!(line.starts_with("working: 2 of 4, "), "{line}");
+        }
+        bar.finish_and_clear();
+        assert!(teller.join().is_ok());
     }
 }

@@ -20,6 +20,7 @@ use crate::convert::Format;
 use crate::files::refuse_existing;
 use crate::motion_arguments::MotionArguments;
 use crate::output::say;
+use crate::progress::working;
 
 /// Heading of the help.
 const VIDEO: &str = "The video";
@@ -123,12 +124,11 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let options = options(arguments)?;
     let motion_options = arguments.motion.options()?;
     let model = body::model(arguments.body.as_deref())?;
-    let (mut clip, first_frame) = clip(
-        &arguments.poses,
-        pixels(arguments.image),
-        &model,
-        &motion_options,
-    )?;
+    let read = || {
+        let image = pixels(arguments.image);
+        clip(&arguments.poses, image, &model, &motion_options)
+    };
+    let (mut clip, first_frame) = working("reading poses", read)?;
     let folder = CameraFolder {
         keypoints: arguments.keypoints.clone(),
         depth: arguments.depth.clone(),
@@ -137,7 +137,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     };
     let mut files = folder.read(clip.poses.len(), options.least_confidence)?;
     (clip.keypoints, clip.cameras) = (files.keypoints, files.cameras);
-    let placed = global_trajectory(&clip, &mut files.depth, &model, &options)?;
+    let placed = working("placing in the world", || {
+        global_trajectory(&clip, &mut files.depth, &model, &options)
+    })?;
     let file = MotionFile {
         target,
         options: &motion_options,
