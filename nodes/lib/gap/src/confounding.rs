@@ -66,7 +66,7 @@ fn special_cases(regression: &ResidualRegression) -> impl Iterator<Item = Effect
                 search.special_case_of.contains(&dependence)
                     && kind.spec().channels.contains(&channel)
             }
-            Search::Choice | Search::ReadOff(_) => false,
+            Search::Choice | Search::ReadOff(_) | Search::Given => false,
         })
 }
 

@@ -21,7 +21,7 @@ pub(crate) fn is_sound(model: &FitModel, fit: &Fit) -> bool {
 fn is_plausible(set: &EffectSet) -> bool {
     set.iter().all(|effect| match effect.kind().spec().search {
         Search::Fitted(search) => (search.is_plausible)(effect, set),
-        Search::Choice | Search::ReadOff(_) => true,
+        Search::Choice | Search::ReadOff(_) | Search::Given => true,
     })
 }
 

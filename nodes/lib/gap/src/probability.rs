@@ -23,7 +23,7 @@ pub(crate) fn probability_of(findings: &Findings, effect: &Effect) -> f64 {
     match (margin, effect.kind().spec().search) {
         (Some(margin), _) => MOST * (1.0 - 1.0 / (2.0 + margin.max(0.0) / MARGIN_NATS)),
         (None, Search::ReadOff(search)) => search.probability,
-        (None, Search::Fitted(_) | Search::Choice) => WITHOUT_MARGIN,
+        (None, Search::Fitted(_) | Search::Choice | Search::Given) => WITHOUT_MARGIN,
     }
 }
 

@@ -42,7 +42,7 @@ pub(crate) fn price_of_effect(model: &FitModel, kind: EffectKind) -> f64 {
         };
     match kind.spec().search {
         Search::Choice => price::EFFECT_NATS + price::CHOICE_NATS,
-        Search::Fitted(_) | Search::ReadOff(_) => {
+        Search::Fitted(_) | Search::ReadOff(_) | Search::Given => {
             let values = free_values(kind).len() as f64;
             factor * (price::EFFECT_NATS + price::VALUE_NATS * values)
         }

@@ -4,13 +4,16 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use crate::effects::RawUnexplained;
-use crate::{DeclaredNoise, EffectSet, ImuError, Stage, UnexplainedErrors};
+use crate::effects::{RawUnexplained, number, write_effects, write_unexplained};
+use crate::{
+    DeclaredNoise, Effect, EffectKind, EffectSet, ImuError, PlacementEffects, Stage,
+    UnexplainedErrors,
+};
 
 const SCHEMA: &str = "cromosim/device/1";
 
 /// The embedded devices by name.
-pub const EMBEDDED_DEVICES: [(&str, &str); 3] = [
+pub const EMBEDDED_DEVICES: [(&str, &str); 12] = [
     (
         "ideal",
         include_str!("../../../../config/devices/ideal.yaml"),
@@ -22,6 +25,42 @@ pub const EMBEDDED_DEVICES: [(&str, &str); 3] = [
     (
         "precision_mems",
         include_str!("../../../../config/devices/precision_mems.yaml"),
+    ),
+    (
+        "bmi270",
+        include_str!("../../../../config/devices/bmi270.yaml"),
+    ),
+    (
+        "icm20948",
+        include_str!("../../../../config/devices/icm20948.yaml"),
+    ),
+    (
+        "icm42688p",
+        include_str!("../../../../config/devices/icm42688p.yaml"),
+    ),
+    (
+        "lsm6dsox",
+        include_str!("../../../../config/devices/lsm6dsox.yaml"),
+    ),
+    (
+        "mpu6050",
+        include_str!("../../../../config/devices/mpu6050.yaml"),
+    ),
+    (
+        "adis16470",
+        include_str!("../../../../config/devices/adis16470.yaml"),
+    ),
+    (
+        "mti630",
+        include_str!("../../../../config/devices/mti630.yaml"),
+    ),
+    (
+        "mtw_awinda",
+        include_str!("../../../../config/devices/mtw_awinda.yaml"),
+    ),
+    (
+        "movella_dot",
+        include_str!("../../../../config/devices/movella_dot.yaml"),
     ),
 ];
 
@@ -89,6 +128,15 @@ impl Device {
         }
     }
 
+    /// The device with these effects in the place of its own; those of a reference are left out.
+    #[must_use]
+    pub fn with_effects(self, effects: EffectSet) -> Self {
+        Self {
+            effects: effects.filtered(|effect| effect.kind().spec().stage != Stage::Reference),
+            ..self
+        }
+    }
+
     /// Parses a file's text; `file` names it in errors.
     ///
     /// # Errors
@@ -144,6 +192,44 @@ impl Device {
             effects: raw.effects,
             unexplained: raw.unexplained.into(),
         })
+    }
+
+    /// The device of a diagnosed placement: what a device file can hold of it. The others, which are the
+    /// reference's or happened at one time, come by their names.
+    pub fn of_placement(placement: &PlacementEffects) -> (Self, Vec<&'static str>) {
+        let is_of_recording = |effect: &Effect| {
+            effect.kind().spec().stage == Stage::Reference || effect.kind() == EffectKind::MountSlip
+        };
+        let left_out = placement.effects.iter().filter(|it| is_of_recording(it));
+        let left_out = left_out.map(|effect| effect.kind().name()).collect();
+        let noise = placement.declared_noise;
+        let device = Self {
+            effects: placement
+                .effects
+                .filtered(|effect| !is_of_recording(effect)),
+            unexplained: placement.unexplained,
+            ..Self::white(noise.accel_density, noise.gyro_density)
+        };
+        (device, left_out)
+    }
+
+    /// The file's text; parsed again it is the same device. `about` becomes comments at its top.
+    pub fn to_yaml(&self, about: &str) -> String {
+        let mut text: String = about.lines().map(|line| format!("# {line}\n")).collect();
+        let (accel, gyro) = (number(self.accel_density), number(self.gyro_density));
+        let orientation = match self.orientation_stddev {
+            0.0 => String::new(),
+            stddev => format!(", orientation_stddev: {}", number(stddev)),
+        };
+        text += &format!(
+            "schema: {SCHEMA}\ndeclared_noise: {{accel_density: {accel}, gyro_density: {gyro}{orientation}}}   # (m/s2)/sqrt(Hz), (rad/s)/sqrt(Hz)\n"
+        );
+        if !self.effects.is_empty() {
+            text += "effects:\n";
+            write_effects(&mut text, "  ", &self.effects);
+        }
+        write_unexplained(&mut text, "", &self.unexplained);
+        text
     }
 
     /// Reads a file.

@@ -110,6 +110,20 @@ pub enum ImuError {
         /// Its value.
         value: f64,
     },
+    /// A file of Kalibr's that does not say what it should.
+    #[error("{file}: {problem}")]
+    Kalibr {
+        /// The file's name.
+        file: String,
+        /// The place, what is wrong, what was expected.
+        problem: String,
+    },
+    /// Readings that do not show a device's noise at rest.
+    #[error("{problem}")]
+    NotStatic {
+        /// What is wrong, and what would help.
+        problem: String,
+    },
     /// An effect that belongs to a recording, in the file of a live device.
     #[error(
         "{file}: `{effect}` is an effect of a recording's reference; a device has none: take it out here and use it with `simulate --reference --effects`"

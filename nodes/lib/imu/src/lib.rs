@@ -42,10 +42,12 @@
 //! # }
 //! ```
 
+pub mod allan;
 mod channel;
 mod device;
 pub mod effects;
 mod error;
+mod kalibr;
 mod low_pass_error;
 mod mount;
 mod noise;
@@ -75,14 +77,16 @@ pub use channel::{AXES, Channel, PerChannel, Reading};
 pub use cromosim_spatial::{Bandwidth, SampleVariance};
 pub use device::{Device, EMBEDDED_DEVICES};
 pub use effects::{
-    DeclaredNoise, Dependence, Dropouts, Effect, EffectKind, EffectSet, EffectSpec, EffectsFile,
-    FirstGuess, FittedSearch, GravityMode, GridTrace, Identifiability, MeasurementInput, Ordinary,
-    OtherSession, Owner, ParameterFit, ParameterSpec, PlacementEffects, ReadOff, ReadOffSearch,
-    ResidualView, Rounding, Search, SensorModel, Shape, SpectralLine, Stage, StagedReadings,
-    StreamingEffects, UnexplainedErrors, Wave, clipping_limit, lattice_spacing, length_factors,
-    nearest_signed_permutation, strongest_line, unit_factors, white_noise_density,
+    DeclaredNoise, Dependence, DrawnBiases, Dropouts, Effect, EffectKind, EffectSet, EffectSpec,
+    EffectsFile, FirstGuess, FittedSearch, GravityMode, GridTrace, Identifiability,
+    MeasurementInput, Ordinary, OtherSession, Owner, ParameterFit, ParameterSpec, PlacementEffects,
+    ReadOff, ReadOffSearch, ResidualView, Rounding, Search, SensorModel, Shape, SpectralLine,
+    Stage, StagedReadings, StreamingEffects, UnexplainedErrors, Wave, clipping_limit,
+    lattice_spacing, length_factors, nearest_signed_permutation, strongest_line, unit_factors,
+    white_noise_density,
 };
 pub use error::{EffectError, ImuError, PlacementProblem};
+pub use kalibr::KalibrNoise;
 pub use mount::{MountedSensor, MountedSensors, SensorPose, point_oddity};
 pub use noise::{Covariances, NoiseSource};
 pub use placement::{Follow, MAX_RATE_HZ, Placement, SiteChoice};

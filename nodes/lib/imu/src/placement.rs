@@ -127,6 +127,15 @@ impl Placement {
         Self { mount, ..self }
     }
 
+    /// The same placement with another device, see [`crate::Device::resolve`].
+    #[must_use]
+    pub fn with_device(self, device: &str) -> Self {
+        Self {
+            device: Some(device.to_owned()),
+            ..self
+        }
+    }
+
     /// The same placement by another scheme.
     #[must_use]
     pub fn with_scheme(self, scheme: Scheme) -> Self {

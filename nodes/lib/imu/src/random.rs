@@ -20,6 +20,9 @@ pub(crate) fn uniform(random: &mut ChaCha12Rng) -> f64 {
 
 /// The stream of lost samples; 0 to 2 are the channels of [`crate::NoiseSource`].
 pub(crate) const DROPOUT_CHANNEL: u64 = 3;
+/// The first stream of [`crate::effects::DrawnBiases`]: turn-on bias, instability and walk, of two
+/// channels each.
+pub(crate) const DRAWN_BIAS_CHANNEL: u64 = 4;
 
 /// A key of 32 bytes: seed, two hashes of the name, channel.
 pub(crate) fn stream(seed: u64, placement: &str, channel: u64) -> ChaCha12Rng {

@@ -3,6 +3,7 @@
 use cromosim_spatial::Stamp;
 use nalgebra::Vector3;
 
+use crate::effects::StatedBiases;
 use crate::{
     Channel, DeclaredNoise, Device, EffectSet, PerChannel, Reading, SampleVariance, SensorModel,
     UnexplainedErrors,
@@ -12,9 +13,12 @@ use crate::{
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StatedErrors {
     /// Variances per sample and axis of what is the device's own, in the units that it reports: its
-    /// white noise, its rounding (step^2 / 12), and what stays unexplained.
+    /// white noise, its rounding (step^2 / 12), the spread of its turn-on bias and bias instability, and
+    /// what stays unexplained.
     pub own: PerChannel<f64>,
     unexplained: UnexplainedErrors,
+    /// What the walk of its biases adds per second, SI units squared.
+    walk: PerChannel<f64>,
     units: PerChannel<f64>,
 }
 
@@ -27,6 +31,7 @@ impl StatedErrors {
         rate_hz: f64,
     ) -> Self {
         let noise = SensorModel::new(effects, Stamp::default()).total_noise(declared);
+        let biases = StatedBiases::new(effects);
         let units = PerChannel::from_fn(|channel| effects.unit_factor(channel));
         let own = PerChannel::from_fn(|channel| {
             let density = match channel {
@@ -34,12 +39,16 @@ impl StatedErrors {
                 Channel::Gyroscope => noise.gyro_density,
             };
             let rounding = effects.lsb(channel).powi(2) / 12.0;
-            let si = density.powi(2) * rate_hz + rounding + unexplained.variance[channel];
+            let si = density.powi(2) * rate_hz
+                + rounding
+                + biases.steady[channel]
+                + unexplained.variance[channel];
             si * units[channel].powi(2)
         });
         Self {
             own,
             unexplained,
+            walk: biases.per_second,
             units,
         }
     }
@@ -51,14 +60,17 @@ impl StatedErrors {
     }
 
     /// What errors of the poses leave (`variance`, in SI units), motion that they cover included, in the
-    /// units that the device reports.
-    pub fn of_motion(&self, variance: SampleVariance) -> SampleVariance {
+    /// units that the device reports; with what its biases have walked in so many seconds.
+    pub fn of_motion(&self, variance: SampleVariance, walked_s: f64) -> SampleVariance {
         let factor = PerChannel::from_fn(|channel| {
             (1.0 + self.unexplained.reference_excess[channel]) * self.units[channel].powi(2)
         });
+        let walked = |channel| walked_s * self.walk[channel] * self.units[channel].powi(2);
         SampleVariance {
-            acceleration: variance.acceleration * factor.accelerometer,
-            angular_velocity: variance.angular_velocity * factor.gyroscope,
+            acceleration: variance.acceleration * factor.accelerometer
+                + walked(Channel::Accelerometer),
+            angular_velocity: variance.angular_velocity * factor.gyroscope
+                + walked(Channel::Gyroscope),
             ..variance
         }
     }

@@ -13,7 +13,7 @@ use nalgebra::UnitQuaternion;
 
 use crate::stated_errors::{StatedErrors, with_clock_errors};
 use crate::{
-    Covariances, Device, Dropouts, EffectKind, ImuError, ImuSample, KinematicSample,
+    Covariances, Device, DrawnBiases, Dropouts, EffectKind, ImuError, ImuSample, KinematicSample,
     MeasurementInput, NoiseSource, PlacementEffects, Reading, SampleVariance, SensorModel,
     StreamingEffects,
 };
@@ -46,7 +46,7 @@ pub struct ImuOptions {
     /// The name that the random numbers depend on: the placement's, after the body's where there
     /// are several.
     pub name: String,
-    /// The random part of the errors: white noise and lost samples. Without it biases and all other
+    /// The random part of the errors: white noise, drawn biases, lost samples. Without it biases and all other
     /// effects stay.
     pub noise: bool,
     /// `header.frame_id` of the messages.
@@ -103,7 +103,9 @@ impl VirtualImu {
     /// The messages of a sample; `None` where the device loses it.
     pub fn measure(&mut self, motion: &KinematicSample) -> Option<ImuMessages> {
         let sample = self.effects.step(motion)?;
-        let variance = self.stated.of_motion(motion.variance);
+        let variance = self
+            .stated
+            .of_motion(motion.variance, self.effects.walked_seconds());
         Some(self.output.messages(sample, &variance))
     }
 
@@ -169,10 +171,19 @@ pub fn measure_recording(
     let declared = effects.declared_noise;
     let model = SensorModel::new(&effects.effects, effects.epoch);
     let mut source = NoiseSource::white(&model.total_noise(&declared), 0.0, rate_hz, seed, &name)?;
+    let mut biases = noise
+        .then(|| DrawnBiases::new(&effects.effects, seed, &name))
+        .flatten();
+    let walks = biases.is_some();
     let input = MeasurementInput::Motion(motion.track);
     let readings = model.measure(input, motion.stamps, |readings| {
         if noise {
             source.add_to(readings);
+        }
+        for (reading, stamp) in readings.iter_mut().zip(motion.stamps) {
+            biases
+                .iter_mut()
+                .for_each(|own| own.add_to(reading, *stamp));
         }
     });
     let losses = effects.effects.get(EffectKind::DroppedSamples);
@@ -189,7 +200,12 @@ pub fn measure_recording(
     let message = |(k, variance): (usize, &SampleVariance)| {
         let (stamp, reading) = (&motion.stamps[k], &readings[k]);
         let late = effects.effects.clock_uncertainty(*stamp - effects.epoch);
-        let variance = stated.of_motion(*variance);
+        let walked = if walks {
+            *stamp - motion.stamps[0]
+        } else {
+            0.0
+        };
+        let variance = stated.of_motion(*variance, walked);
         let variance = &with_clock_errors(variance, late, k, motion.stamps, &readings);
         let lost = dropouts.as_mut().is_some_and(Dropouts::next_is_lost);
         let sample = ImuSample {

@@ -96,7 +96,7 @@ fn a_device_states_live_what_it_states_offline() {
         angular_velocity: 1e-4,
         orientation: 0.0,
     };
-    let stated = StatedErrors::of_device(&device(rest), 100.0).of_motion(of_poses);
+    let stated = StatedErrors::of_device(&device(rest), 100.0).of_motion(of_poses, 0.0);
     assert!((stated.acceleration - 0.04 * 1.5 * 0.01).abs() < 1e-15);
     assert_eq!(stated.angular_velocity, 1e-4);
     let refused = Device::parse(

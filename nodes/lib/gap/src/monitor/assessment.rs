@@ -60,7 +60,7 @@ impl Tried {
         let spec = self.effect.spec();
         let values = match spec.search {
             Search::Choice => 1,
-            Search::Fitted(_) | Search::ReadOff(_) => spec.value_count(),
+            Search::Fitted(_) | Search::ReadOff(_) | Search::Given => spec.value_count(),
         };
         self.share - VALUE_COST * values as f64
     }

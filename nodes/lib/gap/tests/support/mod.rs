@@ -34,10 +34,18 @@ const MARGIN_S: f64 = 4.0;
 const TODAY: Stamp = Stamp::from_nanos(1_700_000_000_123_456_789);
 
 /// Effects that came later than the others' tests.
-const LATER: [EffectKind; 3] = [
+const LATER: [EffectKind; 11] = [
     EffectKind::ReferenceInterpolation,
     EffectKind::ReferenceUnits,
     EffectKind::ChannelDelay,
+    EffectKind::AccelTurnOnBias,
+    EffectKind::GyroTurnOnBias,
+    EffectKind::AccelBiasInstability,
+    EffectKind::GyroBiasInstability,
+    EffectKind::AccelBiasWalk,
+    EffectKind::GyroBiasWalk,
+    EffectKind::AccelLowPass,
+    EffectKind::GyroLowPass,
 ];
 
 /// Seed of the scene in which an effect is tested: a new effect gives the others no other motions.

@@ -5,7 +5,7 @@ use super::{Effect, EffectKind, EffectSet, FirstGuess, Search, Shape, Stage};
 use crate::EffectError;
 
 /// The contract's table, in its order.
-const NAMES: [&str; 35] = [
+const NAMES: [&str; 43] = [
     "reference_noise",
     "reference_smoothing",
     "reference_interpolation",
@@ -30,11 +30,19 @@ const NAMES: [&str; 35] = [
     "gyro_noise",
     "accel_bias_drift",
     "gyro_bias_drift",
+    "accel_turn_on_bias",
+    "gyro_turn_on_bias",
+    "accel_bias_instability",
+    "gyro_bias_instability",
+    "accel_bias_walk",
+    "gyro_bias_walk",
     "accel_saturation",
     "gyro_saturation",
     "accel_quantization",
     "gyro_quantization",
     "low_pass",
+    "accel_low_pass",
+    "gyro_low_pass",
     "gyro_g_sensitivity",
     "vibration",
     "axis_convention",
@@ -119,7 +127,7 @@ fn what_the_search_reads_of_an_effect_fits_its_values() {
                     assert_eq!((spec.value_count(), base.spec().value_count()), (4, 3));
                 }
             }
-            Search::Choice => assert_eq!(free, 0, "{kind}"),
+            Search::Choice | Search::Given => assert_eq!(free, 0, "{kind}"),
             Search::ReadOff(search) => {
                 assert_eq!(free, 0, "{kind}");
                 assert_eq!(EffectKind::read_off(search.from), Some(kind));

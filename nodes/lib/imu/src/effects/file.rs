@@ -273,7 +273,7 @@ impl EffectsFile {
                 }
             );
             write_effects(&mut text, "      ", &placement.effects);
-            write_unexplained(&mut text, &placement.unexplained);
+            write_unexplained(&mut text, "    ", &placement.unexplained);
             write_sessions(&mut text, &placement.other_sessions);
         }
         text
@@ -281,7 +281,7 @@ impl EffectsFile {
 }
 
 /// Nothing where all is explained; of the two kinds those that are there.
-fn write_unexplained(text: &mut String, rest: &UnexplainedErrors) {
+pub(crate) fn write_unexplained(text: &mut String, indent: &str, rest: &UnexplainedErrors) {
     let kinds = [
         ("variance", rest.variance),
         ("reference_excess", rest.reference_excess),
@@ -296,7 +296,7 @@ fn write_unexplained(text: &mut String, rest: &UnexplainedErrors) {
         })
         .collect();
     if !fields.is_empty() {
-        let _ = writeln!(text, "    unexplained: {{{}}}", fields.join(", "));
+        let _ = writeln!(text, "{indent}unexplained: {{{}}}", fields.join(", "));
     }
 }
 
@@ -320,7 +320,7 @@ fn write_sessions(text: &mut String, sessions: &[OtherSession]) {
     }
 }
 
-fn write_effects(text: &mut String, indent: &str, effects: &EffectSet) {
+pub(crate) fn write_effects(text: &mut String, indent: &str, effects: &EffectSet) {
     for effect in effects {
         let _ = writeln!(text, "{indent}- {}", flow(effect));
     }
@@ -368,7 +368,7 @@ fn flow(effect: &Effect) -> String {
 
 /// The shortest digits that read back as the same number, with a point and a signed exponent, as
 /// YAML 1.1 asks for too.
-fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     let text = format!("{value:?}");
     let Some((mantissa, exponent)) = text.split_once('e') else {
         return text;

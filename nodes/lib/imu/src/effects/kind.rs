@@ -53,6 +53,18 @@ macro_rules! with_effects {
             AccelBiasDrift => bias_drift::ACCEL,
             /// Gyroscope bias that grows with time.
             GyroBiasDrift => bias_drift::GYRO,
+            /// Accelerometer bias that is another each run.
+            AccelTurnOnBias => turn_on_bias::ACCEL,
+            /// Gyroscope bias that is another each run.
+            GyroTurnOnBias => turn_on_bias::GYRO,
+            /// Accelerometer bias that wanders about its mean.
+            AccelBiasInstability => bias_instability::ACCEL,
+            /// Gyroscope bias that wanders about its mean.
+            GyroBiasInstability => bias_instability::GYRO,
+            /// Accelerometer bias that walks away at random.
+            AccelBiasWalk => bias_walk::ACCEL,
+            /// Gyroscope bias that walks away at random.
+            GyroBiasWalk => bias_walk::GYRO,
             /// Range of the accelerometer.
             AccelSaturation => saturation::ACCEL,
             /// Range of the gyroscope.
@@ -63,6 +75,10 @@ macro_rules! with_effects {
             GyroQuantization => quantization::GYRO,
             /// The device's own low-pass.
             LowPass => low_pass::SPEC,
+            /// The accelerometer's own low-pass.
+            AccelLowPass => channel_low_pass::ACCEL,
+            /// The gyroscope's own low-pass.
+            GyroLowPass => channel_low_pass::GYRO,
             /// Gyroscope that feels specific force.
             GyroGSensitivity => gyro_g_sensitivity::SPEC,
             /// A vibration at the sensor.

@@ -10,11 +10,11 @@
 //! Sensor   f, w <- M R_mount^T f, M R_mount^T w                      mount_rotation, mount_slip, axis_convention
 //!          f, w += amplitude sin(2 pi hz (t - t0) + phase)           vibration
 //!          w += G f                                                  gyro_g_sensitivity
-//!          second-order Butterworth, both channels                   low_pass
+//!          second-order Butterworth                                  low_pass of both channels, or accel_low_pass, gyro_low_pass
 //! Timing   w(t) <- w(t - seconds)                                    channel_delay
 //!          stamp = t0 + (t - t0) (1 + ppm 1e-6) + seconds            clock_drift, time_offset; dropped_samples
 //! Linear   x <- diag(scale) (I + upper) x + bias + rate (t - t0)     scale, misalignment, bias, bias_drift
-//! Digital  white noise, clip, round, times factor                    noise, saturation, quantization, units
+//! Digital  x += drawn biases + white noise, clip, round, times factor  turn_on_bias, bias_instability, bias_walk, noise; saturation, quantization, units
 //! ```
 //! [`SensorModel`] runs them over a whole recording, [`crate::StreamingEffects`] over live samples.
 //! A recording adds the vibration with the timing, in closed form and as the low-pass leaves it, so
@@ -25,9 +25,13 @@
 mod axis_convention;
 mod bias;
 mod bias_drift;
+mod bias_instability;
+mod bias_walk;
 mod catalogue;
 mod channel_delay;
+mod channel_low_pass;
 mod clock_drift;
+mod drawn_biases;
 mod dropped_samples;
 mod effect;
 mod file;
@@ -64,6 +68,7 @@ mod stages;
 mod streaming;
 mod time_offset;
 mod tissue;
+mod turn_on_bias;
 mod units;
 mod vibration;
 mod wave;
@@ -77,10 +82,12 @@ mod start_tests;
 
 pub use crate::channel::Reading;
 pub use axis_convention::nearest_signed_permutation;
+pub use drawn_biases::DrawnBiases;
+pub(crate) use drawn_biases::StatedBiases;
 pub use dropped_samples::Dropouts;
 pub use effect::{Effect, EffectSet};
-pub(crate) use file::RawUnexplained;
 pub use file::{DeclaredNoise, EffectsFile, OtherSession, PlacementEffects, UnexplainedErrors};
+pub(crate) use file::{RawUnexplained, number, write_effects, write_unexplained};
 pub use gravity_convention::GravityMode;
 pub use kind::EffectKind;
 pub use model::{GridTrace, SensorModel};

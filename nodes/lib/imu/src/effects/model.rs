@@ -14,7 +14,7 @@ use super::{
     DeclaredNoise, Effect, EffectKind, EffectSet, Reading, gravity_convention, lever_arm, low_pass,
     mount_rotation, mount_slip, reference_tilt, sampling,
 };
-use crate::{Channel, GRAVITY_IN_WORLD};
+use crate::{Channel, GRAVITY_IN_WORLD, PerChannel};
 
 /// Both channels on a uniform grid of true time.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -47,7 +47,7 @@ pub struct SensorModel {
     pub(super) slip: Option<(f64, Matrix3<f64>)>,
     /// G.
     pub(super) coupling: Option<Matrix3<f64>>,
-    pub(super) low_pass: Option<SecondOrder>,
+    pub(super) low_pass: PerChannel<Option<SecondOrder>>,
     pub(super) vibration: Option<SpectralLine>,
     pub(super) clock: Clock,
     /// Of the gyroscope against the accelerometer, s.
@@ -94,9 +94,14 @@ impl SensorModel {
             sensor_from_segment,
             slip: effects.get(Kind::MountSlip).map(slipped),
             coupling: effects.get(Kind::GyroGSensitivity).map(Effect::matrix),
-            low_pass: effects
-                .get(Kind::LowPass)
-                .and_then(|effect| filter(effect, low_pass::DAMPING_RATIO)),
+            low_pass: PerChannel::from_fn(|channel| {
+                let own = match channel {
+                    Channel::Accelerometer => Kind::AccelLowPass,
+                    Channel::Gyroscope => Kind::GyroLowPass,
+                };
+                let effect = effects.get(own).or_else(|| effects.get(Kind::LowPass))?;
+                filter(effect, low_pass::DAMPING_RATIO)
+            }),
             vibration: effects.get(Kind::Vibration).and_then(Effect::spectral_line),
             clock: Clock {
                 offset: scalar(Kind::TimeOffset).unwrap_or(0.0),
@@ -177,8 +182,10 @@ impl SensorModel {
                     (turned.specific_force, turned.angular_velocity);
             }
         }
-        if let Some(filter) = &self.low_pass {
+        if let Some(filter) = &self.low_pass.accelerometer {
             filter.apply(&mut trace.specific_force, trace.rate_hz);
+        }
+        if let Some(filter) = &self.low_pass.gyroscope {
             filter.apply(&mut trace.angular_velocity, trace.rate_hz);
         }
         trace
@@ -212,9 +219,10 @@ impl SensorModel {
     /// [`SensorModel::sensor`]. Before and after the grid its ends are held.
     pub(super) fn sample(&self, trace: &GridTrace, stamps: &[Stamp]) -> Vec<Reading> {
         let start = trace.start - self.epoch;
-        let vibration = self.vibration.map(|line| match &self.low_pass {
-            Some(filter) => line.filtered(low_pass::response(filter.natural_hz, line.hz)),
-            None => line,
+        let vibration = self.vibration.map(|line| {
+            line.filtered(PerChannel::from_fn(|channel| {
+                self.low_pass[channel].map(|filter| low_pass::response(filter.natural_hz, line.hz))
+            }))
         });
         let slip = self
             .slip
@@ -315,7 +323,7 @@ struct Slip {
     before: Matrix3<f64>,
     after: Matrix3<f64>,
     /// Low-passed reading at the slip in segment axes, and its derivative per second.
-    memory: Option<(SecondOrder, Reading, Reading)>,
+    memory: Option<(PerChannel<Option<SecondOrder>>, Reading, Reading)>,
 }
 
 impl Slip {
@@ -332,9 +340,13 @@ impl Slip {
             specific_force: sample(&trace.specific_force, position) * factor,
             angular_velocity: sample(&trace.angular_velocity, position) * factor,
         };
-        let memory = model.low_pass.map(|filter| {
+        let filters = model.low_pass;
+        let is_filtered = Channel::ALL
+            .iter()
+            .any(|channel| filters[*channel].is_some());
+        let memory = is_filtered.then(|| {
             (
-                filter,
+                filters,
                 of(sampling::interpolate, 1.0),
                 of(sampling::derivative, trace.rate_hz),
             )
@@ -352,22 +364,21 @@ impl Slip {
             return model.turned(Some(&self.before), reading);
         }
         let mut turned = model.turned(Some(&self.after), reading);
-        if let Some((filter, value, derivative)) = &self.memory {
+        if let Some((filters, value, derivative)) = &self.memory {
             let since = seconds - self.at;
-            // Ten time constants later nothing is left.
-            if since * TAU * filter.natural_hz < 60.0 {
-                let decay = Reading {
-                    specific_force: filter.homogeneous(
-                        since,
-                        &value.specific_force,
-                        &derivative.specific_force,
-                    ),
-                    angular_velocity: filter.homogeneous(
-                        since,
-                        &value.angular_velocity,
-                        &derivative.angular_velocity,
-                    ),
-                };
+            let mut decay = Reading::default();
+            let mut is_left = false;
+            for channel in Channel::ALL {
+                // Ten time constants later nothing is left.
+                if let Some(filter) = &filters[channel]
+                    && since * TAU * filter.natural_hz < 60.0
+                {
+                    is_left = true;
+                    decay[channel] =
+                        filter.homogeneous(since, &value[channel], &derivative[channel]);
+                }
+            }
+            if is_left {
                 let (old, new) = (
                     model.turned(Some(&self.before), &decay),
                     model.turned(Some(&self.after), &decay),

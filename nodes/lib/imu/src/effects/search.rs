@@ -13,6 +13,9 @@ pub enum Search {
     Choice,
     /// Read off what is recorded, in closed form.
     ReadOff(ReadOffSearch),
+    /// Not at all: device files state it, and what shows of it in one recording has a name of its
+    /// own.
+    Given,
 }
 
 /// What the search for the smallest set of effects needs to know of a fitted effect.

@@ -55,7 +55,7 @@ impl Case {
                 FirstGuess::FromResidual(guess) => Some(guess(&view)),
                 FirstGuess::Neutral | FirstGuess::ChangeOf(_) => None,
             },
-            Search::Choice | Search::ReadOff(_) => None,
+            Search::Choice | Search::ReadOff(_) | Search::Given => None,
         }
     }
 

@@ -4,6 +4,7 @@ use cromosim_spatial::Stamp;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use super::channel_delay::DelayLine;
+use super::drawn_biases::DrawnBiases;
 use super::dropped_samples::Dropouts;
 use super::filter::Streamed;
 use super::tissue::{StreamedTissue, Turning};
@@ -23,9 +24,10 @@ pub struct StreamingEffects {
     /// None before the first sample.
     model: Option<SensorModel>,
     noise: Option<NoiseSource>,
+    biases: Option<DrawnBiases>,
     dropouts: Option<Dropouts>,
     tissue: Option<StreamedTissue>,
-    low_pass: Option<PerChannel<Streamed>>,
+    low_pass: PerChannel<Option<Streamed>>,
     /// Of the gyroscope.
     delay: Option<DelayLine>,
     /// Stamp and angular velocity (segment axes) of the sample before.
@@ -56,33 +58,38 @@ impl StreamingEffects {
                 seed,
                 placement,
             )?),
+            biases: DrawnBiases::new(device.effects(), seed, placement),
             dropouts: Dropouts::new(
                 device.effects().get(EffectKind::DroppedSamples),
                 seed,
                 placement,
             ),
             tissue: model.tissue.map(StreamedTissue::new),
-            low_pass: model
-                .low_pass
-                .map(|filter| PerChannel::from_fn(|_| Streamed::new(filter))),
+            low_pass: PerChannel::from_fn(|channel| model.low_pass[channel].map(Streamed::new)),
             delay: (model.channel_delay != 0.0).then(|| DelayLine::new(model.channel_delay)),
             model: None,
             previous: None,
         })
     }
 
-    /// Without the random part: no noise, no losses.
+    /// Without the random part: no noise, no drawn biases, no losses.
     #[must_use]
     pub fn without_noise(self) -> Self {
         Self {
             noise: None,
+            biases: None,
             dropouts: None,
             ..self
         }
     }
 
+    /// For how long biases have walked by now, s; 0 where nothing is drawn.
+    pub(crate) fn walked_seconds(&self) -> f64 {
+        self.biases.as_ref().map_or(0.0, DrawnBiases::seconds)
+    }
+
     /// Begins anew with the next sample, which is the new epoch: for sources that jump back in
-    /// time. Noise and losses go on.
+    /// time. Noise, drawn biases and losses go on.
     pub fn reset(&mut self) {
         self.model = None;
         self.forget();
@@ -93,10 +100,8 @@ impl StreamingEffects {
         self.previous = None;
         self.tissue.iter_mut().for_each(StreamedTissue::reset);
         self.delay.iter_mut().for_each(DelayLine::reset);
-        if let Some(filters) = &mut self.low_pass {
-            Channel::ALL
-                .into_iter()
-                .for_each(|channel| filters[channel].reset());
+        for channel in Channel::ALL {
+            self.low_pass[channel].iter_mut().for_each(Streamed::reset);
         }
     }
 
@@ -153,6 +158,9 @@ impl StreamingEffects {
                 }
                 Stage::Linear => reading = model.linear_reading(&reading, seconds),
                 Stage::Digital => {
+                    if let Some(biases) = &mut self.biases {
+                        biases.add_to(&mut reading, stamp);
+                    }
                     if let Some(noise) = &mut self.noise {
                         noise.add_to(std::slice::from_mut(&mut reading));
                         world_from_sensor *= noise.draw_turn();
@@ -180,9 +188,9 @@ impl StreamingEffects {
         if let Some(line) = &model.vibration {
             model.shake(line, reading, seconds);
         }
-        if let Some(filters) = &mut self.low_pass {
-            for channel in Channel::ALL {
-                reading[channel] = filters[channel].push(reading[channel], interval);
+        for channel in Channel::ALL {
+            if let Some(filter) = &mut self.low_pass[channel] {
+                reading[channel] = filter.push(reading[channel], interval);
             }
         }
     }

@@ -97,10 +97,14 @@ impl SpectralLine {
         self.waves[channel].power()
     }
 
-    /// What a filter of this gain and phase leaves of it.
-    pub(super) fn filtered(self, (gain, phase): (f64, f64)) -> Self {
+    /// What each channel's filter, of this gain and phase, leaves of it.
+    pub(super) fn filtered(self, responses: PerChannel<Option<(f64, f64)>>) -> Self {
+        let left = |channel| match responses[channel] {
+            Some((gain, phase)) => self.waves[channel].filtered(gain, phase),
+            None => self.waves[channel],
+        };
         Self {
-            waves: PerChannel::from_fn(|channel| self.waves[channel].filtered(gain, phase)),
+            waves: PerChannel::from_fn(left),
             ..self
         }
     }
