@@ -30,11 +30,16 @@ const WITH_BODY: [&str; 10] = [
     "inspect",
     "body export",
 ];
-const WITHOUT_BODY: [&str; 6] = [
+const WITHOUT_BODY: [&str; 11] = [
     "compare",
     "map",
     "bag recover",
     "bag csv",
+    "device from-allan",
+    "device from-kalibr",
+    "device to-kalibr",
+    "device from-diagnosis",
+    "device show",
     "completion",
     "node",
 ];

@@ -202,9 +202,8 @@ fn options_of_another_mode_of_simulate() {
         }
     }
     let motions = ["simulate", "--out", "out.mcap"];
-    let cases: [(&[&str], &[&str], &str); 10] = [
+    let cases: [(&[&str], &[&str], &str); 9] = [
         (&motions, &["--placement", "wrist"], "not with motion files"),
-        (&motions, &["--device", "d.yaml"], "not with motion files"),
         (&motions, &["--effects", "e.yaml"], "not with motion files"),
         (
             &reference,

@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use anyhow::bail;
+use anyhow::{Context, bail};
 use cromosim_recording::{is_in_the_way, write_file_with};
 
 use crate::progress::Interrupt;
@@ -34,6 +34,14 @@ pub fn write_whole<V>(
         })?;
         interrupt.check()?;
         Ok(written)
+    })
+}
+
+/// A text as a whole file.
+pub fn write_text(path: &Path, force: bool, text: &str) -> anyhow::Result<()> {
+    write_whole(path, force, |file| {
+        file.write_all(text.as_bytes())
+            .with_context(|| format!("{}: cannot be written", path.display()))
     })
 }
 

@@ -14,6 +14,8 @@ mod body;
 mod compare;
 mod convert;
 mod demo;
+mod device;
+mod device_allan;
 mod diagnose;
 mod diagnose_recordings;
 #[cfg(feature = "view")]
@@ -92,6 +94,11 @@ enum Command {
         #[command(subcommand)]
         command: body::Command,
     },
+    /// Work on devices: show them, make them of a recording at rest, Kalibr or a diagnosis
+    Device {
+        #[command(subcommand)]
+        command: device::Command,
+    },
     /// List names: sites, effects, schemes, devices, models, nodes
     List {
         #[command(subcommand)]
@@ -146,6 +153,7 @@ fn main() -> ExitCode {
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Bag { command } => bag::run(&command),
         Command::Body { command } => body::run(&command),
+        Command::Device { command } => device::run(&command),
         Command::List { command } => list::run(&command),
         Command::Node(arguments) => node::run(&arguments),
         Command::Completion { shell, out, force } => completion(shell, out, force),

@@ -6,9 +6,7 @@ use std::path::Path;
 use anyhow::bail;
 use cromosim_bag::{BagOptions, BagSummary, BagWriter, Compression};
 use cromosim_body::BodyModel;
-use cromosim_imu::{
-    Device, EffectsFile, Placement, PlacementEffects, Scheme, TextureSegment, UnexplainedErrors,
-};
+use cromosim_imu::{Device, EffectsFile, Placement, PlacementEffects, Scheme, TextureSegment};
 use cromosim_learned::{LearnedSimulator, scheme_for_networks};
 use cromosim_recording::rigid::{RigidContent, parse_rigid};
 use cromosim_recording::{
@@ -86,7 +84,7 @@ pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()>
             epoch: recorded[0].span().0,
             declared_noise: device.declared_noise(),
             effects: device.effects().clone(),
-            unexplained: UnexplainedErrors::default(),
+            unexplained: device.unexplained(),
             other_sessions: Vec::new(),
         };
         effects.placements.insert(name.to_owned(), of_device);

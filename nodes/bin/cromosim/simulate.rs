@@ -110,7 +110,14 @@ impl Setup {
             None if arguments.placement.is_empty() => PlacementSet::demo(),
             None => PlacementSet::at_sites(&arguments.placement, "--placement")?,
         };
-        let folder = file.and_then(Path::parent).unwrap_or(Path::new("."));
+        let placements = match &arguments.device {
+            Some(device) => placements.map(|placement| placement.with_device(device)),
+            None => placements,
+        };
+        let folder = match arguments.device {
+            Some(_) => Path::new("."),
+            None => file.and_then(Path::parent).unwrap_or(Path::new(".")),
+        };
         let options = SimulationOptions {
             rate_hz: arguments.rate,
             differentiation: arguments.differentiation()?,

@@ -42,9 +42,9 @@ pub struct Arguments {
     /// /imu/NAME/data_raw [default: body]
     #[arg(long, value_name = "NAME=SITE", help_heading = SENSORS)]
     pub placement: Vec<String>,
-    /// With --rigid: a device's name or file; default: an ideal sensor
+    /// A device's name or file, whose noise and effects are what errs
     ///
-    /// Its noise and effects are what errs
+    /// Default: the placements' own, with --rigid an ideal sensor. `cromosim device show` lists the built-in ones
     #[arg(
         long,
         value_name = "DEVICE",
@@ -328,7 +328,6 @@ impl Arguments {
     /// The options that were given and that not every mode takes, with the modes that do.
     fn given(&self) -> anyhow::Result<Vec<(&'static str, &'static [&'static str])>> {
         const MOTION_FILES: &[&str] = &["motion files"];
-        const RIGID_BODIES: &[&str] = &["--rigid"];
         const OF_REFERENCE: &[&str] = &["--reference"];
         const RECORDINGS: &[&str] = &["--reference", "--rigid"];
         const NOT_REFERENCE: &[&str] = &["motion files", "--rigid"];
@@ -348,7 +347,7 @@ impl Arguments {
             ),
             (!self.placement.is_empty(), "--placement", NOT_REFERENCE),
             (self.namespace.is_some(), "--namespace", OF_REFERENCE),
-            (self.device.is_some(), "--device", RIGID_BODIES),
+            (self.device.is_some(), "--device", NOT_REFERENCE),
             (self.effects.is_some(), "--effects", RECORDINGS),
             (self.trim != AUTO, "--trim", NOT_REFERENCE),
             (self.texture.is_some(), "--texture", NOT_REFERENCE),

@@ -59,7 +59,7 @@ pub use bars::{Bar, BarChart, Group};
 pub use error::ChartsError;
 pub use frame::Level;
 pub use lines::{Line, LineChart, Point};
-pub use page::{Block, Chart, Page, Section, document, write_panels};
+pub use page::{Block, Chart, Page, Section, document, standalone, write_panels};
 pub use panel::{Panel, Series};
 #[cfg(feature = "png")]
 pub use png::png;

@@ -68,6 +68,8 @@ pub struct LineChart {
     pub y_label: String,
     /// Whether the lower axis is logarithmic; points at 0 and below are left out then.
     pub logarithmic_x: bool,
+    /// Whether the axis at the left is logarithmic; values at 0 and below are not drawn then.
+    pub logarithmic_y: bool,
     /// In the order of the legend.
     pub lines: Vec<Line>,
     /// A dashed line across.
@@ -158,7 +160,11 @@ impl LineChart {
             title: &self.title,
             width: WIDTH,
             plot_height: PLOT,
-            y: Axis::linear(ends.chain(self.level.as_ref().map(|level| level.value))),
+            y: if self.logarithmic_y {
+                Axis::logarithmic(ends, DECADES)
+            } else {
+                Axis::linear(ends.chain(self.level.as_ref().map(|level| level.value)))
+            },
             series,
             level: self.level.as_ref(),
             least_left: 0.0,
@@ -354,6 +360,7 @@ mod tests {
             x_label: "time, s".to_owned(),
             y_label: "m/s²".to_owned(),
             logarithmic_x: false,
+            logarithmic_y: false,
             lines: vec![
                 line("estimate", 3.0, false, |k| (k != 20).then_some(0.5)),
                 line("truth", 2.0, true, |_| None),

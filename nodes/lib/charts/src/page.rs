@@ -16,6 +16,12 @@ pub fn document(title: &str, further: &str, body: &str) -> String {
     )
 }
 
+/// An `svg` element of this crate as a file of its own, with its style.
+pub fn standalone(svg: &str) -> String {
+    let (tag, rest) = svg.split_once('>').unwrap_or((svg, ""));
+    format!("{tag}><style>\n{STYLE}{CHARTS}</style>{rest}\n")
+}
+
 /// Panels of curves, two in a row.
 pub fn write_panels(page: &mut String, panels: &[Panel]) {
     page.push_str("<div class=\"panels\">\n");

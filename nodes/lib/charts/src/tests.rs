@@ -105,6 +105,7 @@ fn curve(lines: usize) -> LineChart {
         x_label: "share of the training people, %".to_owned(),
         y_label: "macro F1, %".to_owned(),
         logarithmic_x: false,
+        logarithmic_y: false,
         lines: (0..lines).map(line).collect(),
         level: None,
     }

@@ -160,6 +160,7 @@ pub fn measure_recording(
     effects: &PlacementEffects,
     options: ImuOptions,
 ) -> Result<Vec<Imu>, ImuError> {
+    let (readings, walks) = noisy_readings(motion, effects, &options)?;
     let ImuOptions {
         rate_hz,
         seed,
@@ -169,23 +170,6 @@ pub fn measure_recording(
         mapping,
     } = options;
     let declared = effects.declared_noise;
-    let model = SensorModel::new(&effects.effects, effects.epoch);
-    let mut source = NoiseSource::white(&model.total_noise(&declared), 0.0, rate_hz, seed, &name)?;
-    let mut biases = noise
-        .then(|| DrawnBiases::new(&effects.effects, seed, &name))
-        .flatten();
-    let walks = biases.is_some();
-    let input = MeasurementInput::Motion(motion.track);
-    let readings = model.measure(input, motion.stamps, |readings| {
-        if noise {
-            source.add_to(readings);
-        }
-        for (reading, stamp) in readings.iter_mut().zip(motion.stamps) {
-            biases
-                .iter_mut()
-                .for_each(|own| own.add_to(reading, *stamp));
-        }
-    });
     let losses = effects.effects.get(EffectKind::DroppedSamples);
     let mut dropouts = (noise && !motion.stamps_are_recorded)
         .then(|| Dropouts::new(losses, seed, &name))
@@ -221,6 +205,33 @@ pub fn measure_recording(
         .zip(variances)
         .filter_map(message)
         .collect())
+}
+
+/// What the device reads, and whether biases walk in it.
+fn noisy_readings(
+    motion: RecordedMotion<'_>,
+    effects: &PlacementEffects,
+    options: &ImuOptions,
+) -> Result<(Vec<Reading>, bool), ImuError> {
+    let (seed, name) = (options.seed, options.name.as_str());
+    let model = SensorModel::new(&effects.effects, effects.epoch);
+    let white = model.total_noise(&effects.declared_noise);
+    let mut source = NoiseSource::white(&white, 0.0, options.rate_hz, seed, name)?;
+    let biases = DrawnBiases::new(&effects.effects, seed, name);
+    let mut biases = biases.filter(|_| options.noise);
+    let walks = biases.is_some();
+    let input = MeasurementInput::Motion(motion.track);
+    let readings = model.measure(input, motion.stamps, |readings| {
+        if options.noise {
+            source.add_to(readings);
+        }
+        if let Some(biases) = &mut biases {
+            for (reading, stamp) in readings.iter_mut().zip(motion.stamps) {
+                biases.add_to(reading, *stamp);
+            }
+        }
+    });
+    Ok((readings, walks))
 }
 
 impl Output {

@@ -37,6 +37,7 @@ mod reference_parts;
 mod resimulation;
 pub mod rigid;
 mod simulation;
+mod static_readings;
 mod trace;
 
 pub(crate) use bag_file::MCAP_MAGIC;
@@ -56,6 +57,7 @@ pub use resimulation::{
     write_resimulated,
 };
 pub use simulation::{Aside, Simulation, SimulationOptions, TextureOn};
+pub use static_readings::{StaticReadings, read_static};
 pub use trace::{
     PlacementTrace, activities_csv, first_stamp, seconds_to_first_stamp, write_traces,
 };

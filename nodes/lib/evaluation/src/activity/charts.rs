@@ -63,6 +63,7 @@ pub(super) fn curve_chart(results: &ActivityResults) -> LineChart {
         x_label: "training subjects, %".to_owned(),
         y_label: "macro F1, %".to_owned(),
         logarithmic_x: true,
+        logarithmic_y: false,
         lines: ["R2R", "R2R, turned", "Mix2R (chosen)"]
             .into_iter()
             .enumerate()

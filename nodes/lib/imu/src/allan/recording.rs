@@ -80,8 +80,8 @@ impl StaticNoise {
         })
     }
 
-    /// A device with this noise: what is white as declared noise, the rest as effects. Its biases are
-    /// not known from one position at rest, but the gyroscope's is its mean.
+    /// A device with this noise: what is white as declared noise, the rest as effects. Biases are left
+    /// out, as one run at rest does not tell how they differ from run to run.
     ///
     /// # Errors
     /// [`ImuError::NotStatic`] for noise beyond an effect's bounds.

@@ -120,6 +120,7 @@ impl PictureResults {
                 x_label: "time, s".to_owned(),
                 y_label: format!("norm of {quantity}, {unit}"),
                 logarithmic_x: false,
+                logarithmic_y: false,
                 lines: self.seen.iter().map(seen).chain([truth]).collect(),
                 level: None,
             };
