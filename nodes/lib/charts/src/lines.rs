@@ -129,8 +129,11 @@ impl LineChart {
             .drawn()
             .partition(|(number, _)| self.lines[*number].is_reference);
         for (number, line) in behind.into_iter().chain(before) {
-            let half = (self.lines.len() as f64 - 1.0) / 2.0;
-            let aside = if spread && half > 0.0 {
+            let beside = self.lines.iter().filter(|line| !line.is_reference).count();
+            let half = (beside as f64 - 1.0) / 2.0;
+            // What the others are to be like stands where it is.
+            let is_moved = spread && !self.lines[number].is_reference;
+            let aside = if is_moved && half > 0.0 {
                 (APART * half).min(ASIDE) * (number as f64 / half - 1.0)
             } else {
                 0.0
@@ -379,5 +382,65 @@ mod tests {
         // The last of each is the line; the first stands in the legend.
         let place = |class: &str| svg.rfind(&format!("<g class=\"{class}\">"));
         assert!(place("reference").is_some() && place("reference") < place("c0"));
+    }
+
+    #[test]
+    fn both_axes_may_be_logarithmic_and_a_reference_is_not_moved_aside() {
+        let of = |label: &str, factor: f64, is_reference: bool| Line {
+            label: label.to_owned(),
+            points: [0.1, 1.0, 10.0, 100.0]
+                .map(|x: f64| Point {
+                    x,
+                    y: factor / x.sqrt(),
+                    interval: (!is_reference).then_some((0.9 * factor / x.sqrt(), 1.1)),
+                })
+                .to_vec(),
+            is_reference,
+        };
+        let mut chart = LineChart {
+            title: "Allan deviation".to_owned(),
+            x_label: "s".to_owned(),
+            y_label: "m/s²".to_owned(),
+            logarithmic_x: true,
+            logarithmic_y: true,
+            lines: vec![
+                of("x", 1.0, false),
+                of("y", 1.0, false),
+                of("fit", 1.0, true),
+            ],
+            level: None,
+        };
+        let svg = crate::standalone(&chart.svg());
+        assert!(roxmltree::Document::parse(&svg).is_ok() && svg.contains("<style>"));
+        let path = |svg: &str, class: &str| -> Vec<(f64, f64)> {
+            let group = svg.rsplit(&format!("<g class=\"{class}\">")).next();
+            let group = group.and_then(|it| it.split("</g>").next()).unwrap_or("");
+            let path = group.split("class=\"stroke\" d=\"M").nth(1);
+            let path = path.and_then(|it| it.split('"').next()).unwrap_or("");
+            let point = |it: &str| {
+                let (x, y) = it.split_once(' ')?;
+                Some((x.parse().ok()?, y.parse().ok()?))
+            };
+            path.split('L').filter_map(point).collect()
+        };
+        // A power law is a straight line.
+        let line = path(&svg, "reference");
+        let rises: Vec<f64> = line.windows(2).map(|it| it[1].1 - it[0].1).collect();
+        assert_eq!(rises.len(), 3, "{line:?}");
+        assert!(
+            rises.iter().all(|rise| (rise - rises[0]).abs() < 0.2),
+            "{rises:?}"
+        );
+        let [x, y] = [path(&svg, "c0"), path(&svg, "c1")];
+        assert!(
+            (0.5 * (x[1].0 + y[1].0) - line[1].0).abs() < 0.2,
+            "{x:?} {line:?}"
+        );
+        chart.logarithmic_y = false;
+        let line = path(&chart.svg(), "reference");
+        assert!(
+            line[1].1 - line[0].1 > 2.0 * (line[2].1 - line[1].1),
+            "{line:?}"
+        );
     }
 }

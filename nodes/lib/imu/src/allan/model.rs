@@ -12,6 +12,9 @@ const DEVIANCE_PER_PARAMETER: f64 = 6.0;
 const Z: f64 = 1.96;
 /// Minimum of a flicker floor over the bias instability, `sqrt(2 ln 2 / pi)` (IEEE Std 952, C.1.3).
 const FLOOR: f64 = 0.664;
+/// Octaves of an overlapping curve share their noise: taken as independent, 123 of 150 intervals of 95 %
+/// held the truth of a generator. Variances are so many times what independent octaves would leave.
+const SHARED: f64 = 2.0;
 const STEPS: usize = 200;
 
 /// What makes up the slow and fast noise of a channel, in its SI unit (m/s2 or rad/s).
@@ -171,7 +174,7 @@ fn of_points(points: &[AllanPoint]) -> Option<NoiseFit> {
     let covariance = information(points, &values, &free).0.try_inverse()?;
     let mut intervals = [None; 4];
     for (place, &k) in free.iter().enumerate() {
-        let error = Z * covariance[(place, place)].max(0.0).sqrt();
+        let error = Z * (SHARED * covariance[(place, place)].max(0.0)).sqrt();
         let scale = if k == 2 { 1.0 } else { 0.5 };
         let at = |sign: f64| values[k].map_or(0.0, |log| (scale * (log + sign * error)).exp());
         intervals[k] = Some((at(-1.0), at(1.0)));

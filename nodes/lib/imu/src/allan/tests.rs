@@ -165,7 +165,9 @@ fn a_generators_coefficients_are_found_within_their_intervals() {
         }
     }
     println!("95 % intervals hold the truth in {within:?} of {all}");
-    assert!(within.iter().all(|held| *held >= 24), "{within:?} of {all}");
+    // 30 of 95 %: 28.5 +- 1.2 each, 142.5 +- 2.7 together.
+    assert!(within.iter().all(|held| *held >= 25), "{within:?} of {all}");
+    assert!(within.iter().sum::<usize>() >= 135, "{within:?} of {all}");
 }
 
 #[test]
