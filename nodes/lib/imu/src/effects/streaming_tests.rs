@@ -46,8 +46,46 @@ const MANY: &str = "- {effect: lever_arm, offset: [0.05, 0.0, -0.06]}
 
 #[test]
 fn live_readings_are_those_of_the_model() {
+    let (errors, stamps) = live_less_offline(MANY);
+    assert!(errors.0 < 0.05 && errors.1 < 0.005, "{errors:?}");
+    assert_eq!(stamps[400].nanos - START.nanos, 1_012_700_000);
+}
+
+#[test]
+fn each_channel_has_its_own_low_pass_live_and_offline() {
+    let filters =
+        |first: &str, second: &str| format!("- {{effect: {first}}}\n- {{effect: {second}}}\n");
+    let both = filters(
+        "accel_low_pass, cutoff_hz: 8.0",
+        "gyro_low_pass, cutoff_hz: 20.0",
+    );
+    let (errors, _) = live_less_offline(&both);
+    assert!(errors.0 < 0.05 && errors.1 < 0.005, "{errors:?}");
+    // One that is named takes the place of the common one, which the other channel keeps.
     let motion = samples(&trajectory(wrist, 240.0, 3.0));
-    let device = device(MANY);
+    let common = filters(
+        "low_pass, cutoff_hz: 20.0",
+        "accel_low_pass, cutoff_hz: 8.0",
+    );
+    let [own, common] = [both, common].map(|effects| readings(&device(&effects), &motion));
+    assert_eq!(own, common);
+    let neither = readings(
+        &device("- {effect: accel_bias, bias: [0.0, 0.0, 0.0]}\n"),
+        &motion,
+    );
+    let apart = |of: fn(&ImuSample) -> Vector3<f64>| {
+        let pairs = own.iter().zip(&neither);
+        pairs
+            .map(|(a, b)| (of(a) - of(b)).norm())
+            .fold(0.0, f64::max)
+    };
+    assert!(apart(|it| it.specific_force) > 1.0 && apart(|it| it.angular_velocity) > 0.1);
+}
+
+/// Largest differences of both channels, and the stamps of the live readings.
+fn live_less_offline(effects: &str) -> ((f64, f64), Vec<Stamp>) {
+    let motion = samples(&trajectory(wrist, 240.0, 3.0));
+    let device = device(effects);
     let live = readings(&device, &motion);
     let mut track = cromosim_spatial::KinematicTrack {
         start: START,
@@ -84,8 +122,7 @@ fn live_readings_are_those_of_the_model() {
         }
     }
     println!("{errors:?}");
-    assert!(errors.0 < 0.05 && errors.1 < 0.005, "{errors:?}");
-    assert_eq!(stamps[400].nanos - START.nanos, 1_012_700_000);
+    (errors, stamps)
 }
 
 #[test]
