@@ -117,13 +117,15 @@ pub enum EvaluationError {
         /// The recording and the IMU.
         name: String,
     },
-    /// A pattern with `*` that no file of a folder matches.
-    #[error("{}: no file matches {pattern}", folder.display())]
-    NoMatch {
-        /// The folder.
-        folder: PathBuf,
-        /// The pattern of the file's name.
-        pattern: String,
+    /// Data that are not there.
+    #[error("{}: {problem}; {hint}", path.display())]
+    NoData {
+        /// The file or folder.
+        path: PathBuf,
+        /// What is missing.
+        problem: String,
+        /// What to get, from whom, and where to put it.
+        hint: String,
     },
     /// A site that cannot carry a sensor.
     #[error("site {site}: {field}: {problem}")]
@@ -221,22 +223,6 @@ pub enum EvaluationError {
         people: String,
         /// Classes that they show.
         classes: String,
-    },
-    /// The folder of the default data cannot be read.
-    #[error(
-        "{}: cannot be read; --data names the folder that holds har_spsw and mocap_cmu_har, --real other recordings", path.display()
-    )]
-    NoDataFolder {
-        /// The folder.
-        path: PathBuf,
-        /// The system's reason.
-        source: io::Error,
-    },
-    /// A folder without npz files.
-    #[error("{}: no .npz files", path.display())]
-    NoNpzFiles {
-        /// The folder.
-        path: PathBuf,
     },
     /// The learned simulator without networks.
     #[error("no networks were given; name their folder by --learned")]

@@ -22,6 +22,7 @@ mod report;
 mod seeds;
 mod training;
 mod training_data;
+mod wanted;
 
 pub use activity::{
     Activities, ActivityOptions, ActivityResults, ChosenVariant, Comparison, ConditionResults,

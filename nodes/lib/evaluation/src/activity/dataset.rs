@@ -14,6 +14,8 @@ use super::activities::Activities;
 use super::wearing::DeviceWearing;
 use super::windows::{CHANNELS_PER_DEVICE, DeviceReadings, WindowGrid};
 use crate::EvaluationError;
+use crate::training_data::entries;
+use crate::wanted::not_there;
 
 /// Where a device is silent for longer, s, its recording is cut.
 const LONGEST_GAP: f64 = 0.25;
@@ -294,19 +296,13 @@ fn labels(
 
 /// The npz files of a folder of the default data, har_spsw or mocap_cmu_har.
 pub(super) fn default_files(folder: &Path) -> Result<Vec<PathBuf>, EvaluationError> {
-    let entries = std::fs::read_dir(folder).map_err(|source| EvaluationError::NoDataFolder {
-        path: folder.to_owned(),
-        source,
-    })?;
-    let mut files: Vec<PathBuf> = entries
+    let mut files: Vec<PathBuf> = entries(folder)?
         .filter_map(|entry| Some(entry.ok()?.path()))
         .filter(|path| path.extension().is_some_and(|end| end == "npz"))
         .collect();
     files.sort();
     if files.is_empty() {
-        return Err(EvaluationError::NoNpzFiles {
-            path: folder.to_owned(),
-        });
+        return Err(not_there(folder, "no .npz files"));
     }
     Ok(files)
 }

@@ -29,6 +29,7 @@ pub use truth_source::TruthSource;
 use crate::EvaluationError;
 use crate::observer::{self, Observer};
 use crate::training_data::{DataFolder, DataSource};
+use crate::wanted::not_there;
 use cases::Case;
 use errors::SquaredErrors;
 use rigid::{RigidOutcome, run_rigid_study};
@@ -57,7 +58,15 @@ pub fn evaluate_fidelity(
     for study in &protocol.studies {
         if study.optional && !options.data.folder.is_dir() {
             let folder = options.data.folder.display();
-            results.skip(&study.name, &format!("no folder {folder}"));
+            let sources = study.test.iter();
+            let mut files =
+                sources.flat_map(|source| source.motions.iter().chain(&source.recordings));
+            let wanted = files.next().map(|file| options.data.folder.join(file));
+            let reason = wanted.map_or_else(
+                || format!("no folder {folder}"),
+                |file| not_there(&file, &format!("no folder {folder}")).to_string(),
+            );
+            results.skip(&study.name, &reason);
             continue;
         }
         let scored = run_study(study, protocol.seed, options, observer)?;

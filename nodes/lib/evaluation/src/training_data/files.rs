@@ -1,8 +1,11 @@
 //! Files by patterns with `*` in their names.
 
+use std::fs::ReadDir;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use crate::EvaluationError;
+use crate::wanted::not_there;
 
 /// The files that patterns name, relative to a folder; those of one pattern in alphabetical order.
 pub(crate) fn matching_files(
@@ -13,6 +16,9 @@ pub(crate) fn matching_files(
     for pattern in patterns {
         let path = folder.join(pattern);
         if !pattern.contains('*') {
+            if !path.exists() {
+                return Err(not_there(&path, "not there"));
+            }
             found.push(path);
             continue;
         }
@@ -21,10 +27,7 @@ pub(crate) fn matching_files(
             parent => parent,
         };
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let entries = std::fs::read_dir(parent).map_err(|source| EvaluationError::Read {
-            path: parent.to_owned(),
-            source,
-        })?;
+        let entries = entries(parent)?;
         let mut matching: Vec<PathBuf> = entries
             .filter_map(|entry| Some(entry.ok()?.path()))
             .filter(|path| {
@@ -33,15 +36,23 @@ pub(crate) fn matching_files(
             })
             .collect();
         if matching.is_empty() {
-            return Err(EvaluationError::NoMatch {
-                folder: parent.to_owned(),
-                pattern: name.into_owned(),
-            });
+            return Err(not_there(parent, &format!("no file matches {name}")));
         }
         matching.sort();
         found.extend(matching);
     }
     Ok(found)
+}
+
+/// What is in a folder of the data.
+pub(crate) fn entries(folder: &Path) -> Result<ReadDir, EvaluationError> {
+    std::fs::read_dir(folder).map_err(|source| match source.kind() {
+        ErrorKind::NotFound => not_there(folder, "not there"),
+        _ => EvaluationError::Read {
+            path: folder.to_owned(),
+            source,
+        },
+    })
 }
 
 /// Whether a name is the pattern with any text in place of each `*`.

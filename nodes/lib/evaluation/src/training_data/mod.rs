@@ -13,7 +13,7 @@ mod source;
 
 pub use clips::{LabelledMotion, MotionClip, read_labelled_motion};
 pub use drawn::draw_wearers;
-pub(crate) use files::matching_files;
+pub(crate) use files::{entries, matching_files};
 pub use pairs::{split_pairs, training_pairs};
 pub use recorded::recorded_pieces;
 pub use source::{DataFolder, DataSource, PoseSource};
