@@ -14,6 +14,7 @@ use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use cromosim_body::ShapedBody;
 use cromosim_imu::{Device, MountedSensors, PlacementSet};
+use cromosim_motion::MotionOptions;
 use cromosim_ros::{Network, RosArgs, Security};
 use cromosim_spatial::PoseSource;
 
@@ -41,6 +42,9 @@ pub struct Arguments {
     /// From its beginning to its end
     #[arg(long, value_name = "FILE", help_heading = PLAYED)]
     motion: Option<PathBuf>,
+    /// The skeleton map of a BVH or AMC file with joint names of its own
+    #[arg(long, value_name = "MAP", requires = "motion", help_heading = PLAYED)]
+    skeleton_map: Option<String>,
     /// Stop after so many seconds of the motion
     #[arg(
         long,
@@ -350,7 +354,13 @@ impl Arguments {
         Security::from_env(&RosArgs::default())?;
         let model = body::model(self.body.as_deref())?;
         let motion = match &self.motion {
-            Some(path) => cromosim_motion::read_motion_for(path, &model, &Default::default())?,
+            Some(path) => {
+                let options = MotionOptions {
+                    skeleton_map: self.skeleton_map.clone(),
+                    ..MotionOptions::default()
+                };
+                cromosim_motion::read_motion_for(path, &model, &options)?
+            }
             None => cromosim_motion::embedded_walk(),
         };
         if let Some(path) = &self.placements {
@@ -436,6 +446,9 @@ impl Arguments {
         if let Some(motion) = &self.motion {
             let motion = std::path::absolute(motion).unwrap_or_else(|_| motion.clone());
             parameters.push(("motion", quoted(&motion.display().to_string())));
+        }
+        if let Some(map) = &self.skeleton_map {
+            parameters.push(("skeleton_map", quoted(map)));
         }
         if let Some(body) = &self.body {
             let body = std::path::absolute(body).unwrap_or_else(|_| body.clone());

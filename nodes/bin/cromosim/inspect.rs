@@ -4,10 +4,11 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use anyhow::{Context, bail};
 use clap::Args;
 use cromosim_bag::{BagReader, Cadence};
 use cromosim_body::Joint;
-use cromosim_motion::{PoseAxes, SmplMotion};
+use cromosim_motion::{MotionOptions, PoseAxes, SkeletonDraft, SmplMotion, read_skeleton};
 use cromosim_msgs::printable;
 use cromosim_recording::datasets::{DatasetFormat, DatasetRecording};
 use cromosim_recording::inspect::{
@@ -17,6 +18,7 @@ use cromosim_recording::inspect::{
 use cromosim_recording::rigid::RigidFormat;
 
 use crate::body;
+use crate::files::{refuse_existing, write_whole};
 use crate::motion_arguments::MotionArguments;
 use crate::output::say;
 use crate::progress::working;
@@ -41,6 +43,15 @@ pub struct Arguments {
     /// Rather than the embedded one
     #[arg(long, value_name = "FILE")]
     body: Option<PathBuf>,
+    /// Of a BVH or AMC file with joint names of its own: draft a skeleton map
+    ///
+    /// The draft (YAML) is for you to check, and then for --skeleton-map of every command that reads
+    /// the file
+    #[arg(long, value_name = "FILE")]
+    skeleton_map_draft: Option<PathBuf>,
+    /// Replace the draft where it exists
+    #[arg(long, requires = "skeleton_map_draft")]
+    force: bool,
     #[command(flatten)]
     motion: MotionArguments,
 }
@@ -48,6 +59,9 @@ pub struct Arguments {
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let options = arguments.motion.options()?;
+    if let Some(out) = &arguments.skeleton_map_draft {
+        return draft(arguments, &options, out);
+    }
     let model = body::model(arguments.body.as_deref())?;
     for path in &arguments.files {
         let doing = format!("reading {}", path.display());
@@ -61,6 +75,33 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         }
     }
     Ok(())
+}
+
+/// Writes a draft of the file's skeleton map.
+fn draft(arguments: &Arguments, options: &MotionOptions, out: &Path) -> anyhow::Result<()> {
+    let [path] = arguments.files.as_slice() else {
+        bail!("--skeleton-map-draft takes one file; a map fits all files of one skeleton");
+    };
+    refuse_existing(out, arguments.force)?;
+    let clip = read_skeleton(path, options)?;
+    let name = out.file_stem().unwrap_or_default().to_string_lossy();
+    let draft = SkeletonDraft::of(&clip, &name)?;
+    write_whole(out, arguments.force, |file| {
+        file.write_all(draft.yaml.as_bytes())
+            .with_context(|| format!("{}: cannot be written", out.display()))
+    })?;
+    let out = out.display();
+    say!(
+        "{out}: a draft with {} of SMPL's joints; check it, left and right above all",
+        draft.found
+    )?;
+    if draft.missing.is_empty() {
+        say!("  then: --skeleton-map {out}")
+    } else {
+        let missing = draft.missing.iter().map(ToString::to_string);
+        let missing: Vec<String> = missing.collect();
+        say!("  to be added: {}", missing.join(", "))
+    }
 }
 
 fn print_rigid(path: &Path, rigid: &RigidInspection) -> anyhow::Result<()> {

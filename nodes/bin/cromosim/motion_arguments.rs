@@ -38,6 +38,12 @@ pub struct MotionArguments {
     /// Take so many seconds of the motion; default: to its end
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     duration: Option<f64>,
+    /// Which joint is which, where a BVH or AMC file has names of its own
+    ///
+    /// cmu, cmu_asf, daz, lafan1, mixamo, smpl, xsens, or a YAML file, which `cromosim inspect
+    /// --skeleton-map-draft` drafts; default: the one that fits the names
+    #[arg(long, value_name = "MAP", hide_short_help = true)]
+    skeleton_map: Option<String>,
     /// An AMC file's skeleton (ASF) rather than the one beside it
     #[arg(long, value_name = "FILE", hide_short_help = true)]
     skeleton: Option<PathBuf>,
@@ -97,6 +103,7 @@ impl MotionArguments {
         }
         Ok(MotionOptions {
             up_axis,
+            skeleton_map: self.skeleton_map.clone(),
             unit_scale_m: self.unit,
             start_s: self.start,
             duration_s: self.duration,

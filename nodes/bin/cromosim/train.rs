@@ -33,6 +33,9 @@ pub struct Arguments {
     /// SMPL, SMPL-H or SMPL-X, rather than the embedded one
     #[arg(long, value_name = "FILE")]
     body: Option<PathBuf>,
+    /// The skeleton map of BVH and AMC files with joint names of their own
+    #[arg(long, value_name = "MAP")]
+    skeleton_map: Option<String>,
     /// Begin anew, rather than go on with the training in DIR
     #[arg(long)]
     force: bool,
@@ -58,6 +61,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let data = DataFolder {
         folder: folder.to_owned(),
         body: body::given(arguments.body.as_deref())?,
+        skeleton_map: arguments.skeleton_map.clone(),
     };
     let pairs = training_pairs(&config.data, config.training.seed, &data, &terminal)?;
     for line in data_summary(&pairs) {

@@ -36,6 +36,9 @@ pub struct Arguments {
     /// SMPL, SMPL-H or SMPL-X, rather than the embedded one
     #[arg(long, value_name = "FILE")]
     body: Option<PathBuf>,
+    /// The skeleton map of BVH and AMC files with joint names of their own
+    #[arg(long, value_name = "MAP")]
+    skeleton_map: Option<String>,
     /// Draw little, to show that all of it runs
     ///
     /// One person and device for each motion and site; of rigid bodies, one IMU of each known motion
@@ -59,6 +62,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         data: DataFolder {
             folder: data_folder(arguments.data.as_deref()),
             body: body::given(arguments.body.as_deref())?,
+            skeleton_map: arguments.skeleton_map.clone(),
         },
         models: arguments.models.clone(),
         quick: arguments.quick,

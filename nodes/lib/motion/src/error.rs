@@ -185,7 +185,7 @@ pub enum MotionError {
     },
     /// No skeleton map fits the joint names.
     #[error(
-        "{name}: no skeleton map fits: nearest is {nearest} ({found} of {total} joints), not found: {}; write a map and name it by skeleton_map",
+        "{name}: no skeleton map fits: nearest is {nearest} ({found} of {total} joints), not found: {}; `cromosim inspect FILE --skeleton-map-draft map.yaml` drafts a map, to be named by --skeleton-map (the node's parameter skeleton_map)",
         missing.join(", ")
     )]
     UnknownSkeleton {
@@ -200,8 +200,14 @@ pub enum MotionError {
         /// Its indispensable joints that are not in the file.
         missing: Vec<String>,
     },
+    /// A file without a skeleton of its own.
+    #[error("{}: neither BVH nor AMC; only their skeletons need a map", path.display())]
+    NoJoints {
+        /// The file.
+        path: PathBuf,
+    },
     /// The chosen skeleton map does not fit.
-    #[error("{name}: skeleton map {map} does not fit, not found: {}; choose another skeleton_map or leave it out", missing.join(", "))]
+    #[error("{name}: skeleton map {map} does not fit, not found: {}; choose another by --skeleton-map (the node's parameter skeleton_map) or leave it out", missing.join(", "))]
     MissingJoints {
         /// The file.
         name: String,

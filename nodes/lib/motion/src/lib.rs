@@ -35,6 +35,7 @@ mod poses;
 mod read;
 mod report;
 mod retarget;
+mod skeleton_draft;
 mod skeleton_map;
 mod text;
 mod trc;
@@ -59,9 +60,10 @@ pub use poses::{
     PoseTrack, PoseView, RateOrigin, ShapeChoice, ShapeOrigin, VIDEO_RATE_HZ, open_poses,
     read_people, read_people_whole,
 };
-pub use read::{read_motion, read_motion_for};
+pub use read::{read_motion, read_motion_for, read_skeleton};
 pub use report::RetargetReport;
 pub use retarget::retarget;
+pub use skeleton_draft::SkeletonDraft;
 pub use skeleton_map::{FeetAtRest, Sides, SkeletonMap};
 pub use trc::{parse_trc, write_trc};
 pub use walk::embedded_walk;

@@ -76,6 +76,23 @@ pub fn read_motion_for(
         .possible()
 }
 
+/// Reads the skeleton of a BVH or AMC file as it is, without a map: to draft one
+/// ([`crate::SkeletonDraft`]).
+///
+/// # Errors
+/// As [`read_motion`], and [`MotionError::NoJoints`] for other files.
+pub fn read_skeleton(path: &Path, options: &MotionOptions) -> Result<BvhClip, MotionError> {
+    let bytes = read_bytes(path)?;
+    let text = String::from_utf8_lossy(&bytes);
+    match MotionFormat::of(&bytes) {
+        Some(MotionFormat::Bvh) => parse_bvh(&text, &path.display().to_string()),
+        Some(MotionFormat::Amc) => acclaim(path, &text, options),
+        _ => Err(MotionError::NoJoints {
+            path: path.to_owned(),
+        }),
+    }
+}
+
 fn of_markers(
     clip: &MarkerClip,
     body: &Arc<BodyModel>,

@@ -20,7 +20,7 @@ const EMBEDDED: [(&str, &str); 7] = [
 ];
 
 /// Joints without which a motion cannot be retargeted, beside the neck or the head.
-const INDISPENSABLE: [Joint; 14] = [
+pub(crate) const INDISPENSABLE: [Joint; 14] = [
     Joint::Pelvis,
     Joint::LeftHip,
     Joint::RightHip,

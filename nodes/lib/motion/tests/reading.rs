@@ -8,8 +8,8 @@ use std::path::Path;
 use common::own_file;
 use cromosim_body::BodyModel;
 use cromosim_motion::{
-    MotionError, MotionOptions, RestChoice, SkeletonMap, UpAxis, embedded_walk, parse_bvh,
-    read_motion, retarget,
+    MotionError, MotionOptions, RestChoice, SkeletonDraft, SkeletonMap, UpAxis, embedded_walk,
+    parse_bvh, read_motion, retarget,
 };
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
@@ -133,6 +133,7 @@ fn unknown_skeletons_are_described() {
     assert!(
         found.contains("no skeleton map fits: nearest is")
             && found.contains("not found: ")
+            && found.contains("cromosim inspect FILE --skeleton-map-draft map.yaml")
             && found.contains("skeleton_map"),
         "{found}"
     );
@@ -392,6 +393,7 @@ fn absurd_skeletons_never_panic() {
         let Ok(clip) = parse_bvh(&damaged.concat().replace("  ", " "), "damaged.bvh") else {
             continue;
         };
+        assert!(SkeletonDraft::of(&clip, "damaged").is_ok());
         let unit_scale_m = rng.random_bool(0.5).then_some(0.01);
         match retarget(
             &clip,

@@ -8,7 +8,10 @@ use common::export::{Bone, Exporter};
 use common::known::{about, joint_shift, known_motion, rest, y_up};
 use common::quantile;
 use cromosim_body::{BodyModel, BodyPose, Joint, ShapedBody};
-use cromosim_motion::{MotionOptions, RetargetReport, SmplMotion, parse_bvh, retarget};
+use cromosim_motion::{
+    BvhClip, BvhJoint, MotionOptions, RetargetReport, SkeletonDraft, SkeletonMap, SmplMotion,
+    parse_bvh, retarget,
+};
 use nalgebra::{UnitQuaternion, Vector3};
 
 const MIXAMO: &str = "Hips::pelvis LeftUpLeg:Hips:left_hip LeftLeg:LeftUpLeg:left_knee LeftFoot:LeftLeg:left_ankle
@@ -318,4 +321,63 @@ fn xsens_with_z_up() {
         bone.body_from_joint = about(Vector3::x(), -90.0);
     }
     check("xsens, z up", &exporter, true, "zero pose");
+}
+
+/// A draft finds by the tree alone, and by the names, which joint is which.
+#[test]
+fn drafts_find_the_joints_of_known_skeletons() {
+    let body = body();
+    for (name, words, map) in [
+        ("cmu", CMU, include_str!("../maps/cmu.yaml")),
+        ("daz", DAZ, include_str!("../maps/daz.yaml")),
+        ("mixamo", MIXAMO, include_str!("../maps/mixamo.yaml")),
+    ] {
+        let text = exporter(&body, words).write(&known_motion(true).frames);
+        let clip = parse_bvh(&text, name).unwrap();
+        for anonymous in [false, true] {
+            let own = |index: usize, known: &str| {
+                if anonymous {
+                    format!("bone{index}")
+                } else {
+                    known.to_owned()
+                }
+            };
+            let joints = clip.joints().iter().enumerate();
+            let joints = joints.map(|(index, joint)| BvhJoint {
+                name: own(index, &joint.name),
+                ..joint.clone()
+            });
+            let values = (0..clip.frame_count()).flat_map(|index| clip.frame(index).to_vec());
+            let time = clip.frame_time_s();
+            let renamed = BvhClip::from_parts(name, joints.collect(), time, values.collect());
+            let draft = SkeletonDraft::of(&renamed, "draft").unwrap();
+            assert!(draft.missing.is_empty(), "{name}: {}", draft.yaml);
+            assert!(SkeletonMap::from_yaml(&draft.yaml, "draft.yaml").is_ok());
+            let mut wrong = Vec::new();
+            for joint in Joint::ALL {
+                let line = |known: &&str| known.starts_with(&format!("  {joint}: "));
+                let Some(line) = map.lines().find(line) else {
+                    continue;
+                };
+                let known = line.split(": ").nth(1).unwrap();
+                let place = |it: &BvhJoint| it.name == known;
+                let Some(index) = clip.joints().iter().position(place) else {
+                    continue;
+                };
+                if !draft
+                    .yaml
+                    .contains(&format!("  {joint}: {}\n", own(index, known)))
+                {
+                    wrong.push(joint);
+                }
+            }
+            // How many joints of a neck or a spine there are, a tree does not tell.
+            let expected = [Joint::Spine1, Joint::Spine2, Joint::Neck, Joint::Head];
+            assert!(
+                wrong.iter().all(|joint| expected.contains(joint)) && wrong.len() <= 1,
+                "{name}, anonymous {anonymous}: {wrong:?}\n{}",
+                draft.yaml
+            );
+        }
+    }
 }

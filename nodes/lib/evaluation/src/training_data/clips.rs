@@ -58,18 +58,24 @@ pub fn read_labelled_motion(
     on_body(parse_skeleton(path)?, path, model)
 }
 
-/// Reads a motion of any kind, skeleton clips as npz among them.
+/// Reads a motion of any kind, skeleton clips as npz among them; `skeleton_map` as
+/// [`MotionOptions::skeleton_map`].
 ///
 /// # Errors
 /// A file that cannot be read, or is no motion.
 pub fn read_motion_clip(
     path: &Path,
     model: &Arc<BodyModel>,
+    skeleton_map: Option<&str>,
 ) -> Result<MotionClip, EvaluationError> {
     if let Ok(clip) = parse_skeleton(path) {
         return Ok(on_body(clip, path, model)?.motion);
     }
-    let motion = read_motion_for(path, model, &options())?;
+    let options = MotionOptions {
+        skeleton_map: skeleton_map.map(str::to_owned),
+        ..options()
+    };
+    let motion = read_motion_for(path, model, &options)?;
     Ok(MotionClip {
         name: name_of_file(path),
         rate_hz: motion.rate_hz,

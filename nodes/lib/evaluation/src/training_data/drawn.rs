@@ -34,6 +34,7 @@ pub fn draw_wearers<T: Send>(
     let files = source.motion_files(&data.folder)?;
     let draws = Draws {
         source,
+        skeleton_map: data.skeleton_map.as_deref(),
         model: data.model(),
         placements: source
             .sites
@@ -62,6 +63,7 @@ pub fn draw_wearers<T: Send>(
 /// What all draws of a source share.
 struct Draws<'a> {
     source: &'a DataSource,
+    skeleton_map: Option<&'a str>,
     model: Arc<BodyModel>,
     placements: Vec<Placement>,
     wearing: WearerRanges,
@@ -76,7 +78,7 @@ impl Draws<'_> {
         path: &Path,
         make: impl Fn(DrawnWearer, PairNames) -> Result<T, EvaluationError>,
     ) -> Result<Vec<T>, EvaluationError> {
-        let motion = read_motion_clip(path, &self.model)?;
+        let motion = read_motion_clip(path, &self.model, self.skeleton_map)?;
         let mut made = Vec::new();
         for (index, placement) in self.placements.iter().enumerate() {
             for repeat in 0..self.source.repeats {

@@ -19,6 +19,8 @@ pub struct DataFolder {
     /// The body that motions and recordings are played on; without, the embedded one, and a
     /// recording that was made on another is refused.
     pub body: Option<Arc<BodyModel>>,
+    /// The skeleton map of BVH and AMC files, as [`cromosim_motion::MotionOptions::skeleton_map`].
+    pub skeleton_map: Option<String>,
 }
 
 impl DataFolder {

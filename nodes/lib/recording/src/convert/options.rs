@@ -57,6 +57,7 @@ impl ReadOptions {
         first_of([
             (motion.up_axis != UpAxis::Detect, "--up-axis"),
             (motion.unit_scale_m.is_some(), "--unit"),
+            (motion.skeleton_map.is_some(), "--skeleton-map"),
             (with_part && motion.start_s != 0.0, "--start"),
             (with_part && motion.duration_s.is_some(), "--duration"),
             (motion.skeleton.is_some(), "--skeleton"),
