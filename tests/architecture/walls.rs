@@ -109,6 +109,20 @@ fn imports_run_one_way() {
                 "charts",
             ],
         ),
+        (
+            "nodes/lib/python",
+            &[
+                "spatial",
+                "body",
+                "motion",
+                "imu",
+                "learned",
+                "gap",
+                "bag",
+                "msgs",
+                "recording",
+            ],
+        ),
     ]);
     for (folder, manifest) in manifests() {
         let Some(&may) = allowed.get(folder.as_str()) else {

@@ -8,6 +8,8 @@ use cromosim_bag::{BagReader, write_imu_csv};
 use cromosim_imu::{ImuMessages, MountedSensors, VirtualImu};
 use cromosim_motion::{MotionError, PersonPart, SmplMotion};
 use cromosim_msgs::cromosim_msgs::SmplState;
+use cromosim_msgs::geometry_msgs::PoseStamped;
+use cromosim_msgs::std_msgs::Header;
 use cromosim_spatial::Stamp;
 
 use crate::motion_spill::MotionSpill;
@@ -69,6 +71,24 @@ pub struct SimulatedPerson {
     pub sites: MountedSensors,
     /// In the order of `sites`.
     pub placements: Vec<SimulatedPlacement>,
+}
+
+impl SimulatedPerson {
+    /// Of each placement `world_from_sensor` at the frames that are played.
+    pub fn references(&self, person: &PlayedPerson) -> Vec<Vec<PoseStamped>> {
+        let mut references = vec![Vec::new(); self.placements.len()];
+        for frame in person.played.clone() {
+            let stamp = person.stamps[frame];
+            let poses = self.sites.poses(&person.motion.frames[frame]);
+            for (own, pose) in references.iter_mut().zip(&poses) {
+                own.push(PoseStamped {
+                    header: Header::new(stamp.nanos, "world"),
+                    pose: pose.world_from_sensor.into(),
+                });
+            }
+        }
+        references
+    }
 }
 
 /// Poses on either side of a part that are differentiated with it, s: several times what neighbours

@@ -1,0 +1,168 @@
+//! Virtual IMUs of a person, and of a rigid body.
+
+use std::path::Path;
+use std::str::FromStr;
+
+use cromosim_imu::{Device, Differentiation, ImuMessages, PlacementSet, Scheme, TextureSegment, Trim};
+use cromosim_learned::{LearnedSimulator, MappingFile};
+use cromosim_msgs::geometry_msgs::PoseStamped;
+use cromosim_msgs::sensor_msgs::Imu;
+use cromosim_recording::{
+    Aside, PlayedPerson, Quality, RecordingError, Simulation, SimulationOptions, TextureOn,
+};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use rayon::prelude::*;
+use serde::Deserialize;
+
+use crate::arrays::{poses, readings};
+use crate::error::raise;
+use crate::motion::Motion;
+
+/// The options of a simulation as `python/cromosim` writes them.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Options {
+    /// A scheme's name.
+    scheme: Option<String>,
+    bandwidth_hz: Option<f64>,
+    /// Seconds; none: as long as the ends are far more uncertain.
+    trim_s: Option<f64>,
+    /// `own`, or a segment.
+    texture: Option<String>,
+    seed: u64,
+    noise: bool,
+    #[serde(default)]
+    pose_error_correlation_s: f64,
+    learned: Option<String>,
+    mapping: Option<String>,
+}
+
+impl Options {
+    /// Parses JSON.
+    pub fn parse(text: &str) -> PyResult<SimulationOptions> {
+        let options: Self =
+            serde_json::from_str(text).map_err(|error| raise(format!("simulate: {error}")))?;
+        let scheme = options.scheme.as_deref().map(Scheme::from_str).transpose();
+        let scheme = scheme.map_err(|error| raise(format!("scheme: {error}")))?;
+        let differentiation = match (scheme, options.bandwidth_hz) {
+            (Some(_), Some(_)) => {
+                return Err(raise(
+                    "bandwidth_hz takes the place of scheme; give one of them",
+                ));
+            }
+            (scheme, bandwidth_hz) => scheme
+                .map(Differentiation::Scheme)
+                .or(bandwidth_hz.map(Differentiation::Bandwidth)),
+        };
+        if options.learned.is_some() {
+            if options.bandwidth_hz.is_some() {
+                return Err(raise(
+                    "learned corrects what a scheme estimates, not a bandwidth_hz; leave one out",
+                ));
+            }
+            if options.texture.is_some() {
+                return Err(raise(
+                    "learned corrects what texture draws anew; leave one out",
+                ));
+            }
+        }
+        Ok(SimulationOptions {
+            rate_hz: None,
+            differentiation,
+            trim: options.trim_s.map_or(Trim::Uncertain, Trim::Seconds),
+            texture: options.texture.as_deref().map(texture).transpose()?,
+            seed: options.seed,
+            noise: options.noise,
+            pose_error_correlation_s: options.pose_error_correlation_s,
+            learned: options
+                .learned
+                .map(|model| LearnedSimulator::find(Path::new(&model)))
+                .transpose()
+                .map_err(raise)?,
+            mapping: match options.mapping {
+                Some(path) => MappingFile::read(Path::new(&path)).map_err(raise)?,
+                None => MappingFile::default(),
+            },
+        })
+    }
+}
+
+fn texture(name: &str) -> PyResult<TextureOn> {
+    let known = TextureSegment::ALL;
+    let found = known.into_iter().find(|segment| segment.name() == name);
+    match found {
+        Some(segment) => Ok(TextureOn::Segment(segment)),
+        None if name == "own" => Ok(TextureOn::ItsSegment),
+        None => Err(raise(format!(
+            "texture {name}: expected own, {}",
+            known.map(TextureSegment::name).join(", ")
+        ))),
+    }
+}
+
+/// The IMUs at `placements` (the text of a placements file) of a moving person: a dictionary of
+/// arrays for each. `device` is a device's text, with the placements that have it.
+#[pyfunction]
+#[pyo3(signature = (motion, placements, folder, device, options))]
+pub fn simulate<'py>(
+    py: Python<'py>,
+    motion: &Motion,
+    placements: &str,
+    folder: &str,
+    device: Option<(Vec<String>, String)>,
+    options: &str,
+) -> PyResult<Bound<'py, PyDict>> {
+    let simulated = py.detach(|| {
+        let placements = PlacementSet::parse(placements, "placements").map_err(raise)?;
+        let options = Options::parse(options)?;
+        let model = motion.model.clone();
+        let mut simulation =
+            Simulation::new(model, placements, Path::new(folder), options).map_err(raise)?;
+        if let Some((names, text)) = device {
+            let device = Device::parse(&text, "device").map_err(raise)?;
+            let with =
+                |simulation: Simulation, name: &String| simulation.with_device(name, &device);
+            simulation = names.iter().fold(simulation, with);
+        }
+        let (start_s, duration_s) = (motion.start_s, motion.duration_s);
+        let person = PlayedPerson::part(&motion.motion, start_s, duration_s).map_err(raise)?;
+        let simulated = simulation
+            .simulate::<RecordingError>(&person, &Aside::in_memory(), || Ok(()), || ())
+            .map_err(raise)?;
+        let references = simulated.references(&person);
+        let measured = simulated
+            .placements
+            .into_par_iter()
+            .map(|mut placement| Ok((placement.messages()?, placement)))
+            .collect::<Result<Vec<_>, RecordingError>>()
+            .map_err(raise)?;
+        Ok::<_, PyErr>(measured.into_iter().zip(references).collect::<Vec<_>>())
+    })?;
+    let imus = PyDict::new(py);
+    for ((messages, placement), reference) in simulated {
+        let arrays = arrays_of(py, messages, &reference, &placement.quality)?;
+        imus.set_item(&placement.name, arrays)?;
+    }
+    Ok(imus)
+}
+
+fn arrays_of<'py>(
+    py: Python<'py>,
+    messages: Vec<ImuMessages>,
+    reference: &[PoseStamped],
+    quality: &Quality,
+) -> PyResult<Bound<'py, PyDict>> {
+    let (raw, full): (Vec<Imu>, Vec<Imu>) = messages
+        .into_iter()
+        .map(|both| (both.data_raw, both.data))
+        .unzip();
+    let arrays = readings(py, &raw, Some(&full))?;
+    arrays.set_item("reference", poses(py, reference)?)?;
+    arrays.set_item(
+        "bandwidth_hz",
+        quality.bandwidth.map(|it| it.acceleration_hz),
+    )?;
+    arrays.set_item("trimmed_s", quality.trimmed_s)?;
+    Ok(arrays)
+}

@@ -1,0 +1,87 @@
+"""CPU time of 60 s x 5 placements, through Python and by the command line, in one run.
+
+    CROMOSIM_BINARY=... python measure.py        (five turns, alternating; medians)
+
+The command line's time holds its start, reading, and writing of a bag as well; Python's its start, the
+import and reading. `alone` is `simulate` by itself, in a process that is already running.
+"""
+
+import os
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+import cromosim
+
+TURNS = 5
+NAMES = ("left_watch", "right_watch", "sternum", "left_shin", "right_shin")
+
+
+def cpu(command: list[str]) -> float:
+    """User and system time of a process, s."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
+
+
+PROGRAM = """
+import resource, sys
+import cromosim
+motion = cromosim.read_motion(sys.argv[1])
+placements = {f"p{k}": cromosim.Placement(site=site) for k, site in enumerate(sys.argv[2:])}
+before = resource.getrusage(resource.RUSAGE_SELF)
+imus = cromosim.simulate(motion, placements, rate_hz=100, device="consumer_mems")
+after = resource.getrusage(resource.RUSAGE_SELF)
+assert sum(map(len, imus.values())) > 29000
+print(after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime)
+"""
+
+
+def main() -> None:
+    binary = os.environ["CROMOSIM_BINARY"]
+    walk = cromosim.walk()
+    repeats = -(-60 * int(walk.rate_hz) // len(walk))
+    rotations = np.concatenate([walk.rotations] * repeats)
+    there_and_back = [walk.root_positions, walk.root_positions[::-1]] * repeats
+    positions = np.concatenate(there_and_back)[: len(rotations)]
+    frames = round(60 * walk.rate_hz) + 1
+    sites = [name for name in NAMES if name in cromosim.Body().site_names]
+    sites += [name for name in cromosim.Body().site_names if name not in sites]
+    sites = sites[:5]
+    with tempfile.TemporaryDirectory() as folder:
+        minute, sensors = Path(folder) / "minute.npz", Path(folder) / "sensors.yaml"
+        np.savez(
+            minute,
+            poses=rotations[:frames].reshape(frames, 72),
+            trans=positions[:frames],
+            betas=walk.betas,
+            mocap_framerate=walk.rate_hz,
+            gender="neutral",
+        )
+        entries = "".join(f"  p{k}: {{site: {site}}}\n" for k, site in enumerate(sites))
+        sensors.write_text(
+            "schema: cromosim/placements/1\ndefaults: {rate_hz: 100, device: consumer_mems}\n"
+            f"placements:\n{entries}"
+        )
+        line = [binary, "simulate", str(minute), "--placements", str(sensors), "--force"]
+        line += ["--out", str(Path(folder) / "out.mcap")]
+        python = [sys.executable, "-c", PROGRAM, str(minute), *sites]
+        of_line, of_python, alone = [], [], []
+        for _ in range(TURNS):
+            of_line.append(cpu(line))
+            of_python.append(cpu(python))
+            done = subprocess.run(python, check=True, capture_output=True, text=True)
+            alone.append(float(done.stdout))
+    line_s, python_s, alone_s = map(statistics.median, (of_line, of_python, alone))
+    print(f"command line {line_s:.3f} s, Python {python_s:.3f} s: {python_s / line_s:.2f} times")
+    print(f"simulate alone {alone_s:.3f} s")
+
+
+if __name__ == "__main__":
+    main()
