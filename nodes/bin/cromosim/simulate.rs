@@ -352,7 +352,7 @@ fn simulate_one(
                 out,
                 folder,
                 person,
-                &names(&setup.simulation.placements()),
+                &names(setup.simulation.placements()),
                 setup.force,
             )?;
         }

@@ -95,10 +95,8 @@ fn header_stamp(message: &Message) -> Option<Stamp> {
 }
 
 fn begins_with_header(topic: &Topic) -> bool {
-    let lines = topic.schema_text().lines().map(str::trim);
-    let first = lines
-        .filter(|line| !line.is_empty() && !line.starts_with('#'))
-        .next();
+    let mut lines = topic.schema_text().lines().map(str::trim);
+    let first = lines.find(|line| !line.is_empty() && !line.starts_with('#'));
     first.is_some_and(|line| {
         matches!(
             line.split_whitespace().next(),

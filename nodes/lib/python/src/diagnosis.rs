@@ -58,6 +58,7 @@ impl Record {
         Ok(Self {
             record: PlacementRecord {
                 name,
+                set_back: Vec::new(),
                 reference: PoseSeries {
                     stamps: frames.iter().map(|frame| frame.stamp).collect(),
                     positions: frames

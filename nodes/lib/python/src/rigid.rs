@@ -42,6 +42,7 @@ pub fn simulate_rigid<'py>(
             frames,
             measured: Vec::new(),
             notes: Vec::new(),
+            set_back: Vec::new(),
         };
         let scheme = options
             .differentiation

@@ -3,7 +3,9 @@
 use std::path::Path;
 use std::str::FromStr;
 
-use cromosim_imu::{Device, Differentiation, ImuMessages, PlacementSet, Scheme, TextureSegment, Trim};
+use cromosim_imu::{
+    Device, Differentiation, ImuMessages, PlacementSet, Scheme, TextureSegment, Trim,
+};
 use cromosim_learned::{LearnedSimulator, MappingFile};
 use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_msgs::sensor_msgs::Imu;
