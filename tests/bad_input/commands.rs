@@ -203,7 +203,7 @@ fn options_of_another_mode_of_simulate() {
     }
     let motions = ["simulate", "--out", "out.mcap"];
     let cases: [(&[&str], &[&str], &str); 9] = [
-        (&motions, &["--placement", "wrist"], "not with motion files"),
+        (&motions, &["--placement", "wrist"], "NAME=SITE"),
         (&motions, &["--effects", "e.yaml"], "not with motion files"),
         (
             &reference,

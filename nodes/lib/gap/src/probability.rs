@@ -2,6 +2,7 @@
 
 use cromosim_imu::{Effect, EffectKind, Search};
 
+use crate::confounding::is_calibration;
 use crate::diagnosis::{Cause, UNKNOWN};
 use crate::findings::Findings;
 use crate::policy::probability::{
@@ -37,8 +38,8 @@ const POOR_REFERENCES: [EffectKind; 3] = [
 const MOST_OTHERS: usize = 2;
 
 /// From what the margins say of each cause to what has come true of such causes: the log-odds
-/// `base + share log10(gap_share) + others (causes beside it) + poor_reference + margin (logit(p) -
-/// logit(0.95))`, the last where p, by the margin, is below 0.95.
+/// `base + share log10(gap_share) + others (causes beside it) + poor_reference + takes_up_unknown +
+/// margin (logit(p) - logit(0.95))`, the last where p, by the margin, is below 0.95.
 pub(crate) fn calibrate(causes: &mut [Cause]) {
     let names: Vec<String> = causes.iter().map(|cause| cause.effect.clone()).collect();
     for cause in causes {
@@ -51,15 +52,22 @@ pub(crate) fn calibrate(causes: &mut [Cause]) {
             kind.name() != cause.effect && names.iter().any(|name| name == kind.name())
         };
         let poor_reference = f64::from(u8::from(POOR_REFERENCES.iter().any(is_beside)));
+        let takes_up = is_calibration_of(&cause.effect) && names.iter().any(|name| name == UNKNOWN);
+        let takes_up = f64::from(u8::from(takes_up));
         let others = (names.len() - 1).min(MOST_OTHERS) as f64;
         let by_margin = cause.probability_by_margin.clamp(1e-4, of.sure);
         let log_odds = of.base
             + of.share * cause.gap_share.max(of.least_share).log10()
             + of.others * others
             + of.poor_reference * poor_reference
+            + of.takes_up_unknown * takes_up
             + of.margin * (logit(by_margin) - logit(0.95));
         cause.probability = 1.0 / (1.0 + (-log_odds).exp());
     }
+}
+
+fn is_calibration_of(name: &str) -> bool {
+    EffectKind::from_name(name).is_some_and(is_calibration)
 }
 
 fn logit(probability: f64) -> f64 {
