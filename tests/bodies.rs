@@ -18,7 +18,7 @@ use cromosim_ros::testing::{environment, in_private_network};
 use cromosim_spatial::Stamp;
 
 /// Commands that take poses or shapes of a body, and those that never see one.
-const WITH_BODY: [&str; 10] = [
+const WITH_BODY: [&str; 12] = [
     "demo",
     "simulate",
     "train",
@@ -29,8 +29,10 @@ const WITH_BODY: [&str; 10] = [
     "trajectory",
     "inspect",
     "body export",
+    "body sites",
+    "list sites",
 ];
-const WITHOUT_BODY: [&str; 11] = [
+const WITHOUT_BODY: [&str; 16] = [
     "compare",
     "map",
     "bag recover",
@@ -40,6 +42,11 @@ const WITHOUT_BODY: [&str; 11] = [
     "device to-kalibr",
     "device from-diagnosis",
     "device show",
+    "list effects",
+    "list schemes",
+    "list devices",
+    "list models",
+    "list nodes",
     "completion",
     "node",
 ];
@@ -53,7 +60,9 @@ fn commands(help: &str) -> Vec<String> {
         .skip_while(|line| *line != "Commands:")
         .skip(1)
         .take_while(|line| line.starts_with("  "));
-    list.filter_map(|line| line.split_whitespace().next().map(str::to_owned))
+    // A long description goes on below, further in.
+    list.filter(|line| !line.starts_with("   "))
+        .filter_map(|line| line.split_whitespace().next().map(str::to_owned))
         .filter(|name| name != "help")
         .collect()
 }
