@@ -195,9 +195,11 @@ impl Simulation {
             advance();
             Ok(simulated?)
         };
-        let placements = (0..sites.sensors().len()).into_par_iter().map(one);
+        // Of several errors the first placement's is said, whichever comes first.
+        let indices = (0..sites.sensors().len()).into_par_iter();
+        let placements: Vec<Result<_, E>> = indices.map(one).collect();
         Ok(SimulatedPerson {
-            placements: placements.collect::<Result<_, E>>()?,
+            placements: placements.into_iter().collect::<Result<_, E>>()?,
             sites,
         })
     }

@@ -67,7 +67,7 @@ impl<'a> Machine<'a> {
         self.opcodes += 1;
         self.budget.opcodes = self.budget.opcodes.checked_sub(1).ok_or_else(|| {
             format!(
-                "more than {} steps to unpack it, which no sound file of arrays needs; the file may be damaged",
+                "more than {} opcodes, which no sound file of arrays needs; the file may be damaged",
                 self.budget.limits.opcodes
             )
         })?;
