@@ -60,7 +60,7 @@ pub use error::ChartsError;
 pub use frame::Level;
 pub use lines::{Line, LineChart, Point};
 pub use page::{Block, Chart, Page, Section, document, standalone, write_panels};
-pub use panel::{Panel, Series};
+pub use panel::{POINTS, Panel, Series};
 #[cfg(feature = "png")]
 pub use png::png;
 pub use table::{Column, Table};

@@ -15,10 +15,13 @@ const BOTTOM: f64 = 36.0;
 /// line's width.
 const TOLERANCE: f64 = 0.3;
 
-/// A line of a panel.
+/// Class of a series whose points are drawn each by itself.
+pub const POINTS: &str = "points";
+
+/// A line of a panel, or points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
-    /// CSS class, which gives its colour: `measured`, `before`, `after` or `predicted`.
+    /// CSS class, which gives its colour: `measured`, `before`, `after` or `predicted`; or [`POINTS`].
     pub class: &'static str,
     /// x and y; what is not finite interrupts the line.
     pub points: Vec<(f64, f64)>,
@@ -104,7 +107,11 @@ impl Panel {
             );
         }
         for series in &self.series {
-            let path = self.path(&series.points);
+            let path = if series.class == POINTS {
+                self.dots(&series.points)
+            } else {
+                self.path(&series.points)
+            };
             if !path.is_empty() {
                 let _ = write!(svg, "<path class=\"line {}\" d=\"{path}\"/>", series.class);
             }
@@ -167,6 +174,17 @@ impl Panel {
             svg,
             "<text class=\"label\" transform=\"translate(12 {centre:.1})rotate(-90)\" text-anchor=\"middle\">{label}</text>"
         );
+    }
+
+    /// Lines without length, whose round ends are dots.
+    fn dots(&self, points: &[(f64, f64)]) -> String {
+        let mut path = String::new();
+        for &(x, y) in points {
+            if let (Some(x), Some(y)) = (self.x_at(x), self.y_at(y)) {
+                let _ = write!(path, "M{} {}h0", short(x), short(y));
+            }
+        }
+        path
     }
 
     /// The line's path, with no more points than the eye needs.

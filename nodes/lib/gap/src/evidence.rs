@@ -4,6 +4,7 @@ use cromosim_imu::{Channel, PerChannel, Reading};
 use cromosim_spatial::{Spectrum, Stamp, welch};
 
 use crate::axes::{axes_of_channel, channel_of_axis, value_on_axis};
+use crate::dependence_curves::{DependenceCurve, dependence_curves};
 use crate::findings::Findings;
 use crate::metrics::Comparison;
 
@@ -32,6 +33,8 @@ pub struct Evidence {
     pub spectra: Spectra,
     /// Whitened residual over time.
     pub course: Vec<CoursePoint>,
+    /// What the part that no effect explains depends on, the strongest first.
+    pub dependences: Vec<DependenceCurve>,
 }
 
 /// One-sided densities on common frequencies, (unit)^2/Hz, each `[frequency][axis]`.
@@ -92,6 +95,7 @@ pub(crate) fn collect(
         after: all(after),
         spectra: curves.spectra(before, after),
         course: curves.course(before, after),
+        dependences: dependence_curves(findings, comparison, after),
     }
 }
 

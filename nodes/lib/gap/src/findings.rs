@@ -1,6 +1,6 @@
 //! What the analysis of a placement found, before it is put into numbers and words.
 
-use cromosim_imu::{Channel, EffectKind, EffectSet, PerChannel};
+use cromosim_imu::{Channel, Dependence, EffectKind, EffectSet, PerChannel};
 
 use crate::diagnosis::GapLocation;
 use crate::digital::Digital;
@@ -35,6 +35,8 @@ pub(crate) struct Unknown {
     pub channel: &'static str,
     pub axes: Vec<String>,
     pub depends_on: &'static str,
+    /// What a regression predicts, the strongest first.
+    pub dependences: Vec<ResidualDependence>,
     pub probability: f64,
     /// Part of the rest that regressions predict on held-out time, or, without any, that stands out
     /// of the noise.
@@ -43,6 +45,15 @@ pub(crate) struct Unknown {
     pub confounded_effects: Vec<EffectKind>,
     /// Those that stand beside it.
     pub sound_effects: Vec<EffectKind>,
+}
+
+/// What a channel's rest depends on.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ResidualDependence {
+    pub dependence: Dependence,
+    pub channel: Channel,
+    /// Part of the rest that a regression on it predicts on held-out time.
+    pub share: f64,
 }
 
 impl Findings<'_> {

@@ -10,6 +10,7 @@ mod clock_runs;
 mod coarse_alignment;
 mod confounding;
 mod correlation;
+mod dependence_curves;
 mod diagnose;
 mod diagnosis;
 mod digital;
@@ -56,6 +57,7 @@ mod unknown;
 mod whiten;
 mod words;
 
+pub use dependence_curves::DependenceCurve;
 pub use diagnose::{DiagnoseOptions, OfRecording, PlacementAnswer, diagnose, diagnose_together};
 pub use diagnosis::{
     Cause, ClockJump, Diagnosis, Gap, GapLocation, Interval, KeptCalibration, Metrics,

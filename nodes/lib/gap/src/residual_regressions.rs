@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use cromosim_imu::{Channel, Dependence, Reading};
+use cromosim_spatial::Stamp;
 use nalgebra::Vector3;
 
 use crate::axes::{axes_of_channel, channel_of_axis, value_on_axis};
@@ -182,7 +183,7 @@ fn column(readings: &[Reading], axis: usize, value: impl Fn(&Reading) -> f64) ->
     (axis, readings.iter().map(value).collect())
 }
 
-fn other(channel: Channel) -> Channel {
+pub(crate) fn other(channel: Channel) -> Channel {
     match channel {
         Channel::Accelerometer => Channel::Gyroscope,
         Channel::Gyroscope => Channel::Accelerometer,
@@ -249,20 +250,21 @@ fn curves(readings: &[Reading], axes: Range<usize>) -> Vec<Column> {
     columns
 }
 
+/// Up in the axes of the reference, for each stamp.
+pub(crate) fn up_in_segment(findings: &Findings, stamps: &[Stamp]) -> Vec<Vector3<f64>> {
+    let track = &findings.model.track;
+    let up = |stamp: &Stamp| {
+        let entry = ((*stamp - track.start) * track.rate_hz)
+            .clamp(0.0, (track.len() - 1) as f64)
+            .round() as usize;
+        track.world_from_segment[entry].inverse() * Vector3::z()
+    };
+    stamps.iter().map(up).collect()
+}
+
 /// Up as the sensor sees it.
 fn orientation(findings: &Findings, axes: Range<usize>) -> Vec<Column> {
-    let prepared = findings.model.prepared;
-    let track = &findings.model.track;
-    let up: Vec<Vector3<f64>> = prepared
-        .stamps
-        .iter()
-        .map(|stamp| {
-            let entry = ((*stamp - track.start) * track.rate_hz)
-                .clamp(0.0, (track.len() - 1) as f64)
-                .round() as usize;
-            track.world_from_segment[entry].inverse() * Vector3::z()
-        })
-        .collect();
+    let up = up_in_segment(findings, &findings.model.prepared.stamps);
     let of = |axis: usize, i: usize| (axis, up.iter().map(|up| up[i]).collect());
     axes.flat_map(|axis| (0..3).map(move |i| (axis, i)))
         .map(|(axis, i)| of(axis, i))

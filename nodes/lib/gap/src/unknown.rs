@@ -4,7 +4,7 @@ use cromosim_imu::{Channel, EffectKind, PerChannel, ReadOff, Reading};
 
 use crate::axes::{any, axes_of_channel, larger, value_on_axis};
 use crate::confounding::{Judgement, is_calibration, judged_effects};
-use crate::findings::{Findings, Unknown};
+use crate::findings::{Findings, ResidualDependence, Unknown};
 use crate::fit::{Fit, FitModel};
 use crate::gram::dot;
 use crate::location::{bands, locate, summed_spectrum};
@@ -19,6 +19,9 @@ use crate::prepared::PreparedPlacement;
 use crate::residual_regressions::{ResidualRegression, dependence_name, residual_regressions};
 use crate::search::excess;
 use crate::trace::trace;
+
+/// What is shown of what the rest depends on.
+const MOST_DEPENDENCES: usize = 4;
 
 /// Which fitted effects may be found to be confounded with what is unknown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -85,9 +88,21 @@ pub(crate) fn detect_unmodelled_structure(
         .map(|(name, _)| name.clone())
         .collect();
     let excess = excess(&findings.model, &findings.scored.fit).max(1.0);
-    let predictable = structure.strong.first().map_or(0.5, |regression| {
-        (regression.gain / excess).clamp(0.05, 1.0)
-    });
+    let share = |regression: &ResidualRegression| (regression.gain / excess).clamp(0.05, 1.0);
+    let predictable = structure
+        .strong
+        .first()
+        .map_or(0.5, |regression| share(regression));
+    let dependences = structure
+        .strong
+        .iter()
+        .take(MOST_DEPENDENCES)
+        .map(|regression| ResidualDependence {
+            dependence: regression.dependence,
+            channel: regression.channel,
+            share: share(regression),
+        })
+        .collect();
     let Judgement {
         mut confounded,
         sound,
@@ -107,6 +122,7 @@ pub(crate) fn detect_unmodelled_structure(
         channel: structure.channel(),
         axes,
         depends_on: structure.depends_on(),
+        dependences,
         probability: structure.probability(),
         confounded_effects: confounded,
         sound_effects: sound,

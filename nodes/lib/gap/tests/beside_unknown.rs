@@ -31,3 +31,39 @@ fn what_explains_as_much_as_any_regression_would_stays_a_cause() {
     }
     values_are(&diagnosis, scene.effects.get(K::LeverArm).unwrap());
 }
+
+#[test]
+fn what_the_unknown_part_depends_on_is_shown() {
+    let factor = 0.02;
+    let evidence = answer(&with_squares(&Scene::new(71), factor)).evidence;
+    let curve = evidence
+        .dependences
+        .iter()
+        .find(|curve| curve.depends_on == "angular rate")
+        .unwrap_or_else(|| panic!("{:?}", evidence.dependences));
+    assert!(
+        curve.axis.starts_with("gyro_") && curve.x_label.contains("angular velocity"),
+        "{} over {}",
+        curve.axis,
+        curve.x_label
+    );
+    assert!((0.3..=1.0).contains(&curve.share) && (300..=600).contains(&curve.points.len()));
+    // Scale factors that stand in take the straight part of it: what is left of x |x| bends both ways.
+    let reach = curve
+        .means
+        .iter()
+        .map(|mean| mean.1.abs())
+        .fold(0.0, f64::max);
+    let largest = curve
+        .means
+        .iter()
+        .map(|mean| mean.0.abs())
+        .fold(0.0, f64::max);
+    assert!(
+        reach > 0.1 * factor * largest * largest,
+        "{:?}",
+        curve.means
+    );
+    let calm = answer(&Scene::new(71).record()).evidence;
+    assert_eq!(calm.dependences, [], "nothing is unknown, nothing is shown");
+}

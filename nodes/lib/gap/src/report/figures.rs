@@ -1,10 +1,12 @@
 //! The pictures of one placement: curves of the worst seconds, the residual over time, spectra.
 
-use cromosim_charts::{Axis, Panel, Series};
+use cromosim_charts::text::percent;
+use cromosim_charts::{Axis, POINTS, Panel, Series};
 use cromosim_imu::AXES;
 use cromosim_spatial::Stamp;
 
 use super::text::axis_name;
+use crate::dependence_curves::DependenceCurve;
 use crate::diagnosis::PlacementDiagnosis;
 use crate::evidence::{CoursePoint, Evidence};
 use crate::period::median_period;
@@ -166,6 +168,63 @@ fn left_out(evidence: &Evidence, first: Stamp, window: Window) -> Vec<(&'static 
     }
     stretches.extend(open.map(|(from, to)| ("left-out", from, to)));
     stretches
+}
+
+/// What the rest that no effect explains depends on, a panel each.
+pub(super) fn dependences(evidence: &Evidence) -> Vec<Panel> {
+    let panel = |curve: &DependenceCurve| {
+        let (x, y) = (
+            middle_of(curve, 0.01, |point| point.0),
+            // Readings scatter wider than their means bend.
+            middle_of(curve, 0.15, |point| point.1),
+        );
+        let inside =
+            |point: &&(f64, f64)| (x.0..=x.1).contains(&point.0) && (y.0..=y.1).contains(&point.1);
+        Panel {
+            title: format!(
+                "{}, {} of what is left: {}",
+                axis_name(&curve.axis),
+                percent(curve.share),
+                curve.depends_on
+            ),
+            width: WIDTH,
+            height: 210.0,
+            x: Axis::linear([x.0, x.1].into_iter()),
+            y: Axis::linear([y.0, y.1].into_iter()),
+            x_label: curve.x_label.clone(),
+            y_label: curve.y_label.clone(),
+            shades: Vec::new(),
+            level: Some(0.0),
+            series: vec![
+                Series {
+                    class: POINTS,
+                    points: curve.points.iter().filter(inside).copied().collect(),
+                },
+                Series {
+                    class: "after",
+                    points: curve.means.clone(),
+                },
+            ],
+        }
+    };
+    evidence.dependences.iter().map(panel).collect()
+}
+
+/// From the least to the greatest of the points, a share of them at either end left out, and of all
+/// means.
+fn middle_of(curve: &DependenceCurve, share: f64, of: fn(&(f64, f64)) -> f64) -> (f64, f64) {
+    let mut values: Vec<f64> = curve.points.iter().map(of).collect();
+    values.sort_unstable_by(f64::total_cmp);
+    let cut = (share * values.len() as f64) as usize;
+    let kept = values.get(cut..values.len() - cut).unwrap_or_default();
+    curve
+        .means
+        .iter()
+        .map(of)
+        .chain(kept.iter().copied())
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+            (low.min(value), high.max(value))
+        })
 }
 
 /// The whitened residual over time, one panel a channel; 1 is noise alone.

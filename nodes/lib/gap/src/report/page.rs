@@ -91,6 +91,7 @@ fn write_placement(
         write_curves(page, evidence, window);
         write_course(page, evidence, window);
         write_spectra(page, evidence, placement);
+        write_dependences(page, evidence);
     } else {
         page.push_str("<p class=\"note\">No curves are at hand for this placement.</p>\n");
     }
@@ -175,6 +176,21 @@ fn write_spectra(page: &mut String, evidence: &Evidence, placement: &PlacementDi
     ];
     legend(page, &entries);
     write_panels(page, &panels);
+}
+
+fn write_dependences(page: &mut String, evidence: &Evidence) {
+    let panels = figures::dependences(evidence);
+    if panels.is_empty() {
+        return;
+    }
+    page.push_str("<h3>What the unknown part depends on</h3>\n");
+    let entries = [
+        ("measured", "readings"),
+        ("after", "mean, or slope, of each sixteenth of them"),
+    ];
+    legend(page, &entries);
+    write_panels(page, &panels);
+    page.push_str("<p class=\"note\">Residual after all named causes. Shares: what a regression predicts on held-out time; they overlap and do not add up.</p>\n");
 }
 
 fn write_rest(page: &mut String, placement: &PlacementDiagnosis) {
