@@ -55,6 +55,7 @@ fn only_one_crate_names_each_wire_library() {
         ("ros2-client", "nodes/lib/ros"),
         ("rustdds", "nodes/lib/ros"),
         ("mcap", "nodes/lib/bag"),
+        ("rusqlite", "nodes/lib/bag"),
         ("re_sdk", "nodes/lib/view"),
     ];
     for (folder, manifest) in manifests() {

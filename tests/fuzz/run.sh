@@ -19,6 +19,7 @@ for target in "$@"; do
         datasets) cp tests/fuzz/samples/datasets/* nodes/lib/arrays/tests/data/*.mat nodes/lib/recording/tests/data/broad.mat "$seeds" ;;
         model) cp nodes/lib/body/tests/data/model_* "$seeds" ;;
         poses) find nodes/lib/motion/tests/data/poses nodes/lib/arrays/tests/data -type f -exec cp {} "$seeds" \; ;;
+        bag) cp tests/fuzz/samples/bag/* nodes/lib/bag/tests/data/*.bag nodes/lib/bag/tests/data/sqlite/*.db3 "$seeds" ;;
         bvh | c3d) cp nodes/lib/motion/tests/data/*."$target" "$seeds" ;;
         *) cp tests/fuzz/samples/"$target"/* "$seeds" ;;
     esac

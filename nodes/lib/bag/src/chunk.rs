@@ -80,13 +80,14 @@ fn check(header: &ChunkHeader, records: &[u8]) -> Option<String> {
 }
 
 /// At most `most` bytes, as many as could be unpacked, and what went wrong.
-fn decompress(compression: &str, packed: &[u8], most: u64) -> (Vec<u8>, Option<String>) {
+pub(crate) fn decompress(compression: &str, packed: &[u8], most: u64) -> (Vec<u8>, Option<String>) {
     let mut records = Vec::new();
     let read = match compression {
-        "" => packed.take(most).read_to_end(&mut records),
+        "" | "none" => packed.take(most).read_to_end(&mut records),
         "zstd" => zstd::stream::read::Decoder::with_buffer(packed)
             .and_then(|decoder| drain(decoder, most, &mut records)),
         "lz4" => lz4::Decoder::new(packed).and_then(|decoder| drain(decoder, most, &mut records)),
+        "bz2" => drain(bzip2::read::BzDecoder::new(packed), most, &mut records),
         other => return (records, Some(format!("unknown compression {other:?}"))),
     };
     let fault = read

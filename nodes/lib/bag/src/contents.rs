@@ -199,7 +199,7 @@ impl Contents {
         let file = cromosim_spatial::open_file(path).map_err(io_error(path, "open"))?;
         let mut walker = Walker::new(file)
             .map_err(io_error(path, "read"))?
-            .ok_or_else(|| BagError::NotMcap {
+            .ok_or_else(|| BagError::NotABag {
                 path: path.to_owned(),
             })?;
         let mut contents = Self {

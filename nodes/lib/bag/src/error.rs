@@ -29,10 +29,10 @@ pub enum BagError {
         /// What the operating system said.
         source: io::Error,
     },
-    /// Not an MCAP file at all.
-    #[error("{}: not an MCAP file: it does not start with the MCAP magic bytes", path.display())]
-    NotMcap {
-        /// The MCAP file.
+    /// Not a bag at all.
+    #[error("{}: not a bag: it starts neither as MCAP nor as SQLite nor as a bag of ROS 1 does", path.display())]
+    NotABag {
+        /// The file.
         path: PathBuf,
     },
     /// The file ends too early: a recorder was killed, or the file was cut.
@@ -55,8 +55,32 @@ pub enum BagError {
         /// What is wrong with it.
         reason: String,
     },
+    /// A file that `recover` does not know.
+    #[error("{}: not an MCAP file, and no others are recovered; `sqlite3 FILE .recover` mends SQLite files, `rosbag reindex` of ROS 1 its own", path.display())]
+    NotRecoverable {
+        /// The file.
+        path: PathBuf,
+    },
+    /// An SQLite file that is damaged, or no bag.
+    #[error("{}: cannot be read as a bag: {reason}", path.display())]
+    Database {
+        /// The `.db3` file.
+        path: PathBuf,
+        /// What SQLite said.
+        reason: String,
+    },
+    /// A bag of ROS 1 that is cut or damaged.
+    #[error("{}, byte {at}: {reason}; `rosbag reindex` of ROS 1 mends bags that were cut", path.display())]
+    Ros1 {
+        /// The `.bag` file.
+        path: PathBuf,
+        /// Start of the record.
+        at: u64,
+        /// What is wrong with it.
+        reason: String,
+    },
     /// A bag directory without its table of contents.
-    #[error("{}: no metadata.yaml in this directory; where it holds .mcap files, `cromosim bag recover {}` makes it anew", path.display(), path.display())]
+    #[error("{}: no metadata.yaml in this directory; where it holds .mcap files, `cromosim bag recover {}` makes it anew; give a .db3 file itself", path.display(), path.display())]
     NoMetadata {
         /// Where `metadata.yaml` should be.
         path: PathBuf,
@@ -70,7 +94,7 @@ pub enum BagError {
         reason: String,
     },
     /// A bag of a kind that this crate does not read.
-    #[error("{}: {what} is not supported, only MCAP bags without file compression", path.display())]
+    #[error("{}: {what} is not supported, only MCAP and sqlite3, as they are or compressed by zstd", path.display())]
     Unsupported {
         /// As the user named it.
         path: PathBuf,

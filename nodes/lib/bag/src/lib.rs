@@ -1,4 +1,4 @@
-//! Bags: recordings of ROS 2 messages as rosbag2 lays them out in MCAP files.
+//! Bags: recordings of ROS 2 messages as rosbag2 lays them out in MCAP and SQLite files, and those of ROS 1.
 //!
 //! - [`BagWriter`] writes a file or a directory; [`StreamWriter`] writes into anything.
 //! - [`BagReader`] lists and reads them, in order of log time.
@@ -15,11 +15,16 @@ mod chunk;
 mod contents;
 mod csv;
 mod error;
+mod mcap_messages;
 mod metadata;
+mod packed;
 mod qos;
 mod reader;
 mod recover;
 mod resync;
+mod ros1;
+mod sqlite;
+mod stored;
 mod stream;
 mod summary;
 mod topic;
@@ -32,6 +37,7 @@ pub use error::BagError;
 pub use qos::{QosProfile, QosTime};
 pub use reader::{BagReader, Message, Messages, Selection};
 pub use recover::{Damage, Recovery, recover, recover_over};
+pub use stored::starts_like_bag;
 pub use stream::{Compression, StreamWriter, TopicId, payload_of};
 pub use summary::{BagSummary, CountedTopic};
 pub use topic::Topic;

@@ -149,10 +149,28 @@ struct ReadInformation {
     relative_file_paths: Vec<String>,
     #[serde(default)]
     compression_mode: String,
+    #[serde(default)]
+    compression_format: String,
 }
 
-/// The MCAP files of a bag directory, in the order of its `metadata.yaml`.
-pub(crate) fn files_of(directory: &Path) -> Result<Vec<PathBuf>, BagError> {
+/// The files of a bag, and whether each is packed as a whole.
+pub(crate) struct Listed {
+    pub(crate) files: Vec<PathBuf>,
+    pub(crate) files_are_packed: bool,
+}
+
+impl Listed {
+    /// A file by itself.
+    pub(crate) fn alone(path: &Path) -> Self {
+        Self {
+            files: vec![path.to_owned()],
+            files_are_packed: false,
+        }
+    }
+}
+
+/// The files of a bag directory, in the order of its `metadata.yaml`.
+pub(crate) fn files_of(directory: &Path) -> Result<Listed, BagError> {
     let path = directory.join("metadata.yaml");
     let text = match cromosim_spatial::read_text(&path) {
         Ok(text) => text,
@@ -172,17 +190,24 @@ pub(crate) fn files_of(directory: &Path) -> Result<Vec<PathBuf>, BagError> {
             });
         }
     };
-    if information.storage_identifier != "mcap" {
-        return Err(BagError::Unsupported {
-            path,
-            what: format!("storage {:?}", information.storage_identifier),
-        });
+    let unsupported = |what: String| BagError::Unsupported {
+        path: path.clone(),
+        what,
+    };
+    if !["mcap", "sqlite3"].contains(&information.storage_identifier.as_str()) {
+        let storage = &information.storage_identifier;
+        return Err(unsupported(format!("storage {storage:?}")));
     }
-    if information.compression_mode.eq_ignore_ascii_case("file") {
-        return Err(BagError::Unsupported {
-            path,
-            what: "compression of whole files".to_owned(),
-        });
+    let mode = information.compression_mode.to_ascii_lowercase();
+    let (is_packed, files_are_packed) = match mode.as_str() {
+        "" | "none" => (false, false),
+        "file" => (true, true),
+        "message" => (true, false),
+        other => return Err(unsupported(format!("compression mode {other:?}"))),
+    };
+    let format = &information.compression_format;
+    if is_packed && format != "zstd" {
+        return Err(unsupported(format!("compression format {format:?}")));
     }
     let mut files = Vec::with_capacity(information.relative_file_paths.len());
     for relative in information.relative_file_paths {
@@ -198,5 +223,8 @@ pub(crate) fn files_of(directory: &Path) -> Result<Vec<PathBuf>, BagError> {
             }
         }
     }
-    Ok(files)
+    Ok(Listed {
+        files,
+        files_are_packed,
+    })
 }

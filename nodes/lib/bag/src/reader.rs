@@ -1,28 +1,29 @@
 //! Reading bags.
 
-use std::cmp::Reverse;
-use std::collections::{BTreeMap, BinaryHeap, VecDeque};
-use std::fs::File;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use cromosim_msgs::RosMessage;
 use cromosim_spatial::Stamp;
+use tempfile::TempPath;
 
 use crate::cdr;
-use crate::chunk::inner_records;
-use crate::contents::{ChunkAt, Contents, LooseMessage, MessageHead};
-use crate::error::{BagError, io_error};
-use crate::metadata::files_of;
+use crate::error::BagError;
+use crate::metadata::{Listed, files_of};
+use crate::packed::{unpacked, unpacked_file};
+use crate::stored::{StoredFile, StoredMessages};
 use crate::summary::BagSummary;
 use crate::topic::Topic;
-use crate::walk::{Attachment, Fields, RecordAt, Walker, op, stamp};
+use crate::walk::Attachment;
 
-/// A bag opened for reading: an MCAP file, or a rosbag2 directory of them.
+/// A bag opened for reading: an MCAP or SQLite file, a rosbag2 directory of them, or a bag of ROS 1.
 #[derive(Debug)]
 pub struct BagReader {
     path: PathBuf,
-    files: Vec<Contents>,
+    files: Vec<StoredFile>,
+    /// Files that were packed as a whole, as long as they are read.
+    _temporary: Vec<TempPath>,
     summary: BagSummary,
 }
 
@@ -46,12 +47,11 @@ impl Selection {
         }
     }
 
-    fn has_time(&self, log_time: u64) -> bool {
-        let time = stamp(log_time);
+    pub(crate) fn has_time(&self, time: Stamp) -> bool {
         self.from.is_none_or(|from| time >= from) && self.until.is_none_or(|until| time < until)
     }
 
-    fn has_topic(&self, name: &str) -> bool {
+    pub(crate) fn has_topic(&self, name: &str) -> bool {
         self.topics
             .as_ref()
             .is_none_or(|topics| topics.iter().any(|topic| topic == name))
@@ -104,23 +104,32 @@ impl BagReader {
     ///
     /// # Errors
     /// [`BagError::Unfinished`] and [`BagError::Corrupt`] with the byte where reading ended,
-    /// [`BagError::NotMcap`], [`BagError::NoMetadata`], [`BagError::Metadata`],
+    /// [`BagError::NotABag`], [`BagError::NoMetadata`], [`BagError::Metadata`],
     /// [`BagError::Unsupported`], [`BagError::Io`].
     pub fn open(path: &Path) -> Result<Self, BagError> {
-        let paths = if path.is_dir() {
+        let listed = if path.is_dir() {
             files_of(path)?
         } else {
-            vec![path.to_owned()]
+            Listed::alone(path)
         };
-        let files = paths
-            .iter()
-            .map(|file| Contents::read(file))
-            .collect::<Result<Vec<_>, _>>()?;
+        let mut temporary = Vec::new();
+        let mut files = Vec::with_capacity(listed.files.len());
+        for file in &listed.files {
+            files.push(if listed.files_are_packed {
+                let whole = unpacked_file(file)?;
+                let stored = StoredFile::open(&whole)?;
+                temporary.push(whole);
+                stored
+            } else {
+                StoredFile::open(file)?
+            });
+        }
         let mut summary = BagSummary::default();
-        files.iter().for_each(|file| summary.add(&file.summary));
+        files.iter().for_each(|file| summary.add(file.summary()));
         Ok(Self {
             path: path.to_owned(),
             files,
+            _temporary: temporary,
             summary,
         })
     }
@@ -139,16 +148,7 @@ impl BagReader {
                 })
             })
         };
-        for contents in &mut self.files {
-            for (channel, topic) in &mut contents.channels.topics {
-                match inside(topic) {
-                    Some(seen) => *topic = seen,
-                    None => {
-                        contents.hidden.insert(*channel);
-                    }
-                }
-            }
-        }
+        self.files.iter_mut().for_each(|file| file.see(&inside));
         self.summary.topics.retain_mut(|counted| {
             let seen = inside(&counted.topic);
             seen.map(|topic| counted.topic = topic).is_some()
@@ -192,7 +192,7 @@ impl BagReader {
 
     /// The attachments of all files, in their order.
     pub fn attachments(&self) -> impl Iterator<Item = &Attachment> {
-        self.files.iter().flat_map(|file| &file.attachments)
+        self.files.iter().flat_map(StoredFile::attachments)
     }
 
     /// The content of the last attachment of this name.
@@ -207,7 +207,7 @@ impl BagReader {
     pub fn metadata_records(&self) -> impl Iterator<Item = (&str, &BTreeMap<String, String>)> {
         self.files
             .iter()
-            .flat_map(|file| &file.metadata)
+            .flat_map(StoredFile::metadata)
             .map(|(name, values)| (name.as_str(), values))
     }
 
@@ -232,7 +232,7 @@ impl BagReader {
         let files = self
             .files
             .iter()
-            .map(|contents| FileMessages::new(contents, selection))
+            .map(|file| file.messages(selection))
             .collect::<Result<_, _>>()?;
         Ok(Messages {
             files,
@@ -258,7 +258,7 @@ impl BagReader {
 
 /// Iterates over the messages of a bag: see [`BagReader::messages`].
 pub struct Messages<'a> {
-    files: Vec<FileMessages<'a>>,
+    files: Vec<StoredMessages<'a>>,
     failed: bool,
 }
 
@@ -269,7 +269,7 @@ impl Iterator for Messages<'_> {
         if self.failed {
             return None;
         }
-        let mut earliest: Option<(u64, usize)> = None;
+        let mut earliest: Option<(Stamp, usize)> = None;
         for (index, file) in self.files.iter_mut().enumerate() {
             match file.peek_time() {
                 Err(error) => {
@@ -282,166 +282,9 @@ impl Iterator for Messages<'_> {
                 Ok(_) => {}
             }
         }
-        self.files.get_mut(earliest?.1)?.pop().map(Ok)
-    }
-}
-
-/// A message read ahead, ordered by log time and then by place in the file.
-struct Ahead {
-    order: (u64, u64, usize),
-    message: Message,
-}
-
-impl PartialEq for Ahead {
-    fn eq(&self, other: &Self) -> bool {
-        self.order == other.order
-    }
-}
-impl Eq for Ahead {}
-impl PartialOrd for Ahead {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Ahead {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        self.order.cmp(&other.order)
-    }
-}
-
-/// A stretch of the file that is read in one go.
-enum Stretch {
-    Chunk(ChunkAt),
-    Loose(LooseMessage),
-}
-
-impl Stretch {
-    /// No message in the stretch is earlier.
-    fn start_time(&self) -> u64 {
-        match self {
-            Self::Chunk(chunk) => chunk.start_time,
-            Self::Loose(message) => message.log_time,
-        }
-    }
-
-    fn record(&self) -> RecordAt {
-        match self {
-            Self::Chunk(chunk) => chunk.record,
-            Self::Loose(message) => message.record,
-        }
-    }
-}
-
-/// The messages of one file: stretches are loaded when their time comes.
-struct FileMessages<'a> {
-    contents: &'a Contents,
-    selection: Selection,
-    walker: Walker<File>,
-    stretches: VecDeque<Stretch>,
-    ahead: BinaryHeap<Reverse<Ahead>>,
-}
-
-impl<'a> FileMessages<'a> {
-    fn new(contents: &'a Contents, selection: &Selection) -> Result<Self, BagError> {
-        let path = &contents.path;
-        let file = cromosim_spatial::open_file(path).map_err(io_error(path, "open"))?;
-        let walker = Walker::new(file)
-            .map_err(io_error(path, "read"))?
-            .ok_or_else(|| BagError::NotMcap { path: path.clone() })?;
-        let outside = |start: u64, end: u64| {
-            selection.until.is_some_and(|until| stamp(start) >= until)
-                || selection.from.is_some_and(|from| stamp(end) < from)
-        };
-        let chunks = contents
-            .chunks
-            .iter()
-            .filter(|chunk| !outside(chunk.start_time, chunk.end_time))
-            .map(|&chunk| Stretch::Chunk(chunk));
-        let loose = contents
-            .loose
-            .iter()
-            .filter(|message| selection.has_time(message.log_time))
-            .map(|&message| Stretch::Loose(message));
-        let mut stretches: Vec<Stretch> = chunks.chain(loose).collect();
-        stretches.sort_by_key(|stretch| (stretch.start_time(), stretch.record().start));
-        Ok(Self {
-            contents,
-            selection: selection.clone(),
-            walker,
-            stretches: stretches.into(),
-            ahead: BinaryHeap::new(),
-        })
-    }
-
-    /// Log time of the next message, once everything that could come before it is loaded.
-    fn peek_time(&mut self) -> Result<Option<u64>, BagError> {
-        while let Some(stretch) = self.stretches.front() {
-            if self
-                .ahead
-                .peek()
-                .is_some_and(|Reverse(next)| next.order.0 < stretch.start_time())
-            {
-                break;
-            }
-            if let Some(stretch) = self.stretches.pop_front() {
-                self.load(&stretch)?;
-            }
-        }
-        Ok(self.ahead.peek().map(|Reverse(next)| next.order.0))
-    }
-
-    fn pop(&mut self) -> Option<Message> {
-        self.ahead.pop().map(|Reverse(next)| next.message)
-    }
-
-    fn load(&mut self, stretch: &Stretch) -> Result<(), BagError> {
-        let record = stretch.record();
-        match *stretch {
-            Stretch::Loose(_) => {
-                let body = self
-                    .walker
-                    .read_body(record, u64::MAX)
-                    .map_err(io_error(&self.contents.path, "read"))?;
-                self.take(&body, record, 0)
-            }
-            Stretch::Chunk(chunk) => {
-                let records = self.contents.unpack(chunk, &mut self.walker)?;
-                let messages = inner_records(&records).filter(|inner| inner.opcode == op::MESSAGE);
-                messages
-                    .enumerate()
-                    .try_for_each(|(index, inner)| self.take(inner.body, record, index))
-            }
-        }
-    }
-
-    fn take(&mut self, body: &[u8], record: RecordAt, index: usize) -> Result<(), BagError> {
-        let corrupt = |reason: String| BagError::Corrupt {
-            path: self.contents.path.clone(),
-            at: record.start,
-            reason,
-        };
-        let mut fields = Fields(body);
-        let head = MessageHead::take(&mut fields)
-            .ok_or_else(|| corrupt("a message without a whole header".to_owned()))?;
-        if self.contents.hidden.contains(&head.channel) {
-            return Ok(());
-        }
-        let topic = self.contents.channels.topics.get(&head.channel);
-        let topic = topic
-            .ok_or_else(|| corrupt(format!("a message of the unknown channel {}", head.channel)))?;
-        if self.selection.has_time(head.log_time) && self.selection.has_topic(&topic.name) {
-            let message = Message {
-                topic: Arc::clone(topic),
-                sequence: head.sequence,
-                log_time: stamp(head.log_time),
-                publish_time: stamp(head.publish_time),
-                payload: fields.0.to_vec(),
-            };
-            self.ahead.push(Reverse(Ahead {
-                order: (head.log_time, record.start, index),
-                message,
-            }));
-        }
-        Ok(())
+        let message = self.files.get_mut(earliest?.1)?.pop().transpose()?;
+        let message = message.and_then(unpacked);
+        self.failed = message.is_err();
+        Some(message)
     }
 }

@@ -71,7 +71,7 @@ impl Recovery {
 /// complete.
 ///
 /// # Errors
-/// [`BagError::NotMcap`] where not even the start of a bag is there, [`BagError::NoMetadata`] for a
+/// [`BagError::NotRecoverable`] where not even the start of a bag is there, [`BagError::NoMetadata`] for a
 /// directory without `.mcap` files, [`BagError::Exists`] where `output` is another bag,
 /// [`BagError::Io`].
 pub fn recover(path: &Path, output: &Path) -> Result<Recovery, BagError> {
@@ -158,7 +158,7 @@ fn recover_file(path: &Path, output: &Path) -> Result<Recovery, BagError> {
     let input = cromosim_spatial::open_file(path).map_err(io_error(path, "open"))?;
     let mut walker = Walker::new(input)
         .map_err(io_error(path, "read"))?
-        .ok_or_else(|| BagError::NotMcap {
+        .ok_or_else(|| BagError::NotRecoverable {
             path: path.to_owned(),
         })?;
     let (file, temporary) = temporary(output)
@@ -213,7 +213,7 @@ fn preview(path: &Path) -> Result<Preview, BagError> {
     let (mut compression, mut channels) = (None, Channels::default());
     let mut loose_messages = false;
     let Some(mut walker) = Walker::new(input).map_err(io_error(path, "read"))? else {
-        return Err(BagError::NotMcap {
+        return Err(BagError::NotRecoverable {
             path: path.to_owned(),
         });
     };

@@ -6,8 +6,8 @@ use cromosim_msgs::{MessageType, RosMessage, known_type};
 
 use crate::qos::QosProfile;
 
-const QOS_KEY: &str = "offered_qos_profiles";
-const HASH_KEY: &str = "topic_type_hash";
+pub(crate) const QOS_KEY: &str = "offered_qos_profiles";
+pub(crate) const HASH_KEY: &str = "topic_type_hash";
 
 /// A topic: its name, its type and how its messages are encoded. One channel of an MCAP file.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]

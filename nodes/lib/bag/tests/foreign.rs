@@ -162,12 +162,11 @@ fn errors_name_the_file_and_what_is_wrong() {
             .ends_with("absent.mcap: cannot open: No such file or directory (os error 2)")
     );
     fs::write(at("text.mcap"), "HIERARCHY\nROOT Hips\n").unwrap();
-    assert!(
-        message("text.mcap")
-            .ends_with("text.mcap: not an MCAP file: it does not start with the MCAP magic bytes")
-    );
+    assert!(message("text.mcap").ends_with(
+        "text.mcap: not a bag: it starts neither as MCAP nor as SQLite nor as a bag of ROS 1 does"
+    ));
     fs::write(at("zero.mcap"), "").unwrap();
-    assert!(message("zero.mcap").contains("not an MCAP file"));
+    assert!(message("zero.mcap").contains("not a bag"));
     for (folder, metadata, expected) in [
         (
             "yaml",
@@ -180,9 +179,9 @@ fn errors_name_the_file_and_what_is_wrong() {
             "relative_file_paths",
         ),
         (
-            "sqlite",
-            "rosbag2_bagfile_information:\n  storage_identifier: sqlite3\n  relative_file_paths: []\n",
-            "storage \"sqlite3\" is not supported",
+            "storage",
+            "rosbag2_bagfile_information:\n  storage_identifier: my_storage\n  relative_file_paths: []\n",
+            "storage \"my_storage\" is not supported",
         ),
         (
             "gone",

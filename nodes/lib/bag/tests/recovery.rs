@@ -357,7 +357,7 @@ fn no_damage_makes_reading_or_mending_panic() {
                     BagReader::open(&mended).unwrap().summary(),
                     &recovery.summary
                 ),
-                Err(error) => assert!(matches!(error, BagError::NotMcap { .. }), "{error}"),
+                Err(error) => assert!(matches!(error, BagError::NotRecoverable { .. }), "{error}"),
             }
         }
     }

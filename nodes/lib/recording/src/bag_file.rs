@@ -3,25 +3,26 @@
 use std::io::Read;
 use std::path::Path;
 
-use cromosim_bag::{BagOptions, BagWriter, Compression};
+use cromosim_bag::{BagOptions, BagWriter, Compression, starts_like_bag};
 
 use crate::datasets::{DatasetFiles, open_dataset};
 use crate::rigid::{RigidContent, parse_rigid};
 use crate::trace::{PlacementTrace, first_stamp, seconds_to_first_stamp, write_traces};
 use crate::{RecordingError, read_whole};
 
-/// How an MCAP file begins.
-pub(crate) const MCAP_MAGIC: [u8; 5] = *b"\x89MCAP";
+/// Enough of a file to know a bag by.
+const HEAD_BYTES: u64 = 16;
 
-/// Whether the path is a bag by its content: a directory, or a file that begins as MCAP does. What
-/// cannot be read counts as a bag, so that opening it says why.
+/// Whether the path is a bag by its content: a directory, or a file that begins as MCAP, SQLite or a
+/// bag of ROS 1 does. What cannot be read counts as a bag, so that opening it says why.
 pub fn is_bag(path: &Path) -> bool {
-    let mut magic = [0; MCAP_MAGIC.len()];
-    !path.is_file()
-        || cromosim_spatial::open_file(path)
-            .and_then(|mut file| file.read_exact(&mut magic))
-            .is_err()
-        || magic == MCAP_MAGIC
+    if !path.is_file() {
+        return true;
+    }
+    let mut head = Vec::new();
+    let read = cromosim_spatial::open_file(path)
+        .and_then(|file| file.take(HEAD_BYTES).read_to_end(&mut head));
+    read.is_err() || head.is_empty() || starts_like_bag(&head)
 }
 
 /// Writes a data set's recording, a trajectory or an IMU series as the bag `out`; false where the

@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 use std::path::Path;
 use std::sync::Arc;
 
-use cromosim_bag::BagReader;
+use cromosim_bag::{BagReader, starts_like_bag};
 use cromosim_body::{BodyModel, Gender, ShapeSpace, ShapedBody};
 use cromosim_motion::{
     MotionError, MotionFormat, MotionOptions, PoseAxes, PoseFile, PoseFormat, PoseTrack, PoseView,
@@ -15,7 +15,7 @@ use nalgebra::Vector3;
 
 use crate::datasets::{DatasetFiles, DatasetFormat, DatasetRecording, open_dataset};
 use crate::rigid::{RigidContent, RigidFormat, parse_rigid, sniff_rigid};
-use crate::{MCAP_MAGIC, RecordingError, read_head, read_whole};
+use crate::{RecordingError, read_head, read_whole};
 
 /// What a file holds.
 #[derive(Debug)]
@@ -130,7 +130,7 @@ pub fn inspect(
         return Ok(Inspection::Bag(BagReader::open(path)?));
     }
     let head = read_head(path)?;
-    if head.starts_with(&MCAP_MAGIC) {
+    if starts_like_bag(&head) {
         return Ok(Inspection::Bag(BagReader::open(path)?));
     }
     if head.is_empty() {

@@ -40,7 +40,6 @@ mod simulation;
 mod static_readings;
 mod trace;
 
-pub(crate) use bag_file::MCAP_MAGIC;
 pub use bag_file::{is_bag, write_as_bag};
 pub use body::body_for_bag;
 pub use error::RecordingError;

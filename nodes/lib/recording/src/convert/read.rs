@@ -2,13 +2,14 @@
 
 use std::path::Path;
 
+use cromosim_bag::starts_like_bag;
 use cromosim_body::BodyModel;
 use cromosim_motion::{MotionFormat, read_motion_for};
 
 use super::{Content, Read, ReadOptions, Target, bag_topic, dataset};
 use crate::datasets::open_dataset;
 use crate::rigid::{RigidContent, parse_rigid, sniff_rigid};
-use crate::{MCAP_MAGIC, RecordingError, read_head, read_whole};
+use crate::{RecordingError, read_head, read_whole};
 
 /// Reads whatever the file is; of a bag and of a data set what `target` can hold.
 ///
@@ -24,11 +25,11 @@ pub fn read_content(
         problem,
     };
     let head = if path.is_dir() {
-        MCAP_MAGIC.to_vec()
+        Vec::new()
     } else {
         read_head(path)?
     };
-    if head.starts_with(&MCAP_MAGIC) {
+    if path.is_dir() || starts_like_bag(&head) {
         refuse_dataset_settings(path, options)?;
         let read = bag_topic::read(path, options, target)?;
         refuse_motion_settings(path, &read.content, options)?;
