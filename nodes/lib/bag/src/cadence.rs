@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use cromosim_spatial::Stamp;
 
 use crate::error::BagError;
-use crate::reader::{BagReader, Message, Selection};
+use crate::message::{Message, Selection};
+use crate::reader::BagReader;
 use crate::topic::Topic;
 
 /// Intervals from which on something is missing, in median intervals.

@@ -6,7 +6,8 @@ use std::path::Path;
 use cromosim_msgs::sensor_msgs::Imu;
 
 use crate::error::{BagError, io_error};
-use crate::reader::{BagReader, Selection};
+use crate::message::Selection;
+use crate::reader::BagReader;
 
 /// The first line of the file: time, world from sensor, rad/s, m/s2.
 const COLUMNS: &str = "stamp_ns,orientation_x,orientation_y,orientation_z,orientation_w,angular_velocity_x,angular_velocity_y,\

@@ -10,7 +10,7 @@ use cromosim_spatial::Stamp;
 use crate::chunk::inner_records;
 use crate::contents::{ChunkAt, Contents, LooseMessage, MessageHead};
 use crate::error::{BagError, io_error};
-use crate::reader::{Message, Selection};
+use crate::message::{Message, Selection};
 use crate::walk::{Fields, RecordAt, Walker, op, stamp};
 
 /// A message read ahead, ordered by log time and then by place in the file.

@@ -7,7 +7,7 @@ use tempfile::TempPath;
 
 use crate::chunk::decompress;
 use crate::error::{BagError, io_error};
-use crate::reader::Message;
+use crate::message::Message;
 use crate::walk::LARGEST_RECORD;
 
 /// How a Zstandard frame begins. CDR begins with a zero.

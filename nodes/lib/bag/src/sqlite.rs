@@ -12,7 +12,7 @@ use cromosim_spatial::Stamp;
 use rusqlite::{Connection, OpenFlags, Row};
 
 use crate::error::BagError;
-use crate::reader::{Message, Selection};
+use crate::message::{Message, Selection};
 use crate::summary::BagSummary;
 use crate::topic::{HASH_KEY, QOS_KEY, Topic};
 

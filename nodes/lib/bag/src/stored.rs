@@ -10,7 +10,7 @@ use cromosim_spatial::Stamp;
 use crate::contents::Contents;
 use crate::error::{BagError, io_error};
 use crate::mcap_messages::FileMessages;
-use crate::reader::{Message, Selection};
+use crate::message::{Message, Selection};
 use crate::ros1::{MAGIC as ROS1_MAGIC, Ros1File, Ros1Messages};
 use crate::sqlite::{MAGIC as SQLITE_MAGIC, SqliteFile, SqliteMessages};
 use crate::summary::BagSummary;

@@ -88,21 +88,10 @@ pub(crate) fn detect_unmodelled_structure(
         .map(|(name, _)| name.clone())
         .collect();
     let excess = excess(&findings.model, &findings.scored.fit).max(1.0);
-    let share = |regression: &ResidualRegression| (regression.gain / excess).clamp(0.05, 1.0);
-    let predictable = structure
-        .strong
+    let dependences = structure.dependences(excess);
+    let predictable = dependences
         .first()
-        .map_or(0.5, |regression| share(regression));
-    let dependences = structure
-        .strong
-        .iter()
-        .take(MOST_DEPENDENCES)
-        .map(|regression| ResidualDependence {
-            dependence: regression.dependence,
-            channel: regression.channel,
-            share: share(regression),
-        })
-        .collect();
+        .map_or(0.5, |dependence| dependence.share);
     let Judgement {
         mut confounded,
         sound,
@@ -185,6 +174,19 @@ impl<'a> Structure<'a> {
         } else {
             "time"
         }
+    }
+
+    /// What the strongest regressions are on, and what each predicts of the excess, nats.
+    fn dependences(&self, excess: f64) -> Vec<ResidualDependence> {
+        self.strong
+            .iter()
+            .take(MOST_DEPENDENCES)
+            .map(|regression| ResidualDependence {
+                dependence: regression.dependence,
+                channel: regression.channel,
+                share: (regression.gain / excess).clamp(0.05, 1.0),
+            })
+            .collect()
     }
 
     fn channel(&self) -> &'static str {

@@ -17,7 +17,7 @@ use self::definition::{Definition, Field};
 use self::records::{Header, RecordAt, Records, inner_records, op};
 use crate::chunk::decompress;
 use crate::error::{BagError, io_error};
-use crate::reader::{Message, Selection};
+use crate::message::{Message, Selection};
 use crate::summary::BagSummary;
 use crate::topic::Topic;
 use crate::walk::LARGEST_RECORD;
