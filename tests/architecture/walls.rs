@@ -56,6 +56,7 @@ fn only_one_crate_names_each_wire_library() {
         ("rustdds", "nodes/lib/ros"),
         ("mcap", "nodes/lib/bag"),
         ("rusqlite", "nodes/lib/bag"),
+        ("parquet", "nodes/lib/recording"),
         ("re_sdk", "nodes/lib/view"),
     ];
     for (folder, manifest) in manifests() {

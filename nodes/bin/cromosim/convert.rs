@@ -26,10 +26,10 @@ const DATA_SETS: &str = "Of a data set";
 pub struct Arguments {
     /// A motion, a trajectory, an IMU series, a data set's recording or a bag
     ///
-    /// Trajectories are TUM, EuRoC or CSV, IMU series EuRoC or CSV, data sets BROAD, TotalCapture,
+    /// Trajectories are TUM, EuRoC or CSV, IMU series EuRoC, CSV or Parquet, data sets BROAD, TotalCapture,
     /// PAMAP2, RealWorld, phone and watch; the file's content tells
     input: PathBuf,
-    /// What to write: .npz, .bvh, .trc, .tum or .txt, .csv, .mcap
+    /// What to write: .npz, .bvh, .trc, .tum or .txt, .csv, .parquet, .mcap
     ///
     /// The ending decides where --to does not
     out: PathBuf,
@@ -125,6 +125,10 @@ impl ValueEnum for Format {
             Target::Tum => ("tum", "TUM trajectory"),
             Target::Euroc => ("euroc", "EuRoC/ASL ground truth, or IMU file"),
             Target::Csv => ("csv", "Table with a header: poses, or readings"),
+            Target::Columns => (
+                "parquet",
+                "Columns of readings, for pandas, polars, DuckDB and others",
+            ),
             Target::Bag => (
                 "bag",
                 "rosbag2 MCAP with /reference/NAME and /imu/NAME/data_raw; of a motion /smpl/pose with its confidence",

@@ -33,6 +33,8 @@ mod progress;
 mod reference;
 mod simulate;
 mod simulate_arguments;
+mod simulate_setup;
+mod simulated_file;
 mod simulated_quality;
 mod summary;
 mod train;

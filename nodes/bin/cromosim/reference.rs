@@ -18,8 +18,8 @@ use rayon::prelude::*;
 use crate::files::refuse_existing;
 use crate::output::say;
 use crate::progress::{self, Interrupt};
-use crate::simulate::read_mapping;
 use crate::simulate_arguments::Arguments;
+use crate::simulate_setup::read_mapping;
 use crate::simulated_quality::{quality_entries, quality_line, unlikely, warn};
 
 /// Runs `simulate --reference RECORDING`.

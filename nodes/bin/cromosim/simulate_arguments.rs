@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use anyhow::{Context, bail};
-use clap::Args;
+use clap::{Args, ValueEnum};
 use cromosim_imu::{Differentiation, MAX_RATE_HZ, Scheme, TextureSegment, Trim};
 use cromosim_recording::TextureOn;
 use cromosim_recording::convert::ReadOptions;
@@ -58,11 +58,14 @@ pub struct Arguments {
     /// As a diagnosis writes them, rather than the nominal simulation
     #[arg(long, value_name = "FILE", help_heading = SENSORS)]
     pub effects: Option<PathBuf>,
-    /// The bag to write: .mcap, or a rosbag2 directory
+    /// The bag to write: .mcap, or a rosbag2 directory; or columns: .parquet
     ///
-    /// With several motions a directory for one .mcap each
+    /// With several motions a directory for one file each
     #[arg(long, value_name = "OUT")]
     pub out: PathBuf,
+    /// What to write of motion files: bag or parquet; default: as OUT ends
+    #[arg(long, value_enum, value_name = "FORMAT", hide_possible_values = true)]
+    format: Option<Format>,
     /// Where on the body the sensors are (YAML); default: five places
     ///
     /// Without, left_wrist, right_ankle, pelvis, sternum and head; of motion files
@@ -165,6 +168,25 @@ pub struct Arguments {
     pub mapping: Option<PathBuf>,
 }
 
+/// What is written of a motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// A rosbag2 MCAP
+    Bag,
+    /// Readings in columns, for pandas, polars, DuckDB and others
+    Parquet,
+}
+
+impl Format {
+    /// How its files' names end.
+    pub const fn ending(self) -> &'static str {
+        match self {
+            Self::Bag => "mcap",
+            Self::Parquet => "parquet",
+        }
+    }
+}
+
 /// The default of `--trim`.
 const AUTO: &str = "auto";
 
@@ -191,6 +213,17 @@ impl Mode<'_> {
 }
 
 impl Arguments {
+    /// The format that is given, or that OUT's ending says.
+    pub fn format(&self) -> Format {
+        let ending = self.out.extension().unwrap_or_default();
+        let said = if ending.eq_ignore_ascii_case(Format::Parquet.ending()) {
+            Format::Parquet
+        } else {
+            Format::Bag
+        };
+        self.format.unwrap_or(said)
+    }
+
     /// The mode, where the numbers are sound and every option is one that the mode takes.
     ///
     /// # Errors
@@ -241,6 +274,13 @@ impl Arguments {
                 "--placement {given}: expected NAME=SITE, such as left_wrist=left_watch; `cromosim body sites` lists the sites"
             );
         }
+        if mode != Mode::Motions && self.format() == Format::Parquet {
+            bail!(
+                "{}: {} writes a bag, which `cromosim convert` makes columns of; give a name in .mcap",
+                self.out.display(),
+                mode.name()
+            );
+        }
         self.refuse_rivals()?;
         if matches!(mode, Mode::Rigid(_)) && self.rate.is_none() {
             bail!("--rigid needs --rate HZ: the messages of the IMU per second");
@@ -261,6 +301,9 @@ impl Arguments {
         }
         if self.texture.is_some() && self.learned.is_some() {
             bail!("--learned corrects what --texture draws anew; leave one out");
+        }
+        if self.csv.is_some() && self.format() == Format::Parquet {
+            bail!("--csv is made of a bag, and a Parquet file has these columns; leave it out");
         }
         if self.device.is_some() && self.effects.is_some() {
             bail!("--device and --effects both say what errs; give one of them");
@@ -338,6 +381,7 @@ impl Arguments {
         };
         let mut given = Vec::from_iter(motion.motion_setting(true).map(|it| (it, MOTION_FILES)));
         let options = [
+            (self.format.is_some(), "--format", MOTION_FILES),
             (self.placements.is_some(), "--placements", MOTION_FILES),
             (self.csv.is_some(), "--csv", MOTION_FILES),
             (

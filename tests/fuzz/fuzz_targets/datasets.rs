@@ -1,4 +1,4 @@
-//! Recordings of data sets (TotalCapture, PAMAP2, RealWorld, BROAD, phone and watch, DIP-IMU) and
+//! Recordings of data sets (TotalCapture, PAMAP2, RealWorld, BROAD, phone and watch, columns, DIP-IMU) and
 //! labelled skeleton clips. No panic, and what comes out is in order.
 #![no_main]
 
@@ -7,7 +7,7 @@ use std::path::Path;
 
 use cromosim_arrays::{Container, Entry, Limits};
 use cromosim_recording::datasets::{
-    DatasetRecording, DipArray, DipRecording, parse_broad, parse_har_spsw, parse_marked_imu, parse_pamap2, parse_realworld, parse_skeleton_npz,
+    DatasetRecording, DipArray, DipRecording, parse_broad, parse_columns, parse_har_spsw, parse_marked_imu, parse_pamap2, parse_realworld, parse_skeleton_npz,
     parse_totalcapture_calibration, parse_totalcapture_reference, parse_totalcapture_sensors, sniff_dataset,
 };
 use libfuzzer_sys::fuzz_target;
@@ -53,6 +53,9 @@ fuzz_target!(|bytes: &[u8]| {
         check(&recording);
     }
     if let Ok(recording) = parse_har_spsw(Cursor::new(bytes), "fuzz") {
+        check(&recording);
+    }
+    if let Ok(recording) = parse_columns(bytes.to_vec(), "fuzz") {
         check(&recording);
     }
     // One zip in both places: each table is its own partner.

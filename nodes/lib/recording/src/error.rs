@@ -172,6 +172,14 @@ pub enum RecordingError {
         /// The reason.
         source: std::io::Error,
     },
+    /// Columns that cannot be written.
+    #[error("{}: cannot be written: {source}", path.display())]
+    WriteColumns {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        source: parquet::errors::ParquetError,
+    },
     /// The operating system refuses the place where samples are put aside.
     #[error("{}: samples cannot be put aside there: {source}", folder.display())]
     PutAside {
@@ -190,7 +198,7 @@ pub enum RecordingError {
     },
     /// A name that does not say which format to write.
     #[error(
-        "{}: the ending does not say what to write (.npz, .bvh, .trc, .tum, .txt, .csv or .mcap do); give --to",
+        "{}: the ending does not say what to write (.npz, .bvh, .trc, .tum, .txt, .csv, .parquet or .mcap do); give --to",
         path.display()
     )]
     UnknownEnding {

@@ -72,7 +72,7 @@ pub fn write_file(path: &Path, bytes: &[u8], replace: bool) -> Result<(), Record
 pub fn write_file_with<V, E: From<RecordingError>>(
     path: &Path,
     replace: bool,
-    write: impl FnOnce(&mut dyn Write) -> Result<V, E>,
+    write: impl FnOnce(&mut (dyn Write + Send)) -> Result<V, E>,
 ) -> Result<V, E> {
     let cannot = cannot_write(path);
     if is_device(path) {

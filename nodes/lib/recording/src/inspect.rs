@@ -14,7 +14,7 @@ use cromosim_spatial::Stamp;
 use nalgebra::Vector3;
 
 use crate::datasets::{DatasetFiles, DatasetFormat, DatasetRecording, open_dataset};
-use crate::rigid::{RigidContent, RigidFormat, parse_rigid, sniff_rigid};
+use crate::rigid::{RigidContent, RigidFormat, median_rate, parse_rigid, sniff_rigid};
 use crate::{RecordingError, read_head, read_whole};
 
 /// What a file holds.
@@ -193,15 +193,6 @@ fn inspect_rigid(path: &Path, format: RigidFormat) -> Result<RigidInspection, Re
         duration_s: last - first,
         extent,
     })
-}
-
-/// The inverse of the median interval, Hz; none without two stamps.
-fn median_rate(stamps: &[Stamp]) -> Option<f64> {
-    let mut intervals: Vec<f64> = stamps.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    intervals.sort_unstable_by(f64::total_cmp);
-    intervals
-        .get(intervals.len() / 2)
-        .map(|interval| interval.recip())
 }
 
 /// Length of the way from point to point, m.

@@ -8,6 +8,7 @@
 //! - [`PlacementTrace`] is what either of them says of one placement; [`write_traces`] writes it
 //!   under the topics that every command and node knows: `/reference/NAME`, `/imu/NAME/data_raw`,
 //!   `/imu/NAME/data`. [`write_as_bag`] does so for a file of any of these kinds.
+//! - [`columns`] writes readings as Parquet, for those who train on them.
 //! - [`convert`](mod@convert) reads any file and writes any format; [`inspect`](mod@inspect) says
 //!   what is in a file; [`compare`](mod@compare) says how two recordings or diagnoses differ.
 //! - [`Resimulation`] gives the messages of its IMUs again, from the reference motion.
@@ -20,6 +21,7 @@
 
 mod bag_file;
 mod body;
+pub mod columns;
 pub mod compare;
 pub mod convert;
 pub mod datasets;

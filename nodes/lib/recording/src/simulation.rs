@@ -153,6 +153,11 @@ impl Simulation {
         &self.placements
     }
 
+    /// Their devices, in the placements' order.
+    pub fn devices(&self) -> &[Device] {
+        &self.devices
+    }
+
     /// The rest.
     pub fn options(&self) -> &SimulationOptions {
         &self.options

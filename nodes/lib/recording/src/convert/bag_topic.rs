@@ -11,9 +11,10 @@ use cromosim_spatial::Stamp;
 use nalgebra::Vector3;
 
 use super::frame_tree::FrameTree;
-use super::{Content, Read, ReadOptions, Target, motion_topic};
+use super::{Content, Read, ReadOptions, Target, dataset, motion_topic};
+use crate::datasets::{DatasetRecording, PlacedImu};
 use crate::rigid::{EurocGroundTruth, ImuSeries, PoseTrajectory};
-use crate::{RecordingError, read_poses};
+use crate::{RecordingError, read_poses, read_static};
 
 /// Reads the chosen topic, or the chosen frame of the bag's TF.
 pub(super) fn read(
@@ -21,6 +22,9 @@ pub(super) fn read(
     options: &ReadOptions,
     target: Target,
 ) -> Result<Read, RecordingError> {
+    if target == Target::Columns && options.bag_setting().is_none() {
+        return every_imu(path, options);
+    }
     let reader = BagReader::open(path)?;
     if let Some(frame) = &options.frame {
         let tree = FrameTree::read(&reader)?;
@@ -63,6 +67,30 @@ pub(super) fn read(
             TFMessage::TYPE_NAME
         ))),
     }
+}
+
+/// All IMUs of a bag, which columns hold side by side.
+fn every_imu(path: &Path, options: &ReadOptions) -> Result<Read, RecordingError> {
+    let read = read_static(path)?;
+    let imus = read.into_iter().map(|own| {
+        let both = own.readings.iter();
+        let series = ImuSeries {
+            stamps: own.stamps,
+            specific_force: both.clone().map(|it| it.specific_force).collect(),
+            angular_velocity: both.map(|it| it.angular_velocity).collect(),
+        };
+        PlacedImu {
+            placement: own.name,
+            series,
+            ..PlacedImu::default()
+        }
+    });
+    let recording = DatasetRecording {
+        name: path.display().to_string(),
+        imus: imus.collect(),
+        ..DatasetRecording::default()
+    };
+    dataset::chosen(path, recording, Target::Columns, options)
 }
 
 /// The given topic, or the only one that suits; with its type.

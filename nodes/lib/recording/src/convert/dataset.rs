@@ -53,7 +53,8 @@ fn choose_placements(
             ));
         }
     }
-    if target != Target::Bag && recording.imus.len() != 1 {
+    let holds_all = matches!(target, Target::Bag | Target::Columns);
+    if !holds_all && recording.imus.len() != 1 {
         return Err(format!(
             "several placements; give --placement, one of {known}"
         ));
@@ -72,7 +73,7 @@ fn choose_placements(
 /// What the target holds of the recording; `Err` says what is missing.
 fn held_by(target: Target, mut recording: DatasetRecording) -> Result<Content, String> {
     Ok(match target {
-        Target::Bag => Content::Recording(Box::new(recording)),
+        Target::Bag | Target::Columns => Content::Recording(Box::new(recording)),
         Target::Tum => {
             let placement = recording.imus[0].placement.clone();
             let mut references = recording.references.into_iter();

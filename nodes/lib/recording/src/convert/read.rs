@@ -30,7 +30,10 @@ pub fn read_content(
         read_head(path)?
     };
     if path.is_dir() || starts_like_bag(&head) {
-        refuse_dataset_settings(path, options)?;
+        // Columns hold all IMUs of a bag, from which one can be chosen.
+        if target != Target::Columns || options.placement.is_none() {
+            refuse_dataset_settings(path, options)?;
+        }
         let read = bag_topic::read(path, options, target)?;
         refuse_motion_settings(path, &read.content, options)?;
         return Ok(read);

@@ -19,19 +19,22 @@ pub enum Target {
     Euroc,
     /// A table with a header: poses, or readings.
     Csv,
+    /// Readings in columns (Parquet).
+    Columns,
     /// rosbag2 MCAP.
     Bag,
 }
 
 impl Target {
     /// Every format.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Amass,
         Self::Bvh,
         Self::Trc,
         Self::Tum,
         Self::Euroc,
         Self::Csv,
+        Self::Columns,
         Self::Bag,
     ];
 
@@ -50,6 +53,7 @@ impl Target {
             "trc" => Self::Trc,
             "tum" | "txt" => Self::Tum,
             "csv" => Self::Csv,
+            "parquet" => Self::Columns,
             "mcap" => Self::Bag,
             _ => {
                 return Err(RecordingError::UnknownEnding {
@@ -73,6 +77,7 @@ impl Target {
             Self::Tum => "a TUM trajectory",
             Self::Euroc => "a EuRoC file",
             Self::Csv => "a table",
+            Self::Columns => "a Parquet file of readings",
             Self::Bag => "a bag",
         }
     }

@@ -13,7 +13,8 @@ use cromosim_motion::{
 };
 
 use super::{Content, Conversion, Target};
-use crate::datasets::DatasetRecording;
+use crate::columns::{ColumnsHeader, write_recording_columns};
+use crate::datasets::{DatasetRecording, PlacedImu};
 use crate::rigid::{
     ImuSeries, write_euroc_ground_truth, write_euroc_imu, write_imu_csv, write_pose_csv, write_tum,
 };
@@ -54,6 +55,9 @@ pub(super) fn write(
             return write_motion(motion, model, &written, out);
         }
         (_, Target::Bag) => return write_bag(content, conversion, imu),
+        (Content::Imu(_) | Content::Recording(_), Target::Columns) => {
+            return write_columns(content, conversion);
+        }
         (Content::Poses(poses), Target::Tum) => write_tum(&poses.trajectory),
         (Content::Poses(poses), Target::Euroc) => write_euroc_ground_truth(poses),
         (Content::Poses(poses), Target::Csv) => write_pose_csv(&poses.trajectory),
@@ -189,6 +193,42 @@ fn write_bag(
     write_traces(&mut bag, &traces, shift_s)?;
     bag.finish()?;
     Ok(())
+}
+
+/// Every IMU of the content in a table; the recording is named after the input.
+fn write_columns(content: &Content, conversion: &Conversion) -> Result<(), RecordingError> {
+    let of_series = |series: &ImuSeries| DatasetRecording {
+        imus: vec![PlacedImu {
+            placement: conversion
+                .options
+                .name
+                .as_deref()
+                .unwrap_or("body")
+                .to_owned(),
+            series: series.clone(),
+            ..PlacedImu::default()
+        }],
+        ..DatasetRecording::default()
+    };
+    let (alone, recording);
+    recording = match content {
+        Content::Recording(recording) => recording.as_ref(),
+        Content::Imu(series) => {
+            alone = of_series(series);
+            &alone
+        }
+        _ => return Ok(()),
+    };
+    let stem = conversion.input.file_stem().unwrap_or_default();
+    let entry = |key: &str, value: &str| (key.to_owned(), value.to_owned());
+    let header = ColumnsHeader {
+        recording: stem.to_string_lossy().into_owned(),
+        metadata: BTreeMap::from([
+            entry("version", env!("CARGO_PKG_VERSION")),
+            entry("command", "convert"),
+        ]),
+    };
+    write_recording_columns(recording, &header, &conversion.out, conversion.replace)
 }
 
 fn create_bag(

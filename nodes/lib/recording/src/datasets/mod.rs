@@ -1,11 +1,13 @@
 //! Importers of the data sets that people have: TotalCapture, PAMAP2, RealWorld (HAR), BROAD,
-//! smartphone and smartwatch, IMUs on segments with markers, and the structure of DIP-IMU. Each
+//! smartphone and smartwatch, IMUs on segments with markers, columns of readings, and the structure
+//! of DIP-IMU. Each
 //! gives the IMUs by placement, and references where there are.
 //!
 //! [`open_dataset`] tells a file by its content and looks for what belongs to it. Parsers work over
 //! bytes and open nothing. What a data set does not say (gyroscopes in DIP-IMU) is not made up.
 
 mod broad;
+mod columns;
 mod dip;
 mod har_spsw;
 mod marked_imu;
@@ -17,6 +19,7 @@ mod skeleton_npz;
 mod totalcapture;
 
 pub use broad::parse_broad;
+pub use columns::parse_columns;
 pub use dip::{DIP_SENSORS, DipArray, DipRecording};
 pub use har_spsw::{HAR_SPSW_RATE_HZ, parse_har_spsw};
 pub use marked_imu::parse_marked_imu;

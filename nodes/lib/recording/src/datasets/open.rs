@@ -1,15 +1,15 @@
 //! From a file to a data set's recording, by the file's content.
 
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use cromosim_arrays::{Container, Format, Limits};
 
 use super::{
-    DatasetRecording, broad, har_spsw, marked_imu, parse_broad, parse_har_spsw, parse_marked_imu,
-    parse_pamap2, parse_realworld, parse_totalcapture_reference, parse_totalcapture_sensors,
-    realworld, totalcapture,
+    DatasetRecording, broad, columns, har_spsw, marked_imu, parse_broad, parse_columns,
+    parse_har_spsw, parse_marked_imu, parse_pamap2, parse_realworld, parse_totalcapture_reference,
+    parse_totalcapture_sensors, realworld, totalcapture,
 };
 use crate::rigid::RigidError;
 
@@ -35,6 +35,8 @@ pub enum DatasetFormat {
     MarkedImu,
     /// [`parse_har_spsw`].
     HarSpsw,
+    /// [`parse_columns`].
+    Columns,
 }
 
 impl std::fmt::Display for DatasetFormat {
@@ -46,6 +48,7 @@ impl std::fmt::Display for DatasetFormat {
             Self::Broad => "BROAD",
             Self::MarkedImu => "IMU on a segment with markers",
             Self::HarSpsw => "smartphone and smartwatch (HAR)",
+            Self::Columns => "columns (Parquet)",
         })
     }
 }
@@ -113,6 +116,11 @@ pub fn open_dataset(
         return Ok(None);
     }
     let name = path.display().to_string();
+    let start = reader.fill_buf().map_err(unreadable)?;
+    if start.starts_with(&columns::MAGIC) {
+        let recording = parse_columns(bytes(path)?, &name)?;
+        return Ok(Some((DatasetFormat::Columns, recording)));
+    }
     let recording = match Format::detect(&mut reader).map_err(unreadable)? {
         None => return text(path, &name, beside),
         Some(Format::Zip) if realworld::is_realworld(open(path)?) => {

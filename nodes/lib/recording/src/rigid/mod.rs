@@ -27,6 +27,7 @@ pub use euroc::{
 };
 pub use imu_csv::{parse_imu_csv, write_imu_csv};
 pub use pose_csv::{parse_pose_csv, write_pose_csv};
+pub(crate) use series::median_rate;
 pub use series::{ImuSeries, PoseTrajectory};
 pub use sniff::{RigidFormat, sniff_rigid};
 pub use tum::{parse_tum, write_tum};

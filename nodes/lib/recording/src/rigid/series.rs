@@ -91,3 +91,12 @@ impl ImuSeries {
         both.map(reading).collect()
     }
 }
+
+/// The inverse of the median interval, Hz; none without two stamps.
+pub(crate) fn median_rate(stamps: &[Stamp]) -> Option<f64> {
+    let mut intervals: Vec<f64> = stamps.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    intervals.sort_unstable_by(f64::total_cmp);
+    intervals
+        .get(intervals.len() / 2)
+        .map(|interval| interval.recip())
+}

@@ -1,0 +1,176 @@
+//! What is the same for all motions of a call of `cromosim simulate`.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::bail;
+use cromosim_imu::{PlacementSet, point_oddity};
+use cromosim_learned::{LearnedSimulator, MappingFile};
+use cromosim_motion::{
+    MotionOptions, SmplMotion, embedded_walk, read_motion_for, read_people_whole,
+};
+use cromosim_recording::{
+    Aside, PlayedPerson, SimulatedPerson, Simulation, SimulationOptions, csv_file,
+};
+use indicatif::ProgressBar;
+
+use crate::body;
+use crate::progress::Interrupt;
+use crate::simulate_arguments::{Arguments, Format};
+
+/// What is the same for all motions of a call.
+pub struct Setup {
+    pub simulation: Simulation,
+    motion: MotionOptions,
+    pub format: Format,
+    pub force: bool,
+    pub csv: Option<PathBuf>,
+    pub interrupt: Interrupt,
+}
+
+impl Setup {
+    pub fn new(arguments: &Arguments) -> anyhow::Result<Self> {
+        let file = arguments.placements.as_deref();
+        let placements = match file {
+            Some(path) => PlacementSet::read(path)?,
+            None if arguments.placement.is_empty() => PlacementSet::demo(),
+            None => PlacementSet::at_sites(&arguments.placement, "--placement")?,
+        };
+        let placements = match &arguments.device {
+            Some(device) => placements.map(|placement| placement.with_device(device)),
+            None => placements,
+        };
+        let folder = match arguments.device {
+            Some(_) => Path::new("."),
+            None => file.and_then(Path::parent).unwrap_or(Path::new(".")),
+        };
+        let options = SimulationOptions {
+            rate_hz: arguments.rate,
+            differentiation: arguments.differentiation()?,
+            trim: arguments.trim()?,
+            texture: arguments.texture()?,
+            seed: arguments.seed,
+            noise: !arguments.no_noise,
+            pose_error_correlation_s: arguments.pose_error_correlation,
+            learned: arguments
+                .learned
+                .as_deref()
+                .map(LearnedSimulator::find)
+                .transpose()?,
+            mapping: read_mapping(arguments.mapping.as_deref(), &names(&placements))?,
+        };
+        let model = body::model(arguments.body.as_deref())?;
+        Ok(Self {
+            simulation: Simulation::new(model, placements, folder, options)?,
+            motion: arguments.motion.options()?,
+            format: arguments.format(),
+            force: arguments.force,
+            csv: arguments.csv.clone(),
+            interrupt: Interrupt::watch()?,
+        })
+    }
+
+    pub fn read(&self, path: Option<&PathBuf>) -> anyhow::Result<Vec<PlayedPerson>> {
+        let several = self.motion.asks_for_several();
+        Ok(match path {
+            Some(path) if several => {
+                read_people_whole(path, self.simulation.model(), &self.motion)?
+                    .into_iter()
+                    .map(PlayedPerson::of_several)
+                    .collect()
+            }
+            Some(path) => {
+                let whole = MotionOptions {
+                    start_s: 0.0,
+                    duration_s: None,
+                    ..self.motion.clone()
+                };
+                let motion = read_motion_for(path, self.simulation.model(), &whole)?;
+                vec![self.part(&motion)?]
+            }
+            None if several => {
+                bail!("--person: the embedded walk has one person; name a motion file")
+            }
+            None => vec![self.part(&embedded_walk())?],
+        })
+    }
+
+    /// The part of a motion that is asked for.
+    fn part(&self, motion: &SmplMotion) -> anyhow::Result<PlayedPerson> {
+        let (start_s, duration_s) = (self.motion.start_s, self.motion.duration_s);
+        Ok(PlayedPerson::part(motion, start_s, duration_s)?)
+    }
+
+    pub fn simulate(
+        &self,
+        person: &PlayedPerson,
+        aside: &Aside,
+        bar: &ProgressBar,
+    ) -> anyhow::Result<SimulatedPerson> {
+        let check = || self.interrupt.check();
+        self.simulation
+            .simulate(person, aside, check, || bar.inc(1))
+    }
+
+    /// The CSV files of a bag, where they are asked for.
+    pub fn csv_files(&self, people: &[PlayedPerson], out: &Path) -> Vec<PathBuf> {
+        let of_person = |folder: &Path, person: &PlayedPerson| -> Vec<PathBuf> {
+            let names = names(self.simulation.placements()).into_iter();
+            names
+                .map(|name| csv_file(out, folder, person, name))
+                .collect()
+        };
+        let folder = self.csv.iter();
+        folder
+            .flat_map(|folder| people.iter().map(|person| of_person(folder, person)))
+            .flatten()
+            .collect()
+    }
+
+    /// What is unlikely of people and placements; the readers have refused what is impossible.
+    pub fn oddities(&self, people: &[PlayedPerson]) -> anyhow::Result<Vec<String>> {
+        let mut oddities = Vec::new();
+        for person in people {
+            let who = if person.label.is_empty() {
+                String::new()
+            } else {
+                format!("{}: ", person.label)
+            };
+            let odd = person.motion.oddities().into_iter();
+            oddities.extend(odd.map(|odd| format!("{who}{odd}")));
+        }
+        for placement in self.simulation.placements().placements() {
+            let odd = point_oddity(self.simulation.model(), placement)?;
+            oddities.extend(odd.map(|odd| format!("placement {}: {odd}", placement.name())));
+        }
+        Ok(oddities)
+    }
+}
+
+pub fn names(placements: &PlacementSet) -> Vec<&str> {
+    placements
+        .placements()
+        .iter()
+        .map(cromosim_imu::Placement::name)
+        .collect()
+}
+
+/// A mapping of these placements at least in part.
+pub fn read_mapping(path: Option<&Path>, placements: &[&str]) -> anyhow::Result<MappingFile> {
+    let Some(path) = path else {
+        return Ok(MappingFile::default());
+    };
+    let mapping = MappingFile::read(path)?;
+    if !placements
+        .iter()
+        .any(|name| mapping.placements.contains_key(*name))
+    {
+        let known: Vec<&str> = mapping.placements.keys().map(String::as_str).collect();
+        bail!(
+            "{}: maps {}; none of the placements {}",
+            path.display(),
+            known.join(", "),
+            placements.join(", ")
+        );
+    }
+    Ok(mapping)
+}

@@ -1,0 +1,213 @@
+//! What `cromosim simulate` writes of a motion: a bag, or columns.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use cromosim_bag::{BagOptions, BagWriter, Compression};
+use cromosim_motion::SmplMotion;
+use cromosim_recording::columns::{ColumnsHeader, PeopleColumns, write_people_columns};
+use cromosim_recording::{
+    Aside, FIRST_STAMP, PlayedPerson, SimulatedPerson, SimulatedPlacement, write_people,
+    write_people_csv,
+};
+use cromosim_spatial::Stamp;
+use indicatif::ProgressBar;
+
+use crate::files::refuse_existing;
+use crate::simulate_arguments::Format;
+use crate::simulate_setup::{Setup, names};
+use crate::simulated_quality::{quality_entries, quality_line, unlikely, warn};
+
+/// What a file says about how it was made.
+fn metadata(setup: &Setup, motion: &SmplMotion) -> BTreeMap<String, String> {
+    let entry = |key: &str, value: String| (key.to_owned(), value);
+    BTreeMap::from([
+        entry("version", env!("CARGO_PKG_VERSION").to_owned()),
+        entry("command", "simulate".to_owned()),
+        entry(
+            "motion",
+            Path::new(&motion.name).file_name().map_or_else(
+                || motion.name.clone(),
+                |name| name.to_string_lossy().into_owned(),
+            ),
+        ),
+        entry("body", setup.simulation.model().id().to_owned()),
+        entry("seed", setup.simulation.options().seed.to_string()),
+        entry("noise", setup.simulation.options().noise.to_string()),
+        entry("placements", setup.simulation.placements().to_yaml()),
+        entry(
+            "learned",
+            setup
+                .simulation
+                .options()
+                .learned
+                .as_ref()
+                .map_or("none", |networks| networks.input().name())
+                .to_owned(),
+        ),
+        entry(
+            "mapping",
+            setup
+                .simulation
+                .options()
+                .mapping
+                .placements
+                .keys()
+                .cloned()
+                .collect::<Vec<_>>()
+                .join(", "),
+        ),
+    ])
+}
+
+fn last_played(people: &[PlayedPerson]) -> Option<Stamp> {
+    let last = |person: &PlayedPerson| person.stamps.get(*person.played.end()).copied();
+    people.iter().filter_map(last).max()
+}
+
+/// What the file says, with what its readings are good for.
+fn metadata_of(
+    setup: &Setup,
+    people: &[PlayedPerson],
+    simulated: &[SimulatedPerson],
+    oddities: &[String],
+) -> BTreeMap<String, String> {
+    let mut metadata = metadata(setup, &people[0].motion);
+    for (person, simulated) in people.iter().zip(simulated) {
+        let quality = |placement: &SimulatedPlacement| {
+            quality_entries(&person.frame(&placement.name), &placement.quality)
+        };
+        metadata.extend(simulated.placements.iter().flat_map(quality));
+    }
+    metadata.extend(unlikely(oddities.iter().cloned()));
+    metadata
+}
+
+/// Writes a bag; gives the number of its messages.
+fn write_bag(
+    setup: &Setup,
+    people: &[PlayedPerson],
+    simulated: &mut [SimulatedPerson],
+    metadata: BTreeMap<String, String>,
+    out: &Path,
+) -> anyhow::Result<u64> {
+    let options = BagOptions {
+        compression: Compression::Zstd,
+        replace: setup.force,
+        ..BagOptions::default()
+    };
+    let mut bag = BagWriter::create(out, options)?;
+    bag.write_metadata("cromosim", metadata)?;
+    bag.attach(
+        "placements.yaml",
+        "application/yaml",
+        FIRST_STAMP,
+        setup.simulation.placements().to_yaml().as_bytes(),
+    )?;
+    write_people(&mut bag, people, simulated, || setup.interrupt.check())?;
+    Ok(bag.finish()?.message_count())
+}
+
+/// Writes columns; gives the number of their rows.
+fn write_columns(
+    setup: &Setup,
+    people: &[PlayedPerson],
+    simulated: &mut [SimulatedPerson],
+    mut metadata: BTreeMap<String, String>,
+    (out, recording): (&Path, &str),
+) -> anyhow::Result<u64> {
+    let simulation = &setup.simulation;
+    let placements = simulation.placements().placements().iter();
+    for (placement, device) in placements.zip(simulation.devices()) {
+        let name = placement.name();
+        metadata.insert(format!("device.{name}"), device.to_yaml(name));
+    }
+    let header = ColumnsHeader {
+        recording: recording.to_owned(),
+        metadata,
+    };
+    let mut draws = [PeopleColumns {
+        draw: 0,
+        people,
+        simulated,
+    }];
+    let check = || setup.interrupt.check();
+    write_people_columns(out, setup.force, &header, &mut draws, check)
+}
+
+/// Writes the file; gives how many it holds, and of what.
+fn write(
+    setup: &Setup,
+    people: &[PlayedPerson],
+    simulated: &mut [SimulatedPerson],
+    oddities: &[String],
+    out: &Path,
+) -> anyhow::Result<(u64, &'static str)> {
+    let metadata = metadata_of(setup, people, simulated, oddities);
+    match setup.format {
+        Format::Bag => Ok((
+            write_bag(setup, people, simulated, metadata, out)?,
+            "messages",
+        )),
+        Format::Parquet => {
+            let stem = out.file_stem().unwrap_or_default().to_string_lossy();
+            let to = (out, stem.as_ref());
+            let rows = write_columns(setup, people, simulated, metadata, to)?;
+            Ok((rows, "rows"))
+        }
+    }
+}
+
+/// Simulates people and writes the file `out`; gives the line that says so.
+pub fn simulate_one(
+    setup: &Setup,
+    people: &[PlayedPerson],
+    out: &Path,
+    bar: &ProgressBar,
+) -> anyhow::Result<String> {
+    refuse_existing(out, setup.force)?;
+    for path in setup.csv_files(people, out) {
+        refuse_existing(&path, setup.force)?;
+    }
+    let aside = Aside::beside(
+        out,
+        people.len() * setup.simulation.placements().placements().len(),
+    );
+    let mut simulated = people
+        .iter()
+        .map(|person| setup.simulate(person, &aside, bar))
+        .collect::<anyhow::Result<Vec<_>>>()?;
+    let oddities = setup.oddities(people)?;
+    let (count, counted) = write(setup, people, &mut simulated, &oddities, out)?;
+    if let Some(folder) = &setup.csv {
+        for person in people {
+            write_people_csv(
+                out,
+                folder,
+                person,
+                &names(setup.simulation.placements()),
+                setup.force,
+            )?;
+        }
+    }
+    let motion = &people[0].motion;
+    bar.suspend(|| warn(Path::new(&motion.name), &oddities));
+    let last = last_played(people).map_or(0.0, |last| last - FIRST_STAMP);
+    let placements = setup.simulation.placements().placements().len();
+    let who = if people.len() > 1 {
+        format!("{} people, ", people.len())
+    } else {
+        String::new()
+    };
+    Ok(format!(
+        "{}: {count} {counted}, {who}{placements} placements, {last:.2} s of {}{}",
+        out.display(),
+        motion.name,
+        quality_line(
+            simulated
+                .iter()
+                .flat_map(|person| &person.placements)
+                .map(|placement| placement.quality)
+        )
+    ))
+}
