@@ -33,6 +33,7 @@ mod progress;
 mod reference;
 mod simulate;
 mod simulate_arguments;
+mod simulate_many;
 mod simulate_setup;
 mod simulated_file;
 mod simulated_quality;

@@ -7,6 +7,7 @@ use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use cromosim_imu::{Differentiation, MAX_RATE_HZ, Scheme, TextureSegment, Trim};
 use cromosim_recording::TextureOn;
+use cromosim_recording::batch::{Shard, is_of_many};
 use cromosim_recording::convert::ReadOptions;
 
 use crate::list;
@@ -21,7 +22,10 @@ const READINGS: &str = "How readings are made";
 /// Simulate IMUs from motion files, or again from a recording's reference
 #[derive(Args)]
 pub struct Arguments {
-    /// Motion files (BVH, ASF/AMC, C3D, TRC); none: the embedded walk
+    /// Motion files, folders, patterns or @LIST; none: the embedded walk
+    ///
+    /// BVH, ASF/AMC, C3D, TRC and files of SMPL parameters; folders with all below them, "*.bvh" and the like, and @LIST, a
+    /// file with one of these a line. What OUT holds already is left alone
     pub motions: Vec<PathBuf>,
     /// Simulate the IMUs of this recording again, from its reference motion
     #[arg(long, value_name = "RECORDING", help_heading = INPUT)]
@@ -60,12 +64,17 @@ pub struct Arguments {
     pub effects: Option<PathBuf>,
     /// The bag to write: .mcap, or a rosbag2 directory; or columns: .parquet
     ///
-    /// With several motions a directory for one file each
+    /// With several motions a directory for one file each and manifest.jsonl, which says what became of them
     #[arg(long, value_name = "OUT")]
     pub out: PathBuf,
     /// What to write of motion files: bag or parquet; default: as OUT ends
     #[arg(long, value_enum, value_name = "FORMAT", hide_possible_values = true)]
     format: Option<Format>,
+    /// Of many motions only each Nth, from the Ith on, such as 2/8
+    ///
+    /// For one of several machines, which may write into the same OUT
+    #[arg(long, value_name = "I/N", hide_short_help = true, help_heading = INPUT)]
+    pub shard: Option<Shard>,
     /// Where on the body the sensors are (YAML); default: five places
     ///
     /// Without, left_wrist, right_ankle, pelvis, sternum and head; of motion files
@@ -213,6 +222,20 @@ impl Mode<'_> {
 }
 
 impl Arguments {
+    /// Whether OUT is a folder of files, even of one.
+    pub fn is_of_many(&self) -> bool {
+        let ending = self.out.extension().unwrap_or_default();
+        let is_file = ending.eq_ignore_ascii_case(self.format().ending());
+        match self.motions.as_slice() {
+            [] => false,
+            [only] => {
+                let columns = self.format() == Format::Parquet && !is_file;
+                is_of_many(only) || self.shard.is_some() || columns
+            }
+            _ => true,
+        }
+    }
+
     /// The format that is given, or that OUT's ending says.
     pub fn format(&self) -> Format {
         let ending = self.out.extension().unwrap_or_default();
@@ -382,6 +405,7 @@ impl Arguments {
         let mut given = Vec::from_iter(motion.motion_setting(true).map(|it| (it, MOTION_FILES)));
         let options = [
             (self.format.is_some(), "--format", MOTION_FILES),
+            (self.shard.is_some(), "--shard", MOTION_FILES),
             (self.placements.is_some(), "--placements", MOTION_FILES),
             (self.csv.is_some(), "--csv", MOTION_FILES),
             (

@@ -1,9 +1,11 @@
 //! What is the same for all motions of a call of `cromosim simulate`.
 
+use std::collections::BTreeMap;
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
-use cromosim_imu::{PlacementSet, point_oddity};
+use cromosim_imu::{Device, Placement, PlacementSet, point_oddity};
 use cromosim_learned::{LearnedSimulator, MappingFile};
 use cromosim_motion::{
     MotionOptions, SmplMotion, embedded_walk, read_motion_for, read_people_whole,
@@ -69,7 +71,84 @@ impl Setup {
         })
     }
 
-    pub fn read(&self, path: Option<&PathBuf>) -> anyhow::Result<Vec<PlayedPerson>> {
+    /// What a file says about how it was made, whatever the motion.
+    pub fn settings(&self) -> BTreeMap<String, String> {
+        let entry = |key: &str, value: String| (key.to_owned(), value);
+        BTreeMap::from([
+            entry("version", env!("CARGO_PKG_VERSION").to_owned()),
+            entry("command", "simulate".to_owned()),
+            entry("body", self.simulation.model().id().to_owned()),
+            entry("seed", self.simulation.options().seed.to_string()),
+            entry("noise", self.simulation.options().noise.to_string()),
+            entry("placements", self.simulation.placements().to_yaml()),
+            entry(
+                "learned",
+                self.simulation
+                    .options()
+                    .learned
+                    .as_ref()
+                    .map_or("none", |networks| networks.input().name())
+                    .to_owned(),
+            ),
+            entry(
+                "mapping",
+                self.simulation
+                    .options()
+                    .mapping
+                    .placements
+                    .keys()
+                    .cloned()
+                    .collect::<Vec<_>>()
+                    .join(", "),
+            ),
+        ])
+    }
+
+    /// Each placement's device, with its effects.
+    pub fn devices(&self) -> BTreeMap<String, String> {
+        let placements = self.simulation.placements().placements().iter();
+        let entry = |(placement, device): (&Placement, &Device)| {
+            let name = placement.name();
+            (format!("device.{name}"), device.to_yaml(name))
+        };
+        placements
+            .zip(self.simulation.devices())
+            .map(entry)
+            .collect()
+    }
+
+    /// All that outputs depend on beside the motion, for the manifest.
+    pub fn manifest_settings(
+        &self,
+        arguments: &Arguments,
+    ) -> anyhow::Result<BTreeMap<String, String>> {
+        let mut settings = self.settings();
+        settings.extend(self.devices());
+        let options = self.simulation.options();
+        let mapping = arguments.mapping.as_ref().map(fs::read).transpose()?;
+        for (key, value) in [
+            ("format", format!("{:?}", self.format)),
+            ("csv", format!("{:?}", self.csv)),
+            ("differentiation", format!("{:?}", options.differentiation)),
+            ("trim", format!("{:?}", options.trim)),
+            ("texture", format!("{:?}", options.texture)),
+            (
+                "pose_error_correlation_s",
+                options.pose_error_correlation_s.to_string(),
+            ),
+            ("networks", format!("{:?}", arguments.learned)),
+            (
+                "mapping_crc32",
+                format!("{:?}", mapping.map(|bytes| crc32fast::hash(&bytes))),
+            ),
+            ("motion_files", format!("{:?}", self.motion)),
+        ] {
+            settings.insert(key.to_owned(), value);
+        }
+        Ok(settings)
+    }
+
+    pub fn read(&self, path: Option<&Path>) -> anyhow::Result<Vec<PlayedPerson>> {
         let several = self.motion.asks_for_several();
         Ok(match path {
             Some(path) if several => {

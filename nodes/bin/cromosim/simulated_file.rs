@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use cromosim_bag::{BagOptions, BagWriter, Compression};
-use cromosim_motion::SmplMotion;
 use cromosim_recording::columns::{ColumnsHeader, PeopleColumns, write_people_columns};
 use cromosim_recording::{
     Aside, FIRST_STAMP, PlayedPerson, SimulatedPerson, SimulatedPlacement, write_people,
@@ -18,51 +17,33 @@ use crate::simulate_arguments::Format;
 use crate::simulate_setup::{Setup, names};
 use crate::simulated_quality::{quality_entries, quality_line, unlikely, warn};
 
-/// What a file says about how it was made.
-fn metadata(setup: &Setup, motion: &SmplMotion) -> BTreeMap<String, String> {
-    let entry = |key: &str, value: String| (key.to_owned(), value);
-    BTreeMap::from([
-        entry("version", env!("CARGO_PKG_VERSION").to_owned()),
-        entry("command", "simulate".to_owned()),
-        entry(
-            "motion",
-            Path::new(&motion.name).file_name().map_or_else(
-                || motion.name.clone(),
-                |name| name.to_string_lossy().into_owned(),
-            ),
-        ),
-        entry("body", setup.simulation.model().id().to_owned()),
-        entry("seed", setup.simulation.options().seed.to_string()),
-        entry("noise", setup.simulation.options().noise.to_string()),
-        entry("placements", setup.simulation.placements().to_yaml()),
-        entry(
-            "learned",
-            setup
-                .simulation
-                .options()
-                .learned
-                .as_ref()
-                .map_or("none", |networks| networks.input().name())
-                .to_owned(),
-        ),
-        entry(
-            "mapping",
-            setup
-                .simulation
-                .options()
-                .mapping
-                .placements
-                .keys()
-                .cloned()
-                .collect::<Vec<_>>()
-                .join(", "),
-        ),
-    ])
-}
-
 fn last_played(people: &[PlayedPerson]) -> Option<Stamp> {
     let last = |person: &PlayedPerson| person.stamps.get(*person.played.end()).copied();
     people.iter().filter_map(last).max()
+}
+
+/// The file to write.
+#[derive(Clone, Copy)]
+pub struct Output<'a> {
+    pub path: &'a Path,
+    /// The recording's name in columns.
+    pub recording: &'a str,
+}
+
+/// A file that was written.
+pub struct Written {
+    /// Messages or rows.
+    pub count: u64,
+    /// What is said of it.
+    pub line: String,
+}
+
+fn file_name(motion: &str) -> String {
+    let name = Path::new(motion).file_name();
+    name.map_or_else(
+        || motion.to_owned(),
+        |name| name.to_string_lossy().into_owned(),
+    )
 }
 
 /// What the file says, with what its readings are good for.
@@ -72,7 +53,8 @@ fn metadata_of(
     simulated: &[SimulatedPerson],
     oddities: &[String],
 ) -> BTreeMap<String, String> {
-    let mut metadata = metadata(setup, &people[0].motion);
+    let mut metadata = setup.settings();
+    metadata.insert("motion".to_owned(), file_name(&people[0].motion.name));
     for (person, simulated) in people.iter().zip(simulated) {
         let quality = |placement: &SimulatedPlacement| {
             quality_entries(&person.frame(&placement.name), &placement.quality)
@@ -114,16 +96,11 @@ fn write_columns(
     people: &[PlayedPerson],
     simulated: &mut [SimulatedPerson],
     mut metadata: BTreeMap<String, String>,
-    (out, recording): (&Path, &str),
+    output: Output<'_>,
 ) -> anyhow::Result<u64> {
-    let simulation = &setup.simulation;
-    let placements = simulation.placements().placements().iter();
-    for (placement, device) in placements.zip(simulation.devices()) {
-        let name = placement.name();
-        metadata.insert(format!("device.{name}"), device.to_yaml(name));
-    }
+    metadata.extend(setup.devices());
     let header = ColumnsHeader {
-        recording: recording.to_owned(),
+        recording: output.recording.to_owned(),
         metadata,
     };
     let mut draws = [PeopleColumns {
@@ -132,7 +109,7 @@ fn write_columns(
         simulated,
     }];
     let check = || setup.interrupt.check();
-    write_people_columns(out, setup.force, &header, &mut draws, check)
+    write_people_columns(output.path, setup.force, &header, &mut draws, check)
 }
 
 /// Writes the file; gives how many it holds, and of what.
@@ -141,30 +118,29 @@ fn write(
     people: &[PlayedPerson],
     simulated: &mut [SimulatedPerson],
     oddities: &[String],
-    out: &Path,
+    output: Output<'_>,
 ) -> anyhow::Result<(u64, &'static str)> {
     let metadata = metadata_of(setup, people, simulated, oddities);
     match setup.format {
         Format::Bag => Ok((
-            write_bag(setup, people, simulated, metadata, out)?,
+            write_bag(setup, people, simulated, metadata, output.path)?,
             "messages",
         )),
         Format::Parquet => {
-            let stem = out.file_stem().unwrap_or_default().to_string_lossy();
-            let to = (out, stem.as_ref());
-            let rows = write_columns(setup, people, simulated, metadata, to)?;
+            let rows = write_columns(setup, people, simulated, metadata, output)?;
             Ok((rows, "rows"))
         }
     }
 }
 
-/// Simulates people and writes the file `out`; gives the line that says so.
+/// Simulates people and writes their file.
 pub fn simulate_one(
     setup: &Setup,
     people: &[PlayedPerson],
-    out: &Path,
+    output: Output<'_>,
     bar: &ProgressBar,
-) -> anyhow::Result<String> {
+) -> anyhow::Result<Written> {
+    let out = output.path;
     refuse_existing(out, setup.force)?;
     for path in setup.csv_files(people, out) {
         refuse_existing(&path, setup.force)?;
@@ -178,7 +154,7 @@ pub fn simulate_one(
         .map(|person| setup.simulate(person, &aside, bar))
         .collect::<anyhow::Result<Vec<_>>>()?;
     let oddities = setup.oddities(people)?;
-    let (count, counted) = write(setup, people, &mut simulated, &oddities, out)?;
+    let (count, counted) = write(setup, people, &mut simulated, &oddities, output)?;
     if let Some(folder) = &setup.csv {
         for person in people {
             write_people_csv(
@@ -199,7 +175,7 @@ pub fn simulate_one(
     } else {
         String::new()
     };
-    Ok(format!(
+    let line = format!(
         "{}: {count} {counted}, {who}{placements} placements, {last:.2} s of {}{}",
         out.display(),
         motion.name,
@@ -209,5 +185,6 @@ pub fn simulate_one(
                 .flat_map(|person| &person.placements)
                 .map(|placement| placement.quality)
         )
-    ))
+    );
+    Ok(Written { count, line })
 }

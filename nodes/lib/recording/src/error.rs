@@ -172,6 +172,32 @@ pub enum RecordingError {
         /// The reason.
         source: std::io::Error,
     },
+    /// Two inputs whose outputs would have one name.
+    #[error(
+        "{} and {} would both become {name}; simulate them into two folders, or name the folder above them, whose subfolders are kept",
+        files[0].display(), files[1].display()
+    )]
+    SameOutput {
+        /// The inputs.
+        files: [PathBuf; 2],
+        /// The output's name without its ending.
+        name: String,
+    },
+    /// Outputs that were made otherwise.
+    #[error(
+        "{}: its outputs were made with other settings ({key}: {there} there, {here} here); give another folder, or --force to write all anew",
+        path.display()
+    )]
+    OtherSettings {
+        /// The manifest.
+        path: PathBuf,
+        /// The first setting that differs.
+        key: String,
+        /// Its value in the manifest.
+        there: String,
+        /// As it is now.
+        here: String,
+    },
     /// Columns that cannot be written.
     #[error("{}: cannot be written: {source}", path.display())]
     WriteColumns {

@@ -8,6 +8,7 @@
 //! - [`PlacementTrace`] is what either of them says of one placement; [`write_traces`] writes it
 //!   under the topics that every command and node knows: `/reference/NAME`, `/imu/NAME/data_raw`,
 //!   `/imu/NAME/data`. [`write_as_bag`] does so for a file of any of these kinds.
+//! - [`batch`](mod@batch) says which of many inputs are to be done, and what became of them.
 //! - [`columns`] writes readings as Parquet, for those who train on them.
 //! - [`convert`](mod@convert) reads any file and writes any format; [`inspect`](mod@inspect) says
 //!   what is in a file; [`compare`](mod@compare) says how two recordings or diagnoses differ.
@@ -20,6 +21,7 @@
 //! these functions alone.
 
 mod bag_file;
+pub mod batch;
 mod body;
 pub mod columns;
 pub mod compare;
