@@ -33,6 +33,9 @@ pub struct Arguments {
     /// Replace FILE.json where it exists
     #[arg(long, requires = "out")]
     force: bool,
+    /// Print what is found as JSON, the same as in FILE.json
+    #[arg(long)]
+    json: bool,
 }
 
 /// What one side is.
@@ -75,13 +78,16 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
             )
         }
     };
+    let text =
+        serde_json::to_string_pretty(&found.json).context("what was found is no JSON")? + "\n";
     if let Some(path) = &arguments.out {
-        let text =
-            serde_json::to_string_pretty(&found.json).context("what was found is no JSON")? + "\n";
         write_whole(path, arguments.force, |file| {
             file.write_all(text.as_bytes())
                 .with_context(|| format!("{}: cannot be written", path.display()))
         })?;
+    }
+    if arguments.json {
+        return print(format_args!("{text}"));
     }
     say!("A  {}\nB  {}", arguments.a.display(), arguments.b.display())?;
     print(format_args!("{}", found.text))?;

@@ -20,7 +20,7 @@ use crate::diagnose_recordings::{OneRecording, Selected, file_names, of_recordin
 use crate::files::refuse_existing;
 use crate::list;
 use crate::named::Named;
-use crate::output::{remark, say};
+use crate::output::{self, remark, say};
 use crate::progress::{self, Interrupt};
 
 /// The files in DIR.
@@ -65,6 +65,9 @@ pub struct Arguments {
     /// Replace the files of an earlier diagnosis in DIR
     #[arg(long)]
     force: bool,
+    /// Print diagnosis.json rather than the verdicts
+    #[arg(long)]
+    json: bool,
     /// Settings (YAML), see below with --help
     #[arg(long, value_name = "FILE", help_heading = SEARCH)]
     config: Option<PathBuf>,
@@ -134,11 +137,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         }
     }
     if answers.is_empty() {
-        let files: Vec<String> = arguments
-            .recordings
-            .iter()
-            .map(|file| file.display().to_string())
-            .collect();
+        let files = arguments.recordings.iter();
+        let files: Vec<String> = files.map(|file| file.display().to_string()).collect();
         bail!("{}: {}", files.join(", "), failures.join("; "));
     }
     for note in &notes {
@@ -150,9 +150,10 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let (diagnosis, effects, evidence) = split(answers);
     // What was found is said even where its files cannot be written.
     let written = write(out, &arguments.recordings, &diagnosis, &effects, &evidence);
-    let said = print(&diagnosis);
-    written?;
-    said?;
+    if arguments.json {
+        return output::print(format_args!("{}", json(&diagnosis)?)).and(written);
+    }
+    print(&diagnosis).and(written)?;
     print_files(out)
 }
 
@@ -358,7 +359,7 @@ fn write(
     let interrupt = Interrupt::watch()?;
     let recording = file_names(recordings).join(", ");
     let texts = [
-        serde_json::to_string_pretty(diagnosis)? + "\n",
+        json(diagnosis)?,
         effects.to_yaml(),
         cromosim_gap::report::html(
             diagnosis,
@@ -382,6 +383,11 @@ fn write(
         drop(fs::remove_file(folder.join(FILES[3])));
     }
     Ok(())
+}
+
+/// diagnosis.json.
+fn json(diagnosis: &Diagnosis) -> anyhow::Result<String> {
+    Ok(serde_json::to_string_pretty(diagnosis)? + "\n")
 }
 
 /// Which files were written.

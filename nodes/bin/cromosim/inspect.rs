@@ -15,10 +15,10 @@ use cromosim_recording::inspect::{
     BodyInspection, Inspection, PersonInspection, PosesInspection, RigidExtent, RigidInspection,
     inspect, path_length,
 };
-use cromosim_recording::rigid::RigidFormat;
 
 use crate::body;
 use crate::files::{refuse_existing, write_whole};
+use crate::inspect_json::{self, rigid_kind};
 use crate::motion_arguments::MotionArguments;
 use crate::output::say;
 use crate::progress::working;
@@ -52,6 +52,9 @@ pub struct Arguments {
     /// Replace the draft where it exists
     #[arg(long, requires = "skeleton_map_draft")]
     force: bool,
+    /// Print JSON: an object and a line for each file
+    #[arg(long, conflicts_with = "skeleton_map_draft")]
+    json: bool,
     #[command(flatten)]
     motion: MotionArguments,
 }
@@ -65,7 +68,12 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let model = body::model(arguments.body.as_deref())?;
     for path in &arguments.files {
         let doing = format!("reading {}", path.display());
-        match working(&doing, || inspect(path, &model, &options))? {
+        let found = working(&doing, || inspect(path, &model, &options))?;
+        if arguments.json {
+            say!("{}", inspect_json::of(path, &found)?)?;
+            continue;
+        }
+        match found {
             Inspection::Bag(reader) => print_bag(path, &reader)?,
             Inspection::Recording(format, recording) => print_recording(path, format, &recording)?,
             Inspection::Rigid(rigid) => print_rigid(path, &rigid)?,
@@ -105,13 +113,7 @@ fn draft(arguments: &Arguments, options: &MotionOptions, out: &Path) -> anyhow::
 }
 
 fn print_rigid(path: &Path, rigid: &RigidInspection) -> anyhow::Result<()> {
-    let kind = match rigid.format {
-        RigidFormat::Tum => "trajectory (TUM)",
-        RigidFormat::EurocGroundTruth => "trajectory (EuRoC ground truth)",
-        RigidFormat::PoseCsv => "trajectory (table with a header)",
-        RigidFormat::EurocImu => "IMU series (EuRoC)",
-        RigidFormat::ImuCsv => "IMU series (table with a header)",
-    };
+    let kind = rigid_kind(rigid.format);
     let rate = rigid
         .median_rate_hz
         .map_or_else(String::new, |rate| format!(" at {rate:.3} Hz (median)"));

@@ -23,6 +23,7 @@ mod diagnose_view;
 mod evaluate;
 mod files;
 mod inspect;
+mod inspect_json;
 mod list;
 mod map;
 mod motion_arguments;
