@@ -1,15 +1,23 @@
 """The demo for those who have ROS 2: the five nodes of cromosim as processes, recorded and drawn.
 
 ros2 launch demo.launch.py [motion:=FILE.bvh] [out:=DIR]
-The program `cromosim` has to be on PATH (cargo install --path .).
+Where colcon has built the package: ros2 launch cromosim demo.launch.py. Else the program `cromosim` has to be on PATH (cargo install --path .).
 """
 
 import os
+import pathlib
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, EmitEvent, ExecuteProcess, OpaqueFunction, TimerAction
 from launch.events import Shutdown
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+
+
+def program():
+    """`cromosim` of the package that this file was installed with, else the one on PATH."""
+    prefix = pathlib.Path(os.path.abspath(__file__)).parents[3:4]
+    installed = [folder / "lib/cromosim/cromosim" for folder in prefix]
+    return next((str(path) for path in installed if path.is_file()), "cromosim")
 
 
 def died(event, context):
@@ -22,7 +30,7 @@ def died(event, context):
 
 def node(name, *parameters, on_exit=died):
     """One node of the suite; parameters are lists that make `name:=value`."""
-    command = ["cromosim", "node", name, "--ros-args"]
+    command = [program(), "node", name, "--ros-args", "-r", ["__ns:=/", LaunchConfiguration("namespace")]]
     for parameter in parameters:
         command += ["-p", parameter]
     return ExecuteProcess(cmd=command, name=name, output="screen", on_exit=on_exit)
@@ -42,6 +50,7 @@ def make_folder(context):
 def generate_launch_description():
     out = LaunchConfiguration("out")
     return LaunchDescription([
+        DeclareLaunchArgument("namespace", default_value="", description="Of all nodes and their topics, such as robot1"),
         DeclareLaunchArgument("motion", default_value="", description="A BVH file; empty: the embedded walk"),
         DeclareLaunchArgument("out", default_value="cromosim-demo", description="Where bag and recording go; OUT/bag must not exist yet"),
         OpaqueFunction(function=make_folder),

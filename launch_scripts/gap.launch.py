@@ -2,12 +2,23 @@
 
 ros2 launch gap.launch.py names:=left_wrist,head [placements:=FILE.yaml] [motion:=FILE.bvh]
 The drivers of the real IMUs publish /imu/NAME/data_raw, a source of motion publishes /smpl/pose (or motion:=FILE.bvh is looped); /diagnostics
-says how far apart real and virtual ones are, and the first cause. The program `cromosim` has to be on PATH (cargo install --path .).
+says how far apart real and virtual ones are, and the first cause.
+Where colcon has built the package: ros2 launch cromosim gap.launch.py. Else the program `cromosim` has to be on PATH (cargo install --path .).
 """
+
+import os
+import pathlib
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, ExecuteProcess, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
+
+
+def program():
+    """`cromosim` of the package that this file was installed with, else the one on PATH."""
+    prefix = pathlib.Path(os.path.abspath(__file__)).parents[3:4]
+    installed = [folder / "lib/cromosim/cromosim" for folder in prefix]
+    return next((str(path) for path in installed if path.is_file()), "cromosim")
 
 
 def died(event, context):
@@ -20,7 +31,7 @@ def died(event, context):
 
 def node(name, *arguments):
     """One node of the suite, with its arguments after --ros-args."""
-    return ExecuteProcess(cmd=["cromosim", "node", name, "--ros-args", *arguments], name=name, output="screen", on_exit=died)
+    return ExecuteProcess(cmd=[program(), "node", name, "--ros-args", "-r", ["__ns:=/", LaunchConfiguration("namespace")], *arguments], name=name, output="screen", on_exit=died)
 
 
 def nodes(context):
@@ -43,6 +54,7 @@ def nodes(context):
 
 def generate_launch_description():
     return LaunchDescription([
+        DeclareLaunchArgument("namespace", default_value="", description="Of all nodes and their topics, such as robot1"),
         DeclareLaunchArgument("names", description="Placements to watch, separated by commas"),
         DeclareLaunchArgument("placements", default_value="", description="Sensor placements (YAML); empty: the demo's"),
         DeclareLaunchArgument("motion", default_value="", description="A BVH file to loop; empty: /smpl/pose comes from elsewhere"),
