@@ -4,8 +4,8 @@ use crate::output::say;
 use crate::progress;
 use crate::simulate_arguments::Arguments;
 use crate::simulate_many;
-use crate::simulate_setup::Setup;
-use crate::simulated_file::{Output, simulate_one};
+use crate::simulate_setup::{Output, Setup};
+use crate::simulated_file::simulate_one;
 
 /// Runs `simulate MOTIONS`.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {

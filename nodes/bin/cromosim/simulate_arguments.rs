@@ -170,6 +170,11 @@ pub struct Arguments {
     /// default, as in training. Not with --reference
     #[arg(long, value_name = "MODEL", help_heading = READINGS)]
     pub learned: Option<PathBuf>,
+    /// Draw people, wearing and devices anew for each motion, as this file says (YAML)
+    ///
+    /// Several draws a motion where it says so; into columns (--format parquet)
+    #[arg(long, value_name = "FILE", help_heading = SENSORS, hide_short_help = true)]
+    pub draw: Option<PathBuf>,
     /// Map distributions as a file of `cromosim map` says
     ///
     /// Applied last, to the placements that it names. Not with --reference
@@ -328,6 +333,9 @@ impl Arguments {
         if self.csv.is_some() && self.format() == Format::Parquet {
             bail!("--csv is made of a bag, and a Parquet file has these columns; leave it out");
         }
+        if self.draw.is_some() && self.format() != Format::Parquet {
+            bail!("--draw writes columns, which tell draws apart; give --format parquet");
+        }
         if self.device.is_some() && self.effects.is_some() {
             bail!("--device and --effects both say what errs; give one of them");
         }
@@ -406,6 +414,7 @@ impl Arguments {
         let options = [
             (self.format.is_some(), "--format", MOTION_FILES),
             (self.shard.is_some(), "--shard", MOTION_FILES),
+            (self.draw.is_some(), "--draw", MOTION_FILES),
             (self.placements.is_some(), "--placements", MOTION_FILES),
             (self.csv.is_some(), "--csv", MOTION_FILES),
             (

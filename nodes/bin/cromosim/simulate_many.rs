@@ -17,8 +17,8 @@ use indicatif::ProgressBar;
 use crate::output::{remark, say};
 use crate::progress;
 use crate::simulate_arguments::Arguments;
-use crate::simulate_setup::Setup;
-use crate::simulated_file::{Output, Written, simulate_one};
+use crate::simulate_setup::{Output, Setup, Written};
+use crate::simulated_file::simulate_one;
 
 /// Runs `simulate MOTIONS` of several motions, or of what may be several.
 pub fn run(arguments: &Arguments, mut setup: Setup) -> anyhow::Result<()> {

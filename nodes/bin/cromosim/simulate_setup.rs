@@ -5,6 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
+use cromosim_evaluation::SimulationDraws;
 use cromosim_imu::{Device, Placement, PlacementSet, point_oddity};
 use cromosim_learned::{LearnedSimulator, MappingFile};
 use cromosim_motion::{
@@ -19,9 +20,26 @@ use crate::body;
 use crate::progress::Interrupt;
 use crate::simulate_arguments::{Arguments, Format};
 
+/// The file to write.
+#[derive(Clone, Copy)]
+pub struct Output<'a> {
+    pub path: &'a Path,
+    /// The recording's name in columns.
+    pub recording: &'a str,
+}
+
+/// A file that was written.
+pub struct Written {
+    /// Messages or rows.
+    pub count: u64,
+    /// What is said of it.
+    pub line: String,
+}
+
 /// What is the same for all motions of a call.
 pub struct Setup {
     pub simulation: Simulation,
+    pub draws: Option<SimulationDraws>,
     motion: MotionOptions,
     pub format: Format,
     pub force: bool,
@@ -61,8 +79,15 @@ impl Setup {
             mapping: read_mapping(arguments.mapping.as_deref(), &names(&placements))?,
         };
         let model = body::model(arguments.body.as_deref())?;
+        let simulation = Simulation::new(model, placements, folder, options)?;
+        let draws = |path: &PathBuf| -> anyhow::Result<SimulationDraws> {
+            let draws = SimulationDraws::read(path)?;
+            draws.check(simulation.placements(), path)?;
+            Ok(draws)
+        };
         Ok(Self {
-            simulation: Simulation::new(model, placements, folder, options)?,
+            draws: arguments.draw.as_ref().map(draws).transpose()?,
+            simulation,
             motion: arguments.motion.options()?,
             format: arguments.format(),
             force: arguments.force,
@@ -104,11 +129,24 @@ impl Setup {
         ])
     }
 
-    /// Each placement's device, with its effects.
+    /// The same of a motion's people.
+    pub fn settings_of(&self, people: &[PlayedPerson]) -> BTreeMap<String, String> {
+        let motion = &people[0].motion.name;
+        let name = Path::new(motion).file_name();
+        let name = name.map_or_else(
+            || motion.clone(),
+            |name| name.to_string_lossy().into_owned(),
+        );
+        let mut settings = self.settings();
+        settings.insert("motion".to_owned(), name);
+        settings
+    }
+
+    /// The placements' devices by name, with their effects; `ideal` where a placement names none.
     pub fn devices(&self) -> BTreeMap<String, String> {
         let placements = self.simulation.placements().placements().iter();
         let entry = |(placement, device): (&Placement, &Device)| {
-            let name = placement.name();
+            let name = placement.device().unwrap_or("ideal");
             (format!("device.{name}"), device.to_yaml(name))
         };
         placements
@@ -129,6 +167,7 @@ impl Setup {
         for (key, value) in [
             ("format", format!("{:?}", self.format)),
             ("csv", format!("{:?}", self.csv)),
+            ("draws", format!("{:?}", self.draws)),
             ("differentiation", format!("{:?}", options.differentiation)),
             ("trim", format!("{:?}", options.trim)),
             ("texture", format!("{:?}", options.texture)),

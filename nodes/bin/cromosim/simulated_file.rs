@@ -4,46 +4,23 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use cromosim_bag::{BagOptions, BagWriter, Compression};
-use cromosim_recording::columns::{ColumnsHeader, PeopleColumns, write_people_columns};
+use cromosim_recording::columns::{ColumnsHeader, ColumnsWriter};
 use cromosim_recording::{
-    Aside, FIRST_STAMP, PlayedPerson, SimulatedPerson, SimulatedPlacement, write_people,
-    write_people_csv,
+    Aside, FIRST_STAMP, PlayedPerson, SimulatedPerson, SimulatedPlacement, write_file_with,
+    write_people, write_people_csv,
 };
 use cromosim_spatial::Stamp;
 use indicatif::ProgressBar;
 
 use crate::files::refuse_existing;
 use crate::simulate_arguments::Format;
-use crate::simulate_setup::{Setup, names};
+use crate::simulate_setup::{Output, Setup, Written, names};
+use crate::simulated_draws::simulate_draws;
 use crate::simulated_quality::{quality_entries, quality_line, unlikely, warn};
 
 fn last_played(people: &[PlayedPerson]) -> Option<Stamp> {
     let last = |person: &PlayedPerson| person.stamps.get(*person.played.end()).copied();
     people.iter().filter_map(last).max()
-}
-
-/// The file to write.
-#[derive(Clone, Copy)]
-pub struct Output<'a> {
-    pub path: &'a Path,
-    /// The recording's name in columns.
-    pub recording: &'a str,
-}
-
-/// A file that was written.
-pub struct Written {
-    /// Messages or rows.
-    pub count: u64,
-    /// What is said of it.
-    pub line: String,
-}
-
-fn file_name(motion: &str) -> String {
-    let name = Path::new(motion).file_name();
-    name.map_or_else(
-        || motion.to_owned(),
-        |name| name.to_string_lossy().into_owned(),
-    )
 }
 
 /// What the file says, with what its readings are good for.
@@ -53,8 +30,7 @@ fn metadata_of(
     simulated: &[SimulatedPerson],
     oddities: &[String],
 ) -> BTreeMap<String, String> {
-    let mut metadata = setup.settings();
-    metadata.insert("motion".to_owned(), file_name(&people[0].motion.name));
+    let mut metadata = setup.settings_of(people);
     for (person, simulated) in people.iter().zip(simulated) {
         let quality = |placement: &SimulatedPlacement| {
             quality_entries(&person.frame(&placement.name), &placement.quality)
@@ -103,13 +79,13 @@ fn write_columns(
         recording: output.recording.to_owned(),
         metadata,
     };
-    let mut draws = [PeopleColumns {
-        draw: 0,
-        people,
-        simulated,
-    }];
-    let check = || setup.interrupt.check();
-    write_people_columns(output.path, setup.force, &header, &mut draws, check)
+    write_file_with(output.path, setup.force, |file| {
+        let mut columns = ColumnsWriter::new(file, output.path, &header)?;
+        for (person, simulated) in people.iter().zip(simulated) {
+            columns.write_person(0, person, simulated, || setup.interrupt.check())?;
+        }
+        Ok(columns.finish()?)
+    })
 }
 
 /// Writes the file; gives how many it holds, and of what.
@@ -144,6 +120,9 @@ pub fn simulate_one(
     refuse_existing(out, setup.force)?;
     for path in setup.csv_files(people, out) {
         refuse_existing(&path, setup.force)?;
+    }
+    if let Some(draws) = &setup.draws {
+        return simulate_draws(setup, draws, people, output);
     }
     let aside = Aside::beside(
         out,

@@ -67,6 +67,16 @@ pub enum EvaluationError {
         /// The schema that the file names.
         found: String,
     },
+    /// Something that cannot be drawn.
+    #[error("{}: {field}: {problem}", path.display())]
+    Draws {
+        /// The file.
+        path: PathBuf,
+        /// The field.
+        field: String,
+        /// What is wrong with it.
+        problem: String,
+    },
     /// A data source's fields do not go together, or a number is out of range.
     #[error("data of subject {subject}: {problem}")]
     DataSource {

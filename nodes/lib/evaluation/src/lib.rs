@@ -5,6 +5,7 @@
 //! - [`evaluate_activities`]: what virtual IMUs are worth to a classifier of activities.
 //! - [`TrainingConfig`], [`training_pairs`], [`TrainingRun`]: what a training learns from, and the
 //!   folder that it works in.
+//! - [`SimulationDraws`]: people, ways of wearing and devices, drawn anew for each motion.
 //! - [`fit_mapping`]: the distribution mapping from one recording to another.
 //!
 //! Computations that take long tell an [`Observer`] of their progress and ask it whether to stop.
@@ -20,6 +21,7 @@ mod mapping;
 mod observer;
 mod report;
 mod seeds;
+mod simulation_draws;
 mod training;
 mod training_data;
 mod wanted;
@@ -39,6 +41,7 @@ pub use fidelity::{
 pub use mapping::fit_mapping;
 pub use observer::{Observer, Unobserved};
 pub use report::Report;
+pub use simulation_draws::{DrawnSimulation, SimulationDraws};
 pub use training::{
     EngineChoice, Learnt, NetworkSizes, TrainingConfig, TrainingRun, TrainingSettings, data_summary,
 };

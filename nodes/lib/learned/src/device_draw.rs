@@ -154,6 +154,11 @@ impl DrawnDevice {
         &self.effects
     }
 
+    /// Its white noise.
+    pub fn noise(&self) -> &DeclaredNoise {
+        &self.noise
+    }
+
     /// Its readings at `stamps` of a sensor that moves along `kinematics` (world axes, on a uniform
     /// grid of `rate_hz`).
     ///

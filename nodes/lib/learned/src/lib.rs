@@ -62,5 +62,5 @@ pub use shape::{Direction, MOST_PARAMETERS, NetworkShape, Tensor};
 pub use simulator::{LearnedSimulator, WholeMotionCorrection, scheme_for_networks};
 pub use site_motion::{NETWORK_RATE_HZ, SiteMotion};
 pub use streaming::{StreamingBatch, StreamingNetwork};
-pub use virtual_pairs::{DrawnWearer, KnownMotion, WearerRanges};
+pub use virtual_pairs::{DrawnWearer, KnownMotion, WearerRanges, draw_shape};
 pub use windows::{Blend, HOP, WINDOW, window_starts};

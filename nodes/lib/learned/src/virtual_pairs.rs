@@ -95,8 +95,7 @@ impl WearerRanges {
         let mut random = ChaCha12Rng::seed_from_u64(seed);
         let speed = self.speed[0] + (self.speed[1] - self.speed[0]) * random.random::<f64>();
         let (poses, rate_hz) = (motion.poses, motion.rate_hz * speed);
-        let mean_shape = vec![0.0; model.beta_count().min(SHAPES)];
-        let shape = betas(&mut random, &mean_shape, self.shape);
+        let shape = draw_shape(&mut random, model, self.shape);
         let told = ShapedBody::new(model.clone(), &betas(&mut random, &shape, self.shape_error))?;
         let worn = ShapedBody::new(model.clone(), &shape)?;
         let stamps = stamps(poses.len(), rate_hz);
@@ -144,6 +143,11 @@ impl WearerRanges {
             doubtful,
         })
     }
+}
+
+/// A person's coefficients of shape, with this standard deviation, cut off where nobody is.
+pub fn draw_shape(random: &mut ChaCha12Rng, model: &BodyModel, sigma: f64) -> Vec<f64> {
+    betas(random, &vec![0.0; model.beta_count().min(SHAPES)], sigma)
 }
 
 /// Coefficients of shape around others, with this standard deviation.

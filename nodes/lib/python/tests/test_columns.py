@@ -44,7 +44,7 @@ def test_pandas_and_pyarrow_read_them(written):
     assert file.schema_arrow.field("angular_velocity_z").metadata[b"unit"] == b"rad/s"
     metadata = file.metadata.metadata
     assert metadata[b"seed"] == b"3"
-    assert b"declared_noise" in metadata[b"device.left_wrist"]
+    assert b"declared_noise" in metadata[b"device.consumer_mems"]
 
 
 def test_polars_reads_them(written):

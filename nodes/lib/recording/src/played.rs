@@ -13,7 +13,10 @@ use cromosim_msgs::std_msgs::Header;
 use cromosim_spatial::Stamp;
 
 use crate::motion_spill::MotionSpill;
-use crate::{MessageHeader, Quality, RecordingError, smpl_state, stamp_of_frame, write_file_with};
+use crate::{
+    FIRST_STAMP, MessageHeader, Quality, RecordingError, smpl_state, stamp_of_frame,
+    write_file_with,
+};
 
 /// One person of a motion file.
 pub struct PlayedPerson {
@@ -119,6 +122,25 @@ impl PlayedPerson {
     ) -> Result<Self, MotionError> {
         let frames = motion.part(start_s, duration_s)?;
         Ok(Self::of_frames(motion, frames, 0.0))
+    }
+
+    /// The same motion by somebody of another shape, or `speed` times as fast.
+    #[must_use]
+    pub fn varied(&self, betas: Option<&[f64]>, speed: f64) -> Self {
+        let begin = FIRST_STAMP;
+        let faster = |stamp: &Stamp| begin.plus_seconds((*stamp - begin) / speed);
+        let mut motion = self.motion.clone();
+        motion.rate_hz *= speed;
+        if let Some(betas) = betas {
+            betas.clone_into(&mut motion.betas);
+        }
+        Self {
+            motion,
+            label: self.label.clone(),
+            body_id: self.body_id.clone(),
+            stamps: self.stamps.iter().map(faster).collect(),
+            played: self.played.clone(),
+        }
     }
 
     /// One of several people, in the part that is asked for, as [`PlayedPerson::part`].

@@ -95,7 +95,9 @@ pub struct Simulation {
     model: Arc<BodyModel>,
     placements: PlacementSet,
     devices: Vec<Device>,
-    options: SimulationOptions,
+    options: Arc<SimulationOptions>,
+    /// Of the noise.
+    seed: u64,
 }
 
 impl Simulation {
@@ -127,7 +129,8 @@ impl Simulation {
             model,
             placements,
             devices,
-            options,
+            seed: options.seed,
+            options: Arc::new(options),
         })
     }
 
@@ -141,6 +144,18 @@ impl Simulation {
             }
         }
         self
+    }
+
+    /// The same with other placements, their devices, and another seed of the noise.
+    #[must_use]
+    pub fn varied(&self, placements: PlacementSet, devices: Vec<Device>, seed: u64) -> Self {
+        Self {
+            model: self.model.clone(),
+            placements,
+            devices,
+            options: self.options.clone(),
+            seed,
+        }
     }
 
     /// The body.
@@ -247,7 +262,7 @@ impl Simulation {
         let output = uniform_stamps(start, end, rate_hz)?;
         let options = ImuOptions {
             rate_hz,
-            seed: self.options.seed,
+            seed: self.seed,
             // Several people's devices err each on its own, as those of nodes with a prefix do.
             name: person.frame(name),
             noise: self.options.noise,
@@ -293,7 +308,7 @@ impl Simulation {
             return Ok(None);
         };
         let segment = texture.or(TextureSegment::of_joint(mounted.joint()));
-        let drawn = add_texture(motion, segment, (self.options.seed, whose));
+        let drawn = add_texture(motion, segment, (self.seed, whose));
         let drawn = drawn.ok_or_else(|| RecordingError::NoBandwidth {
             placement: whose.to_owned(),
         })?;

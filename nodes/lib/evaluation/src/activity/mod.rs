@@ -49,7 +49,7 @@ use clips::{ActivityClip, ClipDraw};
 use dataset::{RealDataset, Subject};
 use experiment::{Experiment, VirtualSet};
 use player::ClipPlayer;
-use wearing::DeviceWearing;
+pub(crate) use wearing::{DeviceWearing, WornDevice};
 
 /// People of a quick run.
 const QUICK_SUBJECTS: usize = 3;

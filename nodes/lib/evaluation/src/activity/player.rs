@@ -5,9 +5,9 @@ use std::sync::Arc;
 use cromosim_body::{BodyModel, BodyPose, ShapedBody};
 use cromosim_imu::{
     GridTrace, KinematicSample, MountedSensor, Placement, Scheme, SensorFrame, SensorTrajectory,
-    normal_pair, simulate_kinematics,
+    simulate_kinematics,
 };
-use cromosim_learned::{Examples, LearnedSimulator, NETWORK_RATE_HZ, SiteMotion};
+use cromosim_learned::{Examples, LearnedSimulator, NETWORK_RATE_HZ, SiteMotion, draw_shape};
 use cromosim_spatial::{Stamp, uniform_stamps};
 use nalgebra::Isometry3;
 use rand::SeedableRng;
@@ -21,11 +21,6 @@ use super::wearing::{DeviceWearing, WornDevice};
 use super::windows::{CHANNELS_PER_DEVICE, DeviceReadings};
 use crate::EvaluationError;
 use crate::seeds::mixed_seed;
-
-/// Coefficients of shape that are drawn.
-const SHAPES: usize = 10;
-/// Nobody's coefficient is further from 0, standard deviations.
-const WIDEST_SHAPE: f64 = 2.5;
 
 /// Plays clips on drawn people who wear devices.
 pub(super) struct ClipPlayer<'a> {
@@ -67,9 +62,7 @@ impl ClipPlayer<'_> {
         let clip = &self.clips[draw.clip];
         let mut random = ChaCha12Rng::seed_from_u64(draw.seed);
         let spread = self.settings.shape_std;
-        let betas: Vec<f64> = (0..self.model.beta_count().min(SHAPES))
-            .map(|_| (spread * normal_pair(&mut random)[0]).clamp(-WIDEST_SHAPE, WIDEST_SHAPE))
-            .collect();
+        let betas = draw_shape(&mut random, self.model, spread);
         let body = ShapedBody::new(self.model.clone(), &betas)?;
         let worn: Vec<WornDevice> = self
             .wearings

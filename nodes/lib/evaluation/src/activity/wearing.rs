@@ -7,7 +7,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha12Rng;
 
 /// Where people wear a device that a data set calls by one placement's name, and how.
-pub(super) struct DeviceWearing {
+pub(crate) struct DeviceWearing {
     /// The data set's name of the placement.
     pub placement: &'static str,
     /// Sites of the skin, and the joint nearest to each; one is drawn.
@@ -105,7 +105,7 @@ const KNOWN: [DeviceWearing; 10] = [
 ];
 
 /// A device on a drawn person.
-pub(super) struct WornDevice {
+pub(crate) struct WornDevice {
     /// The site's name.
     pub site: &'static str,
     /// The joint nearest to the site.

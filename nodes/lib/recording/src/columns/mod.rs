@@ -10,7 +10,6 @@ mod people;
 mod schema;
 mod write;
 
-pub use people::{PeopleColumns, write_people_columns};
 pub(crate) use schema::{
     ACTIVITY, CHANNELS, DRAW, PERSON, PLACEMENT, RECORDING as RECORDING_COLUMN, STAMP,
 };

@@ -74,17 +74,19 @@ pub fn properties(metadata: &BTreeMap<String, String>) -> Result<WriterPropertie
     entries.extend(said.map(|(key, value)| KeyValue::new(key.clone(), value.clone())));
     let mut properties = WriterProperties::builder()
         .set_created_by(format!("cromosim version {}", env!("CARGO_PKG_VERSION")))
-        .set_compression(Compression::ZSTD(ZstdLevel::try_new(1)?))
         .set_statistics_enabled(EnabledStatistics::Chunk)
         .set_key_value_metadata(Some(entries));
-    let plain = [(STAMP, Encoding::DELTA_BINARY_PACKED)]
-        .into_iter()
-        .chain(CHANNELS.map(|channel| (channel, Encoding::BYTE_STREAM_SPLIT)));
-    for (name, encoding) in plain {
-        let path = ColumnPath::from(name);
+    let stamp = ColumnPath::from(STAMP);
+    properties = properties
+        .set_column_dictionary_enabled(stamp.clone(), false)
+        .set_column_encoding(stamp, Encoding::DELTA_BINARY_PACKED);
+    // What else is small already is not compressed; nobody looks for readings by their size.
+    for channel in CHANNELS.map(ColumnPath::from) {
         properties = properties
-            .set_column_dictionary_enabled(path.clone(), false)
-            .set_column_encoding(path, encoding);
+            .set_column_dictionary_enabled(channel.clone(), false)
+            .set_column_encoding(channel.clone(), Encoding::BYTE_STREAM_SPLIT)
+            .set_column_compression(channel.clone(), Compression::ZSTD(ZstdLevel::try_new(1)?))
+            .set_column_statistics_enabled(channel, EnabledStatistics::None);
     }
     Ok(properties.build())
 }

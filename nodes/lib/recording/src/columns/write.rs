@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use parquet::data_type::{ByteArray, ByteArrayType, DataType, FloatType, Int32Type, Int64Type};
 use parquet::errors::ParquetError;
+use parquet::file::metadata::KeyValue;
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 
 use super::schema::{properties, schema};
@@ -124,6 +125,12 @@ impl<'a> ColumnsWriter<'a> {
         column::<ByteArrayType>(&mut rows, &known, Some(&levels))?;
         rows.close()?;
         Ok(())
+    }
+
+    /// Adds to what the file says of itself.
+    pub fn note(&mut self, key: &str, value: String) {
+        let entry = KeyValue::new(key.to_owned(), value);
+        self.file.append_key_value_metadata(entry);
     }
 
     /// Ends the file; gives the number of its rows.
