@@ -302,3 +302,37 @@ fn what_is_no_set_of_inputs_is_refused() {
     assert_eq!(shard.status.code(), Some(2));
     assert!(text(&shard).contains("expected I/N"), "{}", text(&shard));
 }
+
+/// What Slurm runs for each task of an array, one of them killed before it did anything.
+#[test]
+fn tasks_of_a_slurm_array_give_the_same_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    motions(here, 5);
+    succeed(here, &simulate("motions", "whole", &[]));
+    let script = common::root().join("nodes/lib/python/examples/slurm_simulate.sh");
+    let task = |number: usize, count: usize| {
+        let output = Command::new("bash")
+            .arg(&script)
+            .args(["motions", "tasks", "--device", "consumer_mems"])
+            .current_dir(here)
+            .env("CROMOSIM_BINARY", CROMOSIM)
+            .env("SLURM_CPUS_PER_TASK", "2")
+            .env("SLURM_ARRAY_TASK_ID", number.to_string())
+            .env("SLURM_ARRAY_TASK_COUNT", count.to_string())
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{}", text(&output));
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    task(1, 3);
+    task(3, 3);
+    assert_eq!(files(&here.join("tasks")).len(), 3);
+    let again = [task(1, 2), task(2, 2)].concat();
+    assert_eq!(
+        again.matches(".parquet: ").count(),
+        2,
+        "what is missing: {again}"
+    );
+    assert!(files(&here.join("whole")) == files(&here.join("tasks")));
+}
