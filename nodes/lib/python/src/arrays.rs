@@ -2,6 +2,7 @@
 
 use cromosim_msgs::geometry_msgs::{PoseStamped, Quaternion};
 use cromosim_msgs::sensor_msgs::Imu;
+use cromosim_recording::rigid::unit_quaternion;
 use cromosim_spatial::Stamp;
 use nalgebra::{UnitQuaternion, Vector3};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
@@ -34,10 +35,8 @@ pub fn vectors(array: &PyReadonlyArray2<'_, f64>, name: &str) -> PyResult<Vec<Ve
     Ok(view.rows().into_iter().map(vector).collect())
 }
 
-/// How far a quaternion's norm may be from 1: what single precision and a few printed digits leave.
-const NORM_TOLERANCE: f64 = 1e-3;
-
-/// (N, 4) of quaternions x, y, z, w.
+/// (N, 4) of quaternions x, y, z, w, as files of trajectories are read: the same bits then give the
+/// same readings.
 pub fn rotations(
     array: &PyReadonlyArray2<'_, f64>,
     name: &str,
@@ -52,14 +51,11 @@ pub fn rotations(
     }
     let rotation = |(number, row): (usize, numpy::ndarray::ArrayView1<'_, f64>)| {
         let quaternion = nalgebra::Quaternion::new(row[3], row[0], row[1], row[2]);
-        let norm = quaternion.norm();
-        if (norm - 1.0).abs() <= NORM_TOLERANCE {
-            Ok(UnitQuaternion::new_normalize(quaternion))
-        } else {
-            Err(raise(format!(
+        unit_quaternion(quaternion).map_err(|norm| {
+            raise(format!(
                 "{name}, row {number}: a quaternion x, y, z, w of norm {norm}; it must be 1"
-            )))
-        }
+            ))
+        })
     };
     view.rows().into_iter().enumerate().map(rotation).collect()
 }

@@ -2,7 +2,7 @@
 
 use cromosim_imu::{
     Device, EffectsFile, ImuOptions, PlacementEffects, Scheme, SensorFrame, StreamOptions,
-    StreamingImu, TextureSegment, UnexplainedErrors, VirtualImu,
+    StreamingImu, TextureSegment, VirtualImu,
 };
 use cromosim_learned::scheme_for_networks;
 use cromosim_msgs::sensor_msgs::Imu;
@@ -81,7 +81,7 @@ fn of_device(name: &str, device: &Device, epoch: Stamp) -> EffectsFile {
         epoch,
         declared_noise: device.declared_noise(),
         effects: device.effects().clone(),
-        unexplained: UnexplainedErrors::default(),
+        unexplained: device.unexplained(),
         other_sessions: Vec::new(),
     };
     let mut file = EffectsFile::default();

@@ -4,6 +4,7 @@
 
 The command line's time holds its start, reading, and writing of a bag as well; Python's its start, the
 import and reading. `alone` is `simulate` by itself, in a process that is already running.
+IMUSIM_PYTHON names a Python that has IMUSim (see peer_imusim.py): then it, too, of the same motion.
 """
 
 import os
@@ -78,9 +79,22 @@ def main() -> None:
             of_python.append(cpu(python))
             done = subprocess.run(python, check=True, capture_output=True, text=True)
             alone.append(float(done.stdout))
+        imusim = os.environ.get("IMUSIM_PYTHON")
+        if imusim is not None:
+            bvh = str(Path(folder) / "minute.bvh")
+            subprocess.run([binary, "convert", str(minute), bvh], check=True, stdout=subprocess.DEVNULL)
+            peer = [imusim, str(Path(__file__).parent / "peer_imusim.py"), bvh]
+            peer += ["left_wrist", "right_wrist", "spine3", "left_knee", "right_knee"]
+            told = subprocess.run(peer, check=True, capture_output=True, text=True).stdout
     line_s, python_s, alone_s = map(statistics.median, (of_line, of_python, alone))
     print(f"command line {line_s:.3f} s, Python {python_s:.3f} s: {python_s / line_s:.2f} times")
     print(f"simulate alone {alone_s:.3f} s")
+    if imusim is not None:
+        peer_alone_s, peer_s = map(float, told.split())
+        print(
+            f"IMUSim alone {peer_alone_s:.2f} s, {peer_alone_s / alone_s:.0f} times; "
+            f"in all {peer_s:.2f} s, {peer_s / python_s:.0f} times"
+        )
 
 
 if __name__ == "__main__":

@@ -30,4 +30,5 @@ pub use pose_csv::{parse_pose_csv, write_pose_csv};
 pub(crate) use series::median_rate;
 pub use series::{ImuSeries, PoseTrajectory};
 pub use sniff::{RigidFormat, sniff_rigid};
+pub use table::unit_quaternion;
 pub use tum::{parse_tum, write_tum};

@@ -161,8 +161,12 @@ impl Row<'_> {
     }
 }
 
-/// A rotation from a quaternion whose length is 1 within a hundredth; the length where it is not.
-pub(crate) fn unit_quaternion(quaternion: Quaternion<f64>) -> Result<UnitQuaternion<f64>, f64> {
+/// A rotation from a quaternion whose length is 1 within a hundredth; within a billionth it stays
+/// bit for bit as it is.
+///
+/// # Errors
+/// The length where it is not.
+pub fn unit_quaternion(quaternion: Quaternion<f64>) -> Result<UnitQuaternion<f64>, f64> {
     let length = quaternion.norm();
     match (length - 1.0).abs() {
         off if off <= EXACT_LENGTH => Ok(UnitQuaternion::new_unchecked(quaternion)),
