@@ -42,6 +42,23 @@ def test_a_trajectory_gives_the_command_lines_values(tmp_path, command_line):
     assert table[:, 5:].astype(np.float64).tobytes() == both.tobytes(), "to the last bit"
 
 
+def test_what_a_device_leaves_unexplained_is_in_the_covariances(tmp_path):
+    def variance(unexplained):
+        path = tmp_path / "device.yaml"
+        path.write_text(
+            "schema: cromosim/device/1\n"
+            f"declared_noise: {{accel_density: 0.001, gyro_density: 0.0001}}\n{unexplained}",
+            encoding="utf-8",
+        )
+        read = cromosim.simulate_rigid(STAMPS, POSITIONS, TURNS, rate_hz=100, device=path)
+        middle = len(read) // 2
+        return read.specific_force_covariance[middle, 0], read.angular_velocity_covariance[middle, 0]
+
+    plain = variance("")
+    more = variance("unexplained: {accel_variance: 0.002, gyro_variance: 1.0e-5}\n")
+    assert np.subtract(more, plain) == pytest.approx([0.002, 1e-5], rel=0.01)
+
+
 def test_a_stream_reads_what_the_whole_reads():
     device = Device({"gyro_bias": {"bias": [0.01, 0, 0]}})
     imu = cromosim.StreamingImu(RATE_HZ, 60, scheme="richardson", device=device)
