@@ -1,6 +1,6 @@
 //! People, ways of wearing and devices, drawn anew for each motion that is simulated: data to learn
-//! from. What is drawn, and how, is what trainings ([`WearerRanges`]) and the evaluation of
-//! activities draw.
+//! from. What is drawn, and how, is what trainings ([`cromosim_learned::WearerRanges`]) and the
+//! evaluation of activities draw.
 
 use std::collections::BTreeMap;
 use std::path::Path;
