@@ -4,6 +4,7 @@
 mod common;
 
 use common::{root, succeed};
+use cromosim_bag::BagReader;
 use serde_json::Value;
 
 fn parsed(text: &str) -> Value {
@@ -97,4 +98,37 @@ fn diagnose_and_compare_print_what_their_files_hold() {
         std::fs::read_to_string(here.join("found.json")).unwrap()
     );
     assert!(parsed(&said).is_object());
+}
+
+#[test]
+fn simulate_prints_an_object_for_each_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let object = |arguments: &[&str]| parsed(&succeed(here, arguments));
+    let walk = object(&["simulate", "--out", "walk.mcap", "--json"]);
+    assert_eq!(walk["out"], "walk.mcap");
+    assert_eq!(walk["placements"].as_array().unwrap().len(), 5);
+    let wrist = &walk["placements"][0];
+    assert_eq!(wrist["name"], "left_wrist");
+    assert!(wrist["specific_force_bandwidth_hz"].as_f64().unwrap() > 5.0);
+    let count = BagReader::open(&here.join("walk.mcap")).unwrap();
+    assert_eq!(walk["messages"], count.summary().message_count());
+    let columns = object(&["simulate", "--out", "walk.parquet", "--json"]);
+    assert!(columns["rows"].as_u64().unwrap() > 4000 && columns["messages"].is_null());
+    let again = object(&[
+        "simulate",
+        "--reference",
+        "walk.mcap",
+        "--out",
+        "again.mcap",
+        "--json",
+    ]);
+    assert_eq!(again["placements"].as_array().unwrap().len(), 5);
+    succeed(here, &["convert", "walk.mcap", "walk.bvh"]);
+    let lines = succeed(
+        here,
+        &["simulate", "walk.bvh", "*.bvh", "--out", "many", "--json"],
+    );
+    let lines: Vec<Value> = lines.lines().map(parsed).collect();
+    assert_eq!(lines[1]["written"], 1, "{lines:?}");
 }

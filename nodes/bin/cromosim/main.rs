@@ -38,6 +38,7 @@ mod simulate_many;
 mod simulate_setup;
 mod simulated_draws;
 mod simulated_file;
+mod simulated_json;
 mod simulated_quality;
 mod summary;
 mod train;

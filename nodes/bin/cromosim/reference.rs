@@ -20,6 +20,7 @@ use crate::output::say;
 use crate::progress::{self, Interrupt};
 use crate::simulate_arguments::Arguments;
 use crate::simulate_setup::read_mapping;
+use crate::simulated_json::WrittenFile;
 use crate::simulated_quality::{quality_entries, quality_line, unlikely, warn};
 
 /// Runs `simulate --reference RECORDING`.
@@ -58,6 +59,14 @@ pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
         },
         arguments,
     )?;
+    if arguments.json {
+        return print_json(
+            recording,
+            summary.message_count(),
+            (&recorded, &simulated),
+            arguments,
+        );
+    }
     say!(
         "{}: {} messages of {} placements, from the reference in {}",
         arguments.out.display(),
@@ -79,14 +88,7 @@ pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()>
     let recorded = [rigid_placement(trajectory, name)?];
     let mut effects = given_effects(arguments, &recorded)?;
     if let Some(device) = &arguments.device {
-        let device = Device::resolve(Some(device), Path::new("."))?;
-        let of_device = PlacementEffects {
-            epoch: recorded[0].span().0,
-            declared_noise: device.declared_noise(),
-            effects: device.effects().clone(),
-            unexplained: device.unexplained(),
-            other_sessions: Vec::new(),
-        };
+        let of_device = effects_of_device(device, &recorded[0])?;
         effects.placements.insert(name.to_owned(), of_device);
     }
     let learned = arguments
@@ -119,6 +121,10 @@ pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()>
         arguments,
     )?;
     warn(trajectory, &recorded[0].notes);
+    if arguments.json {
+        let count = summary.message_count();
+        return print_json(trajectory, count, (&recorded, &simulated), arguments);
+    }
     say!(
         "{}: {} messages of {name}, along {}{}",
         arguments.out.display(),
@@ -127,6 +133,47 @@ pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()>
         quality_line(simulated.iter().map(|placement| placement.quality))
     )?;
     Ok(())
+}
+
+/// A device as what errs.
+fn effects_of_device(
+    device: &str,
+    recorded: &RecordedPlacement,
+) -> anyhow::Result<PlacementEffects> {
+    let device = Device::resolve(Some(device), Path::new("."))?;
+    Ok(PlacementEffects {
+        epoch: recorded.span().0,
+        declared_noise: device.declared_noise(),
+        effects: device.effects().clone(),
+        unexplained: device.unexplained(),
+        other_sessions: Vec::new(),
+    })
+}
+
+/// What was written, as JSON; notes are its warnings.
+fn print_json(
+    source: &Path,
+    count: u64,
+    (recorded, simulated): (&[RecordedPlacement], &[Resimulated]),
+    arguments: &Arguments,
+) -> anyhow::Result<()> {
+    let notes = recorded.iter().flat_map(|placement| {
+        let notes = placement.notes.iter().cloned();
+        let notes = notes.chain(outside_reference(placement));
+        notes.map(|note| format!("placement {}: {note}", placement.name))
+    });
+    let placements = recorded.iter().zip(simulated);
+    let file = WrittenFile {
+        out: &arguments.out,
+        counted: "messages",
+        count,
+        source: &source.display().to_string(),
+        placements: placements
+            .map(|(placement, simulated)| (placement.name.clone(), simulated.quality))
+            .collect(),
+        warnings: notes.collect(),
+    };
+    say!("{}", file.json())
 }
 
 /// The effects of `--effects`; none without.

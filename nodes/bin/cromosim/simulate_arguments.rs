@@ -157,6 +157,9 @@ pub struct Arguments {
     /// Write each placement's samples as CSV into this directory too
     #[arg(long, value_name = "DIR")]
     pub csv: Option<PathBuf>,
+    /// Print what was written as JSON: an object and a line for each file
+    #[arg(long, hide_short_help = true)]
+    pub json: bool,
     /// Replace OUT, and the CSV files of --csv, where they exist
     #[arg(long)]
     pub force: bool,

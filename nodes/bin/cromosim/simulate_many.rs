@@ -13,6 +13,7 @@ use std::thread;
 use anyhow::{Context, bail};
 use cromosim_recording::batch::{BatchInput, Manifest, Outcome, expand};
 use indicatif::ProgressBar;
+use serde_json::json;
 
 use crate::output::{remark, say};
 use crate::progress;
@@ -180,17 +181,25 @@ impl Done {
         for error in &self.errors {
             remark!("error: {error}");
         }
-        let there = match there {
-            0 => String::new(),
-            there => format!("{there} were there already, "),
-        };
-        say!(
-            "{}: {} files written, {there}{} failed; {}",
-            folder.display(),
-            self.written,
-            self.errors.len(),
-            manifest.display()
-        )?;
+        let failed = self.errors.len();
+        let out = folder.display();
+        if setup.json {
+            say!(
+                "{}",
+                json!({"out": out.to_string(), "written": self.written, "there_already": there, "failed": failed,
+                    "manifest": manifest.display().to_string()})
+            )?;
+        } else {
+            let there = match there {
+                0 => String::new(),
+                there => format!("{there} were there already, "),
+            };
+            let manifest = manifest.display();
+            say!(
+                "{out}: {} files written, {there}{failed} failed; {manifest}",
+                self.written
+            )?;
+        }
         if !self.errors.is_empty() {
             bail!(
                 "{} of {} files failed (above); the others are written",

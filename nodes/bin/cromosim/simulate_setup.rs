@@ -43,6 +43,8 @@ pub struct Setup {
     motion: MotionOptions,
     pub format: Format,
     pub force: bool,
+    /// Whether what is written is said as JSON.
+    pub json: bool,
     pub csv: Option<PathBuf>,
     pub interrupt: Interrupt,
 }
@@ -91,6 +93,7 @@ impl Setup {
             motion: arguments.motion.options()?,
             format: arguments.format(),
             force: arguments.force,
+            json: arguments.json,
             csv: arguments.csv.clone(),
             interrupt: Interrupt::watch()?,
         })

@@ -4,6 +4,7 @@
 use cromosim_evaluation::{DrawnSimulation, SimulationDraws};
 use cromosim_recording::columns::{ColumnsHeader, ColumnsWriter};
 use cromosim_recording::{Aside, PlayedPerson, write_file_with};
+use serde_json::json;
 
 use crate::simulate_setup::{Output, Setup, Written};
 
@@ -34,15 +35,14 @@ pub fn simulate_draws(
         }
         anyhow::Ok(columns.finish()?)
     })?;
-    Ok(Written {
-        count: rows,
-        line: format!(
-            "{}: {rows} rows, {} draws of {placements} placements, of {}",
-            output.path.display(),
-            draws.count(),
-            people[0].motion.name
-        ),
-    })
+    let (out, source) = (output.path.display(), &people[0].motion.name);
+    let draws = draws.count();
+    let line = if setup.json {
+        json!({"out": out.to_string(), "rows": rows, "draws": draws, "source": source}).to_string()
+    } else {
+        format!("{out}: {rows} rows, {draws} draws of {placements} placements, of {source}")
+    };
+    Ok(Written { count: rows, line })
 }
 
 /// What was drawn, as YAML with comments.

@@ -16,6 +16,7 @@ use crate::files::refuse_existing;
 use crate::simulate_arguments::Format;
 use crate::simulate_setup::{Output, Setup, Written, names};
 use crate::simulated_draws::simulate_draws;
+use crate::simulated_json::WrittenFile;
 use crate::simulated_quality::{quality_entries, quality_line, unlikely, warn};
 
 fn last_played(people: &[PlayedPerson]) -> Option<Stamp> {
@@ -147,23 +148,50 @@ pub fn simulate_one(
     }
     let motion = &people[0].motion;
     bar.suspend(|| warn(Path::new(&motion.name), &oddities));
+    let line = if setup.json {
+        let placements = people.iter().zip(&simulated);
+        let placements = placements.flat_map(|(person, simulated)| {
+            let of = |own: &SimulatedPlacement| (person.frame(&own.name), own.quality);
+            simulated.placements.iter().map(of)
+        });
+        let file = WrittenFile {
+            out,
+            counted,
+            count,
+            source: &motion.name,
+            placements: placements.collect(),
+            warnings: oddities,
+        };
+        file.json().to_string()
+    } else {
+        words(out, (count, counted), people, &simulated)
+    };
+    Ok(Written { count, line })
+}
+
+/// What was written, in words.
+fn words(
+    out: &Path,
+    (count, counted): (u64, &str),
+    people: &[PlayedPerson],
+    simulated: &[SimulatedPerson],
+) -> String {
     let last = last_played(people).map_or(0.0, |last| last - FIRST_STAMP);
-    let placements = setup.simulation.placements().placements().len();
+    let placements = simulated.first().map_or(0, |own| own.placements.len());
     let who = if people.len() > 1 {
         format!("{} people, ", people.len())
     } else {
         String::new()
     };
-    let line = format!(
+    format!(
         "{}: {count} {counted}, {who}{placements} placements, {last:.2} s of {}{}",
         out.display(),
-        motion.name,
+        people[0].motion.name,
         quality_line(
             simulated
                 .iter()
                 .flat_map(|person| &person.placements)
                 .map(|placement| placement.quality)
         )
-    );
-    Ok(Written { count, line })
+    )
 }
