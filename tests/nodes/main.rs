@@ -9,6 +9,7 @@ mod demo;
 mod faults;
 mod launch;
 mod other_host;
+mod parameters;
 mod process;
 #[path = "../../nodes/lib/ros/tests/stranger/mod.rs"]
 mod stranger;

@@ -14,9 +14,10 @@ node_config! {
         pub bag: String = String::new(),
         /// Topics of the bag to play; empty: all.
         pub topics: Vec<String> = Vec::new(),
-        /// Speed factor, positive.
+        /// Speed factor, positive. May change at run time.
         pub rate: f64 = 1.0,
-        /// Begin again at the end. Between two rounds lies a second of silence.
+        /// Begin again at the end. Between two rounds lies a second of silence. May change at run
+        /// time.
         pub r#loop: bool = false,
         /// Begin so many seconds after the beginning.
         pub start_seconds: f64 = 0.0,
@@ -68,4 +69,15 @@ node_config! {
         /// Begin after so many seconds even where subscriptions are missing.
         pub ready_timeout_seconds: f64 = 10.0,
     }
+}
+
+/// # Errors
+/// Where the factor is not positive.
+pub fn check_rate(rate: f64) -> Result<(), String> {
+    if rate.is_finite() && rate > 0.0 {
+        return Ok(());
+    }
+    Err(format!(
+        "parameter 'rate': expected a positive factor, found {rate}"
+    ))
 }

@@ -62,6 +62,12 @@ pub fn run(arguments: &[String]) -> anyhow::Result<()> {
         config.start_paused,
     );
     let remote = Remote::new(player, source.begins()..=source.ends(), &bell);
+    remote.take_up(&config).map_err(anyhow::Error::msg)?;
+    let changed = remote.clone();
+    node.parameters()
+        .settable(&["rate", "loop"], move |config: Config| {
+            changed.take_up(&config)
+        })?;
     let _services = remote.serve(&node)?;
     let ended = Playback {
         node: &node,
@@ -99,11 +105,7 @@ fn wait_for_listeners(node: &Node, config: &Config, outlet: &Outlet) {
 }
 
 fn check(config: &Config) -> anyhow::Result<()> {
-    anyhow::ensure!(
-        config.rate.is_finite() && config.rate > 0.0,
-        "parameter 'rate': expected a positive factor, found {}",
-        config.rate
-    );
+    config::check_rate(config.rate).map_err(anyhow::Error::msg)?;
     let not_negative = [
         ("start_seconds", config.start_seconds),
         ("duration_seconds", config.duration_seconds),
@@ -158,7 +160,7 @@ impl Playback<'_> {
                 ))?;
             }
             let Some(due) = self.source.due() else {
-                if !self.config.r#loop {
+                if !self.remote.loops() {
                     return Ok(());
                 }
                 self.begin_again()?;

@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use cromosim_msgs::rosbag2_interfaces as srv;
 use cromosim_ros::{Bell, Node, RosError, ServiceServer};
 
+use crate::config::{Config, check_rate};
 use crate::player::Player;
 use crate::system_clock::system_nanos;
 
@@ -24,6 +25,8 @@ struct Shared {
     seekable: RangeInclusive<i64>,
     /// Messages to publish at once while paused.
     burst: u64,
+    /// Begin again at the end.
+    loops: bool,
 }
 
 /// Access to the player while it is not changed by anybody else.
@@ -51,6 +54,7 @@ impl Remote {
                 seek: None,
                 seekable,
                 burst: 0,
+                loops: false,
             })),
             bell: bell.clone(),
         }
@@ -78,21 +82,41 @@ impl Remote {
         wanted
     }
 
+    /// Whether to begin again at the end.
+    pub fn loops(&self) -> bool {
+        self.lock().loops
+    }
+
+    /// Takes up the parameters that may change at run time.
+    ///
+    /// # Errors
+    /// Where the rate is not positive.
+    pub fn take_up(&self, config: &Config) -> Result<(), String> {
+        check_rate(config.rate)?;
+        self.change(|shared, now| {
+            shared.loops = config.r#loop;
+            if shared.player.rate() != config.rate {
+                shared.player.set_rate(now, config.rate);
+            }
+        });
+        Ok(())
+    }
+
     fn change<A>(&self, change: impl FnOnce(&mut Shared, i64) -> A) -> A {
         let answer = change(&mut self.lock(), system_nanos());
         self.bell.ring();
         answer
     }
 
-    /// Offers the services below the node's name.
+    /// Offers the services below the node's name; a rate that they set is the parameter's too.
     ///
     /// # Errors
     /// What DDS refuses.
     pub fn serve(&self, node: &Node) -> Result<Vec<ServiceServer>, RosError> {
         let remote = || self.clone();
         let (pause, resume, toggle, is_paused) = (remote(), remote(), remote(), remote());
-        let (set_rate, get_rate, seek, play_next, burst) =
-            (remote(), remote(), remote(), remote(), remote());
+        let (get_rate, seek, play_next, burst) = (remote(), remote(), remote(), remote());
+        let parameters = node.parameters().clone();
         Ok(vec![
             node.serve::<srv::Pause>("~/pause", move |_| {
                 pause.change(|shared, now| (shared.player.pause(now), Default::default()).1)
@@ -114,7 +138,7 @@ impl Remote {
                 paused: is_paused.player().paused(),
             })?,
             node.serve::<srv::SetRate>("~/set_rate", move |request| srv::SetRateResponse {
-                success: set_rate.change(|shared, now| shared.player.set_rate(now, request.rate)),
+                success: parameters.set("rate", request.rate).is_ok(),
             })?,
             node.serve::<srv::GetRate>("~/get_rate", move |_| srv::GetRateResponse {
                 rate: get_rate.player().rate(),

@@ -20,16 +20,16 @@ node_config! {
         /// and smoothed before, as AMASS). Empty: tracked, as no message says it.
         pub pose_source: String = String::new(),
         /// Add the random part of the device's errors: white noise and lost samples. Without it
-        /// biases and all other effects stay.
+        /// biases and all other effects stay. May change at run time.
         pub noise: bool = true,
-        /// Seed of the noise and of lost samples.
+        /// Seed of the noise and of lost samples. May change at run time.
         pub seed: i64 = 0,
         /// Folder of streaming networks, as `cromosim train` writes it, that correct acceleration
         /// and angular velocity before the device's effects; placements then run at 100 Hz, at most
-        /// 90 ms and two states behind. Empty: none.
+        /// 90 ms and two states behind. Empty: none. May change at run time.
         pub learned: String = String::new(),
         /// Distribution mapping (YAML), as `cromosim map` writes it, applied last to the placements
-        /// that it names. Empty: none.
+        /// that it names. Empty: none. May change at run time.
         pub mapping: String = String::new(),
         /// Put before every frame but the world's, with a slash; as for smpl_state.
         pub prefix: String = String::new(),

@@ -6,6 +6,7 @@ mod node;
 
 use std::path::Path;
 use std::str::FromStr;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use anyhow::Context;
@@ -35,16 +36,10 @@ struct Publishers {
     diagnostics: Publisher<DiagnosticArray>,
     // Kept for late subscriptions.
     _static_frames: Option<Publisher<TFMessage>>,
-    _placements: Publisher<std_msgs::String>,
 }
 
 impl Publishers {
-    fn new(
-        node: &Node,
-        logic: &VirtualImuNode,
-        config: &Config,
-        placements: &PlacementSet,
-    ) -> Result<Self, RosError> {
+    fn new(node: &Node, logic: &VirtualImuNode, config: &Config) -> Result<Self, RosError> {
         let topics = |ending: &str| {
             logic
                 .placements()
@@ -79,11 +74,6 @@ impl Publishers {
             .as_ref()
             .map(|publisher| publisher.publish(&rigid))
             .transpose()?;
-        let described =
-            node.publisher::<std_msgs::String>("virtual_imu/placements", Qos::tf_static())?;
-        described.publish(&std_msgs::String {
-            data: placements.to_yaml(),
-        })?;
         Ok(Self {
             data_raw: imu("data_raw")?,
             data: imu("data")?,
@@ -91,7 +81,6 @@ impl Publishers {
             frames: node.publisher("/tf", Qos::tf())?,
             diagnostics: node.publisher("/diagnostics", Qos::reliable())?,
             _static_frames: static_frames,
-            _placements: described,
         })
     }
 
@@ -133,10 +122,12 @@ pub fn run(arguments: &[String]) -> anyhow::Result<()> {
     else {
         return Ok(());
     };
-    let (mut logic, placements) = logic(&prepared.config)?;
+    let (logic, named) = logic(&prepared.config)?;
     let (node, config) = prepared.start()?;
     let states = node.subscription::<SmplState>("smpl/state", Qos::reliable().depth(100))?;
-    let publishers = Publishers::new(&node, &logic, &config, &placements)?;
+    let publishers = Publishers::new(&node, &logic, &config)?;
+    let logic = Arc::new(Mutex::new(logic));
+    open_to_changes(&node, &logic, named, &config)?;
     let watched: Vec<_> = publishers
         .data_raw
         .iter()
@@ -148,7 +139,7 @@ pub fn run(arguments: &[String]) -> anyhow::Result<()> {
     let name = node.name().to_string();
     while !node.shutdown().is_requested() {
         match states.recv_timeout(schedule.left().unwrap_or(Duration::from_secs(1))) {
-            Ok(Some(state)) => match logic.step(&state.message) {
+            Ok(Some(state)) => match lock(&logic).step(&state.message) {
                 Ok(step) => publishers.publish(&step),
                 Err(refusal) => log::warn!("a state is left out: {refusal}"),
             },
@@ -159,11 +150,49 @@ pub fn run(arguments: &[String]) -> anyhow::Result<()> {
             report(
                 publishers
                     .diagnostics
-                    .publish(&logic.diagnostics(Time::from_nanos(node.now().nanos), &name)),
+                    .publish(&lock(&logic).diagnostics(Time::from_nanos(node.now().nanos), &name)),
             );
         }
     }
     Ok(())
+}
+
+/// What may change at run time does so between two states; the placements' schemes are said anew.
+fn open_to_changes(
+    node: &Node,
+    logic: &Arc<Mutex<VirtualImuNode>>,
+    named: PlacementSet,
+    config: &Config,
+) -> anyhow::Result<()> {
+    let described =
+        node.publisher::<std_msgs::String>("virtual_imu/placements", Qos::tf_static())?;
+    let describe = move |placements: &PlacementSet| {
+        described.publish(&std_msgs::String {
+            data: placements.to_yaml(),
+        })
+    };
+    describe(&with_settings(named.clone(), config)?)?;
+    let (logic, mut learned) = (Arc::clone(logic), config.learned.clone());
+    let take_up = move |config: Config| {
+        let placements =
+            with_settings(named.clone(), &config).map_err(|error| format!("{error:#}"))?;
+        let now = config.learned.clone();
+        lock(&logic)
+            .change(config, &placements)
+            .map_err(|refusal| refusal.to_string())?;
+        if learned != now {
+            learned = now;
+            report(describe(&placements));
+        }
+        Ok(())
+    };
+    node.parameters()
+        .settable(&["noise", "seed", "learned", "mapping"], take_up)?;
+    Ok(())
+}
+
+fn lock(logic: &Mutex<VirtualImuNode>) -> MutexGuard<'_, VirtualImuNode> {
+    logic.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// The placements of a configuration, with what it says for all of them.
@@ -171,11 +200,18 @@ pub fn run(arguments: &[String]) -> anyhow::Result<()> {
 /// # Errors
 /// What is wrong with the file or a parameter.
 pub fn placements(config: &Config) -> anyhow::Result<PlacementSet> {
-    let read = if config.placements.is_empty() {
+    with_settings(named_placements(config)?, config)
+}
+
+fn named_placements(config: &Config) -> anyhow::Result<PlacementSet> {
+    Ok(if config.placements.is_empty() {
         PlacementSet::demo()
     } else {
         PlacementSet::read(Path::new(&config.placements))?
-    };
+    })
+}
+
+fn with_settings(read: PlacementSet, config: &Config) -> anyhow::Result<PlacementSet> {
     let rate_hz = config.rate_hz;
     anyhow::ensure!(
         (0.0..=MAX_RATE_HZ).contains(&rate_hz),
@@ -200,6 +236,7 @@ pub fn placements(config: &Config) -> anyhow::Result<PlacementSet> {
     }))
 }
 
+/// The node, and the placements as their file has them.
 fn logic(config: &Config) -> anyhow::Result<(VirtualImuNode, PlacementSet)> {
     let not_negative = [
         ("state_rate_hz", config.state_rate_hz),
@@ -217,7 +254,8 @@ fn logic(config: &Config) -> anyhow::Result<(VirtualImuNode, PlacementSet)> {
         "parameter 'gap_seconds': expected more than 0, found {}",
         config.gap_seconds
     );
-    let placements = placements(config)?;
+    let named = named_placements(config)?;
+    let placements = with_settings(named.clone(), config)?;
     let model = if config.body.is_empty() {
         BodyModel::embedded()
     } else {
@@ -228,7 +266,7 @@ fn logic(config: &Config) -> anyhow::Result<(VirtualImuNode, PlacementSet)> {
         .unwrap_or(Path::new("."));
     Ok((
         VirtualImuNode::new(config.clone(), model, &placements, folder)?,
-        placements,
+        named,
     ))
 }
 

@@ -80,6 +80,8 @@ pub struct VirtualImuNode {
     sensors: MountedSensors,
     /// States that wait until their rate is known.
     early: Vec<(Stamp, BodyPose, PoseStd)>,
+    /// 0 before it is known.
+    state_rate_hz: f64,
     last: Option<Stamp>,
     counts: Counts,
     learned: Option<LearnedSimulator>,
@@ -120,66 +122,66 @@ impl VirtualImuNode {
             .collect::<Result<Vec<_>, _>>()?;
         let shaped = ShapedBody::new(model.clone(), &[])?;
         let sensors = MountedSensors::new(&shaped, &placements)?;
-        let learned = if config.learned.is_empty() {
-            None
-        } else {
-            Some(LearnedSimulator::find(Path::new(&config.learned))?)
-        };
+        let learned = read_networks(&config.learned)?;
         let mapping = read_mapping(&config.mapping, &placements)?;
         let source = pose_source(&config.pose_source)?;
-        let mut node = Self {
+        let imus = fresh_imus(&config, &mapping, &placements, &devices)?;
+        let live = fresh_networks(learned.as_ref(), &shaped, &placements, &config)?;
+        Ok(Self {
             config,
             model,
             placements,
             devices,
             streams: Vec::new(),
-            imus: Vec::new(),
+            imus,
             betas: Vec::new(),
             shaped,
             sensors,
             early: Vec::new(),
+            state_rate_hz: 0.0,
             last: None,
             counts: Counts::default(),
             learned,
-            live: None,
+            live,
             networks_delay: 0.0,
             mapping,
             source,
-        };
-        node.imus = node.fresh_imus()?;
-        node.live = node.fresh_networks()?;
-        Ok(node)
+        })
     }
 
-    fn fresh_imus(&self) -> Result<Vec<VirtualImu>, ImuError> {
-        let imu = |(placement, device): (&Placement, &Device)| {
-            let mapping = self.mapping.placements.get(placement.name()).cloned();
-            let options = ImuOptions {
-                rate_hz: placement.rate_hz(),
-                seed: self.config.seed as u64,
-                // Several bodies' devices err each on its own.
-                name: self.config.frame(placement.name()),
-                noise: self.config.noise,
-                frame_id: self.config.frame(&format!("{}_imu", placement.name())),
-                mapping: mapping.map(|mapping| Box::new(mapping) as Box<dyn ReadingMapping>),
-            };
-            VirtualImu::new(device, options)
+    /// Takes up another configuration whose noise, seed, networks or mapping differ, and their
+    /// placements: the same with other schemes. The devices are switched on anew; other networks
+    /// start the schemes over, as they need another one.
+    ///
+    /// # Errors
+    /// Networks or a mapping that cannot be used; the node is then as it was.
+    pub fn change(&mut self, config: Config, placements: &PlacementSet) -> Result<(), Refusal> {
+        if config == self.config {
+            return Ok(());
+        }
+        let other_networks = config.learned != self.config.learned;
+        let mapping = if config.mapping == self.config.mapping {
+            self.mapping.clone()
+        } else {
+            read_mapping(&config.mapping, &self.placements)?
         };
-        self.placements.iter().zip(&self.devices).map(imu).collect()
-    }
-
-    fn fresh_networks(&self) -> Result<Option<LivePlacements>, LearnedError> {
-        self.learned
-            .as_ref()
-            .map(|networks| {
-                LivePlacements::new(
-                    networks,
-                    &self.shaped,
-                    &self.placements,
-                    self.config.gap_seconds,
-                )
-            })
-            .transpose()
+        let networks = if other_networks {
+            let learned = read_networks(&config.learned)?;
+            let placements = placements.placements().to_vec();
+            let live = fresh_networks(learned.as_ref(), &self.shaped, &placements, &config)?;
+            Some((learned, live, placements))
+        } else {
+            None
+        };
+        let imus = fresh_imus(&config, &mapping, &self.placements, &self.devices)?;
+        (self.config, self.mapping, self.imus) = (config, mapping, imus);
+        if let Some(networks) = networks {
+            (self.learned, self.live, self.placements) = networks;
+            if self.state_rate_hz > 0.0 {
+                self.open_streams(self.state_rate_hz)?;
+            }
+        }
+        Ok(())
     }
 
     /// The placements; their order numbers [`Step::readings`].
@@ -236,7 +238,12 @@ impl VirtualImuNode {
             self.shaped = ShapedBody::new(self.model.clone(), &state.betas)?;
             self.sensors = MountedSensors::new(&self.shaped, &self.placements)?;
             self.betas.clone_from(&state.betas);
-            self.live = self.fresh_networks()?;
+            self.live = fresh_networks(
+                self.learned.as_ref(),
+                &self.shaped,
+                &self.placements,
+                &self.config,
+            )?;
         }
         let pose_std =
             PoseStd::from_confidence(state.confidence, self.config.pose_error_correlation_s);
@@ -267,6 +274,8 @@ impl VirtualImuNode {
         } else {
             0.0
         };
+        self.state_rate_hz = state_rate_hz;
+        self.streams.clear();
         for placement in &self.placements {
             let options = StreamOptions {
                 longest_gap: self.config.gap_seconds,
@@ -436,6 +445,46 @@ impl VirtualImuNode {
             status: vec![status],
         }
     }
+}
+
+fn fresh_imus(
+    config: &Config,
+    mapping: &MappingFile,
+    placements: &[Placement],
+    devices: &[Device],
+) -> Result<Vec<VirtualImu>, ImuError> {
+    let imu = |(placement, device): (&Placement, &Device)| {
+        let mapping = mapping.placements.get(placement.name()).cloned();
+        let options = ImuOptions {
+            rate_hz: placement.rate_hz(),
+            seed: config.seed as u64,
+            // Several bodies' devices err each on its own.
+            name: config.frame(placement.name()),
+            noise: config.noise,
+            frame_id: config.frame(&format!("{}_imu", placement.name())),
+            mapping: mapping.map(|mapping| Box::new(mapping) as Box<dyn ReadingMapping>),
+        };
+        VirtualImu::new(device, options)
+    };
+    placements.iter().zip(devices).map(imu).collect()
+}
+
+fn fresh_networks(
+    learned: Option<&LearnedSimulator>,
+    shaped: &ShapedBody,
+    placements: &[Placement],
+    config: &Config,
+) -> Result<Option<LivePlacements>, LearnedError> {
+    learned
+        .map(|networks| LivePlacements::new(networks, shaped, placements, config.gap_seconds))
+        .transpose()
+}
+
+/// None where no folder is named.
+fn read_networks(folder: &str) -> Result<Option<LearnedSimulator>, LearnedError> {
+    (!folder.is_empty())
+        .then(|| LearnedSimulator::find(Path::new(folder)))
+        .transpose()
 }
 
 /// A mapping of these placements at least in part; that of no file changes nothing.

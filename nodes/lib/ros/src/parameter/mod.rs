@@ -4,6 +4,7 @@
 mod config;
 mod declaration;
 mod file;
+mod live;
 mod services;
 mod store;
 mod value;

@@ -1,7 +1,7 @@
 //! The parameters of a node and the rules for changing them.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, Weak};
+use std::sync::{Arc, Mutex, MutexGuard, Weak};
 
 use ros2_client::ParameterValue;
 
@@ -16,13 +16,18 @@ use crate::wake::{Bell, lock};
 pub(crate) const USE_SIM_TIME: &str = "use_sim_time";
 const QOS_OVERRIDES: &str = "qos_overrides.";
 
+/// What takes up a configuration as changes would make it, or says why not.
+pub(crate) type TakeUp = Box<dyn FnMut(&Parameters) -> RosResult<()> + Send>;
+
 /// The parameters of a node. Cloning shares them.
 #[derive(Clone, Default)]
 pub struct Parameters {
     inner: Arc<Mutex<Store>>,
+    /// Held while parameters change: by one caller at a time.
+    take_up: Arc<Mutex<Option<TakeUp>>>,
 }
 
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Store {
     declared: BTreeMap<String, Parameter>,
     /// Names below which everything is taken into the configuration.
@@ -141,12 +146,13 @@ impl Parameters {
     /// Changes parameters at run time, all or none; the values as they are now.
     ///
     /// # Errors
-    /// Where a parameter is unknown or read-only, or a value does not fit.
+    /// Where a parameter is unknown or read-only, a value does not fit, or the node cannot use it.
     pub(crate) fn set_all(
         &self,
         changes: &[(String, ParameterValue)],
         place: &str,
     ) -> RosResult<Vec<(String, ParameterValue)>> {
+        let mut turn = self.turn();
         let mut checked = Vec::new();
         for (name, value) in changes {
             if self
@@ -160,6 +166,12 @@ impl Parameters {
             }
             checked.push((name.clone(), self.checked(name, value.clone(), place)?));
         }
+        // The node acts before anything is stored: nobody sees a change that it refuses.
+        if let Some(take_up) = turn.as_mut()
+            && checked.iter().any(|(name, _)| self.is_in_config(name))
+        {
+            take_up(&self.with(&checked))?;
+        }
         checked
             .iter()
             .for_each(|(name, value)| self.store(name, value.clone()));
@@ -167,6 +179,28 @@ impl Parameters {
             .bells
             .retain(|bell| bell.upgrade().inspect(|bell| bell.ring()).is_some());
         Ok(checked)
+    }
+
+    /// What takes up changes; whoever holds it changes alone.
+    pub(crate) fn turn(&self) -> MutexGuard<'_, Option<TakeUp>> {
+        lock(&self.take_up)
+    }
+
+    fn is_in_config(&self, name: &str) -> bool {
+        self.describe(name)
+            .is_some_and(|parameter| parameter.in_config)
+    }
+
+    /// A copy with these values, which nobody else sees.
+    fn with(&self, values: &[(String, ParameterValue)]) -> Self {
+        let copy = Self {
+            inner: Arc::new(Mutex::new(lock(&self.inner).clone())),
+            take_up: Arc::default(),
+        };
+        values
+            .iter()
+            .for_each(|(name, value)| copy.store(name, value.clone()));
+        copy
     }
 
     pub(crate) fn describe(&self, name: &str) -> Option<Parameter> {
