@@ -194,3 +194,43 @@ fn refuses_usage(folder: &Path, arguments: &[&str], word: &str) {
     assert_eq!(output.status.code(), Some(2), "{arguments:?}");
     assert!(common::text(&output).contains(word), "{arguments:?}");
 }
+
+#[test]
+fn one_placement_becomes_a_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let wrist = ["simulate", "--placement", "wrist=left_watch", "--out"];
+    succeed(here, &[&wrist[..], &["wrist.csv"]].concat());
+    let text = fs::read_to_string(here.join("wrist.csv")).unwrap();
+    let mut lines = text.lines();
+    assert!(
+        lines
+            .next()
+            .unwrap()
+            .starts_with("time [s],specific_force_x [m/s2],")
+    );
+    // The same readings as in a bag, to the last digit, and readable as what they are.
+    succeed(here, &[&wrist[..], &["wrist.mcap"]].concat());
+    let reader = BagReader::open(&here.join("wrist.mcap")).unwrap();
+    let messages = reader.read::<Imu>("/imu/wrist/data").unwrap();
+    assert_eq!(lines.clone().count(), messages.len());
+    for (line, (_, message)) in lines.zip(&messages) {
+        let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
+        let stamp = &message.header.stamp;
+        assert!((cells[0] - f64::from(stamp.sec) - 1e-9 * f64::from(stamp.nanosec)).abs() < 1e-9);
+        assert_eq!(cells[1], message.linear_acceleration.x);
+        assert_eq!(cells[6], message.angular_velocity.z);
+    }
+    let said = succeed(here, &["inspect", "wrist.csv"]);
+    assert!(
+        said.contains("IMU series") && said.contains("100.000 Hz"),
+        "{said}"
+    );
+    refuses(here, &[&wrist[..], &["wrist.csv"]].concat(), &["--force"]);
+    refuses(
+        here,
+        &["simulate", "--out", "all.csv"],
+        &["all.csv", "--placement NAME=SITE", "--csv DIR"],
+    );
+    assert!(!here.join("all.csv").exists());
+}

@@ -36,6 +36,7 @@ mod simulate;
 mod simulate_arguments;
 mod simulate_many;
 mod simulate_setup;
+mod simulated_csv;
 mod simulated_draws;
 mod simulated_file;
 mod simulated_json;

@@ -62,12 +62,12 @@ pub struct Arguments {
     /// As a diagnosis writes them, rather than the nominal simulation
     #[arg(long, value_name = "FILE", help_heading = SENSORS)]
     pub effects: Option<PathBuf>,
-    /// The bag to write: .mcap, or a rosbag2 directory; or columns: .parquet
+    /// The bag to write: .mcap, or a rosbag2 directory; columns: .parquet; one placement: .csv
     ///
     /// With several motions a directory for one file each and manifest.jsonl, which says what became of them
     #[arg(long, value_name = "OUT")]
     pub out: PathBuf,
-    /// What to write of motion files: bag or parquet; default: as OUT ends
+    /// What to write of motion files: bag, parquet or csv; default: as OUT ends
     #[arg(long, value_enum, value_name = "FORMAT", hide_possible_values = true)]
     format: Option<Format>,
     /// Of many motions only each Nth, from the Ith on, such as 2/8
@@ -192,6 +192,8 @@ pub enum Format {
     Bag,
     /// Readings in columns, for pandas, polars, DuckDB and others
     Parquet,
+    /// A table of one placement
+    Csv,
 }
 
 impl Format {
@@ -200,6 +202,7 @@ impl Format {
         match self {
             Self::Bag => "mcap",
             Self::Parquet => "parquet",
+            Self::Csv => "csv",
         }
     }
 }
@@ -247,12 +250,9 @@ impl Arguments {
     /// The format that is given, or that OUT's ending says.
     pub fn format(&self) -> Format {
         let ending = self.out.extension().unwrap_or_default();
-        let said = if ending.eq_ignore_ascii_case(Format::Parquet.ending()) {
-            Format::Parquet
-        } else {
-            Format::Bag
-        };
-        self.format.unwrap_or(said)
+        let is = |format: &Format| ending.eq_ignore_ascii_case(format.ending());
+        let said = [Format::Parquet, Format::Csv].into_iter().find(is);
+        self.format.or(said).unwrap_or(Format::Bag)
     }
 
     /// The mode, where the numbers are sound and every option is one that the mode takes.
@@ -305,9 +305,9 @@ impl Arguments {
                 "--placement {given}: expected NAME=SITE, such as left_wrist=left_watch; `cromosim body sites` lists the sites"
             );
         }
-        if mode != Mode::Motions && self.format() == Format::Parquet {
+        if mode != Mode::Motions && self.format() != Format::Bag {
             bail!(
-                "{}: {} writes a bag, which `cromosim convert` makes columns of; give a name in .mcap",
+                "{}: {} writes a bag, which `cromosim convert` makes tables and columns of; give a name in .mcap",
                 self.out.display(),
                 mode.name()
             );
@@ -333,8 +333,8 @@ impl Arguments {
         if self.texture.is_some() && self.learned.is_some() {
             bail!("--learned corrects what --texture draws anew; leave one out");
         }
-        if self.csv.is_some() && self.format() == Format::Parquet {
-            bail!("--csv is made of a bag, and a Parquet file has these columns; leave it out");
+        if self.csv.is_some() && self.format() != Format::Bag {
+            bail!("--csv is made of a bag, and OUT holds the same columns already; leave it out");
         }
         if self.draw.is_some() && self.format() != Format::Parquet {
             bail!("--draw writes columns, which tell draws apart; give --format parquet");

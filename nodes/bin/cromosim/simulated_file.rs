@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use anyhow::Context;
 use cromosim_bag::{BagOptions, BagWriter, Compression};
 use cromosim_recording::columns::{ColumnsHeader, ColumnsWriter};
 use cromosim_recording::{
@@ -15,6 +16,7 @@ use indicatif::ProgressBar;
 use crate::files::refuse_existing;
 use crate::simulate_arguments::Format;
 use crate::simulate_setup::{Output, Setup, Written, names};
+use crate::simulated_csv::{the_only, write_table};
 use crate::simulated_draws::simulate_draws;
 use crate::simulated_json::WrittenFile;
 use crate::simulated_quality::{quality_entries, quality_line, unlikely, warn};
@@ -107,6 +109,15 @@ fn write(
             let rows = write_columns(setup, people, simulated, metadata, output)?;
             Ok((rows, "rows"))
         }
+        Format::Csv => {
+            let (person, placement) = the_only(setup, people, output.path)?;
+            let topic = person.topic(&format!("imu/{placement}/data"));
+            let folder = tempfile::tempdir().context("no folder for temporary files")?;
+            let bag = folder.path().join("readings.mcap");
+            write_bag(setup, people, simulated, metadata, &bag)?;
+            let rows = write_table(&bag, &topic, output.path, setup.force)?;
+            Ok((rows, "rows"))
+        }
     }
 }
 
@@ -121,6 +132,9 @@ pub fn simulate_one(
     refuse_existing(out, setup.force)?;
     for path in setup.csv_files(people, out) {
         refuse_existing(&path, setup.force)?;
+    }
+    if setup.format == Format::Csv {
+        the_only(setup, people, out)?;
     }
     if let Some(draws) = &setup.draws {
         return simulate_draws(setup, draws, people, output);

@@ -179,7 +179,7 @@ impl PlayedPerson {
     }
 
     /// The name of a topic.
-    pub(crate) fn topic(&self, name: &str) -> String {
+    pub fn topic(&self, name: &str) -> String {
         format!("/{}", self.frame(name))
     }
 
