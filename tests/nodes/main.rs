@@ -7,6 +7,7 @@ mod chain;
 mod common;
 mod demo;
 mod faults;
+mod imu_users;
 mod launch;
 mod other_host;
 mod parameters;
