@@ -90,7 +90,7 @@ fn noise_and_seed_change_and_no_sample_is_lost() {
 }
 
 #[test]
-fn a_mapping_acts_from_its_change_on_and_a_wrong_one_changes_nothing() {
+fn a_mapping_that_is_not_there_changes_nothing() {
     let motion = embedded_walk();
     let mut changing = node(quiet());
     feed(&mut changing, &motion, 0..FRAMES);

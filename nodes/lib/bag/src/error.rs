@@ -102,7 +102,7 @@ pub enum BagError {
         what: String,
     },
     /// No such topic.
-    #[error("{}: no topic {topic}; it holds {}", path.display(), list(known))]
+    #[error("{}: no topic {topic}{}; it holds {}", path.display(), meant(topic, known), list(known))]
     UnknownTopic {
         /// As the user named it.
         path: PathBuf,
@@ -163,6 +163,13 @@ pub enum BagError {
         /// Which limit was passed.
         reason: String,
     },
+}
+
+/// What somebody may have meant.
+fn meant(name: &str, known: &[String]) -> String {
+    let known = known.iter().map(String::as_str);
+    cromosim_spatial::nearest_name(name, known)
+        .map_or_else(String::new, |nearest| format!(", the nearest is {nearest}"))
 }
 
 fn list(names: &[String]) -> String {

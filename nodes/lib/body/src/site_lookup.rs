@@ -1,5 +1,6 @@
 //! Sites of a body by name, by triangle and by the nearest point.
 
+use cromosim_spatial::nearest_name;
 use nalgebra::Vector3;
 
 use crate::site::{Site, point_at};
@@ -23,9 +24,7 @@ impl BodyModel {
         {
             return Ok(self.sites[index].site);
         }
-        let nearest = self
-            .site_names()
-            .min_by_key(|known| strsim::levenshtein(known, name))
+        let nearest = nearest_name(name, self.site_names())
             .unwrap_or("none")
             .to_owned();
         Err(BodyError::UnknownSite {

@@ -157,10 +157,12 @@ pub enum ImuError {
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum EffectError {
     /// No effect of this name.
-    #[error("unknown effect `{effect}`")]
+    #[error("unknown effect `{effect}`; the nearest is {nearest}")]
     UnknownEffect {
         /// The name given.
         effect: String,
+        /// The name that is most like it.
+        nearest: &'static str,
     },
     /// The name of what a diagnosis could not explain.
     #[error(

@@ -52,6 +52,7 @@ mod grid;
 mod influence;
 mod kinks;
 mod local_spline;
+mod nearest_name;
 mod noise_floor;
 mod noise_shape;
 pub mod plausible;
@@ -87,6 +88,7 @@ pub use frame_grid::FrameGrid;
 pub use golden::greatest_near;
 pub use grid::{check_times, relative_seconds, uniform_stamps};
 pub use influence::{Influence, SampleWeights};
+pub use nearest_name::nearest_name;
 pub use pose_series::PoseSeries;
 pub use pose_spline::{
     Bandwidth, Motion, MotionEstimate, PoseAdaptation, PoseSmoothing, PoseSource, PoseSpline,

@@ -176,7 +176,7 @@ fn refusals_name_file_placement_effect_and_field() {
         (
             "effect: lever_arm",
             "effect: lever",
-            "unknown effect `lever`",
+            "unknown effect `lever`; the nearest is lever_arm",
         ),
         (
             "effect: lever_arm, offset: [0.05, 0.0, -0.06]",

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use cromosim_spatial::nearest_name;
 use serde::de::{self, MapAccess, SeqAccess, Visitor};
 use serde::ser::SerializeMap;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -28,6 +29,7 @@ fn kind(name: &str) -> Result<EffectKind, EffectError> {
     }
     EffectKind::from_name(name).ok_or_else(|| EffectError::UnknownEffect {
         effect: name.to_owned(),
+        nearest: nearest_name(name, EffectKind::ALL.map(EffectKind::name)).unwrap_or_default(),
     })
 }
 
