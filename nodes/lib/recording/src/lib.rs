@@ -23,6 +23,7 @@
 mod bag_file;
 pub mod batch;
 mod body;
+mod caught;
 pub mod columns;
 pub mod compare;
 pub mod convert;

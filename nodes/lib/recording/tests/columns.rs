@@ -103,7 +103,7 @@ fn what_is_written_comes_back() {
 fn damage_is_refused_in_one_line() {
     let bytes = written(&groups());
     let (mut refused, mut panicked) = (0, 0);
-    common::damaged(&bytes, 3000, |bytes| {
+    common::damaged(&bytes, 20000, |bytes| {
         match std::panic::catch_unwind(|| parse_columns(bytes.to_vec(), "damaged.parquet")) {
             Ok(Ok(recording)) => {
                 for imu in &recording.imus {

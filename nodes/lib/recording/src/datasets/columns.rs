@@ -19,6 +19,7 @@ use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, RowGroupReader, SerializedFileReader};
 
 use super::{DatasetRecording, PlacedImu};
+use crate::caught::caught;
 use crate::columns::{ACTIVITY, CHANNELS, DRAW, PERSON, PLACEMENT, RECORDING_COLUMN, STAMP};
 use crate::rigid::{RigidError, median_rate};
 
@@ -37,6 +38,12 @@ const FREE_ROWS: u64 = 1 << 20;
 /// # Errors
 /// [`RigidError::Content`], which names the column; [`RigidError::Empty`].
 pub fn parse_columns(bytes: Vec<u8>, name: &str) -> Result<DatasetRecording, RigidError> {
+    // The crate takes some numbers of a file for granted, and panics where they are nonsense.
+    caught(|| parse(bytes, name))
+        .unwrap_or_else(|| Err(content(name, "Parquet", "the file is damaged")))
+}
+
+fn parse(bytes: Vec<u8>, name: &str) -> Result<DatasetRecording, RigidError> {
     let whole = |error| content(name, "Parquet", reason(error));
     let most = FREE_ROWS + bytes.len() as u64;
     let file = SerializedFileReader::new(Bytes::from(bytes)).map_err(whole)?;
@@ -180,11 +187,8 @@ fn column<T: DataType>(
     index: usize,
     count: usize,
 ) -> Result<Vec<Option<T::T>>, ParquetError> {
-    let most = group
-        .metadata()
-        .column(index)
-        .column_descr()
-        .max_def_level();
+    let chunk = group.metadata().column(index);
+    let most = chunk.column_descr().max_def_level();
     let mut reader = get_typed_column_reader::<T>(group.get_column_reader(index)?);
     let mut all = Vec::new();
     while all.len() < count {
