@@ -12,6 +12,7 @@ use cromosim_gap::{
     DiagnoseOptions, Diagnosis, Evidence, OfRecording, PlacementAnswer, PlacementDiagnosis, SCHEMA,
 };
 use cromosim_imu::{EffectKind, EffectsFile};
+use cromosim_spatial::nearest_name;
 use rayon::prelude::*;
 use serde::Deserialize;
 use serde_json::Value;
@@ -248,15 +249,11 @@ impl Config {
     }
 }
 
-/// The effect of a name, or an error that says which names are near.
+/// The effect of a name, or an error that says which name is nearest.
 fn effect(name: &str, place: &str) -> anyhow::Result<EffectKind> {
     EffectKind::from_name(name).ok_or_else(|| {
-        let mut known: Vec<&str> = EffectKind::ALL.into_iter().map(EffectKind::name).collect();
-        known.sort_by_key(|known| strsim::levenshtein(known, name));
-        anyhow!(
-            "{place} {name}: no such effect; the nearest are {}",
-            known[..3].join(", ")
-        )
+        let nearest = nearest_name(name, EffectKind::ALL.map(EffectKind::name)).unwrap_or_default();
+        anyhow!("{place} {name}: no such effect; the nearest is {nearest}")
     })
 }
 

@@ -9,6 +9,7 @@
 //! `ros2msg` text. The same calls give the same bytes: times come from the caller, and compression
 //! uses one thread.
 
+mod ahead;
 mod cadence;
 pub mod cdr;
 mod chunk;

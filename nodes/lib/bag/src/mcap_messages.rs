@@ -7,34 +7,15 @@ use std::sync::Arc;
 
 use cromosim_spatial::Stamp;
 
+use crate::ahead::Ahead;
 use crate::chunk::inner_records;
 use crate::contents::{ChunkAt, Contents, LooseMessage, MessageHead};
 use crate::error::{BagError, io_error};
 use crate::message::{Message, Selection};
 use crate::walk::{Fields, RecordAt, Walker, op, stamp};
 
-/// A message read ahead, ordered by log time and then by place in the file.
-struct Ahead {
-    order: (u64, u64, usize),
-    message: Message,
-}
-
-impl PartialEq for Ahead {
-    fn eq(&self, other: &Self) -> bool {
-        self.order == other.order
-    }
-}
-impl Eq for Ahead {}
-impl PartialOrd for Ahead {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Ahead {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        self.order.cmp(&other.order)
-    }
-}
+/// A message with its log time, the start of its stretch and its number in it.
+type MessageAhead = Ahead<(u64, u64, usize), Message>;
 
 /// A stretch of the file that is read in one go.
 enum Stretch {
@@ -65,7 +46,7 @@ pub(crate) struct FileMessages<'a> {
     selection: Selection,
     walker: Walker<File>,
     stretches: VecDeque<Stretch>,
-    ahead: BinaryHeap<Reverse<Ahead>>,
+    ahead: BinaryHeap<Reverse<MessageAhead>>,
 }
 
 impl<'a> FileMessages<'a> {
@@ -118,7 +99,7 @@ impl<'a> FileMessages<'a> {
     }
 
     pub(crate) fn pop(&mut self) -> Option<Message> {
-        self.ahead.pop().map(|Reverse(next)| next.message)
+        self.ahead.pop().map(|Reverse(next)| next.value)
     }
 
     fn load(&mut self, stretch: &Stretch) -> Result<(), BagError> {
@@ -166,7 +147,7 @@ impl<'a> FileMessages<'a> {
             };
             self.ahead.push(Reverse(Ahead {
                 order: (head.log_time, record.start, index),
-                message,
+                value: message,
             }));
         }
         Ok(())

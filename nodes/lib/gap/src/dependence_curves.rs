@@ -11,6 +11,8 @@ use crate::residual_regressions::{dependence_name, other, up_in_segment};
 const BINS: usize = 16;
 /// Readings shown beside the means.
 const POINTS: usize = 600;
+/// Readings that means are of, about; more of a long recording change no picture.
+const READINGS: usize = 20_000;
 
 /// The residual of one axis against what it depends on.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -100,10 +102,13 @@ impl Scene<'_> {
         })
     }
 
-    /// Numbers of the readings that are compared on an axis.
+    /// Numbers of readings that are compared on an axis, evenly spread.
     fn used(&self, axis: usize) -> impl Iterator<Item = usize> + '_ {
         let usable = &self.comparison.prepared.usable;
-        (0..self.after.len()).filter(move |k| usable[*k][axis])
+        let step = self.after.len().div_ceil(READINGS).max(1);
+        (0..self.after.len())
+            .step_by(step)
+            .filter(move |k| usable[*k][axis])
     }
 
     fn residual(&self, axis: usize, k: usize) -> f64 {

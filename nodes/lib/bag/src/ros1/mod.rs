@@ -15,6 +15,7 @@ use cromosim_spatial::Stamp;
 
 use self::definition::{Definition, Field};
 use self::records::{Header, RecordAt, Records, inner_records, op};
+use crate::ahead::Ahead;
 use crate::chunk::decompress;
 use crate::error::{BagError, io_error};
 use crate::message::{Message, Selection};
@@ -292,29 +293,8 @@ fn read_info(header: &Header<'_>, mut data: &[u8]) -> Option<(u64, ChunkInfo)> {
     Some((header.u64("chunk_pos")?, info))
 }
 
-/// A message read ahead, ordered by time and then by place in the file.
-struct Ahead {
-    order: (Stamp, u64, usize),
-    connection: u32,
-    content: Vec<u8>,
-}
-
-impl PartialEq for Ahead {
-    fn eq(&self, other: &Self) -> bool {
-        self.order == other.order
-    }
-}
-impl Eq for Ahead {}
-impl PartialOrd for Ahead {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Ahead {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        self.order.cmp(&other.order)
-    }
-}
+/// A message's connection and content with its time, the start of its chunk and its number in it.
+type MessageAhead = Ahead<(Stamp, u64, usize), (u32, Vec<u8>)>;
 
 /// The messages of a `.bag` file: chunks are loaded when their time comes.
 pub(crate) struct Ros1Messages<'a> {
@@ -322,7 +302,7 @@ pub(crate) struct Ros1Messages<'a> {
     selection: Selection,
     records: Records,
     chunks: VecDeque<(Stamp, &'a ChunkAt)>,
-    ahead: BinaryHeap<Reverse<Ahead>>,
+    ahead: BinaryHeap<Reverse<MessageAhead>>,
 }
 
 impl<'a> Ros1Messages<'a> {
@@ -379,8 +359,7 @@ impl<'a> Ros1Messages<'a> {
             if connection.topic.as_ref().is_some_and(wanted) && self.selection.has_time(time) {
                 self.ahead.push(Reverse(Ahead {
                     order: (time, chunk.at, index),
-                    connection: id,
-                    content: data.to_vec(),
+                    value: (id, data.to_vec()),
                 }));
             }
         }
@@ -391,17 +370,18 @@ impl<'a> Ros1Messages<'a> {
         let Some(Reverse(next)) = self.ahead.pop() else {
             return Ok(None);
         };
+        let (connection, content) = next.value;
         let Some(Connection {
             topic: Some(topic),
             fields,
-        }) = self.file.connections.get(&next.connection)
+        }) = self.file.connections.get(&connection)
         else {
             return Ok(None);
         };
         let (time, at, _) = next.order;
         let payload = match fields {
-            None => next.content,
-            Some(fields) => to_cdr::to_cdr(fields, &next.content).map_err(|reason| {
+            None => content,
+            Some(fields) => to_cdr::to_cdr(fields, &content).map_err(|reason| {
                 let name = &topic.name;
                 self.file.damaged(
                     at,
