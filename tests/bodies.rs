@@ -162,11 +162,18 @@ fn a_file_that_is_no_body_is_refused_by_every_command() {
         .collect();
     succeed(
         folder.path(),
-        &["simulate", "--out", "walk.mcap", "--duration", "0.5"],
+        &[
+            "simulate",
+            "--walk",
+            "--out",
+            "walk.mcap",
+            "--duration",
+            "0.5",
+        ],
     );
     let calls: [&[&str]; 10] = [
         &["demo"],
-        &["simulate", "--out", "x.mcap"],
+        &["simulate", "--walk", "--out", "x.mcap"],
         &["simulate", "--reference", "walk.mcap", "--out", "x.mcap"],
         &["diagnose", "walk.mcap", "--out", "diagnosis"],
         &["convert", "walk.bvh", "x.npz"],
@@ -245,6 +252,7 @@ fn a_recording_of_states_is_simulated_again_on_its_own_body() {
         here,
         &[
             "simulate",
+            "--walk",
             "--body",
             "tall.npz",
             "--no-noise",

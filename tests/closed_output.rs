@@ -26,7 +26,7 @@ const PRINTING: [&[&str]; 14] = [
     &["body", "export", "OUT.obj"],
     &["compare", "REPO/bags/walk", "REPO/bags/walk"],
     &["convert", "REPO/bags/walk", "OUT.bvh"],
-    &["simulate", "--duration", "1", "--out", "OUT.mcap"],
+    &["simulate", "--walk", "--duration", "1", "--out", "OUT.mcap"],
     &[
         "simulate",
         "--reference",

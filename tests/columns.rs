@@ -22,6 +22,7 @@ fn columns_hold_what_the_bag_holds() {
     let here = folder.path();
     let simulate = [
         "simulate",
+        "--walk",
         "--duration",
         "3",
         "--seed",
@@ -65,6 +66,7 @@ fn same_input_and_seed_same_bytes_at_any_number_of_threads() {
         command
             .args([
                 "simulate",
+                "--walk",
                 "--duration",
                 "2",
                 "--out",
@@ -86,7 +88,7 @@ fn same_input_and_seed_same_bytes_at_any_number_of_threads() {
 fn series_and_bags_become_columns_and_columns_become_series() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    let simulate = ["simulate", "--duration", "2", "--out"];
+    let simulate = ["simulate", "--walk", "--duration", "2", "--out"];
     succeed(here, &[&simulate[..], &["walk.mcap"]].concat());
     succeed(here, &[&simulate[..], &["walk.parquet"]].concat());
     // All IMUs of a bag at once: the rows that simulate writes.
@@ -126,7 +128,7 @@ fn what_cannot_be_columns_is_refused() {
     let here = folder.path();
     let refused = |arguments: &[&str], words: &[&str]| refuses(here, arguments, words);
     refused(
-        &["simulate", "--out", "x.parquet", "--csv", "csv"],
+        &["simulate", "--walk", "--out", "x.parquet", "--csv", "csv"],
         &["--csv", "leave it out"],
     );
     let rigid = [
@@ -141,10 +143,24 @@ fn what_cannot_be_columns_is_refused() {
     refused(&rigid, &["x.parquet", "--rigid", ".mcap"]);
     succeed(
         here,
-        &["simulate", "--duration", "1", "--out", "walk.parquet"],
+        &[
+            "simulate",
+            "--walk",
+            "--duration",
+            "1",
+            "--out",
+            "walk.parquet",
+        ],
     );
     refused(
-        &["simulate", "--duration", "1", "--out", "walk.parquet"],
+        &[
+            "simulate",
+            "--walk",
+            "--duration",
+            "1",
+            "--out",
+            "walk.parquet",
+        ],
         &["exists already"],
     );
     refused(

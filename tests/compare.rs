@@ -18,11 +18,11 @@ fn recordings_are_compared_and_the_findings_written() {
     let folder = tempfile::tempdir().unwrap();
     succeed(
         folder.path(),
-        &["simulate", "--seed", "1", "--out", "a.mcap"],
+        &["simulate", "--walk", "--seed", "1", "--out", "a.mcap"],
     );
     succeed(
         folder.path(),
-        &["simulate", "--seed", "2", "--out", "b.mcap"],
+        &["simulate", "--walk", "--seed", "2", "--out", "b.mcap"],
     );
     let said = succeed(
         folder.path(),
@@ -68,7 +68,7 @@ fn diagnoses_are_compared_and_mistakes_named_on_one_line() {
             && said.contains("new      low_pass"),
         "{said}"
     );
-    succeed(folder.path(), &["simulate", "--out", "a.mcap"]);
+    succeed(folder.path(), &["simulate", "--walk", "--out", "a.mcap"]);
     fs::write(
         folder.path().join("wrong.json"),
         DIAGNOSIS

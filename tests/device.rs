@@ -102,6 +102,7 @@ fn a_recording_at_rest_becomes_a_device_with_pictures() {
         here,
         &[
             "simulate",
+            "--walk",
             "--device",
             "made/body.yaml",
             "--duration",

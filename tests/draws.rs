@@ -23,7 +23,7 @@ fn each_draw_is_somebody_else_and_the_same_each_time() {
     let draw_on = |threads: &str, out: &str, more: &[&str]| {
         let mut command = std::process::Command::new(CROMOSIM);
         command
-            .args(["simulate", "--duration", "2", "--draw"])
+            .args(["simulate", "--walk", "--duration", "2", "--draw"])
             .arg(&config)
             .args(["--out", out])
             .args(more)
@@ -77,6 +77,7 @@ fn nothing_drawn_is_what_is_simulated_without() {
     .unwrap();
     let simulate = [
         "simulate",
+        "--walk",
         "--duration",
         "2",
         "--no-noise",
@@ -104,7 +105,11 @@ fn what_cannot_be_drawn_is_refused() {
     let here = folder.path();
     let config = |text: &str| fs::write(here.join("d.yaml"), text).unwrap();
     let refused = |out: &str, words: &[&str]| {
-        refuses(here, &["simulate", "--draw", "d.yaml", "--out", out], words);
+        refuses(
+            here,
+            &["simulate", "--walk", "--draw", "d.yaml", "--out", out],
+            words,
+        );
         assert!(!here.join(out).exists());
     };
     config("schema: cromosim/draws/1\ndraws: 2\nwearing: {knee: thigh}\n");

@@ -51,9 +51,9 @@ placements:
       - {effect: accel_quantization, lsb: 0.01}
 YAML
 
-run simulate --out walk.mcap --csv csv
-run simulate --no-noise --scheme richardson --out walk_ideal.mcap
-run simulate --placements placements.yaml --seed 7 --out walk_worn.mcap
+run simulate --walk --out walk.mcap --csv csv
+run simulate --walk --no-noise --scheme richardson --out walk_ideal.mcap
+run simulate --walk --placements placements.yaml --seed 7 --out walk_worn.mcap
 run convert walk.mcap walk.bvh
 run simulate walk.bvh --out bvh.mcap
 run simulate "$poses/poses/amass.npz" --out amass.mcap
@@ -63,9 +63,9 @@ run simulate --reference walk.mcap --scheme spline --rate 60 --no-noise --out ag
 run convert "walk.bvh" watch.tum --site left_watch
 run simulate --rigid watch.tum --rate 100 --device consumer_mems --out rigid.mcap
 run simulate --rigid watch.tum --rate 100 --learned motion_capture --out rigid_learned.mcap
-run simulate --learned motion_capture_60 --out walk_learned.mcap
+run simulate --walk --learned motion_capture_60 --out walk_learned.mcap
 run map --simulated walk.mcap --measured walk_worn.mcap --out map.yaml
-run simulate --mapping map.yaml --learned streaming --out walk_mapped.mcap
+run simulate --walk --mapping map.yaml --learned streaming --out walk_mapped.mcap
 run convert bvh.mcap bvh.npz
 run convert "walk.bvh" markers.trc
 run convert again.mcap again.csv --topic /imu/left_wrist/data_raw

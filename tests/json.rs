@@ -105,7 +105,7 @@ fn simulate_prints_an_object_for_each_file() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     let object = |arguments: &[&str]| parsed(&succeed(here, arguments));
-    let walk = object(&["simulate", "--out", "walk.mcap", "--json"]);
+    let walk = object(&["simulate", "--walk", "--out", "walk.mcap", "--json"]);
     assert_eq!(walk["out"], "walk.mcap");
     assert_eq!(walk["placements"].as_array().unwrap().len(), 5);
     let wrist = &walk["placements"][0];
@@ -113,7 +113,7 @@ fn simulate_prints_an_object_for_each_file() {
     assert!(wrist["specific_force_bandwidth_hz"].as_f64().unwrap() > 5.0);
     let count = BagReader::open(&here.join("walk.mcap")).unwrap();
     assert_eq!(walk["messages"], count.summary().message_count());
-    let columns = object(&["simulate", "--out", "walk.parquet", "--json"]);
+    let columns = object(&["simulate", "--walk", "--out", "walk.parquet", "--json"]);
     assert!(columns["rows"].as_u64().unwrap() > 4000 && columns["messages"].is_null());
     let again = object(&[
         "simulate",

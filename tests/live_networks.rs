@@ -95,6 +95,7 @@ fn the_node_says_what_simulate_computes_of_the_same_states() {
             fs::write(here.join("map.yaml"), MAPPING).unwrap();
             let simulate = [
                 "simulate",
+                "--walk",
                 "--placements",
                 "placements.yaml",
                 "--duration",

@@ -19,7 +19,7 @@ fn the_embedded_walk_becomes_a_bag() {
     let folder = tempfile::tempdir().unwrap();
     succeed(
         folder.path(),
-        &["simulate", "--out", "walk.mcap", "--csv", "csv"],
+        &["simulate", "--walk", "--out", "walk.mcap", "--csv", "csv"],
     );
     let reader = BagReader::open(&folder.path().join("walk.mcap")).unwrap();
     let states = reader.read::<SmplState>("/smpl/state").unwrap();
@@ -70,7 +70,15 @@ fn the_embedded_walk_becomes_a_bag() {
 fn a_fixed_bandwidth_leaves_out_its_ends() {
     let folder = tempfile::tempdir().unwrap();
     let simulate = |out: &str, trim: &[&str]| {
-        let mut arguments = vec!["simulate", "--bandwidth", "6", "--no-noise", "--out", out];
+        let mut arguments = vec![
+            "simulate",
+            "--walk",
+            "--bandwidth",
+            "6",
+            "--no-noise",
+            "--out",
+            out,
+        ];
         arguments.extend(trim);
         let said = succeed(folder.path(), &arguments);
         let reader = BagReader::open(&folder.path().join(out)).unwrap();
@@ -111,7 +119,7 @@ fn same_input_and_seed_same_bytes_at_any_number_of_threads() {
         let folder = tempfile::tempdir().unwrap();
         let mut command = std::process::Command::new(common::CROMOSIM);
         command
-            .args(["simulate", "--out", "walk.mcap", "--seed", seed])
+            .args(["simulate", "--walk", "--out", "walk.mcap", "--seed", seed])
             .current_dir(folder.path())
             .env("RAYON_NUM_THREADS", threads);
         assert!(command.output().unwrap().status.success());
@@ -230,6 +238,7 @@ fn a_recording_is_simulated_again_from_its_reference() {
         folder.path(),
         &[
             "simulate",
+            "--walk",
             "--out",
             "walk.mcap",
             "--no-noise",
@@ -322,8 +331,8 @@ fn the_sample_without_a_gap_has_none_but_noise() {
 fn python_reads_what_simulate_writes() {
     let Some(python) = python() else { return };
     let folder = tempfile::tempdir().unwrap();
-    succeed(folder.path(), &["simulate", "--out", "walk.mcap"]);
-    succeed(folder.path(), &["simulate", "--out", "walk"]);
+    succeed(folder.path(), &["simulate", "--walk", "--out", "walk.mcap"]);
+    succeed(folder.path(), &["simulate", "--walk", "--out", "walk"]);
     for bag in ["walk.mcap", "walk"] {
         let output = std::process::Command::new(&python)
             .arg(root().join("tests/interop/check_bag.py"))
@@ -351,6 +360,7 @@ fn bodies_are_exported_and_read_again() {
         folder.path(),
         &[
             "simulate",
+            "--walk",
             "--out",
             "a.mcap",
             "--body",

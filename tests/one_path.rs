@@ -95,7 +95,14 @@ fn a_device_with_effects_reads_live_what_it_reads_offline() {
     fs::write(here.join("placements.yaml"), PLACEMENTS).unwrap();
     let mut lost = Vec::new();
     for (noise, option) in [(true, None), (false, Some("--no-noise"))] {
-        let mut command = vec!["simulate", "--placements", "placements.yaml", "--seed", "7"];
+        let mut command = vec![
+            "simulate",
+            "--walk",
+            "--placements",
+            "placements.yaml",
+            "--seed",
+            "7",
+        ];
         command.extend(["--duration", "4", "--trim", "0"]);
         command.extend(["--force", "--out", "offline.mcap"]);
         command.extend(option);

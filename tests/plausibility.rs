@@ -190,7 +190,14 @@ fn placements_off_the_body_are_refused() {
         let words = [&["wrist"][..], &words].concat();
         refuses(
             folder.path(),
-            &["simulate", "--placements", name, "--out", "o.mcap"],
+            &[
+                "simulate",
+                "--walk",
+                "--placements",
+                name,
+                "--out",
+                "o.mcap",
+            ],
             &words,
         );
         let placements = format!("placements:={name}");

@@ -51,7 +51,14 @@ fn short_work_says_nothing_of_its_progress() {
     let folder = tempfile::tempdir().unwrap();
     let output = cromosim_in(
         folder.path(),
-        &["simulate", "--duration", "1", "--out", "walk.mcap"],
+        &[
+            "simulate",
+            "--walk",
+            "--duration",
+            "1",
+            "--out",
+            "walk.mcap",
+        ],
     );
     assert!(
         output.status.success() && output.stderr.is_empty(),

@@ -15,7 +15,15 @@ const OUT: &str = "walk.mcap";
 /// What was said, the bytes and the summed squares of the ankle's changes from sample to sample.
 fn simulated(options: &[&str]) -> (String, Vec<u8>, f64) {
     let folder = tempfile::tempdir().unwrap();
-    let arguments = ["simulate", "--duration", "4", "--no-noise", "--out", OUT];
+    let arguments = [
+        "simulate",
+        "--walk",
+        "--duration",
+        "4",
+        "--no-noise",
+        "--out",
+        OUT,
+    ];
     let said = succeed(folder.path(), &[&arguments[..], options].concat());
     let path = folder.path().join(OUT);
     let reader = BagReader::open(&path).unwrap();
@@ -41,7 +49,7 @@ fn texture_is_drawn_by_the_seed_where_it_is_asked_for() {
 fn a_bag_says_what_was_drawn_and_from_where_on() {
     let folder = tempfile::tempdir().unwrap();
     let metadata = |options: &[&str]| {
-        let arguments = ["simulate", "--force", "--out", OUT];
+        let arguments = ["simulate", "--walk", "--force", "--out", OUT];
         succeed(folder.path(), &[&arguments[..], options].concat());
         let reader = BagReader::open(&folder.path().join(OUT)).unwrap();
         reader.metadata("cromosim").unwrap().clone()
@@ -107,13 +115,16 @@ fn what_texture_cannot_go_with_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     for (options, words) in [
-        (&["--texture=hoof"][..], ["--texture=hoof", "foot, shank"]),
         (
-            &["--texture", "--scheme", "richardson"],
+            &["--walk", "--texture=hoof"][..],
+            ["--texture=hoof", "foot, shank"],
+        ),
+        (
+            &["--walk", "--texture", "--scheme", "richardson"],
             ["left_wrist", "--bandwidth"],
         ),
         (
-            &["--texture", "--learned", "motion_capture"],
+            &["--walk", "--texture", "--learned", "motion_capture"],
             ["--learned", "--texture"],
         ),
         (

@@ -81,7 +81,13 @@ fn copy_into(from: &Path, to: &Path, namespaces: &[&str]) {
 fn recordings_in_namespaces_are_diagnosed_simulated_and_compared() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    let simulate = ["simulate", "--placement", "wrist=left_watch", "--out"];
+    let simulate = [
+        "simulate",
+        "--walk",
+        "--placement",
+        "wrist=left_watch",
+        "--out",
+    ];
     succeed(here, &[&simulate[..], &["plain.mcap"]].concat());
     let plain = here.join("plain.mcap");
     copy_into(&plain, &here.join("one.mcap"), &["/robot1"]);
@@ -121,14 +127,23 @@ fn placements_are_given_without_a_file() {
     ];
     succeed(
         here,
-        &[&["simulate", "--out", "a.mcap"], &pairs[..]].concat(),
+        &[&["simulate", "--walk", "--out", "a.mcap"], &pairs[..]].concat(),
     );
     let reader = BagReader::open(&here.join("a.mcap")).unwrap();
     let rate = |name: &str| reader.cadences().unwrap()[name].rate_hz;
     for name in ["/imu/watch/data_raw", "/imu/hip/data_raw"] {
         assert!((rate(name) - 100.0).abs() < 1e-6, "{name}: {}", rate(name));
     }
-    let with = |given: &'static str| ["simulate", "--out", "b.mcap", "--placement", given];
+    let with = |given: &'static str| {
+        [
+            "simulate",
+            "--walk",
+            "--out",
+            "b.mcap",
+            "--placement",
+            given,
+        ]
+    };
     refuses(
         here,
         &with("watch"),
@@ -199,7 +214,13 @@ fn refuses_usage(folder: &Path, arguments: &[&str], word: &str) {
 fn one_placement_becomes_a_table() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    let wrist = ["simulate", "--placement", "wrist=left_watch", "--out"];
+    let wrist = [
+        "simulate",
+        "--walk",
+        "--placement",
+        "wrist=left_watch",
+        "--out",
+    ];
     succeed(here, &[&wrist[..], &["wrist.csv"]].concat());
     let text = fs::read_to_string(here.join("wrist.csv")).unwrap();
     let mut lines = text.lines();
@@ -229,7 +250,7 @@ fn one_placement_becomes_a_table() {
     refuses(here, &[&wrist[..], &["wrist.csv"]].concat(), &["--force"]);
     refuses(
         here,
-        &["simulate", "--out", "all.csv"],
+        &["simulate", "--walk", "--out", "all.csv"],
         &["all.csv", "--placement NAME=SITE", "--csv DIR"],
     );
     assert!(!here.join("all.csv").exists());

@@ -48,7 +48,7 @@ fn what_cannot_be_written_whole_leaves_nothing() {
         &["body", "export", "body.npz"],
         &["body", "export", "body.obj"],
         &["convert", &bag, "walk.bvh"],
-        &["simulate", "--out", "walk.mcap"],
+        &["simulate", "--walk", "--out", "walk.mcap"],
         &["completion", "bash", "--out", "completion"],
         &["diagnose", &session, "--out", "diagnosis"],
     ];
@@ -87,7 +87,7 @@ fn a_signal_leaves_nothing_half_written() {
     let motion = motion.display().to_string();
     common::succeed(
         folder.path(),
-        &["simulate", "--rate", "20000", "--out", &motion],
+        &["simulate", "--walk", "--rate", "20000", "--out", &motion],
     );
     let before = listing(folder.path());
     let mut child = Command::new(CROMOSIM)
@@ -122,11 +122,14 @@ fn nothing_is_replaced_without_force() {
     let path = |name: &str| root().join(name).display().to_string();
     let (walk, session) = (path("bags/walk"), path("bags/gap/session"));
     let walk_file = path("bags/walk/walk_0.mcap");
-    common::succeed(here, &["simulate", "--out", "s.mcap"]);
+    common::succeed(here, &["simulate", "--walk", "--out", "s.mcap"]);
     common::succeed(here, &["convert", &walk, "w.tum", "--site", "left_watch"]);
     // What is there already, and the command that would replace it.
     let cases: [(&str, &[&str]); 13] = [
-        ("simulated.mcap", &["simulate", "--out", "simulated.mcap"]),
+        (
+            "simulated.mcap",
+            &["simulate", "--walk", "--out", "simulated.mcap"],
+        ),
         (
             "again.mcap",
             &["simulate", "--reference", &session, "--out", "again.mcap"],
@@ -145,7 +148,7 @@ fn nothing_is_replaced_without_force() {
         ),
         (
             "csv/new_head.csv",
-            &["simulate", "--out", "new.mcap", "--csv", "csv"],
+            &["simulate", "--walk", "--out", "new.mcap", "--csv", "csv"],
         ),
         (
             "diagnosis/effects.yaml",
@@ -235,6 +238,7 @@ fn many_samples_take_little_memory() {
         .arg(CROMOSIM)
         .args([
             "simulate",
+            "--walk",
             "--rate",
             "5000",
             "--out",

@@ -9,6 +9,6 @@ cd "$(dirname "$0")"
 
 # The walk's poses are exact: the scheme expects no noise of them.
 # Walking: what is diagnosed.
-"$cromosim" simulate --placements made_from/placements.yaml --duration 6 --scheme spline --seed 1 --out session --force
+"$cromosim" simulate --walk --placements made_from/placements.yaml --duration 6 --scheme spline --seed 1 --out session --force
 # Stopping, reaching out and turning: what the diagnosis is checked on.
-"$cromosim" simulate --placements made_from/placements.yaml --start 6 --scheme spline --seed 2 --out check --force
+"$cromosim" simulate --walk --placements made_from/placements.yaml --start 6 --scheme spline --seed 2 --out check --force

@@ -125,7 +125,14 @@ fn placements_and_settings() {
         fs::write(folder.path().join(name), content).unwrap();
         refuses(
             folder.path(),
-            &["simulate", "--placements", name, "--out", "out.mcap"],
+            &[
+                "simulate",
+                "--walk",
+                "--placements",
+                name,
+                "--out",
+                "out.mcap",
+            ],
             expected,
         );
         refuses(
@@ -143,27 +150,36 @@ fn placements_and_settings() {
     }
     refuses(
         folder.path(),
-        &["simulate", "--rate", "-5", "--out", "out.mcap"],
+        &["simulate", "--walk", "--rate", "-5", "--out", "out.mcap"],
         &["--rate", "-5"],
     );
     refuses(
         folder.path(),
-        &["simulate", "--rate", "1e9", "--out", "out.mcap"],
+        &["simulate", "--walk", "--rate", "1e9", "--out", "out.mcap"],
         &["--rate", "100000"],
     );
     refuses(
         folder.path(),
-        &["simulate", "--scheme", "guess", "--out", "out.mcap"],
+        &[
+            "simulate", "--walk", "--scheme", "guess", "--out", "out.mcap",
+        ],
         &["guess", "spline"],
     );
     refuses(
         folder.path(),
-        &["simulate", "--body", "nobody.npz", "--out", "out.mcap"],
+        &[
+            "simulate",
+            "--walk",
+            "--body",
+            "nobody.npz",
+            "--out",
+            "out.mcap",
+        ],
         &["nobody.npz"],
     );
     refuses(
         folder.path(),
-        &["simulate", "--out", "missing/out.mcap"],
+        &["simulate", "--walk", "--out", "missing/out.mcap"],
         &["missing"],
     );
 }
@@ -201,8 +217,12 @@ fn options_of_another_mode_of_simulate() {
             );
         }
     }
-    let motions = ["simulate", "--out", "out.mcap"];
-    let cases: [(&[&str], &[&str], &str); 9] = [
+    let motions = ["simulate", "--walk", "--out", "out.mcap"];
+    let nothing = ["simulate", "--out", "out.mcap"];
+    refuses(folder.path(), &nothing, &["no motion file", "--walk"]);
+    let cases: [(&[&str], &[&str], &str); 11] = [
+        (&nothing, &["--walk", "walk.bvh"], "leave one of them out"),
+        (&rigid, &["--walk"], "not with --rigid"),
         (&motions, &["--placement", "wrist"], "NAME=SITE"),
         (&motions, &["--effects", "e.yaml"], "not with motion files"),
         (
@@ -250,9 +270,16 @@ fn pipes_are_refused_at_once() {
         &["inspect", "pipe"],
         &["convert", "pipe", "o.bvh"],
         &["simulate", "pipe", "--out", "o.mcap"],
-        &["simulate", "--placements", "pipe", "--out", "o.mcap"],
-        &["simulate", "--body", "pipe", "--out", "o.mcap"],
-        &["simulate", "--mapping", "pipe", "--out", "o.mcap"],
+        &[
+            "simulate",
+            "--walk",
+            "--placements",
+            "pipe",
+            "--out",
+            "o.mcap",
+        ],
+        &["simulate", "--walk", "--body", "pipe", "--out", "o.mcap"],
+        &["simulate", "--walk", "--mapping", "pipe", "--out", "o.mcap"],
         &[
             "simulate", "--rigid", "pipe", "--rate", "50", "--out", "o.mcap",
         ],

@@ -6,6 +6,7 @@ mod commands;
 mod common;
 mod diagnoses;
 mod nodes;
+mod slips;
 
 use std::fs;
 use std::path::Path;

@@ -159,7 +159,7 @@ fn security_that_cannot_be_had() {
 fn bags() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
-    succeed(folder.path(), &["simulate", "--out", "walk.mcap"]);
+    succeed(folder.path(), &["simulate", "--walk", "--out", "walk.mcap"]);
     let whole = fs::read(path("walk.mcap")).unwrap();
     fs::write(path("cut.mcap"), &whole[..whole.len() * 2 / 3]).unwrap();
     fs::write(path("text.mcap"), "not a bag").unwrap();
@@ -193,7 +193,7 @@ fn bags() {
     );
     refuses(
         folder.path(),
-        &["simulate", "--out", "walk.mcap"],
+        &["simulate", "--walk", "--out", "walk.mcap"],
         &["walk.mcap"],
     );
     refuses(

@@ -94,7 +94,14 @@ fn one_bad_placement_does_not_hide_the_other() {
 fn states_and_placements_stand_in_for_a_reference() {
     let folder = tempfile::tempdir().unwrap();
     // The walk's poses are exact, and the default scheme would smooth them.
-    let exact = ["simulate", "--scheme", "spline", "--out", "walk.mcap"];
+    let exact = [
+        "simulate",
+        "--walk",
+        "--scheme",
+        "spline",
+        "--out",
+        "walk.mcap",
+    ];
     succeed(folder.path(), &exact);
     let walk = BagReader::open(&folder.path().join("walk.mcap")).unwrap();
     let mut bag =

@@ -70,7 +70,7 @@ fn a_killed_recorder_loses_half_a_second_at_most() {
 fn a_bag_is_replayed_with_everything_in_it() {
     in_private_network("bags::a_bag_is_replayed_with_everything_in_it", || {
         let folder = tempfile::tempdir().unwrap();
-        common::succeed(folder.path(), &["simulate", "--out", "walk.mcap"]);
+        common::succeed(folder.path(), &["simulate", "--walk", "--out", "walk.mcap"]);
         let recorded = BagReader::open(&folder.path().join("walk.mcap")).unwrap();
         let node = observer();
         let wrist = node

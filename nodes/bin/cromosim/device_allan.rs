@@ -1,5 +1,6 @@
 //! `cromosim device from-allan`: devices of recordings at rest, with tables and pictures.
 
+use cromosim_spatial::meant;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
@@ -50,8 +51,9 @@ fn chosen(recording: &Path, placement: Option<&str>) -> anyhow::Result<Vec<Stati
     let chosen: Vec<_> = all.iter().filter(|own| own.name == name).cloned().collect();
     if chosen.is_empty() {
         bail!(
-            "{}: no placement `{name}`; it has {known}",
-            recording.display()
+            "{}: no placement `{name}`; it has {known}{}",
+            recording.display(),
+            meant(name, known.split(", "))
         );
     }
     Ok(chosen)

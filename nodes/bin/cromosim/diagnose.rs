@@ -12,7 +12,7 @@ use cromosim_gap::{
     DiagnoseOptions, Diagnosis, Evidence, OfRecording, PlacementAnswer, PlacementDiagnosis, SCHEMA,
 };
 use cromosim_imu::{EffectKind, EffectsFile};
-use cromosim_spatial::nearest_name;
+use cromosim_spatial::{meant, with_nearest};
 use rayon::prelude::*;
 use serde::Deserialize;
 use serde_json::Value;
@@ -240,7 +240,7 @@ impl Config {
     fn read(file: &Path) -> anyhow::Result<Self> {
         let text = cromosim_spatial::read_text(file)
             .with_context(|| format!("{}: cannot be read", file.display()))?;
-        Self::parse(&text).with_context(|| file.display().to_string())
+        Self::parse(&text).map_err(|error| anyhow!("{}: {}", file.display(), with_nearest(error)))
     }
 
     /// An empty file sets nothing.
@@ -252,8 +252,8 @@ impl Config {
 /// The effect of a name, or an error that says which name is nearest.
 fn effect(name: &str, place: &str) -> anyhow::Result<EffectKind> {
     EffectKind::from_name(name).ok_or_else(|| {
-        let nearest = nearest_name(name, EffectKind::ALL.map(EffectKind::name)).unwrap_or_default();
-        anyhow!("{place} {name}: no such effect; the nearest is {nearest}")
+        let meant = meant(name, EffectKind::ALL.map(EffectKind::name));
+        anyhow!("{place} {name}: no such effect{meant}")
     })
 }
 

@@ -1,5 +1,6 @@
 //! Which placements of which recordings `cromosim diagnose` looks at.
 
+use cromosim_spatial::meant;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -94,8 +95,9 @@ pub fn select(
         known.sort();
         known.dedup();
         bail!(
-            "{all}: placement `{name}` of the config: the recording has no such placement; it has {}",
-            known.join(", ")
+            "{all}: placement `{name}` of the config: the recording has no such placement; it has {}{}",
+            known.join(", "),
+            meant(name, known.iter().map(String::as_str))
         );
     }
     if selected.placements.is_empty() && selected.failures.is_empty() {

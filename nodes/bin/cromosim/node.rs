@@ -2,6 +2,7 @@
 //! binary takes.
 
 use clap::Args;
+use cromosim_spatial::meant;
 
 use crate::list;
 use crate::named::Named;
@@ -41,7 +42,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
             Ok(())
         }
         other => anyhow::bail!(
-            "there is no node '{other}'; there are replay, smpl_state, virtual_imu, recorder, viewer and gap_monitor"
+            "there is no node '{other}'; there are {}{}",
+            list::node_names().join(", "),
+            meant(other, list::node_names().iter().map(AsRef::as_ref))
         ),
     }
 }

@@ -22,18 +22,21 @@ const READINGS: &str = "How readings are made";
 /// Simulate IMUs from motion files, or again from a recording's reference
 #[derive(Args)]
 pub struct Arguments {
-    /// Motion files, folders, patterns or @LIST; none: the embedded walk
+    /// Motion files, folders, patterns or @LIST
     ///
     /// BVH, ASF/AMC, C3D, TRC and files of SMPL parameters; folders with all below them, "*.bvh" and the like, and @LIST, a
     /// file with one of these a line. What OUT holds already is left alone
     pub motions: Vec<PathBuf>,
+    /// Simulate the walk that comes with the suite, rather than a file
+    #[arg(long, help_heading = INPUT)]
+    pub walk: bool,
     /// Simulate the IMUs of this recording again, from its reference motion
     #[arg(long, value_name = "RECORDING", help_heading = INPUT)]
     pub reference: Option<PathBuf>,
     /// The namespace of the recording's topics, where there are several
     ///
     /// Such as /robot1; with --reference
-    #[arg(long, value_name = "NAME", help_heading = INPUT)]
+    #[arg(long, hide_short_help = true, value_name = "NAME", help_heading = INPUT)]
     pub namespace: Option<String>,
     /// Simulate an IMU on a rigid body along this trajectory
     ///
@@ -312,11 +315,28 @@ impl Arguments {
                 mode.name()
             );
         }
+        if mode == Mode::Motions {
+            self.refuse_nothing_to_move()?;
+        }
         self.refuse_rivals()?;
         if matches!(mode, Mode::Rigid(_)) && self.rate.is_none() {
             bail!("--rigid needs --rate HZ: the messages of the IMU per second");
         }
         Ok(mode)
+    }
+
+    /// A shell's pattern may have found no file: that is no wish for a walk.
+    fn refuse_nothing_to_move(&self) -> anyhow::Result<()> {
+        match (self.motions.first(), self.walk) {
+            (None, false) => bail!(
+                "no motion file is given; name files, a folder or a pattern, or give --walk for the walk that comes with the suite"
+            ),
+            (Some(motion), true) => bail!(
+                "{}: --walk moves the body without a file; leave one of them out",
+                motion.display()
+            ),
+            _ => Ok(()),
+        }
     }
 
     /// Options of which one alone can be followed.
@@ -415,6 +435,7 @@ impl Arguments {
         };
         let mut given = Vec::from_iter(motion.motion_setting(true).map(|it| (it, MOTION_FILES)));
         let options = [
+            (self.walk, "--walk", MOTION_FILES),
             (self.format.is_some(), "--format", MOTION_FILES),
             (self.shard.is_some(), "--shard", MOTION_FILES),
             (self.draw.is_some(), "--draw", MOTION_FILES),

@@ -1,5 +1,6 @@
 //! What can go wrong with a bag.
 
+use cromosim_spatial::meant;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -102,7 +103,7 @@ pub enum BagError {
         what: String,
     },
     /// No such topic.
-    #[error("{}: no topic {topic}{}; it holds {}", path.display(), meant(topic, known), list(known))]
+    #[error("{}: no topic {topic}; it holds {}{}", path.display(), list(known), meant(topic, known.iter().map(String::as_str)))]
     UnknownTopic {
         /// As the user named it.
         path: PathBuf,
@@ -163,13 +164,6 @@ pub enum BagError {
         /// Which limit was passed.
         reason: String,
     },
-}
-
-/// What somebody may have meant.
-fn meant(name: &str, known: &[String]) -> String {
-    let known = known.iter().map(String::as_str);
-    cromosim_spatial::nearest_name(name, known)
-        .map_or_else(String::new, |nearest| format!(", the nearest is {nearest}"))
 }
 
 fn list(names: &[String]) -> String {

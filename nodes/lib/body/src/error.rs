@@ -1,5 +1,7 @@
 //! Errors of this crate.
 
+use crate::Joint;
+use cromosim_spatial::meant;
 use std::io;
 use std::path::PathBuf;
 
@@ -161,7 +163,7 @@ pub enum BodyError {
         point: [f64; 3],
     },
     /// A name that no joint has.
-    #[error("joint {name} is unknown; joints are named as in SMPL: pelvis, left_hip, … right_hand")]
+    #[error("joint {name} is unknown; joints are named as in SMPL: pelvis, left_hip, … right_hand{}", meant(name, Joint::ALL.iter().map(|joint| joint.name())))]
     UnknownJoint {
         /// The name as given.
         name: String,

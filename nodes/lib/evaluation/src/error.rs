@@ -1,5 +1,6 @@
 //! What can go wrong.
 
+use cromosim_spatial::with_nearest;
 use std::io;
 use std::path::PathBuf;
 
@@ -50,7 +51,7 @@ pub enum EvaluationError {
     #[error("results")]
     Json(#[source] serde_json::Error),
     /// A file that is not YAML, or has wrong or unknown fields.
-    #[error("{file}")]
+    #[error("{file}: {}", with_nearest(source))]
     Yaml {
         /// The file's name.
         file: String,

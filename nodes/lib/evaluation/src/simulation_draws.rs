@@ -2,6 +2,7 @@
 //! from. What is drawn, and how, is what trainings ([`cromosim_learned::WearerRanges`]) and the
 //! evaluation of activities draw.
 
+use cromosim_spatial::meant;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -103,7 +104,8 @@ impl SimulationDraws {
         for (placement, way) in &draws.wearing {
             if DeviceWearing::for_placement(way).is_none() {
                 let known = DeviceWearing::known_placements();
-                let problem = format!("{way} is no way of wearing; there are {known}");
+                let meant = meant(way, known.split(", "));
+                let problem = format!("{way} is no way of wearing; there are {known}{meant}");
                 return Err(wrong(&format!("wearing.{placement}"), problem));
             }
         }
@@ -134,8 +136,9 @@ impl SimulationDraws {
                 path: path.to_owned(),
                 field: format!("wearing.{unknown}"),
                 problem: format!(
-                    "no such placement; there are {}",
-                    names().collect::<Vec<_>>().join(", ")
+                    "no such placement; there are {}{}",
+                    names().collect::<Vec<_>>().join(", "),
+                    meant(unknown, names())
                 ),
             }),
         }

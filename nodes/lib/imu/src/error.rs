@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use cromosim_body::BodyError;
 use cromosim_spatial::plausible::Oddity;
-use cromosim_spatial::{SpatialError, Stamp};
+use cromosim_spatial::{SpatialError, Stamp, meant, with_nearest};
 use thiserror::Error;
 
 /// Errors of this crate.
@@ -19,7 +19,7 @@ pub enum ImuError {
         source: std::io::Error,
     },
     /// A file that is not YAML, or has wrong or unknown fields.
-    #[error("{file}: {source}")]
+    #[error("{file}: {}", with_nearest(source))]
     Yaml {
         /// The file's name.
         file: String,
@@ -85,7 +85,7 @@ pub enum ImuError {
         triangle: u32,
     },
     /// An unknown scheme.
-    #[error("unknown scheme `{name}`; known are {known}")]
+    #[error("unknown scheme `{name}`; known are {known}{}", meant(name, known.split(", ")))]
     UnknownScheme {
         /// The name given.
         name: String,
@@ -93,7 +93,7 @@ pub enum ImuError {
         known: String,
     },
     /// A device that is neither embedded nor a file.
-    #[error("unknown device `{name}`; known are {known}, or give the path of a .yaml file")]
+    #[error("unknown device `{name}`; known are {known}, or give the path of a .yaml file{}", meant(name, known.split(", ")))]
     UnknownDevice {
         /// The name given.
         name: String,
@@ -176,7 +176,7 @@ pub enum EffectError {
         effect: &'static str,
     },
     /// A parameter that the effect does not have.
-    #[error("{effect}: unknown field `{field}`; expected {expected}")]
+    #[error("{effect}: unknown field `{field}`; expected {expected}{}", meant(field, expected.split(", ")))]
     UnknownField {
         /// The effect.
         effect: &'static str,

@@ -1,5 +1,6 @@
 //! Files of placements.
 
+use cromosim_spatial::with_nearest;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -249,7 +250,7 @@ fn malformed(error: &serde_norway::Error) -> (&'static str, PlacementProblem) {
     (
         "fields",
         PlacementProblem::Malformed {
-            message: error.to_string(),
+            message: with_nearest(error),
         },
     )
 }

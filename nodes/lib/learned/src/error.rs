@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use cromosim_body::BodyError;
 use cromosim_imu::{EffectError, ImuError};
-use cromosim_spatial::SpatialError;
+use cromosim_spatial::{SpatialError, meant, with_nearest};
 
 /// Errors of this crate; the message names the file, the place and what to do.
 #[derive(Debug, thiserror::Error)]
@@ -13,7 +13,8 @@ use cromosim_spatial::SpatialError;
 pub enum LearnedError {
     /// No model of this name comes with the suite.
     #[error(
-        "{name}: neither a folder with networks nor a model that comes with the suite ({known})"
+        "{name}: neither a folder with networks nor a model that comes with the suite ({known}){}",
+        meant(name, known.split(", "))
     )]
     UnknownModel {
         /// The name or folder that was given.
@@ -153,7 +154,7 @@ pub enum LearnedError {
         value: f32,
     },
     /// A file that is not YAML, or has wrong or unknown fields.
-    #[error("{file}: {source}")]
+    #[error("{file}: {}", with_nearest(source))]
     Yaml {
         /// The file's name.
         file: String,

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use cromosim_arrays::ArraysError;
 use cromosim_body::BodyError;
 use cromosim_spatial::plausible::Oddity;
+use cromosim_spatial::{meant, with_nearest};
 
 /// An error of this crate: one line that names the file, the place and what to do.
 #[derive(Debug, thiserror::Error)]
@@ -59,7 +60,7 @@ pub enum MotionError {
         found: Vec<String>,
     },
     /// A marker set's name is neither embedded nor a file.
-    #[error("marker set {given} is neither a file nor one of {}", known.join(", "))]
+    #[error("marker set {given} is neither a file nor one of {}{}", known.join(", "), meant(given, known.iter().map(String::as_str)))]
     UnknownMarkerSet {
         /// What was given.
         given: String,
@@ -91,7 +92,7 @@ pub enum MotionError {
         found: String,
     },
     /// Several people in a recording, or none of the given name.
-    #[error("{name}: subject {given} asked for, the file has {}; set subject to one of them", if known.is_empty() { "no named subjects".to_owned() } else { known.join(", ") })]
+    #[error("{name}: subject {given} asked for, the file has {}; set subject to one of them{}", if known.is_empty() { "no named subjects".to_owned() } else { known.join(", ") }, meant(given, known.iter().map(String::as_str)))]
     Subject {
         /// The file.
         name: String,
@@ -217,7 +218,7 @@ pub enum MotionError {
         missing: Vec<String>,
     },
     /// A skeleton map's name is neither embedded nor a file.
-    #[error("skeleton map {given} is neither a file nor one of {}", known.join(", "))]
+    #[error("skeleton map {given} is neither a file nor one of {}{}", known.join(", "), meant(given, known.iter().map(String::as_str)))]
     UnknownMap {
         /// What was given.
         given: String,
@@ -225,7 +226,7 @@ pub enum MotionError {
         known: Vec<String>,
     },
     /// A skeleton map cannot be parsed.
-    #[error("{origin}: not a skeleton map: {source}")]
+    #[error("{origin}: not a skeleton map: {}", with_nearest(source))]
     MapSyntax {
         /// The map's file.
         origin: String,
@@ -233,7 +234,7 @@ pub enum MotionError {
         source: serde_norway::Error,
     },
     /// A marker set cannot be parsed.
-    #[error("{origin}: not a marker set: {source}")]
+    #[error("{origin}: not a marker set: {}", with_nearest(source))]
     MarkerSetSyntax {
         /// The set's file.
         origin: String,
@@ -339,7 +340,7 @@ pub enum MotionError {
         found: String,
     },
     /// Nobody of that name.
-    #[error("{}: person {person} is not in it; there are {known}; choose one by person", path.display())]
+    #[error("{}: person {person} is not in it; there are {known}; choose one by person{}", path.display(), meant(person, known.split(", ").filter_map(|one| one.split(" (").next())))]
     UnknownPerson {
         /// The file.
         path: PathBuf,

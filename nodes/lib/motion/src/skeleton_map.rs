@@ -1,5 +1,6 @@
 //! Which joint of a source is which joint of SMPL: data, one YAML file a skeleton.
 
+use cromosim_spatial::meant;
 use std::collections::BTreeMap;
 
 use cromosim_body::{JOINT_COUNT, Joint};
@@ -150,7 +151,7 @@ impl SkeletonMap {
             problem: problem.to_owned(),
         };
         let unit = raw.unit_scale_m;
-        let joints = smpl_joints(raw.joints).map_err(|(key, problem)| content(key, problem))?;
+        let joints = smpl_joints(raw.joints).map_err(|(key, problem)| content(key, &problem))?;
         if unit.is_some_and(|scale| !(scale > 0.0 && scale.is_finite())) {
             let problem = "expected metres per unit, more than 0";
             return Err(content("unit_scale_m".to_owned(), problem));
@@ -317,22 +318,28 @@ impl SkeletonMap {
 /// missing.
 fn smpl_joints(
     names: BTreeMap<String, String>,
-) -> Result<[Option<String>; JOINT_COUNT], (String, &'static str)> {
+) -> Result<[Option<String>; JOINT_COUNT], (String, String)> {
     let mut joints: [Option<String>; JOINT_COUNT] = Default::default();
     for (smpl, source) in names {
-        let joint = Joint::from_name(&smpl)
-            .ok_or_else(|| (format!("joints.{smpl}"), "SMPL has no such joint"))?;
+        let joint = Joint::from_name(&smpl).ok_or_else(|| {
+            let meant = meant(&smpl, Joint::ALL.iter().map(|joint| joint.name()));
+            let problem = format!("SMPL has no such joint{meant}");
+            (format!("joints.{smpl}"), problem)
+        })?;
         joints[joint.index()] = Some(source);
     }
     let missing = INDISPENSABLE
         .iter()
         .find(|joint| joints[joint.index()].is_none());
     if let Some(joint) = missing {
-        return Err((format!("joints.{joint}"), "missing, and indispensable"));
+        return Err((
+            format!("joints.{joint}"),
+            "missing, and indispensable".to_owned(),
+        ));
     }
     if joints[Joint::Neck.index()].is_none() && joints[Joint::Head.index()].is_none() {
         let problem = "missing, and so is head; one of them is needed";
-        return Err(("joints.neck".to_owned(), problem));
+        return Err(("joints.neck".to_owned(), problem.to_owned()));
     }
     Ok(joints)
 }

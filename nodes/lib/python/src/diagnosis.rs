@@ -1,5 +1,6 @@
 //! Diagnoses of arrays and of recordings.
 
+use cromosim_spatial::meant;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -120,9 +121,8 @@ pub fn diagnose(
 ) -> PyResult<(String, String, String)> {
     let excluded = without.iter().map(|name| {
         EffectKind::from_name(name).ok_or_else(|| {
-            raise(format!(
-                "without {name}: no such effect; effects() lists all"
-            ))
+            let meant = meant(name, EffectKind::ALL.map(EffectKind::name));
+            raise(format!("without {name}: no such effect{meant}"))
         })
     });
     let options = DiagnoseOptions {

@@ -1,5 +1,6 @@
 //! Motions, on the body that they were read for.
 
+use cromosim_spatial::with_nearest;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -39,8 +40,8 @@ pub fn read_motion(
     body: Option<PathBuf>,
     options: &str,
 ) -> PyResult<Motion> {
-    let options: MotionOptions =
-        serde_json::from_str(options).map_err(|error| raise(format!("read_motion: {error}")))?;
+    let options: MotionOptions = serde_json::from_str(options)
+        .map_err(|error| raise(format!("read_motion: {}", with_nearest(error))))?;
     py.detach(|| {
         let model = model(body.as_deref())?;
         let whole = MotionOptions {

@@ -1,5 +1,6 @@
 //! Virtual IMUs of a person, and of a rigid body.
 
+use cromosim_spatial::with_nearest;
 use std::path::Path;
 use std::str::FromStr;
 
@@ -43,8 +44,8 @@ pub struct Options {
 impl Options {
     /// Parses JSON.
     pub fn parse(text: &str) -> PyResult<SimulationOptions> {
-        let options: Self =
-            serde_json::from_str(text).map_err(|error| raise(format!("simulate: {error}")))?;
+        let options: Self = serde_json::from_str(text)
+            .map_err(|error| raise(format!("simulate: {}", with_nearest(error))))?;
         let scheme = options.scheme.as_deref().map(Scheme::from_str).transpose();
         let scheme = scheme.map_err(|error| raise(format!("scheme: {error}")))?;
         let differentiation = match (scheme, options.bandwidth_hz) {

@@ -17,7 +17,8 @@ def written(command_line, tmp_path):
     """walk.parquet, and what the package says of the same placements."""
     given = [f"--placement={name}={site}" for name, site in PLACEMENTS.items()]
     path = tmp_path / "walk.parquet"
-    command_line("simulate", "--seed", 3, "--device", "consumer_mems", *given, "--out", path)
+    given += ["--seed", 3, "--device", "consumer_mems"]
+    command_line("simulate", "--walk", *given, "--out", path)
     placements = {name: Placement(site=site) for name, site in PLACEMENTS.items()}
     return path, cromosim.simulate(cromosim.walk(), placements, device="consumer_mems", seed=3)
 

@@ -1,5 +1,6 @@
 //! What can go wrong with a recording.
 
+use cromosim_spatial::meant;
 use std::path::PathBuf;
 
 use cromosim_bag::BagError;
@@ -258,7 +259,7 @@ pub enum RecordingError {
         duration_s: f64,
     },
     /// A joint that SMPL does not have.
-    #[error("--joint {name}: SMPL has no such joint; it has {}", known.join(", "))]
+    #[error("--joint {name}: SMPL has no such joint; it has {}{}", known.join(", "), meant(name, known.iter().copied()))]
     UnknownJoint {
         /// As given.
         name: String,

@@ -1,5 +1,6 @@
 //! Recordings of several robots or people, each in a namespace of its own.
 
+use cromosim_spatial::meant;
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -44,8 +45,9 @@ pub fn open_recording(
                     format!("no topic of a recording is in namespace {name}, nor in any")
                 } else {
                     format!(
-                        "no topic of a recording is in namespace {name}; there are some in {}",
-                        listed()
+                        "no topic of a recording is in namespace {name}; there are some in {}{}",
+                        listed(),
+                        meant(&name, known.iter().map(String::as_str))
                     )
                 };
                 return Err(refuse(reason));

@@ -1,5 +1,6 @@
 //! The IMUs of a recording again, from its reference motion.
 
+use cromosim_spatial::meant;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
@@ -98,8 +99,9 @@ pub fn read_effects(
         return Err(RecordingError::Unsuitable {
             path: file.to_owned(),
             problem: format!(
-                "placement `{name}`: the recording has no such placement; it has {}",
-                names.join(", ")
+                "placement `{name}`: the recording has no such placement; it has {}{}",
+                names.join(", "),
+                meant(name, names.iter().copied())
             ),
         });
     }

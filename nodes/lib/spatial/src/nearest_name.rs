@@ -1,5 +1,7 @@
 //! Names that somebody may have meant.
 
+use std::fmt::Display;
+
 /// Of known names the one that takes the fewest changed letters for its length (Levenshtein 1966), the
 /// first of equals; none where nothing is known.
 pub fn nearest_name<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
@@ -9,6 +11,34 @@ pub fn nearest_name<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) ->
         .map(likeness)
         .reduce(|best, other| if other.0 > best.0 { other } else { best })?;
     Some(nearest)
+}
+
+/// The end of an error line about a name that is not known: `; the nearest is NAME`, or nothing where
+/// there is no choice.
+pub fn meant<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
+    let known: Vec<&str> = known.into_iter().filter(|one| !one.is_empty()).collect();
+    match nearest_name(name, known.iter().copied()) {
+        Some(nearest) if known.len() > 1 => format!("; the nearest is {nearest}"),
+        _ => String::new(),
+    }
+}
+
+/// What a parser of serde's says, with the nearest of the names that it expected where it found an
+/// unknown field or variant.
+pub fn with_nearest(problem: impl Display) -> String {
+    let problem = problem.to_string();
+    let nearest = meant_by_serde(&problem).unwrap_or_default();
+    problem + &nearest
+}
+
+/// Of "unknown field `given`, expected one of `this`, `that` at line 3 column 1".
+fn meant_by_serde(problem: &str) -> Option<String> {
+    let (_, slip) = ["unknown field `", "unknown variant `"]
+        .iter()
+        .find_map(|start| problem.split_once(start))?;
+    let (given, rest) = slip.split_once('`')?;
+    let expected = rest.strip_prefix(", expected ")?;
+    Some(meant(given, expected.split('`').skip(1).step_by(2)))
 }
 
 #[cfg(test)]
@@ -23,5 +53,37 @@ mod tests {
         let topics = ["/imu/left_wrist/data_raw", "/note"];
         assert_eq!(nearest_name("/imu/head/data", topics), Some(topics[0]));
         assert_eq!(nearest_name("x", []), None);
+        assert_eq!(meant("lowpas", known), "; the nearest is low_pass");
+        assert_eq!(meant("x", ["only"]), "");
+    }
+
+    #[test]
+    fn what_serde_expects_is_read_from_its_message() {
+        #[derive(Debug, serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Settings {
+            #[serde(rename = "rate_hz")]
+            _rate_hz: Option<f64>,
+            #[serde(rename = "scheme")]
+            _scheme: Option<Choice>,
+        }
+        #[derive(Debug, serde::Deserialize)]
+        #[serde(rename_all = "snake_case")]
+        enum Choice {
+            Spline,
+            Adaptive,
+        }
+        let problem = |text: &str| {
+            with_nearest(serde_norway::from_str::<Settings>(text).expect_err("a slip"))
+        };
+        for (text, nearest) in [
+            ("rate_khz: 1", "; the nearest is rate_hz"),
+            ("scheme: splin", "; the nearest is spline"),
+        ] {
+            let problem = problem(text);
+            assert!(problem.ends_with(nearest), "{problem}");
+        }
+        let of_a_number = problem("rate_hz: fast");
+        assert!(!of_a_number.contains("nearest"), "{of_a_number}");
     }
 }

@@ -1,5 +1,6 @@
 //! A data set's recording: which part and which of its placements is taken.
 
+use cromosim_spatial::meant;
 use std::path::Path;
 
 use super::{Content, Read, ReadOptions, Target};
@@ -49,7 +50,8 @@ fn choose_placements(
         recording.imus.retain(|imu| imu.placement == *placement);
         if recording.imus.is_empty() {
             return Err(format!(
-                "--placement {placement}: no such placement; there are {known}"
+                "--placement {placement}: no such placement; there are {known}{}",
+                meant(placement, known.split(", "))
             ));
         }
     }

@@ -1,5 +1,6 @@
 //! A bag's tree of frames (`/tf`, `/tf_static`): where one frame is in another over time.
 
+use cromosim_spatial::meant;
 use std::collections::BTreeMap;
 
 use cromosim_bag::BagReader;
@@ -93,6 +94,10 @@ impl<'a> FrameTree<'a> {
         self.branches.keys().cloned().collect::<Vec<_>>().join(", ")
     }
 
+    fn meant(&self, frame: &str) -> String {
+        meant(frame, self.branches.keys().map(String::as_str))
+    }
+
     fn wrong(&self, problem: String) -> RecordingError {
         RecordingError::Unsuitable {
             path: self.reader.path().to_owned(),
@@ -118,8 +123,9 @@ impl<'a> FrameTree<'a> {
                         )));
                     }
                     _ => {
+                        let (known, meant) = (self.known(), self.meant(frame));
                         return Err(
-                            self.wrong(format!("no frame {frame}; there are {}", self.known()))
+                            self.wrong(format!("no frame {frame}; there are {known}{meant}"))
                         );
                     }
                 }

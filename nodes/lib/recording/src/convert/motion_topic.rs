@@ -6,6 +6,7 @@ use cromosim_motion::SmplMotion;
 use cromosim_msgs::RosMessage;
 use cromosim_msgs::cromosim_msgs::{SmplPose, SmplState};
 use cromosim_spatial::Stamp;
+use cromosim_spatial::meant;
 
 use super::ReadOptions;
 use crate::placement::body_pose;
@@ -103,7 +104,16 @@ fn states(
         problem,
     };
     match person {
-        Some(person) => states.retain(|state| state.body_id == person),
+        Some(person) if people.iter().any(|one| one == person) => {
+            states.retain(|state| state.body_id == person);
+        }
+        Some(person) => {
+            return Err(wrong(format!(
+                "--person {person}: nobody of that name; there are {}{}",
+                people.join(", "),
+                meant(person, people.iter().map(String::as_str))
+            )));
+        }
         None if people.len() > 1 => {
             return Err(wrong(format!(
                 "several bodies; give --person, one of {}",
