@@ -301,13 +301,6 @@ impl Arguments {
                 );
             }
         }
-        if mode == Mode::Motions
-            && let Some(given) = self.placement.iter().find(|given| !given.contains('='))
-        {
-            bail!(
-                "--placement {given}: expected NAME=SITE, such as left_wrist=left_watch; `cromosim body sites` lists the sites"
-            );
-        }
         if mode != Mode::Motions && self.format() != Format::Bag {
             bail!(
                 "{}: {} writes a bag, which `cromosim convert` makes tables and columns of; give a name in .mcap",
@@ -316,6 +309,7 @@ impl Arguments {
             );
         }
         if mode == Mode::Motions {
+            self.refuse_unnamed_sites()?;
             self.refuse_nothing_to_move()?;
         }
         self.refuse_rivals()?;
@@ -323,6 +317,15 @@ impl Arguments {
             bail!("--rigid needs --rate HZ: the messages of the IMU per second");
         }
         Ok(mode)
+    }
+
+    fn refuse_unnamed_sites(&self) -> anyhow::Result<()> {
+        if let Some(given) = self.placement.iter().find(|given| !given.contains('=')) {
+            bail!(
+                "--placement {given}: expected NAME=SITE, such as left_wrist=left_watch; `cromosim body sites` lists the sites"
+            );
+        }
+        Ok(())
     }
 
     /// A shell's pattern may have found no file: that is no wish for a walk.

@@ -1,7 +1,5 @@
 //! Errors of this crate.
 
-use crate::Joint;
-use cromosim_spatial::meant;
 use std::io;
 use std::path::PathBuf;
 
@@ -163,10 +161,14 @@ pub enum BodyError {
         point: [f64; 3],
     },
     /// A name that no joint has.
-    #[error("joint {name} is unknown; joints are named as in SMPL: pelvis, left_hip, … right_hand{}", meant(name, Joint::ALL.iter().map(|joint| joint.name())))]
+    #[error(
+        "joint {name} is unknown; joints are named as in SMPL: pelvis, left_hip, … right_hand{meant}"
+    )]
     UnknownJoint {
         /// The name as given.
         name: String,
+        /// The nearest name, as [`cromosim_spatial::meant`] words it.
+        meant: String,
     },
     /// A file cannot be written.
     #[error("{}: cannot write: {source}", path.display())]

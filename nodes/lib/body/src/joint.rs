@@ -3,6 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use cromosim_spatial::meant;
+
 use crate::BodyError;
 
 /// Number of SMPL's joints, and so of its segments.
@@ -160,6 +162,7 @@ impl FromStr for Joint {
     fn from_str(name: &str) -> Result<Self, BodyError> {
         Self::from_name(name).ok_or_else(|| BodyError::UnknownJoint {
             name: name.to_owned(),
+            meant: meant(name, Self::ALL.iter().map(|joint| joint.name())),
         })
     }
 }
