@@ -9,7 +9,8 @@ use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use cromosim_body::BodyModel;
 use cromosim_gap::{
-    DiagnoseOptions, Diagnosis, Evidence, OfRecording, PlacementAnswer, PlacementDiagnosis, SCHEMA,
+    DiagnoseOptions, Diagnosis, Evidence, OfRecording, PlacementAnswer, PlacementDiagnosis,
+    Progress, SCHEMA,
 };
 use cromosim_imu::{EffectKind, EffectsFile};
 use cromosim_spatial::{meant, with_nearest};
@@ -171,6 +172,7 @@ fn options(arguments: &Arguments, config: &Config) -> anyhow::Result<DiagnoseOpt
     Ok(DiagnoseOptions {
         excluded,
         seed: arguments.seed.or(config.seed).unwrap_or(0),
+        ..DiagnoseOptions::default()
     })
 }
 
@@ -182,15 +184,22 @@ fn diagnose_all(
 ) -> Vec<Result<(PlacementAnswer, Vec<String>), String>> {
     // Until the files are written a signal may end the process as it likes: there is nothing to
     // clear away.
-    let bar = progress::bar(placements.len() as u64, "diagnosing, placements");
+    let doing = match placements.len() {
+        1 => "diagnosing".to_owned(),
+        count => format!("diagnosing {count} placements"),
+    };
+    let bar = progress::shares(placements.len(), &doing);
     let diagnose = |recorded: &Vec<OneRecording>| {
-        let answer = diagnose_placement(recorded, options);
-        bar.inc(1);
-        answer
+        let one = bar.of_one();
+        let told = DiagnoseOptions {
+            progress: Progress::new(move |share| one.reached(share)),
+            ..options.clone()
+        };
+        diagnose_placement(recorded, &told)
     };
     let in_order: Vec<&Vec<OneRecording>> = placements.values().collect();
     let results = in_order.into_par_iter().map(diagnose).collect();
-    bar.finish_and_clear();
+    bar.finish();
     results
 }
 

@@ -1,7 +1,7 @@
 //! Progress on work that takes longer than a second, and its end by a signal.
 
 use std::io::{IsTerminal, stderr};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Duration;
@@ -18,6 +18,19 @@ const SHORT: Duration = Duration::from_secs(1);
 const LINE_EVERY: Duration = Duration::from_secs(10);
 /// From so many seconds on a time is told in minutes.
 const IN_MINUTES_S: f64 = 120.0;
+/// Steps of a bar for each work that tells shares.
+const SHARE_STEPS: u64 = 1000;
+
+/// Says of how many steps how many are done.
+type Count = fn(u64, u64) -> String;
+
+fn of_steps(done: u64, steps: u64) -> String {
+    format!("{done} of {steps}")
+}
+
+fn percent(done: u64, steps: u64) -> String {
+    format!("{} %", 100 * done / steps.max(1))
+}
 
 /// A bar of `steps` steps on standard error, with the time left; a line every ten seconds where that
 /// is no terminal. Shown once the work has taken a second.
@@ -26,7 +39,54 @@ pub fn bar(steps: u64, doing: &str) -> ProgressBar {
         ProgressBar::with_draw_target(Some(steps), ProgressDrawTarget::hidden()),
         doing,
         "{msg:24} {wide_bar:.cyan} {pos}/{len}, {eta} left",
+        of_steps,
     )
+}
+
+/// A bar for so many works that tell which share of them is done; else as [`bar`].
+pub fn shares(works: usize, doing: &str) -> Shares {
+    Shares(shown(
+        ProgressBar::with_draw_target(
+            Some(SHARE_STEPS * works as u64),
+            ProgressDrawTarget::hidden(),
+        ),
+        doing,
+        "{msg:24} {wide_bar:.cyan} {percent} %, {eta} left",
+        percent,
+    ))
+}
+
+/// A bar of shares.
+pub struct Shares(ProgressBar);
+
+impl Shares {
+    /// One of its works.
+    pub fn of_one(&self) -> OneOf {
+        OneOf {
+            bar: self.0.clone(),
+            reached: AtomicU64::new(0),
+        }
+    }
+
+    /// The works are done.
+    pub fn finish(self) {
+        self.0.finish_and_clear();
+    }
+}
+
+/// One of the works of [`Shares`].
+pub struct OneOf {
+    bar: ProgressBar,
+    reached: AtomicU64,
+}
+
+impl OneOf {
+    /// So much of it is done, from 0 to 1.
+    pub fn reached(&self, share: f64) {
+        let steps = (share * SHARE_STEPS as f64) as u64;
+        let before = self.reached.fetch_max(steps, Ordering::Relaxed);
+        self.bar.inc(steps.saturating_sub(before));
+    }
 }
 
 /// Does work whose length nobody knows; as [`bar`], with the time gone.
@@ -35,13 +95,14 @@ pub fn working<T>(doing: &str, work: impl FnOnce() -> T) -> T {
         ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden()),
         doing,
         "{spinner} {msg}, {elapsed}",
+        of_steps,
     );
     let done = work();
     spinner.finish_and_clear();
     done
 }
 
-fn shown(bar: ProgressBar, doing: &str, template: &str) -> ProgressBar {
+fn shown(bar: ProgressBar, doing: &str, template: &str, count: Count) -> ProgressBar {
     if let Ok(style) = ProgressStyle::with_template(template) {
         bar.set_style(style);
     }
@@ -50,7 +111,7 @@ fn shown(bar: ProgressBar, doing: &str, template: &str) -> ProgressBar {
     if stderr().is_terminal() {
         thread::spawn(move || draw(&watched));
     } else {
-        thread::spawn(move || tell(&watched, LINE_EVERY, |line| remark!("{line}")));
+        thread::spawn(move || tell(&watched, count, LINE_EVERY, |line| remark!("{line}")));
     }
     bar
 }
@@ -65,19 +126,25 @@ fn draw(bar: &WeakProgressBar) {
 }
 
 /// Tells of the work, again and again, until it is done.
-fn tell(bar: &WeakProgressBar, every: Duration, say: impl Fn(String)) {
+fn tell(bar: &WeakProgressBar, count: Count, every: Duration, say: impl Fn(String)) {
     loop {
         thread::sleep(every);
         let Some(bar) = bar.upgrade().filter(|bar| !bar.is_finished()) else {
             return;
         };
         let gone = bar.elapsed().as_secs_f64();
-        say(line(&bar.message(), bar.position(), bar.length(), gone));
+        say(line(
+            &bar.message(),
+            bar.position(),
+            bar.length(),
+            count,
+            gone,
+        ));
     }
 }
 
 /// `simulating, placements: 3 of 17, 12 s gone, about 56 s left`.
-fn line(doing: &str, done: u64, steps: Option<u64>, gone_s: f64) -> String {
+fn line(doing: &str, done: u64, steps: Option<u64>, count: Count, gone_s: f64) -> String {
     let gone = format!("{} gone", time(gone_s));
     let Some(steps) = steps else {
         return format!("{doing}: {gone}");
@@ -88,7 +155,7 @@ fn line(doing: &str, done: u64, steps: Option<u64>, gone_s: f64) -> String {
         let left = gone_s / done as f64 * steps.saturating_sub(done) as f64;
         format!("about {} left", time(left))
     };
-    format!("{doing}: {done} of {steps}, {gone}, {left}")
+    format!("{doing}: {}, {gone}, {left}", count(done, steps))
 }
 
 fn time(seconds: f64) -> String {
@@ -189,20 +256,40 @@ mod tests {
 
     #[test]
     fn lines_tell_what_is_done_and_how_long_it_takes() {
-        let told = |done, gone_s| line("diagnosing, placements", done, Some(17), gone_s);
+        let told = |done, gone_s| line("simulating, files", done, Some(17), of_steps, gone_s);
         assert_eq!(
             told(3, 12.0),
-            "diagnosing, placements: 3 of 17, 12 s gone, about 56 s left"
+            "simulating, files: 3 of 17, 12 s gone, about 56 s left"
         );
         assert_eq!(
             told(0, 10.0),
-            "diagnosing, placements: 0 of 17, 10 s gone, time left not known yet"
+            "simulating, files: 0 of 17, 10 s gone, time left not known yet"
         );
         assert_eq!(
             told(2, 60.0),
-            "diagnosing, placements: 2 of 17, 60 s gone, about 8 min left"
+            "simulating, files: 2 of 17, 60 s gone, about 8 min left"
         );
-        assert_eq!(line("fitting", 0, None, 130.0), "fitting: 2 min gone");
+        assert_eq!(
+            line("diagnosing", 350, Some(1000), percent, 14.0),
+            "diagnosing: 35 %, 14 s gone, about 26 s left"
+        );
+        assert_eq!(
+            line("fitting", 0, None, of_steps, 130.0),
+            "fitting: 2 min gone"
+        );
+    }
+
+    #[test]
+    fn shares_of_several_works_add_up() {
+        let shares = shares(2, "working");
+        let (first, second) = (shares.of_one(), shares.of_one());
+        for share in [0.1, 0.5, 0.4, 1.0, 1.0] {
+            first.reached(share);
+        }
+        second.reached(0.25);
+        assert_eq!(shares.0.position(), 1250);
+        assert_eq!(shares.0.length(), Some(2000));
+        shares.finish();
     }
 
     #[test]
@@ -213,7 +300,7 @@ mod tests {
         let watched = bar.downgrade();
         let (sender, told) = std::sync::mpsc::channel();
         let teller = thread::spawn(move || {
-            tell(&watched, Duration::from_millis(20), |line| {
+            tell(&watched, of_steps, Duration::from_millis(20), |line| {
                 let _ = sender.send(line);
             });
         });

@@ -9,6 +9,7 @@ use crate::library::Library;
 use crate::noise_updates::{first_model, with_rest_as_noise, with_updated_noise};
 use crate::policy::report::MOSTLY_EXPLAINED;
 use crate::policy::search::{MOST, MOST_AT_FIRST, ROUNDS};
+use crate::progress::{self, Progress, THINNED};
 use crate::reportable::{Observations, is_ordinary, reportable_effects};
 use crate::search::{ScoredEffectSet, excess, exchanged, score, score_as_it_is, search};
 use crate::sensor_noise::{found_noise, is_white};
@@ -21,6 +22,7 @@ use crate::trace::{names, trace};
 pub(crate) struct Analysis<'a> {
     pub session: &'a Session,
     pub library: &'a Library,
+    pub progress: Progress,
 }
 
 impl<'a> Analysis<'a> {
@@ -33,7 +35,9 @@ impl<'a> Analysis<'a> {
         }
         let fitted = self.library.fitted();
         let (model, scored) = self.searched(&fitted);
+        self.progress.reached(progress::ROUNDS.end);
         let scored = exchanged(&model, scored, &fitted);
+        self.progress.reached(1.0);
         (model, scored)
     }
 
@@ -79,6 +83,7 @@ impl<'a> Analysis<'a> {
         let searched = Analysis {
             session: thinned,
             library: self.library,
+            progress: self.progress.part(&THINNED),
         };
         let (coarse, found) = searched.best_set();
         let mut model = self.first_model();
@@ -90,6 +95,7 @@ impl<'a> Analysis<'a> {
         model = with_updated_noise(&model, &scored, digital, self.library);
         let scored = score(&model, scored.fit.set);
         trace_scored("at the full rate", &scored);
+        self.progress.reached(1.0);
         let margins = found.margins;
         let is_sound = scored.score.is_finite() && !self.holds_folded_line(&model, &scored);
         is_sound.then_some((model, ScoredEffectSet { margins, ..scored }))
@@ -139,14 +145,17 @@ impl<'a> Analysis<'a> {
         let mut model = self.first_model();
         let mut scored = search(&model, starts, fitted, MOST_AT_FIRST);
         trace_scored("first", &scored);
+        self.progress.reached(progress::ROUNDS.start);
         if self.library.allows_read_off(ReadOff::ReferenceSpectrum) {
             (model, scored) = try_smoothing(model, scored, starts, fitted);
         }
+        let rounds = self.progress.part(&progress::ROUNDS);
         for round in 0..ROUNDS {
             model = with_updated_noise(&model, &scored, digital, self.library);
             let before = scored.fit.set.clone();
             scored = search(&model, std::slice::from_ref(&before), fitted, MOST);
             trace_scored(&format!("round {round}"), &scored);
+            rounds.one_of(round, ROUNDS).reached(1.0);
             if names(&before) == names(&scored.fit.set) {
                 break;
             }

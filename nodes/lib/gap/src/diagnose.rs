@@ -14,6 +14,7 @@ use crate::error::GapError;
 use crate::evidence::Evidence;
 use crate::findings::Findings;
 use crate::library::Library;
+use crate::progress::{ANALYSIS, PREPARATION, Progress};
 use crate::record::PlacementRecord;
 use crate::session::Session;
 use crate::together::analysed;
@@ -27,6 +28,8 @@ pub struct DiagnoseOptions {
     pub excluded: Vec<EffectKind>,
     /// Seed of the noise in comparisons with the noisy simulation.
     pub seed: u64,
+    /// Who is told how far it has come.
+    pub progress: Progress,
 }
 
 /// A placement's answer.
@@ -72,7 +75,8 @@ pub fn diagnose_together<'r>(
     let library = Library::without(&options.excluded);
     let (cut, jumps) = in_parts(recordings);
     let (mut sessions, mut kept, mut errors) = (Vec::new(), Vec::new(), Vec::new());
-    for part in &cut {
+    let preparing = options.progress.part(&PREPARATION);
+    for (index, part) in cut.iter().enumerate() {
         match Session::new(&part.record, &library, None) {
             Ok(session) => {
                 sessions.push(session);
@@ -80,6 +84,7 @@ pub fn diagnose_together<'r>(
             }
             Err(error) => errors.push((part.recording, error)),
         }
+        preparing.one_of(index, cut.len()).reached(1.0);
     }
     if sessions.is_empty() {
         return Err(errors.swap_remove(0));
@@ -92,7 +97,7 @@ pub fn diagnose_together<'r>(
         }
     }
     let names: Vec<&str> = kept.iter().map(|part| part.name.as_str()).collect();
-    let mut answer = answer(&sessions, &names, &library, options.seed);
+    let mut answer = answer(&sessions, &names, &library, options);
     if !jumps.is_empty() {
         let verdict = &answer.diagnosis.verdict;
         answer.diagnosis.verdict = format!("{}; {verdict}", jumps_in_words(&jumps));
@@ -161,19 +166,21 @@ fn answer(
     sessions: &[Session],
     recordings: &[&str],
     library: &Library,
-    seed: u64,
+    options: &DiagnoseOptions,
 ) -> PlacementAnswer {
-    let findings = analysed(sessions, library);
+    let findings = analysed(sessions, library, &options.progress.part(&ANALYSIS));
     for one in &findings {
         trace(|| eprintln!("{}: {:?}", one.model.prepared.name, names(&one.reportable)));
     }
-    let builder = DiagnosisBuilder::new(&findings, sessions, seed);
+    let builder = DiagnosisBuilder::new(&findings, sessions, options.seed);
     let unexplained = builder.unexplained_errors();
-    PlacementAnswer {
+    let answer = PlacementAnswer {
         diagnosis: builder.diagnosis(recordings),
         effects: simulated_effects(&findings, &unexplained),
         evidence: builder.evidence(recordings),
-    }
+    };
+    options.progress.reached(1.0);
+    answer
 }
 
 /// What a simulation of the device takes: the named effects of the last recording (and those of the

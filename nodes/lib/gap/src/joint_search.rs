@@ -10,6 +10,7 @@ use crate::gauss_newton::fit_together;
 use crate::plausibility::is_sound;
 use crate::policy::price::LEAST_SHARE;
 use crate::policy::search::{FIT_STEPS, MOST_RISE};
+use crate::progress::Progress;
 use crate::search::{ScoredEffectSet, excess, price_of_effect, rises};
 use crate::trace::{names, trace};
 
@@ -41,6 +42,7 @@ struct JointSearch<'j, 'a> {
 pub(crate) fn search_together(
     models: &[FitModel],
     found: &[ScoredEffectSet],
+    progress: &Progress,
 ) -> Vec<ScoredEffectSet> {
     let search = JointSearch {
         models: models.iter().collect(),
@@ -58,7 +60,9 @@ pub(crate) fn search_together(
     };
     let mut devices: Vec<EffectSet> = vec![of_device_in_any(found)];
     let (mut best, mut margins) = pruned_with(&devices[0]);
-    for found in found {
+    let steps = found.len() + 2;
+    progress.one_of(0, steps).reached(1.0);
+    for (index, found) in found.iter().enumerate() {
         let alone = owned_by(Owner::Device, &found.fit.set);
         if devices.iter().all(|other| names(other) != names(&alone)) {
             let other = pruned_with(&alone);
@@ -67,10 +71,12 @@ pub(crate) fn search_together(
             }
             devices.push(alone);
         }
+        progress.one_of(index + 1, steps).reached(1.0);
     }
     if let Some(better) = search.with_effects_of_other_sessions(&best) {
         (best, margins) = search.pruned(better);
     }
+    progress.reached(1.0);
     let with_margins = |(session, fit): (usize, Fit)| ScoredEffectSet {
         fit,
         score: best.score,

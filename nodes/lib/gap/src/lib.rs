@@ -35,6 +35,7 @@ mod plausibility;
 mod policy;
 mod prepared;
 mod probability;
+mod progress;
 mod record;
 mod reference_jumps;
 mod reference_tracks;
@@ -65,4 +66,5 @@ pub use diagnosis::{
 };
 pub use error::GapError;
 pub use evidence::{CoursePoint, Evidence, Spectra};
+pub use progress::Progress;
 pub use record::{MeasuredImu, PlacementRecord, PoseSeries};

@@ -10,29 +10,47 @@ use crate::gauss_newton::fit_together;
 use crate::joint_search::{owned_by, search_together};
 use crate::library::{Library, without_all};
 use crate::policy::search::FIT_STEPS;
+use crate::progress::{ALONE, JUDGEMENT, Progress, SEARCH, TOGETHER};
 use crate::screen::sharpen_change_point;
 use crate::session::Session;
 use crate::unknown::{Suspects, detect_unmodelled_structure};
 
 /// What was found in each recording.
-pub(crate) fn analysed<'a>(sessions: &'a [Session], library: &'a Library) -> Vec<Findings<'a>> {
+pub(crate) fn analysed<'a>(
+    sessions: &'a [Session],
+    library: &'a Library,
+    progress: &Progress,
+) -> Vec<Findings<'a>> {
+    let searching = progress.part(&SEARCH);
+    let alone = if sessions.len() == 1 {
+        searching.clone()
+    } else {
+        searching.part(&ALONE)
+    };
     let analyses: Vec<Analysis<'a>> = sessions
         .iter()
-        .map(|session| Analysis { session, library })
+        .enumerate()
+        .map(|(index, session)| Analysis {
+            session,
+            library,
+            progress: alone.one_of(index, sessions.len()),
+        })
         .collect();
     let (models, found): (Vec<_>, Vec<_>) = analyses.iter().map(Analysis::best_set).unzip();
-    let best = search_together(&models, &found);
+    let best = search_together(&models, &found, &searching.part(&TOGETHER));
     let mut findings: Vec<Findings> = analyses
         .iter()
         .zip(models.into_iter().zip(best))
         .map(|(analysis, (model, scored))| analysis.findings(model, scored))
         .collect();
     agree_on_device(&mut findings);
-    judge_rest(&mut findings);
+    judge_rest(&mut findings, &progress.part(&JUDGEMENT));
     if let [alone] = findings.as_mut_slice() {
         refit_beside_unknown(alone);
     }
+    progress.reached(JUDGEMENT.end);
     keep_calibrations(&mut findings);
+    progress.reached(1.0);
     findings
 }
 
@@ -80,8 +98,9 @@ fn median_effect(effects: &[Effect]) -> Option<Effect> {
 
 /// Looks for what no named effect explains, and takes out what only passes for it. Half of the
 /// recordings have to show it.
-fn judge_rest(findings: &mut [Findings]) {
-    for suspects in [Suspects::Others, Suspects::All] {
+fn judge_rest(findings: &mut [Findings], progress: &Progress) {
+    let passes = [Suspects::Others, Suspects::All];
+    for (index, suspects) in passes.into_iter().enumerate() {
         for one in findings.iter_mut() {
             one.unknown = detect_unmodelled_structure(one, suspects);
         }
@@ -91,6 +110,7 @@ fn judge_rest(findings: &mut [Findings]) {
             return;
         }
         remove_confounded_effects(findings);
+        progress.one_of(index, passes.len()).reached(1.0);
     }
 }
 

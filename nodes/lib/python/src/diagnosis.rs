@@ -128,6 +128,7 @@ pub fn diagnose(
     let options = DiagnoseOptions {
         excluded: excluded.collect::<PyResult<_>>()?,
         seed,
+        ..DiagnoseOptions::default()
     };
     let records: Vec<PlacementRecord> = records.iter().map(|one| one.record.clone()).collect();
     py.detach(|| {
