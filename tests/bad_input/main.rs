@@ -8,8 +8,10 @@ mod diagnoses;
 mod nodes;
 mod slips;
 
+use std::collections::BTreeSet;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 use common::cromosim_in;
 
@@ -30,12 +32,59 @@ fn refuses(folder: &Path, arguments: &[&str], expected: &[&str]) {
             "{arguments:?}: '{part}' is not in: {error}"
         );
     }
-    assert!(!error.contains("panicked"), "{error}");
+    names_no_internals(&error);
     assert_eq!(
         listing(folder),
         before,
         "{arguments:?} left something behind"
     );
+}
+
+/// Users know no types, functions or modules of the source.
+fn names_no_internals(error: &str) {
+    for internal in [
+        "panicked", "::", "struct ", "enum ", "unwrap", "Some(", "Err(",
+    ] {
+        assert!(!error.contains(internal), "'{internal}' in: {error}");
+    }
+    let mut words = error.split(|letter: char| !letter.is_alphanumeric() && letter != '_');
+    let type_name = words.find(|word| types_of_the_source().contains(*word));
+    assert_eq!(type_name, None, "{error}");
+}
+
+/// Types of more than one word, which no message means otherwise.
+fn types_of_the_source() -> &'static BTreeSet<String> {
+    static TYPES: LazyLock<BTreeSet<String>> = LazyLock::new(|| {
+        let has_words = |name: &str| name.chars().skip(1).any(char::is_uppercase);
+        let mut types = BTreeSet::new();
+        for file in sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("nodes")) {
+            let text = fs::read_to_string(file).unwrap();
+            let after = |word: &'static str| text.split(word).skip(1);
+            types.extend(
+                after("struct ")
+                    .chain(after("enum "))
+                    .filter_map(|rest| rest.split(|letter: char| !letter.is_alphanumeric()).next())
+                    .filter(|name| name.starts_with(char::is_uppercase) && has_words(name))
+                    .map(str::to_owned),
+            );
+        }
+        assert!(types.contains("PlacementRecord"));
+        types
+    });
+    &TYPES
+}
+
+fn sources(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            found.extend(sources(&path));
+        } else if path.extension().is_some_and(|ending| ending == "rs") {
+            found.push(path);
+        }
+    }
+    found
 }
 
 fn listing(folder: &Path) -> Vec<String> {

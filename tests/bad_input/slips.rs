@@ -141,3 +141,45 @@ fn the_nearest_name_is_offered_for_what_files_hold() {
     ];
     refuses(here, &rate, &["did you mean 'rate'?"]);
 }
+
+#[test]
+fn what_a_file_should_hold_is_said_in_words_of_the_user() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    fs::write(here.join("number.yaml"), "5\n").unwrap();
+    fs::write(here.join("walk.bvh"), TINY_BVH).unwrap();
+    let set = "schema: cromosim/placements/1\nplacements: {wrist: 5}\n";
+    fs::write(here.join("wrist.yaml"), set).unwrap();
+    succeed(
+        here,
+        &[
+            "simulate",
+            "--walk",
+            "--duration",
+            "2",
+            "--out",
+            "walk.mcap",
+        ],
+    );
+    let simulate = ["simulate", "--walk", "--out", "out"];
+    let file = "number.yaml";
+    for (command, options) in [
+        (&simulate[..], &["--placements", file][..]),
+        (&simulate, &["--placements", "wrist.yaml"]),
+        (&simulate, &["--device", file]),
+        (&simulate, &["--mapping", file]),
+        (&simulate, &["--draw", file, "--format", "parquet"]),
+        (
+            &["simulate", "--reference", "walk.mcap", "--out", "out.mcap"],
+            &["--effects", file],
+        ),
+        (
+            &["diagnose", "walk.mcap", "--out", "out"],
+            &["--config", file],
+        ),
+        (&["inspect", "walk.bvh"], &["--skeleton-map", file]),
+    ] {
+        let arguments = [command, options].concat();
+        refuses(here, &arguments, &[options[1], "expected a map of fields"]);
+    }
+}

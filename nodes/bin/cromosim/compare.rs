@@ -4,12 +4,13 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, anyhow, bail, ensure};
 use clap::Args;
 use cromosim_bag::BagReader;
 use cromosim_gap::{Diagnosis, SCHEMA};
 use cromosim_recording::compare::{compare_diagnoses, compare_recordings};
 use cromosim_recording::open_recording;
+use cromosim_spatial::in_plain_words;
 
 use crate::files::{refuse_existing, write_whole};
 use crate::output::{print, say};
@@ -119,8 +120,13 @@ fn open(path: &Path, namespace: Option<&str>) -> anyhow::Result<Side> {
 fn read_diagnosis(path: &Path) -> anyhow::Result<Side> {
     let text = cromosim_spatial::read_text(path)
         .with_context(|| format!("{}: cannot be read", path.display()))?;
-    let diagnosis: Diagnosis =
-        serde_json::from_str(&text).with_context(|| format!("{}: no diagnosis", path.display()))?;
+    let diagnosis: Diagnosis = serde_json::from_str(&text).map_err(|error| {
+        anyhow!(
+            "{}: no diagnosis: {}",
+            path.display(),
+            in_plain_words(error)
+        )
+    })?;
     ensure!(
         diagnosis.schema == SCHEMA,
         "{}: expected the schema '{SCHEMA}', found '{}'",

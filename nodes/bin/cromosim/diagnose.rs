@@ -13,7 +13,7 @@ use cromosim_gap::{
     Progress, SCHEMA,
 };
 use cromosim_imu::{EffectKind, EffectsFile};
-use cromosim_spatial::{meant, with_nearest};
+use cromosim_spatial::{in_plain_words, meant};
 use rayon::prelude::*;
 use serde::Deserialize;
 use serde_json::Value;
@@ -249,7 +249,7 @@ impl Config {
     fn read(file: &Path) -> anyhow::Result<Self> {
         let text = cromosim_spatial::read_text(file)
             .with_context(|| format!("{}: cannot be read", file.display()))?;
-        Self::parse(&text).map_err(|error| anyhow!("{}: {}", file.display(), with_nearest(error)))
+        Self::parse(&text).map_err(|error| anyhow!("{}: {}", file.display(), in_plain_words(error)))
     }
 
     /// An empty file sets nothing.

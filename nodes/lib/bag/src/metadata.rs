@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use cromosim_spatial::in_plain_words;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{BagError, io_error};
@@ -186,7 +187,7 @@ pub(crate) fn files_of(directory: &Path) -> Result<Listed, BagError> {
         Err(error) => {
             return Err(BagError::Metadata {
                 path,
-                reason: error.to_string(),
+                reason: in_plain_words(error),
             });
         }
     };

@@ -1,6 +1,5 @@
 //! What can go wrong.
 
-use cromosim_spatial::with_nearest;
 use std::io;
 use std::path::PathBuf;
 
@@ -51,12 +50,12 @@ pub enum EvaluationError {
     #[error("results")]
     Json(#[source] serde_json::Error),
     /// A file that is not YAML, or has wrong or unknown fields.
-    #[error("{file}: {}", with_nearest(source))]
+    #[error("{file}: {problem}")]
     Yaml {
         /// The file's name.
         file: String,
         /// The reason, with line and column.
-        source: serde_norway::Error,
+        problem: String,
     },
     /// A file of another kind or version.
     #[error("{file}: schema: expected `{expected}`, found `{found}`")]

@@ -2,7 +2,7 @@
 //! from. What is drawn, and how, is what trainings ([`cromosim_learned::WearerRanges`]) and the
 //! evaluation of activities draw.
 
-use cromosim_spatial::meant;
+use cromosim_spatial::{in_plain_words, meant};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -74,9 +74,9 @@ impl SimulationDraws {
     /// # Errors
     /// What is wrong in it.
     pub fn parse(text: &str, path: &Path) -> Result<Self, EvaluationError> {
-        let draws: Self = serde_norway::from_str(text).map_err(|source| EvaluationError::Yaml {
+        let draws: Self = serde_norway::from_str(text).map_err(|error| EvaluationError::Yaml {
             file: path.display().to_string(),
-            source,
+            problem: in_plain_words(error),
         })?;
         let wrong = |field: &str, problem: String| EvaluationError::Draws {
             path: path.to_owned(),

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use cromosim_spatial::in_plain_words;
 use serde::Deserialize;
 
 use crate::effects::{RawUnexplained, number, write_effects, write_unexplained};
@@ -143,9 +144,9 @@ impl Device {
     /// [`ImuError::Yaml`], [`ImuError::Schema`], [`ImuError::DeviceNumber`],
     /// [`ImuError::ReferenceEffect`].
     pub fn parse(text: &str, file: &str) -> Result<Self, ImuError> {
-        let raw: RawDevice = serde_norway::from_str(text).map_err(|source| ImuError::Yaml {
+        let raw: RawDevice = serde_norway::from_str(text).map_err(|error| ImuError::Yaml {
             file: file.to_owned(),
-            source,
+            problem: in_plain_words(error),
         })?;
         if raw.schema != SCHEMA {
             return Err(ImuError::Schema {

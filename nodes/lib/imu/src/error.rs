@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use cromosim_body::BodyError;
 use cromosim_spatial::plausible::Oddity;
-use cromosim_spatial::{SpatialError, Stamp, meant, with_nearest};
+use cromosim_spatial::{SpatialError, Stamp, meant};
 use thiserror::Error;
 
 /// Errors of this crate.
@@ -19,12 +19,12 @@ pub enum ImuError {
         source: std::io::Error,
     },
     /// A file that is not YAML, or has wrong or unknown fields.
-    #[error("{file}: {}", with_nearest(source))]
+    #[error("{file}: {problem}")]
     Yaml {
         /// The file's name.
         file: String,
         /// Why, with line and column.
-        source: serde_norway::Error,
+        problem: String,
     },
     /// A bandwidth that the frames do not resolve.
     #[error(

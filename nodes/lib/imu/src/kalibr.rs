@@ -1,5 +1,6 @@
 //! Kalibr's imu.yaml: white noise and bias walk of both channels.
 
+use cromosim_spatial::in_plain_words;
 use serde_norway::{Mapping, Value};
 
 use crate::effects::number;
@@ -35,9 +36,9 @@ impl KalibrNoise {
     /// # Errors
     /// [`ImuError::Yaml`], and [`ImuError::Kalibr`] for what is missing or no number.
     pub fn parse(text: &str, file: &str) -> Result<Self, ImuError> {
-        let content: Mapping = serde_norway::from_str(text).map_err(|source| ImuError::Yaml {
+        let content: Mapping = serde_norway::from_str(text).map_err(|error| ImuError::Yaml {
             file: file.to_owned(),
-            source,
+            problem: in_plain_words(error),
         })?;
         let nested = content.get(NESTED).and_then(Value::as_mapping);
         let (content, place) = nested.map_or((&content, ""), |own| (own, "imu0: "));

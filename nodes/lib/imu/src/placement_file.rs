@@ -1,6 +1,6 @@
 //! Files of placements.
 
-use cromosim_spatial::with_nearest;
+use cromosim_spatial::in_plain_words;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -53,9 +53,9 @@ impl PlacementSet {
     /// [`ImuError::Yaml`], [`ImuError::Schema`] or [`ImuError::Placement`], naming file, placement
     /// and field.
     pub fn parse(text: &str, file: &str) -> Result<Self, ImuError> {
-        let raw: RawFile = serde_norway::from_str(text).map_err(|source| ImuError::Yaml {
+        let raw: RawFile = serde_norway::from_str(text).map_err(|error| ImuError::Yaml {
             file: file.to_owned(),
-            source,
+            problem: in_plain_words(error),
         })?;
         if raw.schema != SCHEMA {
             return Err(ImuError::Schema {
@@ -250,7 +250,7 @@ fn malformed(error: &serde_norway::Error) -> (&'static str, PlacementProblem) {
     (
         "fields",
         PlacementProblem::Malformed {
-            message: with_nearest(error),
+            message: in_plain_words(error),
         },
     )
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use cromosim_body::BodyError;
 use cromosim_imu::{EffectError, ImuError};
-use cromosim_spatial::{SpatialError, meant, with_nearest};
+use cromosim_spatial::{SpatialError, meant};
 
 /// Errors of this crate; the message names the file, the place and what to do.
 #[derive(Debug, thiserror::Error)]
@@ -154,12 +154,12 @@ pub enum LearnedError {
         value: f32,
     },
     /// A file that is not YAML, or has wrong or unknown fields.
-    #[error("{file}: {}", with_nearest(source))]
+    #[error("{file}: {problem}")]
     Yaml {
         /// The file's name.
         file: String,
         /// Why, with line and column.
-        source: serde_norway::Error,
+        problem: String,
     },
     /// A file of another kind or version.
     #[error("{file}: schema: expected `{expected}`, found `{found}`")]

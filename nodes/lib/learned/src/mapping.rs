@@ -11,6 +11,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use cromosim_imu::{Reading, ReadingMapping};
+use cromosim_spatial::in_plain_words;
 use serde::Deserialize;
 
 use crate::LearnedError;
@@ -231,9 +232,9 @@ impl MappingFile {
     /// # Errors
     /// [`LearnedError::Yaml`], [`LearnedError::Schema`], [`LearnedError::Knots`].
     pub fn parse(text: &str, file: &str) -> Result<Self, LearnedError> {
-        let raw: RawFile = serde_norway::from_str(text).map_err(|source| LearnedError::Yaml {
+        let raw: RawFile = serde_norway::from_str(text).map_err(|error| LearnedError::Yaml {
             file: file.to_owned(),
-            source,
+            problem: in_plain_words(error),
         })?;
         if raw.schema != SCHEMA {
             return Err(LearnedError::Schema {

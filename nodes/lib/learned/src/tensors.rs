@@ -8,6 +8,7 @@ use std::fs::{self, File};
 use std::io::{Read, Write};
 use std::path::Path;
 
+use cromosim_spatial::in_plain_words;
 use safetensors::tensor::{Dtype, TensorView};
 use safetensors::{SafeTensorError, SafeTensors, serialize};
 use serde::Serialize;
@@ -131,7 +132,7 @@ impl<'a> TensorFile<'a> {
         let text = self.metadata.get(key).ok_or_else(|| {
             wrong("missing, so that it is unknown what the tensors are".to_owned())
         })?;
-        serde_json::from_str(text).map_err(|error| wrong(error.to_string()))
+        serde_json::from_str(text).map_err(|error| wrong(in_plain_words(error)))
     }
 
     /// Refuses tensors that nobody asks for, the first by name.

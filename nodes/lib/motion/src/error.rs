@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use cromosim_arrays::ArraysError;
 use cromosim_body::BodyError;
+use cromosim_spatial::meant;
 use cromosim_spatial::plausible::Oddity;
-use cromosim_spatial::{meant, with_nearest};
 
 /// An error of this crate: one line that names the file, the place and what to do.
 #[derive(Debug, thiserror::Error)]
@@ -226,20 +226,20 @@ pub enum MotionError {
         known: Vec<String>,
     },
     /// A skeleton map cannot be parsed.
-    #[error("{origin}: not a skeleton map: {}", with_nearest(source))]
+    #[error("{origin}: not a skeleton map: {problem}")]
     MapSyntax {
         /// The map's file.
         origin: String,
         /// The reason, with its line.
-        source: serde_norway::Error,
+        problem: String,
     },
     /// A marker set cannot be parsed.
-    #[error("{origin}: not a marker set: {}", with_nearest(source))]
+    #[error("{origin}: not a marker set: {problem}")]
     MarkerSetSyntax {
         /// The set's file.
         origin: String,
         /// The reason, with its line.
-        source: serde_norway::Error,
+        problem: String,
     },
     /// A skeleton map or a marker set contradicts itself.
     #[error("{origin}: key {key}: {problem}")]

@@ -4,6 +4,7 @@
 use std::fmt::Write;
 
 use cromosim_body::{JOINT_COUNT, Joint};
+use cromosim_spatial::in_plain_words;
 use nalgebra::Vector3;
 
 use crate::skeleton_map::INDISPENSABLE;
@@ -51,9 +52,9 @@ impl SkeletonDraft {
 
 /// A text as YAML's scalar.
 fn scalar(text: &str) -> Result<String, MotionError> {
-    let yaml = serde_norway::to_string(text).map_err(|source| MotionError::MapSyntax {
+    let yaml = serde_norway::to_string(text).map_err(|error| MotionError::MapSyntax {
         origin: text.to_owned(),
-        source,
+        problem: in_plain_words(error),
     })?;
     Ok(yaml.trim_end().to_owned())
 }

@@ -1,6 +1,6 @@
 //! Which joint of a source is which joint of SMPL: data, one YAML file a skeleton.
 
-use cromosim_spatial::meant;
+use cromosim_spatial::{in_plain_words, meant};
 use std::collections::BTreeMap;
 
 use cromosim_body::{JOINT_COUNT, Joint};
@@ -140,11 +140,10 @@ impl SkeletonMap {
     /// # Errors
     /// [`MotionError::MapSyntax`] and [`MotionError::MapContent`].
     pub fn from_yaml(yaml: &str, origin: &str) -> Result<Self, MotionError> {
-        let raw: RawMap =
-            serde_norway::from_str(yaml).map_err(|source| MotionError::MapSyntax {
-                origin: origin.to_owned(),
-                source,
-            })?;
+        let raw: RawMap = serde_norway::from_str(yaml).map_err(|error| MotionError::MapSyntax {
+            origin: origin.to_owned(),
+            problem: in_plain_words(error),
+        })?;
         let content = |key: String, problem: &str| MotionError::MapContent {
             origin: origin.to_owned(),
             key,

@@ -1,6 +1,6 @@
 //! Motions, on the body that they were read for.
 
-use cromosim_spatial::with_nearest;
+use cromosim_spatial::in_plain_words;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -41,7 +41,7 @@ pub fn read_motion(
     options: &str,
 ) -> PyResult<Motion> {
     let options: MotionOptions = serde_json::from_str(options)
-        .map_err(|error| raise(format!("read_motion: {}", with_nearest(error))))?;
+        .map_err(|error| raise(format!("read_motion: {}", in_plain_words(error))))?;
     py.detach(|| {
         let model = model(body.as_deref())?;
         let whole = MotionOptions {

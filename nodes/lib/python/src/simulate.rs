@@ -1,6 +1,6 @@
 //! Virtual IMUs of a person, and of a rigid body.
 
-use cromosim_spatial::with_nearest;
+use cromosim_spatial::in_plain_words;
 use std::path::Path;
 use std::str::FromStr;
 
@@ -45,7 +45,7 @@ impl Options {
     /// Parses JSON.
     pub fn parse(text: &str) -> PyResult<SimulationOptions> {
         let options: Self = serde_json::from_str(text)
-            .map_err(|error| raise(format!("simulate: {}", with_nearest(error))))?;
+            .map_err(|error| raise(format!("simulate: {}", in_plain_words(error))))?;
         let scheme = options.scheme.as_deref().map(Scheme::from_str).transpose();
         let scheme = scheme.map_err(|error| raise(format!("scheme: {error}")))?;
         let differentiation = match (scheme, options.bandwidth_hz) {

@@ -88,7 +88,7 @@ pub use frame_grid::FrameGrid;
 pub use golden::greatest_near;
 pub use grid::{check_times, relative_seconds, uniform_stamps};
 pub use influence::{Influence, SampleWeights};
-pub use nearest_name::{meant, nearest_name, with_nearest};
+pub use nearest_name::{in_plain_words, meant, nearest_name};
 pub use pose_series::PoseSeries;
 pub use pose_spline::{
     Bandwidth, Motion, MotionEstimate, PoseAdaptation, PoseSmoothing, PoseSource, PoseSpline,

@@ -23,12 +23,42 @@ pub fn meant<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String
     }
 }
 
-/// What a parser of serde's says, with the nearest of the names that it expected where it found an
-/// unknown field or variant.
-pub fn with_nearest(problem: impl Display) -> String {
-    let problem = problem.to_string();
+/// What a parser of serde's says, without the names of types that only the source knows, and with the
+/// nearest of the names that it expected where it found an unknown field or variant.
+pub fn in_plain_words(problem: impl Display) -> String {
+    let problem = without_types(&problem.to_string());
     let nearest = meant_by_serde(&problem).unwrap_or_default();
     problem + &nearest
+}
+
+/// What serde calls types, and what users write for them.
+const TYPES: [(&str, &str); 7] = [
+    (", expected struct ", ", expected a map of fields"),
+    (", expected tuple struct ", ", expected a list"),
+    (", expected unit struct ", ", expected nothing"),
+    (", expected newtype struct ", ", expected a value"),
+    (", expected enum ", ", expected a name"),
+    (
+        ", expected internally tagged enum ",
+        ", expected a map of fields",
+    ),
+    (
+        "data did not match any variant of untagged enum ",
+        "none of the forms that this may have",
+    ),
+];
+
+/// Of "invalid type: integer `5`, expected struct RawFile at line 1 column 1".
+fn without_types(problem: &str) -> String {
+    let found = TYPES
+        .iter()
+        .find_map(|(internal, plain)| Some((problem.split_once(internal)?, plain)));
+    let Some(((before, after), plain)) = found else {
+        return problem.to_owned();
+    };
+    let is_of_name = |letter: char| letter.is_alphanumeric() || letter == '_';
+    let rest = after.trim_start_matches(is_of_name);
+    format!("{before}{plain}{rest}")
 }
 
 /// Of "unknown field `given`, expected one of `this`, `that` at line 3 column 1".
@@ -58,6 +88,39 @@ mod tests {
     }
 
     #[test]
+    fn types_of_the_source_are_not_named() {
+        #[derive(Debug, serde::Deserialize)]
+        struct RawFile {
+            #[serde(rename = "point")]
+            _point: Option<RawPoint>,
+            #[serde(rename = "either")]
+            _either: Option<RawEither>,
+        }
+        #[derive(Debug, serde::Deserialize)]
+        #[expect(dead_code, reason = "only parsed")]
+        struct RawPoint(f64, f64);
+        #[derive(Debug, serde::Deserialize)]
+        #[serde(untagged)]
+        #[expect(dead_code, reason = "only parsed")]
+        enum RawEither {
+            Number(f64),
+        }
+        for (text, said) in [
+            ("5", "invalid type: integer `5`, expected a map of fields"),
+            ("point: x", "expected a list"),
+            ("point: [1.0]", "expected a list with 2 elements"),
+            ("either: x", "none of the forms that this may have"),
+        ] {
+            let problem = serde_norway::from_str::<RawFile>(text).expect_err("a slip");
+            let problem = in_plain_words(problem);
+            assert!(
+                problem.contains(said) && !problem.contains("Raw"),
+                "{problem}"
+            );
+        }
+    }
+
+    #[test]
     fn what_serde_expects_is_read_from_its_message() {
         #[derive(Debug, serde::Deserialize)]
         #[serde(deny_unknown_fields)]
@@ -74,7 +137,7 @@ mod tests {
             Adaptive,
         }
         let problem = |text: &str| {
-            with_nearest(serde_norway::from_str::<Settings>(text).expect_err("a slip"))
+            in_plain_words(serde_norway::from_str::<Settings>(text).expect_err("a slip"))
         };
         for (text, nearest) in [
             ("rate_khz: 1", "; the nearest is rate_hz"),

@@ -29,12 +29,12 @@ pub enum VideoError {
         limit: u64,
     },
     /// Keypoints that are no JSON of OpenPose.
-    #[error("{name}: not OpenPose keypoints: {source}")]
+    #[error("{name}: not OpenPose keypoints: {problem}")]
     Json {
         /// The file.
         name: String,
         /// The reason, with line and column.
-        source: serde_json::Error,
+        problem: String,
     },
     /// A person's keypoints are not those of BODY_25.
     #[error(

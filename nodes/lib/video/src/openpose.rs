@@ -1,5 +1,6 @@
 //! OpenPose's `*_keypoints.json`.
 
+use cromosim_spatial::in_plain_words;
 use serde::Deserialize;
 
 use crate::error::VideoError;
@@ -35,9 +36,9 @@ pub fn parse_openpose(bytes: &[u8], name: &str) -> Result<Vec<PersonKeypoints>, 
             limit: MAX_BYTES as u64,
         });
     }
-    let file: File = serde_json::from_slice(bytes).map_err(|source| VideoError::Json {
+    let file: File = serde_json::from_slice(bytes).map_err(|error| VideoError::Json {
         name: name.to_owned(),
-        source,
+        problem: in_plain_words(error),
     })?;
     file.people
         .iter()

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::EvaluationError;
+use cromosim_spatial::in_plain_words;
 
 /// The classes that the virtual side knows, in their order.
 pub const FIVE: [&str; 5] = [
@@ -45,9 +46,9 @@ impl Activities {
             source,
         })?;
         let names: BTreeMap<String, String> =
-            serde_norway::from_str(&text).map_err(|source| EvaluationError::Yaml {
+            serde_norway::from_str(&text).map_err(|error| EvaluationError::Yaml {
                 file: path.display().to_string(),
-                source,
+                problem: in_plain_words(error),
             })?;
         let map = Self::from_names(names.into_iter());
         if !(2..=100).contains(&map.classes.len()) {

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use cromosim_spatial::in_plain_words;
 use serde::Deserialize;
 
 use super::rigid::RigidStudy;
@@ -83,9 +84,9 @@ impl Protocol {
 
     fn parse(text: &str, file: &str) -> Result<Self, EvaluationError> {
         let protocol: Self =
-            serde_norway::from_str(text).map_err(|source| EvaluationError::Yaml {
+            serde_norway::from_str(text).map_err(|error| EvaluationError::Yaml {
                 file: file.to_owned(),
-                source,
+                problem: in_plain_words(error),
             })?;
         if protocol.schema != SCHEMA {
             return Err(EvaluationError::Schema {

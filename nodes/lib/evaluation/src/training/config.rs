@@ -4,6 +4,7 @@ use std::path::Path;
 
 use cromosim_learned::train::{Loss, Schedule, TrainOptions};
 use cromosim_learned::{Direction, Input, NetworkShape, Turns};
+use cromosim_spatial::in_plain_words;
 use serde::Deserialize;
 
 use super::engine::EngineChoice;
@@ -73,9 +74,9 @@ impl TrainingConfig {
             source,
         })?;
         let config: Self =
-            serde_norway::from_str(&text).map_err(|source| EvaluationError::Yaml {
+            serde_norway::from_str(&text).map_err(|error| EvaluationError::Yaml {
                 file: file(),
-                source,
+                problem: in_plain_words(error),
             })?;
         if config.schema != SCHEMA {
             return Err(EvaluationError::Schema {

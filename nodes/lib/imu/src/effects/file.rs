@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::{self, Write};
 use std::path::Path;
 
-use cromosim_spatial::Stamp;
+use cromosim_spatial::{Stamp, in_plain_words};
 use serde::de::{self, Visitor};
 use serde::{Deserialize, Deserializer};
 
@@ -184,9 +184,9 @@ impl EffectsFile {
     /// [`ImuError::Yaml`] naming placement, effect and field, [`ImuError::Schema`],
     /// [`ImuError::DeviceNumber`].
     pub fn parse(text: &str, file: &str) -> Result<Self, ImuError> {
-        let raw: RawFile = serde_norway::from_str(text).map_err(|source| ImuError::Yaml {
+        let raw: RawFile = serde_norway::from_str(text).map_err(|error| ImuError::Yaml {
             file: file.to_owned(),
-            source,
+            problem: in_plain_words(error),
         })?;
         if raw.schema != SCHEMA {
             return Err(ImuError::Schema {

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use cromosim_body::{BodyModel, Joint, Site};
+use cromosim_spatial::in_plain_words;
 use nalgebra::Vector3;
 use serde::Deserialize;
 
@@ -110,9 +111,9 @@ impl MarkerSet {
     /// [`MotionError::MarkerSetSyntax`] and [`MotionError::MapContent`].
     pub fn from_yaml(yaml: &str, origin: &str) -> Result<Self, MotionError> {
         let raw: RawSet =
-            serde_norway::from_str(yaml).map_err(|source| MotionError::MarkerSetSyntax {
+            serde_norway::from_str(yaml).map_err(|error| MotionError::MarkerSetSyntax {
                 origin: origin.to_owned(),
-                source,
+                problem: in_plain_words(error),
             })?;
         let content = |key: &str, problem: &str| MotionError::MapContent {
             origin: origin.to_owned(),

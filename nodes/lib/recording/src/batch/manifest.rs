@@ -6,6 +6,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
+use cromosim_spatial::in_plain_words;
 use serde::{Deserialize, Serialize};
 
 use super::Shard;
@@ -111,7 +112,10 @@ impl Manifest {
         })?;
         let damaged = |line: usize, error: &dyn std::fmt::Display| RecordingError::Unsuitable {
             path: path.to_owned(),
-            problem: format!("line {line}: {error}; --force writes all anew"),
+            problem: format!(
+                "line {line}: {}; --force writes all anew",
+                in_plain_words(error)
+            ),
         };
         let mut lines = text.split_inclusive('\n').enumerate();
         let (_, first) = lines.next().unwrap_or_default();

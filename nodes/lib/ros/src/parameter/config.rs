@@ -1,6 +1,6 @@
 //! Parameters from and to a configuration struct.
 
-use cromosim_spatial::with_nearest;
+use cromosim_spatial::in_plain_words;
 use ros2_client::ParameterValue;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -60,7 +60,7 @@ impl Parameters {
             insert_map(&mut root, &name);
         }
         serde_norway::from_value(Value::Mapping(root)).map_err(|error| RosError::Config {
-            problem: one_line(&with_nearest(error)),
+            problem: one_line(&in_plain_words(error)),
         })
     }
 }
