@@ -15,9 +15,8 @@ use cromosim_spatial::Stamp;
 
 use crate::common::succeed;
 use crate::process::{PATIENCE, Process, observer};
-use crate::{node, setting};
+use crate::{is_built, node, seen_bytes, setting};
 
-const NAMES: [&str; 4] = ["smpl_state", "virtual_imu", "gap_monitor", "recorder"];
 /// What a node may grow by from the first quarter of a day on: the allocator's pieces.
 const GROWTH_MB: f64 = 16.0;
 /// The same of minutes, in which queues are still filled for the first time.
@@ -95,7 +94,9 @@ fn write_motion(path: &Path, frames: usize, rate_hz: f64) {
     motion.finish().unwrap();
 }
 
-fn start_nodes(folder: &Path, rate_hz: f64) -> [Process; 4] {
+/// The viewer writes to a file; what it draws of the body is drawn twenty times in all.
+fn start_nodes(folder: &Path, course: &Course) -> Vec<(&'static str, Process)> {
+    let rate_hz = course.rate_hz;
     let placements = format!(
         "schema: cromosim/placements/1\ndefaults: {{rate_hz: {rate_hz}, device: consumer_mems}}\nplacements:\n  head: {{site: forehead}}\n"
     );
@@ -103,30 +104,32 @@ fn start_nodes(folder: &Path, rate_hz: f64) -> [Process; 4] {
 
     let state_rate = format!("state_rate_hz:={rate_hz:?}");
     let gap = format!("gap_seconds:={:?}", 2.5 / rate_hz);
-    let nodes = [
-        node(folder, "smpl_state", &["use_sim_time:=true"]),
-        node(
-            folder,
+    let mesh_rate = format!("mesh_rate_hz:={:?}", 20.0 / course.seconds);
+    let follows = "use_sim_time:=true";
+    // The recorder last: it is also the last to end.
+    let nodes: [(&str, &[&str]); 5] = [
+        ("smpl_state", &[follows]),
+        (
             "virtual_imu",
-            &[
-                "placements:=placements.yaml",
-                &state_rate,
-                &gap,
-                "use_sim_time:=true",
-            ],
+            &["placements:=placements.yaml", &state_rate, &gap, follows],
         ),
-        node(
-            folder,
+        (
             "gap_monitor",
+            // Against itself: what counts here is that it goes on.
             &[
                 "placements:=[head]",
-                // Against itself: what counts here is that it goes on.
                 "simulated_topic:=/imu/{name}/data",
-                "use_sim_time:=true",
+                follows,
             ],
         ),
-        node(folder, "recorder", &["bag_path:=bag", "compression:=zstd"]),
+        ("viewer", &["recording:=seen.rrd", &mesh_rate, follows]),
+        ("recorder", &["bag_path:=bag", "compression:=zstd"]),
     ];
+    let nodes = nodes
+        .into_iter()
+        .filter(|(name, _)| is_built(name))
+        .map(|(name, parameters)| (name, node(folder, name, parameters)))
+        .collect();
     // All that talk to each other have met before the first pose.
     let looking = observer();
     let imus = looking.subscription::<Imu>("/imu/head/data_raw", cromosim_ros::Qos::recorder());
@@ -147,7 +150,7 @@ fn play(folder: &Path, course: &Course) {
     } = course;
     let frames = (seconds * rate_hz) as usize;
     write_motion(&folder.join("motion.mcap"), frames, rate_hz);
-    let nodes = start_nodes(folder, rate_hz);
+    let nodes = start_nodes(folder, course);
     let begun = Instant::now();
     let times = format!("rate:={speed:?}");
     let mut replay = node(
@@ -155,35 +158,42 @@ fn play(folder: &Path, course: &Course) {
         "replay",
         &["bag:=motion.mcap", &times, "clock_rate_hz:=20.0"],
     );
-    let mut memory: Vec<[f64; 5]> = Vec::new();
+    let mut memory: Vec<Vec<f64>> = Vec::new();
     while !replay.has_succeeded() {
-        let mut now = [memory_mb(&replay); 5];
-        for (place, process) in now.iter_mut().zip(&nodes) {
-            *place = memory_mb(process);
-        }
-        now[4] = memory_mb(&replay);
-        memory.push(now);
+        let all = nodes.iter().map(|(_, process)| process).chain([&replay]);
+        memory.push(all.map(memory_mb).collect());
         std::thread::sleep(Duration::from_millis(500));
         let most = Duration::from_secs_f64(10.0 * seconds / speed + 120.0);
         assert!(begun.elapsed() < most, "the replay does not end");
     }
     let took_s = begun.elapsed().as_secs_f64();
     std::thread::sleep(Duration::from_secs(3));
-    // The recorder last.
-    for process in nodes {
+    let mut names = Vec::new();
+    for (name, process) in nodes {
         process.interrupt();
+        names.push(name);
     }
+    names.push("replay");
     println!("{seconds} s in {took_s:.0} s");
-    check_memory(&memory, growth_mb);
+    check_memory(&names, &memory, growth_mb);
     check_bag(folder, frames, rate_hz);
+    if is_built("viewer") {
+        // Curves of each sample, and pictures of the body.
+        let seen = seen_bytes(&folder.join("seen.rrd"));
+        println!("the viewer's file: {seen} bytes");
+        assert!(
+            seen > 40 * frames as u64,
+            "{seen} bytes of {frames} samples"
+        );
+    }
 }
 
 /// From a quarter of the time on nothing grows.
-fn check_memory(memory: &[[f64; 5]], growth_mb: f64) {
+fn check_memory(names: &[&str], memory: &[Vec<f64>], growth_mb: f64) {
     let (first, rest) = memory.split_at(memory.len() / 4);
     let most =
-        |part: &[[f64; 5]], which: usize| part.iter().map(|now| now[which]).fold(0.0, f64::max);
-    for (which, name) in NAMES.into_iter().chain(["replay"]).enumerate() {
+        |part: &[Vec<f64>], which: usize| part.iter().map(|now| now[which]).fold(0.0, f64::max);
+    for (which, name) in names.iter().enumerate() {
         let (before, after) = (most(first, which), most(rest, which));
         println!("{name}: {before:.1} MB in the first quarter, {after:.1} MB after");
         assert!(

@@ -11,20 +11,25 @@ use cromosim_ros::{Node, Qos, Subscription};
 
 use crate::common::succeed;
 use crate::process::{Process, observer};
-use crate::{node, setting};
+use crate::{is_built, node, seen_bytes, setting};
 
 /// A machine with other work is slow; a node that does not come back is not back then either.
 const LONG: Duration = Duration::from_secs(60);
-const NAMES: [&str; 5] = [
+const NAMES: [&str; 6] = [
     "replay",
     "smpl_state",
     "virtual_imu",
     "gap_monitor",
     "recorder",
+    // Last, so that it can be left out.
+    "viewer",
 ];
 /// Of [`NAMES`].
 const RECORDER: usize = 4;
 const MONITOR: usize = 3;
+const VIEWER: usize = 5;
+/// What the viewer has written once it shows bodies and curves.
+const SEEN_BYTES: u64 = 100_000;
 
 /// Random numbers that are the same everywhere (splitmix64).
 struct Random(u64);
@@ -73,13 +78,29 @@ impl Watch {
     }
 }
 
+/// Waits until the viewer's file holds what it shows.
+fn wait_for_pictures(recording: &Path, what: &str) {
+    let begun = Instant::now();
+    while seen_bytes(recording) < SEEN_BYTES {
+        assert!(
+            begun.elapsed() < LONG,
+            "{what}: {} bytes",
+            seen_bytes(recording)
+        );
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    std::fs::remove_file(recording).unwrap();
+}
+
 fn start(folder: &Path, which: usize, bag: &str) -> Process {
+    let recording = format!("recording:={bag}.rrd");
     let bag = format!("bag_path:={bag}");
     let parameters: &[&str] = match which {
         0 => &["loop:=true"],
         2 => &["rate_hz:=50.0"],
         MONITOR => &["placements:=[head]", "simulated_topic:=/imu/{name}/data"],
         RECORDER => &[&bag],
+        VIEWER => &[&recording, "mesh_rate_hz:=1.0"],
         _ => &[],
     };
     node(folder, NAMES[which], parameters)
@@ -104,18 +125,17 @@ fn kill(folder: &Path, times: u64) {
     let watch = Watch::new(&looking);
     let mut random = Random(16);
     let mut bag = "bag0".to_owned();
-    let mut processes: Vec<Process> = (0..NAMES.len())
-        .map(|which| start(folder, which, &bag))
-        .collect();
+    let count = NAMES.iter().filter(|name| is_built(name)).count();
+    let mut processes: Vec<Process> = (0..count).map(|which| start(folder, which, &bag)).collect();
     watch.wait("the beginning", true);
-    let mut order: Vec<usize> = (0..NAMES.len() * times as usize).collect();
+    let mut order: Vec<usize> = (0..count * times as usize).collect();
     for place in (1..order.len()).rev() {
         order.swap(place, random.below(place as u64 + 1) as usize);
     }
     let mut took: Vec<Vec<f64>> = vec![Vec::new(); NAMES.len()];
     let mut kept = 0;
     for (round, number) in order.into_iter().enumerate() {
-        let which = number % NAMES.len();
+        let which = number % count;
         std::thread::sleep(Duration::from_millis(random.below(400)));
         let begun = Instant::now();
         let next = format!("bag{}", round + 1);
@@ -128,13 +148,16 @@ fn kill(folder: &Path, times: u64) {
         processes.insert(which, start(folder, which, &next));
         let what = format!("round {round}, {} killed", NAMES[which]);
         watch.wait(&what, which == MONITOR);
+        if which == VIEWER {
+            wait_for_pictures(&folder.join(format!("{next}.rrd")), &what);
+        }
         took[which].push(begun.elapsed().as_secs_f64());
     }
     for process in processes {
         process.interrupt();
     }
     BagReader::open(&folder.join(&bag)).unwrap();
-    for (name, took) in NAMES.into_iter().zip(&mut took) {
+    for (name, took) in NAMES.into_iter().zip(&mut took).take(count) {
         took.sort_by(f64::total_cmp);
         let (middle, last) = (took[took.len() / 2], took[took.len() - 1]);
         println!(

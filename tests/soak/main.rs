@@ -18,6 +18,16 @@ fn setting(name: &str, default: f64) -> f64 {
     text.map_or(default, |text| text.parse().expect("a number"))
 }
 
+/// Without Rerun there is no viewer.
+fn is_built(name: &str) -> bool {
+    name != "viewer" || cfg!(feature = "view")
+}
+
+/// Bytes of the viewer's file so far.
+fn seen_bytes(recording: &Path) -> u64 {
+    std::fs::metadata(recording).map_or(0, |file| file.len())
+}
+
 /// Starts a node with parameters.
 fn node(folder: &Path, name: &str, parameters: &[&str]) -> Process {
     let mut arguments = vec!["node", name, "--ros-args"];
