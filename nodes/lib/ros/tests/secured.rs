@@ -2,8 +2,9 @@
 #![cfg(feature = "security")]
 #![allow(clippy::unwrap_used)]
 
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use cromosim_msgs::std_msgs::String as Text;
@@ -93,4 +94,85 @@ fn secured_nodes_hear_each_other_and_plain_ones_nothing() {
             );
         },
     );
+}
+
+/// A participant of Fast DDS, which CROMOSIM_FASTDDS_PEER names (tests/interop/fastdds_peer.cpp).
+struct FastDds(Child);
+
+impl FastDds {
+    /// `enclave`: its folder, or - for the clear.
+    fn start(peer: &Path, does: &str, enclave: &Path) -> Self {
+        let mut command = Command::new(peer);
+        command.arg(does).arg(enclave);
+        let streams = command.stdin(Stdio::piped()).stdout(Stdio::piped());
+        Self(streams.spawn().unwrap())
+    }
+
+    /// Ends it; the lengths of the texts that it heard.
+    fn lengths(mut self) -> Vec<usize> {
+        drop(self.0.stdin.take());
+        let lines = BufReader::new(self.0.stdout.take().unwrap()).lines();
+        let lengths = lines.map(|line| line.unwrap().parse().unwrap()).collect();
+        assert!(self.0.wait().unwrap().success());
+        lengths
+    }
+}
+
+impl Drop for FastDds {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// What comes until there is nothing for two seconds.
+fn all_of(subscription: &Subscription<Text>) -> Vec<usize> {
+    let mut lengths = Vec::new();
+    let mut patience = LONG;
+    while let Some(received) = subscription.recv_timeout(patience).unwrap() {
+        lengths.push(received.message.data.len());
+        patience = Duration::from_secs(2);
+    }
+    lengths
+}
+
+#[test]
+fn fast_dds_and_secured_nodes_hear_each_other() {
+    let Some(peer) = std::env::var_os("CROMOSIM_FASTDDS_PEER").map(PathBuf::from) else {
+        println!("skipped: CROMOSIM_FASTDDS_PEER names no Fast DDS peer");
+        return;
+    };
+    in_private_network("fast_dds_and_secured_nodes_hear_each_other", || {
+        if !is_private() {
+            println!("skipped: no network namespaces here");
+            return;
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let keystore = keystore(folder.path());
+        let folder_of = |name: &str| keystore.join("enclaves").join(name);
+        let clear = Path::new("-");
+        let qos = Qos::reliable().depth(100);
+
+        let talker = start("talker", Security::Enclave(folder_of("talker")));
+        let publisher = talker.publisher::<Text>("/text", qos).unwrap();
+        let secured = FastDds::start(&peer, "hear", &folder_of("listener"));
+        let plain = FastDds::start(&peer, "hear", clear);
+        assert!(publisher.wait_for_subscriptions(1, LONG), "no secured peer");
+        for length in 0..40 {
+            let data = "x".repeat(length);
+            publisher.publish(&Text { data }).unwrap();
+        }
+        std::thread::sleep(Duration::from_secs(2));
+        assert_eq!(secured.lengths(), (0..40).collect::<Vec<_>>());
+        assert_eq!(plain.lengths(), [0; 0]);
+        drop((publisher, talker));
+
+        let listener = start("listener", Security::Enclave(folder_of("listener")));
+        let subscription = listener.subscription::<Text>("/text", qos).unwrap();
+        let plain = FastDds::start(&peer, "say", clear);
+        let secured = FastDds::start(&peer, "say", &folder_of("talker"));
+        let sent: Vec<usize> = (3..160).step_by(4).collect();
+        assert_eq!(all_of(&subscription), sent, "of the secured one, and once");
+        drop((plain, secured));
+    });
 }
