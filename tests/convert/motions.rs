@@ -239,7 +239,7 @@ fn poses_of_a_body_in_a_bag_become_a_motion_again() {
     refuses(
         here,
         &["convert", "uneven.mcap", "x.npz", "--person", "7"],
-        &["/smpl/pose: no pose of 7; there are bodies 0"],
+        &["/smpl/pose: --person 7: nobody of that name; the bodies here: 0"],
     );
     refuses(
         here,

@@ -109,7 +109,7 @@ fn states(
         }
         Some(person) => {
             return Err(wrong(format!(
-                "--person {person}: nobody of that name; there are {}{}",
+                "--person {person}: nobody of that name; the bodies here: {}{}",
                 people.join(", "),
                 meant(person, people.iter().map(String::as_str))
             )));
@@ -125,12 +125,7 @@ fn states(
     states.sort_by_key(|state| state.header.stamp.nanos());
     states.dedup_by_key(|state| state.header.stamp.nanos());
     if states.is_empty() {
-        let whose = person.map(|person| format!(" of {person}"));
-        return Err(wrong(format!(
-            "no pose{}; there are bodies {}",
-            whose.unwrap_or_default(),
-            people.join(", ")
-        )));
+        return Err(wrong("no pose".into()));
     }
     Ok(states)
 }
