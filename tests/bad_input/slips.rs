@@ -2,6 +2,10 @@
 
 use std::fs;
 
+use cromosim_bag::{BagOptions, BagWriter};
+use cromosim_msgs::cromosim_msgs::SmplPose;
+use cromosim_spatial::Stamp;
+
 use crate::common::{TINY_BVH, succeed};
 use crate::refuses;
 
@@ -75,7 +79,7 @@ fn the_nearest_name_is_offered_for_what_simulate_takes() {
 }
 
 /// Commands, and the name that was meant.
-const COMMANDS: [(&str, &str); 15] = [
+const COMMANDS: [(&str, &str); 16] = [
     ("node recordr", "recorder"),
     ("inspect walk.bvh --skeleton-map mixmo", "mixamo"),
     ("inspect walk.bvh --skeleton-map joints.yaml", "pelvis"),
@@ -94,6 +98,7 @@ const COMMANDS: [(&str, &str); 15] = [
     ("convert walk.mcap w.tum --joint left_wrst", "left_wrist"),
     ("convert walk.mcap w.tum --site left_wach", "left_watch"),
     ("convert walk.mcap w.parquet --placement hed", "head"),
+    ("convert people.mcap p.npz --person annn", "ann"),
     ("device show bmi27", "bmi270"),
     (
         "device from-allan walk.mcap --placement hed --out d",
@@ -127,6 +132,17 @@ fn the_nearest_name_is_offered_for_what_files_hold() {
         fs::write(here.join(name), content).unwrap();
     }
     succeed(here, &["simulate", "--walk", "--out", "walk.mcap"]);
+    let mut people = BagWriter::create(&here.join("people.mcap"), BagOptions::default()).unwrap();
+    for body_id in ["ann", "bob"].map(str::to_owned) {
+        let pose = SmplPose {
+            body_id,
+            ..SmplPose::default()
+        };
+        people
+            .write("/smpl/pose", Stamp::from_nanos(1), &pose)
+            .unwrap();
+    }
+    people.finish().unwrap();
     for (command, meant) in COMMANDS {
         let arguments: Vec<&str> = command.split(' ').collect();
         refuses(here, &arguments, &["nearest", meant]);

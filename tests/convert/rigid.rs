@@ -195,6 +195,11 @@ fn frames_of_tf_become_a_trajectory() {
             .unwrap();
     }
     bag.finish().unwrap();
+    refuses(
+        folder.path(),
+        &["convert", "tf.mcap", "tool.tum", "--frame", "tol"],
+        &["tf.mcap", "no frame tol", "; the nearest is tool"],
+    );
     succeed(
         folder.path(),
         &["convert", "tf.mcap", "tool.tum", "--frame", "tool"],

@@ -5,20 +5,28 @@ use std::fmt::Display;
 /// Of known names the one that takes the fewest changed letters for its length (Levenshtein 1966), the
 /// first of equals; none where nothing is known.
 pub fn nearest_name<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let likeness = |known: &'a str| (strsim::normalized_levenshtein(known, name), known);
-    let (_, nearest) = known
-        .into_iter()
-        .map(likeness)
-        .reduce(|best, other| if other.0 > best.0 { other } else { best })?;
-    Some(nearest)
+    nearest(name, known).map(|(_, nearest)| nearest)
 }
 
-/// The end of an error line about a name that is not known: `; the nearest is NAME`, or nothing where
-/// there is no choice.
+/// The nearest name with its likeness, from 0 to 1 for the same.
+fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<(f64, &'a str)> {
+    known
+        .into_iter()
+        .map(|known| (strsim::normalized_levenshtein(known, name), known))
+        .reduce(|best, other| if other.0 > best.0 { other } else { best })
+}
+
+/// Half of the letters must be right for a name to be offered beside a list of all.
+const ALIKE: f64 = 0.5;
+
+/// The end of an error line that lists the known names: `; the nearest is NAME`, or nothing where there
+/// is no choice or none is like it.
 pub fn meant<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     let known: Vec<&str> = known.into_iter().filter(|one| !one.is_empty()).collect();
-    match nearest_name(name, known.iter().copied()) {
-        Some(nearest) if known.len() > 1 => format!("; the nearest is {nearest}"),
+    match nearest(name, known.iter().copied()) {
+        Some((likeness, nearest)) if known.len() > 1 && likeness >= ALIKE => {
+            format!("; the nearest is {nearest}")
+        }
         _ => String::new(),
     }
 }
@@ -84,7 +92,8 @@ mod tests {
         assert_eq!(nearest_name("/imu/head/data", topics), Some(topics[0]));
         assert_eq!(nearest_name("x", []), None);
         assert_eq!(meant("lowpas", known), "; the nearest is low_pass");
-        assert_eq!(meant("x", ["only"]), "");
+        assert_eq!(meant("only", ["onlz"]), "");
+        assert_eq!(meant("kinect", ["mixamo", "cmu"]), "");
     }
 
     #[test]
