@@ -177,6 +177,8 @@ fn subjects_are_told_apart() {
             .to_string()
             .contains("subject Eve asked for, the file has Ann, Bob")
     );
+    let slip = clip.labels_of(Some("Anne")).unwrap_err().to_string();
+    assert!(slip.ends_with("; the nearest is Ann"), "{slip}");
 }
 
 #[test]
