@@ -12,7 +12,7 @@ use cromosim_bag::BagReader;
 use cromosim_body::BodyModel;
 use cromosim_imu::ImuMessages;
 use cromosim_msgs::cromosim_msgs::SmplState;
-use cromosim_msgs::sensor_msgs::Imu;
+use cromosim_msgs::sensor_msgs::{Imu, MagneticField};
 use cromosim_virtual_imu::{Config, VirtualImuNode, placements};
 
 const DEVICE: &str = "\
@@ -27,6 +27,7 @@ effects:
 - {effect: time_offset, seconds: 0.0125}
 - {effect: dropped_samples, fraction: 0.1, mean_burst: 3.0}
 - {effect: accel_quantization, lsb: 0.0048}
+magnetometer: {noise_density: 1.0e-8, hard_iron: [2.0e-6, 0, 0], hard_iron_deviation: [1.0e-6, 1.0e-6, 1.0e-6], delay: 0.013, lsb: 1.5e-7}
 ";
 /// Schemes whose first samples rest on the frames that have come live, too, so that filters with a
 /// memory start alike.
@@ -37,6 +38,8 @@ placements:
   left_wrist: {site: left_watch, scheme: second_difference}
   right_shin: {site: right_shank_front, scheme: triangle, follow: segment}
 ";
+const FIELD: &str = "0,1.9e-5,-4.5e-5";
+const ORIENTATION: &str = "vqf";
 const NAMES: [&str; 2] = ["left_wrist", "right_shin"];
 /// m/s2, rad/s and of quaternions. Live a state's rotations are normalised once more; what that
 /// changes at 1 m, 1e-16 m, is 4e-12 m/s2 in a second difference over (10 ms)2.
@@ -69,12 +72,30 @@ fn same(live: &Imu, offline: &Imu) {
     assert_eq!(covariances(live), covariances(offline));
 }
 
+fn same_field(live: &MagneticField, offline: &MagneticField) {
+    assert_eq!(live.header, offline.header);
+    let (live, offline) = (&live.magnetic_field, &offline.magnetic_field);
+    // A value on the edge of a step may round to either side.
+    for (live, offline) in [
+        (live.x, offline.x),
+        (live.y, offline.y),
+        (live.z, offline.z),
+    ] {
+        assert!(
+            (live - offline).abs() < 1e-12,
+            "{live} live, {offline} offline"
+        );
+    }
+}
+
 /// The messages that the node makes of a bag's states.
 fn live(folder: &Path, bag: &BagReader, noise: bool) -> Vec<(usize, ImuMessages)> {
     let config = Config {
         placements: folder.join("placements.yaml").display().to_string(),
         seed: 7,
         noise,
+        magnetic_field: FIELD.to_owned(),
+        orientation: ORIENTATION.to_owned(),
         state_rate_hz: 100.0,
         ..Config::default()
     };
@@ -104,6 +125,7 @@ fn a_device_with_effects_reads_live_what_it_reads_offline() {
             "7",
         ];
         command.extend(["--duration", "4", "--trim", "0"]);
+        command.extend(["--magnetic-field", FIELD, "--orientation", ORIENTATION]);
         command.extend(["--force", "--out", "offline.mcap"]);
         command.extend(option);
         succeed(here, &command);
@@ -115,6 +137,9 @@ fn a_device_with_effects_reads_live_what_it_reads_offline() {
                 bag.read::<Imu>(&topic).unwrap()
             };
             let (data_raw, data) = (read("data_raw"), read("data"));
+            let mag = bag
+                .read::<MagneticField>(&format!("/imu/{name}/mag"))
+                .unwrap();
             let live: Vec<&ImuMessages> = live
                 .iter()
                 .filter(|(placement, _)| *placement == number)
@@ -128,6 +153,9 @@ fn a_device_with_effects_reads_live_what_it_reads_offline() {
             for (live, ((_, data_raw), (_, data))) in live.iter().zip(data_raw.iter().zip(&data)) {
                 same(&live.data_raw, data_raw);
                 same(&live.data, data);
+            }
+            for (live, (_, mag)) in live.iter().zip(&mag) {
+                same_field(live.mag.as_ref().unwrap(), mag);
             }
             lost.push(401 - data_raw.len());
         }

@@ -90,6 +90,7 @@ static KNOWN: &[&MessageType] = types![
     rosbag2_interfaces::TogglePausedResponse,
     rosgraph_msgs::Clock,
     sensor_msgs::Imu,
+    sensor_msgs::MagneticField,
     std_msgs::Header,
     std_msgs::String,
     tf2_msgs::TFMessage,

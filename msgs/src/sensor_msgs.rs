@@ -27,3 +27,17 @@ ros_message! {
         pub linear_acceleration_covariance: [f64; 9],
     }
 }
+
+ros_message! {
+    "sensor_msgs/msg/MagneticField", "../std/sensor_msgs/msg/MagneticField.msg", Message;
+    /// One sample of a magnetometer, in sensor axes.
+    #[derive(Default)]
+    pub struct MagneticField {
+        /// Time, and the sensor's frame.
+        pub header: Header,
+        /// Flux density, T.
+        pub magnetic_field: Vector3,
+        /// T2, row major 3x3. All zeros: unknown.
+        pub magnetic_field_covariance: [f64; 9],
+    }
+}

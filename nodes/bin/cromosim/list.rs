@@ -4,7 +4,9 @@ use std::path::PathBuf;
 
 use clap::Subcommand;
 use cromosim_body::{BodyModel, Joint};
-use cromosim_imu::{Device, EMBEDDED_DEVICES, EffectKind, Scheme, TextureSegment};
+use cromosim_imu::{
+    Device, EMBEDDED_DEVICES, EffectKind, OrientationSource, Scheme, TextureSegment,
+};
 use cromosim_learned::LearnedSimulator;
 
 use crate::body;
@@ -139,6 +141,13 @@ pub fn joint_names() -> Vec<String> {
 /// Names of effects.
 pub fn effect_names() -> Vec<String> {
     owned(EffectKind::ALL.map(EffectKind::name))
+}
+
+/// For shells.
+pub fn orientation_names() -> Vec<String> {
+    OrientationSource::ALL
+        .map(|source| source.name().to_owned())
+        .to_vec()
 }
 
 /// Names of derivative schemes.

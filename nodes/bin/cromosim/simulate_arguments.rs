@@ -5,7 +5,9 @@ use std::str::FromStr;
 
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
-use cromosim_imu::{Differentiation, MAX_RATE_HZ, Scheme, TextureSegment, Trim};
+use cromosim_imu::{
+    AmbientField, Differentiation, MAX_RATE_HZ, OrientationSource, Scheme, TextureSegment, Trim,
+};
 use cromosim_recording::TextureOn;
 use cromosim_recording::batch::{Shard, is_of_many};
 use cromosim_recording::convert::ReadOptions;
@@ -157,6 +159,25 @@ pub struct Arguments {
         hide_short_help = true
     )]
     pub pose_error_correlation: f64,
+    /// The magnetic field that devices with a magnetometer read, as /imu/NAME/mag
+    ///
+    /// A vector in T and world axes (0,1.9e-5,-4.5e-5), a place and a day (52.52N,13.41E,2026-11-24; World Magnetic
+    /// Model, with the world's x axis east), or a YAML file, which may say disturbances too [default: no /imu/NAME/mag]
+    #[arg(long, value_name = "FIELD", allow_hyphen_values = true, help_heading = SENSORS, hide_short_help = true)]
+    pub magnetic_field: Option<String>,
+    /// Where the orientation of /imu/NAME/data comes from
+    ///
+    /// truth, vqf, madgwick or mahony (fused from the device's own readings), or none
+    #[arg(
+        long,
+        value_name = "SOURCE",
+        default_value = OrientationSource::Truth.name(),
+        help_heading = SENSORS,
+        hide_short_help = true,
+        hide_possible_values = true,
+        value_parser = Named(list::orientation_names)
+    )]
+    pub orientation: String,
     /// Write each placement's samples as CSV into this directory too
     #[arg(long, value_name = "DIR")]
     pub csv: Option<PathBuf>,
@@ -359,6 +380,14 @@ impl Arguments {
         if self.csv.is_some() && self.format() != Format::Bag {
             bail!("--csv is made of a bag, and OUT holds the same columns already; leave it out");
         }
+        if self.orientation != OrientationSource::Truth.name() && self.format() != Format::Bag {
+            bail!(
+                "--orientation is of /imu/NAME/data, and tables hold no orientation; give a name in .mcap"
+            );
+        }
+        if self.magnetic_field.is_some() && self.format() == Format::Parquet {
+            bail!("--magnetic-field: columns hold no magnetometer; give a name in .mcap or .csv");
+        }
         if self.draw.is_some() && self.format() != Format::Parquet {
             bail!("--draw writes columns, which tell draws apart; give --format parquet");
         }
@@ -391,6 +420,23 @@ impl Arguments {
         let scheme = self.scheme.as_deref().map(Scheme::from_str).transpose();
         let scheme = scheme.context("--scheme")?.map(Differentiation::Scheme);
         Ok(scheme.or(self.bandwidth.map(Differentiation::Bandwidth)))
+    }
+
+    /// What `--magnetic-field` says; none where it was not given.
+    ///
+    /// # Errors
+    /// No field.
+    pub fn field(&self) -> anyhow::Result<Option<AmbientField>> {
+        let field = self.magnetic_field.as_deref().map(AmbientField::resolve);
+        field.transpose().context("--magnetic-field")
+    }
+
+    /// What `--orientation` says.
+    ///
+    /// # Errors
+    /// An unknown name.
+    pub fn orientation(&self) -> anyhow::Result<OrientationSource> {
+        self.orientation.parse().context("--orientation")
     }
 
     /// What `--trim` says.
@@ -444,6 +490,16 @@ impl Arguments {
             (self.draw.is_some(), "--draw", MOTION_FILES),
             (self.placements.is_some(), "--placements", MOTION_FILES),
             (self.csv.is_some(), "--csv", MOTION_FILES),
+            (
+                self.magnetic_field.is_some(),
+                "--magnetic-field",
+                MOTION_FILES,
+            ),
+            (
+                self.orientation != OrientationSource::Truth.name(),
+                "--orientation",
+                MOTION_FILES,
+            ),
             (
                 self.pose_error_correlation != 0.0,
                 "--pose-error-correlation",

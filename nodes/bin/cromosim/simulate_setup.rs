@@ -3,10 +3,11 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use anyhow::bail;
 use cromosim_evaluation::SimulationDraws;
-use cromosim_imu::{Device, Placement, PlacementSet, point_oddity};
+use cromosim_imu::{Device, OrientationSource, Placement, PlacementSet, point_oddity};
 use cromosim_learned::{LearnedSimulator, MappingFile};
 use cromosim_motion::{
     MotionOptions, SmplMotion, embedded_walk, read_motion_for, read_people_whole,
@@ -46,6 +47,8 @@ pub struct Setup {
     /// Whether what is written is said as JSON.
     pub json: bool,
     pub csv: Option<PathBuf>,
+    /// As it was given.
+    magnetic_field: Option<String>,
     pub interrupt: Interrupt,
 }
 
@@ -79,6 +82,8 @@ impl Setup {
                 .map(LearnedSimulator::find)
                 .transpose()?,
             mapping: read_mapping(arguments.mapping.as_deref(), &names(&placements))?,
+            field: arguments.field()?.map(Arc::new),
+            orientation: arguments.orientation()?,
         };
         let model = body::model(arguments.body.as_deref())?;
         let simulation = Simulation::new(model, placements, folder, options)?;
@@ -95,6 +100,7 @@ impl Setup {
             force: arguments.force,
             json: arguments.json,
             csv: arguments.csv.clone(),
+            magnetic_field: arguments.magnetic_field.clone(),
             interrupt: Interrupt::watch()?,
         })
     }
@@ -142,6 +148,13 @@ impl Setup {
         );
         let mut settings = self.settings();
         settings.insert("motion".to_owned(), name);
+        if let Some(field) = &self.magnetic_field {
+            settings.insert("magnetic_field".to_owned(), field.clone());
+        }
+        let orientation = self.simulation.options().orientation;
+        if orientation != OrientationSource::Truth {
+            settings.insert("orientation".to_owned(), orientation.to_string());
+        }
         settings
     }
 
@@ -173,6 +186,8 @@ impl Setup {
             ("draws", format!("{:?}", self.draws)),
             ("differentiation", format!("{:?}", options.differentiation)),
             ("trim", format!("{:?}", options.trim)),
+            ("magnetic_field", format!("{:?}", options.field)),
+            ("orientation", options.orientation.to_string()),
             ("texture", format!("{:?}", options.texture)),
             (
                 "pose_error_correlation_s",

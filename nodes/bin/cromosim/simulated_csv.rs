@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 use cromosim_bag::BagReader;
-use cromosim_msgs::sensor_msgs::Imu;
+use cromosim_msgs::sensor_msgs::{Imu, MagneticField};
 use cromosim_recording::{PlayedPerson, write_file_with};
 
 use crate::simulate_setup::{Setup, names};
@@ -12,6 +12,9 @@ use crate::simulate_setup::{Setup, names};
 /// Columns; `cromosim convert` and everything that takes an IMU series reads them.
 const HEADER: &str = "time [s],specific_force_x [m/s2],specific_force_y [m/s2],specific_force_z [m/s2],\
     angular_velocity_x [rad/s],angular_velocity_y [rad/s],angular_velocity_z [rad/s]";
+
+/// Of devices with a magnetometer, in a known field.
+const MAGNETIC: &str = ",magnetic_field_x [T],magnetic_field_y [T],magnetic_field_z [T]";
 
 /// The only person and the only placement's name.
 ///
@@ -37,20 +40,35 @@ pub fn the_only<'a>(
     }
 }
 
-/// Writes the messages of a bag as a table; gives the number of its rows.
+/// Writes the messages of a bag (`TOPIC/data`, and `TOPIC/mag` where it is) as a table; gives the number
+/// of its rows.
 pub fn write_table(bag: &Path, topic: &str, out: &Path, force: bool) -> anyhow::Result<u64> {
-    let messages = BagReader::open(bag)?.read::<Imu>(topic)?;
+    let reader = BagReader::open(bag)?;
+    let messages = reader.read::<Imu>(&format!("{topic}/data"))?;
+    let magnetic_topic = format!("{topic}/mag");
+    let has_field = reader.topic(&magnetic_topic).is_ok();
+    let fields = match has_field {
+        true => reader.read::<MagneticField>(&magnetic_topic)?,
+        false => Vec::new(),
+    };
     write_file_with(out, force, |file| {
         let mut write = || -> std::io::Result<()> {
-            writeln!(file, "{HEADER}")?;
+            writeln!(file, "{HEADER}{}", if has_field { MAGNETIC } else { "" })?;
+            let mut fields = fields.iter();
             for (_, message) in &messages {
                 let stamp = &message.header.stamp;
                 let (f, w) = (&message.linear_acceleration, &message.angular_velocity);
-                writeln!(
+                write!(
                     file,
                     "{}.{:09},{},{},{},{},{},{}",
                     stamp.sec, stamp.nanosec, f.x, f.y, f.z, w.x, w.y, w.z
                 )?;
+                // One each reading, in the same order.
+                if let Some((_, field)) = fields.next() {
+                    let m = &field.magnetic_field;
+                    write!(file, ",{},{},{}", m.x, m.y, m.z)?;
+                }
+                writeln!(file)?;
             }
             Ok(())
         };

@@ -111,7 +111,7 @@ fn write(
         }
         Format::Csv => {
             let (person, placement) = the_only(setup, people, output.path)?;
-            let topic = person.topic(&format!("imu/{placement}/data"));
+            let topic = person.topic(&format!("imu/{placement}"));
             let folder = tempfile::tempdir().context("no folder for temporary files")?;
             let bag = folder.path().join("readings.mcap");
             write_bag(setup, people, simulated, metadata, &bag)?;

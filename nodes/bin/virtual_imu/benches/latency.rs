@@ -5,7 +5,7 @@
 //! and receives `imu/NAME/data_raw` of every placement over DDS, in a private network namespace. A
 //! sample's latency is the time from just before the publication of the state that released it to
 //! its reception here, so two hops of DDS are in it. Goal: p99 under 2 ms at 5 and at 17
-//! placements.
+//! placements. The last case also receives `data`, whose orientation VQF fuses, and `mag`.
 #![allow(missing_docs)]
 
 use std::process::{Child, Command, Stdio};
@@ -13,13 +13,16 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use cromosim_imu::PlacementSet;
+use cromosim_msgs::RosMessage;
 use cromosim_msgs::cromosim_msgs::SmplState;
-use cromosim_msgs::sensor_msgs::Imu;
+use cromosim_msgs::sensor_msgs::{Imu, MagneticField};
 use cromosim_msgs::std_msgs::Header;
 use cromosim_ros::testing::{environment, inside_private_network, network};
 use cromosim_ros::{Bell, Clock, Node, NodeOptions, Parameters, Qos, RosArgs, Subscription};
 
 const NODE: &str = "CROMOSIM_BENCH_NODE";
+/// Set where the node fuses orientations and has magnetometers.
+const COMPLETE: &str = "CROMOSIM_BENCH_COMPLETE";
 const STATES: usize = 1000;
 const INTERVAL_NANOS: i64 = 10_000_000;
 /// Left out: connections, caches and the first look at the states' rate.
@@ -27,8 +30,18 @@ const WARM_UP: usize = 100;
 
 fn main() {
     if let Ok(placements) = std::env::var(NODE) {
-        let arguments =
-            ["--ros-args", "-p", &format!("placements:='{placements}'")].map(str::to_owned);
+        let mut arguments = ["--ros-args", "-p", &format!("placements:='{placements}'")]
+            .map(str::to_owned)
+            .to_vec();
+        if std::env::var_os(COMPLETE).is_some() {
+            let complete = [
+                "-p",
+                "magnetic_field:=0,1.9e-5,-4.5e-5",
+                "-p",
+                "orientation:=vqf",
+            ];
+            arguments.extend(complete.map(str::to_owned));
+        }
         cromosim_virtual_imu::run(&arguments).expect("the node runs");
         return;
     }
@@ -49,13 +62,18 @@ fn main() {
     }
     println!("latency from SmplState to Imu over DDS, {STATES} states at 100 Hz, scheme spline");
     let folder = std::env::temp_dir();
-    for (name, set) in [
-        ("5 placements", PlacementSet::demo()),
-        ("17 placements", PlacementSet::full17()),
+    for (name, set, is_complete) in [
+        ("5 placements", PlacementSet::demo(), false),
+        ("17 placements", PlacementSet::full17(), false),
+        (
+            "17 placements, with data by VQF and mag",
+            PlacementSet::full17(),
+            true,
+        ),
     ] {
         let file = folder.join(format!("cromosim_latency_{}.yaml", std::process::id()));
         std::fs::write(&file, set.to_yaml()).expect("a temporary file can be written");
-        let latencies = measure(&set, &file.display().to_string());
+        let latencies = measure(&set, &file.display().to_string(), is_complete);
         std::fs::remove_file(&file).expect("the temporary file is there");
         let at = |fraction: f64| {
             1e3 * latencies[((latencies.len() - 1) as f64 * fraction).round() as usize]
@@ -70,6 +88,12 @@ fn main() {
     }
 }
 
+/// A topic that is received beside those that are timed.
+fn heard<M: RosMessage>(node: &Node, name: &str, ending: &str) -> Subscription<M> {
+    node.subscription::<M>(&format!("imu/{name}/{ending}"), Qos::recorder())
+        .expect("a subscription")
+}
+
 /// The node's process; ended with its owner.
 struct NodeProcess(Child);
 
@@ -80,14 +104,14 @@ impl Drop for NodeProcess {
     }
 }
 
-fn measure(set: &PlacementSet, file: &str) -> Vec<f64> {
+fn measure(set: &PlacementSet, file: &str, is_complete: bool) -> Vec<f64> {
     let program = std::env::current_exe().expect("this program has a path");
-    let child = Command::new(program)
-        .env(NODE, file)
-        .envs(environment())
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn();
+    let mut command = Command::new(program);
+    command.env(NODE, file).envs(environment());
+    if is_complete {
+        command.env(COMPLETE, "1");
+    }
+    let child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn();
     let _node_process = NodeProcess(child.expect("the node's process starts"));
     let args = RosArgs::parse(Vec::<String>::new()).expect("no arguments");
     let node = Node::start(
@@ -111,6 +135,18 @@ fn measure(set: &PlacementSet, file: &str) -> Vec<f64> {
         .placements()
         .iter()
         .map(|placement| subscribe(placement.name()))
+        .collect();
+    let names = || {
+        set.placements()
+            .iter()
+            .filter(|_| is_complete)
+            .map(|it| it.name())
+    };
+    let _data: Vec<_> = names()
+        .map(|name| heard::<Imu>(&node, name, "data"))
+        .collect();
+    let _mag: Vec<_> = names()
+        .map(|name| heard::<MagneticField>(&node, name, "mag"))
         .collect();
     let long = Duration::from_secs(20);
     assert!(

@@ -31,6 +31,16 @@ node_config! {
         /// Distribution mapping (YAML), as `cromosim map` writes it, applied last to the placements
         /// that it names. Empty: none. May change at run time.
         pub mapping: String = String::new(),
+        /// The magnetic field that devices with a magnetometer read, as `imu/NAME/mag`: a vector
+        /// in T and world axes (0,1.9e-5,-4.5e-5), a place and a day (52.52N,13.41E,2026-11-24;
+        /// World Magnetic Model, x east) or a YAML file with disturbances. Empty: no `imu/NAME/mag`.
+        pub magnetic_field: String = String::new(),
+        /// Where the orientation of `imu/NAME/data` comes from: `truth`, `vqf`, `madgwick` or
+        /// `mahony` (fused from the device's own readings), or `none`. May change at run time.
+        pub orientation: String = "truth".to_owned(),
+        /// Device of every placement, in the place of its own: a built-in one's name or a YAML file.
+        /// Empty: as the placements say. May change at run time.
+        pub device: String = String::new(),
         /// Put before every frame but the world's, with a slash; as for smpl_state.
         pub prefix: String = String::new(),
         /// Publish the site's pose of every state as `reference/NAME` too.

@@ -1,5 +1,6 @@
 //! The node `virtual_imu`: `smpl/state` in; `imu/NAME/data_raw` and `imu/NAME/data` of every
-//! placement out, with their frames.
+//! placement out, `imu/NAME/mag` where a device has a magnetometer and the field is known, with their
+//! frames.
 
 mod config;
 mod node;
@@ -13,11 +14,12 @@ use anyhow::Context;
 use cromosim_body::BodyModel;
 use cromosim_imu::{MAX_RATE_HZ, Placement, PlacementSet, Scheme};
 use cromosim_learned::scheme_for_networks;
+use cromosim_msgs::RosMessage;
 use cromosim_msgs::builtin_interfaces::Time;
 use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_msgs::diagnostic_msgs::DiagnosticArray;
 use cromosim_msgs::geometry_msgs::PoseStamped;
-use cromosim_msgs::sensor_msgs::Imu;
+use cromosim_msgs::sensor_msgs::{Imu, MagneticField};
 use cromosim_msgs::std_msgs;
 use cromosim_msgs::tf2_msgs::TFMessage;
 use cromosim_ros::{Durability, Node, Publisher, Qos, RosError, prepare};
@@ -31,6 +33,8 @@ const ABOUT: &str = "virtual_imu: what IMUs on the body would measure, one senso
 struct Publishers {
     data_raw: Vec<Publisher<Imu>>,
     data: Vec<Publisher<Imu>>,
+    /// By placement; none without a magnetometer or a known field.
+    mag: Vec<Option<Publisher<MagneticField>>>,
     references: Vec<Publisher<PoseStamped>>,
     frames: Publisher<TFMessage>,
     diagnostics: Publisher<DiagnosticArray>,
@@ -52,6 +56,13 @@ impl Publishers {
                 .iter()
                 .map(|topic| node.publisher::<Imu>(topic, Qos::reliable()))
                 .collect::<Result<Vec<_>, _>>()
+        };
+        let mag = |(placement, topic): (usize, &String)| {
+            let publisher = || node.publisher::<MagneticField>(topic, Qos::reliable());
+            logic
+                .has_magnetometer(placement)
+                .then(publisher)
+                .transpose()
         };
         let reference = |placement: &Placement| {
             node.publisher::<PoseStamped>(
@@ -77,6 +88,11 @@ impl Publishers {
         Ok(Self {
             data_raw: imu("data_raw")?,
             data: imu("data")?,
+            mag: topics("mag")
+                .iter()
+                .enumerate()
+                .map(mag)
+                .collect::<Result<_, _>>()?,
             references: referenced.iter().map(reference).collect::<Result<_, _>>()?,
             frames: node.publisher("/tf", Qos::tf())?,
             diagnostics: node.publisher("/diagnostics", Qos::reliable())?,
@@ -92,6 +108,9 @@ impl Publishers {
         }
         for (placement, reading) in &step.readings {
             publish_if_heard(&self.data[*placement], &reading.data);
+            if let (Some(publisher), Some(mag)) = (&self.mag[*placement], &reading.mag) {
+                publish_if_heard(publisher, mag);
+            }
         }
         if !step.frames.transforms.is_empty() {
             report(self.frames.publish(&step.frames));
@@ -102,7 +121,7 @@ impl Publishers {
     }
 }
 
-fn publish_if_heard(publisher: &Publisher<Imu>, message: &Imu) {
+fn publish_if_heard<M: RosMessage>(publisher: &Publisher<M>, message: &M) {
     // A transient-local publisher keeps its messages for those who come late.
     if publisher.subscription_count() > 0
         || publisher.qos().durability == Durability::TransientLocal
@@ -186,8 +205,17 @@ fn open_to_changes(
         }
         Ok(())
     };
-    node.parameters()
-        .settable(&["noise", "seed", "learned", "mapping"], take_up)?;
+    node.parameters().settable(
+        &[
+            "noise",
+            "seed",
+            "learned",
+            "mapping",
+            "orientation",
+            "device",
+        ],
+        take_up,
+    )?;
     Ok(())
 }
 

@@ -1,12 +1,13 @@
 //! From the states of a body to the messages of its virtual IMUs.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use cromosim_body::{BodyError, BodyModel, BodyPose, Joint, ShapedBody};
 use cromosim_imu::{
-    Device, Follow, ImuError, ImuMessages, ImuOptions, MountedSensors, Placement, PlacementSet,
-    PoseStd, ReadingMapping, StreamOptions, StreamingImu, VirtualImu, measure_all,
+    AmbientField, Device, Follow, ImuError, ImuMessages, ImuOptions, MountedSensors,
+    OrientationSource, Placement, PlacementSet, PoseStd, ReadingMapping, StreamOptions,
+    StreamingImu, VirtualImu, measure_all,
 };
 use cromosim_learned::{LearnedError, LearnedSimulator, LivePlacements, MappingFile};
 use cromosim_msgs::NotABody;
@@ -72,6 +73,9 @@ pub struct VirtualImuNode {
     model: Arc<BodyModel>,
     placements: Vec<Placement>,
     devices: Vec<Device>,
+    device_folder: PathBuf,
+    /// None: nothing is said of magnetometers.
+    field: Option<Arc<AmbientField>>,
     /// Of the placements; none before the rate of the states is known.
     streams: Vec<StreamingImu>,
     imus: Vec<VirtualImu>,
@@ -114,24 +118,26 @@ impl VirtualImuNode {
         placements: &PlacementSet,
         device_folder: &Path,
     ) -> Result<Self, Refusal> {
-        let resolve = |placement: &Placement| Device::resolve(placement.device(), device_folder);
         let placements: Vec<Placement> = placements.placements().to_vec();
-        let devices = placements
-            .iter()
-            .map(resolve)
-            .collect::<Result<Vec<_>, _>>()?;
+        let devices = resolved_devices(&config, &placements, device_folder)?;
+        let field = match config.magnetic_field.as_str() {
+            "" => None,
+            text => Some(Arc::new(AmbientField::resolve(text)?)),
+        };
         let shaped = ShapedBody::new(model.clone(), &[])?;
         let sensors = MountedSensors::new(&shaped, &placements)?;
         let learned = read_networks(&config.learned)?;
         let mapping = read_mapping(&config.mapping, &placements)?;
         let source = pose_source(&config.pose_source)?;
-        let imus = fresh_imus(&config, &mapping, &placements, &devices)?;
+        let imus = fresh_imus(&config, &mapping, (&placements, &devices), field.as_ref())?;
         let live = fresh_networks(learned.as_ref(), &shaped, &placements, &config)?;
         Ok(Self {
             config,
             model,
             placements,
             devices,
+            device_folder: device_folder.to_owned(),
+            field,
             streams: Vec::new(),
             imus,
             betas: Vec::new(),
@@ -149,7 +155,7 @@ impl VirtualImuNode {
         })
     }
 
-    /// Takes up another configuration whose noise, seed, networks or mapping differ, and their
+    /// Takes up another configuration whose noise, seed, devices, networks or mapping differ, and their
     /// placements: the same with other schemes. The devices are switched on anew; other networks
     /// start the schemes over, as they need another one.
     ///
@@ -173,8 +179,19 @@ impl VirtualImuNode {
         } else {
             None
         };
-        let imus = fresh_imus(&config, &mapping, &self.placements, &self.devices)?;
+        let devices = if config.device == self.config.device {
+            self.devices.clone()
+        } else {
+            resolved_devices(&config, &self.placements, &self.device_folder)?
+        };
+        let imus = fresh_imus(
+            &config,
+            &mapping,
+            (&self.placements, &devices),
+            self.field.as_ref(),
+        )?;
         (self.config, self.mapping, self.imus) = (config, mapping, imus);
+        self.devices = devices;
         if let Some(networks) = networks {
             (self.learned, self.live, self.placements) = networks;
             if self.state_rate_hz > 0.0 {
@@ -187,6 +204,12 @@ impl VirtualImuNode {
     /// The placements; their order numbers [`Step::readings`].
     pub fn placements(&self) -> &[Placement] {
         &self.placements
+    }
+
+    /// Whether `imu/NAME/mag` is there: the placement's device has a magnetometer, and the field is
+    /// known.
+    pub fn has_magnetometer(&self, placement: usize) -> bool {
+        self.field.is_some() && self.devices[placement].magnetometer().is_some()
     }
 
     /// Delay of each placement's scheme and networks, s; none before the rate of the states is
@@ -447,12 +470,26 @@ impl VirtualImuNode {
     }
 }
 
+/// The placements' own, or that of the parameter, which is found from where the node runs.
+fn resolved_devices(
+    config: &Config,
+    placements: &[Placement],
+    folder: &Path,
+) -> Result<Vec<Device>, ImuError> {
+    let resolve = |placement: &Placement| match config.device.as_str() {
+        "" => Device::resolve(placement.device(), folder),
+        device => Device::resolve(Some(device), Path::new(".")),
+    };
+    placements.iter().map(resolve).collect()
+}
+
 fn fresh_imus(
     config: &Config,
     mapping: &MappingFile,
-    placements: &[Placement],
-    devices: &[Device],
+    (placements, devices): (&[Placement], &[Device]),
+    field: Option<&Arc<AmbientField>>,
 ) -> Result<Vec<VirtualImu>, ImuError> {
+    let orientation: OrientationSource = config.orientation.parse()?;
     let imu = |(placement, device): (&Placement, &Device)| {
         let mapping = mapping.placements.get(placement.name()).cloned();
         let options = ImuOptions {
@@ -463,6 +500,8 @@ fn fresh_imus(
             noise: config.noise,
             frame_id: config.frame(&format!("{}_imu", placement.name())),
             mapping: mapping.map(|mapping| Box::new(mapping) as Box<dyn ReadingMapping>),
+            field: field.cloned(),
+            orientation,
         };
         VirtualImu::new(device, options)
     };

@@ -6,8 +6,9 @@ use cromosim_spatial::in_plain_words;
 use serde::Deserialize;
 
 use crate::effects::{RawUnexplained, number, write_effects, write_unexplained};
+use crate::magnetic::RawMagnetometer;
 use crate::{
-    DeclaredNoise, Effect, EffectKind, EffectSet, ImuError, PlacementEffects, Stage,
+    DeclaredNoise, Effect, EffectKind, EffectSet, ImuError, Magnetometer, PlacementEffects, Stage,
     UnexplainedErrors,
 };
 
@@ -74,6 +75,7 @@ pub const EMBEDDED_DEVICES: [(&str, &str); 12] = [
 ///   - {effect: accel_bias, bias: [0.05, -0.03, 0.08]}
 ///   - {effect: gyro_bias, bias: [0.004, -0.006, 0.003]}
 /// unexplained: {accel_variance: 0.0021, gyro_variance: 1.2e-5}   # may be left out
+/// magnetometer: {noise_density: 1.0e-8}   # of devices that have one, see [`Magnetometer`]
 /// ```
 /// Densities are one-sided, (m/s2)/sqrt(Hz) and (rad/s)/sqrt(Hz); the list and what is unexplained are
 /// those of an [`crate::EffectsFile`], without the effects of a reference. What depends on time is anchored at
@@ -85,6 +87,7 @@ pub struct Device {
     orientation_stddev: f64,
     effects: EffectSet,
     unexplained: UnexplainedErrors,
+    magnetometer: Option<Magnetometer>,
 }
 
 #[derive(Deserialize)]
@@ -96,6 +99,7 @@ struct RawDevice {
     effects: EffectSet,
     #[serde(default)]
     unexplained: RawUnexplained,
+    magnetometer: Option<RawMagnetometer>,
 }
 
 #[derive(Deserialize)]
@@ -108,7 +112,7 @@ struct RawNoise {
 }
 
 impl Device {
-    /// A device without error.
+    /// A device without error, with a magnetometer.
     pub fn ideal() -> Self {
         Self {
             accel_density: 0.0,
@@ -116,6 +120,7 @@ impl Device {
             orientation_stddev: 0.0,
             effects: EffectSet::new(),
             unexplained: UnexplainedErrors::default(),
+            magnetometer: Some(Magnetometer::default()),
         }
     }
 
@@ -125,6 +130,7 @@ impl Device {
         Self {
             accel_density,
             gyro_density,
+            magnetometer: None,
             ..Self::ideal()
         }
     }
@@ -142,7 +148,7 @@ impl Device {
     ///
     /// # Errors
     /// [`ImuError::Yaml`], [`ImuError::Schema`], [`ImuError::DeviceNumber`],
-    /// [`ImuError::ReferenceEffect`].
+    /// [`ImuError::ReferenceEffect`], [`ImuError::Magnetometer`].
     pub fn parse(text: &str, file: &str) -> Result<Self, ImuError> {
         let raw: RawDevice = serde_norway::from_str(text).map_err(|error| ImuError::Yaml {
             file: file.to_owned(),
@@ -186,7 +192,13 @@ impl Device {
                 effect: effect.kind().name(),
             });
         }
+        let magnetometer = raw.magnetometer.map(RawMagnetometer::parse).transpose();
+        let magnetometer = magnetometer.map_err(|problem| ImuError::Magnetometer {
+            file: file.to_owned(),
+            problem,
+        })?;
         Ok(Self {
+            magnetometer,
             accel_density,
             gyro_density,
             orientation_stddev,
@@ -230,6 +242,11 @@ impl Device {
             write_effects(&mut text, "  ", &self.effects);
         }
         write_unexplained(&mut text, "", &self.unexplained);
+        text += &self
+            .magnetometer
+            .as_ref()
+            .map(Magnetometer::to_yaml)
+            .unwrap_or_default();
         text
     }
 
@@ -275,6 +292,11 @@ impl Device {
             }
             Some(name) => Self::embedded(name),
         }
+    }
+
+    /// Its magnetometer, where it has one.
+    pub fn magnetometer(&self) -> Option<&Magnetometer> {
+        self.magnetometer.as_ref()
     }
 
     /// White noise of the accelerometer, (m/s2)/sqrt(Hz).

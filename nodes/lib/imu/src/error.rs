@@ -110,6 +110,30 @@ pub enum ImuError {
         /// Its value.
         value: f64,
     },
+    /// A magnetometer that makes no sense.
+    #[error("{file}: {problem}")]
+    Magnetometer {
+        /// The file's name.
+        file: String,
+        /// Field, value, what was expected.
+        problem: String,
+    },
+    /// No magnetic field.
+    #[error("magnetic field {from}: {problem}")]
+    Field {
+        /// The file, or what was given.
+        from: String,
+        /// What is wrong, what was expected.
+        problem: String,
+    },
+    /// An unknown source of orientations.
+    #[error("unknown orientation `{name}`; known are {known}{}", meant(name, known.split(", ")))]
+    UnknownOrientation {
+        /// The name given.
+        name: String,
+        /// The names that there are.
+        known: String,
+    },
     /// A file of Kalibr's that does not say what it should.
     #[error("{file}: {problem}")]
     Kalibr {

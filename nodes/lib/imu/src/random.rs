@@ -23,6 +23,8 @@ pub(crate) const DROPOUT_CHANNEL: u64 = 3;
 /// The first stream of [`crate::effects::DrawnBiases`]: turn-on bias, instability and walk, of two
 /// channels each.
 pub(crate) const DRAWN_BIAS_CHANNEL: u64 = 4;
+/// The first stream of a magnetometer: its noise, then its hard iron.
+pub(crate) const MAGNETOMETER_CHANNEL: u64 = 10;
 
 /// A key of 32 bytes: seed, two hashes of the name, channel.
 pub(crate) fn stream(seed: u64, placement: &str, channel: u64) -> ChaCha12Rng {

@@ -1,21 +1,25 @@
 //! The one way from a placement's motion to its messages.
 //!
 //! ```text
-//! motion -> correction (networks) -> measurement (effects, noise, losses) -> mapping -> covariances -> messages
+//! motion -> correction (networks) -> measurement (effects, noise, losses) -> mapping -> orientation, covariances -> messages
 //! ```
 //! Live and offline share all of it: [`VirtualImu::measure`] takes samples as they come,
 //! [`measure_recording`] a whole motion at given stamps; both end in the same messages.
 
-use cromosim_msgs::sensor_msgs::Imu;
+use std::sync::Arc;
+
+use cromosim_msgs::sensor_msgs::{Imu, MagneticField};
 use cromosim_msgs::std_msgs::Header;
 use cromosim_spatial::{KinematicTrack, Stamp};
-use nalgebra::UnitQuaternion;
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
+use crate::magnetic::MagneticSensor;
+use crate::orientation::OrientationFilter;
 use crate::stated_errors::{StatedErrors, with_clock_errors};
 use crate::{
-    Covariances, Device, DrawnBiases, Dropouts, EffectKind, ImuError, ImuSample, KinematicSample,
-    MeasurementInput, NoiseSource, PlacementEffects, Reading, SampleVariance, SensorModel,
-    StreamingEffects,
+    AmbientField, Covariances, Device, DrawnBiases, Dropouts, EffectKind, ImuError, ImuSample,
+    KinematicSample, MeasurementInput, NoiseSource, OrientationSource, PlacementEffects, Reading,
+    SampleVariance, SensorModel, StreamingEffects,
 };
 
 /// Changes a motion before it is measured: the place of learned networks.
@@ -53,6 +57,10 @@ pub struct ImuOptions {
     pub frame_id: String,
     /// Applied last to the readings.
     pub mapping: Option<Box<dyn ReadingMapping>>,
+    /// The magnetic field that devices with a magnetometer read; none: they say nothing of it.
+    pub field: Option<Arc<AmbientField>>,
+    /// Where the orientation of `data` comes from.
+    pub orientation: OrientationSource,
 }
 
 /// One sample in both forms of REP-145.
@@ -62,6 +70,8 @@ pub struct ImuMessages {
     pub data_raw: Imu,
     /// For `imu/NAME/data`: with orientation.
     pub data: Imu,
+    /// For `imu/NAME/mag`, of devices that have a magnetometer, in a known field.
+    pub mag: Option<MagneticField>,
 }
 
 /// The last steps: from a reading to messages.
@@ -75,6 +85,10 @@ struct Output {
 pub struct VirtualImu {
     effects: StreamingEffects,
     stated: StatedErrors,
+    magnetic: Option<MagneticSensor>,
+    orientation: OrientationSource,
+    /// None where the orientation is no filter's.
+    filter: Option<OrientationFilter>,
     output: Output,
 }
 
@@ -85,7 +99,17 @@ impl VirtualImu {
     /// [`ImuError::Trajectory`] for a rate that is not positive.
     pub fn new(device: &Device, options: ImuOptions) -> Result<Self, ImuError> {
         let effects = StreamingEffects::new(device, options.rate_hz, options.seed, &options.name)?;
+        let noise = options
+            .noise
+            .then_some((options.seed, options.name.as_str()));
+        let magnetic = device
+            .magnetometer()
+            .zip(options.field)
+            .map(|(model, field)| MagneticSensor::new(model, field, options.rate_hz, noise));
         Ok(Self {
+            magnetic,
+            orientation: options.orientation,
+            filter: OrientationFilter::new(options.orientation, options.rate_hz),
             effects: if options.noise {
                 effects
             } else {
@@ -102,16 +126,44 @@ impl VirtualImu {
 
     /// The messages of a sample; `None` where the device loses it.
     pub fn measure(&mut self, motion: &KinematicSample) -> Option<ImuMessages> {
-        let sample = self.effects.step(motion)?;
+        let sample = self.effects.step(motion);
+        // A magnetometer that is late needs the samples that are lost.
+        let world_from_sensor = Isometry3::from_parts(
+            motion.world_from_sensor.translation,
+            self.effects.world_from_sensor(motion),
+        );
+        let read = |sensor: &mut MagneticSensor| sensor.read(&world_from_sensor, motion.stamp);
+        let field = self.magnetic.as_mut().map(read);
+        let sample = self.output.mapped(sample?);
         let variance = self
             .stated
             .of_motion(motion.variance, self.effects.walked_seconds());
-        Some(self.output.messages(sample, &variance))
+        let mut messages = self.output.messages(&sample, &variance);
+        self.orient(&sample, field.as_ref(), &mut messages.data);
+        messages.mag = self
+            .magnetic
+            .as_ref()
+            .zip(field)
+            .map(|(sensor, field)| sensor.message(field, sample.stamp, &self.output.frame_id));
+        Some(messages)
+    }
+
+    /// Puts the orientation that is asked for in the place of the true one.
+    fn orient(&mut self, sample: &ImuSample, field: Option<&Vector3<f64>>, data: &mut Imu) {
+        if let Some(filter) = &mut self.filter {
+            data.orientation = filter.update(&sample.reading(), field, sample.stamp).into();
+            data.orientation_covariance = filter.covariance(field.is_some());
+        } else if self.orientation == OrientationSource::None {
+            data.orientation = UnitQuaternion::identity().into();
+            data.orientation_covariance = self.output.covariances.without_orientation().orientation;
+        }
     }
 
     /// Begins anew with the next sample, see [`StreamingEffects::reset`].
     pub fn reset(&mut self) {
         self.effects.reset();
+        self.magnetic.iter_mut().for_each(MagneticSensor::reset);
+        self.filter.iter_mut().for_each(OrientationFilter::reset);
     }
 }
 
@@ -168,6 +220,7 @@ pub fn measure_recording(
         noise,
         frame_id,
         mapping,
+        ..
     } = options;
     let declared = effects.declared_noise;
     let losses = effects.effects.get(EffectKind::DroppedSamples);
@@ -198,7 +251,7 @@ pub fn measure_recording(
             specific_force: reading.specific_force,
             angular_velocity: reading.angular_velocity,
         };
-        (!lost).then(|| output.messages(sample, variance).data_raw)
+        (!lost).then(|| output.messages(&output.mapped(sample), variance).data_raw)
     };
     let variances = motion.variances.iter().chain(std::iter::repeat(&none));
     Ok((0..readings.len())
@@ -235,18 +288,23 @@ fn noisy_readings(
 }
 
 impl Output {
-    fn messages(&self, mut sample: ImuSample, variance: &SampleVariance) -> ImuMessages {
+    fn mapped(&self, mut sample: ImuSample) -> ImuSample {
         if let Some(mapping) = &self.mapping {
             let mapped = mapping.map(&sample.reading());
             (sample.specific_force, sample.angular_velocity) =
                 (mapped.specific_force, mapped.angular_velocity);
         }
-        let covariances = self.covariances.with_motion(variance, &sample);
+        sample
+    }
+
+    fn messages(&self, sample: &ImuSample, variance: &SampleVariance) -> ImuMessages {
+        let covariances = self.covariances.with_motion(variance, sample);
         let raw = covariances.without_orientation();
         let none = UnitQuaternion::identity();
         ImuMessages {
-            data_raw: self.message(&sample, none, &raw),
-            data: self.message(&sample, sample.world_from_sensor, &covariances),
+            data_raw: self.message(sample, none, &raw),
+            data: self.message(sample, sample.world_from_sensor, &covariances),
+            mag: None,
         }
     }
 

@@ -49,6 +49,8 @@ fn stated(effects: EffectSet, before_s: f64) -> Imu {
         noise: false,
         frame_id: "wrist_imu".to_owned(),
         mapping: None,
+        field: None,
+        orientation: OrientationSource::Truth,
     };
     measure_recording(motion, &effects, options).unwrap()[50].clone()
 }

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use cromosim_imu::{
-    Device, EffectKind, EffectSpec, GRAVITY_IN_WORLD, ImuOptions, KinematicSample, SampleVariance,
-    VirtualImu,
+    Device, EffectKind, EffectSpec, GRAVITY_IN_WORLD, ImuOptions, KinematicSample,
+    OrientationSource, SampleVariance, VirtualImu,
 };
 use cromosim_learned::MappingFile;
 use cromosim_msgs::sensor_msgs::Imu;
@@ -177,6 +177,8 @@ pub fn apply_device<'py>(
             frame_id: format!("{name}_imu"),
             name,
             noise,
+            field: None,
+            orientation: OrientationSource::Truth,
         };
         let mut imu = VirtualImu::new(&device, options).map_err(raise)?;
         let samples = (0..ideal.stamps.len()).map(|k| ideal.sample(k));

@@ -1,8 +1,8 @@
 //! IMUs on rigid bodies, whole or live.
 
 use cromosim_imu::{
-    Device, EffectsFile, ImuOptions, PlacementEffects, Scheme, SensorFrame, StreamOptions,
-    StreamingImu, TextureSegment, VirtualImu,
+    Device, EffectsFile, ImuOptions, OrientationSource, PlacementEffects, Scheme, SensorFrame,
+    StreamOptions, StreamingImu, TextureSegment, VirtualImu,
 };
 use cromosim_learned::scheme_for_networks;
 use cromosim_msgs::sensor_msgs::Imu;
@@ -152,6 +152,8 @@ impl Stream {
             name,
             noise,
             mapping: None,
+            field: None,
+            orientation: OrientationSource::Truth,
         };
         Ok(Self {
             scheme: StreamingImu::new(scheme.unwrap_or_default(), options).map_err(raise)?,

@@ -44,6 +44,7 @@ pub fn write_as_bag(path: &Path, out: &Path) -> Result<bool, RecordingError> {
             reference,
             imu,
             orientations: &[],
+            magnetic_field: &[],
         }]
     };
     match parse_rigid(&read_whole(path)?, &name)? {

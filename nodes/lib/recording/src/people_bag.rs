@@ -6,7 +6,7 @@ use cromosim_imu::{ImuMessages, MountedSensors, SensorPose};
 use cromosim_msgs::RosMessage;
 use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_msgs::geometry_msgs::PoseStamped;
-use cromosim_msgs::sensor_msgs::Imu;
+use cromosim_msgs::sensor_msgs::{Imu, MagneticField};
 use cromosim_msgs::std_msgs::Header;
 use cromosim_spatial::Stamp;
 use rayon::prelude::*;
@@ -73,7 +73,10 @@ pub fn write_people<E: From<RecordingError>>(
     Ok(())
 }
 
-/// Of each person: of the states, then of each placement's reference, `data_raw` and `data`. Their
+/// Topics of each placement, see [`topics`].
+const PLACEMENT_TOPICS: usize = 4;
+
+/// Of each person: of the states, then of each placement's reference, `data_raw`, `data` and `mag`. Their
 /// places are the ranks of messages.
 fn topics(people: &[PlayedPerson], simulated: &[SimulatedPerson]) -> Vec<Topic> {
     let mut topics = Vec::new();
@@ -86,6 +89,8 @@ fn topics(people: &[PlayedPerson], simulated: &[SimulatedPerson]) -> Vec<Topic> 
                 let imu = person.topic(&format!("imu/{name}/{ending}"));
                 topics.push(Topic::for_message::<Imu>(&imu));
             }
+            let mag = person.topic(&format!("imu/{name}/mag"));
+            topics.push(Topic::for_message::<MagneticField>(&mag));
         }
     }
     topics
@@ -145,7 +150,7 @@ impl<'a> Blocks<'a> {
                     pending: None,
                     rank,
                 })));
-                rank += 3;
+                rank += PLACEMENT_TOPICS;
             }
         }
         let step_s = (last - first).max(1e-3) * (BLOCK_MESSAGES / messages.max(1) as f64).min(1.0);
@@ -216,7 +221,12 @@ impl Frames<'_> {
                     header: Header::new(stamp.nanos, "world"),
                     pose: pose.world_from_sensor.into(),
                 };
-                encoded(&message, stamp, [rank + 1 + 3 * index; 2], topics)
+                encoded(
+                    &message,
+                    stamp,
+                    [rank + 1 + PLACEMENT_TOPICS * index; 2],
+                    topics,
+                )
             };
             let references = poses.iter().enumerate().map(reference);
             std::iter::once(Ok(state))
@@ -256,6 +266,9 @@ impl Samples<'_> {
                 [rank, self.rank + 2],
                 topics,
             )?);
+            if let Some(mag) = &messages.mag {
+                taken.push(encoded(mag, stamp, [rank, self.rank + 3], topics)?);
+            }
         }
     }
 

@@ -7,9 +7,9 @@ use std::path::Path;
 use cromosim_bag::BagWriter;
 use cromosim_imu::{
     DeclaredNoise, Differentiation, EffectSet, EffectsFile, ImuOptions, KinematicSample,
-    PlacementEffects, ReadingMapping, RecordedMotion, SampleVariance, SensorFrame,
-    SensorTrajectory, TextureSegment, Trim, UnexplainedErrors, add_texture, measure_recording,
-    simulate_kinematics, track_in_sensor_axes,
+    OrientationSource, PlacementEffects, ReadingMapping, RecordedMotion, SampleVariance,
+    SensorFrame, SensorTrajectory, TextureSegment, Trim, UnexplainedErrors, add_texture,
+    measure_recording, simulate_kinematics, track_in_sensor_axes,
 };
 use cromosim_learned::{LearnedSimulator, MappingFile, SiteMotion};
 use cromosim_msgs::geometry_msgs::PoseStamped;
@@ -186,6 +186,8 @@ impl Resimulation {
                 |message| message.header.frame_id.clone(),
             ),
             mapping: reading_mapping(&self.mapping, name),
+            field: None,
+            orientation: OrientationSource::Truth,
         };
         let messages = measure_recording(motion, effects, options)?;
         Ok(Resimulated { messages, quality })

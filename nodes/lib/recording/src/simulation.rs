@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use cromosim_body::{BodyModel, ShapedBody};
 use cromosim_imu::{
-    Device, Differentiation, DrawnTexture, ImuOptions, KinematicSample, MotionCorrection,
-    MountedSensor, MountedSensors, PlacementSet, PoseStd, SensorTrajectory, TextureSegment, Trim,
-    VirtualImu, add_texture, simulate_kinematics_on,
+    AmbientField, Device, Differentiation, DrawnTexture, ImuOptions, KinematicSample,
+    MotionCorrection, MountedSensor, MountedSensors, OrientationSource, PlacementSet, PoseStd,
+    SensorTrajectory, TextureSegment, Trim, VirtualImu, add_texture, simulate_kinematics_on,
 };
 use cromosim_learned::{LearnedSimulator, MappingFile, Patch, SiteMotion, scheme_for_networks};
 use cromosim_spatial::{PoseTimes, uniform_stamps};
@@ -88,6 +88,10 @@ pub struct SimulationOptions {
     pub learned: Option<LearnedSimulator>,
     /// Maps readings last, at the placements that it names.
     pub mapping: MappingFile,
+    /// What devices with a magnetometer read; none: nothing is said of it.
+    pub field: Option<Arc<AmbientField>>,
+    /// Where the orientations come from.
+    pub orientation: OrientationSource,
 }
 
 /// Placements with their devices on a body, ready for any number of motions.
@@ -268,6 +272,8 @@ impl Simulation {
             noise: self.options.noise,
             frame_id: person.frame(&format!("{name}_imu")),
             mapping: reading_mapping(&self.options.mapping, name),
+            field: self.options.field.clone(),
+            orientation: self.options.orientation,
         };
         let imu = VirtualImu::new(device, options)?;
         let by = match self.options.differentiation {

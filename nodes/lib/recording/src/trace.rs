@@ -1,15 +1,15 @@
 //! What was recorded of placements, as the messages that nodes and commands know:
-//! `/reference/NAME`, `/imu/NAME/data_raw` and, where the device gave orientations,
-//! `/imu/NAME/data`.
+//! `/reference/NAME`, `/imu/NAME/data_raw` and, where the device gave orientations or has a magnetometer,
+//! `/imu/NAME/data` and `/imu/NAME/mag`.
 
 use std::fmt::Write;
 
 use cromosim_bag::{BagError, BagWriter};
 use cromosim_msgs::geometry_msgs::{Pose, PoseStamped};
-use cromosim_msgs::sensor_msgs::Imu;
+use cromosim_msgs::sensor_msgs::{Imu, MagneticField};
 use cromosim_msgs::std_msgs::Header;
 use cromosim_spatial::Stamp;
-use nalgebra::UnitQuaternion;
+use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::FIRST_STAMP;
 use crate::datasets::DatasetRecording;
@@ -26,6 +26,8 @@ pub struct PlacementTrace<'a> {
     pub imu: Option<&'a ImuSeries>,
     /// world_from_sensor as the device estimated it, one a reading, or none.
     pub orientations: &'a [UnitQuaternion<f64>],
+    /// T, in the sensor's axes, one a reading, or none.
+    pub magnetic_field: &'a [Vector3<f64>],
 }
 
 impl DatasetRecording {
@@ -40,6 +42,7 @@ impl DatasetRecording {
             reference: reference(&imu.placement),
             imu: Some(&imu.series),
             orientations: &imu.world_from_sensor,
+            magnetic_field: &imu.magnetic_field,
         });
         traces.collect()
     }
@@ -126,6 +129,7 @@ struct TraceWriter<'a> {
     reference_topic: String,
     raw_topic: String,
     oriented_topic: String,
+    magnetic_topic: String,
     sensor_frame: String,
     world_frame: &'a str,
 }
@@ -142,6 +146,7 @@ impl<'a> TraceWriter<'a> {
             reference_topic: format!("/reference/{name}"),
             raw_topic: format!("/imu/{name}/data_raw"),
             oriented_topic: format!("/imu/{name}/data"),
+            magnetic_topic: format!("/imu/{name}/mag"),
             sensor_frame: format!("{name}_imu"),
             world_frame: world.unwrap_or("world"),
         }
@@ -160,6 +165,14 @@ impl<'a> TraceWriter<'a> {
             (Row::Reading(index), _, Some(series)) => {
                 let message = imu_message(series, index, stamp, &self.sensor_frame);
                 bag.write(&self.raw_topic, stamp, &message)?;
+                if let Some(field) = self.trace.magnetic_field.get(index) {
+                    let field = MagneticField {
+                        header: message.header.clone(),
+                        magnetic_field: (*field).into(),
+                        ..MagneticField::default()
+                    };
+                    bag.write(&self.magnetic_topic, stamp, &field)?;
+                }
                 let Some(orientation) = self.trace.orientations.get(index) else {
                     return Ok(());
                 };

@@ -82,7 +82,7 @@ fn broad_as_published_is_told_read_and_cut() {
         (imu.series.stamps.len(), body.stamps.len(), name.as_str()),
         (40, 37, "body")
     );
-    assert_eq!(imu.magnetic_field[7], Vector3::new(20.0, 0.0, -40.0));
+    assert_eq!(imu.magnetic_field[7], Vector3::new(20.0, 0.0, -40.0) * 1e-6);
     // Rows of MATLAB's columns: the body turns about z by 0.5 rad/s and goes along x by 0.1 m/s.
     let (last, time) = (body.rotations.len() - 1, 39.0 * 3.5e-3);
     assert!(

@@ -5,8 +5,9 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use super::*;
 use crate::{
-    Channel, Device, DrawnBiases, ImuOptions, KinematicSample, NoiseSource, PlacementEffects,
-    Reading, RecordedMotion, SampleVariance, UnexplainedErrors, VirtualImu, measure_recording,
+    Channel, Device, DrawnBiases, ImuOptions, KinematicSample, NoiseSource, OrientationSource,
+    PlacementEffects, Reading, RecordedMotion, SampleVariance, UnexplainedErrors, VirtualImu,
+    measure_recording,
 };
 
 const START: Stamp = Stamp::from_nanos(1_700_000_000_000_000_000);
@@ -106,6 +107,8 @@ fn options(rate_hz: f64, seed: u64) -> ImuOptions {
         noise: true,
         frame_id: "still_imu".to_owned(),
         mapping: None,
+        field: None,
+        orientation: OrientationSource::Truth,
     }
 }
 

@@ -55,14 +55,14 @@ const ORDINARY_S: f64 = 1e-3;
 /// A channel's values as they come, given out late: straight lines between the samples. What would be
 /// early follows the last line on, as nothing of the future is known.
 #[derive(Clone, Debug)]
-pub(super) struct DelayLine {
+pub(crate) struct DelayLine {
     delay_s: f64,
     /// Time, s, and value, in order.
     history: VecDeque<(f64, Vector3<f64>)>,
 }
 
 impl DelayLine {
-    pub(super) fn new(delay_s: f64) -> Self {
+    pub(crate) fn new(delay_s: f64) -> Self {
         Self {
             delay_s,
             history: VecDeque::new(),
@@ -71,7 +71,7 @@ impl DelayLine {
 
     /// The value at `seconds` less the delay, given that at `seconds`; before the first one it is
     /// held.
-    pub(super) fn push(&mut self, seconds: f64, value: Vector3<f64>) -> Vector3<f64> {
+    pub(crate) fn push(&mut self, seconds: f64, value: Vector3<f64>) -> Vector3<f64> {
         self.history.push_back((seconds, value));
         let wanted = seconds - self.delay_s;
         while self.history.len() > 2 && self.history[1].0 <= wanted {
@@ -87,7 +87,7 @@ impl DelayLine {
     }
 
     /// Begins anew with the next value.
-    pub(super) fn reset(&mut self) {
+    pub(crate) fn reset(&mut self) {
         self.history.clear();
     }
 }

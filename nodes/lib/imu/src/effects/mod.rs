@@ -82,6 +82,7 @@ mod start_tests;
 
 pub use crate::channel::Reading;
 pub use axis_convention::nearest_signed_permutation;
+pub(crate) use channel_delay::DelayLine;
 pub use drawn_biases::DrawnBiases;
 pub(crate) use drawn_biases::StatedBiases;
 pub use dropped_samples::Dropouts;

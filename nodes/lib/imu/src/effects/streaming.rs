@@ -118,17 +118,22 @@ impl StreamingEffects {
         (!lost).then_some(reading)
     }
 
+    /// world_from_sensor of a sample that [`StreamingEffects::step`] has taken, as it is.
+    pub(crate) fn world_from_sensor(&self, sample: &KinematicSample) -> UnitQuaternion<f64> {
+        let turn = self
+            .model
+            .as_ref()
+            .and_then(|model| sensor_from_segment(model, sample.stamp - model.epoch));
+        sample.world_from_sensor.rotation * orientation(turn.as_ref())
+    }
+
     fn reading(&mut self, model: &SensorModel, sample: &KinematicSample) -> ImuSample {
         let seconds = sample.stamp - model.epoch;
         let interval = self.previous.map_or(0.0, |(stamp, _)| sample.stamp - stamp);
         if !(0.0..=10.0 / self.rate_hz).contains(&interval) {
             self.forget();
         }
-        let sensor_from_segment = model
-            .slip
-            .filter(|(at, _)| seconds >= *at)
-            .map(|(_, after)| after)
-            .or(model.sensor_from_segment);
+        let sensor_from_segment = sensor_from_segment(model, seconds);
         let (mut reading, mut turning) = (Reading::default(), Turning::default());
         let mut stamp = sample.stamp;
         let mut world_from_sensor =
@@ -228,6 +233,15 @@ impl StreamingEffects {
             angular_velocity: turning.velocity,
         }
     }
+}
+
+/// So many seconds after the epoch.
+fn sensor_from_segment(model: &SensorModel, seconds: f64) -> Option<Matrix3<f64>> {
+    model
+        .slip
+        .filter(|(at, _)| seconds >= *at)
+        .map(|(_, after)| after)
+        .or(model.sensor_from_segment)
 }
 
 /// segment_from_sensor as a rotation; a mirrored axis convention, which is none, leaves the

@@ -157,6 +157,7 @@ fn write_bag(
         reference,
         imu,
         orientations: &[],
+        magnetic_field: &[],
     };
     let (traces, recording): (_, Option<&DatasetRecording>) = match content {
         Content::Motion(_) => (Vec::new(), None),

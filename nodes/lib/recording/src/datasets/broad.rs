@@ -9,7 +9,7 @@ use cromosim_arrays::{Container, Entry, Limits};
 use cromosim_spatial::Stamp;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-use super::{DatasetRecording, PlacedImu};
+use super::{DatasetRecording, PlacedImu, TESLA_PER_MICROTESLA};
 use crate::rigid::table::unit_quaternion;
 use crate::rigid::{PoseTrajectory, RigidError};
 
@@ -106,7 +106,7 @@ pub fn parse_broad<R: Read + Seek>(reader: R, name: &str) -> Result<DatasetRecor
         match trial.reading(row) {
             Some([acc, gyr, mag]) => {
                 imu.series.push(stamp, acc, gyr);
-                imu.magnetic_field.push(mag);
+                imu.magnetic_field.push(mag * TESLA_PER_MICROTESLA);
             }
             None => imu.rows_left_out += 1,
         }

@@ -18,6 +18,9 @@ mod recording;
 mod skeleton_npz;
 mod totalcapture;
 
+/// Data sets give magnetic fields in microtesla.
+const TESLA_PER_MICROTESLA: f64 = 1e-6;
+
 pub use broad::parse_broad;
 pub use columns::parse_columns;
 pub use dip::{DIP_SENSORS, DipArray, DipRecording};

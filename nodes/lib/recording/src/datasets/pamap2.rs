@@ -2,7 +2,7 @@
 
 use cromosim_body::Joint;
 
-use super::{DatasetRecording, PlacedImu};
+use super::{DatasetRecording, PlacedImu, TESLA_PER_MICROTESLA};
 use crate::rigid::RigidError;
 use crate::rigid::table::{Row, by_blanks, rows, text};
 
@@ -61,7 +61,8 @@ pub fn parse_pamap2(bytes: &[u8], name: &str) -> Result<DatasetRecording, RigidE
             ) {
                 (Some(specific_force), Some(angular_velocity), Some(magnetic_field)) => {
                     imu.series.push(stamp, specific_force, angular_velocity);
-                    imu.magnetic_field.push(magnetic_field);
+                    imu.magnetic_field
+                        .push(magnetic_field * TESLA_PER_MICROTESLA);
                 }
                 _ => imu.rows_left_out += 1,
             }

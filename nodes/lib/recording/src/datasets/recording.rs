@@ -20,7 +20,7 @@ pub struct PlacedImu {
     pub series: ImuSeries,
     /// world_from_sensor as the device estimated it; one a reading, or none at all.
     pub world_from_sensor: Vec<UnitQuaternion<f64>>,
-    /// Magnetometer in the sensor's axes, in the data set's unit; one a reading, or none at all.
+    /// Magnetometer in the sensor's axes, T; one a reading, or none at all.
     pub magnetic_field: Vec<Vector3<f64>>,
     /// Rows without readings of this IMU, or out of the order of time.
     pub rows_left_out: usize,

@@ -16,6 +16,10 @@ const MAX_SENSORS: usize = 100;
 const MAX_JOINTS: usize = 200;
 const METRES_PER_INCH: f64 = 0.0254;
 
+/// Xsens gives the magnetic field in units of the earth's where the device was calibrated, which the files do
+/// not say; taken as that of the data set's university, 51.2 N 0.6 W (WMM2020), to two digits.
+const TESLA_PER_UNIT: f64 = 4.9e-5;
+
 /// Reads a `.sensors` file: a line with the numbers of sensors and frames; per frame a line with
 /// its number, and a line per sensor with its name, orientation (w x y z, world_from_sensor),
 /// specific force (m/s2), angular velocity (rad/s) and magnetic field, in its own axes.
@@ -96,7 +100,7 @@ fn add(
     imu.world_from_sensor.push(row.rotation([2, 3, 4, 1])?);
     imu.series
         .push(stamp(frame), row.vector(5)?, row.vector(8)?);
-    imu.magnetic_field.push(row.vector(11)?);
+    imu.magnetic_field.push(row.vector(11)? * TESLA_PER_UNIT);
     Ok(())
 }
 

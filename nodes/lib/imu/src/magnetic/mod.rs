@@ -1,0 +1,8 @@
+//! The magnetic field of a place, and what a device's magnetometer makes of it.
+
+mod field;
+mod magnetometer;
+
+pub use field::AmbientField;
+pub use magnetometer::Magnetometer;
+pub(crate) use magnetometer::{MagneticSensor, RawMagnetometer};
