@@ -12,7 +12,7 @@ use cromosim_bag::BagReader;
 use cromosim_body::BodyModel;
 use cromosim_imu::ImuMessages;
 use cromosim_msgs::cromosim_msgs::SmplState;
-use cromosim_msgs::sensor_msgs::{Imu, MagneticField};
+use cromosim_msgs::sensor_msgs::{Imu, MagneticField, Temperature};
 use cromosim_virtual_imu::{Config, VirtualImuNode, placements};
 
 const DEVICE: &str = "\
@@ -27,6 +27,7 @@ effects:
 - {effect: time_offset, seconds: 0.0125}
 - {effect: dropped_samples, fraction: 0.1, mean_burst: 3.0}
 - {effect: accel_quantization, lsb: 0.0048}
+- {effect: warm_up, start: 22.0, rise: 10.0, time_constant: 3.0, accel_per_kelvin: [0.02, 0.0, -0.01], gyro_per_kelvin: [0.0, 0.002, 0.0]}
 magnetometer: {noise_density: 1.0e-8, hard_iron: [2.0e-6, 0, 0], hard_iron_deviation: [1.0e-6, 1.0e-6, 1.0e-6], delay: 0.013, lsb: 1.5e-7}
 ";
 /// Schemes whose first samples rest on the frames that have come live, too, so that filters with a
@@ -157,6 +158,18 @@ fn a_device_with_effects_reads_live_what_it_reads_offline() {
             for (live, (_, mag)) in live.iter().zip(&mag) {
                 same_field(live.mag.as_ref().unwrap(), mag);
             }
+            let said: Vec<&Temperature> = live
+                .iter()
+                .filter_map(|it| it.temperature.as_ref())
+                .collect();
+            let temperature = bag
+                .read::<Temperature>(&format!("/imu/{name}/temperature"))
+                .unwrap();
+            assert!(said.len() >= 4 && said.len() <= temperature.len());
+            for (live, (_, offline)) in said.iter().zip(&temperature) {
+                assert_eq!(*live, offline);
+            }
+            assert!(said[0].temperature == 22.0 && said[3].temperature > 28.0);
             lost.push(401 - data_raw.len());
         }
     }

@@ -91,6 +91,7 @@ static KNOWN: &[&MessageType] = types![
     rosgraph_msgs::Clock,
     sensor_msgs::Imu,
     sensor_msgs::MagneticField,
+    sensor_msgs::Temperature,
     std_msgs::Header,
     std_msgs::String,
     tf2_msgs::TFMessage,

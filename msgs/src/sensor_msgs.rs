@@ -41,3 +41,17 @@ ros_message! {
         pub magnetic_field_covariance: [f64; 9],
     }
 }
+
+ros_message! {
+    "sensor_msgs/msg/Temperature", "../std/sensor_msgs/msg/Temperature.msg", Message;
+    /// One reading of a thermometer.
+    #[derive(Default)]
+    pub struct Temperature {
+        /// Time, and where it is measured.
+        pub header: Header,
+        /// degC.
+        pub temperature: f64,
+        /// K2; 0: unknown.
+        pub variance: f64,
+    }
+}

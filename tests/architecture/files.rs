@@ -197,7 +197,8 @@ fn files_are_read_in_a_sitting() {
     let long: Vec<String> = ["nodes", "msgs", "tests"]
         .into_iter()
         .flat_map(files_below)
-        .filter(|file| file.ends_with(".rs"))
+        // What the fuzz targets' build made is nobody's reading.
+        .filter(|file| file.ends_with(".rs") && !file.starts_with("tests/fuzz/target/"))
         .map(|file| {
             let text = fs::read_to_string(root().join(&file)).unwrap();
             (text.lines().count(), file)

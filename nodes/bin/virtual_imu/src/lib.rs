@@ -1,6 +1,6 @@
 //! The node `virtual_imu`: `smpl/state` in; `imu/NAME/data_raw` and `imu/NAME/data` of every
-//! placement out, `imu/NAME/mag` where a device has a magnetometer and the field is known, with their
-//! frames.
+//! placement out, `imu/NAME/mag` where a device has a magnetometer and the field is known,
+//! `imu/NAME/temperature` where it warms up, with their frames.
 
 mod config;
 mod node;
@@ -19,7 +19,7 @@ use cromosim_msgs::builtin_interfaces::Time;
 use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_msgs::diagnostic_msgs::DiagnosticArray;
 use cromosim_msgs::geometry_msgs::PoseStamped;
-use cromosim_msgs::sensor_msgs::{Imu, MagneticField};
+use cromosim_msgs::sensor_msgs::{Imu, MagneticField, Temperature};
 use cromosim_msgs::std_msgs;
 use cromosim_msgs::tf2_msgs::TFMessage;
 use cromosim_ros::{Durability, Node, Publisher, Qos, RosError, prepare};
@@ -35,6 +35,8 @@ struct Publishers {
     data: Vec<Publisher<Imu>>,
     /// By placement; none without a magnetometer or a known field.
     mag: Vec<Option<Publisher<MagneticField>>>,
+    /// By placement; none of devices without a temperature.
+    temperature: Vec<Option<Publisher<Temperature>>>,
     references: Vec<Publisher<PoseStamped>>,
     frames: Publisher<TFMessage>,
     diagnostics: Publisher<DiagnosticArray>,
@@ -56,13 +58,6 @@ impl Publishers {
                 .iter()
                 .map(|topic| node.publisher::<Imu>(topic, Qos::reliable()))
                 .collect::<Result<Vec<_>, _>>()
-        };
-        let mag = |(placement, topic): (usize, &String)| {
-            let publisher = || node.publisher::<MagneticField>(topic, Qos::reliable());
-            logic
-                .has_magnetometer(placement)
-                .then(publisher)
-                .transpose()
         };
         let reference = |placement: &Placement| {
             node.publisher::<PoseStamped>(
@@ -88,11 +83,8 @@ impl Publishers {
         Ok(Self {
             data_raw: imu("data_raw")?,
             data: imu("data")?,
-            mag: topics("mag")
-                .iter()
-                .enumerate()
-                .map(mag)
-                .collect::<Result<_, _>>()?,
+            mag: some(node, &topics("mag"), |it| logic.has_magnetometer(it))?,
+            temperature: some(node, &topics("temperature"), |it| logic.warms_up(it))?,
             references: referenced.iter().map(reference).collect::<Result<_, _>>()?,
             frames: node.publisher("/tf", Qos::tf())?,
             diagnostics: node.publisher("/diagnostics", Qos::reliable())?,
@@ -111,6 +103,10 @@ impl Publishers {
             if let (Some(publisher), Some(mag)) = (&self.mag[*placement], &reading.mag) {
                 publish_if_heard(publisher, mag);
             }
+            let temperature = (&self.temperature[*placement], &reading.temperature);
+            if let (Some(publisher), Some(temperature)) = temperature {
+                publish_if_heard(publisher, temperature);
+            }
         }
         if !step.frames.transforms.is_empty() {
             report(self.frames.publish(&step.frames));
@@ -119,6 +115,19 @@ impl Publishers {
             report(publisher.publish(reference));
         }
     }
+}
+
+/// Publishers of the placements that have something to say; `topics` are in their order.
+fn some<M: RosMessage>(
+    node: &Node,
+    topics: &[String],
+    is_wanted: impl Fn(usize) -> bool,
+) -> Result<Vec<Option<Publisher<M>>>, RosError> {
+    let publisher = |(placement, topic): (usize, &String)| {
+        let publisher = || node.publisher::<M>(topic, Qos::reliable());
+        is_wanted(placement).then(publisher).transpose()
+    };
+    topics.iter().enumerate().map(publisher).collect()
 }
 
 fn publish_if_heard<M: RosMessage>(publisher: &Publisher<M>, message: &M) {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use cromosim_body::{BodyError, BodyModel, BodyPose, Joint, ShapedBody};
 use cromosim_imu::{
-    AmbientField, Device, Follow, ImuError, ImuMessages, ImuOptions, MountedSensors,
+    AmbientField, Device, EffectKind, Follow, ImuError, ImuMessages, ImuOptions, MountedSensors,
     OrientationSource, Placement, PlacementSet, PoseStd, ReadingMapping, StreamOptions,
     StreamingImu, VirtualImu, measure_all,
 };
@@ -210,6 +210,13 @@ impl VirtualImuNode {
     /// known.
     pub fn has_magnetometer(&self, placement: usize) -> bool {
         self.field.is_some() && self.devices[placement].magnetometer().is_some()
+    }
+
+    /// Whether `imu/NAME/temperature` is there: the placement's device warms up.
+    pub fn warms_up(&self, placement: usize) -> bool {
+        self.devices[placement]
+            .effects()
+            .contains(EffectKind::WarmUp)
     }
 
     /// Delay of each placement's scheme and networks, s; none before the rate of the states is

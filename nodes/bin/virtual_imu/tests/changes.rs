@@ -14,6 +14,18 @@ const START: i64 = 1_700_000_000_000_000_000;
 const FRAMES: usize = 200;
 /// Of the states.
 const RATE_HZ: f64 = 100.0;
+/// Moves one channel of one placement.
+const MAPPING: &str = "\
+schema: cromosim/mapping/1
+placements:
+  left_wrist:
+    accel_x: {simulated: [-90.0, 90.0], measured: [-89.5, 90.5]}
+    accel_y: &same {simulated: [-90.0, 90.0], measured: [-90.0, 90.0]}
+    accel_z: *same
+    gyro_x: *same
+    gyro_y: *same
+    gyro_z: *same
+";
 
 fn node(config: Config) -> VirtualImuNode {
     let set = placements(&config).unwrap();
@@ -136,4 +148,82 @@ fn networks_come_and_go() {
         ..quiet()
     });
     assert_eq!(plain, feed(&mut fresh, &motion, 2 * FRAMES..3 * FRAMES));
+}
+
+#[test]
+fn another_device_and_another_orientation_act_from_the_next_state_on() {
+    let motion = embedded_walk();
+    let with = |device: &str, orientation: &str| Config {
+        device: device.to_owned(),
+        orientation: orientation.to_owned(),
+        ..quiet()
+    };
+    let mut changing = node(quiet());
+    feed(&mut changing, &motion, 0..FRAMES);
+    change(&mut changing, with("icm42688p", "none"));
+    let after = feed(&mut changing, &motion, FRAMES..2 * FRAMES);
+    assert!(
+        after
+            .iter()
+            .all(|(_, it)| it.data.orientation_covariance[0] == -1.0)
+    );
+    assert!(after.iter().any(|(_, it)| it.temperature.is_some()));
+    let whole = feed(&mut node(with("icm42688p", "none")), &motion, 0..2 * FRAMES);
+    // The same but for the warming up, which began with the change.
+    let (now, then) = (
+        &after[after.len() - 1].1.data,
+        &whole[whole.len() - 1].1.data,
+    );
+    assert_eq!(now.header, then.header);
+    assert!((now.linear_acceleration.x - then.linear_acceleration.x).abs() < 2e-3 + 0.0048);
+
+    change(&mut changing, with("", "vqf"));
+    let fused = feed(&mut changing, &motion, 2 * FRAMES..3 * FRAMES);
+    assert!(
+        fused
+            .iter()
+            .all(|(_, it)| it.data.orientation_covariance[8] > 3.0 && it.temperature.is_none())
+    );
+
+    for (wrong, word) in [
+        (with("icm", ""), "unknown device `icm`"),
+        (with("", "madgwik"), "the nearest is madgwick"),
+        (with("gone.yaml", "truth"), "gone.yaml"),
+    ] {
+        let set = placements(&wrong).unwrap();
+        let refusal = changing.change(wrong, &set).unwrap_err().to_string();
+        assert!(refusal.contains(word), "{refusal}");
+    }
+    let kept = feed(&mut changing, &motion, 3 * FRAMES..4 * FRAMES);
+    assert!(
+        kept.iter()
+            .all(|(_, it)| it.data.orientation_covariance[8] > 3.0)
+    );
+}
+
+#[test]
+fn a_mapping_acts_from_the_next_state_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("map.yaml");
+    std::fs::write(&file, MAPPING).unwrap();
+    let mapped = Config {
+        mapping: file.display().to_string(),
+        ..quiet()
+    };
+    let motion = embedded_walk();
+    let mut changing = node(quiet());
+    feed(&mut changing, &motion, 0..FRAMES);
+    change(&mut changing, mapped);
+    let range = FRAMES..2 * FRAMES;
+    let after = feed(&mut changing, &motion, range.clone());
+    let mut plain = node(quiet());
+    feed(&mut plain, &motion, 0..FRAMES);
+    for ((placement, mapped), (_, plain)) in after.iter().zip(feed(&mut plain, &motion, range)) {
+        let moved = mapped.data.linear_acceleration.x - plain.data.linear_acceleration.x;
+        let is_mapped = changing.placements()[*placement].name() == "left_wrist";
+        assert!(
+            (moved - if is_mapped { 0.5 } else { 0.0 }).abs() < 1e-6,
+            "{moved}"
+        );
+    }
 }

@@ -97,7 +97,7 @@ pub(crate) struct OrientationFilter {
 enum Filter {
     Vqf(Box<VQF>),
     /// With a magnetometer its world is north, west, up.
-    Other(Box<dyn AhrsWithDt + Send>),
+    Other(Box<dyn AhrsWithDt + Send + Sync>),
 }
 
 impl OrientationFilter {

@@ -8,11 +8,12 @@
 
 use std::sync::Arc;
 
-use cromosim_msgs::sensor_msgs::{Imu, MagneticField};
+use cromosim_msgs::sensor_msgs::{Imu, MagneticField, Temperature};
 use cromosim_msgs::std_msgs::Header;
 use cromosim_spatial::{KinematicTrack, Stamp};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
+use crate::effects::Thermometer;
 use crate::magnetic::MagneticSensor;
 use crate::orientation::OrientationFilter;
 use crate::stated_errors::{StatedErrors, with_clock_errors};
@@ -72,6 +73,8 @@ pub struct ImuMessages {
     pub data: Imu,
     /// For `imu/NAME/mag`, of devices that have a magnetometer, in a known field.
     pub mag: Option<MagneticField>,
+    /// For `imu/NAME/temperature`, once a second, of devices that warm up.
+    pub temperature: Option<Temperature>,
 }
 
 /// The last steps: from a reading to messages.
@@ -86,6 +89,7 @@ pub struct VirtualImu {
     effects: StreamingEffects,
     stated: StatedErrors,
     magnetic: Option<MagneticSensor>,
+    thermometer: Option<Thermometer>,
     orientation: OrientationSource,
     /// None where the orientation is no filter's.
     filter: Option<OrientationFilter>,
@@ -108,6 +112,7 @@ impl VirtualImu {
             .map(|(model, field)| MagneticSensor::new(model, field, options.rate_hz, noise));
         Ok(Self {
             magnetic,
+            thermometer: Thermometer::new(device.effects()),
             orientation: options.orientation,
             filter: OrientationFilter::new(options.orientation, options.rate_hz),
             effects: if options.noise {
@@ -145,6 +150,15 @@ impl VirtualImu {
             .as_ref()
             .zip(field)
             .map(|(sensor, field)| sensor.message(field, sample.stamp, &self.output.frame_id));
+        let temperature = self
+            .thermometer
+            .as_mut()
+            .and_then(|it| it.read(sample.stamp));
+        messages.temperature = temperature.map(|temperature| Temperature {
+            header: Header::new(sample.stamp.nanos, &self.output.frame_id),
+            temperature,
+            variance: 0.0,
+        });
         Some(messages)
     }
 
@@ -164,6 +178,7 @@ impl VirtualImu {
         self.effects.reset();
         self.magnetic.iter_mut().for_each(MagneticSensor::reset);
         self.filter.iter_mut().for_each(OrientationFilter::reset);
+        self.thermometer.iter_mut().for_each(Thermometer::reset);
     }
 }
 
@@ -305,6 +320,7 @@ impl Output {
             data_raw: self.message(sample, none, &raw),
             data: self.message(sample, sample.world_from_sensor, &covariances),
             mag: None,
+            temperature: None,
         }
     }
 

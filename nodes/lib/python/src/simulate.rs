@@ -5,7 +5,8 @@ use std::path::Path;
 use std::str::FromStr;
 
 use cromosim_imu::{
-    Device, Differentiation, ImuMessages, PlacementSet, Scheme, TextureSegment, Trim,
+    Device, Differentiation, ImuMessages, OrientationSource, PlacementSet, Scheme, TextureSegment,
+    Trim,
 };
 use cromosim_learned::{LearnedSimulator, MappingFile};
 use cromosim_msgs::geometry_msgs::PoseStamped;
@@ -87,6 +88,8 @@ impl Options {
                 Some(path) => MappingFile::read(Path::new(&path)).map_err(raise)?,
                 None => MappingFile::default(),
             },
+            field: None,
+            orientation: OrientationSource::Truth,
         })
     }
 }

@@ -6,7 +6,7 @@ use cromosim_imu::{ImuMessages, MountedSensors, SensorPose};
 use cromosim_msgs::RosMessage;
 use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_msgs::geometry_msgs::PoseStamped;
-use cromosim_msgs::sensor_msgs::{Imu, MagneticField};
+use cromosim_msgs::sensor_msgs::{Imu, MagneticField, Temperature};
 use cromosim_msgs::std_msgs::Header;
 use cromosim_spatial::Stamp;
 use rayon::prelude::*;
@@ -74,10 +74,10 @@ pub fn write_people<E: From<RecordingError>>(
 }
 
 /// Topics of each placement, see [`topics`].
-const PLACEMENT_TOPICS: usize = 4;
+const PLACEMENT_TOPICS: usize = 5;
 
-/// Of each person: of the states, then of each placement's reference, `data_raw`, `data` and `mag`. Their
-/// places are the ranks of messages.
+/// Of each person: of the states, then of each placement's reference, `data_raw`, `data`, `mag` and
+/// `temperature`. Their places are the ranks of messages.
 fn topics(people: &[PlayedPerson], simulated: &[SimulatedPerson]) -> Vec<Topic> {
     let mut topics = Vec::new();
     for (person, simulated) in people.iter().zip(simulated) {
@@ -91,6 +91,8 @@ fn topics(people: &[PlayedPerson], simulated: &[SimulatedPerson]) -> Vec<Topic> 
             }
             let mag = person.topic(&format!("imu/{name}/mag"));
             topics.push(Topic::for_message::<MagneticField>(&mag));
+            let temperature = person.topic(&format!("imu/{name}/temperature"));
+            topics.push(Topic::for_message::<Temperature>(&temperature));
         }
     }
     topics
@@ -268,6 +270,9 @@ impl Samples<'_> {
             )?);
             if let Some(mag) = &messages.mag {
                 taken.push(encoded(mag, stamp, [rank, self.rank + 3], topics)?);
+            }
+            if let Some(temperature) = &messages.temperature {
+                taken.push(encoded(temperature, stamp, [rank, self.rank + 4], topics)?);
             }
         }
     }

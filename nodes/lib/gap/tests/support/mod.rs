@@ -34,7 +34,7 @@ const MARGIN_S: f64 = 4.0;
 const TODAY: Stamp = Stamp::from_nanos(1_700_000_000_123_456_789);
 
 /// Effects that came later than the others' tests.
-const LATER: [EffectKind; 11] = [
+const LATER: [EffectKind; 12] = [
     EffectKind::ReferenceInterpolation,
     EffectKind::ReferenceUnits,
     EffectKind::ChannelDelay,
@@ -46,6 +46,7 @@ const LATER: [EffectKind; 11] = [
     EffectKind::GyroBiasWalk,
     EffectKind::AccelLowPass,
     EffectKind::GyroLowPass,
+    EffectKind::WarmUp,
 ];
 
 /// Seed of the scene in which an effect is tested: a new effect gives the others no other motions.

@@ -5,7 +5,7 @@ use super::{Effect, EffectKind, EffectSet, FirstGuess, Search, Shape, Stage};
 use crate::EffectError;
 
 /// The contract's table, in its order.
-const NAMES: [&str; 43] = [
+const NAMES: [&str; 44] = [
     "reference_noise",
     "reference_smoothing",
     "reference_interpolation",
@@ -36,6 +36,7 @@ const NAMES: [&str; 43] = [
     "gyro_bias_instability",
     "accel_bias_walk",
     "gyro_bias_walk",
+    "warm_up",
     "accel_saturation",
     "gyro_saturation",
     "accel_quantization",

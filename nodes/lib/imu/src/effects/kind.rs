@@ -65,6 +65,8 @@ macro_rules! with_effects {
             AccelBiasWalk => bias_walk::ACCEL,
             /// Gyroscope bias that walks away at random.
             GyroBiasWalk => bias_walk::GYRO,
+            /// Biases that follow the temperature while the device warms up.
+            WarmUp => warm_up::SPEC,
             /// Range of the accelerometer.
             AccelSaturation => saturation::ACCEL,
             /// Range of the gyroscope.

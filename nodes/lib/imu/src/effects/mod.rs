@@ -14,6 +14,7 @@
 //! Timing   w(t) <- w(t - seconds)                                    channel_delay
 //!          stamp = t0 + (t - t0) (1 + ppm 1e-6) + seconds            clock_drift, time_offset; dropped_samples
 //! Linear   x <- diag(scale) (I + upper) x + bias + rate (t - t0)     scale, misalignment, bias, bias_drift
+//!          x += per_kelvin rise (1 - exp(-(t - t0) / time_constant)) warm_up
 //! Digital  x += drawn biases + white noise, clip, round, times factor  turn_on_bias, bias_instability, bias_walk, noise; saturation, quantization, units
 //! ```
 //! [`SensorModel`] runs them over a whole recording, [`crate::StreamingEffects`] over live samples.
@@ -71,6 +72,7 @@ mod tissue;
 mod turn_on_bias;
 mod units;
 mod vibration;
+mod warm_up;
 mod wave;
 
 #[cfg(test)]
@@ -106,4 +108,5 @@ pub use spectral_line::strongest_line;
 pub use stages::{MeasurementInput, StagedReadings};
 pub use streaming::StreamingEffects;
 pub use units::unit_factors;
+pub(crate) use warm_up::Thermometer;
 pub use wave::{SpectralLine, Wave};

@@ -9,6 +9,7 @@ use super::clock_drift::Clock;
 use super::filter::SecondOrder;
 use super::readout::Readout;
 use super::tissue::{Tissue, Turning};
+use super::warm_up::WarmUp;
 use super::wave::SpectralLine;
 use super::{
     DeclaredNoise, Effect, EffectKind, EffectSet, Reading, gravity_convention, lever_arm, low_pass,
@@ -52,6 +53,7 @@ pub struct SensorModel {
     pub(super) clock: Clock,
     /// Of the gyroscope against the accelerometer, s.
     pub(super) channel_delay: f64,
+    pub(super) warm_up: Option<WarmUp>,
     pub(super) accelerometer: Readout,
     pub(super) gyroscope: Readout,
 }
@@ -108,6 +110,7 @@ impl SensorModel {
                 ppm: scalar(Kind::ClockDrift).unwrap_or(0.0),
             },
             channel_delay: scalar(Kind::ChannelDelay).unwrap_or(0.0),
+            warm_up: WarmUp::new(effects),
             accelerometer: Readout::new(effects, Channel::Accelerometer),
             gyroscope: Readout::new(effects, Channel::Gyroscope),
         }
@@ -272,7 +275,7 @@ impl SensorModel {
         }
     }
 
-    /// [`super::Stage::Linear`]: scale, misalignment, bias and drift.
+    /// [`super::Stage::Linear`]: scale, misalignment, bias, drift and temperature.
     pub(super) fn linear(&self, readings: &mut [Reading], stamps: &[Stamp]) {
         for (reading, stamp) in readings.iter_mut().zip(stamps) {
             let seconds = self.clock.true_seconds(*stamp - self.epoch);
@@ -283,10 +286,16 @@ impl SensorModel {
     /// The same for one reading, true seconds since the epoch.
     #[inline]
     pub(super) fn linear_reading(&self, reading: &Reading, seconds: f64) -> Reading {
-        Reading {
+        let mut reading = Reading {
             specific_force: self.accelerometer.linear(&reading.specific_force, seconds),
             angular_velocity: self.gyroscope.linear(&reading.angular_velocity, seconds),
+        };
+        if let Some(warm_up) = &self.warm_up {
+            let bias = warm_up.bias(seconds);
+            reading.specific_force += bias.specific_force;
+            reading.angular_velocity += bias.angular_velocity;
         }
+        reading
     }
 
     /// White noise of the readings: the declared and what effects add to it; variances add.
