@@ -59,6 +59,14 @@ impl StatedErrors {
         Self::new(device.effects(), &declared, device.unexplained(), rate_hz)
     }
 
+    /// A reading as the device knows it, SI units, whatever it reports.
+    pub fn in_si(&self, reading: &Reading) -> Reading {
+        Reading {
+            specific_force: reading.specific_force / self.units.accelerometer,
+            angular_velocity: reading.angular_velocity / self.units.gyroscope,
+        }
+    }
+
     /// What errors of the poses leave (`variance`, in SI units), motion that they cover included, in the
     /// units that the device reports; with what its biases have walked in so many seconds.
     pub fn of_motion(&self, variance: SampleVariance, walked_s: f64) -> SampleVariance {

@@ -165,7 +165,8 @@ impl VirtualImu {
     /// Puts the orientation that is asked for in the place of the true one.
     fn orient(&mut self, sample: &ImuSample, field: Option<&Vector3<f64>>, data: &mut Imu) {
         if let Some(filter) = &mut self.filter {
-            data.orientation = filter.update(&sample.reading(), field, sample.stamp).into();
+            let reading = self.stated.in_si(&sample.reading());
+            data.orientation = filter.update(&reading, field, sample.stamp).into();
             data.orientation_covariance = filter.covariance(field.is_some());
         } else if self.orientation == OrientationSource::None {
             data.orientation = UnitQuaternion::identity().into();

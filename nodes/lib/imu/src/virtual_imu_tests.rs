@@ -112,3 +112,45 @@ fn a_device_states_live_what_it_states_offline() {
         "{refused}"
     );
 }
+
+#[test]
+fn a_filter_knows_the_units_that_its_device_reports() {
+    let orientations = |effects: &str| {
+        let text = format!(
+            "schema: cromosim/device/1\ndeclared_noise: {{accel_density: 0.0, gyro_density: 0.0}}\neffects: [{effects}]\n"
+        );
+        let options = ImuOptions {
+            rate_hz: 100.0,
+            seed: 1,
+            name: "wrist".to_owned(),
+            noise: false,
+            frame_id: "wrist_imu".to_owned(),
+            mapping: None,
+            field: None,
+            orientation: OrientationSource::Madgwick,
+        };
+        let mut imu = VirtualImu::new(&Device::parse(&text, "d.yaml").unwrap(), options).unwrap();
+        let motion = |k: i64| KinematicSample {
+            stamp: Stamp::from_nanos(k * 10_000_000),
+            world_from_sensor: Isometry3::rotation(Vector3::z() * (0.01 * k as f64)),
+            acceleration_in_world: Vector3::zeros(),
+            angular_velocity_in_world: Vector3::z(),
+            angular_acceleration_in_world: None,
+            variance: SampleVariance::default(),
+            bandwidth: None,
+        };
+        let turned = |k| imu.measure(&motion(k)).unwrap().data.orientation.z;
+        (0..100).map(turned).collect::<Vec<f64>>()
+    };
+    let plain = orientations("");
+    assert!(
+        (plain[99] - (0.99_f64 / 2.0).sin()).abs() < 1e-3,
+        "{}",
+        plain[99]
+    );
+    let degrees =
+        "{effect: gyro_units, factor: 57.29577951308232}, {effect: accel_units, factor: 0.10197}";
+    for (plain, degrees) in plain.iter().zip(orientations(degrees)) {
+        assert!((plain - degrees).abs() < 1e-5);
+    }
+}

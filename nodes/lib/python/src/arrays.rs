@@ -1,7 +1,7 @@
 //! Between NumPy's arrays and the libraries' types.
 
 use cromosim_msgs::geometry_msgs::{PoseStamped, Quaternion};
-use cromosim_msgs::sensor_msgs::Imu;
+use cromosim_msgs::sensor_msgs::{Imu, MagneticField};
 use cromosim_recording::rigid::unit_quaternion;
 use cromosim_spatial::Stamp;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -112,6 +112,18 @@ pub fn readings<'py>(
         arrays.set_item("orientation", rows(py, values, 4)?)?;
     }
     Ok(arrays)
+}
+
+/// Magnetometer readings, (N, 3), T.
+pub fn magnetic_fields<'py>(
+    py: Python<'py>,
+    messages: &[MagneticField],
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let values = messages.iter().flat_map(|message| {
+        let v = &message.magnetic_field;
+        [v.x, v.y, v.z]
+    });
+    rows(py, values.collect(), 3)
 }
 
 /// The arrays of a reference: `stamps_ns` (N,), `positions` (N, 3), `orientations` (N, 4).

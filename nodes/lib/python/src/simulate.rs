@@ -3,14 +3,15 @@
 use cromosim_spatial::in_plain_words;
 use std::path::Path;
 use std::str::FromStr;
+use std::sync::Arc;
 
 use cromosim_imu::{
-    Device, Differentiation, ImuMessages, OrientationSource, PlacementSet, Scheme, TextureSegment,
-    Trim,
+    AmbientField, Device, Differentiation, ImuMessages, OrientationSource, PlacementSet, Scheme,
+    TextureSegment, Trim,
 };
 use cromosim_learned::{LearnedSimulator, MappingFile};
 use cromosim_msgs::geometry_msgs::PoseStamped;
-use cromosim_msgs::sensor_msgs::Imu;
+use cromosim_msgs::sensor_msgs::{Imu, MagneticField};
 use cromosim_recording::{
     Aside, PlayedPerson, Quality, RecordingError, Simulation, SimulationOptions, TextureOn,
 };
@@ -19,7 +20,7 @@ use pyo3::types::PyDict;
 use rayon::prelude::*;
 use serde::Deserialize;
 
-use crate::arrays::{poses, readings};
+use crate::arrays::{magnetic_fields, poses, readings};
 use crate::error::raise;
 use crate::motion::Motion;
 
@@ -40,6 +41,9 @@ pub struct Options {
     pose_error_correlation_s: f64,
     learned: Option<String>,
     mapping: Option<String>,
+    /// As `simulate --magnetic-field` takes it.
+    magnetic_field: Option<String>,
+    orientation: Option<String>,
 }
 
 impl Options {
@@ -88,8 +92,17 @@ impl Options {
                 Some(path) => MappingFile::read(Path::new(&path)).map_err(raise)?,
                 None => MappingFile::default(),
             },
-            field: None,
-            orientation: OrientationSource::Truth,
+            field: options
+                .magnetic_field
+                .map(|text| AmbientField::resolve(&text).map(Arc::new))
+                .transpose()
+                .map_err(raise)?,
+            orientation: match options.orientation {
+                Some(name) => name
+                    .parse()
+                    .map_err(|error| raise(format!("orientation: {error}")))?,
+                None => OrientationSource::Truth,
+            },
         })
     }
 }
@@ -159,11 +172,16 @@ fn arrays_of<'py>(
     reference: &[PoseStamped],
     quality: &Quality,
 ) -> PyResult<Bound<'py, PyDict>> {
+    let fields: Vec<MagneticField> = messages.iter().filter_map(|it| it.mag.clone()).collect();
     let (raw, full): (Vec<Imu>, Vec<Imu>) = messages
         .into_iter()
         .map(|both| (both.data_raw, both.data))
         .unzip();
-    let arrays = readings(py, &raw, Some(&full))?;
+    let is_known = full.iter().any(|it| it.orientation_covariance[0] >= 0.0);
+    let arrays = readings(py, &raw, is_known.then_some(&full[..]))?;
+    if !fields.is_empty() {
+        arrays.set_item("magnetic_field", magnetic_fields(py, &fields)?)?;
+    }
     arrays.set_item("reference", poses(py, reference)?)?;
     arrays.set_item(
         "bandwidth_hz",

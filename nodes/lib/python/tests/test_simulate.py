@@ -193,3 +193,26 @@ def test_numpy_alone_is_needed():
     code = "import sys, cromosim; print([m for m in ('pandas', 'pyarrow', 'torch') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert json.loads(done.stdout.replace("'", '"')) == []
+
+
+def test_a_magnetometer_and_a_fused_orientation():
+    walk_motion = cromosim.walk()
+    field = np.array([0.0, 1.9e-5, -4.5e-5])
+    placements = {"wrist": cromosim.Placement(site="left_watch")}
+    ideal = cromosim.simulate(walk_motion, placements, device="ideal", magnetic_field=field)["wrist"]
+    x, y, z, w = ideal.orientation.T
+    north = np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], 1)
+    up = np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], 1)
+    np.testing.assert_allclose(ideal.magnetic_field, north * field[1] + up * field[2], atol=1e-15)
+    assert "magnetic_field_z" in ideal.columns()
+    fused = cromosim.simulate(
+        walk_motion, placements, device="consumer_mems", magnetic_field="0,1.9e-5,-4.5e-5", orientation="vqf"
+    )["wrist"]
+    near = np.abs(np.sum(fused.orientation * ideal.orientation, 1))
+    assert np.all(near > np.cos(0.3)) and not np.allclose(near, 1.0)
+    none = cromosim.simulate(walk_motion, placements, orientation="none")["wrist"]
+    assert none.orientation is None and none.magnetic_field is None
+    with pytest.raises(cromosim.CromosimError, match="the nearest is madgwick"):
+        cromosim.simulate(walk_motion, placements, orientation="magdwick")
+    with pytest.raises(cromosim.CromosimError, match="1 uT is 1e-6 T"):
+        cromosim.simulate(walk_motion, placements, magnetic_field=[20, 0, -43])

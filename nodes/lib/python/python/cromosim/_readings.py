@@ -53,6 +53,8 @@ class Readings:
     """Rows of the 3x3 covariances, shape (N, 9), (rad/s)^2."""
     orientation: NDArray[np.float64] | None = None
     """world_from_sensor, shape (N, 4), quaternions x, y, z, w; None where it is not known."""
+    magnetic_field: NDArray[np.float64] | None = None
+    """Shape (N, 3), T; None without a magnetometer or a known field."""
     reference: Poses | None = None
     """The sensor's true poses at the motion's frames."""
     bandwidth_hz: float | None = None
@@ -70,7 +72,7 @@ class Readings:
 
     def columns(self) -> dict[str, NDArray[Any]]:
         """Columns by name: `stamp_ns`, `specific_force_x` ... `angular_velocity_z`, and the
-        orientation's where it is known. They are views."""
+        orientation's and the magnetometer's where they are known. They are views."""
         columns: dict[str, NDArray[Any]] = {"stamp_ns": self.stamps_ns}
         for quantity in ("specific_force", "angular_velocity"):
             values = getattr(self, quantity)
@@ -79,6 +81,8 @@ class Readings:
             columns |= {
                 f"orientation_{part}": self.orientation[:, k] for k, part in enumerate("xyzw")
             }
+        if self.magnetic_field is not None:
+            columns |= {f"magnetic_field_{axis}": self.magnetic_field[:, k] for k, axis in enumerate(AXES)}
         return columns
 
     def to_pandas(self) -> pandas.DataFrame:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from typing import Any
 
@@ -29,6 +29,8 @@ def simulate(
     pose_error_correlation_s: float = 0.0,
     learned: str | PathLike[str] | None = None,
     mapping: str | PathLike[str] | None = None,
+    magnetic_field: str | PathLike[str] | Sequence[float] | None = None,
+    orientation: str = "truth",
 ) -> dict[str, Readings]:
     """Simulate what IMUs on a moving person read, exactly as ``cromosim simulate`` does.
 
@@ -65,6 +67,12 @@ def simulate(
         Networks that correct the kinematics: a shipped model's name or a trained folder.
     mapping : path, optional
         A distribution mapping that ``cromosim map`` wrote.
+    magnetic_field : sequence of float, str or path, optional
+        What devices with a magnetometer read: the field in world axes, T; a place and a day
+        (``"52.52N,13.41E,2026-11-24"``) or a YAML file. None: no ``magnetic_field``.
+    orientation : str, optional
+        ``"truth"``; ``"vqf"``, ``"madgwick"`` or ``"mahony"``, fused from the device's own readings;
+        ``"none"``.
 
     Returns
     -------
@@ -88,9 +96,18 @@ def simulate(
         pose_error_correlation_s=pose_error_correlation_s,
         learned=learned,
         mapping=mapping,
+        magnetic_field=field_text(magnetic_field),
+        orientation=orientation,
     )
     imus = _native.simulate(motion._native, text, ".", given, options)
     return {name: readings_of(name, arrays) for name, arrays in imus.items()}
+
+
+def field_text(field: str | PathLike[str] | Sequence[float] | None) -> str | None:
+    """As the command line takes it."""
+    if field is None or isinstance(field, (str, PathLike)):
+        return None if field is None else str(field)
+    return ",".join(repr(float(value)) for value in field)
 
 
 def names_without_device(placements: Mapping[str, Placement | Mapping[str, Any]]) -> list[str]:
