@@ -10,10 +10,20 @@ use crate::weight_search::LOWEST_LOG_WEIGHT;
 /// decides; longer, a burst's start is smoothed away. Chosen among 0.05, 0.1, 0.15 and 0.25 s on
 /// motions like those of `tests/bursts`, none of them among its own.
 const SHARED_DRIVE_S: f64 = 0.1;
-/// The same of the noise, which changes more slowly: markers come and go. Longer, a clip's ends
-/// change its middle (`tests/cuts.rs`). Chosen among 0.12 to 0.5 s on joints of recorded walks and
-/// dances, the clips of that test among them.
+/// What the drive right around an interval says beside that, standard deviation in intervals, and
+/// what the drive over [`SHARED_DRIVE_S`] counts beside it, in intervals that are free: an impact is
+/// over within some frames. Chosen among 1.5 to 3 and 0.1 to 10 on draws of the physics' motions of
+/// `bags/truth` and of bursts that no test and no study draws.
+const NEAR_DRIVE_INTERVALS: f64 = 2.0;
+const NEAR_DRIVE_COUNT: f64 = 1.0;
+/// The same as [`SHARED_DRIVE_S`] of the noise, which changes more slowly: markers come and go. Longer,
+/// a clip's ends change its middle (`tests/cuts.rs`: with 0.3 s by 2.5 % of the signal rather than 0.9).
+/// Chosen among 0.12 to 0.5 s on joints of recorded walks and dances, the clips of that test among them.
 const SHARED_NOISE_S: f64 = 0.15;
+/// The noise over this standard deviation, in intervals, is what is shared, as the fourth power of
+/// the mean of its fourth roots: the few frames of an impact, which no spline follows, are not taken
+/// for noise of all that is around. Chosen among the powers 0.1 to 1 as [`NEAR_DRIVE_INTERVALS`].
+const NEAR_NOISE_INTERVALS: f64 = 2.0;
 /// The same of the vigour, s. Longer, cuts differ more from the whole (0.5 s: a specific force of 95 %
 /// 0.025 rather than 0.012 in `tests/every_clip.rs`).
 const SHARED_VIGOUR_S: f64 = 0.2;
@@ -81,7 +91,10 @@ pub struct ExpectedNoise {
 /// `v(t) = sum_k K(t - t_k) |f2_k|^2 / sum_k K(t - t_k) / (2 b)`, b the band of a body's accelerations.
 /// This keeps a clip's ends, which have samples on one side only, from taking noise for motion.
 ///
-/// To each sum what is expected is added with its count, see the constants above.
+/// To each sum what is expected is added with its count, see the constants above. An impact drives
+/// the motion for some frames alone, and leaves residuals that are no noise. So s(t) is the mean of
+/// what the nearest intervals say and of s(t) as above, which counts [`NEAR_DRIVE_COUNT`]; and r(t) is
+/// the mean over K of the fourth roots of such sums over the nearest samples, to the fourth power.
 /// K is a symmetric kernel, so that what is learnt at t depends on the samples near t alone: the
 /// same seconds of a longer series give the same estimate.
 ///
@@ -220,15 +233,20 @@ impl<const L: usize> Adaptation<L> {
         }: &mut Statements<L>,
         stride: Stride,
     ) {
-        let found = local_means(drives, SHARED_DRIVE_S / equations.interval);
-        for (drive, found) in self.drive.iter_mut().zip(found) {
+        let mut near = drives.clone();
+        Kernel::new(NEAR_DRIVE_INTERVALS).smooth(&mut near);
+        let around = local_means(drives, SHARED_DRIVE_S / equations.interval);
+        for ((drive, near), around) in self.drive.iter_mut().zip(near).zip(around) {
+            let found = with_expected(near, around, NEAR_DRIVE_COUNT);
             *drive = match stride {
                 Stride::Whole => found,
                 Stride::Half => std::array::from_fn(|lane| (drive[lane] * found[lane]).sqrt()),
             };
         }
         self.learn_vigour(equations, accelerations);
-        let found = local_means(residuals, SHARED_NOISE_S / equations.interval);
+        take_fourth_roots(residuals);
+        let found = local_means(residuals, SHARED_NOISE_S / equations.interval)
+            .map(|roots| roots.map(|root| root.powi(4)));
         for (noise, found) in self.noise.iter_mut().zip(found) {
             *noise = std::array::from_fn(|lane| found[lane].max(self.least_noise[lane]));
         }
@@ -290,6 +308,32 @@ fn local_means<const L: usize>(
     evidence.iter().map(|[square, count]| {
         std::array::from_fn(|lane| (square[lane] / count[lane]).max(f64::MIN_POSITIVE))
     })
+}
+
+/// The mean that evidence gives together with what is expected, which counts so much.
+fn with_expected<const L: usize>(
+    [square, count]: Evidence<L>,
+    expected: [f64; L],
+    expected_count: f64,
+) -> [f64; L] {
+    std::array::from_fn(|lane| {
+        let mean =
+            (square[lane] + expected_count * expected[lane]) / (count[lane] + expected_count);
+        mean.max(f64::MIN_POSITIVE)
+    })
+}
+
+/// In place of each sum of squares the fourth root of the mean over the nearest entries, times what
+/// the entry counts.
+fn take_fourth_roots<const L: usize>(evidence: &mut [Evidence<L>]) {
+    let mut near = evidence.to_vec();
+    Kernel::new(NEAR_NOISE_INTERVALS).smooth(&mut near);
+    for ([square, count], [near_square, near_count]) in evidence.iter_mut().zip(near) {
+        for lane in 0..L {
+            let mean = near_square[lane] / near_count[lane];
+            square[lane] = count[lane] * mean.max(f64::MIN_POSITIVE).sqrt().sqrt();
+        }
+    }
 }
 
 /// Largest distance of a sample from the first, over all channels.
