@@ -190,7 +190,15 @@ impl<'a> DiagnosisBuilder<'a> {
 
     /// How far the readings of each recording are off beyond all that is known of.
     pub fn unexplained_errors(&self) -> Vec<UnexplainedErrors> {
-        let of = |part: &Part| unexplained_errors(part.findings, &part.simulations, &part.after);
+        let of = |part: &Part| {
+            let Part {
+                findings,
+                simulations,
+                after,
+                ..
+            } = part;
+            unexplained_errors(findings, simulations, &part.after_readings, after)
+        };
         self.parts.iter().map(of).collect()
     }
 

@@ -207,6 +207,8 @@ fn simulated_effects(findings: &[Findings], unexplained: &[UnexplainedErrors]) -
         unexplained: UnexplainedErrors {
             variance: mean(|own| own.variance),
             reference_excess: mean(|own| own.reference_excess),
+            // The clock is the session's own.
+            late: unexplained.last().map(|own| own.late).unwrap_or_default(),
         },
         other_sessions: others
             .iter()

@@ -1,8 +1,9 @@
 //! How far readings are off beyond all that is known of.
 
-use cromosim_imu::{Channel, PerChannel, UnexplainedErrors};
+use cromosim_imu::{Channel, Lateness, PerChannel, Reading, UnexplainedErrors, change_per_second};
+use nalgebra::{Matrix2, Vector2};
 
-use crate::axes::axes_of_channel;
+use crate::axes::{axes_of_channel, value_on_axis};
 use crate::diagnosis::Metrics;
 use crate::findings::Findings;
 use crate::policy::report::{MOST_REFERENCE_EXCESS, REFERENCE_SHARE};
@@ -15,12 +16,18 @@ use crate::simulations::Simulations;
 pub(crate) fn unexplained_errors(
     findings: &Findings,
     simulations: &Simulations,
+    after_readings: &[Reading],
     after: &Metrics,
 ) -> UnexplainedErrors {
     let [of_derivatives, of_orientation] = reference_variances(findings, simulations);
     let of_reference =
         PerChannel::from_fn(|channel| of_derivatives[channel] + of_orientation[channel]);
-    let rest = rest_variances(findings, simulations, after, &of_reference);
+    let clocks = PerChannel::from_fn(|channel| lateness(simulations, after_readings, channel));
+    let known = PerChannel::from_fn(|channel| {
+        let units = findings.applied().unit_factor(channel);
+        of_reference[channel] + clocks[channel].1 / units.powi(2)
+    });
+    let rest = rest_variances(findings, simulations, after, &known);
     let reference_excess = PerChannel::from_fn(|channel| match findings.unknown {
         Some(_) => 0.0,
         None => (REFERENCE_SHARE * rest[channel] / of_derivatives[channel].max(f64::MIN_POSITIVE))
@@ -30,15 +37,16 @@ pub(crate) fn unexplained_errors(
     UnexplainedErrors {
         variance: PerChannel::from_fn(|channel| left(channel).max(0.0)),
         reference_excess,
+        late: PerChannel::from_fn(|channel| clocks[channel].0),
     }
 }
 
-/// The part of that variance which neither the device's noise nor the reference's errors explain.
+/// The part of that variance which neither the device's noise nor what is `known` beside it explains.
 fn rest_variances(
     findings: &Findings,
     simulations: &Simulations,
     after: &Metrics,
-    of_reference: &PerChannel<f64>,
+    known: &PerChannel<f64>,
 ) -> PerChannel<f64> {
     let set = &findings.applied();
     PerChannel::from_fn(|channel| {
@@ -48,8 +56,40 @@ fn rest_variances(
         };
         let found = (rmse / set.unit_factor(channel)).powi(2) / 3.0;
         let own = simulations.white_variance(set, channel) + set.lsb(channel).powi(2) / 12.0;
-        (found - own - of_reference[channel]).max(0.0)
+        (found - own - known[channel]).max(0.0)
     })
+}
+
+/// How late a channel stays against the simulation, and the variance that this leaves, mean over the compared
+/// readings and their axes, in units of the device.
+///
+/// Least squares of `measured - simulated = -(seconds + per_second t) d simulated / dt`, t from the first message.
+/// Two values of thousands of readings: what they take of mere noise does not count.
+fn lateness(simulations: &Simulations, simulated: &[Reading], channel: Channel) -> (Lateness, f64) {
+    let (stamps, comparison) = (&simulations.whole.stamps, &simulations.comparison);
+    let (mut normal, mut right, mut count) = (Matrix2::zeros(), Vector2::zeros(), 0.0);
+    for k in 0..simulated.len() {
+        let Some(change) = change_per_second(k, stamps, simulated) else {
+            continue;
+        };
+        let regressors = Vector2::new(1.0, stamps[k] - stamps[0]);
+        for axis in axes_of_channel(channel).filter(|axis| comparison.covered[k][*axis]) {
+            let of = |reading: &Reading| value_on_axis(reading, axis);
+            let change = of(&change);
+            let residual = of(&comparison.measured[k]) - of(&simulated[k]);
+            normal += regressors * regressors.transpose() * change.powi(2);
+            right -= regressors * change * residual;
+            count += 1.0;
+        }
+    }
+    let Some(values) = normal.cholesky().map(|factor| factor.solve(&right)) else {
+        return Default::default();
+    };
+    let late = Lateness {
+        seconds: values.x,
+        per_second: values.y,
+    };
+    (late, values.dot(&(normal * values)) / count)
 }
 
 /// What errors of the reference's derivatives and of its orientation leave, mean over the compared

@@ -4,10 +4,10 @@
 mod support;
 
 use cromosim_gap::{PlacementAnswer, PlacementRecord};
-use cromosim_imu::{EffectKind as K, EffectSet, Reading, SensorModel};
+use cromosim_imu::{Channel, EffectKind as K, EffectSet, Reading, SensorModel};
 use cromosim_spatial::{FrameGrid, PoseEstimate, Stamp};
 use support::Scene;
-use support::judge::{answer, names_exactly, values_are};
+use support::judge::{answer, names_exactly, near, values_are};
 
 /// A pair is named as such, with its values.
 fn pair(scene: &Scene) {
@@ -167,4 +167,30 @@ kept! {
 #[test]
 fn nothing_is_promised_where_nothing_is_found() {
     kept(&Scene::new(80));
+}
+
+/// A clock that drifts by less than what is an effect says so in what stays unexplained, by how much it is
+/// late and no more: an unexplained variance of a minute's drift would be too large for shorter recordings
+/// and slower motion.
+#[test]
+fn an_ordinary_drift_of_the_clock_is_stated_as_one() {
+    let drifting = answer(&Scene::new(84).with(K::ClockDrift, &[22.0]).record());
+    let steady = answer(&Scene::new(84).record());
+    assert!(
+        drifting.diagnosis.causes.is_empty() && drifting.effects.effects.is_empty(),
+        "{}",
+        drifting.diagnosis.verdict
+    );
+    let [found, without] = [&drifting, &steady].map(|one| &one.effects.unexplained);
+    for channel in Channel::ALL {
+        let (late, other) = (found.late[channel], without.late[channel]);
+        near(late.per_second, 22e-6, 3e-6, "lateness per second");
+        near(late.seconds, 0.0, 6e-5, "lateness at the first message");
+        near(other.per_second, 0.0, 3e-6, "without a drift");
+        let [rest, plain] = [found, without].map(|rest| rest.variance[channel]);
+        assert!(
+            rest < 1.3 * plain + 1e-7,
+            "{channel:?}: {rest} unexplained, {plain} without a drift"
+        );
+    }
 }

@@ -80,7 +80,7 @@ pub use cromosim_spatial::{Bandwidth, SampleVariance};
 pub use device::{Device, EMBEDDED_DEVICES};
 pub use effects::{
     DeclaredNoise, Dependence, DrawnBiases, Dropouts, Effect, EffectKind, EffectSet, EffectSpec,
-    EffectsFile, FirstGuess, FittedSearch, GravityMode, GridTrace, Identifiability,
+    EffectsFile, FirstGuess, FittedSearch, GravityMode, GridTrace, Identifiability, Lateness,
     MeasurementInput, Ordinary, OtherSession, Owner, ParameterFit, ParameterSpec, PlacementEffects,
     ReadOff, ReadOffSearch, ResidualView, Rounding, Search, SensorModel, Shape, SpectralLine,
     Stage, StagedReadings, StreamingEffects, UnexplainedErrors, Wave, clipping_limit,
@@ -102,6 +102,7 @@ pub use sample::{
 };
 pub use schemes::Scheme;
 pub use simulate::{Differentiation, simulate, simulate_kinematics, simulate_kinematics_on};
+pub use stated_errors::change_per_second;
 pub use stream::{StreamOptions, StreamingImu};
 pub use texture::{DrawnTexture, TextureSegment, add_texture};
 pub use trajectory::{SensorFrame, SensorTrajectory};

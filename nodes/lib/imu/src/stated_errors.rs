@@ -67,6 +67,14 @@ impl StatedErrors {
         }
     }
 
+    /// Mean square of the time that each channel may be late at some time after a recording's first
+    /// message, s2; `clock_s` is how uncertain the clock is then.
+    pub fn late_squared(&self, after_s: f64, clock_s: f64) -> PerChannel<f64> {
+        PerChannel::from_fn(|channel| {
+            self.unexplained.late[channel].at(after_s).powi(2) + clock_s.powi(2)
+        })
+    }
+
     /// What errors of the poses leave (`variance`, in SI units), motion that they cover included, in the
     /// units that the device reports; with what its biases have walked in so many seconds.
     pub fn of_motion(&self, variance: SampleVariance, walked_s: f64) -> SampleVariance {
@@ -84,27 +92,40 @@ impl StatedErrors {
     }
 }
 
-/// What stamps that are `late` by this standard deviation (s) add to a reading's variances: the square of
-/// its change over time, from the readings around it, mean over the axes.
+/// What readings change by per second around one of them, from its neighbours but one; none where these have
+/// one stamp.
+pub fn change_per_second(k: usize, stamps: &[Stamp], readings: &[Reading]) -> Option<Reading> {
+    let (from, to) = (k.saturating_sub(2), (k + 2).min(readings.len() - 1));
+    let seconds = stamps[to] - stamps[from];
+    let change =
+        |of: fn(&Reading) -> Vector3<f64>| (of(&readings[to]) - of(&readings[from])) / seconds;
+    (seconds > 0.0).then(|| Reading {
+        specific_force: change(|reading| reading.specific_force),
+        angular_velocity: change(|reading| reading.angular_velocity),
+    })
+}
+
+/// What stamps add to a reading's variances that are late by unknown times with these mean squares (s2): the
+/// square of the reading's change in that time, mean over the axes.
 pub(crate) fn with_clock_errors(
     variance: SampleVariance,
-    late: f64,
+    late_squared: PerChannel<f64>,
     k: usize,
     stamps: &[Stamp],
     readings: &[Reading],
 ) -> SampleVariance {
-    let (from, to) = (k.saturating_sub(2), (k + 2).min(readings.len() - 1));
-    let seconds = stamps[to] - stamps[from];
-    if late == 0.0 || seconds <= 0.0 {
+    if late_squared == PerChannel::default() {
         return variance;
     }
-    let added = |of: fn(&Reading) -> Vector3<f64>| {
-        let change = (of(&readings[to]) - of(&readings[from])) / seconds;
-        late * late * change.norm_squared() / 3.0
+    let Some(change) = change_per_second(k, stamps, readings) else {
+        return variance;
     };
+    let added =
+        |channel, change: &Vector3<f64>| late_squared[channel] * change.norm_squared() / 3.0;
     SampleVariance {
-        acceleration: variance.acceleration + added(|reading| reading.specific_force),
-        angular_velocity: variance.angular_velocity + added(|reading| reading.angular_velocity),
+        acceleration: variance.acceleration + added(Channel::Accelerometer, &change.specific_force),
+        angular_velocity: variance.angular_velocity
+            + added(Channel::Gyroscope, &change.angular_velocity),
         ..variance
     }
 }

@@ -252,14 +252,15 @@ pub fn measure_recording(
     let none = SampleVariance::default();
     let message = |(k, variance): (usize, &SampleVariance)| {
         let (stamp, reading) = (&motion.stamps[k], &readings[k]);
-        let late = effects.effects.clock_uncertainty(*stamp - effects.epoch);
+        let clock_s = effects.effects.clock_uncertainty(*stamp - effects.epoch);
+        let late_squared = stated.late_squared(*stamp - motion.stamps[0], clock_s);
         let walked = if walks {
             *stamp - motion.stamps[0]
         } else {
             0.0
         };
         let variance = stated.of_motion(*variance, walked);
-        let variance = &with_clock_errors(variance, late, k, motion.stamps, &readings);
+        let variance = &with_clock_errors(variance, late_squared, k, motion.stamps, &readings);
         let lost = dropouts.as_mut().is_some_and(Dropouts::next_is_lost);
         let sample = ImuSample {
             stamp: *stamp,

@@ -4,7 +4,7 @@ use cromosim_spatial::KinematicTrack;
 use nalgebra::Vector3;
 
 use super::*;
-use crate::{DeclaredNoise, Effect, EffectSet, UnexplainedErrors};
+use crate::{DeclaredNoise, Effect, EffectSet, Lateness, UnexplainedErrors};
 
 /// Spins up by 2 rad/s2 about one axis, at 100 Hz.
 fn spinning_up() -> KinematicTrack {
@@ -21,7 +21,7 @@ fn spinning_up() -> KinematicTrack {
     }
 }
 
-fn stated(effects: EffectSet, before_s: f64) -> Imu {
+fn stated(effects: EffectSet, before_s: f64, unexplained: UnexplainedErrors) -> Imu {
     let track = spinning_up();
     let stamps: Vec<Stamp> = (50..150)
         .map(|k| track.start.plus_seconds(k as f64 / 100.0))
@@ -39,7 +39,7 @@ fn stated(effects: EffectSet, before_s: f64) -> Imu {
             gyro_density: 1e-4,
         },
         effects,
-        unexplained: UnexplainedErrors::default(),
+        unexplained,
         other_sessions: Vec::new(),
     };
     let options = ImuOptions {
@@ -60,15 +60,35 @@ fn a_drifting_clock_is_less_sure_the_longer_it_runs() {
     // 17 ppm of 1000 s are 17 ms, in which 2 rad/s2 become 35 mrad/s about one of three axes.
     let drifts = || EffectSet::new().with(Effect::new(EffectKind::ClockDrift, vec![0.0]).unwrap());
     let variance = |imu: &Imu| imu.angular_velocity_covariance[0];
-    let own = variance(&stated(EffectSet::new(), 1000.0));
+    let none = UnexplainedErrors::default();
+    let own = variance(&stated(EffectSet::new(), 1000.0, none));
     assert!((own - 1e-6).abs() < 1e-12, "{own}");
-    assert_eq!(variance(&stated(drifts(), 0.0)), own);
-    let later = variance(&stated(drifts(), 1000.0)) - own;
+    assert_eq!(variance(&stated(drifts(), 0.0, none)), own);
+    let later = variance(&stated(drifts(), 1000.0, none)) - own;
     let expected = (30e-6 / 3.0_f64.sqrt() * 1000.0 * 2.0).powi(2) / 3.0;
     assert!(
         (later / expected - 1.0).abs() < 1e-6,
         "{later} rather than {expected}"
     );
+}
+
+#[test]
+fn what_stays_between_the_clocks_grows_with_the_motion_and_the_recording() {
+    // 4 ms at the first message less 6 ms per second: 1 ms after half a second, in which 2 rad/s2
+    // become 2 mrad/s about one of three axes.
+    let mut rest = UnexplainedErrors::default();
+    rest.late.gyroscope = Lateness {
+        seconds: 4e-3,
+        per_second: -6e-3,
+    };
+    let imu = stated(EffectSet::new(), 0.0, rest);
+    let (added, expected) = (
+        imu.angular_velocity_covariance[0] - 1e-6,
+        (1e-3 * 2.0_f64).powi(2) / 3.0,
+    );
+    assert!((added / expected - 1.0).abs() < 1e-6, "{added}");
+    let accel = imu.linear_acceleration_covariance[0];
+    assert!((accel - 1e-4).abs() < 1e-12, "{accel}");
 }
 
 #[test]

@@ -26,7 +26,7 @@ const SCHEMA: &str = "cromosim/effects/1";
 ///       - {effect: lever_arm, offset: [0.05, 0.0, -0.06]}
 ///       - {effect: time_offset, seconds: 0.021}
 ///     unexplained: {accel_variance: 0.0021, gyro_variance: 1.2e-5}   # where something is, and
-///     # accel_reference_excess, gyro_reference_excess, see [`UnexplainedErrors`]
+///     # {accel,gyro}_{reference_excess,late,late_per_second}, see [`UnexplainedErrors`]
 ///     other_sessions:   # where several recordings were diagnosed together
 ///       - epoch: 1690000000.0
 ///         effects:
@@ -64,6 +64,26 @@ pub struct UnexplainedErrors {
     /// And as a part of the variance that the errors of a reference leave: for motion that they cover,
     /// which a better reference shows.
     pub reference_excess: PerChannel<f64>,
+    /// And what readings change by in the time that clocks are apart.
+    pub late: PerChannel<Lateness>,
+}
+
+/// How late a channel still is against the reference, too little for an effect: at `t` seconds after a
+/// recording's first message by `seconds + per_second t`. Clocks of references drift anew in each recording,
+/// which is why it goes into the covariances and not into the readings.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Lateness {
+    /// At the first message, s.
+    pub seconds: f64,
+    /// And more with each second.
+    pub per_second: f64,
+}
+
+impl Lateness {
+    /// Seconds at a time after the recording's first message.
+    pub fn at(&self, seconds: f64) -> f64 {
+        self.seconds + self.per_second * seconds
+    }
 }
 
 /// Another session of a device.
@@ -145,16 +165,24 @@ pub(crate) struct RawUnexplained {
     gyro_variance: f64,
     accel_reference_excess: f64,
     gyro_reference_excess: f64,
+    accel_late: f64,
+    gyro_late: f64,
+    accel_late_per_second: f64,
+    gyro_late_per_second: f64,
 }
 
 impl RawUnexplained {
-    /// Names and values, for checks.
-    pub(crate) fn fields(&self) -> [(&'static str, f64); 4] {
+    /// Names and sizes, for checks.
+    pub(crate) fn fields(&self) -> [(&'static str, f64); 8] {
         [
             ("accel_variance", self.accel_variance),
             ("gyro_variance", self.gyro_variance),
             ("accel_reference_excess", self.accel_reference_excess),
             ("gyro_reference_excess", self.gyro_reference_excess),
+            ("accel_late", self.accel_late.abs()),
+            ("gyro_late", self.gyro_late.abs()),
+            ("accel_late_per_second", self.accel_late_per_second.abs()),
+            ("gyro_late_per_second", self.gyro_late_per_second.abs()),
         ]
     }
 }
@@ -169,6 +197,16 @@ impl From<RawUnexplained> for UnexplainedErrors {
             reference_excess: PerChannel {
                 accelerometer: raw.accel_reference_excess,
                 gyroscope: raw.gyro_reference_excess,
+            },
+            late: PerChannel {
+                accelerometer: Lateness {
+                    seconds: raw.accel_late,
+                    per_second: raw.accel_late_per_second,
+                },
+                gyroscope: Lateness {
+                    seconds: raw.gyro_late,
+                    per_second: raw.gyro_late_per_second,
+                },
             },
         }
     }
@@ -280,11 +318,14 @@ impl EffectsFile {
     }
 }
 
-/// Nothing where all is explained; of the two kinds those that are there.
+/// Nothing where all is explained; of the kinds those that are there.
 pub(crate) fn write_unexplained(text: &mut String, indent: &str, rest: &UnexplainedErrors) {
+    let late = |of: fn(&Lateness) -> f64| PerChannel::from_fn(|channel| of(&rest.late[channel]));
     let kinds = [
         ("variance", rest.variance),
         ("reference_excess", rest.reference_excess),
+        ("late", late(|late| late.seconds)),
+        ("late_per_second", late(|late| late.per_second)),
     ];
     let there = kinds
         .iter()

@@ -12,7 +12,7 @@ placements:
       - {effect: mount_slip, at: 1700000030.250000000, rotvec: [0.1, 0.0, 0.2]}
       - {effect: gyro_g_sensitivity, matrix: [[0.001, 0.0, 0.0], [0.0, 0.0, 1.0e-9], [0.0, 0.0, 0.0]]}
       - {effect: gravity_convention, mode: removed}
-    unexplained: {accel_variance: 0.0021, gyro_variance: 1.2e-5, accel_reference_excess: 0.25, gyro_reference_excess: 0.0}
+    unexplained: {accel_variance: 0.0021, gyro_variance: 1.2e-5, accel_reference_excess: 0.25, gyro_reference_excess: 0.0, accel_late: 0.0, gyro_late: -0.001, accel_late_per_second: 2.4e-5, gyro_late_per_second: 0.0}
     other_sessions:
       - epoch: 1690000000.000000000
         effects:

@@ -89,7 +89,9 @@ pub use drawn_biases::DrawnBiases;
 pub(crate) use drawn_biases::StatedBiases;
 pub use dropped_samples::Dropouts;
 pub use effect::{Effect, EffectSet};
-pub use file::{DeclaredNoise, EffectsFile, OtherSession, PlacementEffects, UnexplainedErrors};
+pub use file::{
+    DeclaredNoise, EffectsFile, Lateness, OtherSession, PlacementEffects, UnexplainedErrors,
+};
 pub(crate) use file::{RawUnexplained, number, write_effects, write_unexplained};
 pub use gravity_convention::GravityMode;
 pub use kind::EffectKind;
