@@ -160,6 +160,114 @@ fn what_does_not_fit_is_refused() {
     );
 }
 
+/// A minute of a thing in a hand that is turned about all axes, as TUM.
+fn turning(file: &Path) {
+    let line = |k: usize| {
+        let t = k as f64 * 0.01;
+        let turn = Vector3::new(
+            1.3 * (1.1 * t).sin() + 0.8 * (2.3 * t).cos(),
+            1.2 * (0.9 * t + 1.0).sin(),
+            1.9 * (0.7 * t + 2.0).cos(),
+        );
+        let q = UnitQuaternion::from_scaled_axis(turn);
+        let position = 0.2 * Vector3::new((2.0 * t).sin(), (1.7 * t).cos(), (2.9 * t).sin());
+        format!(
+            "{:.3} {:.9} {:.9} {:.9} {:.9} {:.9} {:.9} {:.9}\n",
+            1.7e9 + t,
+            position.x,
+            position.y,
+            position.z,
+            q.i,
+            q.j,
+            q.k,
+            q.w
+        )
+    };
+    std::fs::write(file, (0..6000).map(line).collect::<String>()).unwrap();
+}
+
+const IRON: &str = "schema: cromosim/device/1
+declared_noise: {accel_density: 0.0014, gyro_density: 0.00012}
+magnetometer: {noise_density: 3.0e-8, hard_iron: [8.0e-6, -4.0e-6, 3.0e-6], delay: 0.03}
+";
+
+#[test]
+fn what_a_magnetometer_does_is_found_and_simulated_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    turning(&folder.join("hand.tum"));
+    std::fs::write(folder.join("iron.yaml"), IRON).unwrap();
+    let again = |out: &str, options: &[&str]| {
+        let mut all = vec!["simulate", "--out", out];
+        all.extend(options);
+        succeed(folder, &all);
+        let bag = BagReader::open(&folder.join(out)).unwrap();
+        bag.read::<MagneticField>("/imu/hand/mag").unwrap()
+    };
+    let rigid = [
+        "--rigid",
+        "hand.tum",
+        "--placement",
+        "hand",
+        "--rate",
+        "100",
+    ];
+    let device = ["--device", "iron.yaml", "--magnetic-field", FIELD];
+    let real = again("real.mcap", &[&rigid[..], &device].concat());
+    let said = succeed(folder, &["diagnose", "real.mcap", "--out", "found"]);
+    assert!(
+        said.contains("magnetometer: ") && said.contains("hard_iron"),
+        "{said}"
+    );
+    let json = std::fs::read_to_string(folder.join("found/diagnosis.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let magnetometer = &json["placements"]["hand"]["magnetometer"];
+    let causes = magnetometer["causes"].as_array().unwrap();
+    let mut names: Vec<&str> = causes
+        .iter()
+        .filter_map(|it| it["effect"].as_str())
+        .collect();
+    names.sort_unstable();
+    assert_eq!(names, ["delay", "hard_iron"], "{magnetometer}");
+    let report = std::fs::read_to_string(folder.join("found/report.html")).unwrap();
+    assert!(
+        report.contains("<h3>Magnetometer</h3>") && report.contains("magnetometer x, residual")
+    );
+    // The same stamps, and the readings but for the noise of 0.3 uT.
+    let effects = [
+        "--reference",
+        "real.mcap",
+        "--effects",
+        "found/effects.yaml",
+        "--no-noise",
+    ];
+    let simulated = again("again.mcap", &effects);
+    assert_eq!(real.len(), simulated.len());
+    let square = |((_, real), (_, again)): (&(_, MagneticField), &(_, MagneticField))| {
+        assert_eq!(real.header.stamp, again.header.stamp);
+        (vector(&real.magnetic_field) - vector(&again.magnetic_field)).norm_squared()
+    };
+    let inside = 100..real.len() - 100;
+    let squares = real[inside.clone()]
+        .iter()
+        .zip(&simulated[inside.clone()])
+        .map(square);
+    let rmse = (squares.sum::<f64>() / inside.len() as f64).sqrt();
+    assert!((4.5e-7..6.0e-7).contains(&rmse), "{rmse}");
+    // And as a device, anywhere.
+    succeed(
+        folder,
+        &["device", "from-diagnosis", "found", "--out", "devices"],
+    );
+    let device = cromosim_imu::Device::read(&folder.join("devices/hand.yaml")).unwrap();
+    let iron = device.magnetometer().unwrap();
+    let off = iron.hard_iron - Vector3::new(8e-6, -4e-6, 3e-6);
+    assert!(
+        off.norm() < 1e-7 && (iron.delay - 0.03).abs() < 1e-3,
+        "{iron:?}"
+    );
+}
+
 /// Root mean squares over all placements: tilt and heading, rad.
 fn fusion_errors(bag: &BagReader) -> [f64; 2] {
     let (mut squares, mut count) = ([0.0; 2], 0.0);

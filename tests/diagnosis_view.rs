@@ -34,6 +34,7 @@ fn diagnosis() -> Diagnosis {
     };
     let placement = |verdict: &str| PlacementDiagnosis {
         recordings: Vec::new(),
+        magnetometer: None,
         clock_jumps: Vec::new(),
         calibration: Vec::new(),
         verdict: verdict.to_owned(),
@@ -66,6 +67,7 @@ fn diagnosis() -> Diagnosis {
     };
     let quiet = PlacementDiagnosis {
         recordings: Vec::new(),
+        magnetometer: None,
         clock_jumps: Vec::new(),
         calibration: Vec::new(),
         causes: Vec::new(),

@@ -9,8 +9,8 @@ use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use cromosim_body::BodyModel;
 use cromosim_gap::{
-    DiagnoseOptions, Diagnosis, Evidence, OfRecording, PlacementAnswer, PlacementDiagnosis,
-    Progress, SCHEMA,
+    DiagnoseOptions, Diagnosis, Evidence, MagnetometerDiagnosis, OfRecording, PlacementAnswer,
+    PlacementDiagnosis, Progress, SCHEMA,
 };
 use cromosim_imu::{EffectKind, EffectsFile};
 use cromosim_spatial::{in_plain_words, meant};
@@ -433,6 +433,9 @@ fn print(diagnosis: &Diagnosis) -> anyhow::Result<()> {
                 parameters(&kept.effect, &kept.parameters, &kept.standard_errors)
             )?;
         }
+        if let Some(magnetometer) = &placement.magnetometer {
+            print_magnetometer(magnetometer)?;
+        }
         for one in &placement.recordings {
             let (gap, left_out) = (&one.gap, &one.left_out);
             say!(
@@ -446,6 +449,26 @@ fn print(diagnosis: &Diagnosis) -> anyhow::Result<()> {
                 left_out.gyro_rmse
             )?;
         }
+    }
+    Ok(())
+}
+
+fn print_magnetometer(found: &MagnetometerDiagnosis) -> anyhow::Result<()> {
+    say!("  magnetometer: {}", found.verdict)?;
+    for cause in &found.causes {
+        say!(
+            "    {:<18} {:5.1} % of its gap; {}",
+            cause.effect,
+            100.0 * cause.gap_share,
+            parameters(&cause.effect, &cause.parameters, &cause.standard_errors)
+        )?;
+    }
+    for one in &found.unidentifiable {
+        say!(
+            "    {:<18} not to be told; {} would",
+            one.effect,
+            one.would_tell
+        )?;
     }
     Ok(())
 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
 use anyhow::bail;
 use cromosim_bag::{BagOptions, BagSummary, BagWriter, Compression};
@@ -46,6 +47,7 @@ pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
     let how = Resimulation {
         scheme,
         effects,
+        field: arguments.field()?.map(Arc::new),
         ..from_arguments(arguments)
     };
     let simulated = simulate_all(&recorded, &how)?;
@@ -103,6 +105,7 @@ pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()>
     let mapping = read_mapping(arguments.mapping.as_deref(), &[name])?;
     let how = Resimulation {
         scheme: Some(scheme),
+        field: arguments.field()?.map(Arc::new),
         trim: arguments.trim()?,
         texture: arguments
             .texture()?
@@ -147,6 +150,8 @@ fn effects_of_device(
         effects: device.effects().clone(),
         unexplained: device.unexplained(),
         other_sessions: Vec::new(),
+        magnetometer: device.magnetometer().cloned(),
+        field_in_world: None,
     })
 }
 
@@ -230,6 +235,7 @@ fn rigid_placement(trajectory: &Path, name: &str) -> anyhow::Result<RecordedPlac
         measured: Vec::new(),
         notes: oddities.iter().map(ToString::to_string).collect(),
         set_back: Vec::new(),
+        magnetic: Vec::new(),
     })
 }
 

@@ -162,7 +162,7 @@ pub struct Arguments {
     /// The magnetic field that devices with a magnetometer read, as /imu/NAME/mag
     ///
     /// A vector in T and world axes (0,1.9e-5,-4.5e-5), a place and a day (52.52N,13.41E,2026-11-24; World Magnetic
-    /// Model, with the world's x axis east), or a YAML file, which may say disturbances too [default: no /imu/NAME/mag]
+    /// Model, with the world's x axis east), or a YAML file, which may say disturbances too [default: no /imu/NAME/mag, but for --reference with the field in --effects]
     #[arg(long, value_name = "FIELD", allow_hyphen_values = true, help_heading = SENSORS, hide_short_help = true)]
     pub magnetic_field: Option<String>,
     /// Where the orientation of /imu/NAME/data comes from
@@ -490,11 +490,6 @@ impl Arguments {
             (self.draw.is_some(), "--draw", MOTION_FILES),
             (self.placements.is_some(), "--placements", MOTION_FILES),
             (self.csv.is_some(), "--csv", MOTION_FILES),
-            (
-                self.magnetic_field.is_some(),
-                "--magnetic-field",
-                MOTION_FILES,
-            ),
             (
                 self.orientation != OrientationSource::Truth.name(),
                 "--orientation",

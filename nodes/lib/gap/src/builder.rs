@@ -170,6 +170,7 @@ impl<'a> DiagnosisBuilder<'a> {
                 Vec::new()
             },
             clock_jumps: Vec::new(),
+            magnetometer: None,
         }
     }
 

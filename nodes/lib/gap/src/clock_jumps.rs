@@ -6,7 +6,7 @@ use cromosim_spatial::Stamp;
 use crate::clock_runs::{Run, runs, set_between, undo_jumps};
 use crate::diagnosis::ClockJump;
 use crate::period::median_period;
-use crate::record::{MeasuredImu, PlacementRecord, PoseSeries};
+use crate::record::{MeasuredField, MeasuredImu, PlacementRecord, PoseSeries};
 use crate::reference_jumps::{Moved, reference_jumps};
 
 /// Nothing is laid over a longer pause, s: its two sides are parts of their own, so that what is
@@ -163,6 +163,7 @@ fn cut_out(record: &PlacementRecord, name: String, pieces: &Pieces) -> Placement
             declared: record.imu.declared,
         },
         set_back: Vec::new(),
+        field: MeasuredField::default(),
     }
 }
 

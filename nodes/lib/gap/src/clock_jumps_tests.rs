@@ -36,6 +36,7 @@ fn record(reference: &[Stamped], imu: &[Stamped]) -> PlacementRecord {
             ..MeasuredImu::default()
         },
         set_back: Vec::new(),
+        field: crate::record::MeasuredField::default(),
     }
 }
 

@@ -14,8 +14,9 @@ use crate::error::GapError;
 use crate::evidence::Evidence;
 use crate::findings::Findings;
 use crate::library::Library;
+use crate::magnetometer::{MagneticRecording, diagnose_magnetometer};
 use crate::progress::{ANALYSIS, PREPARATION, Progress};
-use crate::record::PlacementRecord;
+use crate::record::{MeasuredField, PlacementRecord};
 use crate::session::Session;
 use crate::together::analysed;
 use crate::trace::{names, trace};
@@ -97,7 +98,8 @@ pub fn diagnose_together<'r>(
         }
     }
     let names: Vec<&str> = kept.iter().map(|part| part.name.as_str()).collect();
-    let mut answer = answer(&sessions, &names, &library, options);
+    let fields: Vec<&MeasuredField> = kept.iter().map(|part| &part.record.field).collect();
+    let mut answer = answer(&sessions, &fields, &names, &library, options);
     if !jumps.is_empty() {
         let verdict = &answer.diagnosis.verdict;
         answer.diagnosis.verdict = format!("{}; {verdict}", jumps_in_words(&jumps));
@@ -164,6 +166,7 @@ fn commonest_units(sessions: &[Session]) -> PerChannel<f64> {
 
 fn answer(
     sessions: &[Session],
+    fields: &[&MeasuredField],
     recordings: &[&str],
     library: &Library,
     options: &DiagnoseOptions,
@@ -174,11 +177,21 @@ fn answer(
     }
     let builder = DiagnosisBuilder::new(&findings, sessions, options.seed);
     let unexplained = builder.unexplained_errors();
-    let answer = PlacementAnswer {
+    let magnetic: Vec<MagneticRecording> = findings
+        .iter()
+        .zip(fields)
+        .map(|(findings, measured)| MagneticRecording { findings, measured })
+        .collect();
+    let mut answer = PlacementAnswer {
         diagnosis: builder.diagnosis(recordings),
         effects: simulated_effects(&findings, &unexplained),
         evidence: builder.evidence(recordings),
     };
+    if let Some(found) = diagnose_magnetometer(&magnetic) {
+        answer.diagnosis.magnetometer = Some(found.diagnosis);
+        answer.evidence.magnetic = found.curves;
+        (answer.effects.magnetometer, answer.effects.field_in_world) = found.simulated.unzip();
+    }
     options.progress.reached(1.0);
     answer
 }
@@ -217,5 +230,7 @@ fn simulated_effects(findings: &[Findings], unexplained: &[UnexplainedErrors]) -
                 effects: one.applied(),
             })
             .collect(),
+        magnetometer: None,
+        field_in_world: None,
     }
 }

@@ -48,6 +48,59 @@ pub struct PlacementDiagnosis {
     /// `recordings` holds.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub clock_jumps: Vec<ClockJump>,
+    /// Of its magnetometer, where the recording has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub magnetometer: Option<MagnetometerDiagnosis>,
+}
+
+/// What is said of a placement's magnetometer: `m = S A R_SW(t - delay) B + h`, S of determinant 1, so that
+/// B has the strength with which this device measures it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MagnetometerDiagnosis {
+    /// For people.
+    pub verdict: String,
+    /// On time that was not fitted to; none where nothing could be compared.
+    pub gap: Option<MagneticGap>,
+    /// `hard_iron` (h, T), `soft_iron` (S, rows), `delay` (s), `axes` (A, a signed permutation), by share of
+    /// the gap; each under its own name among the parameters.
+    pub causes: Vec<MagneticCause>,
+    /// What this motion cannot tell.
+    pub unidentifiable: Vec<Unidentifiable>,
+    /// B, T, in the reference's world; of several recordings the last one's.
+    pub field_in_world: Option<[f64; 3]>,
+    /// Of B, T.
+    pub field_standard_errors: Option<[f64; 3]>,
+    /// White noise by fourth differences, T/sqrt(Hz).
+    pub noise_density: f64,
+    /// Root mean square of the residual vector beyond that noise, T: a field that is not the same
+    /// everywhere, for one.
+    pub beyond_noise: f64,
+}
+
+/// Root mean square of the vector residual, T: of a magnetometer without error in the field that fits best,
+/// and with all causes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MagneticGap {
+    /// Without causes.
+    pub before: f64,
+    /// With them.
+    pub after: f64,
+}
+
+/// A magnetometer's effect.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MagneticCause {
+    /// Its name.
+    pub effect: String,
+    /// Held-out log-likelihood that is lost without it, nats.
+    pub gain_nats: f64,
+    /// By its own name, in SI.
+    pub parameters: BTreeMap<String, Value>,
+    /// In the form of the parameters.
+    pub standard_errors: BTreeMap<String, Value>,
+    /// Of the mean square that the causes explain, in proportion to what is lost without each; with what
+    /// stays they add up to 1.
+    pub gap_share: f64,
 }
 
 /// A clock that was set, or stamps that it never had.

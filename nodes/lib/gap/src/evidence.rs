@@ -35,6 +35,19 @@ pub struct Evidence {
     pub course: Vec<CoursePoint>,
     /// What the part that no effect explains depends on, the strongest first.
     pub dependences: Vec<DependenceCurve>,
+    /// Of the magnetometer; empty without one.
+    pub magnetic: MagneticCurves,
+}
+
+/// Residuals of a magnetometer, one entry for each reading that was compared.
+#[derive(Clone, Debug, Default)]
+pub struct MagneticCurves {
+    /// Stamp of each.
+    pub stamps: Vec<Stamp>,
+    /// Without causes, T, sensor axes.
+    pub before: Vec<[f64; 3]>,
+    /// With them.
+    pub after: Vec<[f64; 3]>,
 }
 
 /// One-sided densities on common frequencies, (unit)^2/Hz, each `[frequency][axis]`.
@@ -96,6 +109,7 @@ pub(crate) fn collect(
         spectra: curves.spectra(before, after),
         course: curves.course(before, after),
         dependences: dependence_curves(findings, comparison, after),
+        magnetic: MagneticCurves::default(),
     }
 }
 

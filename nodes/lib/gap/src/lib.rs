@@ -26,6 +26,7 @@ mod joint_search;
 mod lag;
 mod library;
 mod location;
+mod magnetometer;
 mod metrics;
 pub mod monitor;
 mod noise_model;
@@ -61,10 +62,11 @@ mod words;
 pub use dependence_curves::DependenceCurve;
 pub use diagnose::{DiagnoseOptions, OfRecording, PlacementAnswer, diagnose, diagnose_together};
 pub use diagnosis::{
-    Cause, ClockJump, Diagnosis, Gap, GapLocation, Interval, KeptCalibration, Metrics,
-    PlacementDiagnosis, RecordingCause, RecordingDiagnosis, SCHEMA, Unexplained, Unidentifiable,
+    Cause, ClockJump, Diagnosis, Gap, GapLocation, Interval, KeptCalibration, MagneticCause,
+    MagneticGap, MagnetometerDiagnosis, Metrics, PlacementDiagnosis, RecordingCause,
+    RecordingDiagnosis, SCHEMA, Unexplained, Unidentifiable,
 };
 pub use error::GapError;
-pub use evidence::{CoursePoint, Evidence, Spectra};
+pub use evidence::{CoursePoint, Evidence, MagneticCurves, Spectra};
 pub use progress::Progress;
-pub use record::{MeasuredImu, PlacementRecord, PoseSeries};
+pub use record::{MeasuredField, MeasuredImu, PlacementRecord, PoseSeries};

@@ -285,3 +285,62 @@ pub(crate) mod probability {
     /// A unit of a band's mean square counts as so many nats of gain.
     pub const NATS_PER_BAND: f64 = 10.0;
 }
+
+/// What is said of a magnetometer.
+pub(crate) mod magnetometer {
+    /// Readings below which nothing is said, as of the other channels.
+    pub const LEAST_READINGS: usize = 50;
+    /// Readings of one recording that are fitted to: beyond, every second, third and so on is. Their
+    /// residuals resemble each other for seconds (the field of a room), so that more tell nothing new.
+    pub const MOST_READINGS: usize = 6000;
+    /// Of which so many give the start.
+    pub const START_READINGS: usize = 1000;
+    /// Left out at the reference's ends and next to its gaps, as of the other channels, s.
+    pub const ENDS_S: f64 = 1.0;
+    /// See above.
+    pub const BESIDE_GAPS_S: f64 = 0.35;
+    /// Length of the blocks of time that are held out together, s, as of the other channels.
+    pub const BLOCK_S: f64 = 4.0;
+    /// Median strength of readings in tesla: a third of the earth's weakest field (2.2e-5 T), beside magnets
+    /// as strong as people's devices bear.
+    pub const WEAKEST_T: f64 = 7e-6;
+    /// See above; ICM-20948's range is 4.9e-3 T.
+    pub const STRONGEST_T: f64 = 5e-3;
+    /// Readings farther off, in units of the noise per axis, weigh less (Huber): of white noise one in 900.
+    pub const OUTLIER_SIGMAS: f64 = 4.0;
+    /// Most steps of a fit.
+    pub const MOST_STEPS: usize = 20;
+    /// Difference of delays of which derivatives are taken, s.
+    pub const DELAY_STEP_S: f64 = 1e-3;
+    /// Standard deviations of the weak priors: some ten times what devices have. T.
+    pub const FIELD_PRIOR_T: f64 = 1e-3;
+    /// See above, T.
+    pub const HARD_IRON_PRIOR_T: f64 = 2e-4;
+    /// See above.
+    pub const SOFT_IRON_PRIOR: f64 = 0.5;
+    /// See above, s.
+    pub const DELAY_PRIOR_S: f64 = 0.2;
+    /// Part of the own axes' mean square below which other axes have to come: where little is turned, many
+    /// fit as well.
+    pub const AXES_RESIDUAL: f64 = 0.5;
+    /// What every device has is no cause: T, two steps of an ICM-20948.
+    pub const ORDINARY_HARD_IRON_T: f64 = 3e-7;
+    /// See above, largest entry off the identity.
+    pub const ORDINARY_SOFT_IRON: f64 = 5e-3;
+    /// See above, s, as of `time_offset`.
+    pub const ORDINARY_DELAY_S: f64 = 2e-3;
+    /// A size that matters; where two standard errors are larger, the motion cannot tell: T, which turns
+    /// north by 6 degrees at 2e-5 T of horizontal field.
+    pub const RELEVANT_HARD_IRON_T: f64 = 2e-6;
+    /// See above, a turn of 3 degrees.
+    pub const RELEVANT_SOFT_IRON: f64 = 0.05;
+    /// See above, s.
+    pub const RELEVANT_DELAY_S: f64 = 0.01;
+    /// What would tell a hard iron.
+    pub const TURN_ABOUT_TWO: &str = "turns of 90 degrees or more about two axes";
+    /// What would tell a soft iron.
+    pub const TURN_ABOUT_ALL: &str =
+        "turns of 180 degrees or more about two axes, so that each axis meets the field both ways";
+    /// What would tell a delay.
+    pub const TURN_FAST: &str = "turns with changing angular velocity, 1 rad/s or more";
+}

@@ -3,6 +3,7 @@
 use cromosim_imu::{PerChannel, Reading};
 pub use cromosim_spatial::PoseSeries;
 use cromosim_spatial::Stamp;
+use nalgebra::Vector3;
 
 use crate::diagnosis::ClockJump;
 
@@ -18,6 +19,17 @@ pub struct PlacementRecord {
     /// Where the reference's clock was set back over time that it had been through: these poses are
     /// left out of `reference`.
     pub set_back: Vec<ClockJump>,
+    /// What its magnetometer read; empty where it has none.
+    pub field: MeasuredField,
+}
+
+/// What a real magnetometer sent; both lists have the same length.
+#[derive(Clone, Debug, Default)]
+pub struct MeasuredField {
+    /// By the IMU's clock.
+    pub stamps: Vec<Stamp>,
+    /// T, in the sensor's axes.
+    pub readings: Vec<Vector3<f64>>,
 }
 
 /// What a real IMU sent, in the order of its messages; both lists have the same length.

@@ -221,6 +221,7 @@ impl Device {
                 .effects
                 .filtered(|effect| !is_of_recording(effect)),
             unexplained: placement.unexplained,
+            magnetometer: placement.magnetometer.clone(),
             ..Self::white(noise.accel_density, noise.gyro_density)
         };
         (device, left_out)

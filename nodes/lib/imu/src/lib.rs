@@ -89,7 +89,7 @@ pub use effects::{
 };
 pub use error::{EffectError, ImuError, PlacementProblem};
 pub use kalibr::KalibrNoise;
-pub use magnetic::{AmbientField, Magnetometer};
+pub use magnetic::{AmbientField, MagneticMotion, Magnetometer, measure_magnetic_recording};
 pub use mount::{MountedSensor, MountedSensors, SensorPose, point_oddity};
 pub use noise::{Covariances, NoiseSource};
 pub use orientation::OrientationSource;

@@ -41,6 +41,8 @@ fn stated(effects: EffectSet, before_s: f64, unexplained: UnexplainedErrors) -> 
         effects,
         unexplained,
         other_sessions: Vec::new(),
+        magnetometer: None,
+        field_in_world: None,
     };
     let options = ImuOptions {
         rate_hz: 100.0,

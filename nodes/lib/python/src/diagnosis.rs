@@ -6,7 +6,8 @@ use std::path::PathBuf;
 
 use cromosim_bag::BagReader;
 use cromosim_gap::{
-    DiagnoseOptions, Diagnosis, MeasuredImu, PlacementRecord, PoseSeries, SCHEMA, diagnose_together,
+    DiagnoseOptions, Diagnosis, MeasuredField, MeasuredImu, PlacementRecord, PoseSeries, SCHEMA,
+    diagnose_together,
 };
 use cromosim_imu::{EffectKind, EffectsFile, PerChannel, Reading};
 use cromosim_recording::read_placements;
@@ -60,6 +61,7 @@ impl Record {
             record: PlacementRecord {
                 name,
                 set_back: Vec::new(),
+                field: MeasuredField::default(),
                 reference: PoseSeries {
                     stamps: frames.iter().map(|frame| frame.stamp).collect(),
                     positions: frames

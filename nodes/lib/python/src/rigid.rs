@@ -43,6 +43,7 @@ pub fn simulate_rigid<'py>(
             measured: Vec::new(),
             notes: Vec::new(),
             set_back: Vec::new(),
+            magnetic: Vec::new(),
         };
         let scheme = options
             .differentiation
@@ -62,6 +63,7 @@ pub fn simulate_rigid<'py>(
             rate_hz: Some(rate_hz),
             seed: options.seed,
             noise: options.noise,
+            field: None,
         };
         how.simulate(&recorded).map_err(raise)
     })?;
@@ -83,6 +85,8 @@ fn of_device(name: &str, device: &Device, epoch: Stamp) -> EffectsFile {
         effects: device.effects().clone(),
         unexplained: device.unexplained(),
         other_sessions: Vec::new(),
+        magnetometer: device.magnetometer().cloned(),
+        field_in_world: None,
     };
     let mut file = EffectsFile::default();
     file.placements.insert(name.to_owned(), effects);

@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use cromosim_bag::BagReader;
 use cromosim_body::{BodyModel, BodyPose, ShapedBody};
-use cromosim_gap::{ClockJump, MeasuredImu, PlacementRecord, PoseSeries};
+use cromosim_gap::{ClockJump, MeasuredField, MeasuredImu, PlacementRecord, PoseSeries};
 use cromosim_imu::{
     Channel, MountedSensors, PerChannel, PlacementSet, Reading, SensorFrame, SensorTrajectory,
 };
 use cromosim_msgs::RosMessage;
 use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_msgs::geometry_msgs::PoseStamped;
-use cromosim_msgs::sensor_msgs::Imu;
+use cromosim_msgs::sensor_msgs::{Imu, MagneticField};
 use cromosim_spatial::Stamp;
 
 use crate::{RecordingError, body_for_bag};
@@ -37,6 +37,8 @@ pub struct RecordedPlacement {
     /// Where the reference's clock was set back over time that it had been through; these poses are
     /// left out.
     pub set_back: Vec<ClockJump>,
+    /// Messages of `/imu/NAME/mag` as they were recorded; empty without any.
+    pub magnetic: Vec<MagneticField>,
 }
 
 /// The placements of a bag that have a reference, by name, each on its own: what is wrong with one
@@ -116,7 +118,15 @@ fn with_imu(
     } else {
         Vec::new()
     };
+    let has_field =
+        names_between(reader, "/imu/", "/mag", MagneticField::TYPE_NAME).contains(&name);
+    let magnetic = if has_field {
+        reader.read::<MagneticField>(&format!("/imu/{name}/mag"))?
+    } else {
+        Vec::new()
+    };
     Ok(RecordedPlacement {
+        magnetic: magnetic.into_iter().map(|(_, message)| message).collect(),
         name,
         frames,
         measured: measured.into_iter().map(|(_, message)| message).collect(),
@@ -359,6 +369,12 @@ impl RecordedPlacement {
         messages.map(|message| Stamp::from_nanos(message.header.stamp.nanos()))
     }
 
+    /// Stamps of the magnetometer's messages.
+    pub fn magnetic_stamps(&self) -> impl Iterator<Item = Stamp> {
+        let messages = self.magnetic.iter();
+        messages.map(|message| Stamp::from_nanos(message.header.stamp.nanos()))
+    }
+
     /// The reference and the readings as a diagnosis takes them.
     pub fn record(&self) -> PlacementRecord {
         let reading = |message: &Imu| Reading {
@@ -374,6 +390,14 @@ impl RecordedPlacement {
                 declared: self.declared(),
             },
             set_back: self.set_back.clone(),
+            field: MeasuredField {
+                stamps: self.magnetic_stamps().collect(),
+                readings: self
+                    .magnetic
+                    .iter()
+                    .map(|message| message.magnetic_field.into())
+                    .collect(),
+            },
         }
     }
 }

@@ -34,6 +34,7 @@ pub(crate) fn parts(placement: &RecordedPlacement) -> Option<Vec<(RecordedPlacem
             measured: measured.cloned().collect(),
             notes: Vec::new(),
             set_back: Vec::new(),
+            magnetic: Vec::new(),
         };
         (!places.is_empty()).then_some((part, places))
     };

@@ -3,22 +3,24 @@
 use cromosim_spatial::meant;
 use std::ops::RangeInclusive;
 use std::path::Path;
+use std::sync::Arc;
 
 use cromosim_bag::BagWriter;
 use cromosim_imu::{
-    DeclaredNoise, Differentiation, EffectSet, EffectsFile, ImuOptions, KinematicSample,
-    OrientationSource, PlacementEffects, ReadingMapping, RecordedMotion, SampleVariance,
-    SensorFrame, SensorTrajectory, TextureSegment, Trim, UnexplainedErrors, add_texture,
-    measure_recording, simulate_kinematics, track_in_sensor_axes,
+    AmbientField, DeclaredNoise, Differentiation, EffectSet, EffectsFile, ImuOptions,
+    KinematicSample, MagneticMotion, Magnetometer, OrientationSource, PlacementEffects,
+    ReadingMapping, RecordedMotion, SampleVariance, SensorFrame, SensorTrajectory, TextureSegment,
+    Trim, UnexplainedErrors, add_texture, measure_magnetic_recording, measure_recording,
+    simulate_kinematics, track_in_sensor_axes,
 };
 use cromosim_learned::{LearnedSimulator, MappingFile, SiteMotion};
 use cromosim_msgs::geometry_msgs::PoseStamped;
-use cromosim_msgs::sensor_msgs::Imu;
+use cromosim_msgs::sensor_msgs::{Imu, MagneticField};
 use cromosim_msgs::std_msgs::Header;
 use cromosim_spatial::{
     FrameGrid, KinematicTrack, PoseEstimate, PoseSeries, Stamp, uniform_stamps,
 };
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Vector3};
 
 use crate::reference_parts::parts;
 use crate::{Quality, RecordedPlacement, RecordingError};
@@ -44,6 +46,8 @@ pub struct Resimulation {
     pub seed: u64,
     /// Whether the random part of the errors is there.
     pub noise: bool,
+    /// The magnetic field that magnetometers read; none: the one that a placement's effects hold.
+    pub field: Option<Arc<AmbientField>>,
 }
 
 /// The mapping of a placement, where there is one.
@@ -112,6 +116,9 @@ pub fn read_effects(
 pub struct Resimulated {
     /// In order of time.
     pub messages: Vec<Imu>,
+    /// Of the magnetometer, in order of time: with the stamps of its recorded messages, or of the IMU's
+    /// where none were recorded. Empty without a magnetometer or a field.
+    pub magnetic: Vec<MagneticField>,
     /// What they are good for.
     pub quality: Quality,
 }
@@ -136,8 +143,10 @@ impl Resimulation {
                 messages[*place] = message;
             }
         }
+        // Nothing is laid over such pauses, and so the magnetometer is left out.
         Ok(Resimulated {
             messages,
+            magnetic: Vec::new(),
             quality: Quality::default(),
         })
     }
@@ -157,6 +166,8 @@ impl Resimulation {
             effects: EffectSet::new(),
             unexplained: UnexplainedErrors::default(),
             other_sessions: Vec::new(),
+            magnetometer: self.field.as_ref().map(|_| Magnetometer::default()),
+            field_in_world: None,
         };
         let effects = self.effects.placements.get(name).unwrap_or(&nominal);
         let effects = &effects.in_session_of(stamps[0]);
@@ -189,8 +200,44 @@ impl Resimulation {
             field: None,
             orientation: OrientationSource::Truth,
         };
+        let frame_id = options.frame_id.clone();
         let messages = measure_recording(motion, effects, options)?;
-        Ok(Resimulated { messages, quality })
+        let magnetic = self.magnetic(placement, effects, &track, &stamps, (noise_of, &frame_id));
+        Ok(Resimulated {
+            messages,
+            magnetic,
+            quality,
+        })
+    }
+
+    /// What its magnetometer reads; nothing where it has none, or no field is known.
+    fn magnetic(
+        &self,
+        placement: &RecordedPlacement,
+        effects: &PlacementEffects,
+        track: &KinematicTrack,
+        imu_stamps: &[Stamp],
+        (noise_of, frame_id): (&str, &str),
+    ) -> Vec<MagneticField> {
+        let found = || effects.field_in_world.map(AmbientField::uniform);
+        let field = self.field.clone().or_else(|| found().map(Arc::new));
+        let Some((field, magnetometer)) = field.zip(effects.magnetometer.as_ref()) else {
+            return Vec::new();
+        };
+        let recorded: Vec<Stamp> = placement.magnetic_stamps().collect();
+        let stamps = if recorded.is_empty() {
+            imu_stamps
+        } else {
+            &recorded
+        };
+        let motion = MagneticMotion {
+            track,
+            positions: &positions_at(placement, stamps),
+            stamps,
+            rate_hz: mean_rate(stamps),
+        };
+        let noise = self.noise.then_some((self.seed, noise_of));
+        measure_magnetic_recording(motion, effects, magnetometer, &field, (noise, frame_id))
     }
 
     fn stamps(&self, placement: &RecordedPlacement) -> Result<Vec<Stamp>, RecordingError> {
@@ -321,6 +368,25 @@ fn differentiated(
     Ok((motion, rate_hz))
 }
 
+/// Where the reference frame is at stamps, on straight lines between its poses.
+fn positions_at(placement: &RecordedPlacement, stamps: &[Stamp]) -> Vec<Vector3<f64>> {
+    let frames = &placement.frames;
+    let at = |stamp: &Stamp| {
+        let after = frames.partition_point(|frame| frame.stamp < *stamp);
+        let (before, after) = (after.saturating_sub(1), after.min(frames.len() - 1));
+        let [from, to] = [before, after].map(|place| &frames[place]);
+        let span_s = to.stamp - from.stamp;
+        let part = if span_s > 0.0 {
+            ((*stamp - from.stamp) / span_s).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
+        let [from, to] = [from, to].map(|frame| frame.world_from_sensor.translation.vector);
+        from.lerp(&to, part)
+    };
+    stamps.iter().map(at).collect()
+}
+
 /// The variances of the samples that follow the stamps; none without samples.
 fn variances_at(samples: &[KinematicSample], stamps: &[Stamp]) -> Vec<SampleVariance> {
     let Some(last) = samples.len().checked_sub(1) else {
@@ -373,7 +439,7 @@ pub fn outside_reference(placement: &RecordedPlacement) -> Option<String> {
 }
 
 /// Writes the messages in order of time, with the references where they are wanted,
-/// under `/imu/NAME/data_raw` and `/reference/NAME`.
+/// under `/imu/NAME/data_raw`, `/imu/NAME/mag` and `/reference/NAME`.
 ///
 /// # Errors
 /// Of `check`, which is called before each message, and of the bag.
@@ -385,62 +451,66 @@ pub fn write_resimulated<E: From<RecordingError>>(
     namespace: &str,
     check: impl Fn() -> Result<(), E>,
 ) -> Result<(), E> {
-    let topics: Vec<[String; 2]> = recorded
-        .iter()
-        .map(|placement| {
-            ["imu", "reference"].map(|kind| namespace.to_owned() + &topic(kind, &placement.name))
-        })
-        .collect();
-    for (nanos, is_sample, number, index) in in_order_of_time(recorded, simulated, with_references)
-    {
+    for (nanos, kind, number, index) in in_order_of_time(recorded, simulated, with_references) {
         check()?;
-        let stamp = Stamp::from_nanos(nanos);
-        let [samples, references] = &topics[number];
-        let written = if is_sample {
-            bag.write(samples, stamp, &simulated[number].messages[index])
-        } else {
-            let pose = recorded[number].frames[index].world_from_sensor.into();
-            let header = Header::new(nanos, "world");
-            bag.write(references, stamp, &PoseStamped { header, pose })
+        let (stamp, placement) = (Stamp::from_nanos(nanos), &recorded[number]);
+        let topic = namespace.to_owned() + &kind.topic(&placement.name);
+        let written = match kind {
+            Kind::Sample => bag.write(&topic, stamp, &simulated[number].messages[index]),
+            Kind::Field => bag.write(&topic, stamp, &simulated[number].magnetic[index]),
+            Kind::Reference => {
+                let pose = placement.frames[index].world_from_sensor.into();
+                let header = Header::new(nanos, "world");
+                bag.write(&topic, stamp, &PoseStamped { header, pose })
+            }
         };
         written.map_err(RecordingError::from)?;
     }
     Ok(())
 }
 
-fn topic(kind: &str, name: &str) -> String {
-    match kind {
-        "imu" => format!("/imu/{name}/data_raw"),
-        _ => format!("/{kind}/{name}"),
+/// Of one time, in this order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Kind {
+    Reference,
+    Sample,
+    Field,
+}
+
+impl Kind {
+    fn topic(self, name: &str) -> String {
+        match self {
+            Self::Reference => format!("/reference/{name}"),
+            Self::Sample => format!("/imu/{name}/data_raw"),
+            Self::Field => format!("/imu/{name}/mag"),
+        }
     }
 }
 
-/// Nanoseconds, whether it is a sample, placement and index of each message; of one time, references
-/// first.
+/// Nanoseconds, kind, placement and index of each message.
 fn in_order_of_time(
     recorded: &[RecordedPlacement],
     simulated: &[Resimulated],
     with_references: bool,
-) -> Vec<(i64, bool, usize, usize)> {
+) -> Vec<(i64, Kind, usize, usize)> {
     let mut order = Vec::new();
-    for (number, placement) in recorded.iter().enumerate() {
-        if with_references {
-            order.extend(
-                placement
-                    .frames
-                    .iter()
-                    .enumerate()
-                    .map(|(index, frame)| (frame.stamp.nanos, false, number, index)),
-            );
-        }
-        order.extend(
-            simulated[number]
-                .messages
-                .iter()
-                .enumerate()
-                .map(|(index, message)| (message.header.stamp.nanos(), true, number, index)),
-        );
+    for (number, (placement, simulated)) in recorded.iter().zip(simulated).enumerate() {
+        let frames = if with_references {
+            placement.frames.as_slice()
+        } else {
+            &[]
+        };
+        let of = |kind, stamps: Vec<i64>| {
+            let indexed = stamps.into_iter().enumerate();
+            indexed.map(move |(index, nanos)| (nanos, kind, number, index))
+        };
+        let references = frames.iter().map(|frame| frame.stamp.nanos).collect();
+        let samples = simulated.messages.iter().map(|it| it.header.stamp.nanos());
+        let fields = simulated.magnetic.iter().map(|it| it.header.stamp.nanos());
+        order.extend(of(Kind::Reference, references));
+        order.extend(of(Kind::Sample, samples.collect()));
+        order.extend(of(Kind::Field, fields.collect()));
     }
-    order.sort_by_key(|(nanos, is_sample, ..)| (*nanos, *is_sample));
+    order.sort_by_key(|(nanos, kind, ..)| (*nanos, *kind));
     order
 }

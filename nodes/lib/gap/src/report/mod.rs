@@ -4,6 +4,7 @@
 mod causes;
 mod figures;
 mod location;
+mod magnetometer;
 mod markup;
 mod page;
 mod recordings;

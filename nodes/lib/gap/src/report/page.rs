@@ -9,7 +9,7 @@ use cromosim_charts::{document, write_panels};
 use super::figures::{self, Window};
 use super::markup::change;
 use super::state::State;
-use super::{causes, location, recordings};
+use super::{causes, location, magnetometer, recordings};
 use crate::diagnosis::{Metrics, PlacementDiagnosis, UNKNOWN};
 use crate::evidence::Evidence;
 
@@ -95,6 +95,7 @@ fn write_placement(
     } else {
         page.push_str("<p class=\"note\">No curves are at hand for this placement.</p>\n");
     }
+    write_magnetic(page, placement, evidence);
     page.push_str("<h3>Where the gap of the nominal simulation lies</h3>\n");
     location::write_location(page, &placement.location);
     write_rest(page, placement);
@@ -191,6 +192,16 @@ fn write_dependences(page: &mut String, evidence: &Evidence) {
     legend(page, &entries);
     write_panels(page, &panels);
     page.push_str("<p class=\"note\">Residual after all named causes. Shares: what a regression predicts on held-out time; they overlap and do not add up.</p>\n");
+}
+
+fn write_magnetic(page: &mut String, placement: &PlacementDiagnosis, evidence: Option<&Evidence>) {
+    magnetometer::write_magnetometer(page, placement.magnetometer.as_ref());
+    let panels = evidence.map(|evidence| magnetometer::residuals(&evidence.magnetic));
+    let Some(panels) = panels.filter(|panels| !panels.is_empty()) else {
+        return;
+    };
+    legend(page, &[("before", "before"), ("after", "after")]);
+    write_panels(page, &panels);
 }
 
 fn write_rest(page: &mut String, placement: &PlacementDiagnosis) {

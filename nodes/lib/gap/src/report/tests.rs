@@ -106,6 +106,7 @@ fn placement(verdict: &str, causes: Vec<Cause>, unexplained: Unexplained) -> Pla
     }];
     PlacementDiagnosis {
         recordings: Vec::new(),
+        magnetometer: None,
         clock_jumps: Vec::new(),
         calibration: Vec::new(),
         verdict: verdict.into(),

@@ -30,7 +30,8 @@ fn unit(effect: &str, parameter: &str) -> &'static str {
     match (own, parameter) {
         (Some(unit), _) => unit,
         (None, "band_hz") => "Hz",
-        (None, "intervals_s") => "s",
+        (None, "intervals_s" | "delay") => "s",
+        (None, "hard_iron") => "T",
         (None, _) => "",
     }
 }

@@ -8,7 +8,7 @@ pub mod motion;
 use std::f64::consts::{LN_2, PI, SQRT_2};
 use std::ops::Range;
 
-use cromosim_gap::{MeasuredImu, PlacementRecord, PoseSeries};
+use cromosim_gap::{MeasuredField, MeasuredImu, PlacementRecord, PoseSeries};
 use cromosim_imu::{
     DeclaredNoise, Dropouts, Effect, EffectKind, EffectSet, MeasurementInput, PerChannel, Reading,
     SensorModel, Stage, normal_pair,
@@ -127,6 +127,7 @@ impl Scene {
             reference: self.reference(),
             imu: self.imu(),
             set_back: Vec::new(),
+            field: MeasuredField::default(),
         }
     }
 

@@ -88,6 +88,8 @@ fn offline(device: &Device, rate_hz: f64, count: usize, seed: u64) -> Vec<Readin
         effects: device.effects().clone(),
         unexplained: UnexplainedErrors::default(),
         other_sessions: Vec::new(),
+        magnetometer: None,
+        field_in_world: None,
     };
     let motion = RecordedMotion {
         track: &track,

@@ -5,12 +5,15 @@ use std::fmt::{self, Write};
 use std::path::Path;
 
 use cromosim_spatial::{Stamp, in_plain_words};
+use nalgebra::Vector3;
 use serde::de::{self, Visitor};
 use serde::{Deserialize, Deserializer};
 
+use super::number::number;
 use super::spec::Shape;
 use super::{Effect, EffectSet};
-use crate::{ImuError, PerChannel};
+use crate::magnetic::RawMagnetometer;
+use crate::{ImuError, Magnetometer, PerChannel};
 
 const SCHEMA: &str = "cromosim/effects/1";
 
@@ -27,6 +30,8 @@ const SCHEMA: &str = "cromosim/effects/1";
 ///       - {effect: time_offset, seconds: 0.021}
 ///     unexplained: {accel_variance: 0.0021, gyro_variance: 1.2e-5}   # where something is, and
 ///     # {accel,gyro}_{reference_excess,late,late_per_second}, see [`UnexplainedErrors`]
+///     magnetometer: {hard_iron: [5.0e-6, -2.0e-6, 1.0e-6]}   # where one was diagnosed, as in a device file
+///     field_in_world: [0.0, 1.9e-5, -4.5e-5]   # T, as that magnetometer measures it
 ///     other_sessions:   # where several recordings were diagnosed together
 ///       - epoch: 1690000000.0
 ///         effects:
@@ -54,6 +59,10 @@ pub struct PlacementEffects {
     pub unexplained: UnexplainedErrors,
     /// What acts in other sessions of the same device.
     pub other_sessions: Vec<OtherSession>,
+    /// Its magnetometer, where one is known of.
+    pub magnetometer: Option<Magnetometer>,
+    /// The magnetic field of the place in the reference's world, T, where that is known.
+    pub field_in_world: Option<Vector3<f64>>,
 }
 
 /// How far readings are off beyond the device's noise and the errors that a reference's noise leaves.
@@ -117,6 +126,8 @@ impl PlacementEffects {
             effects: effects.clone(),
             unexplained: self.unexplained,
             other_sessions: Vec::new(),
+            magnetometer: self.magnetometer.clone(),
+            field_in_world: self.field_in_world,
         }
     }
 }
@@ -148,6 +159,8 @@ struct RawPlacement {
     unexplained: RawUnexplained,
     #[serde(default)]
     other_sessions: Vec<RawSession>,
+    magnetometer: Option<RawMagnetometer>,
+    field_in_world: Option<[f64; 3]>,
 }
 
 #[derive(Deserialize)]
@@ -249,9 +262,17 @@ impl EffectsFile {
                     });
                 }
             }
+            let magnetometer = placement.magnetometer.map(RawMagnetometer::parse);
+            let magnetometer = magnetometer.transpose();
+            let magnetometer = magnetometer.map_err(|problem| ImuError::Magnetometer {
+                file: format!("{file}: placement `{name}`"),
+                problem,
+            })?;
             placements.insert(
                 name,
                 PlacementEffects {
+                    magnetometer,
+                    field_in_world: placement.field_in_world.map(Vector3::from),
                     epoch: placement.epoch.0,
                     declared_noise: noise,
                     effects: placement.effects,
@@ -312,6 +333,7 @@ impl EffectsFile {
             );
             write_effects(&mut text, "      ", &placement.effects);
             write_unexplained(&mut text, "    ", &placement.unexplained);
+            write_magnetic(&mut text, placement);
             write_sessions(&mut text, &placement.other_sessions);
         }
         text
@@ -338,6 +360,18 @@ pub(crate) fn write_unexplained(text: &mut String, indent: &str, rest: &Unexplai
         .collect();
     if !fields.is_empty() {
         let _ = writeln!(text, "{indent}unexplained: {{{}}}", fields.join(", "));
+    }
+}
+
+/// Nothing of a placement without a magnetometer.
+fn write_magnetic(text: &mut String, placement: &PlacementEffects) {
+    let magnetometer = placement.magnetometer.as_ref().map(Magnetometer::to_yaml);
+    for line in magnetometer.iter().flat_map(|text| text.lines()) {
+        let _ = writeln!(text, "    {line}");
+    }
+    if let Some(field) = placement.field_in_world {
+        let [x, y, z] = [field.x, field.y, field.z].map(number);
+        let _ = writeln!(text, "    field_in_world: [{x}, {y}, {z}]");
     }
 }
 
@@ -405,18 +439,6 @@ fn flow(effect: &Effect) -> String {
         let _ = write!(text, ", {}: {value}", parameter.name);
     }
     text + "}"
-}
-
-/// The shortest digits that read back as the same number, with a point and a signed exponent, as
-/// YAML 1.1 asks for too.
-pub(crate) fn number(value: f64) -> String {
-    let text = format!("{value:?}");
-    let Some((mantissa, exponent)) = text.split_once('e') else {
-        return text;
-    };
-    let point = if mantissa.contains('.') { "" } else { ".0" };
-    let sign = if exponent.starts_with('-') { "" } else { "+" };
-    format!("{mantissa}{point}e{sign}{exponent}")
 }
 
 /// Seconds with nine decimals, exactly.

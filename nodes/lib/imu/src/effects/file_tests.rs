@@ -107,6 +107,12 @@ fn files_come_back_to_the_last_digit() {
         PlacementEffects {
             epoch: Stamp::from_nanos(-5),
             effects: EffectSet::new(),
+            magnetometer: Some(Magnetometer {
+                hard_iron: Vector3::new(5e-6, -2e-6, 1e-7),
+                delay: -0.01,
+                ..Magnetometer::default()
+            }),
+            field_in_world: Some(Vector3::new(0.0, 1.9e-5, -4.5e-5)),
             ..wrist.clone()
         },
     );

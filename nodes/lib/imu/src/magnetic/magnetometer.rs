@@ -42,7 +42,8 @@ pub struct Magnetometer {
     pub hard_iron_deviation: Vector3<f64>,
     /// Rows x, y, z.
     pub soft_iron: Matrix3<f64>,
-    /// How late it is against the accelerometer under the same stamp, s.
+    /// How late it is against the accelerometer under the same stamp, s; negative where the accelerometer
+    /// is the later one.
     pub delay: f64,
     /// Step of the readings, T; 0: none.
     pub lsb: f64,
@@ -89,7 +90,7 @@ impl RawMagnetometer {
         let (tesla, sizes) = ([-0.01, 0.01], [0.0, 0.01]);
         let mut checks = vec![
             ("noise_density", self.noise_density, sizes, "T/sqrt(Hz)"),
-            ("delay", self.delay, [0.0, 1.0], "s"),
+            ("delay", self.delay, [-0.2, 1.0], "s"),
             ("lsb", self.lsb, sizes, "T"),
             ("limit", self.limit.unwrap_or(1e-3), [1e-6, 1.0], "T"),
         ];
@@ -240,8 +241,17 @@ impl MagneticSensor {
 
     /// The reading of a pose of the sensor, T in sensor axes. `stamp` is the pose's.
     pub fn read(&mut self, world_from_sensor: &Isometry3<f64>, stamp: Stamp) -> Vector3<f64> {
-        let field_in_world = self.field.at(&world_from_sensor.translation.vector);
-        let mut field = world_from_sensor.rotation.inverse() * field_in_world;
+        let field = self.field.at(&world_from_sensor.translation.vector);
+        self.read_field(world_from_sensor.rotation.inverse() * field, stamp)
+    }
+
+    /// The field that it is in, at a point of the world (m), T in world axes.
+    pub fn field_at(&self, position_in_world: &Vector3<f64>) -> Vector3<f64> {
+        self.field.at(position_in_world)
+    }
+
+    /// The reading of a field in the sensor's axes, T.
+    pub fn read_field(&mut self, mut field: Vector3<f64>, stamp: Stamp) -> Vector3<f64> {
         if let Some(delay) = &mut self.delay {
             let epoch = *self.epoch.get_or_insert(stamp);
             field = delay.push(stamp - epoch, field);

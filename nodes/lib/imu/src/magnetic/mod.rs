@@ -2,7 +2,9 @@
 
 mod field;
 mod magnetometer;
+mod recorded;
 
 pub use field::AmbientField;
 pub use magnetometer::Magnetometer;
 pub(crate) use magnetometer::{MagneticSensor, RawMagnetometer};
+pub use recorded::{MagneticMotion, measure_magnetic_recording};

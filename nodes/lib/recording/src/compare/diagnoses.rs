@@ -236,6 +236,7 @@ mod tests {
     fn diagnosis(causes: Vec<Cause>) -> Diagnosis {
         let placement = PlacementDiagnosis {
             recordings: Vec::new(),
+            magnetometer: None,
             clock_jumps: Vec::new(),
             calibration: Vec::new(),
             verdict: String::new(),
