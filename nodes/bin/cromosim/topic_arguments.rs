@@ -14,12 +14,12 @@ pub struct TopicArguments {
     /// PoseStamped, PoseWithCovarianceStamped, Odometry, TransformStamped, mocap4r2's RigidBodies with :BODY, TF with :FRAME or
     /// :FRAME@FIXED (default: the tree's root), such as gripper=/tf:tool0@map. Once given, these are all references.
     /// `cromosim inspect` lists what a bag has
-    #[arg(long, value_name = "[NAME=]TOPIC[:BODY]", help_heading = TOPICS)]
+    #[arg(long, hide_short_help = true, value_name = "[NAME=]TOPIC[:BODY]", help_heading = TOPICS)]
     reference_topic: Vec<String>,
     /// An IMU on another topic than /imu/NAME/data_raw; may be given again
     ///
     /// One reference and one IMU belong together; of several, those of the same NAME
-    #[arg(long, value_name = "[NAME=]TOPIC", help_heading = TOPICS)]
+    #[arg(long, hide_short_help = true, value_name = "[NAME=]TOPIC", help_heading = TOPICS)]
     imu_topic: Vec<String>,
 }
 
