@@ -186,6 +186,14 @@ impl<E: RosElement, const N: usize> RosField for [E; N] {
     };
 }
 
+/// A matrix, row by row: serde knows no arrays of more than 32 elements, and CDR writes both alike.
+impl<E: RosElement, const ROWS: usize, const COLUMNS: usize> RosField for [[E; COLUMNS]; ROWS] {
+    const FIELD_TYPE: FieldType = FieldType {
+        element: E::ELEMENT,
+        arity: Arity::Array(ROWS * COLUMNS),
+    };
+}
+
 impl MessageType {
     /// The definition of this type alone, in the interface language.
     pub fn definition(&self) -> &'static str {

@@ -106,3 +106,51 @@ ros_message! {
         pub transform: Transform,
     }
 }
+
+ros_message! {
+    "geometry_msgs/msg/PoseWithCovariance", "../std/geometry_msgs/msg/PoseWithCovariance.msg", Message;
+    /// A pose, and how far it may be off.
+    #[derive(Copy, Default)]
+    pub struct PoseWithCovariance {
+        /// The pose.
+        pub pose: Pose,
+        /// Of position along x, y, z (m2) and rotation about the fixed axes (rad2).
+        pub covariance: [[f64; 6]; 6],
+    }
+}
+
+ros_message! {
+    "geometry_msgs/msg/PoseWithCovarianceStamped", "../std/geometry_msgs/msg/PoseWithCovarianceStamped.msg", Message;
+    /// An estimated pose with its time and frame.
+    #[derive(Default)]
+    pub struct PoseWithCovarianceStamped {
+        /// Time and frame.
+        pub header: Header,
+        /// The pose in that frame.
+        pub pose: PoseWithCovariance,
+    }
+}
+
+ros_message! {
+    "geometry_msgs/msg/Twist", "../std/geometry_msgs/msg/Twist.msg", Message;
+    /// A velocity.
+    #[derive(Copy, Default)]
+    pub struct Twist {
+        /// m/s.
+        pub linear: Vector3,
+        /// rad/s.
+        pub angular: Vector3,
+    }
+}
+
+ros_message! {
+    "geometry_msgs/msg/TwistWithCovariance", "../std/geometry_msgs/msg/TwistWithCovariance.msg", Message;
+    /// A velocity, and how far it may be off.
+    #[derive(Copy, Default)]
+    pub struct TwistWithCovariance {
+        /// The velocity.
+        pub twist: Twist,
+        /// Of the linear (m2/s2) and the angular velocity (rad2/s2).
+        pub covariance: [[f64; 6]; 6],
+    }
+}

@@ -19,6 +19,7 @@ pub mod cromosim_msgs;
 mod definition;
 pub mod diagnostic_msgs;
 pub mod geometry_msgs;
+pub mod nav_msgs;
 mod printable;
 pub mod rosbag2_interfaces;
 pub mod rosgraph_msgs;
@@ -60,10 +61,15 @@ static KNOWN: &[&MessageType] = types![
     geometry_msgs::Point,
     geometry_msgs::Pose,
     geometry_msgs::PoseStamped,
+    geometry_msgs::PoseWithCovariance,
+    geometry_msgs::PoseWithCovarianceStamped,
     geometry_msgs::Quaternion,
     geometry_msgs::Transform,
     geometry_msgs::TransformStamped,
+    geometry_msgs::Twist,
+    geometry_msgs::TwistWithCovariance,
     geometry_msgs::Vector3,
+    nav_msgs::Odometry,
     rosbag2_interfaces::BurstRequest,
     rosbag2_interfaces::BurstResponse,
     rosbag2_interfaces::GetRateRequest,

@@ -9,7 +9,7 @@ use clap::Args;
 use cromosim_bag::BagReader;
 use cromosim_gap::{Diagnosis, SCHEMA};
 use cromosim_recording::compare::{compare_diagnoses, compare_recordings};
-use cromosim_recording::open_recording;
+use cromosim_recording::{TopicMap, open_recording};
 use cromosim_spatial::in_plain_words;
 
 use crate::files::{refuse_existing, write_whole};
@@ -28,6 +28,12 @@ pub struct Arguments {
     /// The namespace (/robot1, or that of a person) of the recordings' topics, where they are in several
     #[arg(long, value_name = "NAME")]
     namespace: Option<String>,
+    /// An IMU on another topic than /imu/NAME/data_raw; may be given again
+    ///
+    /// Where a recording has no such topic, its IMU of that NAME is on /imu/NAME/data_raw. Once given, these are all that is
+    /// compared
+    #[arg(long, value_name = "[NAME=]TOPIC")]
+    imu_topic: Vec<String>,
     /// Write what is found to this file too, as JSON
     #[arg(long, value_name = "FILE.json")]
     out: Option<PathBuf>,
@@ -59,7 +65,11 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if let Some(path) = &arguments.out {
         refuse_existing(path, arguments.force)?;
     }
-    let namespace = arguments.namespace.as_deref();
+    let topics = TopicMap::parse(&[], &arguments.imu_topic)?;
+    let namespace = match arguments.namespace.as_deref() {
+        None if !topics.is_empty() => Some(""),
+        other => other,
+    };
     let (a, b) = (
         open(&arguments.a, namespace)?,
         open(&arguments.b, namespace)?,
@@ -67,7 +77,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let found = match (&a, &b) {
         (Side::Diagnosis(a), Side::Diagnosis(b)) => compare_diagnoses(a, b)?,
         (Side::Recording(a), Side::Recording(b)) => {
-            working("comparing", || compare_recordings(a, b))?
+            working("comparing", || compare_recordings(a, b, &topics))?
         }
         _ => {
             bail!(

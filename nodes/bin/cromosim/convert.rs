@@ -60,8 +60,9 @@ pub struct Arguments {
     site: Option<String>,
     /// The topic to take; needed where there are several
     ///
-    /// Of type SmplState, SmplPose, PoseStamped, TFMessage or Imu
-    #[arg(long, value_name = "TOPIC", help_heading = BAGS)]
+    /// Of type SmplState, SmplPose, Imu, PoseStamped, PoseWithCovarianceStamped, Odometry, TransformStamped, mocap4r2's
+    /// RigidBodies with :BODY, or TF with :FRAME@FIXED (the same as --frame and --fixed-frame)
+    #[arg(long, value_name = "TOPIC[:BODY]", help_heading = BAGS)]
     topic: Option<String>,
     /// Of its TF: the frame whose motion to take
     #[arg(long, value_name = "FRAME", help_heading = BAGS)]

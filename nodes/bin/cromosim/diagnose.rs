@@ -24,6 +24,7 @@ use crate::list;
 use crate::named::Named;
 use crate::output::{self, remark, say};
 use crate::progress::{self, Interrupt};
+use crate::topic_arguments::TopicArguments;
 
 /// The files in DIR.
 const FILES: [&str; 4] = [
@@ -41,7 +42,7 @@ const SEARCH: &str = "What is searched";
 #[derive(Args)]
 #[command(after_long_help = "\
 The recording (MCAP, ROS 2) holds /reference/NAME (geometry_msgs/msg/PoseStamped) or SMPL states with an attachment placements.yaml, and
-/imu/NAME/data_raw (sensor_msgs/msg/Imu). DIR gets diagnosis.json, effects.yaml (for `cromosim simulate --reference RECORDING --effects`),
+/imu/NAME/data_raw (sensor_msgs/msg/Imu); --reference-topic and --imu-topic name others. DIR gets diagnosis.json, effects.yaml (for `cromosim simulate --reference RECORDING --effects`),
 report.html and diagnosis.rrd (for Rerun). The exit code is 0 when a diagnosis was made, whatever it says.
 
 Of several recordings, what is the device's or its mount's is fitted to all of them, while clock, biases and reference are each recording's own;
@@ -87,6 +88,8 @@ pub struct Arguments {
     /// /robot1, or that of a person
     #[arg(long, value_name = "NAME", help_heading = SEARCH)]
     namespace: Option<String>,
+    #[command(flatten)]
+    topics: TopicArguments,
     /// Body model (npz or pickle) of a recording of SMPL states
     ///
     /// Rather than the embedded one
@@ -121,7 +124,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         &arguments.recordings,
         body.as_ref(),
         &config.placements,
-        arguments.namespace.as_deref(),
+        (arguments.namespace.as_deref(), &arguments.topics.map()?),
     )?;
 
     let results = diagnose_all(&placements, &options);

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use anyhow::bail;
 use cromosim_body::BodyModel;
-use cromosim_recording::{RecordedPlacement, open_recording, read_placements};
+use cromosim_recording::{RecordedPlacement, TopicMap, open_mapped, read_mapped_placements};
 
 /// A placement in one recording.
 pub struct OneRecording {
@@ -62,7 +62,7 @@ pub fn select(
     files: &[PathBuf],
     body: Option<&Arc<BodyModel>>,
     only: &[String],
-    namespace: Option<&str>,
+    (namespace, topics): (Option<&str>, &TopicMap),
 ) -> anyhow::Result<Selected> {
     refuse_twice(files)?;
     let mut selected = Selected::default();
@@ -70,20 +70,27 @@ pub fn select(
     for (path, name) in files.iter().zip(file_names(files)) {
         let file = if files.len() > 1 { name } else { String::new() };
         let of_file = |text: String| of_recording(&file, &text);
-        let (reader, _) = open_recording(path, namespace)?;
-        for (name, placement) in read_placements(&reader, body)? {
+        let (reader, _) = open_mapped(path, namespace, topics)?;
+        for (name, placement) in read_mapped_placements(&reader, body, topics)? {
             known.push(name.clone());
             if !only.is_empty() && !only.contains(&name) {
                 continue;
             }
             match placement {
-                Ok(placement) if placement.measured.is_empty() => selected.notes.push(of_file(format!(
-                    "placement {name}: no messages on /imu/{name}/data_raw (sensor_msgs/msg/Imu); skipped"
-                ))),
-                Ok(placement) => selected.placements.entry(name).or_default().push(OneRecording {
-                    file: file.clone(),
-                    placement,
-                }),
+                Ok(placement) if placement.measured.is_empty() => {
+                    selected.notes.push(of_file(format!(
+                        "placement {name}: no messages on {} (sensor_msgs/msg/Imu); skipped",
+                        topics.imu_topic(&name)
+                    )))
+                }
+                Ok(placement) => selected
+                    .placements
+                    .entry(name)
+                    .or_default()
+                    .push(OneRecording {
+                        file: file.clone(),
+                        placement,
+                    }),
                 Err(error) => selected
                     .failures
                     .push(of_file(format!("placement {name}: {error}"))),

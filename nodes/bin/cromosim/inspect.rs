@@ -15,6 +15,7 @@ use cromosim_recording::inspect::{
     BodyInspection, Inspection, PersonInspection, PosesInspection, RigidExtent, RigidInspection,
     inspect, path_length,
 };
+use cromosim_recording::pose_topics;
 
 use crate::body;
 use crate::files::{refuse_existing, write_whole};
@@ -207,6 +208,18 @@ fn print_bag(path: &Path, reader: &BagReader) -> anyhow::Result<()> {
             "  {name:width$}  {:8} {rate:12}  {type_name}{regularity}",
             counted.message_count
         )?;
+    }
+    for topic in pose_topics(reader)? {
+        let bodies: Vec<String> = topic
+            .bodies
+            .iter()
+            .map(|body| printable(body).into_owned())
+            .collect();
+        let bodies = match bodies.len() {
+            0 => String::new(),
+            _ => format!(":BODY of {}", bodies.join(", ")),
+        };
+        say!("  reference: {}{bodies}", printable(&topic.topic))?;
     }
     for attachment in reader.attachments() {
         say!(

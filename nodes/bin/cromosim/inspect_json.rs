@@ -49,6 +49,9 @@ fn bag(reader: &BagReader) -> anyhow::Result<Value> {
             "longest_gap_s": cadence.map(|own| own.longest_gap_s),
         })
     });
+    let references = cromosim_recording::pose_topics(reader)?;
+    let references = references.into_iter();
+    let references = references.map(|own| json!({"topic": own.topic, "bodies": own.bodies}));
     let attachments = reader
         .attachments()
         .map(|attachment| json!({"name": attachment.name, "bytes": attachment.content.len()}));
@@ -62,6 +65,7 @@ fn bag(reader: &BagReader) -> anyhow::Result<Value> {
         "duration_s": summary.duration(),
         "start_s": summary.time_range.map(|(start, _)| start.as_seconds()),
         "topics": topics.collect::<Vec<_>>(),
+        "references": references.collect::<Vec<_>>(),
         "attachments": attachments.collect::<Vec<_>>(),
         "metadata": metadata.collect::<Map<_, _>>(),
     }))

@@ -42,6 +42,7 @@ mod simulated_file;
 mod simulated_json;
 mod simulated_quality;
 mod summary;
+mod topic_arguments;
 mod train;
 mod trajectory;
 

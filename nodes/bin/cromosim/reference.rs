@@ -11,8 +11,8 @@ use cromosim_imu::{Device, EffectsFile, Placement, PlacementEffects, Scheme, Tex
 use cromosim_learned::{LearnedSimulator, scheme_for_networks};
 use cromosim_recording::rigid::{RigidContent, parse_rigid};
 use cromosim_recording::{
-    RecordedPlacement, Resimulated, Resimulation, open_recording, outside_reference, read_effects,
-    read_placements, read_whole, with_stamps, write_resimulated,
+    RecordedPlacement, Resimulated, Resimulation, open_mapped, outside_reference, read_effects,
+    read_mapped_placements, read_whole, with_stamps, write_resimulated,
 };
 use rayon::prelude::*;
 
@@ -36,9 +36,10 @@ pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
     }
     refuse_existing(&arguments.out, arguments.force)?;
     let scheme = arguments.differentiation()?;
-    let (reader, namespace) = open_recording(recording, arguments.namespace.as_deref())?;
+    let topics = arguments.topics.map()?;
+    let (reader, namespace) = open_mapped(recording, arguments.namespace.as_deref(), &topics)?;
     let body = arguments.body.as_deref().map(BodyModel::read).transpose()?;
-    let recorded = read_placements(&reader, body.as_ref())?
+    let recorded = read_mapped_placements(&reader, body.as_ref(), &topics)?
         .into_iter()
         .map(|(_, placement)| placement)
         .collect::<Result<Vec<_>, _>>()?;

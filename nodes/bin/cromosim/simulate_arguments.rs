@@ -15,6 +15,7 @@ use cromosim_recording::convert::ReadOptions;
 use crate::list;
 use crate::motion_arguments::MotionArguments;
 use crate::named::Named;
+use crate::topic_arguments::TopicArguments;
 
 // Headings of the help.
 const INPUT: &str = "What moves";
@@ -40,6 +41,8 @@ pub struct Arguments {
     /// Such as /robot1; with --reference
     #[arg(long, hide_short_help = true, value_name = "NAME", help_heading = INPUT)]
     pub namespace: Option<String>,
+    #[command(flatten)]
+    pub topics: TopicArguments,
     /// Simulate an IMU on a rigid body along this trajectory
     ///
     /// A robot or a prop; the trajectory is TUM, EuRoC or CSV
@@ -510,6 +513,7 @@ impl Arguments {
             (self.mapping.is_some(), "--mapping", NOT_REFERENCE),
             (self.body.is_some(), "--body", NOT_RIGID),
         ];
+        given.extend(self.topics.given().map(|it| (it, OF_REFERENCE)));
         let options = options.into_iter().filter(|(is_given, ..)| *is_given);
         given.extend(options.map(|(_, option, modes)| (option, modes)));
         Ok(given)

@@ -30,6 +30,7 @@ mod stored;
 mod stream;
 mod summary;
 mod topic;
+mod values;
 mod walk;
 mod writer;
 
@@ -44,5 +45,6 @@ pub use stored::starts_like_bag;
 pub use stream::{Compression, StreamWriter, TopicId, payload_of};
 pub use summary::{BagSummary, CountedTopic};
 pub use topic::Topic;
+pub use values::Value;
 pub use walk::Attachment;
 pub use writer::{BagOptions, BagWriter};

@@ -3,6 +3,8 @@
 //!
 //! - [`read_placements`] gives each placement of a bag: its reference poses and the messages of its
 //!   real IMU.
+//! - [`TopicMap`] says which topics are whose where they have names of their own, [`pose_topics`]
+//!   which can be references.
 //! - [`datasets`] imports what other people recorded; [`rigid`] reads and writes trajectories (TUM,
 //!   EuRoC, tables) and IMU series.
 //! - [`PlacementTrace`] is what either of them says of one placement; [`write_traces`] writes it
@@ -30,6 +32,7 @@ pub mod convert;
 pub mod datasets;
 mod error;
 mod file;
+mod frame_tree;
 pub mod inspect;
 mod messages;
 mod motion_spill;
@@ -37,12 +40,14 @@ mod namespace;
 mod people_bag;
 mod placement;
 mod played;
+mod pose_source;
 mod quality;
 mod reference_parts;
 mod resimulation;
 pub mod rigid;
 mod simulation;
 mod static_readings;
+mod topics;
 mod trace;
 
 pub use bag_file::{is_bag, write_as_bag};
@@ -51,10 +56,11 @@ pub use error::RecordingError;
 pub use file::{is_in_the_way, read_head, read_whole, write_file, write_file_with};
 pub use messages::{FIRST_STAMP, MessageHeader, smpl_pose, smpl_state, stamp_of_frame};
 pub use motion_spill::MotionSpill;
-pub use namespace::open_recording;
+pub use namespace::{open_mapped, open_recording};
 pub use people_bag::write_people;
-pub use placement::{RecordedPlacement, read_placements, read_poses};
+pub use placement::{RecordedPlacement, read_mapped_placements, read_placements, read_poses};
 pub use played::{PlayedPerson, SimulatedPerson, SimulatedPlacement, csv_file, write_people_csv};
+pub use pose_source::{POSE_TYPES, PoseTopic, pose_topics};
 pub use quality::Quality;
 pub use resimulation::{
     Resimulated, Resimulation, outside_reference, read_effects, reading_mapping, with_stamps,
@@ -62,6 +68,7 @@ pub use resimulation::{
 };
 pub use simulation::{Aside, Simulation, SimulationOptions, TextureOn};
 pub use static_readings::{StaticReadings, read_static};
+pub use topics::{PoseSource, TopicMap};
 pub use trace::{
     PlacementTrace, activities_csv, first_stamp, seconds_to_first_stamp, write_traces,
 };

@@ -11,6 +11,8 @@ use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_msgs::sensor_msgs::Imu;
 
 use crate::RecordingError;
+use crate::pose_source::check_pose_topic;
+use crate::topics::TopicMap;
 
 /// Opens a recording as it is seen from within a namespace (`/robot1`; `robot1` is the same): that
 /// of `namespace`, or the only one that holds references, SMPL states or IMUs. Gives the namespace
@@ -69,6 +71,27 @@ pub fn open_recording(
     } else {
         (reader.within(&chosen), chosen)
     })
+}
+
+/// As [`open_recording`], of a recording whose topics have names of their own: where no namespace is
+/// chosen, these are as in the bag, and are checked.
+///
+/// # Errors
+/// As [`open_recording`]; a topic that is not there or of a wrong type, with those that would do.
+pub fn open_mapped(
+    path: &Path,
+    namespace: Option<&str>,
+    topics: &TopicMap,
+) -> Result<(BagReader, String), RecordingError> {
+    let namespace = match namespace {
+        None if !topics.is_empty() => Some(""),
+        other => other,
+    };
+    let (reader, namespace) = open_recording(path, namespace)?;
+    for source in topics.references.values() {
+        check_pose_topic(&reader, source)?;
+    }
+    Ok((reader, namespace))
 }
 
 /// The namespaces in which references, SMPL states or IMUs are.

@@ -1,5 +1,6 @@
 //! The placements of a bag: reference poses, and the messages of the real IMUs.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use cromosim_bag::BagReader;
@@ -12,8 +13,11 @@ use cromosim_msgs::RosMessage;
 use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_msgs::sensor_msgs::{Imu, MagneticField};
-use cromosim_spatial::Stamp;
+use cromosim_msgs::tf2_msgs::TFMessage;
+use cromosim_spatial::{Stamp, meant};
 
+use crate::pose_source::{frame_trajectory, stamped_poses};
+use crate::topics::{PoseSource, TopicMap, check_imu_topic};
 use crate::{RecordingError, body_for_bag};
 
 /// Stamps of a reference that go back further were set back, s: messages overtake each other by less.
@@ -26,11 +30,11 @@ const MOST_SPANS: usize = 8;
 /// A placement of a recording: its reference, and its real IMU where there is one.
 #[derive(Clone, Debug)]
 pub struct RecordedPlacement {
-    /// The NAME of `/reference/NAME` and `/imu/NAME/data_raw`.
+    /// The NAME of `/reference/NAME` and `/imu/NAME/data_raw`, or as a [`TopicMap`] says.
     pub name: String,
     /// The reference: finite, in the order of time, no stamp twice, at least one.
     pub frames: Vec<SensorFrame>,
-    /// Messages of `/imu/NAME/data_raw` as they were recorded; empty where nothing was measured.
+    /// Messages of the IMU's topic as they were recorded; empty where nothing was measured.
     pub measured: Vec<Imu>,
     /// What was left out of the reference, a sentence each.
     pub notes: Vec<String>,
@@ -66,18 +70,39 @@ pub fn read_placements(
     reader: &BagReader,
     body: Option<&Arc<BodyModel>>,
 ) -> Result<Vec<(String, Result<RecordedPlacement, RecordingError>)>, RecordingError> {
-    let references = names_between(reader, "/reference/", "", PoseStamped::TYPE_NAME);
+    read_mapped_placements(reader, body, &TopicMap::default())
+}
+
+/// As [`read_placements`], with the topics that `topics` names: references that it names are all that
+/// there are, and IMUs that it does not name are on `/imu/NAME/data_raw`.
+///
+/// # Errors
+/// As [`read_placements`]; a topic that is not there or of a wrong type, and an IMU whose placement
+/// has no reference.
+#[allow(clippy::type_complexity)]
+pub fn read_mapped_placements(
+    reader: &BagReader,
+    body: Option<&Arc<BodyModel>>,
+    topics: &TopicMap,
+) -> Result<Vec<(String, Result<RecordedPlacement, RecordingError>)>, RecordingError> {
+    for topic in topics.imus.values() {
+        check_imu_topic(reader, topic)?;
+    }
+    let references = references(reader, topics);
+    let with_imu = |name: String, frames, notes| with_imu(reader, topics, name, frames, notes);
     if references.is_empty() {
-        let trajectories = poses_from_states(reader, body)?.into_iter();
+        let trajectories = poses_from_states(reader, body)?;
+        check_named(reader, topics, trajectories.iter().map(|(name, _)| name))?;
+        let trajectories = trajectories.into_iter();
         return Ok(trajectories
-            .map(|(name, frames)| (name.clone(), with_imu(reader, name, frames, Vec::new())))
+            .map(|(name, frames)| (name.clone(), with_imu(name, frames, Vec::new())))
             .collect());
     }
-    let read = |name: String| {
+    check_named(reader, topics, references.keys())?;
+    let read = |(name, source): (String, PoseSource)| {
         let (mut notes, mut set_back) = (Vec::new(), Vec::new());
-        let topic = format!("/reference/{name}");
-        let recorded = read_poses_and_jumps(reader, &topic, &mut notes, &mut set_back)
-            .and_then(|frames| with_imu(reader, name.clone(), frames, notes))
+        let recorded = read_poses_and_jumps(reader, &source, &mut notes, &mut set_back)
+            .and_then(|frames| with_imu(name.clone(), frames, notes))
             .map(|placement| RecordedPlacement {
                 set_back,
                 ..placement
@@ -85,6 +110,43 @@ pub fn read_placements(
         (name, recorded)
     };
     Ok(references.into_iter().map(read).collect())
+}
+
+/// Where the references are, by placement.
+fn references(reader: &BagReader, topics: &TopicMap) -> BTreeMap<String, PoseSource> {
+    if !topics.references.is_empty() {
+        return topics.references.clone();
+    }
+    let names = names_between(reader, "/reference/", "", PoseStamped::TYPE_NAME);
+    let source = |name: String| {
+        let source = PoseSource::topic(&format!("/reference/{name}"));
+        (name, source)
+    };
+    names.into_iter().map(source).collect()
+}
+
+/// Each IMU that a user named belongs to a reference.
+fn check_named<'a>(
+    reader: &BagReader,
+    topics: &TopicMap,
+    known: impl Iterator<Item = &'a String>,
+) -> Result<(), RecordingError> {
+    let known: Vec<&str> = known.map(String::as_str).collect();
+    let stray = topics.imus.iter();
+    let stray = stray
+        .into_iter()
+        .find(|(name, _)| !known.contains(&name.as_str()));
+    let Some((name, topic)) = stray else {
+        return Ok(());
+    };
+    Err(RecordingError::Unsuitable {
+        path: reader.path().to_owned(),
+        problem: format!(
+            "--imu-topic {topic} is the placement {name}, which has no reference; say whose it is, NAME={topic}, of {}{}",
+            known.join(", "),
+            meant(name, known.iter().copied())
+        ),
+    })
 }
 
 /// The parts of topic names of a type between `prefix` and `suffix`, sorted.
@@ -108,13 +170,15 @@ pub(crate) fn names_between(
 
 fn with_imu(
     reader: &BagReader,
+    topics: &TopicMap,
     name: String,
     frames: Vec<SensorFrame>,
     notes: Vec<String>,
 ) -> Result<RecordedPlacement, RecordingError> {
-    let has_imu = names_between(reader, "/imu/", "/data_raw", Imu::TYPE_NAME).contains(&name);
+    let topic = topics.imu_topic(&name);
+    let has_imu = check_imu_topic(reader, &topic).is_ok();
     let measured = if has_imu {
-        reader.read::<Imu>(&format!("/imu/{name}/data_raw"))?
+        reader.read::<Imu>(&topic)?
     } else {
         Vec::new()
     };
@@ -135,31 +199,27 @@ fn with_imu(
     })
 }
 
-/// The poses of a PoseStamped topic: finite, in the order of time, no stamp twice, at least one.
+/// The poses of a source: finite, in the order of time, no stamp twice, at least one.
 /// What was left out is added to `notes`.
 ///
 /// # Errors
 /// [`RecordingError::Pose`], [`RecordingError::NoFinitePose`], and what is wrong with the bag.
 pub fn read_poses(
     reader: &BagReader,
-    topic: &str,
+    source: &PoseSource,
     notes: &mut Vec<String>,
 ) -> Result<Vec<SensorFrame>, RecordingError> {
-    read_poses_and_jumps(reader, topic, notes, &mut Vec::new())
+    read_poses_and_jumps(reader, source, notes, &mut Vec::new())
 }
 
 fn read_poses_and_jumps(
     reader: &BagReader,
-    topic: &str,
+    source: &PoseSource,
     notes: &mut Vec<String>,
     set_back: &mut Vec<ClockJump>,
 ) -> Result<Vec<SensorFrame>, RecordingError> {
-    let messages = reader.read::<PoseStamped>(topic)?;
-    let count = messages.len();
-    let mut frames = Vec::with_capacity(count);
-    for (_, message) in messages {
-        frames.extend(frame(&message, reader, topic)?);
-    }
+    let topic = &source.to_string();
+    let (count, mut frames) = frames_of(reader, source)?;
     let finite = frames.len();
     *set_back = leave_out_set_back(&mut frames);
     if finite < count {
@@ -191,6 +251,33 @@ fn read_poses_and_jumps(
         ));
     }
     Ok(frames)
+}
+
+/// How many poses a source has, and those that are finite, in the order of the bag.
+fn frames_of(
+    reader: &BagReader,
+    source: &PoseSource,
+) -> Result<(usize, Vec<SensorFrame>), RecordingError> {
+    if reader.topic(&source.topic)?.type_name == TFMessage::TYPE_NAME {
+        let mut frames = frame_trajectory(reader, source)?.frames();
+        let count = frames.len();
+        let is_finite = |metres: &f64| metres.is_finite();
+        frames.retain(|it| {
+            it.world_from_sensor
+                .translation
+                .vector
+                .iter()
+                .all(is_finite)
+        });
+        return Ok((count, frames));
+    }
+    let topic = source.to_string();
+    let messages = stamped_poses(reader, source)?;
+    let mut frames = Vec::with_capacity(messages.len());
+    for message in &messages {
+        frames.extend(frame(message, reader, &topic)?);
+    }
+    Ok((messages.len(), frames))
 }
 
 /// The pose of a message; none where it is no number: what motion capture writes while it sees

@@ -14,6 +14,7 @@ use serde_json::{Value, json};
 
 use super::text::{line, only_in, significant};
 use super::{Comparison, RecordingError};
+use crate::topics::{TopicMap, check_imu_topic};
 
 /// Length of a stretch that is looked at for rest, s.
 const REST_S: f64 = 1.0;
@@ -37,16 +38,21 @@ struct Series {
     rest: Option<([f64; 6], f64)>,
 }
 
-/// What differs between the IMUs (`/imu/NAME/data_raw`) of two recordings: rates, losses, noise,
+/// What differs between the IMUs (`/imu/NAME/data_raw`, or as `named` says) of two recordings: rates, losses, noise,
 /// readings at rest, spectra (dB), distributions (Wasserstein-1); where they overlap in time also the
 /// lag of A behind B and what is left of their difference.
 ///
 /// # Errors
 /// Where they have no IMU in common, or a bag cannot be read.
-pub fn compare_recordings(a: &BagReader, b: &BagReader) -> Result<Comparison, RecordingError> {
+pub fn compare_recordings(
+    a: &BagReader,
+    b: &BagReader,
+    named: &TopicMap,
+) -> Result<Comparison, RecordingError> {
     let mut text = String::new();
     let text = &mut text;
-    let (topics_a, topics_b) = (topics(a), topics(b));
+    check_named(a, b, named)?;
+    let (topics_a, topics_b) = (topics(a, named), topics(b, named));
     let mut placements = serde_json::Map::new();
     for (name, topic) in &topics_a {
         let Some(other) = topics_b.get(name) else {
@@ -96,8 +102,22 @@ pub fn compare_recordings(a: &BagReader, b: &BagReader) -> Result<Comparison, Re
 }
 
 /// Topics of IMUs by placement: `.../NAME/data_raw`, below `/imu` before others of the same name.
-fn topics(reader: &BagReader) -> BTreeMap<String, String> {
+fn topics(reader: &BagReader, named: &TopicMap) -> BTreeMap<String, String> {
     let mut found: BTreeMap<String, String> = BTreeMap::new();
+    if !named.imus.is_empty() {
+        for (name, topic) in &named.imus {
+            let standard = format!("/imu/{name}/data_raw");
+            let of_side = [topic.clone(), standard];
+            let has = |topic: &String| check_imu_topic(reader, topic).is_ok();
+            found.extend(
+                of_side
+                    .into_iter()
+                    .find(has)
+                    .map(|topic| (name.clone(), topic)),
+            );
+        }
+        return found;
+    }
     for counted in &reader.summary().topics {
         let topic = &counted.topic.name;
         let Some(name) = topic
@@ -113,6 +133,12 @@ fn topics(reader: &BagReader) -> BTreeMap<String, String> {
         }
     }
     found
+}
+
+/// A topic that neither side has is a slip.
+fn check_named(a: &BagReader, b: &BagReader, named: &TopicMap) -> Result<(), RecordingError> {
+    let sides = |topic: &String| check_imu_topic(b, topic).or_else(|_| check_imu_topic(a, topic));
+    named.imus.values().try_for_each(sides)
 }
 
 impl Series {

@@ -10,11 +10,12 @@ use cromosim_msgs::tf2_msgs::TFMessage;
 use cromosim_spatial::Stamp;
 use nalgebra::Vector3;
 
-use super::frame_tree::FrameTree;
 use super::{Content, Read, ReadOptions, Target, dataset, motion_topic};
 use crate::datasets::{DatasetRecording, PlacedImu};
+use crate::frame_tree::FrameTree;
+use crate::pose_source::stamped_poses;
 use crate::rigid::{EurocGroundTruth, ImuSeries, PoseTrajectory};
-use crate::{RecordingError, read_poses, read_static};
+use crate::{POSE_TYPES, PoseSource, RecordingError, read_poses, read_static};
 
 /// Reads the chosen topic, or the chosen frame of the bag's TF.
 pub(super) fn read(
@@ -31,14 +32,14 @@ pub(super) fn read(
         let trajectory = tree.trajectory(frame, options.fixed_frame.as_deref())?;
         return Ok(poses(trajectory).into());
     }
-    let (topic, type_name) = choose(&reader, options, target)?;
+    let (source, type_name) = choose(&reader, options, target)?;
+    let topic = &source.topic;
     let unsuitable = |problem: String| RecordingError::Unsuitable {
         path: format!("{}, {topic}", path.display()).into(),
         problem,
     };
     match type_name.as_str() {
-        name if name == PoseStamped::TYPE_NAME => trajectory(&reader, &topic),
-        name if name == Imu::TYPE_NAME => series(&reader, &topic),
+        name if name == Imu::TYPE_NAME => series(&reader, topic),
         name if motion_topic::types().contains(&name) => {
             let setting = options.motion_setting(false);
             if let Some(option) = setting.filter(|option| *option != "--person") {
@@ -46,25 +47,27 @@ pub(super) fn read(
                     "{option} is for motion files, and these are poses in SMPL's joints already; leave it out"
                 )));
             }
-            let (motion, notes) = motion_topic::read(&reader, &topic, options)?;
+            let (motion, notes) = motion_topic::read(&reader, topic, options)?;
             let motion = motion.slice(options.motion.start_s, options.motion.duration_s)?;
             let content = Content::Motion(Box::new(motion));
             Ok(Read { content, notes })
         }
-        name if name == TFMessage::TYPE_NAME => Err(RecordingError::Unsuitable {
-            path: topic.clone().into(),
-            problem: format!(
-                "a tree of frames; give --frame, one of {}",
-                FrameTree::read(&reader)?.known()
-            ),
-        }),
+        name if name == TFMessage::TYPE_NAME && source.body.is_none() => {
+            Err(RecordingError::Unsuitable {
+                path: topic.clone().into(),
+                problem: format!(
+                    "a tree of frames; give --frame, one of {}",
+                    FrameTree::read(&reader)?.known()
+                ),
+            })
+        }
+        name if POSE_TYPES.contains(&name) => trajectory(&reader, &source),
         other => Err(unsuitable(format!(
-            "a topic of {other}; {}, {}, {}, {} and {} (with --frame) are converted",
+            "a topic of {other}; {}, {}, {}, {} (TF with --frame) are converted",
             motion_topic::types()[0],
             motion_topic::types()[1],
-            PoseStamped::TYPE_NAME,
             Imu::TYPE_NAME,
-            TFMessage::TYPE_NAME
+            POSE_TYPES.join(", ")
         ))),
     }
 }
@@ -98,9 +101,11 @@ fn choose(
     reader: &BagReader,
     options: &ReadOptions,
     target: Target,
-) -> Result<(String, String), RecordingError> {
+) -> Result<(PoseSource, String), RecordingError> {
     if let Some(topic) = &options.topic {
-        return Ok((topic.clone(), reader.topic(topic)?.type_name.clone()));
+        let source = PoseSource::parse(topic);
+        let type_name = reader.topic(&source.topic)?.type_name.clone();
+        return Ok((source, type_name));
     }
     // A TUM file holds no readings.
     let takes_readings = target != Target::Tum;
@@ -117,21 +122,33 @@ fn choose(
         // The state is what became of the pose.
         let [states, poses] = motion_topic::types().map(|name| of_types(&[name]));
         if states.is_empty() { poses } else { states }
-    } else if takes_readings {
-        of_types(&[PoseStamped::TYPE_NAME, Imu::TYPE_NAME])
     } else {
-        of_types(&[PoseStamped::TYPE_NAME])
+        let readings = takes_readings.then_some(Imu::TYPE_NAME);
+        let plain: Vec<&str> = [PoseStamped::TYPE_NAME]
+            .into_iter()
+            .chain(readings)
+            .collect();
+        let found = of_types(&plain);
+        // Else odometry and the like; TF has no pose without a frame.
+        let others = POSE_TYPES
+            .into_iter()
+            .filter(|name| *name != TFMessage::TYPE_NAME);
+        if found.is_empty() {
+            of_types(&others.collect::<Vec<_>>())
+        } else {
+            found
+        }
     };
     let problem = match found.as_slice() {
-        [only] => return Ok(only.clone()),
+        [(topic, type_name)] => return Ok((PoseSource::topic(topic), type_name.clone())),
         [] if wants_motion => {
             let [state, pose] = motion_topic::types();
             format!("no topic of {state} or {pose}")
         }
         [] => format!(
             "no topic of {} or {}; --frame takes a frame of TF",
-            PoseStamped::TYPE_NAME,
-            Imu::TYPE_NAME
+            Imu::TYPE_NAME,
+            POSE_TYPES[..POSE_TYPES.len() - 1].join(", ")
         ),
         several => {
             let names: Vec<&str> = several.iter().map(|(name, _)| name.as_str()).collect();
@@ -151,13 +168,13 @@ fn poses(trajectory: PoseTrajectory) -> Content {
     })
 }
 
-fn trajectory(reader: &BagReader, topic: &str) -> Result<Read, RecordingError> {
+fn trajectory(reader: &BagReader, source: &PoseSource) -> Result<Read, RecordingError> {
     let mut notes = Vec::new();
-    let frames = read_poses(reader, topic, &mut notes)?;
-    let first = reader.read::<PoseStamped>(topic)?.into_iter().next();
+    let frames = read_poses(reader, source, &mut notes)?;
+    let first = stamped_poses(reader, source)?.into_iter().next();
     let mut trajectory = PoseTrajectory {
         frame: first
-            .map(|(_, message)| message.header.frame_id)
+            .map(|message| message.header.frame_id)
             .unwrap_or_default(),
         ..PoseTrajectory::default()
     };
@@ -169,7 +186,7 @@ fn trajectory(reader: &BagReader, topic: &str) -> Result<Read, RecordingError> {
         content: poses(trajectory),
         notes: notes
             .iter()
-            .map(|note| format!("{topic}: {note}"))
+            .map(|note| format!("{source}: {note}"))
             .collect(),
     })
 }

@@ -8,7 +8,6 @@ mod content;
 mod conversion;
 mod dataset;
 mod follow;
-mod frame_tree;
 mod motion_topic;
 mod options;
 mod read;

@@ -22,7 +22,7 @@ struct Branch {
 }
 
 /// Frames by their names.
-pub(super) struct FrameTree<'a> {
+pub(crate) struct FrameTree<'a> {
     reader: &'a BagReader,
     branches: BTreeMap<String, Branch>,
 }
@@ -92,6 +92,12 @@ impl<'a> FrameTree<'a> {
     /// The frames' names.
     pub fn known(&self) -> String {
         self.branches.keys().cloned().collect::<Vec<_>>().join(", ")
+    }
+
+    /// The names of the frames that move against what they hang on.
+    pub fn moving_frames(&self) -> Vec<String> {
+        let moving = self.branches.iter().filter(|(_, branch)| !branch.is_static);
+        moving.map(|(name, _)| name.clone()).collect()
     }
 
     fn meant(&self, frame: &str) -> String {
