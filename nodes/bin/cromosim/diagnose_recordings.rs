@@ -108,16 +108,23 @@ pub fn select(
         );
     }
     if selected.placements.is_empty() && selected.failures.is_empty() {
-        bail!(
-            "{all}: no placement has both a reference and messages on /imu/NAME/data_raw (sensor_msgs/msg/Imu): {}",
-            if selected.notes.is_empty() {
-                "there is none".to_owned()
-            } else {
-                selected.notes.join("; ")
-            }
-        );
+        bail!("{all}: {}", selected.nothing());
     }
     Ok(selected)
+}
+
+impl Selected {
+    /// What is missing where there is no placement.
+    fn nothing(&self) -> String {
+        let notes = if self.notes.is_empty() {
+            "there is none".to_owned()
+        } else {
+            self.notes.join("; ")
+        };
+        format!(
+            "no placement has both a reference and messages on /imu/NAME/data_raw (sensor_msgs/msg/Imu): {notes}"
+        )
+    }
 }
 
 /// The same recording given again would count as new evidence.

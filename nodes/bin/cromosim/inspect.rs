@@ -209,18 +209,7 @@ fn print_bag(path: &Path, reader: &BagReader) -> anyhow::Result<()> {
             counted.message_count
         )?;
     }
-    for topic in pose_topics(reader)? {
-        let bodies: Vec<String> = topic
-            .bodies
-            .iter()
-            .map(|body| printable(body).into_owned())
-            .collect();
-        let bodies = match bodies.len() {
-            0 => String::new(),
-            _ => format!(":BODY of {}", bodies.join(", ")),
-        };
-        say!("  reference: {}{bodies}", printable(&topic.topic))?;
-    }
+    print_references(reader)?;
     for attachment in reader.attachments() {
         say!(
             "  attachment {} ({} bytes)",
@@ -243,6 +232,23 @@ fn print_bag(path: &Path, reader: &BagReader) -> anyhow::Result<()> {
         for (key, value) in values.iter().filter(|(key, _)| key.contains('.')) {
             say!("    {}: {}", printable(key), printable(value))?;
         }
+    }
+    Ok(())
+}
+
+/// The topics that can be references, and the bodies or frames that they hold.
+fn print_references(reader: &BagReader) -> anyhow::Result<()> {
+    for topic in pose_topics(reader)? {
+        let bodies: Vec<String> = topic
+            .bodies
+            .iter()
+            .map(|body| printable(body).into_owned())
+            .collect();
+        let bodies = match bodies.len() {
+            0 => String::new(),
+            _ => format!(":BODY of {}", bodies.join(", ")),
+        };
+        say!("  reference: {}{bodies}", printable(&topic.topic))?;
     }
     Ok(())
 }

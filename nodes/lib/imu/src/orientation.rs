@@ -76,7 +76,7 @@ impl FromStr for OrientationSource {
 /// square over five placements of the walk with consumer_mems, rounded up.
 const STATED: [(OrientationSource, [f64; 2]); 3] = [
     (OrientationSource::Vqf, [0.04, 0.15]),
-    (OrientationSource::Madgwick, [0.02, 0.09]),
+    (OrientationSource::Madgwick, [0.02, 0.10]),
     (OrientationSource::Mahony, [0.03, 0.09]),
 ];
 

@@ -107,8 +107,6 @@ fn choose(
         let type_name = reader.topic(&source.topic)?.type_name.clone();
         return Ok((source, type_name));
     }
-    // A TUM file holds no readings.
-    let takes_readings = target != Target::Tum;
     let wants_motion =
         (target.takes_motions() && target != Target::Bag) || options.followed.is_some();
     let of_types = |types: &[&str]| {
@@ -123,42 +121,59 @@ fn choose(
         let [states, poses] = motion_topic::types().map(|name| of_types(&[name]));
         if states.is_empty() { poses } else { states }
     } else {
-        let readings = takes_readings.then_some(Imu::TYPE_NAME);
+        let readings = takes_readings(target).then_some(Imu::TYPE_NAME);
         let plain: Vec<&str> = [PoseStamped::TYPE_NAME]
             .into_iter()
             .chain(readings)
             .collect();
         let found = of_types(&plain);
-        // Else odometry and the like; TF has no pose without a frame.
-        let others = POSE_TYPES
-            .into_iter()
-            .filter(|name| *name != TFMessage::TYPE_NAME);
+        // Else odometry and the like.
+        let others = POSE_TYPES.into_iter().filter(is_without_frames);
         if found.is_empty() {
             of_types(&others.collect::<Vec<_>>())
         } else {
             found
         }
     };
-    let problem = match found.as_slice() {
-        [(topic, type_name)] => return Ok((PoseSource::topic(topic), type_name.clone())),
-        [] if wants_motion => {
-            let [state, pose] = motion_topic::types();
-            format!("no topic of {state} or {pose}")
-        }
-        [] => format!(
-            "no topic of {} or {}; --frame takes a frame of TF",
-            Imu::TYPE_NAME,
-            POSE_TYPES[..POSE_TYPES.len() - 1].join(", ")
-        ),
-        several => {
-            let names: Vec<&str> = several.iter().map(|(name, _)| name.as_str()).collect();
-            format!("several topics; give --topic, one of {}", names.join(", "))
-        }
-    };
+    if let [(topic, type_name)] = found.as_slice() {
+        return Ok((PoseSource::topic(topic), type_name.clone()));
+    }
     Err(RecordingError::Unsuitable {
         path: reader.path().to_owned(),
-        problem,
+        problem: none_or_several(&found, wants_motion, target),
     })
+}
+
+/// Why nothing was chosen of topics with their types.
+fn none_or_several(found: &[(String, String)], wants_motion: bool, target: Target) -> String {
+    let several: Vec<&str> = found.iter().map(|(name, _)| name.as_str()).collect();
+    if !several.is_empty() {
+        return format!(
+            "several topics; give --topic, one of {}",
+            several.join(", ")
+        );
+    }
+    if wants_motion {
+        let [state, pose] = motion_topic::types();
+        return format!("no topic of {state} or {pose}");
+    }
+    let readings = takes_readings(target).then_some(Imu::TYPE_NAME);
+    let poses = POSE_TYPES.into_iter().filter(is_without_frames);
+    let types: Vec<&str> = readings.into_iter().chain(poses).collect();
+    format!(
+        "no topic of {}; --frame takes a frame of TF",
+        types.join(" or ")
+    )
+}
+
+/// A TUM file holds no readings.
+fn takes_readings(target: Target) -> bool {
+    target != Target::Tum
+}
+
+/// TF has no pose without a frame.
+fn is_without_frames(type_name: &&str) -> bool {
+    *type_name != TFMessage::TYPE_NAME
 }
 
 fn poses(trajectory: PoseTrajectory) -> Content {
