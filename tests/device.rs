@@ -168,7 +168,7 @@ placements:
       - {effect: reference_tilt, rotvec: [0.01, 0.0, 0.0]}
       - {effect: accel_bias, bias: [0.1, 0.0, 0.0]}
       - {effect: gyro_saturation, limit: 8.7}
-    unexplained: {accel_variance: 0.002, gyro_variance: 1.0e-5}
+    unexplained: {accel_variance: 0.002, gyro_variance: 1.0e-5, gyro_late: -0.001}
 ";
     std::fs::create_dir(here.join("diagnosis")).unwrap();
     std::fs::write(here.join("diagnosis/effects.yaml"), effects).unwrap();

@@ -9,7 +9,7 @@ use clap::Args;
 use cromosim_bag::BagReader;
 use cromosim_gap::{Diagnosis, SCHEMA};
 use cromosim_recording::compare::{compare_diagnoses, compare_recordings};
-use cromosim_recording::{TopicMap, open_recording};
+use cromosim_recording::{TopicMap, open_mapped};
 use cromosim_spatial::in_plain_words;
 
 use crate::files::{refuse_existing, write_whole};
@@ -66,13 +66,10 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         refuse_existing(path, arguments.force)?;
     }
     let topics = TopicMap::parse(&[], &arguments.imu_topic)?;
-    let namespace = match arguments.namespace.as_deref() {
-        None if !topics.is_empty() => Some(""),
-        other => other,
-    };
+    let namespace = arguments.namespace.as_deref();
     let (a, b) = (
-        open(&arguments.a, namespace)?,
-        open(&arguments.b, namespace)?,
+        open(&arguments.a, namespace, &topics)?,
+        open(&arguments.b, namespace, &topics)?,
     );
     let found = match (&a, &b) {
         (Side::Diagnosis(a), Side::Diagnosis(b)) => compare_diagnoses(a, b)?,
@@ -106,8 +103,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
 }
 
 /// Opens a side by its content.
-fn open(path: &Path, namespace: Option<&str>) -> anyhow::Result<Side> {
-    let recording = || Ok(Side::Recording(open_recording(path, namespace)?.0));
+fn open(path: &Path, namespace: Option<&str>, topics: &TopicMap) -> anyhow::Result<Side> {
+    let recording = || Ok(Side::Recording(open_mapped(path, namespace, topics)?.0));
     if path.is_dir() {
         let file = path.join("diagnosis.json");
         return if file.is_file() {

@@ -8,8 +8,8 @@ use serde::Deserialize;
 use crate::effects::{RawUnexplained, number, write_effects, write_unexplained};
 use crate::magnetic::RawMagnetometer;
 use crate::{
-    DeclaredNoise, Effect, EffectKind, EffectSet, ImuError, Magnetometer, PlacementEffects, Stage,
-    UnexplainedErrors,
+    DeclaredNoise, Effect, EffectKind, EffectSet, ImuError, Magnetometer, PerChannel,
+    PlacementEffects, Stage, UnexplainedErrors,
 };
 
 const SCHEMA: &str = "cromosim/device/1";
@@ -182,14 +182,13 @@ impl Device {
                 value,
             });
         }
-        if let Some(effect) = raw
-            .effects
-            .iter()
-            .find(|effect| effect.kind().spec().stage == Stage::Reference)
-        {
+        let of_reference = |effect: &&Effect| effect.kind().spec().stage == Stage::Reference;
+        let effect = raw.effects.iter().find(of_reference);
+        let effect = effect.map(|effect| effect.kind().name());
+        if let Some(effect) = effect.or_else(|| raw.unexplained.of_clocks()) {
             return Err(ImuError::ReferenceEffect {
                 file: file.to_owned(),
-                effect: effect.kind().name(),
+                effect,
             });
         }
         let magnetometer = raw.magnetometer.map(RawMagnetometer::parse).transpose();
@@ -220,7 +219,10 @@ impl Device {
             effects: placement
                 .effects
                 .filtered(|effect| !is_of_recording(effect)),
-            unexplained: placement.unexplained,
+            unexplained: UnexplainedErrors {
+                late: PerChannel::default(),
+                ..placement.unexplained
+            },
             magnetometer: placement.magnetometer.clone(),
             ..Self::white(noise.accel_density, noise.gyro_density)
         };

@@ -79,11 +79,11 @@ pub use channel::{AXES, Channel, PerChannel, Reading};
 pub use cromosim_spatial::{Bandwidth, SampleVariance};
 pub use device::{Device, EMBEDDED_DEVICES};
 pub use effects::{
-    DeclaredNoise, Dependence, DrawnBiases, Dropouts, Effect, EffectKind, EffectSet, EffectSpec,
-    EffectsFile, FirstGuess, FittedSearch, GravityMode, GridTrace, Identifiability, Lateness,
-    MeasurementInput, Ordinary, OtherSession, Owner, ParameterFit, ParameterSpec, PlacementEffects,
-    ReadOff, ReadOffSearch, ResidualView, Rounding, Search, SensorModel, Shape, SpectralLine,
-    Stage, StagedReadings, StreamingEffects, UnexplainedErrors, Wave, clipping_limit,
+    AXIS_ORDERS, DeclaredNoise, Dependence, DrawnBiases, Dropouts, Effect, EffectKind, EffectSet,
+    EffectSpec, EffectsFile, FirstGuess, FittedSearch, GravityMode, GridTrace, Identifiability,
+    Lateness, MeasurementInput, Ordinary, OtherSession, Owner, ParameterFit, ParameterSpec,
+    PlacementEffects, ReadOff, ReadOffSearch, ResidualView, Rounding, Search, SensorModel, Shape,
+    SpectralLine, Stage, StagedReadings, StreamingEffects, UnexplainedErrors, Wave, clipping_limit,
     lattice_spacing, length_factors, nearest_signed_permutation, strongest_line, unit_factors,
     white_noise_density,
 };

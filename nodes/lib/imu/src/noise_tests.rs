@@ -169,6 +169,10 @@ fn shipped_devices_are_sound_and_bad_ones_refused() {
         refusal(&YAML.replace("accel_bias, bias", "reference_tilt, rotvec"))
             .contains("`reference_tilt` is an effect of a recording")
     );
+    assert!(
+        refusal(&format!("{YAML}\nunexplained: {{gyro_late: -0.001}}\n"))
+            .contains("`gyro_late` is an effect of a recording")
+    );
     assert!(refusal(&YAML.replace("accel_density", "accel_densty")).starts_with("d.yaml: "));
     assert!(refusal(&YAML.replace("device/1", "device/2")).contains("found `cromosim/device/2`"));
     assert!(

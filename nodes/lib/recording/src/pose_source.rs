@@ -68,6 +68,8 @@ pub fn pose_topics(reader: &BagReader) -> Result<Vec<PoseTopic>, RecordingError>
                 let tree = FrameTree::read(reader);
                 tree.map_or_else(|_| Vec::new(), |tree| tree.moving_frames())
             }
+            // Their poses have no names: nothing to be read.
+            PoseStamped::TYPE_NAME | PoseWithCovarianceStamped::TYPE_NAME => Vec::new(),
             _ => {
                 let named = named_poses(reader, &topic.name)?;
                 let bodies = named.into_iter().filter_map(|(body, _)| body);

@@ -451,17 +451,21 @@ pub fn write_resimulated<E: From<RecordingError>>(
     namespace: &str,
     check: impl Fn() -> Result<(), E>,
 ) -> Result<(), E> {
+    let topics_of = |placement: &RecordedPlacement| {
+        Kind::ALL.map(|kind| namespace.to_owned() + &kind.topic(&placement.name))
+    };
+    let topics: Vec<[String; 3]> = recorded.iter().map(topics_of).collect();
     for (nanos, kind, number, index) in in_order_of_time(recorded, simulated, with_references) {
         check()?;
-        let (stamp, placement) = (Stamp::from_nanos(nanos), &recorded[number]);
-        let topic = namespace.to_owned() + &kind.topic(&placement.name);
+        let stamp = Stamp::from_nanos(nanos);
+        let topic = &topics[number][kind as usize];
         let written = match kind {
-            Kind::Sample => bag.write(&topic, stamp, &simulated[number].messages[index]),
-            Kind::Field => bag.write(&topic, stamp, &simulated[number].magnetic[index]),
+            Kind::Sample => bag.write(topic, stamp, &simulated[number].messages[index]),
+            Kind::Field => bag.write(topic, stamp, &simulated[number].magnetic[index]),
             Kind::Reference => {
-                let pose = placement.frames[index].world_from_sensor.into();
+                let pose = recorded[number].frames[index].world_from_sensor.into();
                 let header = Header::new(nanos, "world");
-                bag.write(&topic, stamp, &PoseStamped { header, pose })
+                bag.write(topic, stamp, &PoseStamped { header, pose })
             }
         };
         written.map_err(RecordingError::from)?;
@@ -478,6 +482,8 @@ enum Kind {
 }
 
 impl Kind {
+    const ALL: [Self; 3] = [Self::Reference, Self::Sample, Self::Field];
+
     fn topic(self, name: &str) -> String {
         match self {
             Self::Reference => format!("/reference/{name}"),

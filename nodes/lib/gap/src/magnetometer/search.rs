@@ -202,25 +202,24 @@ impl<'a> Search<'a> {
     /// The effects of a set by their shares; that of the axes is what they bring alone.
     fn causes(&self, chosen: &Scored, turned: bool) -> Vec<MagneticCause> {
         let parts = chosen.fit.parts;
-        let without = |parts: Parts| self.of(parts);
         let mut found: Vec<(&'static str, &Scored, Described)> = Vec::new();
         let described = Described::all(&chosen.fit);
         if parts.hard {
-            let rest = without(Parts {
+            let rest = self.of(Parts {
                 hard: false,
                 ..parts
             });
             found.push(("hard_iron", rest, described.hard));
         }
         if parts.soft {
-            let rest = without(Parts {
+            let rest = self.of(Parts {
                 soft: false,
                 ..parts
             });
             found.push(("soft_iron", rest, described.soft));
         }
         if parts.delay {
-            let rest = without(Parts {
+            let rest = self.of(Parts {
                 delay: false,
                 ..parts
             });

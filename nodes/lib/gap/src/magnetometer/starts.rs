@@ -1,5 +1,6 @@
 //! Where fits of a magnetometer begin: its axes, its delay, the field.
 
+use cromosim_imu::AXIS_ORDERS;
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
 use super::fit::Values;
@@ -38,14 +39,7 @@ pub(super) fn starts(samples: &[FieldSamples]) -> (Values, Values) {
 /// these.
 fn turned_axes() -> Vec<Matrix3<f64>> {
     let mut all = Vec::new();
-    for order in [
-        [0, 1, 2],
-        [0, 2, 1],
-        [1, 0, 2],
-        [1, 2, 0],
-        [2, 0, 1],
-        [2, 1, 0],
-    ] {
+    for order in AXIS_ORDERS {
         for signs in 0..8 {
             let mut axes = Matrix3::zeros();
             for (row, column) in order.into_iter().enumerate() {

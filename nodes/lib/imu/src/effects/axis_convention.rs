@@ -28,26 +28,28 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
     search: Search::Choice,
 };
 
+/// The orders in which three axes may stand.
+pub const AXIS_ORDERS: [[usize; 3]; 6] = [
+    [0, 1, 2],
+    [0, 2, 1],
+    [1, 0, 2],
+    [1, 2, 0],
+    [2, 0, 1],
+    [2, 1, 0],
+];
+
 /// The signed permutation next to a matrix: of all assignments of axes the one with the greatest
 /// sum of magnitudes, with the signs of its entries.
 pub fn nearest_signed_permutation(matrix: &Matrix3<f64>) -> Matrix3<f64> {
-    const ORDERS: [[usize; 3]; 6] = [
-        [0, 1, 2],
-        [0, 2, 1],
-        [1, 0, 2],
-        [1, 2, 0],
-        [2, 0, 1],
-        [2, 1, 0],
-    ];
     let score = |order: &[usize; 3]| {
         (0..3)
             .map(|row| matrix[(row, order[row])].abs())
             .sum::<f64>()
     };
-    let best = ORDERS
+    let best = AXIS_ORDERS
         .into_iter()
         .max_by(|a, b| score(a).total_cmp(&score(b)))
-        .unwrap_or(ORDERS[0]);
+        .unwrap_or(AXIS_ORDERS[0]);
     let mut permutation = Matrix3::zeros();
     for (row, column) in best.into_iter().enumerate() {
         permutation[(row, column)] = if matrix[(row, column)] < 0.0 {

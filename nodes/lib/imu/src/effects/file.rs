@@ -198,6 +198,13 @@ impl RawUnexplained {
             ("gyro_late_per_second", self.gyro_late_per_second.abs()),
         ]
     }
+
+    /// The name of a value that is of a recording's clock and its reference's, and of no device.
+    pub(crate) fn of_clocks(&self) -> Option<&'static str> {
+        let [.., a, b, c, d] = self.fields();
+        let given = [a, b, c, d].into_iter().find(|(_, size)| *size > 0.0);
+        given.map(|(name, _)| name)
+    }
 }
 
 impl From<RawUnexplained> for UnexplainedErrors {

@@ -85,7 +85,7 @@ mod model_tests;
 mod start_tests;
 
 pub use crate::channel::Reading;
-pub use axis_convention::nearest_signed_permutation;
+pub use axis_convention::{AXIS_ORDERS, nearest_signed_permutation};
 pub(crate) use channel_delay::DelayLine;
 pub use drawn_biases::DrawnBiases;
 pub(crate) use drawn_biases::StatedBiases;

@@ -46,5 +46,31 @@ fn turned(track: &KinematicTrack, position: f64) -> UnitQuaternion<f64> {
     let before = (position as usize).min(last.saturating_sub(1));
     let after = (before + 1).min(last);
     let of = &track.world_from_segment;
-    of[before].nlerp(&of[after], position - before as f64)
+    let between = of[before].try_slerp(&of[after], position - before as f64, 1e-9);
+    between.unwrap_or(of[before])
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+
+    /// A quaternion and its negative are one orientation.
+    #[test]
+    fn between_entries_the_shorter_arc_is_taken() {
+        let half = UnitQuaternion::from_scaled_axis(Vector3::z() * 0.2);
+        let negative = UnitQuaternion::new_unchecked(-half.into_inner());
+        for end in [half, negative] {
+            let mut track = KinematicTrack {
+                start: Stamp::default(),
+                rate_hz: 100.0,
+                ..KinematicTrack::default()
+            };
+            track.world_from_segment = vec![UnitQuaternion::identity(), end];
+            let between = turned(&track, 0.5);
+            let expected = UnitQuaternion::from_scaled_axis(Vector3::z() * 0.1);
+            assert!(between.angle_to(&expected) < 1e-12, "{between}");
+        }
+    }
 }
