@@ -8,32 +8,38 @@ import os
 import pathlib
 
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, EmitEvent, ExecuteProcess, OpaqueFunction, TimerAction
+from launch.actions import DeclareLaunchArgument, EmitEvent, OpaqueFunction, TimerAction
 from launch.events import Shutdown
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
 
 
-def program():
-    """`cromosim` of the package that this file was installed with, else the one on PATH."""
+def where(name):
+    """A node of the package that this file was installed with, else of the program `cromosim` on PATH."""
     prefix = pathlib.Path(os.path.abspath(__file__)).parents[3:4]
-    installed = [folder / "lib/cromosim/cromosim" for folder in prefix]
-    return next((str(path) for path in installed if path.is_file()), "cromosim")
+    if any((folder / "lib/cromosim" / name).is_file() for folder in prefix):
+        return {"package": "cromosim", "executable": name}
+    return {"executable": "cromosim", "arguments": ["node", name], "exec_name": name}
 
 
 def died(event, context):
     """Ends the launch, with an error, where a node ends that was not told to."""
-    if event.returncode == 0 and context.is_shutdown:
+    # -2: told to end before it listened to signals.
+    if event.returncode in (0, -2) and context.is_shutdown:
         return None
     # launch's own Shutdown would end it with exit code 0.
     raise RuntimeError(f"{event.process_name} has ended with exit code {event.returncode}, and the launch with it")
 
 
-def node(name, *parameters, on_exit=died):
-    """One node of the suite; parameters are lists that make `name:=value`."""
-    command = [program(), "node", name, "--ros-args", "-r", ["__ns:=/", LaunchConfiguration("namespace")]]
-    for parameter in parameters:
-        command += ["-p", parameter]
-    return ExecuteProcess(cmd=command, name=name, output="screen", on_exit=on_exit)
+def node(name, on_exit=died, **parameters):
+    """One node of the suite, in the launch's namespace."""
+    return Node(**where(name), name=name, namespace=LaunchConfiguration("namespace"), parameters=[parameters], output="screen", on_exit=on_exit)
+
+
+def text(value):
+    """A value of the launch as a text, whatever YAML would take it for."""
+    return ParameterValue(value, value_type=str)
 
 
 def played(event, context):
@@ -54,9 +60,9 @@ def generate_launch_description():
         DeclareLaunchArgument("motion", default_value="", description="A BVH file; empty: the embedded walk"),
         DeclareLaunchArgument("out", default_value="cromosim-demo", description="Where bag and recording go; OUT/bag must not exist yet"),
         OpaqueFunction(function=make_folder),
-        node("recorder", ["bag_path:='", PathJoinSubstitution([out, "bag"]), "'"]),
-        node("viewer", ["recording:='", PathJoinSubstitution([out, "demo.rrd"]), "'"]),
-        node("virtual_imu", "ready_subscriptions:=2"),
-        node("smpl_state", "ready_subscriptions:=3"),
-        node("replay", ["motion:='", LaunchConfiguration("motion"), "'"], "ready_subscriptions:=2", on_exit=played),
+        node("recorder", bag_path=text(PathJoinSubstitution([out, "bag"]))),
+        node("viewer", recording=text(PathJoinSubstitution([out, "demo.rrd"]))),
+        node("virtual_imu", ready_subscriptions=2),
+        node("smpl_state", ready_subscriptions=3),
+        node("replay", motion=text(LaunchConfiguration("motion")), ready_subscriptions=2, on_exit=played),
     ])

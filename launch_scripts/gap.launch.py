@@ -10,28 +10,33 @@ import os
 import pathlib
 
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, ExecuteProcess, OpaqueFunction
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
 
 
-def program():
-    """`cromosim` of the package that this file was installed with, else the one on PATH."""
+def where(name):
+    """A node of the package that this file was installed with, else of the program `cromosim` on PATH."""
     prefix = pathlib.Path(os.path.abspath(__file__)).parents[3:4]
-    installed = [folder / "lib/cromosim/cromosim" for folder in prefix]
-    return next((str(path) for path in installed if path.is_file()), "cromosim")
+    if any((folder / "lib/cromosim" / name).is_file() for folder in prefix):
+        return {"package": "cromosim", "executable": name}
+    return {"executable": "cromosim", "arguments": ["node", name], "exec_name": name}
 
 
 def died(event, context):
     """Ends the launch, with an error, where a node ends that was not told to."""
-    if event.returncode == 0 and context.is_shutdown:
+    # -2: told to end before it listened to signals.
+    if event.returncode in (0, -2) and context.is_shutdown:
         return None
     # launch's own Shutdown would end it with exit code 0.
     raise RuntimeError(f"{event.process_name} has ended with exit code {event.returncode}, and the launch with it")
 
 
-def node(name, *arguments):
-    """One node of the suite, with its arguments after --ros-args."""
-    return ExecuteProcess(cmd=[program(), "node", name, "--ros-args", "-r", ["__ns:=/", LaunchConfiguration("namespace")], *arguments], name=name, output="screen", on_exit=died)
+def node(name, remappings=None, **parameters):
+    """One node of the suite, in the launch's namespace."""
+    return Node(
+        **where(name), name=name, namespace=LaunchConfiguration("namespace"), parameters=[parameters] if parameters else None, remappings=remappings, output="screen", on_exit=died
+    )
 
 
 def nodes(context):
@@ -41,14 +46,14 @@ def nodes(context):
     remaps = []
     for name in names:
         for ending in ["data_raw", "data"]:
-            remaps += ["-r", f"imu/{name}/{ending}:=/virtual/{name}/{ending}"]
+            remaps.append((f"imu/{name}/{ending}", f"/virtual/{name}/{ending}"))
     started = [
-        node("gap_monitor", "-p", f"placements:=[{', '.join(names)}]"),
-        node("virtual_imu", "-p", f"placements:='{placements}'", *remaps),
+        node("gap_monitor", placements=names),
+        node("virtual_imu", remappings=remaps, placements=placements),
         node("smpl_state"),
     ]
     if motion:
-        started.append(node("replay", "-p", f"motion:='{motion}'", "-p", "loop:=true"))
+        started.append(node("replay", motion=motion, loop=True))
     return started
 
 

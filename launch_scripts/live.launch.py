@@ -8,31 +8,39 @@ import os
 import pathlib
 
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, ExecuteProcess
+from launch.actions import DeclareLaunchArgument
 from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
 
 
-def program():
-    """`cromosim` of the package that this file was installed with, else the one on PATH."""
+def where(name):
+    """A node of the package that this file was installed with, else of the program `cromosim` on PATH."""
     prefix = pathlib.Path(os.path.abspath(__file__)).parents[3:4]
-    installed = [folder / "lib/cromosim/cromosim" for folder in prefix]
-    return next((str(path) for path in installed if path.is_file()), "cromosim")
+    if any((folder / "lib/cromosim" / name).is_file() for folder in prefix):
+        return {"package": "cromosim", "executable": name}
+    return {"executable": "cromosim", "arguments": ["node", name], "exec_name": name}
 
 
 def died(event, context):
     """Ends the launch, with an error, where a node ends that was not told to."""
-    if event.returncode == 0 and context.is_shutdown:
+    # -2: told to end before it listened to signals.
+    if event.returncode in (0, -2) and context.is_shutdown:
         return None
     # launch's own Shutdown would end it with exit code 0.
     raise RuntimeError(f"{event.process_name} has ended with exit code {event.returncode}, and the launch with it")
 
 
-def node(name, *parameters):
-    """One node of the suite; parameters are lists that make `name:=value`."""
-    command = [program(), "node", name, "--ros-args", "-r", ["__ns:=/", LaunchConfiguration("namespace")]]
-    for parameter in parameters:
-        command += ["-p", parameter]
-    return ExecuteProcess(cmd=command, name=name, output="screen", on_exit=died)
+def node(name, **parameters):
+    """One node of the suite, in the launch's namespace."""
+    return Node(
+        **where(name), name=name, namespace=LaunchConfiguration("namespace"), parameters=[parameters] if parameters else None, output="screen", on_exit=died
+    )
+
+
+def text(argument):
+    """A launch argument as a text, whatever YAML would take it for."""
+    return ParameterValue(LaunchConfiguration(argument), value_type=str)
 
 
 def generate_launch_description():
@@ -41,7 +49,7 @@ def generate_launch_description():
         DeclareLaunchArgument("motion", default_value="", description="A BVH file; empty: the embedded walk"),
         DeclareLaunchArgument("placements", default_value="", description="Sensor placements (YAML); empty: the demo's"),
         node("viewer"),
-        node("virtual_imu", ["placements:='", LaunchConfiguration("placements"), "'"]),
+        node("virtual_imu", placements=text("placements")),
         node("smpl_state"),
-        node("replay", ["motion:='", LaunchConfiguration("motion"), "'"], "loop:=true"),
+        node("replay", motion=text("motion"), loop=True),
     ])

@@ -1,6 +1,6 @@
 """Real ROS 2 (rclpy) beside our nodes, started as `ros2 run` would start them; tests/interop/ros2.sh makes both.
 
-Finds the nodes by the ament index, hears typed Imu and SmplState messages, sees the graph, asks for parameters and tries to set one.
+Finds the nodes by the ament index, hears typed Imu and SmplState messages, sees the graph, asks for parameters and sets them, plays by replay's services.
 Prints what it saw; exit code 1 where anything is missing. Needs rclpy and the packages that colcon built, and a network of its own.
 """
 
@@ -11,10 +11,12 @@ import time
 
 import rclpy
 from ament_index_python.packages import get_package_prefix, get_package_share_directory
+from builtin_interfaces.msg import Time
 from cromosim_msgs.msg import SmplState
 from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
+from rosbag2_interfaces.srv import GetRate, IsPaused, Pause, PlayNext, Resume, Seek, SetRate
 from sensor_msgs.msg import Imu
 
 PATIENCE_S = 60.0
@@ -62,12 +64,36 @@ def check(executor, node):
     assert "seed" in names.result.names, names.result.names
     answer = call(executor, node, GetParameters, "/replay/get_parameters", GetParameters.Request(names=["loop"]))
     assert answer.values[0].bool_value, answer
-    parameter = Parameter("placements", value="elsewhere.yaml").to_parameter_msg()
-    request = SetParameters.Request(parameters=[parameter])
-    answer = call(executor, node, SetParameters, "/virtual_imu/set_parameters", request).results[0]
+    answer = change(executor, node, "virtual_imu", "placements", "elsewhere.yaml")
     assert not answer.successful and "read-only" in answer.reason, answer
     print(f"parameters: {len(names.result.names)}")
     print("refused:", answer.reason)
+    assert change(executor, node, "virtual_imu", "noise", False).successful
+    play(executor, node, states)
+
+
+def change(executor, node, owner, name, value):
+    request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
+    return call(executor, node, SetParameters, f"/{owner}/set_parameters", request).results[0]
+
+
+def play(executor, node, states):
+    """What a player's panel asks of rosbag2, asked of replay."""
+    def ask(kind, name, **fields):
+        return call(executor, node, kind, f"/replay/{name}", kind.Request(**fields))
+
+    ask(Pause, "pause")
+    assert ask(IsPaused, "is_paused").paused
+    states.clear()
+    assert ask(PlayNext, "play_next").success
+    until(executor, "the one state that was asked for", lambda: states)
+    assert ask(SetRate, "set_rate", rate=2.0).success and ask(GetRate, "get_rate").rate == 2.0
+    assert change(executor, node, "replay", "rate", 1.0).successful and ask(GetRate, "get_rate").rate == 1.0
+    before = len(states)
+    ask(Resume, "resume")
+    until(executor, "states after the pause", lambda: len(states) >= before + 5)
+    assert not ask(Seek, "seek", time=Time(sec=10_000)).success
+    print("replay: paused, one state, resumed; rate by service and by parameter; a seek beyond its end refused")
 
 
 def main():

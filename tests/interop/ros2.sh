@@ -28,6 +28,33 @@ export PATH=$venv/bin:$PATH AMENT_PREFIX_PATH=$venv CMAKE_PREFIX_PATH=$venv LD_L
 export ROS_DISTRO=jazzy ROS_VERSION=2 ROS_PYTHON_VERSION=3 RMW_IMPLEMENTATION=rmw_fastrtps_cpp ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST
 
 mkdir -p workspace/src && ln -sfn "$root" workspace/src/cromosim && cd workspace
+# The types of replay's services, which no wheel has, from the definitions that the nodes go by.
+services=src/rosbag2_interfaces
+mkdir -p "$services" && ln -sfn "$root/msgs/std/rosbag2_interfaces/srv" "$services/srv"
+cat > "$services/package.xml" << 'END'
+<package format="3">
+  <name>rosbag2_interfaces</name>
+  <version>0.0.0</version>
+  <description>The services of a playback.</description>
+  <maintainer email="cromosim@example.org">cromosim</maintainer>
+  <license>Apache-2.0</license>
+  <buildtool_depend>ament_cmake</buildtool_depend>
+  <buildtool_depend>rosidl_default_generators</buildtool_depend>
+  <depend>builtin_interfaces</depend>
+  <member_of_group>rosidl_interface_packages</member_of_group>
+  <export><build_type>ament_cmake</build_type></export>
+</package>
+END
+cat > "$services/CMakeLists.txt" << 'END'
+cmake_minimum_required(VERSION 3.8)
+project(rosbag2_interfaces)
+find_package(ament_cmake REQUIRED)
+find_package(builtin_interfaces REQUIRED)
+find_package(rosidl_default_generators REQUIRED)
+file(GLOB services RELATIVE "${CMAKE_CURRENT_SOURCE_DIR}" srv/*.srv)
+rosidl_generate_interfaces(${PROJECT_NAME} ${services} DEPENDENCIES builtin_interfaces)
+ament_package()
+END
 colcon list
 colcon build --cmake-args -DPython3_EXECUTABLE="$venv/bin/python" -DCROMOSIM_VIEWER=OFF "$@"
 set +u
