@@ -336,3 +336,54 @@ fn tasks_of_a_slurm_array_give_the_same_files() {
     );
     assert!(files(&here.join("whole")) == files(&here.join("tasks")));
 }
+
+/// Poses that estimators took from videos, of every kind of file and all people in them.
+#[test]
+fn poses_of_many_videos_become_columns_of_every_person() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let poses = common::root().join("nodes/lib/motion/tests/data/poses");
+    fs::create_dir_all(here.join("videos/below")).unwrap();
+    // People and rows of each: five placements, and each person as long as they were seen.
+    let videos = [
+        ("chain_wham.pkl", "walk_0.pkl", 2, 1681),
+        ("chain_wham.pkl", "below/walk_1.pkl", 2, 1681),
+        ("vibe.joblib", "vibe.joblib", 2, 125),
+        ("phalp.pkl", "phalp.pkl", 2, 120),
+        ("slahmr.npz", "slahmr.npz", 2, 105),
+        ("gvhmr.pt", "gvhmr.pt", 1, 85),
+    ];
+    for (sample, name, ..) in videos {
+        fs::copy(poses.join(sample), here.join("videos").join(name)).unwrap();
+    }
+    let all = ["--person", "all"];
+    for part in ["1/2", "2/2"] {
+        let more = [&all[..], &["--shard", part]].concat();
+        succeed(here, &simulate("videos", "out", &more));
+    }
+    let written = files(&here.join("out"));
+    assert_eq!(written.len(), videos.len(), "{:?}", written.keys());
+    for (_, name, people, rows) in videos {
+        let column = Path::new(name).with_extension("parquet");
+        let said = succeed(here, &["inspect", &format!("out/{}", column.display())]);
+        let header = format!("{} IMUs", 5 * people);
+        assert!(said.contains(&header), "{name}: {said}");
+        let readings: usize = said
+            .split_whitespace()
+            .zip(said.split_whitespace().skip(1))
+            .filter(|(_, word)| *word == "readings,")
+            .map(|(count, _)| count.parse::<usize>().unwrap())
+            .sum();
+        assert_eq!(readings, rows, "{name}: {said}");
+    }
+    fs::create_dir(here.join("alone")).unwrap();
+    succeed(
+        here,
+        &simulate("videos/walk_0.pkl", "alone/walk_0.parquet", &all),
+    );
+    assert!(written["walk_0.parquet"] == files(&here.join("alone"))["walk_0.parquet"]);
+    assert!(
+        written["walk_0.parquet"] != written["below/walk_1.parquet"],
+        "the recording's name"
+    );
+}
