@@ -60,7 +60,7 @@ fn main() {
         );
         return;
     }
-    println!("latency from SmplState to Imu over DDS, {STATES} states at 100 Hz, scheme spline");
+    println!("latency from SmplState to Imu over DDS, {STATES} states at 100 Hz, adaptive_spline");
     let folder = std::env::temp_dir();
     for (name, set, is_complete) in [
         ("5 placements", PlacementSet::demo(), false),

@@ -4,7 +4,8 @@
 
 The command line's time holds its start, reading, and writing of a bag as well; Python's its start, the
 import and reading. `alone` is `simulate` by itself, in a process that is already running.
-IMUSIM_PYTHON names a Python that has IMUSim (see peer_imusim.py): then it, too, of the same motion.
+IMUSIM_PYTHON names a Python that has IMUSim (see peer_imusim.py), WIMUSIM_PYTHON one that has WIMUSim
+(see peer_wimusim.py): then these, too, of the same motion.
 """
 
 import os
@@ -86,6 +87,10 @@ def main() -> None:
             peer = [imusim, str(Path(__file__).parent / "peer_imusim.py"), bvh]
             peer += ["left_wrist", "right_wrist", "spine3", "left_knee", "right_knee"]
             told = subprocess.run(peer, check=True, capture_output=True, text=True).stdout
+        wimusim = os.environ.get("WIMUSIM_PYTHON")
+        if wimusim is not None:
+            peer = [wimusim, str(Path(__file__).parent / "peer_wimusim.py"), str(minute)]
+            torch_told = subprocess.run(peer, check=True, capture_output=True, text=True).stdout
     line_s, python_s, alone_s = map(statistics.median, (of_line, of_python, alone))
     print(f"command line {line_s:.3f} s, Python {python_s:.3f} s: {python_s / line_s:.2f} times")
     print(f"simulate alone {alone_s:.3f} s")
@@ -94,6 +99,12 @@ def main() -> None:
         print(
             f"IMUSim alone {peer_alone_s:.2f} s, {peer_alone_s / alone_s:.0f} times; "
             f"in all {peer_s:.2f} s, {peer_s / python_s:.0f} times"
+        )
+    if wimusim is not None:
+        forward_s, first_s, whole_s = map(float, torch_told.split())
+        print(
+            f"WIMUSim's forward pass {forward_s:.3f} s, {forward_s / alone_s:.2f} times; the first {first_s:.3f} s; "
+            f"in all {whole_s:.2f} s, {whole_s / python_s:.1f} times"
         )
 
 
