@@ -134,7 +134,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
             Ok((answer, errors)) => {
                 failures.extend(errors);
                 let of_placement = |note: &String| format!("placement {name}: {note}");
-                let own = recorded.iter().flat_map(|one| &one.placement.notes);
+                let own = recorded.iter().flat_map(|one| &one.notes);
                 notes.extend(own.map(of_placement));
                 answers.insert(name.clone(), answer);
             }
@@ -210,11 +210,9 @@ fn diagnose_placement(
     recorded: &[OneRecording],
     options: &DiagnoseOptions,
 ) -> Result<(PlacementAnswer, Vec<String>), String> {
-    let records: Vec<_> = recorded.iter().map(|one| one.placement.record()).collect();
     let named: Vec<_> = recorded
         .iter()
-        .map(|one| one.file.as_str())
-        .zip(&records)
+        .map(|one| (one.file.as_str(), &one.record))
         .collect();
     let text = |(file, error): &OfRecording| of_recording(file, &error.to_string());
     match cromosim_gap::diagnose_together(&named, options) {

@@ -7,14 +7,17 @@ use std::sync::Arc;
 
 use anyhow::bail;
 use cromosim_body::BodyModel;
-use cromosim_recording::{RecordedPlacement, TopicMap, open_mapped, read_mapped_placements};
+use cromosim_gap::PlacementRecord;
+use cromosim_recording::{TopicMap, open_mapped, read_mapped_placements};
 
 /// A placement in one recording.
 pub struct OneRecording {
     /// Name of the file among several; empty where there is one alone.
     pub file: String,
     /// What it holds of the placement.
-    pub placement: RecordedPlacement,
+    pub record: PlacementRecord,
+    /// What a user should know of it.
+    pub notes: Vec<String>,
 }
 
 /// What is diagnosed, and what is not.
@@ -87,9 +90,11 @@ pub fn select(
                     .placements
                     .entry(name)
                     .or_default()
+                    // The messages themselves go: they are several times as large.
                     .push(OneRecording {
                         file: file.clone(),
-                        placement,
+                        record: placement.record(),
+                        notes: placement.notes,
                     }),
                 Err(error) => selected
                     .failures

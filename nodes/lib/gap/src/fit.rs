@@ -1,5 +1,7 @@
 //! Joint fits of sets of effects on whitened residuals.
 
+use std::sync::Arc;
+
 use cromosim_imu::{Effect, EffectKind, EffectSet, ParameterFit, PerChannel, Reading};
 use cromosim_spatial::KinematicTrack;
 use nalgebra::DVector;
@@ -25,17 +27,17 @@ pub(crate) struct FitModel<'a> {
     pub counts: Vec<PerChannel<f64>>,
 }
 
-/// A set of effects with fitted values.
+/// A set of effects with fitted values. Copies share its series, which fill much memory.
 #[derive(Clone, Debug)]
 pub(crate) struct Fit {
     pub set: EffectSet,
     /// The fitted values: effect and index among its values.
     pub layout: Vec<(EffectKind, usize)>,
-    pub prediction: Prediction,
+    pub prediction: Arc<Prediction>,
     /// Whitened residual, flat.
-    pub residual: Vec<f64>,
+    pub residual: Arc<Vec<f64>>,
     /// Change of the whitened prediction per unit of each value.
-    pub columns: Vec<Vec<f64>>,
+    pub columns: Arc<Vec<Vec<f64>>>,
     /// Of these columns and the residual.
     pub gram: Gram,
     pub linear: Linear,

@@ -1,6 +1,7 @@
 //! Gauss-Newton fits of sets of effects, of one recording or of several whose device is the same.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use cromosim_imu::{EffectKind, EffectSet, Owner};
 use nalgebra::DVector;
@@ -75,9 +76,9 @@ pub(crate) fn fit_together(
             .map(|((now, (columns, gram)), (linear, layout))| Fit {
                 set: now.set,
                 layout,
-                prediction: now.prediction,
-                residual: now.residual,
-                columns,
+                prediction: Arc::new(now.prediction),
+                residual: Arc::new(now.residual),
+                columns: Arc::new(columns),
                 gram,
                 linear,
             })
