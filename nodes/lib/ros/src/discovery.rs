@@ -118,6 +118,9 @@ impl Network {
             DiscoveryRange::Off => &[][..],
             _ => &self.peers,
         };
+        if !peers.is_empty() && matches!(security, Security::Enclave(_)) {
+            log::warn!("ROS_STATIC_PEERS: secured nodes are not announced to other hosts");
+        }
         let own = peers::own_addresses(peers);
         let builder = DomainParticipantBuilder::new(self.domain_id);
         let builder = match self.range {
