@@ -12,5 +12,6 @@ mod launch;
 mod other_host;
 mod parameters;
 mod process;
+mod static_peers;
 #[path = "../../nodes/lib/ros/tests/stranger/mod.rs"]
 mod stranger;

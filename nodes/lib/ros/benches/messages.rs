@@ -13,6 +13,7 @@ fn node(name: &str) -> Result<Node, RosError> {
     let network = Network {
         domain_id: 199,
         range: DiscoveryRange::Localhost,
+        peers: Vec::new(),
     };
     Node::start(NodeOptions::new(name, &RosArgs::default(), &Parameters::new())?.network(network))
 }

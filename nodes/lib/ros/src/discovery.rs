@@ -5,7 +5,8 @@ use std::net::{IpAddr, Ipv4Addr};
 use rustdds::{DomainParticipant, DomainParticipantBuilder};
 
 use crate::error::{RosError, RosResult, dds};
-use crate::loopback::Sockets;
+use crate::loopback::{Circle, Sockets};
+use crate::peers;
 use crate::security::Security;
 
 /// How far a node looks for peers.
@@ -22,12 +23,15 @@ pub enum DiscoveryRange {
 }
 
 /// The network that a node takes part in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Network {
     /// DDS domain, 0 to 232; nodes see each other only within one domain.
     pub domain_id: u16,
     /// How far the node looks.
     pub range: DiscoveryRange,
+    /// Hosts that it looks at in the place of multicast, and whose nodes look at this one; none
+    /// under `Off`. With `Localhost` no other host is heard.
+    pub peers: Vec<Ipv4Addr>,
 }
 
 impl Default for Network {
@@ -35,13 +39,14 @@ impl Default for Network {
         Self {
             domain_id: 0,
             range: DiscoveryRange::Localhost,
+            peers: Vec::new(),
         }
     }
 }
 
 impl Network {
-    /// From `ROS_DOMAIN_ID`, `ROS_AUTOMATIC_DISCOVERY_RANGE` and `ROS_LOCALHOST_ONLY`. Nothing set:
-    /// domain 0, this machine only.
+    /// From `ROS_DOMAIN_ID`, `ROS_AUTOMATIC_DISCOVERY_RANGE`, `ROS_LOCALHOST_ONLY` and
+    /// `ROS_STATIC_PEERS`. Nothing set: domain 0, this machine only.
     ///
     /// As in ROS 2, `ROS_LOCALHOST_ONLY=1` wins over the range; `ROS_LOCALHOST_ONLY=0` alone means
     /// the subnet.
@@ -95,28 +100,50 @@ impl Network {
             (Some(false), None) => DiscoveryRange::Subnet,
             (None, None) => DiscoveryRange::Localhost,
         };
-        if get("ROS_STATIC_PEERS").is_some() {
-            log::warn!("ROS_STATIC_PEERS is not supported and has no effect");
-        }
-        Ok(Self { domain_id, range })
+        // As in ROS 2, ROS_LOCALHOST_ONLY=1 knows no other hosts at all.
+        let peers = match get("ROS_STATIC_PEERS") {
+            Some(text) if only_localhost != Some(true) => peers::parse(&text)?,
+            _ => Vec::new(),
+        };
+        Ok(Self {
+            domain_id,
+            range,
+            peers,
+        })
     }
 
     /// Made by RustDDS's builder: ros2-client's options know the domain only, not the networks.
-    pub(crate) fn participant(self, security: &Security) -> RosResult<DomainParticipant> {
+    pub(crate) fn participant(&self, security: &Security) -> RosResult<DomainParticipant> {
+        let peers = match self.range {
+            DiscoveryRange::Off => &[][..],
+            _ => &self.peers,
+        };
+        if !peers.is_empty() && matches!(security, Security::Enclave(_)) {
+            log::warn!("ROS_STATIC_PEERS: secured nodes are not announced to other hosts");
+        }
+        let own = peers::own_addresses(peers);
         let builder = DomainParticipantBuilder::new(self.domain_id);
         let builder = match self.range {
             DiscoveryRange::Off => builder
                 .with_only_networks(std::iter::empty::<IpAddr>())
                 .same_host_loopback(false),
-            DiscoveryRange::Localhost => builder.with_only_networks([Ipv4Addr::LOCALHOST]),
+            DiscoveryRange::Localhost => {
+                let here = [Ipv4Addr::LOCALHOST].into_iter();
+                builder.with_only_networks(here.chain(own.iter().copied()))
+            }
             DiscoveryRange::Subnet | DiscoveryRange::SystemDefault => builder,
         };
         let builder = security.protect(builder)?;
         let keeps_here = matches!(self.range, DiscoveryRange::Off | DiscoveryRange::Localhost);
-        let sockets = if keeps_here {
-            Sockets::on_loopback()
-        } else {
-            Sockets::everywhere()
+        let refused_ports = peers::multicast_ports(self.domain_id);
+        let sockets = match (keeps_here, peers.is_empty()) {
+            (true, true) => Sockets::on_loopback(),
+            (true, false) => Sockets::within(Circle::Hosts {
+                admitted: [peers, &own[..]].concat(),
+                refused_ports,
+            }),
+            (false, true) => Sockets::everywhere(),
+            (false, false) => Sockets::within(Circle::Everybody { refused_ports }),
         };
         let doing = || format!("join DDS domain {}", self.domain_id);
         // All of its sockets are bound when this returns.
@@ -130,6 +157,8 @@ impl Network {
             }
             log::warn!("packets of other hosts are not refused on this system");
         }
+        drop(sockets);
+        peers::introduce(&participant, peers).map_err(|error| dds(doing(), error))?;
         Ok(participant)
     }
 }
@@ -154,9 +183,15 @@ mod tests {
             network(&[]).unwrap(),
             Network {
                 domain_id: 0,
-                range: DiscoveryRange::Localhost
+                range: DiscoveryRange::Localhost,
+                peers: Vec::new(),
             }
         );
+        let peers = |variables: &[(&str, &str)]| network(variables).unwrap().peers;
+        let named = ("ROS_STATIC_PEERS", "10.9.8.2;10.9.8.3");
+        let both = [Ipv4Addr::new(10, 9, 8, 2), Ipv4Addr::new(10, 9, 8, 3)];
+        assert_eq!(peers(&[named]), both);
+        assert!(peers(&[named, ("ROS_LOCALHOST_ONLY", "1")]).is_empty());
         assert_eq!(network(&[("ROS_DOMAIN_ID", "42")]).unwrap().domain_id, 42);
         let range = |variables: &[(&str, &str)]| network(variables).unwrap().range;
         assert_eq!(
@@ -194,6 +229,7 @@ mod tests {
             ("ROS_DOMAIN_ID", "x"),
             ("ROS_LOCALHOST_ONLY", "yes"),
             ("ROS_AUTOMATIC_DISCOVERY_RANGE", "near"),
+            ("ROS_STATIC_PEERS", "10.9.8.2 10.9.8.3"),
         ] {
             let text = network(&[(variable, value)]).unwrap_err().to_string();
             assert!(text.contains(variable) && text.contains(value), "{text}");

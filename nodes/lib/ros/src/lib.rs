@@ -12,7 +12,7 @@
 //!
 //! | what | why |
 //! |---|---|
-//! | the participant's builder | ros2-client's options cannot keep it to this machine (nor RustDDS's wholly: `loopback.rs`) |
+//! | the participant's builder | ros2-client's options cannot keep it to this machine (nor RustDDS's wholly: `loopback.rs`), nor name other hosts (`peers.rs`) |
 //! | publishers | ros2-client's hide `wait_for_acknowledgments`: the last messages of a process that ends would be lost |
 //! | sending `ros_discovery_info` | ros2-client's `Node` announces only endpoints that it made, and never takes dropped ones back |
 //! | subscriptions, services, their clients | only `Node` makes them, and its announcement would contradict ours, in which publishers are |
@@ -54,6 +54,7 @@ mod node;
 mod node_options;
 mod parameter;
 mod participant_info;
+mod peers;
 mod publisher;
 mod qos;
 mod raw;

@@ -86,6 +86,7 @@ pub fn inside_private_network(arguments: &[&str]) -> Option<Command> {
         "ROS_DOMAIN_ID",
         "ROS_LOCALHOST_ONLY",
         "ROS_AUTOMATIC_DISCOVERY_RANGE",
+        "ROS_STATIC_PEERS",
         "RMW_IMPLEMENTATION",
     ] {
         command.env_remove(variable);
@@ -117,6 +118,7 @@ pub fn network() -> Network {
     Network {
         domain_id,
         range: DiscoveryRange::Localhost,
+        peers: Vec::new(),
     }
 }
 

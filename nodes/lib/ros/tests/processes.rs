@@ -204,10 +204,11 @@ fn localhost_sends_nothing_on_other_interfaces_and_subnet_does() {
             let exchange = |range| {
                 let before = sent("veth0");
                 let network = Network {
-                    domain_id: 0,
                     range,
+                    ..Network::default()
                 };
-                let (talker, listener) = (start("talker", network), start("listener", network));
+                let talker = start("talker", network.clone());
+                let listener = start("listener", network);
                 let publisher = talker.publisher::<Imu>("/imu", Qos::reliable()).unwrap();
                 let subscription = listener
                     .subscription::<Imu>("/imu", Qos::reliable())

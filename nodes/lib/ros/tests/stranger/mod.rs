@@ -23,8 +23,11 @@ fn shell(script: &str) {
 
 pub fn start(name: &str, range: DiscoveryRange) -> Node {
     let options = NodeOptions::new(name, &RosArgs::default(), &Parameters::new()).unwrap();
-    let domain_id = 0;
-    Node::start(options.network(Network { domain_id, range })).unwrap()
+    let network = Network {
+        range,
+        ..Network::default()
+    };
+    Node::start(options.network(network)).unwrap()
 }
 
 /// An UDP datagram as a packet socket sees it.
