@@ -26,8 +26,8 @@ const DATA_SETS: &str = "Of a data set";
 pub struct Arguments {
     /// A motion, a trajectory, an IMU series, a data set's recording or a bag
     ///
-    /// Trajectories are TUM, EuRoC or CSV, IMU series EuRoC, CSV or Parquet, data sets BROAD, TotalCapture,
-    /// PAMAP2, RealWorld, phone and watch; the file's content tells
+    /// Trajectories are TUM, EuRoC, CSV or OptiTrack, IMU series EuRoC, CSV or Parquet, data sets BROAD,
+    /// TotalCapture, PAMAP2, RealWorld, phone and watch; the file's content tells
     input: PathBuf,
     /// What to write: .npz, .bvh, .trc, .tum or .txt, .csv, .parquet, .mcap
     ///
@@ -164,6 +164,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         files: DatasetFiles {
             reference: arguments.reference.clone(),
             gyroscope: arguments.gyroscope.clone(),
+            ..DatasetFiles::default()
         },
         name: arguments.name.clone(),
     };

@@ -7,7 +7,7 @@ use cromosim_body::BodyModel;
 use cromosim_motion::{MotionFormat, read_motion_for};
 
 use super::{Content, Read, ReadOptions, Target, bag_topic, dataset};
-use crate::datasets::open_dataset;
+use crate::datasets::{DatasetFiles, open_dataset};
 use crate::rigid::{RigidContent, parse_rigid, sniff_rigid};
 use crate::{RecordingError, read_head, read_whole};
 
@@ -46,8 +46,12 @@ pub fn read_content(
     if head.is_empty() {
         return Err(unsuitable("the file is empty".to_owned()));
     }
-    if let Some((_, recording)) = open_dataset(path, &options.files)? {
-        return dataset::chosen(path, recording, target, options);
+    let files = DatasetFiles {
+        up_axis: options.motion.up_axis,
+        ..options.files.clone()
+    };
+    if let Some((format, recording)) = open_dataset(path, &files)? {
+        return dataset::chosen(path, (format, recording), target, options);
     }
     refuse_dataset_settings(path, options)?;
     // Motions first: an AMC's frame can look like a row of numbers.

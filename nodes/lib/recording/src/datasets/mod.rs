@@ -1,17 +1,19 @@
 //! Importers of the data sets that people have: TotalCapture, PAMAP2, RealWorld (HAR), BROAD,
 //! smartphone and smartwatch, IMUs on segments with markers, columns of readings, and the structure
-//! of DIP-IMU. Each
-//! gives the IMUs by placement, and references where there are.
+//! of DIP-IMU; and of what motion capture systems export: OptiTrack. Each gives the IMUs by
+//! placement, and references where there are.
 //!
 //! [`open_dataset`] tells a file by its content and looks for what belongs to it. Parsers work over
 //! bytes and open nothing. What a data set does not say (gyroscopes in DIP-IMU) is not made up.
 
 mod broad;
+mod capture;
 mod columns;
 mod dip;
 mod har_spsw;
 mod marked_imu;
 mod open;
+mod optitrack;
 mod pamap2;
 mod realworld;
 mod recording;
@@ -27,6 +29,7 @@ pub use dip::{DIP_SENSORS, DipArray, DipRecording};
 pub use har_spsw::{HAR_SPSW_RATE_HZ, parse_har_spsw};
 pub use marked_imu::parse_marked_imu;
 pub use open::{DatasetFiles, DatasetFormat, open_dataset, sniff_dataset};
+pub use optitrack::parse_optitrack;
 pub use pamap2::{PAMAP2_RATE_HZ, pamap2_activity, parse_pamap2};
 pub use realworld::parse_realworld;
 pub use recording::{ActivitySpan, DatasetRecording, PlacedImu};

@@ -5,11 +5,12 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use cromosim_arrays::{Container, Format, Limits};
+use cromosim_motion::UpAxis;
 
 use super::{
-    DatasetRecording, broad, columns, har_spsw, marked_imu, parse_broad, parse_columns,
-    parse_har_spsw, parse_marked_imu, parse_pamap2, parse_realworld, parse_totalcapture_reference,
-    parse_totalcapture_sensors, realworld, totalcapture,
+    DatasetRecording, broad, columns, har_spsw, marked_imu, optitrack, parse_broad, parse_columns,
+    parse_har_spsw, parse_marked_imu, parse_optitrack, parse_pamap2, parse_realworld,
+    parse_totalcapture_reference, parse_totalcapture_sensors, realworld, totalcapture,
 };
 use crate::rigid::RigidError;
 
@@ -37,6 +38,15 @@ pub enum DatasetFormat {
     HarSpsw,
     /// [`parse_columns`].
     Columns,
+    /// [`parse_optitrack`].
+    OptiTrack,
+}
+
+impl DatasetFormat {
+    /// Whether its files may have any axis up.
+    pub const fn takes_up_axis(self) -> bool {
+        matches!(self, Self::OptiTrack)
+    }
 }
 
 impl std::fmt::Display for DatasetFormat {
@@ -49,25 +59,32 @@ impl std::fmt::Display for DatasetFormat {
             Self::MarkedImu => "IMU on a segment with markers",
             Self::HarSpsw => "smartphone and smartwatch (HAR)",
             Self::Columns => "columns (Parquet)",
+            Self::OptiTrack => "OptiTrack (CSV)",
         })
     }
 }
 
-/// Files that belong to a recording where they do not lie beside it under the data set's own names.
+/// Files that belong to a recording where they do not lie beside it under the data set's own names,
+/// and what its file does not say.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DatasetFiles {
     /// TotalCapture: the folder of `gt_skel_gbl_pos.txt` and `gt_skel_gbl_ori.txt`.
     pub reference: Option<PathBuf>,
     /// RealWorld: the gyroscope's zip.
     pub gyroscope: Option<PathBuf>,
+    /// OptiTrack: the axis that points up; y where it is to be found out.
+    pub up_axis: UpAxis,
 }
 
-/// What a text file (its first 64 KiB are plenty) is: a row of 54 numbers, or TotalCapture's three
-/// kinds of lines.
+/// What a text file (its first 64 KiB are plenty) is: the header of an export, a row of 54 numbers,
+/// or TotalCapture's three kinds of lines.
 pub fn sniff_dataset(bytes: &[u8]) -> Option<DatasetFormat> {
     let start = String::from_utf8_lossy(&bytes[..bytes.len().min(LOOKED_AT)]);
+    let start = start.trim_start_matches('\u{feff}');
+    if optitrack::is_optitrack(start) {
+        return Some(DatasetFormat::OptiTrack);
+    }
     let mut lines = start
-        .trim_start_matches('\u{feff}')
         .lines()
         .map(str::trim)
         .filter(|line| !line.is_empty() && !line.starts_with('#'));
@@ -160,6 +177,7 @@ fn text(
     };
     let recording = match format {
         DatasetFormat::Pamap2 => parse_pamap2(&bytes(path)?, name)?,
+        DatasetFormat::OptiTrack => parse_optitrack(&bytes(path)?, name, beside.up_axis)?,
         _ => totalcapture(path, name, beside)?,
     };
     Ok(Some((format, recording)))
