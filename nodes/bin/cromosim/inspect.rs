@@ -37,8 +37,8 @@ pub struct Arguments {
     ///
     /// Motion (BVH, ASF/AMC, C3D, TRC, AMASS, video estimates), body (SMPL npz or pickle),
     /// trajectory or IMU series (TUM, EuRoC, CSV), recording of a data set (BROAD, TotalCapture,
-    /// PAMAP2, RealWorld, phone and watch) or of a motion capture system (OptiTrack), or bag (.mcap,
-    /// rosbag2 directory)
+    /// PAMAP2, RealWorld, phone and watch) or of a motion capture system or sensor (OptiTrack,
+    /// Vicon, Movella DOT, MT Manager), or bag (.mcap, rosbag2 directory)
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// Body model (npz or pickle) that motions are read for

@@ -46,7 +46,7 @@ pub struct Arguments {
     /// Simulate an IMU on each rigid body along its trajectory
     ///
     /// A robot or a prop; the trajectory is TUM, EuRoC, CSV, or a motion capture system's export
-    /// (OptiTrack), of one body or several
+    /// (OptiTrack, Vicon), of one body or several
     #[arg(long, value_name = "FILE", help_heading = INPUT)]
     pub rigid: Option<PathBuf>,
     /// A placement at a named site, such as left_wrist=left_watch

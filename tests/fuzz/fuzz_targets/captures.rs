@@ -1,8 +1,8 @@
-//! Exports of motion capture systems: no panic, and what comes out is in order.
+//! Exports of motion capture systems and sensors: no panic, and what comes out is in order.
 #![no_main]
 
 use cromosim_motion::UpAxis;
-use cromosim_recording::datasets::{DatasetRecording, parse_optitrack, sniff_dataset};
+use cromosim_recording::datasets::{DatasetRecording, parse_movella, parse_optitrack, parse_vicon, sniff_dataset};
 use libfuzzer_sys::fuzz_target;
 
 fn check(recording: &DatasetRecording) {
@@ -13,11 +13,22 @@ fn check(recording: &DatasetRecording) {
         assert!(poses.positions.iter().flatten().all(|value| value.is_finite()));
         assert!(poses.rotations.iter().all(|rotation| (rotation.norm() - 1.0).abs() < 1e-6));
     }
+    for imu in &recording.imus {
+        let (stamps, count) = (&imu.series.stamps, imu.series.stamps.len());
+        assert!(stamps.windows(2).all(|pair| pair[0] < pair[1]), "stamps rise");
+        assert_eq!([imu.series.specific_force.len(), imu.series.angular_velocity.len()], [count; 2]);
+        assert!(imu.world_from_sensor.is_empty() || imu.world_from_sensor.len() == count);
+        let vectors = imu.series.specific_force.iter().chain(&imu.series.angular_velocity);
+        assert!(vectors.flatten().all(|value| value.is_finite()));
+    }
 }
 
 fuzz_target!(|bytes: &[u8]| {
     let _ = sniff_dataset(bytes);
-    if let Ok(recording) = parse_optitrack(bytes, "fuzz", UpAxis::Detect) {
-        check(&recording);
-    }
+    let read = [
+        parse_optitrack(bytes, "fuzz", UpAxis::Detect),
+        parse_vicon(bytes, "fuzz", UpAxis::Detect),
+        parse_movella(bytes, "fuzz"),
+    ];
+    read.iter().flatten().for_each(check);
 });

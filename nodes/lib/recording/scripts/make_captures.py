@@ -196,7 +196,8 @@ def main():
     # Fuzzing starts from a few frames of each.
     for path in DATA.iterdir():
         lines = path.read_text().splitlines(keepends=True)
-        (SAMPLES / path.name).write_text("".join(lines[:24]))
+        few = lines[:28] + lines[-3:] if path.suffix == ".mvnx" else lines[:24]
+        (SAMPLES / path.name).write_text("".join(few))
 
 
 main()

@@ -11,6 +11,8 @@ use crate::rigid::{PoseTrajectory, RigidError};
 /// A row of a table is on the grid of its frame rate where it is as near as this, s: times are
 /// printed with six digits.
 const PRINTED_TIME: f64 = 1e-6;
+/// Gravity of the world, m/s2: what free acceleration lacks.
+const GRAVITY_IN_WORLD: Vector3<f64> = Vector3::new(0.0, 0.0, -9.80665);
 
 /// Bodies by name, as they are read row by row.
 pub(super) struct Bodies {
@@ -171,6 +173,14 @@ pub(super) fn from_euler(order: [usize; 3], angles: Vector3<f64>) -> UnitQuatern
     first * second * third
 }
 
+/// What an accelerometer reads whose acceleration in the world, without gravity, is known: R^T (a - g).
+pub(super) fn specific_force(
+    world_from_sensor: UnitQuaternion<f64>,
+    free_acceleration_in_world: Vector3<f64>,
+) -> Vector3<f64> {
+    world_from_sensor.inverse() * (free_acceleration_in_world - GRAVITY_IN_WORLD)
+}
+
 /// An error of a place in a file that is neither a row's cell nor a missing column.
 pub(super) fn content(
     name: &str,
@@ -222,5 +232,11 @@ mod tests {
         for letters in ["", "XY", "XXY", "XYZZ", "XYa"] {
             assert_eq!(euler_order(letters), None);
         }
+    }
+
+    #[test]
+    fn rest_reads_gravity_upwards() {
+        let up = specific_force(UnitQuaternion::identity(), Vector3::zeros());
+        assert_eq!(up, Vector3::new(0.0, 0.0, 9.80665));
     }
 }

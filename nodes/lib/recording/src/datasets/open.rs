@@ -8,9 +8,10 @@ use cromosim_arrays::{Container, Format, Limits};
 use cromosim_motion::UpAxis;
 
 use super::{
-    DatasetRecording, broad, columns, har_spsw, marked_imu, optitrack, parse_broad, parse_columns,
-    parse_har_spsw, parse_marked_imu, parse_optitrack, parse_pamap2, parse_realworld,
-    parse_totalcapture_reference, parse_totalcapture_sensors, realworld, totalcapture,
+    DatasetRecording, broad, columns, har_spsw, marked_imu, movella, optitrack, parse_broad,
+    parse_columns, parse_har_spsw, parse_marked_imu, parse_movella, parse_optitrack, parse_pamap2,
+    parse_realworld, parse_totalcapture_reference, parse_totalcapture_sensors, parse_vicon,
+    realworld, totalcapture, vicon,
 };
 use crate::rigid::RigidError;
 
@@ -40,12 +41,16 @@ pub enum DatasetFormat {
     Columns,
     /// [`parse_optitrack`].
     OptiTrack,
+    /// [`parse_vicon`].
+    Vicon,
+    /// [`parse_movella`].
+    Movella,
 }
 
 impl DatasetFormat {
     /// Whether its files may have any axis up.
     pub const fn takes_up_axis(self) -> bool {
-        matches!(self, Self::OptiTrack)
+        matches!(self, Self::OptiTrack | Self::Vicon)
     }
 }
 
@@ -60,6 +65,8 @@ impl std::fmt::Display for DatasetFormat {
             Self::HarSpsw => "smartphone and smartwatch (HAR)",
             Self::Columns => "columns (Parquet)",
             Self::OptiTrack => "OptiTrack (CSV)",
+            Self::Vicon => "Vicon (CSV)",
+            Self::Movella => "Movella DOT or MT Manager (table)",
         })
     }
 }
@@ -72,7 +79,7 @@ pub struct DatasetFiles {
     pub reference: Option<PathBuf>,
     /// RealWorld: the gyroscope's zip.
     pub gyroscope: Option<PathBuf>,
-    /// OptiTrack: the axis that points up; y where it is to be found out.
+    /// The axis that points up; where it is to be found out, OptiTrack's y and Vicon's z.
     pub up_axis: UpAxis,
 }
 
@@ -83,6 +90,12 @@ pub fn sniff_dataset(bytes: &[u8]) -> Option<DatasetFormat> {
     let start = start.trim_start_matches('\u{feff}');
     if optitrack::is_optitrack(start) {
         return Some(DatasetFormat::OptiTrack);
+    }
+    if vicon::is_vicon(start) {
+        return Some(DatasetFormat::Vicon);
+    }
+    if movella::is_movella(start) {
+        return Some(DatasetFormat::Movella);
     }
     let mut lines = start
         .lines()
@@ -178,6 +191,8 @@ fn text(
     let recording = match format {
         DatasetFormat::Pamap2 => parse_pamap2(&bytes(path)?, name)?,
         DatasetFormat::OptiTrack => parse_optitrack(&bytes(path)?, name, beside.up_axis)?,
+        DatasetFormat::Vicon => parse_vicon(&bytes(path)?, name, beside.up_axis)?,
+        DatasetFormat::Movella => parse_movella(&bytes(path)?, name)?,
         _ => totalcapture(path, name, beside)?,
     };
     Ok(Some((format, recording)))
