@@ -3,6 +3,7 @@
 use std::fs;
 
 use cromosim_bag::BagReader;
+use cromosim_motion::{MotionOptions, read_motion};
 use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_recording::rigid::parse_tum;
@@ -149,6 +150,103 @@ fn what_an_export_does_not_hold_is_said() {
         &[
             "a.tum",
             "--up-axis is for motion files and exports of motion capture",
+        ],
+    );
+}
+
+#[test]
+fn a_suit_is_a_motion_and_a_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let at = |name: &str| here.join(name);
+    let suit = common::root().join("nodes/lib/motion/tests/data/suit.mvnx");
+    let suit = suit.display().to_string();
+    let said = succeed(here, &["inspect", &suit]);
+    for line in [
+        "recording of Xsens MVN (MVNX), 24 references",
+        "a motion of a whole body, too",
+        "no readings: sensorFreeAcceleration",
+    ] {
+        assert!(said.contains(line), "{said}");
+    }
+    let said = succeed(here, &["simulate", &suit, "--out", "suit.mcap"]);
+    assert!(said.contains("5 placements, 0.99 s of"), "{said}");
+    succeed(here, &["convert", &suit, "suit.npz"]);
+    let motion = read_motion(&at("suit.npz"), &MotionOptions::default()).unwrap();
+    assert!(motion.frames.len() > 30);
+    succeed(
+        here,
+        &["convert", &suit, "hand.tum", "--joint", "left_wrist"],
+    );
+    succeed(
+        here,
+        &["convert", &suit, "hand2.tum", "--placement", "LeftHand"],
+    );
+    let [joint, segment] = ["hand.tum", "hand2.tum"]
+        .map(|name| parse_tum(&fs::read(at(name)).unwrap(), name).unwrap());
+    assert_eq!(joint.stamps.len(), segment.stamps.len());
+    succeed(here, &["convert", &suit, "segments.mcap"]);
+    let bag = BagReader::open(&at("segments.mcap")).unwrap();
+    let poses = bag.read::<PoseStamped>("/reference/LeftHand").unwrap();
+    assert_eq!(poses.len(), joint.stamps.len());
+    assert!(poses[0].1.header.stamp.nanos() > 1_600_000_000_000_000_000);
+
+    // With sensors: what they read.
+    succeed(here, &["convert", &sample("suit.mvnx"), "sensors.mcap"]);
+    let bag = BagReader::open(&at("sensors.mcap")).unwrap();
+    let imu = bag.read::<Imu>("/imu/Pelvis/data").unwrap();
+    assert!(imu.len() == 60 && imu[0].1.orientation_covariance[0] >= 0.0);
+}
+
+#[test]
+fn what_sensors_exported_becomes_a_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let at = |name: &str| here.join(name);
+    let dot = sample("dot.csv");
+    let said = succeed(here, &["inspect", &dot]);
+    for line in [
+        "recording of Movella DOT or MT Manager (table), 1 IMU at 60.000 Hz",
+        "Left_wrist: 59 readings",
+        "1 rows left out",
+        "Gyr taken as degrees a second",
+    ] {
+        assert!(said.contains(line), "{said}");
+    }
+    succeed(here, &["convert", &dot, "dot.mcap", "--name", "watch"]);
+    let bag = BagReader::open(&at("dot.mcap")).unwrap();
+    assert_eq!(bag.read::<Imu>("/imu/watch/data").unwrap().len(), 59);
+    // Beside a trajectory, for a diagnosis.
+    let wand = [
+        &sample("vicon_nexus.csv"),
+        "wand.tum",
+        "--placement",
+        "wand",
+    ];
+    succeed(here, &[&["convert"], &wand[..]].concat());
+    let with = ["--name", "watch", "--imu", &dot];
+    succeed(
+        here,
+        &[&["convert", "wand.tum", "session.mcap"], &with[..]].concat(),
+    );
+    let bag = BagReader::open(&at("session.mcap")).unwrap();
+    let counts = [
+        bag.read::<PoseStamped>("/reference/watch").unwrap().len(),
+        bag.read::<Imu>("/imu/watch/data_raw").unwrap().len(),
+    ];
+    assert_eq!(counts, [60, 59]);
+    refuses(
+        here,
+        &[
+            "convert",
+            "wand.tum",
+            "o.mcap",
+            "--imu",
+            &sample("optitrack.csv"),
+        ],
+        &[
+            "optitrack.csv",
+            "a recording of 0 IMUs, and --imu takes one",
         ],
     );
 }

@@ -27,7 +27,7 @@ pub struct Arguments {
     /// A motion, a trajectory, an IMU series, a data set's recording or a bag
     ///
     /// Trajectories are TUM, EuRoC, CSV, OptiTrack or Vicon, IMU series EuRoC, CSV, Parquet, Movella DOT or MT
-    /// Manager, data sets BROAD, TotalCapture, PAMAP2, RealWorld, phone and watch; the file's content tells
+    /// Manager, both MVNX, data sets BROAD, TotalCapture, PAMAP2, RealWorld, phone and watch; the file's content tells
     input: PathBuf,
     /// What to write: .npz, .bvh, .trc, .tum or .txt, .csv, .parquet, .mcap
     ///

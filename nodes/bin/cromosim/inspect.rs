@@ -35,7 +35,7 @@ const LEAST_JITTER: f64 = 0.005;
 pub struct Arguments {
     /// Motions, bodies, trajectories, IMU series, recordings or bags
     ///
-    /// Motion (BVH, ASF/AMC, C3D, TRC, AMASS, video estimates), body (SMPL npz or pickle),
+    /// Motion (BVH, ASF/AMC, MVNX, C3D, TRC, AMASS, video estimates), body (SMPL npz or pickle),
     /// trajectory or IMU series (TUM, EuRoC, CSV), recording of a data set (BROAD, TotalCapture,
     /// PAMAP2, RealWorld, phone and watch) or of a motion capture system or sensor (OptiTrack,
     /// Vicon, Movella DOT, MT Manager), or bag (.mcap, rosbag2 directory)

@@ -1,8 +1,8 @@
 //! Exports of motion capture systems and sensors: no panic, and what comes out is in order.
 #![no_main]
 
-use cromosim_motion::UpAxis;
-use cromosim_recording::datasets::{DatasetRecording, parse_movella, parse_optitrack, parse_vicon, sniff_dataset};
+use cromosim_motion::{UpAxis, parse_mvnx};
+use cromosim_recording::datasets::{DatasetRecording, parse_movella, parse_mvnx_sensors, parse_optitrack, parse_vicon, sniff_dataset};
 use libfuzzer_sys::fuzz_target;
 
 fn check(recording: &DatasetRecording) {
@@ -29,6 +29,10 @@ fuzz_target!(|bytes: &[u8]| {
         parse_optitrack(bytes, "fuzz", UpAxis::Detect),
         parse_vicon(bytes, "fuzz", UpAxis::Detect),
         parse_movella(bytes, "fuzz"),
+        parse_mvnx_sensors(bytes, "fuzz"),
     ];
     read.iter().flatten().for_each(check);
+    if let Ok(suit) = parse_mvnx(&String::from_utf8_lossy(bytes), "fuzz") {
+        let _ = suit.clip();
+    }
 });

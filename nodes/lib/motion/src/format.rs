@@ -1,6 +1,6 @@
 //! What a motion file is, told by its content.
 
-use crate::{c3d, trc};
+use crate::{c3d, mvnx, trc};
 
 /// The motion files that are read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,6 +13,8 @@ pub enum MotionFormat {
     /// Acclaim motion: begins with `:FULLY-SPECIFIED`, `:DEGREES` or the first frame's number and
     /// `root`.
     Amc,
+    /// A suit's recording as XML: its first element is `mvnx`.
+    Mvnx,
     /// Markers in binary: second byte 0x50.
     C3d,
     /// Markers as a table: begins with PathFileType.
@@ -35,6 +37,9 @@ impl MotionFormat {
         }
         if trc::is_trc(start) {
             return Some(Self::Trc);
+        }
+        if mvnx::is_mvnx(start) {
+            return Some(Self::Mvnx);
         }
         let mut lines = start
             .lines()
@@ -61,6 +66,7 @@ impl MotionFormat {
         match self {
             Self::Bvh => "BVH",
             Self::Asf | Self::Amc => "ASF/AMC",
+            Self::Mvnx => "MVNX",
             Self::C3d => "C3D",
             Self::Trc => "TRC",
         }

@@ -1,6 +1,6 @@
 //! Motion files and the embedded walk, all in SMPL's joints.
 //!
-//! [`read_motion`] takes a file and finds out what it is by its content. Skeletons (BVH, ASF/AMC)
+//! [`read_motion`] takes a file and finds out what it is by its content. Skeletons (BVH, ASF/AMC, MVNX)
 //! are retargeted: a [`SmplMotion`] in a world with z up, feet on z = 0, with shape coefficients
 //! fitted to the source's bones; the [`RetargetReport`] says how a source was understood. To
 //! markers (C3D, TRC) a body is fitted, which stays on the recording's floor; the [`MarkerReport`]
@@ -29,6 +29,7 @@ mod error;
 mod format;
 mod markers;
 mod motion;
+mod mvnx;
 mod options;
 mod plausibility;
 mod poses;
@@ -54,6 +55,7 @@ pub use markers::{
     fit_markers, fit_rigid, place_markers,
 };
 pub use motion::{SmplMotion, continuous, slerp};
+pub use mvnx::{Mvnx, parse_mvnx};
 pub use options::{MotionOptions, RestChoice};
 pub use poses::{
     CameraPoses, MAX_POSES, Person, PersonPart, PoseAxes, PoseFile, PoseFormat, PoseReport,

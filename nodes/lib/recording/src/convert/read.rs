@@ -50,7 +50,13 @@ pub fn read_content(
         up_axis: options.motion.up_axis,
         ..options.files.clone()
     };
-    if let Some((format, recording)) = open_dataset(path, &files)? {
+    // A suit's recording is the motion of a body, too.
+    let is_suit = MotionFormat::of(&head) == Some(MotionFormat::Mvnx);
+    let wants_motion =
+        options.followed.is_some() || (target.takes_motions() && target != Target::Bag);
+    if !(is_suit && wants_motion)
+        && let Some((format, recording)) = open_dataset(path, &files)?
+    {
         return dataset::chosen(path, (format, recording), target, options);
     }
     refuse_dataset_settings(path, options)?;

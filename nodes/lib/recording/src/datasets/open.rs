@@ -5,13 +5,13 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use cromosim_arrays::{Container, Format, Limits};
-use cromosim_motion::UpAxis;
+use cromosim_motion::{MotionFormat, UpAxis};
 
 use super::{
     DatasetRecording, broad, columns, har_spsw, marked_imu, movella, optitrack, parse_broad,
-    parse_columns, parse_har_spsw, parse_marked_imu, parse_movella, parse_optitrack, parse_pamap2,
-    parse_realworld, parse_totalcapture_reference, parse_totalcapture_sensors, parse_vicon,
-    realworld, totalcapture, vicon,
+    parse_columns, parse_har_spsw, parse_marked_imu, parse_movella, parse_mvnx_sensors,
+    parse_optitrack, parse_pamap2, parse_realworld, parse_totalcapture_reference,
+    parse_totalcapture_sensors, parse_vicon, realworld, totalcapture, vicon,
 };
 use crate::rigid::RigidError;
 
@@ -45,6 +45,8 @@ pub enum DatasetFormat {
     Vicon,
     /// [`parse_movella`].
     Movella,
+    /// [`parse_mvnx_sensors`].
+    Mvnx,
 }
 
 impl DatasetFormat {
@@ -67,6 +69,7 @@ impl std::fmt::Display for DatasetFormat {
             Self::OptiTrack => "OptiTrack (CSV)",
             Self::Vicon => "Vicon (CSV)",
             Self::Movella => "Movella DOT or MT Manager (table)",
+            Self::Mvnx => "Xsens MVN (MVNX)",
         })
     }
 }
@@ -93,6 +96,9 @@ pub fn sniff_dataset(bytes: &[u8]) -> Option<DatasetFormat> {
     }
     if vicon::is_vicon(start) {
         return Some(DatasetFormat::Vicon);
+    }
+    if MotionFormat::of(bytes) == Some(MotionFormat::Mvnx) {
+        return Some(DatasetFormat::Mvnx);
     }
     if movella::is_movella(start) {
         return Some(DatasetFormat::Movella);
@@ -193,6 +199,7 @@ fn text(
         DatasetFormat::OptiTrack => parse_optitrack(&bytes(path)?, name, beside.up_axis)?,
         DatasetFormat::Vicon => parse_vicon(&bytes(path)?, name, beside.up_axis)?,
         DatasetFormat::Movella => parse_movella(&bytes(path)?, name)?,
+        DatasetFormat::Mvnx => parse_mvnx_sensors(&bytes(path)?, name)?,
         _ => totalcapture(path, name, beside)?,
     };
     Ok(Some((format, recording)))
