@@ -88,13 +88,7 @@ pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()>
     let (recorded, said) = rigid_placements(trajectory, &arguments.placement, up)?;
     let names = recorded.iter().map(|placement| placement.name.as_str());
     let names: Vec<&str> = names.collect();
-    let mut effects = given_effects(arguments, &recorded)?;
-    if let Some(device) = &arguments.device {
-        for placement in &recorded {
-            let of_device = effects_of_device(device, placement)?;
-            effects.placements.insert(placement.name.clone(), of_device);
-        }
-    }
+    let effects = effects_of_rigid(arguments, &recorded)?;
     let learned = arguments
         .learned
         .as_deref()
@@ -143,6 +137,21 @@ pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()>
         quality_line(simulated.iter().map(|placement| placement.quality))
     )?;
     Ok(())
+}
+
+/// The effects of `--effects`, and of `--device` at every placement.
+fn effects_of_rigid(
+    arguments: &Arguments,
+    recorded: &[RecordedPlacement],
+) -> anyhow::Result<EffectsFile> {
+    let mut effects = given_effects(arguments, recorded)?;
+    if let Some(device) = &arguments.device {
+        for placement in recorded {
+            let of_device = effects_of_device(device, placement)?;
+            effects.placements.insert(placement.name.clone(), of_device);
+        }
+    }
+    Ok(effects)
 }
 
 /// A device as what errs.

@@ -1,7 +1,7 @@
 //! Exports of motion capture systems and sensors: no panic, and what comes out is in order.
 #![no_main]
 
-use cromosim_motion::{UpAxis, parse_mvnx};
+use cromosim_motion::{UpAxis, parse_motive_markers, parse_mvnx, parse_vicon_markers};
 use cromosim_recording::datasets::{DatasetRecording, parse_movella, parse_mvnx_sensors, parse_optitrack, parse_vicon, sniff_dataset};
 use libfuzzer_sys::fuzz_target;
 
@@ -32,7 +32,11 @@ fuzz_target!(|bytes: &[u8]| {
         parse_mvnx_sensors(bytes, "fuzz"),
     ];
     read.iter().flatten().for_each(check);
-    if let Ok(suit) = parse_mvnx(&String::from_utf8_lossy(bytes), "fuzz") {
+    let text = String::from_utf8_lossy(bytes);
+    if let Ok(suit) = parse_mvnx(&text, "fuzz") {
         let _ = suit.clip();
+    }
+    for markers in [parse_vicon_markers(&text, "fuzz"), parse_motive_markers(&text, "fuzz")].iter().flatten() {
+        assert!(markers.frames.iter().all(|frame| frame.len() == markers.labels.len()));
     }
 });

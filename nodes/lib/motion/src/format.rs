@@ -1,6 +1,6 @@
 //! What a motion file is, told by its content.
 
-use crate::{c3d, mvnx, trc};
+use crate::{c3d, marker_tables, mvnx, trc};
 
 /// The motion files that are read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,6 +19,10 @@ pub enum MotionFormat {
     C3d,
     /// Markers as a table: begins with PathFileType.
     Trc,
+    /// OptiTrack Motive's table, which may hold markers: begins with Format Version.
+    Motive,
+    /// Vicon's table, which may hold markers: begins with a section's name and its rate.
+    Vicon,
 }
 
 impl MotionFormat {
@@ -40,6 +44,12 @@ impl MotionFormat {
         }
         if mvnx::is_mvnx(start) {
             return Some(Self::Mvnx);
+        }
+        if marker_tables::is_motive(start) {
+            return Some(Self::Motive);
+        }
+        if marker_tables::is_vicon(start) {
+            return Some(Self::Vicon);
         }
         let mut lines = start
             .lines()
@@ -69,6 +79,8 @@ impl MotionFormat {
             Self::Mvnx => "MVNX",
             Self::C3d => "C3D",
             Self::Trc => "TRC",
+            Self::Motive => "Motive's CSV",
+            Self::Vicon => "Vicon's CSV",
         }
     }
 }

@@ -3,7 +3,7 @@
 //! [`read_motion`] takes a file and finds out what it is by its content. Skeletons (BVH, ASF/AMC, MVNX)
 //! are retargeted: a [`SmplMotion`] in a world with z up, feet on z = 0, with shape coefficients
 //! fitted to the source's bones; the [`RetargetReport`] says how a source was understood. To
-//! markers (C3D, TRC) a body is fitted, which stays on the recording's floor; the [`MarkerReport`]
+//! markers (C3D, TRC, tables of Motive and Vicon) a body is fitted, which stays on the recording's floor; the [`MarkerReport`]
 //! says how well. [`embedded_walk`] is a motion without a file.
 //!
 //! Files of SMPL parameters (AMASS, and estimates from video: VIBE, WHAM, GVHMR, TRAM, PHALP,
@@ -27,6 +27,7 @@ mod bvh;
 mod c3d;
 mod error;
 mod format;
+mod marker_tables;
 mod markers;
 mod motion;
 mod mvnx;
@@ -50,6 +51,7 @@ pub use bvh::{BvhClip, BvhJoint, Channel, MAX_JOINTS, SkeletonPose, parse_bvh, w
 pub use c3d::parse_c3d;
 pub use error::MotionError;
 pub use format::MotionFormat;
+pub use marker_tables::{VICON_SECTIONS, parse_motive_markers, parse_vicon_markers};
 pub use markers::{
     MarkerClip, MarkerFit, MarkerOptions, MarkerReport, MarkerSet, MarkerSite, SetMarker,
     fit_markers, fit_rigid, place_markers,

@@ -166,7 +166,10 @@ fn vicon_gives_the_motion_back() {
     let recording = parse_vicon(&sample("vicon_tracker.csv"), "v.csv", UpAxis::Z).unwrap();
     assert_holds_both(&recording, ["wand", "tool_tip"], FRAMES);
     let notes = recording.notes.join("\n");
-    assert!(notes.contains("1 bodies in their parents' axes"), "{notes}");
+    assert!(
+        notes.contains("in their parents' axes, and left alone: 1 of the columns' names"),
+        "{notes}"
+    );
     // y up.
     let turned = parse_vicon(&sample("vicon_nexus.csv"), "v.csv", UpAxis::Y).unwrap();
     let turned = turned.reference("wand").unwrap().positions[0];
@@ -228,7 +231,7 @@ fn vicon_takes_sub_frames_and_says_what_is_wrong() {
         (
             "Objects",
             "Trajectories",
-            "v.csv: sections: no Objects and no Segments, but trajectories; export them too",
+            "v.csv: sections: no Objects and no Segments, but trajectories; export them, too",
         ),
     ] {
         assert!(small.contains(from), "{from}");

@@ -46,23 +46,33 @@ pub fn read_content(
     if head.is_empty() {
         return Err(unsuitable("the file is empty".to_owned()));
     }
+    read_file(path, &head, options, target)
+}
+
+/// Reads a file that is no bag; `head` is its beginning.
+fn read_file(
+    path: &Path,
+    head: &[u8],
+    options: &ReadOptions,
+    target: Target,
+) -> Result<Read, RecordingError> {
     let files = DatasetFiles {
         up_axis: options.motion.up_axis,
         ..options.files.clone()
     };
-    // A suit's recording is the motion of a body, too.
-    let is_suit = MotionFormat::of(&head) == Some(MotionFormat::Mvnx);
+    let motion_format = MotionFormat::of(head);
+    // Some recordings are motions, too; a bag takes what was recorded.
     let wants_motion =
         options.followed.is_some() || (target.takes_motions() && target != Target::Bag);
-    if !(is_suit && wants_motion)
+    if !(motion_format.is_some() && wants_motion)
         && let Some((format, recording)) = open_dataset(path, &files)?
     {
         return dataset::chosen(path, (format, recording), target, options);
     }
     refuse_dataset_settings(path, options)?;
     // Motions first: an AMC's frame can look like a row of numbers.
-    if MotionFormat::of(&head).is_none()
-        && sniff_rigid(&head).is_some()
+    if motion_format.is_none()
+        && sniff_rigid(head).is_some()
         && let Some(rigid) = parse_rigid(&read_whole(path)?, &path.display().to_string())?
     {
         let content = match rigid {

@@ -14,6 +14,9 @@ const PRINTED_TIME: f64 = 1e-6;
 /// Gravity of the world, m/s2: what free acceleration lacks.
 const GRAVITY_IN_WORLD: Vector3<f64> = Vector3::new(0.0, 0.0, -9.80665);
 
+/// Where a body is, m, and how it is turned.
+pub(super) type BodyPose = (Vector3<f64>, UnitQuaternion<f64>);
+
 /// Bodies by name, as they are read row by row.
 pub(super) struct Bodies {
     world_from_file: UnitQuaternion<f64>,
@@ -56,12 +59,7 @@ impl Bodies {
     }
 
     /// A body's pose in the file's axes, or that it was not seen.
-    pub fn push(
-        &mut self,
-        body: usize,
-        stamp: Stamp,
-        pose: Option<(Vector3<f64>, UnitQuaternion<f64>)>,
-    ) {
+    pub fn push(&mut self, body: usize, stamp: Stamp, pose: Option<BodyPose>) {
         let track = &mut self.tracks[body];
         match pose {
             Some((position, rotation)) => track.trajectory.push(

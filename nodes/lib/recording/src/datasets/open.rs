@@ -91,14 +91,14 @@ pub struct DatasetFiles {
 pub fn sniff_dataset(bytes: &[u8]) -> Option<DatasetFormat> {
     let start = String::from_utf8_lossy(&bytes[..bytes.len().min(LOOKED_AT)]);
     let start = start.trim_start_matches('\u{feff}');
-    if optitrack::is_optitrack(start) {
-        return Some(DatasetFormat::OptiTrack);
-    }
-    if vicon::is_vicon(start) {
-        return Some(DatasetFormat::Vicon);
-    }
-    if MotionFormat::of(bytes) == Some(MotionFormat::Mvnx) {
-        return Some(DatasetFormat::Mvnx);
+    match MotionFormat::of(bytes) {
+        // Without bodies they are motions alone.
+        Some(MotionFormat::Motive) => {
+            return optitrack::has_bodies(start).then_some(DatasetFormat::OptiTrack);
+        }
+        Some(MotionFormat::Vicon) => return Some(DatasetFormat::Vicon),
+        Some(MotionFormat::Mvnx) => return Some(DatasetFormat::Mvnx),
+        _ => {}
     }
     if movella::is_movella(start) {
         return Some(DatasetFormat::Movella);
@@ -197,7 +197,13 @@ fn text(
     let recording = match format {
         DatasetFormat::Pamap2 => parse_pamap2(&bytes(path)?, name)?,
         DatasetFormat::OptiTrack => parse_optitrack(&bytes(path)?, name, beside.up_axis)?,
-        DatasetFormat::Vicon => parse_vicon(&bytes(path)?, name, beside.up_axis)?,
+        DatasetFormat::Vicon => {
+            let bytes = bytes(path)?;
+            if !vicon::has_poses(&String::from_utf8_lossy(&bytes)) {
+                return Ok(None);
+            }
+            parse_vicon(&bytes, name, beside.up_axis)?
+        }
         DatasetFormat::Movella => parse_movella(&bytes(path)?, name)?,
         DatasetFormat::Mvnx => parse_mvnx_sensors(&bytes(path)?, name)?,
         _ => totalcapture(path, name, beside)?,

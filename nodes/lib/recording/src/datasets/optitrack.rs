@@ -11,25 +11,32 @@ use std::collections::BTreeMap;
 
 use cromosim_motion::UpAxis;
 use cromosim_spatial::Stamp;
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 
 use super::DatasetRecording;
-use super::capture::{Bodies, content, euler_order, from_euler, on_grid};
+use super::capture::{Bodies, BodyPose, content, euler_order, from_euler, on_grid};
 use crate::rigid::RigidError;
 use crate::rigid::header::line_of;
 use crate::rigid::table::{Row, text};
 
-/// How the file begins.
-const BEGINNING: &str = "format version";
 /// Rows of a header before the one that begins with `Frame`: type, name, ID, parent, what it is; one
 /// more is no export.
 const MOST_HEADER_ROWS: usize = 8;
 
-/// Whether the text begins as such an export does.
-pub(super) fn is_optitrack(start: &str) -> bool {
-    start
-        .get(..BEGINNING.len())
-        .is_some_and(|start| start.eq_ignore_ascii_case(BEGINNING))
+/// Whether the header has columns of rigid bodies or bones; `start` holds all of it.
+pub(super) fn has_bodies(start: &str) -> bool {
+    let header = start
+        .lines()
+        .take(MOST_HEADER_ROWS)
+        .take_while(|line| !line.to_lowercase().starts_with("frame,"));
+    let mut cells = header.flat_map(|line| line.split(','));
+    cells.any(|cell| is_body(cell.trim()))
+}
+
+/// Whether a column of this type is a body's.
+fn is_body(kind: &str) -> bool {
+    let kind = kind.to_lowercase().replace(' ', "");
+    matches!(kind.as_str(), "rigidbody" | "bone")
 }
 
 /// Reads rigid bodies and skeletons' bones as references, one a name. Stamps count from the take's
@@ -210,8 +217,8 @@ impl Columns {
         let mut found: Vec<(String, BTreeMap<String, usize>)> = Vec::new();
         let mut others = 0;
         for column in 2..axes.len() {
-            let kind = cell(kinds, column).to_lowercase().replace(' ', "");
-            if !matches!(kind.as_str(), "rigidbody" | "bone") {
+            let kind = cell(kinds, column);
+            if !is_body(&kind) {
                 others += usize::from(!kind.is_empty());
                 continue;
             }
@@ -248,7 +255,7 @@ impl Columns {
             });
         }
         if bodies.is_empty() {
-            let problem = "no rigid bodies and no bones in it; export them too, or labelled markers as C3D or TRC for `cromosim simulate`";
+            let problem = "no rigid bodies and no bones in it; export them, too";
             return Err(content(name, format!("line {line}"), problem));
         }
         Ok(Self { bodies, others })
@@ -257,11 +264,7 @@ impl Columns {
 
 impl Body {
     /// The pose in a row, in the file's axes, m; none where the body was not seen.
-    fn pose(
-        &self,
-        row: &Row<'_>,
-        header: &Header,
-    ) -> Result<Option<(Vector3<f64>, UnitQuaternion<f64>)>, RigidError> {
+    fn pose(&self, row: &Row<'_>, header: &Header) -> Result<Option<BodyPose>, RigidError> {
         let mut columns = self.position.iter().chain(&self.rotation);
         if columns.any(|column| row.cells.get(*column).is_none_or(|cell| cell.is_empty())) {
             return Ok(None);

@@ -7,35 +7,24 @@
 //! helical vector (the axis, as long as the angle) unless the name says Euler with an order of axes.
 //! What was not seen has empty cells. Vicon's z axis is up unless the volume was set up otherwise.
 
-use cromosim_motion::UpAxis;
+use cromosim_motion::{UpAxis, VICON_SECTIONS};
 use cromosim_spatial::Stamp;
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::DatasetRecording;
-use super::capture::{Bodies, content, euler_order, from_euler};
+use super::capture::{Bodies, BodyPose, content, euler_order, from_euler};
 use crate::rigid::RigidError;
 use crate::rigid::table::{Row, text};
 
 /// Sections with poses.
 const POSES: [&str; 2] = ["objects", "segments"];
-/// Sections without.
-const OTHERS: [&str; 7] = [
-    "trajectories",
-    "model outputs",
-    "devices",
-    "joints",
-    "bones",
-    "events",
-    "centers of mass",
-];
 /// Words in front of a name that say how its rotation is given.
 const ANGLES: [&str; 2] = ["Global Angle", "Local Angle"];
 
-/// Whether the text begins as such an export does: a section's name, and its rate below it.
-pub(super) fn is_vicon(start: &str) -> bool {
-    let mut lines = start.lines().map(bare);
-    let known = lines.next().is_some_and(|name| is_section(&name));
-    known && lines.next().is_some_and(|rate| rate.parse::<f64>().is_ok())
+/// Whether any section of the text holds poses.
+pub(super) fn has_poses(text: &str) -> bool {
+    let mut lines = text.lines();
+    lines.any(|line| POSES.contains(&bare(line).as_str()))
 }
 
 /// A line without the delimiters behind it, in lower case.
@@ -45,7 +34,7 @@ fn bare(line: &str) -> String {
 }
 
 fn is_section(name: &str) -> bool {
-    POSES.contains(&name) || OTHERS.contains(&name)
+    VICON_SECTIONS.contains(&name)
 }
 
 /// Reads objects and segments as references, one a name. A frame's stamp is its number by the rate;
@@ -90,7 +79,7 @@ pub fn parse_vicon(bytes: &[u8], name: &str, up: UpAxis) -> Result<DatasetRecord
     }
     if !found {
         let problem = format!(
-            "no Objects and no Segments, but {}; export them too, or labelled markers as C3D or TRC for `cromosim simulate`",
+            "no Objects and no Segments, but {}; export them, too",
             skipped.join(", ")
         );
         return Err(content(name, "sections", problem));
@@ -170,26 +159,8 @@ impl<'a> Section<'a> {
             );
             return Err(at(*columns_line, problem));
         }
-        let starts: Vec<usize> = (2..names.len())
-            .filter(|at| !names[*at].is_empty())
-            .collect();
-        let (mut bodies, mut local) = (Vec::new(), 0);
-        for (number, start) in starts.iter().enumerate() {
-            let end = starts.get(number + 1).copied().unwrap_or(columns.len());
-            if names[*start].starts_with(ANGLES[1]) {
-                local += 1;
-                continue;
-            }
-            let group = Group {
-                title: names[*start],
-                columns: columns
-                    .get(*start..end.min(columns.len()))
-                    .unwrap_or_default(),
-                units: &units,
-                start: *start,
-            };
-            bodies.push(group.body().map_err(|problem| at(*units_line, problem))?);
-        }
+        let (bodies, local) =
+            bodies(&names, &columns, &units).map_err(|problem| at(*units_line, problem))?;
         let row = |(line, cells): &(usize, &'a str)| Row {
             name,
             line: *line,
@@ -213,7 +184,11 @@ impl<'a> Section<'a> {
         for row in &self.rows {
             frames.push([counted(row, 0)?, counted(row, 1)?]);
         }
-        let sub_frames = frames.iter().map(|[_, sub]| sub + 1).max().unwrap_or(1);
+        let sub_frames = frames
+            .iter()
+            .map(|[_, sub]| sub.saturating_add(1))
+            .max()
+            .unwrap_or(1);
         let mut bodies = Bodies::new(self.bodies.iter().map(|body| body.name), up);
         let mut last = None;
         for (row, [frame, sub]) in self.rows.iter().zip(frames) {
@@ -227,7 +202,7 @@ impl<'a> Section<'a> {
         }
         let local = (self.local > 0).then(|| {
             format!(
-                "{} bodies in their parents' axes are left alone",
+                "in their parents' axes, and left alone: {} of the columns' names",
                 self.local
             )
         });
@@ -241,6 +216,34 @@ impl<'a> Section<'a> {
         let notes = local.into_iter().chain(assumed).collect();
         bodies.into_recording(self.name, self.rate_hz, notes)
     }
+}
+
+/// The bodies, and how many are left alone as they are in their parents' axes; or what is wrong with the
+/// columns.
+fn bodies<'a>(
+    names: &[&'a str],
+    columns: &[&'a str],
+    units: &[&'a str],
+) -> Result<(Vec<Body<'a>>, usize), String> {
+    let starts = (2..names.len()).filter(|at| !names[*at].is_empty());
+    let starts: Vec<usize> = starts.collect();
+    let (mut bodies, mut local) = (Vec::new(), 0);
+    for (number, start) in starts.iter().enumerate() {
+        let end = starts.get(number + 1).copied().unwrap_or(columns.len());
+        if names[*start].starts_with(ANGLES[1]) {
+            local += 1;
+            continue;
+        }
+        let own = columns.get(*start..end.min(columns.len()));
+        let group = Group {
+            title: names[*start],
+            columns: own.unwrap_or_default(),
+            units,
+            start: *start,
+        };
+        bodies.push(group.body()?);
+    }
+    Ok((bodies, local))
 }
 
 /// The columns below a name.
@@ -320,10 +323,7 @@ fn kind_and_name(title: &str) -> (&str, &str) {
 
 impl Body<'_> {
     /// The pose in a row, in the file's axes, m; none where the body was not seen.
-    fn pose(
-        &self,
-        row: &Row<'_>,
-    ) -> Result<Option<(Vector3<f64>, UnitQuaternion<f64>)>, RigidError> {
+    fn pose(&self, row: &Row<'_>) -> Result<Option<BodyPose>, RigidError> {
         let turned: &[usize] = match &self.turn {
             Turn::Quaternion(columns) => columns,
             Turn::Helical(columns, _) | Turn::Euler(columns, ..) => columns,

@@ -31,6 +31,19 @@ pub(super) fn is_movella(start: &str) -> bool {
     })
 }
 
+/// The rows with anything in them, from the line `skipped` (0-based) on.
+fn rows<'a>(text: &'a str, name: &'a str, skipped: usize, delimiter: char) -> Vec<Row<'a>> {
+    let lines = text.lines().enumerate().skip(skipped);
+    let lines = lines.filter(|(_, line)| !line.trim().is_empty());
+    lines
+        .map(|(index, line)| Row {
+            name,
+            line: index + 1,
+            cells: line.split(delimiter).map(str::trim).collect(),
+        })
+        .collect()
+}
+
 /// Reads the readings, and the orientation where the file has one, as a recording of one IMU, which is
 /// called as the device's tag says, or `body`. Stamps are the device's own time, or where it has none
 /// count from the first packet.
@@ -48,15 +61,7 @@ pub fn parse_movella(bytes: &[u8], name: &str) -> Result<DatasetRecording, Rigid
         )
     })?;
     let file = About::of(text, index, delimiter);
-    let rows = text.lines().enumerate().skip(index + 1);
-    let rows = rows.filter(|(_, line)| !line.trim().is_empty());
-    let rows: Vec<Row<'_>> = rows
-        .map(|(index, line)| Row {
-            name,
-            line: index + 1,
-            cells: line.split(delimiter).map(str::trim).collect(),
-        })
-        .collect();
+    let rows = rows(text, name, index + 1, delimiter);
     let Some(first) = rows.first() else {
         return Err(RigidError::Empty {
             name: name.to_owned(),
