@@ -3,7 +3,7 @@
 use std::fs;
 
 use cromosim_bag::BagReader;
-use cromosim_motion::{MotionOptions, read_motion};
+use cromosim_motion::{MarkerClip, MotionOptions, parse_trc, read_motion};
 use cromosim_msgs::geometry_msgs::PoseStamped;
 use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_recording::rigid::parse_tum;
@@ -249,4 +249,57 @@ fn what_sensors_exported_becomes_a_recording() {
             "a recording of 0 IMUs, and --imu takes one",
         ],
     );
+}
+
+/// The markers of a clip as Motive exports them: y up, millimetres.
+fn motive(clip: &MarkerClip) -> String {
+    let thrice = |words: &mut dyn Iterator<Item = &str>| -> String {
+        words.map(|word| format!(",{word}").repeat(3)).collect()
+    };
+    let count = clip.labels.len();
+    let mut text = format!(
+        "Format Version,1.23,Export Frame Rate,{},Rotation Type,Quaternion,Length Units,Millimeters,Coordinate Space,Global\n\n,Type{}\n,Name{}\n,ID{}\n,{}\nFrame,Time (Seconds){}\n",
+        clip.rate_hz,
+        thrice(&mut std::iter::repeat_n("Marker", count)),
+        thrice(&mut clip.labels.iter().map(String::as_str)),
+        thrice(&mut clip.labels.iter().map(String::as_str)),
+        thrice(&mut std::iter::repeat_n("Position", count)),
+        ",X,Y,Z".repeat(count)
+    );
+    for (index, frame) in clip.frames.iter().enumerate() {
+        text += &format!("{index},{:.6}", index as f64 / clip.rate_hz);
+        for point in frame {
+            let cells = point.map(|point| {
+                let [x, y, z] = point.coords.map(|part| 1000.0 * part).into();
+                format!(",{x:.6},{:.6},{:.6}", z, -y)
+            });
+            text += &cells.unwrap_or_else(|| ",,,".to_owned());
+        }
+        text.push('\n');
+    }
+    text
+}
+
+#[test]
+fn markers_of_an_export_are_a_motion() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let suit = common::root().join("nodes/lib/motion/tests/data/suit.mvnx");
+    succeed(here, &["convert", &suit.display().to_string(), "walk.trc"]);
+    let trc = fs::read_to_string(here.join("walk.trc")).unwrap();
+    let clip = parse_trc(&trc, "walk.trc").unwrap();
+    fs::write(here.join("walk.csv"), motive(&clip)).unwrap();
+    let [of_trc, of_table] = ["walk.trc", "walk.csv"].map(|name| {
+        let said = succeed(here, &["inspect", name, "--placements-as-given"]);
+        let lines = said.lines().skip(1).map(str::to_owned);
+        lines.collect::<Vec<String>>()
+    });
+    assert!(of_trc.len() > 1, "{of_trc:?}");
+    // Another axis is up; all else is the same.
+    let mentions_up = |line: &&String| !line.contains("up ");
+    let [of_trc, of_table] = [&of_trc, &of_table].map(|lines| {
+        let lines = lines.iter().filter(mentions_up);
+        lines.cloned().collect::<Vec<String>>()
+    });
+    assert_eq!(of_trc, of_table);
 }
