@@ -12,8 +12,9 @@ use cromosim_spatial::meant;
 /// What the IMU is called where nobody says it.
 const NAMELESS: &str = "body";
 
-/// The bodies that `placements` (`NAME`, or `NAME=BODY`) take from the file, as references, and what a
-/// user should know of the file. Without any, all; a body alone takes whatever name is given.
+/// The bodies that `placements` (`NAME`, or `NAME=BODY`) take from the file, as references, and
+/// what a user should know of the file. Without any, all; a body alone takes whatever name is
+/// given.
 ///
 /// # Errors
 /// What is wrong with the file; bodies that it does not have; names that none can have.

@@ -1,6 +1,6 @@
-//! Markers in the tables that motion capture systems export as CSV: Motive's (OptiTrack) columns of type
-//! `Marker`, and the `Trajectories` of Vicon's Nexus and Tracker. What else such tables hold, rigid bodies and
-//! segments, is no business of a body's motion.
+//! Markers in the tables that motion capture systems export as CSV: Motive's (OptiTrack) columns of
+//! type `Marker`, and the `Trajectories` of Vicon's Nexus and Tracker. What else such tables hold,
+//! rigid bodies and segments, is no business of a body's motion.
 
 use nalgebra::Point3;
 
@@ -23,7 +23,8 @@ pub const VICON_SECTIONS: [&str; 9] = [
 const MARKERS: &str = "trajectories";
 /// How Motive's tables begin.
 const MOTIVE: &str = "format version";
-/// Rows of Motive's header above the one that begins with Frame: at most type, name, ID, parent, property.
+/// Rows of Motive's header above the one that begins with Frame: at most type, name, ID, parent,
+/// property.
 const MOST_HEADER_ROWS: usize = 8;
 
 /// Whether a text begins like Motive's export.
@@ -77,8 +78,8 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// The points of each row, m; none where a marker was not seen. A point takes a byte of the text at
-    /// least: memory stays proportional to it.
+    /// The points of each row, m; none where a marker was not seen. A point takes a byte of the
+    /// text at least: memory stays proportional to it.
     fn frames<'r>(
         &self,
         rows: impl Iterator<Item = (usize, Vec<&'r str>)>,

@@ -1,4 +1,5 @@
-//! MVNX: a known motion written as MVN writes one, and read back; what is wrong is said with its line.
+//! MVNX: a known motion written as MVN writes one, and read back; what is wrong is said with its
+//! line.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -13,8 +14,8 @@ use cromosim_motion::{
 };
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-/// MVN's segments and the joints of SMPL that they begin at; T12, which SMPL has none of, stands between
-/// the two around it.
+/// MVN's segments and the joints of SMPL that they begin at; T12, which SMPL has none of, stands
+/// between the two around it.
 const SEGMENTS: [(&str, Joint); 23] = [
     ("Pelvis", Joint::Pelvis),
     ("L5", Joint::Spine1),

@@ -1,5 +1,5 @@
-//! Exports of motion capture systems: look-alikes that `scripts/make_captures.py` makes give the one
-//! motion back that they hold; what is wrong with a file is said in one line.
+//! Exports of motion capture systems: look-alikes that `scripts/make_captures.py` makes give the
+//! one motion back that they hold; what is wrong with a file is said in one line.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -32,7 +32,8 @@ fn pose(seconds: f64) -> (Vector3<f64>, UnitQuaternion<f64>) {
     (position, heading * roll)
 }
 
-/// Each pose is the motion's, moved by `arm` in the body's axes, within what the printed digits give.
+/// Each pose is the motion's, moved by `arm` in the body's axes, within what the printed digits
+/// give.
 fn assert_is_the_motion(poses: &PoseTrajectory, arm: Vector3<f64>) {
     assert!(!poses.stamps.is_empty());
     for ((stamp, position), rotation) in poses

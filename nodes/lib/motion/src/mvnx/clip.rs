@@ -34,8 +34,8 @@ const TREE: [(&str, Option<&str>); 23] = [
 ];
 
 impl Mvnx {
-    /// The segments of the body as joints, m, z up, at rest as in MVN's T-pose; bones are as long as in
-    /// the first frame. Props are left out.
+    /// The segments of the body as joints, m, z up, at rest as in MVN's T-pose; bones are as long
+    /// as in the first frame. Props are left out.
     ///
     /// # Errors
     /// [`MotionError::Mvnx`] where the pelvis is missing, or a segment that others hang from.

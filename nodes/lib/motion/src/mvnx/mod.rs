@@ -1,12 +1,12 @@
 //! MVNX: a recording of Xsens MVN as XML.
 //!
-//! `mvnx > subject` has the frame rate, `segments > segment` and `sensors > sensor` their labels, `frames
-//! > frame` of type `normal` a sample: lists of numbers, by segment or by sensor. `orientation` is
-//! world_from_segment (w x y z) and `position` the segment's origin (m), both in a world with x forward
-//! or north, y left or west, z up; the segments' axes are the world's in a T-pose that faces x.
-//! `sensorOrientation` is world_from_sensor, `sensorFreeAcceleration` (m/s2) in world axes and without
-//! gravity, `angularVelocity` (rad/s) the segment's in world axes. Frames of other types (`identity`,
-//! `tpose`) are poses of a calibration.
+//! The element `subject` has the frame rate, `segments` and `sensors` the labels, a `frame` of type
+//! `normal` is a sample: lists of numbers, by segment or by sensor. `orientation` is
+//! world_from_segment (w x y z) and `position` the segment's origin (m), both in a world with x
+//! forward or north, y left or west, z up; the segments' axes are the world's in a T-pose that
+//! faces x. `sensorOrientation` is world_from_sensor, `sensorFreeAcceleration` (m/s2) in world axes
+//! and without gravity, `angularVelocity` (rad/s) the segment's in world axes. Frames of other
+//! types (`identity`, `tpose`) are poses of a calibration.
 //!
 //! The file is walked through by quick-xml, an element at a time: hundreds of megabytes are usual.
 
@@ -17,8 +17,8 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 pub use parse::parse_mvnx;
 
-/// A recording: at least one segment and one frame. Lists of frames are frame-major; those that the file
-/// does not have are empty.
+/// A recording: at least one segment and one frame. Lists of frames are frame-major; those that the
+/// file does not have are empty.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mvnx {
     /// The file's name.

@@ -171,7 +171,8 @@ pub(super) fn from_euler(order: [usize; 3], angles: Vector3<f64>) -> UnitQuatern
     first * second * third
 }
 
-/// What an accelerometer reads whose acceleration in the world, without gravity, is known: R^T (a - g).
+/// What an accelerometer reads whose acceleration in the world, without gravity, is known: R^T (a -
+/// g).
 pub(super) fn specific_force(
     world_from_sensor: UnitQuaternion<f64>,
     free_acceleration_in_world: Vector3<f64>,

@@ -1,14 +1,14 @@
 //! Xsens MVN's MVNX as a recording: what its sensors read, as far as the file says it, beside the
 //! segments' poses.
 //!
-//! The file has each sensor's orientation and its acceleration without gravity, both in the world, and
-//! each segment's angular velocity. A sensor that is fixed to its segment turns as the segment does, so
-//! that in the sensor's axes, with R its world_from_sensor,
+//! The file has each sensor's orientation and its acceleration without gravity, both in the world,
+//! and each segment's angular velocity. A sensor that is fixed to its segment turns as the segment
+//! does, so that in the sensor's axes, with R its world_from_sensor,
 //!
 //! specific force = R^T (free acceleration - gravity), angular velocity = R^T (the segment's).
 //!
-//! MVN has taken the sensors' biases out before, and smooths the segments; the sensors' own rates and
-//! magnetic fields (in units of their own) are left alone.
+//! MVN has taken the sensors' biases out before, and smooths the segments; the sensors' own rates
+//! and magnetic fields (in units of their own) are left alone.
 
 use cromosim_body::Joint;
 use cromosim_motion::{Mvnx, parse_mvnx};
@@ -19,8 +19,8 @@ use super::{DatasetRecording, PlacedImu};
 use crate::rigid::table::text;
 use crate::rigid::{PoseTrajectory, RigidError};
 
-/// Reads the segments as references and, where the file has what they read, the sensors as IMUs, each by
-/// its segment's name.
+/// Reads the segments as references and, where the file has what they read, the sensors as IMUs,
+/// each by its segment's name.
 ///
 /// # Errors
 /// [`RigidError::NotText`], [`RigidError::Content`]; [`RigidError::Motion`], which names the line.

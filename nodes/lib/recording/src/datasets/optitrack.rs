@@ -2,10 +2,11 @@
 //!
 //! The first line holds keys and values in turn (frame rates, rotation type, length units,
 //! coordinate space); behind it stand rows with each column's type, name, ID, in some versions its
-//! parent, and what it is, down to the one that begins with `Frame`. Of each rigid body and bone there
-//! are three position columns and a rotation: a quaternion (X, Y, Z, W), or three angles in degrees,
-//! turned about the axes in the order that the rotation type names, each as the turns before it left
-//! it. What was not seen has empty cells. Motive's y axis is up unless the export had axes of its own.
+//! parent, and what it is, down to the one that begins with `Frame`. Of each rigid body and bone
+//! there are three position columns and a rotation: a quaternion (X, Y, Z, W), or three angles in
+//! degrees, turned about the axes in the order that the rotation type names, each as the turns
+//! before it left it. What was not seen has empty cells. Motive's y axis is up unless the export
+//! had axes of its own.
 
 use std::collections::BTreeMap;
 
@@ -19,8 +20,8 @@ use crate::rigid::RigidError;
 use crate::rigid::header::line_of;
 use crate::rigid::table::{Row, text};
 
-/// Rows of a header before the one that begins with `Frame`: type, name, ID, parent, what it is; one
-/// more is no export.
+/// Rows of a header before the one that begins with `Frame`: type, name, ID, parent, what it is;
+/// one more is no export.
 const MOST_HEADER_ROWS: usize = 8;
 
 /// Whether the header has columns of rigid bodies or bones; `start` holds all of it.
@@ -40,8 +41,8 @@ fn is_body(kind: &str) -> bool {
 }
 
 /// Reads rigid bodies and skeletons' bones as references, one a name. Stamps count from the take's
-/// beginning; positions become metres and z up, `up` being the axis of the file that points up (y where
-/// it is to be found out). The bodies' own axes stay as Motive has them.
+/// beginning; positions become metres and z up, `up` being the axis of the file that points up (y
+/// where it is to be found out). The bodies' own axes stay as Motive has them.
 ///
 /// # Errors
 /// [`RigidError::Content`], [`RigidError::Value`], [`RigidError::Order`],

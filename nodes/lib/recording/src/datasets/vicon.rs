@@ -1,11 +1,12 @@
 //! Vicon: what Nexus and Tracker export as CSV.
 //!
-//! A file is one section after another, with an empty line between: its name (`Objects`, `Segments`,
-//! `Trajectories`, `Devices` ...), its rate in Hz, the names of what it holds, each above its first
-//! column, the columns (`Frame`, `Sub Frame`, `RX` ...), their units, and a row a frame. Of each object
-//! and segment there are TX TY TZ and a rotation: RX RY RZ RW, a quaternion; else RX RY RZ, which is a
-//! helical vector (the axis, as long as the angle) unless the name says Euler with an order of axes.
-//! What was not seen has empty cells. Vicon's z axis is up unless the volume was set up otherwise.
+//! A file is one section after another, with an empty line between: its name (`Objects`,
+//! `Segments`, `Trajectories`, `Devices` ...), its rate in Hz, the names of what it holds, each
+//! above its first column, the columns (`Frame`, `Sub Frame`, `RX` ...), their units, and a row a
+//! frame. Of each object and segment there are TX TY TZ and a rotation: RX RY RZ RW, a quaternion;
+//! else RX RY RZ, which is a helical vector (the axis, as long as the angle) unless the name says
+//! Euler with an order of axes. What was not seen has empty cells. Vicon's z axis is up unless the
+//! volume was set up otherwise.
 
 use cromosim_motion::{UpAxis, VICON_SECTIONS};
 use cromosim_spatial::Stamp;
@@ -38,8 +39,8 @@ fn is_section(name: &str) -> bool {
 }
 
 /// Reads objects and segments as references, one a name. A frame's stamp is its number by the rate;
-/// positions become metres and z up, `up` being the axis of the file that points up (z where it is to be
-/// found out).
+/// positions become metres and z up, `up` being the axis of the file that points up (z where it is
+/// to be found out).
 ///
 /// # Errors
 /// [`RigidError::Content`], [`RigidError::Value`], [`RigidError::Order`],
@@ -218,8 +219,8 @@ impl<'a> Section<'a> {
     }
 }
 
-/// The bodies, and how many are left alone as they are in their parents' axes; or what is wrong with the
-/// columns.
+/// The bodies, and how many are left alone as they are in their parents' axes; or what is wrong
+/// with the columns.
 fn bodies<'a>(
     names: &[&'a str],
     columns: &[&'a str],

@@ -58,7 +58,8 @@ pub(super) fn stamps(rows: &[Row<'_>], file: &About<'_>) -> Result<Vec<Option<St
     Ok(stamps)
 }
 
-/// How fine SampleTimeFine is: as the rate says where it is known, else as the device's kind has it.
+/// How fine SampleTimeFine is: as the rate says where it is known, else as the device's kind has
+/// it.
 fn ticks_per_second(ticks: &[Option<u64>], file: &About<'_>) -> u32 {
     let known: Vec<u64> = ticks.iter().copied().flatten().collect();
     let mut steps: Vec<u64> = known.windows(2).map(|pair| pair[1] - pair[0]).collect();

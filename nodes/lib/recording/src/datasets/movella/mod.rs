@@ -1,13 +1,14 @@
 //! Movella DOT's CSV exports and MT Manager's text exports (MTw, MTi), one IMU a file.
 //!
-//! Lines of what the device is (`DeviceTag:`, `OutputRate:`; MT Manager's begin with `//`), then a header
-//! from `PacketCounter` on, then a row a sample. Acc in m/s2; Gyr in degrees a second from DOTs, in
-//! radians a second from MT Manager, which is told by its `//` and by quaternions called `q0` to `q3`.
-//! SampleTimeFine counts microseconds (DOT) or tenths of milliseconds, as 32 bits that begin again at 0;
-//! PacketCounter 16 bits or more. Where Acc and Gyr are missing, the increments of velocity and
-//! orientation (`dv`, `dq`; `VelInc`, `OriInc`) by the rate are the same; else `FreeAcc`, whose gravity is
-//! taken out, by an orientation. The orientation is that of the sensor in a world whose z axis is up.
-//! Magnetic fields are in units of their own, and left alone.
+//! Lines of what the device is (`DeviceTag:`, `OutputRate:`; MT Manager's begin with `//`), then a
+//! header from `PacketCounter` on, then a row a sample. Acc in m/s2; Gyr in degrees a second from
+//! DOTs, in radians a second from MT Manager, which is told by its `//` and by quaternions called
+//! `q0` to `q3`. SampleTimeFine counts microseconds (DOT) or tenths of milliseconds, as 32 bits
+//! that begin again at 0; PacketCounter 16 bits or more. Where Acc and Gyr are missing, the
+//! increments of velocity and orientation (`dv`, `dq`; `VelInc`, `OriInc`) by the rate are the
+//! same; else `FreeAcc`, whose gravity is taken out, by an orientation. The orientation is that of
+//! the sensor in a world whose z axis is up. Magnetic fields are in units of their own, and left
+//! alone.
 
 mod about;
 mod clock;
@@ -22,8 +23,8 @@ use super::{DatasetRecording, PlacedImu};
 use crate::rigid::table::{Row, text};
 use crate::rigid::{ImuSeries, RigidError, median_rate};
 
-/// Whether such a file's header is among the first lines: with the device's time, or below lines of what
-/// the device is. A table of packets with a time of its own is anybody's.
+/// Whether such a file's header is among the first lines: with the device's time, or below lines of
+/// what the device is. A table of packets with a time of its own is anybody's.
 pub(super) fn is_movella(start: &str) -> bool {
     header(start).is_some_and(|(index, delimiter)| {
         let line = start.lines().nth(index).unwrap_or_default();
@@ -44,9 +45,9 @@ fn rows<'a>(text: &'a str, name: &'a str, skipped: usize, delimiter: char) -> Ve
         .collect()
 }
 
-/// Reads the readings, and the orientation where the file has one, as a recording of one IMU, which is
-/// called as the device's tag says, or `body`. Stamps are the device's own time, or where it has none
-/// count from the first packet.
+/// Reads the readings, and the orientation where the file has one, as a recording of one IMU, which
+/// is called as the device's tag says, or `body`. Stamps are the device's own time, or where it has
+/// none count from the first packet.
 ///
 /// # Errors
 /// [`RigidError::Header`], [`RigidError::Content`], [`RigidError::Value`],
