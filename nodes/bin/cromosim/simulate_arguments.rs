@@ -27,7 +27,7 @@ const READINGS: &str = "How readings are made";
 pub struct Arguments {
     /// Motion files, folders, patterns or @LIST
     ///
-    /// BVH, ASF/AMC, C3D, TRC and files of SMPL parameters; folders with all below them, "*.bvh" and the like, and @LIST, a
+    /// BVH, ASF/AMC, MVNX, C3D, TRC and files of SMPL parameters; folders with all below them, "*.bvh" and the like, and @LIST, a
     /// file with one of these a line. What OUT holds already is left alone
     pub motions: Vec<PathBuf>,
     /// Simulate the walk that comes with the suite, rather than a file

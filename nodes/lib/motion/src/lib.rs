@@ -3,8 +3,8 @@
 //! [`read_motion`] takes a file and finds out what it is by its content. Skeletons (BVH, ASF/AMC, MVNX)
 //! are retargeted: a [`SmplMotion`] in a world with z up, feet on z = 0, with shape coefficients
 //! fitted to the source's bones; the [`RetargetReport`] says how a source was understood. To
-//! markers (C3D, TRC, tables of Motive and Vicon) a body is fitted, which stays on the recording's floor; the [`MarkerReport`]
-//! says how well. [`embedded_walk`] is a motion without a file.
+//! markers (C3D, TRC, tables of Motive and Vicon) a body is fitted, which stays on the recording's
+//! floor; the [`MarkerReport`] says how well. [`embedded_walk`] is a motion without a file.
 //!
 //! Files of SMPL parameters (AMASS, and estimates from video: VIBE, WHAM, GVHMR, TRAM, PHALP,
 //! SLAHMR) need no retargeting; the [`PoseReport`] says what was taken. Betas of another kind of
