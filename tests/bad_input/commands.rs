@@ -191,11 +191,10 @@ fn options_of_another_mode_of_simulate() {
     let rigid = [
         "simulate", "--rigid", "r.tum", "--rate", "100", "--out", "out.mcap",
     ];
-    let of_motions: [&[&str]; 15] = [
+    let of_motions: [&[&str]; 14] = [
         &["--placements", "p.yaml"],
         &["--csv", "csv"],
         &["--pose-error-correlation", "1"],
-        &["--up-axis", "z"],
         &["--unit", "0.01"],
         &["--start", "1"],
         &["--duration", "1"],
@@ -220,7 +219,7 @@ fn options_of_another_mode_of_simulate() {
     let motions = ["simulate", "--walk", "--out", "out.mcap"];
     let nothing = ["simulate", "--out", "out.mcap"];
     refuses(folder.path(), &nothing, &["no motion file", "--walk"]);
-    let cases: [(&[&str], &[&str], &str); 11] = [
+    let cases: [(&[&str], &[&str], &str); 12] = [
         (&nothing, &["--walk", "walk.bvh"], "leave one of them out"),
         (&rigid, &["--walk"], "not with --rigid"),
         (&motions, &["--placement", "wrist"], "NAME=SITE"),
@@ -230,6 +229,7 @@ fn options_of_another_mode_of_simulate() {
             &["--placement", "wrist"],
             "not with --reference",
         ),
+        (&reference, &["--up-axis", "z"], "not with --reference"),
         (&reference, &["--device", "d.yaml"], "not with --reference"),
         (&reference, &["--learned", "video"], "not with --reference"),
         (&reference, &["--mapping", "m.yaml"], "not with --reference"),

@@ -2,6 +2,7 @@
 //! robots and props.
 #![allow(clippy::unwrap_used)]
 
+mod captures;
 #[path = "../common/mod.rs"]
 mod common;
 mod datasets;

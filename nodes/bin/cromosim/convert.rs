@@ -26,8 +26,8 @@ const DATA_SETS: &str = "Of a data set";
 pub struct Arguments {
     /// A motion, a trajectory, an IMU series, a data set's recording or a bag
     ///
-    /// Trajectories are TUM, EuRoC or CSV, IMU series EuRoC, CSV or Parquet, data sets BROAD, TotalCapture,
-    /// PAMAP2, RealWorld, phone and watch; the file's content tells
+    /// Trajectories are TUM, EuRoC, CSV, OptiTrack or Vicon, IMU series EuRoC, CSV, Parquet, Movella DOT or MT
+    /// Manager, both MVNX, data sets BROAD, TotalCapture, PAMAP2, RealWorld, phone and watch; the file's content tells
     input: PathBuf,
     /// What to write: .npz, .bvh, .trc, .tum or .txt, .csv, .parquet, .mcap
     ///
@@ -77,7 +77,7 @@ pub struct Arguments {
     name: Option<String>,
     /// The IMU series that was measured along the trajectory
     ///
-    /// EuRoC or CSV
+    /// EuRoC, CSV, Movella DOT or MT Manager
     #[arg(long, value_name = "FILE", help_heading = INTO_BAGS)]
     imu: Option<PathBuf>,
     /// Body model (npz or pickle) rather than the embedded one
@@ -164,6 +164,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         files: DatasetFiles {
             reference: arguments.reference.clone(),
             gyroscope: arguments.gyroscope.clone(),
+            ..DatasetFiles::default()
         },
         name: arguments.name.clone(),
     };

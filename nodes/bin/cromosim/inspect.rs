@@ -16,6 +16,7 @@ use cromosim_recording::inspect::{
     inspect, path_length,
 };
 use cromosim_recording::pose_topics;
+use cromosim_spatial::Stamp;
 
 use crate::body;
 use crate::files::{refuse_existing, write_whole};
@@ -34,9 +35,10 @@ const LEAST_JITTER: f64 = 0.005;
 pub struct Arguments {
     /// Motions, bodies, trajectories, IMU series, recordings or bags
     ///
-    /// Motion (BVH, ASF/AMC, C3D, TRC, AMASS, video estimates), body (SMPL npz or pickle),
+    /// Motion (BVH, ASF/AMC, MVNX, C3D, TRC, AMASS, video estimates), body (SMPL npz or pickle),
     /// trajectory or IMU series (TUM, EuRoC, CSV), recording of a data set (BROAD, TotalCapture,
-    /// PAMAP2, RealWorld, phone and watch), or bag (.mcap, rosbag2 directory)
+    /// PAMAP2, RealWorld, phone and watch) or of a motion capture system or sensor (OptiTrack,
+    /// Vicon, Movella DOT, MT Manager), or bag (.mcap, rosbag2 directory)
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// Body model (npz or pickle) that motions are read for
@@ -142,22 +144,21 @@ fn print_recording(
     format: DatasetFormat,
     recording: &DatasetRecording,
 ) -> anyhow::Result<()> {
-    let many = if recording.imus.len() == 1 { "" } else { "s" };
+    let (count, what) = match recording.imus.len() {
+        0 => (recording.references.len(), "reference"),
+        imus => (imus, "IMU"),
+    };
     say!(
-        "{}: recording of {format}, {} IMU{many} at {:.3} Hz",
+        "{}: recording of {format}, {count} {what}{} at {:.3} Hz",
         path.display(),
-        recording.imus.len(),
+        if count == 1 { "" } else { "s" },
         recording.rate_hz
     )?;
     for imu in &recording.imus {
         let stamps = &imu.series.stamps;
-        let seconds = stamps
-            .first()
-            .zip(stamps.last())
-            .map_or(0.0, |(first, last)| *last - *first);
-        let mut references = recording.references.iter();
-        let reference = references.find(|(name, _)| *name == imu.placement);
-        let reference = reference.map_or_else(String::new, |(_, poses)| {
+        let seconds = seconds_of(stamps);
+        let reference = recording.reference(&imu.placement);
+        let reference = reference.map_or_else(String::new, |poses| {
             format!(", reference of {} poses", poses.stamps.len())
         });
         let left_out = if imu.rows_left_out > 0 {
@@ -171,6 +172,30 @@ fn print_recording(
             stamps.len()
         )?;
     }
+    let alone = recording.placements().split_off(recording.imus.len());
+    let alone = alone.into_iter();
+    for (name, poses) in alone.filter_map(|name| Some((name, recording.reference(name)?))) {
+        say!(
+            "  {name}: {} poses, {:.3} s, path of {:.2} m",
+            poses.stamps.len(),
+            seconds_of(&poses.stamps),
+            path_length(&poses.positions)
+        )?;
+    }
+    for note in &recording.notes {
+        say!("  {}", printable(note))?;
+    }
+    print_activities(recording)
+}
+
+/// From the first to the last, s.
+fn seconds_of(stamps: &[Stamp]) -> f64 {
+    let ends = stamps.first().zip(stamps.last());
+    ends.map_or(0.0, |(first, last)| *last - *first)
+}
+
+/// How long each activity was done in all.
+fn print_activities(recording: &DatasetRecording) -> anyhow::Result<()> {
     let mut lengths: BTreeMap<&str, f64> = BTreeMap::new();
     for span in &recording.activities {
         *lengths.entry(&span.activity).or_default() += span.end - span.start;

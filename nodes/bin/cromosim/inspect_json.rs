@@ -75,14 +75,25 @@ fn dataset(format: DatasetFormat, recording: &DatasetRecording) -> Value {
     let imus = recording.imus.iter().map(|imu| {
         let stamps = &imu.series.stamps;
         let ends = stamps.first().zip(stamps.last());
-        let mut references = recording.references.iter();
-        let reference = references.find(|(name, _)| *name == imu.placement);
+        let reference = recording.reference(&imu.placement);
         json!({
             "placement": imu.placement,
             "readings": stamps.len(),
             "duration_s": ends.map_or(0.0, |(first, last)| *last - *first),
-            "reference_poses": reference.map(|(_, poses)| poses.stamps.len()),
+            "reference_poses": reference.map(|poses| poses.stamps.len()),
             "rows_left_out": imu.rows_left_out,
+        })
+    });
+    let alone = recording.placements().split_off(recording.imus.len());
+    let alone = alone.into_iter();
+    let alone = alone.filter_map(|name| Some((name, recording.reference(name)?)));
+    let references = alone.map(|(name, poses)| {
+        let ends = poses.stamps.first().zip(poses.stamps.last());
+        json!({
+            "name": name,
+            "poses": poses.stamps.len(),
+            "duration_s": ends.map_or(0.0, |(first, last)| *last - *first),
+            "path_m": path_length(&poses.positions),
         })
     });
     let activities = recording
@@ -93,6 +104,8 @@ fn dataset(format: DatasetFormat, recording: &DatasetRecording) -> Value {
         "format": format.to_string(),
         "rate_hz": recording.rate_hz,
         "imus": imus.collect::<Vec<_>>(),
+        "references": references.collect::<Vec<_>>(),
+        "notes": recording.notes,
         "activities": activities.collect::<Vec<_>>(),
     })
 }

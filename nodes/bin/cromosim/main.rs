@@ -32,6 +32,7 @@ mod node;
 mod output;
 mod progress;
 mod reference;
+mod rigid_bodies;
 mod simulate;
 mod simulate_arguments;
 mod simulate_many;

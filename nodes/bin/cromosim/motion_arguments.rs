@@ -40,7 +40,7 @@ pub struct MotionArguments {
     duration: Option<f64>,
     /// Which joint is which, where a BVH or AMC file has names of its own
     ///
-    /// cmu, cmu_asf, daz, lafan1, mixamo, smpl, xsens, or a YAML file, which `cromosim inspect
+    /// cmu, cmu_asf, daz, lafan1, mixamo, mvn, smpl, xsens, or a YAML file, which `cromosim inspect
     /// --skeleton-map-draft` drafts; default: the one that fits the names
     #[arg(long, value_name = "MAP", hide_short_help = true)]
     skeleton_map: Option<String>,

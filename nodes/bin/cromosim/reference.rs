@@ -7,18 +7,18 @@ use std::sync::Arc;
 use anyhow::bail;
 use cromosim_bag::{BagOptions, BagSummary, BagWriter, Compression};
 use cromosim_body::BodyModel;
-use cromosim_imu::{Device, EffectsFile, Placement, PlacementEffects, Scheme, TextureSegment};
+use cromosim_imu::{Device, EffectsFile, PlacementEffects, Scheme, TextureSegment};
 use cromosim_learned::{LearnedSimulator, scheme_for_networks};
-use cromosim_recording::rigid::{RigidContent, parse_rigid};
 use cromosim_recording::{
     RecordedPlacement, Resimulated, Resimulation, open_mapped, outside_reference, read_effects,
-    read_mapped_placements, read_whole, with_stamps, write_resimulated,
+    read_mapped_placements, with_stamps, write_resimulated,
 };
 use rayon::prelude::*;
 
 use crate::files::refuse_existing;
-use crate::output::say;
+use crate::output::{remark, say};
 use crate::progress::{self, Interrupt};
+use crate::rigid_bodies::rigid_placements;
 use crate::simulate_arguments::Arguments;
 use crate::simulate_setup::read_mapping;
 use crate::simulated_json::WrittenFile;
@@ -80,20 +80,15 @@ pub fn run(recording: &Path, arguments: &Arguments) -> anyhow::Result<()> {
     print_notes(&recorded, &without_stamps)
 }
 
-/// Runs `simulate --rigid TRAJECTORY`: the trajectory is the reference of one placement.
+/// Runs `simulate --rigid TRAJECTORY`: each of its bodies is the reference of one placement.
 pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()> {
     refuse_existing(&arguments.out, arguments.force)?;
     let scheme = arguments.differentiation()?;
-    let name = arguments.name_of_rigid()?.unwrap_or("body");
-    if let Err((_, problem)) = Placement::at_site(name, "left_watch", 1.0) {
-        bail!("--placement {name}: {problem}");
-    }
-    let recorded = [rigid_placement(trajectory, name)?];
-    let mut effects = given_effects(arguments, &recorded)?;
-    if let Some(device) = &arguments.device {
-        let of_device = effects_of_device(device, &recorded[0])?;
-        effects.placements.insert(name.to_owned(), of_device);
-    }
+    let up = arguments.motion.options()?.up_axis;
+    let (recorded, said) = rigid_placements(trajectory, &arguments.placement, up)?;
+    let names = recorded.iter().map(|placement| placement.name.as_str());
+    let names: Vec<&str> = names.collect();
+    let effects = effects_of_rigid(arguments, &recorded)?;
     let learned = arguments
         .learned
         .as_deref()
@@ -103,7 +98,7 @@ pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()>
         Some(_) => scheme_for_networks(Scheme::default()).into(),
         None => Scheme::default().into(),
     });
-    let mapping = read_mapping(arguments.mapping.as_deref(), &[name])?;
+    let mapping = read_mapping(arguments.mapping.as_deref(), &names)?;
     let how = Resimulation {
         scheme: Some(scheme),
         field: arguments.field()?.map(Arc::new),
@@ -124,19 +119,39 @@ pub fn run_rigid(trajectory: &Path, arguments: &Arguments) -> anyhow::Result<()>
         Written::WITH_REFERENCES,
         arguments,
     )?;
-    warn(trajectory, &recorded[0].notes);
+    let odd = recorded.iter().flat_map(|placement| &placement.notes);
+    warn(trajectory, &odd.cloned().collect::<Vec<_>>());
+    for note in said {
+        remark!("{}: {note}", trajectory.display());
+    }
     if arguments.json {
         let count = summary.message_count();
         return print_json(trajectory, count, (&recorded, &simulated), arguments);
     }
     say!(
-        "{}: {} messages of {name}, along {}{}",
+        "{}: {} messages of {}, along {}{}",
         arguments.out.display(),
         summary.message_count(),
+        names.join(", "),
         trajectory.display(),
         quality_line(simulated.iter().map(|placement| placement.quality))
     )?;
     Ok(())
+}
+
+/// The effects of `--effects`, and of `--device` at every placement.
+fn effects_of_rigid(
+    arguments: &Arguments,
+    recorded: &[RecordedPlacement],
+) -> anyhow::Result<EffectsFile> {
+    let mut effects = given_effects(arguments, recorded)?;
+    if let Some(device) = &arguments.device {
+        for placement in recorded {
+            let of_device = effects_of_device(device, placement)?;
+            effects.placements.insert(placement.name.clone(), of_device);
+        }
+    }
+    Ok(effects)
 }
 
 /// A device as what errs.
@@ -214,30 +229,6 @@ fn print_notes(recorded: &[RecordedPlacement], without_stamps: &[String]) -> any
         )?;
     }
     Ok(())
-}
-
-/// A trajectory as the reference of one placement.
-fn rigid_placement(trajectory: &Path, name: &str) -> anyhow::Result<RecordedPlacement> {
-    let Some(RigidContent::Poses(poses)) =
-        parse_rigid(&read_whole(trajectory)?, &trajectory.display().to_string())?
-    else {
-        bail!(
-            "{}: not a trajectory of a rigid body: expected TUM, EuRoC ground truth or a table of poses with a header",
-            trajectory.display()
-        );
-    };
-    let oddities = poses.trajectory.oddities();
-    if let Some(impossible) = oddities.iter().find(|odd| odd.is_impossible()) {
-        bail!("{}: {impossible}", trajectory.display());
-    }
-    Ok(RecordedPlacement {
-        name: name.to_owned(),
-        frames: poses.trajectory.frames(),
-        measured: Vec::new(),
-        notes: oddities.iter().map(ToString::to_string).collect(),
-        set_back: Vec::new(),
-        magnetic: Vec::new(),
-    })
 }
 
 /// Each placement on whatever core is free.

@@ -27,7 +27,7 @@ const READINGS: &str = "How readings are made";
 pub struct Arguments {
     /// Motion files, folders, patterns or @LIST
     ///
-    /// BVH, ASF/AMC, C3D, TRC and files of SMPL parameters; folders with all below them, "*.bvh" and the like, and @LIST, a
+    /// BVH, ASF/AMC, MVNX, C3D, TRC and files of SMPL parameters; folders with all below them, "*.bvh" and the like, and @LIST, a
     /// file with one of these a line. What OUT holds already is left alone
     pub motions: Vec<PathBuf>,
     /// Simulate the walk that comes with the suite, rather than a file
@@ -43,15 +43,16 @@ pub struct Arguments {
     pub namespace: Option<String>,
     #[command(flatten)]
     pub topics: TopicArguments,
-    /// Simulate an IMU on a rigid body along this trajectory
+    /// Simulate an IMU on each rigid body along its trajectory
     ///
-    /// A robot or a prop; the trajectory is TUM, EuRoC or CSV
+    /// A robot or a prop; the trajectory is TUM, EuRoC, CSV, or a motion capture system's export
+    /// (OptiTrack, Vicon), of one body or several
     #[arg(long, value_name = "FILE", help_heading = INPUT)]
     pub rigid: Option<PathBuf>,
     /// A placement at a named site, such as left_wrist=left_watch
     ///
-    /// At 100 Hz; may be given again; `cromosim body sites` lists the sites. With --rigid the name alone, as in
-    /// /imu/NAME/data_raw [default: body]
+    /// At 100 Hz; may be given again; `cromosim body sites` lists the sites. With --rigid the name as in
+    /// /imu/NAME/data_raw [default: body], or NAME or NAME=BODY of a file of several [default: all]
     #[arg(long, value_name = "NAME=SITE", help_heading = SENSORS)]
     pub placement: Vec<String>,
     /// A device's name or file, whose noise and effects are what errs
@@ -400,21 +401,6 @@ impl Arguments {
         Ok(())
     }
 
-    /// The name that `--placement` gives the IMU of a rigid body.
-    ///
-    /// # Errors
-    /// More than a name.
-    pub fn name_of_rigid(&self) -> anyhow::Result<Option<&str>> {
-        match self.placement.as_slice() {
-            [] => Ok(None),
-            [name] if !name.contains('=') => Ok(Some(name)),
-            given => bail!(
-                "--placement {}: a rigid body has one IMU and no sites; give its name alone",
-                given.join(" ")
-            ),
-        }
-    }
-
     /// What `--scheme` or `--bandwidth` say; none where neither was given.
     ///
     /// # Errors
@@ -485,7 +471,13 @@ impl Arguments {
             motion: self.motion.options()?,
             ..ReadOptions::default()
         };
-        let mut given = Vec::from_iter(motion.motion_setting(true).map(|it| (it, MOTION_FILES)));
+        // Exports of motion capture may have any axis up, too.
+        let modes = |option| match option {
+            "--up-axis" => NOT_REFERENCE,
+            _ => MOTION_FILES,
+        };
+        let settings = motion.motion_settings(true);
+        let mut given = Vec::from_iter(settings.map(|it| (it, modes(it))));
         let options = [
             (self.walk, "--walk", MOTION_FILES),
             (self.format.is_some(), "--format", MOTION_FILES),

@@ -5,7 +5,7 @@ use cromosim_ros::node_config;
 node_config! {
     /// ROS parameters of `replay`.
     pub struct Config {
-        /// Motion file (BVH, ASF/AMC, C3D, TRC, SMPL parameters) to play; empty, with no bag
+        /// Motion file (BVH, ASF/AMC, MVNX, C3D, TRC, SMPL parameters) to play; empty, with no bag
         /// either: the embedded walk.
         pub motion: String = String::new(),
         /// Recording to play: everything in it, with its times; a .mcap file or a rosbag2

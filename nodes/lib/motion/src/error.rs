@@ -32,7 +32,7 @@ pub enum MotionError {
     },
     /// The content is no known motion format.
     #[error(
-        "{}: not a motion file: expected BVH (first word HIERARCHY), AMC, C3D, TRC or SMPL parameters (npz, pickle, pt), found {found}",
+        "{}: not a motion file: expected BVH (first word HIERARCHY), AMC, MVNX, C3D, TRC or SMPL parameters (npz, pickle, pt), found {found}",
         path.display()
     )]
     UnknownFormat {
@@ -40,6 +40,16 @@ pub enum MotionError {
         path: PathBuf,
         /// How the content begins.
         found: String,
+    },
+    /// A suit's recording without a segment that others hang from.
+    #[error("{name}: no segment {segment}; there are {}; export the whole body", found.join(", "))]
+    Mvnx {
+        /// The file.
+        name: String,
+        /// What is missing.
+        segment: String,
+        /// The segments that are there.
+        found: Vec<String>,
     },
     /// A skeleton without a motion.
     #[error("{}: an Acclaim skeleton has no motion; give the AMC file, and this one as skeleton where it does not lie beside it", path.display())]

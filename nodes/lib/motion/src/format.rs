@@ -1,6 +1,6 @@
 //! What a motion file is, told by its content.
 
-use crate::{c3d, trc};
+use crate::{c3d, marker_tables, mvnx, trc};
 
 /// The motion files that are read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,10 +13,16 @@ pub enum MotionFormat {
     /// Acclaim motion: begins with `:FULLY-SPECIFIED`, `:DEGREES` or the first frame's number and
     /// `root`.
     Amc,
+    /// A suit's recording as XML: its first element is `mvnx`.
+    Mvnx,
     /// Markers in binary: second byte 0x50.
     C3d,
     /// Markers as a table: begins with PathFileType.
     Trc,
+    /// OptiTrack Motive's table, which may hold markers: begins with Format Version.
+    Motive,
+    /// Vicon's table, which may hold markers: begins with a section's name and its rate.
+    Vicon,
 }
 
 impl MotionFormat {
@@ -35,6 +41,15 @@ impl MotionFormat {
         }
         if trc::is_trc(start) {
             return Some(Self::Trc);
+        }
+        if mvnx::is_mvnx(start) {
+            return Some(Self::Mvnx);
+        }
+        if marker_tables::is_motive(start) {
+            return Some(Self::Motive);
+        }
+        if marker_tables::is_vicon(start) {
+            return Some(Self::Vicon);
         }
         let mut lines = start
             .lines()
@@ -61,8 +76,11 @@ impl MotionFormat {
         match self {
             Self::Bvh => "BVH",
             Self::Asf | Self::Amc => "ASF/AMC",
+            Self::Mvnx => "MVNX",
             Self::C3d => "C3D",
             Self::Trc => "TRC",
+            Self::Motive => "Motive's CSV",
+            Self::Vicon => "Vicon's CSV",
         }
     }
 }

@@ -1,10 +1,10 @@
 //! Motion files and the embedded walk, all in SMPL's joints.
 //!
-//! [`read_motion`] takes a file and finds out what it is by its content. Skeletons (BVH, ASF/AMC)
+//! [`read_motion`] takes a file and finds out what it is by its content. Skeletons (BVH, ASF/AMC, MVNX)
 //! are retargeted: a [`SmplMotion`] in a world with z up, feet on z = 0, with shape coefficients
 //! fitted to the source's bones; the [`RetargetReport`] says how a source was understood. To
-//! markers (C3D, TRC) a body is fitted, which stays on the recording's floor; the [`MarkerReport`]
-//! says how well. [`embedded_walk`] is a motion without a file.
+//! markers (C3D, TRC, tables of Motive and Vicon) a body is fitted, which stays on the recording's
+//! floor; the [`MarkerReport`] says how well. [`embedded_walk`] is a motion without a file.
 //!
 //! Files of SMPL parameters (AMASS, and estimates from video: VIBE, WHAM, GVHMR, TRAM, PHALP,
 //! SLAHMR) need no retargeting; the [`PoseReport`] says what was taken. Betas of another kind of
@@ -27,8 +27,10 @@ mod bvh;
 mod c3d;
 mod error;
 mod format;
+mod marker_tables;
 mod markers;
 mod motion;
+mod mvnx;
 mod options;
 mod plausibility;
 mod poses;
@@ -49,11 +51,13 @@ pub use bvh::{BvhClip, BvhJoint, Channel, MAX_JOINTS, SkeletonPose, parse_bvh, w
 pub use c3d::parse_c3d;
 pub use error::MotionError;
 pub use format::MotionFormat;
+pub use marker_tables::{VICON_SECTIONS, parse_motive_markers, parse_vicon_markers};
 pub use markers::{
     MarkerClip, MarkerFit, MarkerOptions, MarkerReport, MarkerSet, MarkerSite, SetMarker,
     fit_markers, fit_rigid, place_markers,
 };
 pub use motion::{SmplMotion, continuous, slerp};
+pub use mvnx::{Mvnx, parse_mvnx};
 pub use options::{MotionOptions, RestChoice};
 pub use poses::{
     CameraPoses, MAX_POSES, Person, PersonPart, PoseAxes, PoseFile, PoseFormat, PoseReport,

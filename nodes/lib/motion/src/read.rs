@@ -10,17 +10,19 @@ use crate::poses::read_poses;
 use crate::text::shortened;
 use crate::{
     AMC_RATE_HZ, BvhClip, MarkerClip, MotionError, MotionFormat, MotionOptions, SmplMotion,
-    fit_markers, parse_amc, parse_asf, parse_bvh, parse_c3d, parse_trc, retarget,
+    fit_markers, parse_amc, parse_asf, parse_bvh, parse_c3d, parse_motive_markers, parse_mvnx,
+    parse_trc, parse_vicon_markers, retarget,
 };
 
 /// Larger files are refused: a thousand hours of BVH at 120 Hz are smaller.
 const MAX_BYTES: u64 = 4 << 30;
 
 /// Reads a motion file and retargets or fits it to the embedded body. What the file is, is told by
-/// its content ([`MotionFormat::of`]), not by its name's ending. BVH and ASF/AMC are retargeted; an
+/// its content ([`MotionFormat::of`]), not by its name's ending. BVH, ASF/AMC and MVNX are retargeted; an
 /// AMC file takes its skeleton from [`MotionOptions::skeleton`] or from the ASF file beside it. To
-/// C3D and TRC a body is fitted ([`fit_markers`]). SMPL parameters are packed as npz, pickle,
-/// joblib, torch or npy and told by their keys. What nobody can do is refused
+/// C3D, TRC and the markers of Motive's and Vicon's tables a body is fitted ([`fit_markers`]). SMPL
+/// parameters are packed as npz, pickle, joblib, torch or npy and told by their keys. What nobody can
+/// do is refused
 /// ([`cromosim_spatial::plausible`]); [`SmplMotion::oddities`] says what is only unlikely.
 ///
 /// # Errors
@@ -51,8 +53,15 @@ pub fn read_motion_for(
     let motion = match MotionFormat::of(&bytes) {
         Some(MotionFormat::Bvh) => skeletal(parse_bvh(&text(), &name)?),
         Some(MotionFormat::Amc) => skeletal(acclaim(path, &text(), options)?),
+        Some(MotionFormat::Mvnx) => skeletal(parse_mvnx(&text(), &name)?.clip()?),
         Some(MotionFormat::C3d) => of_markers(&parse_c3d(&bytes, &name)?, body, options),
         Some(MotionFormat::Trc) => of_markers(&parse_trc(&text(), &name)?, body, options),
+        Some(MotionFormat::Motive) => {
+            of_markers(&parse_motive_markers(&text(), &name)?, body, options)
+        }
+        Some(MotionFormat::Vicon) => {
+            of_markers(&parse_vicon_markers(&text(), &name)?, body, options)
+        }
         Some(MotionFormat::Asf) => Err(MotionError::SkeletonOnly {
             path: path.to_owned(),
         }),
@@ -76,7 +85,7 @@ pub fn read_motion_for(
         .possible()
 }
 
-/// Reads the skeleton of a BVH or AMC file as it is, without a map: to draft one
+/// Reads the skeleton of a BVH, AMC or MVNX file as it is, without a map: to draft one
 /// ([`crate::SkeletonDraft`]).
 ///
 /// # Errors
@@ -87,6 +96,7 @@ pub fn read_skeleton(path: &Path, options: &MotionOptions) -> Result<BvhClip, Mo
     match MotionFormat::of(&bytes) {
         Some(MotionFormat::Bvh) => parse_bvh(&text, &path.display().to_string()),
         Some(MotionFormat::Amc) => acclaim(path, &text, options),
+        Some(MotionFormat::Mvnx) => parse_mvnx(&text, &path.display().to_string())?.clip(),
         _ => Err(MotionError::NoJoints {
             path: path.to_owned(),
         }),

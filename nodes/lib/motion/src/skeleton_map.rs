@@ -10,12 +10,13 @@ use serde::Deserialize;
 use crate::axes::frame_of;
 use crate::{BvhClip, MotionError};
 
-const EMBEDDED: [(&str, &str); 7] = [
+const EMBEDDED: [(&str, &str); 8] = [
     ("cmu", include_str!("../maps/cmu.yaml")),
     ("cmu_asf", include_str!("../maps/cmu_asf.yaml")),
     ("daz", include_str!("../maps/daz.yaml")),
     ("lafan1", include_str!("../maps/lafan1.yaml")),
     ("mixamo", include_str!("../maps/mixamo.yaml")),
+    ("mvn", include_str!("../maps/mvn.yaml")),
     ("smpl", include_str!("../maps/smpl.yaml")),
     ("xsens", include_str!("../maps/xsens.yaml")),
 ];
@@ -124,7 +125,8 @@ pub(crate) struct BoundMap {
 }
 
 impl SkeletonMap {
-    /// The maps that come with the suite: cmu, cmu_asf, daz, lafan1, mixamo, smpl, xsens.
+    /// The maps that come with the suite: cmu, cmu_asf, daz, lafan1, mixamo, mvn, smpl,
+    /// xsens.
     ///
     /// # Errors
     /// None in practice: a test reads them all.

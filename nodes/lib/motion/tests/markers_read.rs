@@ -5,7 +5,9 @@ mod common;
 
 use common::marker_files::{Kind, c3d, trc};
 use common::own_file;
-use cromosim_motion::{MarkerClip, parse_c3d, parse_trc};
+use cromosim_motion::{
+    MarkerClip, MotionFormat, parse_c3d, parse_motive_markers, parse_trc, parse_vicon_markers,
+};
 use nalgebra::Point3;
 
 /// Three markers, four frames; the second marker is not seen in the third frame.
@@ -250,5 +252,161 @@ fn errors_name_file_and_place() {
             found.starts_with(expected),
             "expected {expected}\n   found {found}"
         );
+    }
+}
+
+/// Cells of a frame in millimetres; empty where a marker was not seen.
+fn millimetres(frame: &[Option<Point3<f64>>]) -> Vec<String> {
+    let cells = |point: &Option<Point3<f64>>| match point {
+        Some(point) => point
+            .coords
+            .iter()
+            .map(|part| format!("{:.4}", 1000.0 * part))
+            .collect(),
+        None => vec![String::new(); 3],
+    };
+    frame.iter().flat_map(cells).collect()
+}
+
+/// As Vicon's Nexus writes trajectories, behind segments.
+fn vicon(clip: &MarkerClip) -> String {
+    let names: Vec<String> = clip
+        .labels
+        .iter()
+        .map(|label| format!("{label},,"))
+        .collect();
+    let count = clip.labels.len();
+    let mut text = format!(
+        "Segments\r\n100\r\n,,a:a,,,,,\r\nFrame,Sub Frame,RX,RY,RZ,TX,TY,TZ\r\n,,deg,deg,deg,mm,mm,mm\r\n1,0,0,0,0,0,0,0\r\n\r\n\
+         Trajectories\r\n{}\r\n,,{}\r\nFrame,Sub Frame{}\r\n,{}\r\n",
+        clip.rate_hz,
+        names.join(","),
+        ",X,Y,Z".repeat(count),
+        ",mm,mm,mm".repeat(count)
+    );
+    for (index, frame) in clip.frames.iter().enumerate() {
+        text += &format!("{},0,{}\r\n", index + 1, millimetres(frame).join(","));
+    }
+    text
+}
+
+/// As OptiTrack's Motive writes markers, beside a rigid body's.
+fn motive(clip: &MarkerClip) -> String {
+    let thrice = |words: Vec<String>| -> String {
+        let words = words.iter().map(|word| format!(",{word}").repeat(3));
+        words.collect()
+    };
+    let kinds = clip.labels.iter().map(|_| "Marker".to_owned()).collect();
+    let mut text = format!(
+        "Format Version,1.23,Capture Frame Rate,{0},Export Frame Rate,{0},Rotation Type,Quaternion,Length Units,Millimeters,Coordinate Space,Global\n\n\
+         ,Type,Rigid Body Marker,Rigid Body Marker,Rigid Body Marker{1}\n,Name,b,b,b{2}\n,ID,1,1,1{2}\n,,Position,Position,Position{3}\nFrame,Time (Seconds),X,Y,Z{4}\n",
+        clip.rate_hz,
+        thrice(kinds),
+        thrice(clip.labels.clone()),
+        ",Position".repeat(3 * clip.labels.len()),
+        ",X,Y,Z".repeat(clip.labels.len())
+    );
+    for (index, frame) in clip.frames.iter().enumerate() {
+        let time = index as f64 / clip.rate_hz;
+        text += &format!("{index},{time:.6},9,9,9,{}\n", millimetres(frame).join(","));
+    }
+    text
+}
+
+#[test]
+fn tables_of_capture_systems_come_back() {
+    let made = clip();
+    let text = vicon(&made);
+    assert_eq!(MotionFormat::of(text.as_bytes()), Some(MotionFormat::Vicon));
+    assert_same(&parse_vicon_markers(&text, "v.csv").unwrap(), &made, 1e-6);
+    let semicolons = text.replace(',', ";");
+    assert_same(
+        &parse_vicon_markers(&semicolons, "v.csv").unwrap(),
+        &made,
+        1e-6,
+    );
+    let text = motive(&made);
+    assert_eq!(
+        MotionFormat::of(text.as_bytes()),
+        Some(MotionFormat::Motive)
+    );
+    assert_same(&parse_motive_markers(&text, "m.csv").unwrap(), &made, 1e-6);
+}
+
+#[test]
+fn what_is_wrong_with_a_table_is_said() {
+    let (vicon, motive) = (vicon(&clip()), motive(&clip()));
+    for (from, to, expected) in [
+        (
+            "Trajectories",
+            "Markers",
+            "v.csv, line 1: expected a section called Trajectories; export markers, found none",
+        ),
+        (
+            "Trajectories\r\n120",
+            "Trajectories\r\nfast",
+            "v.csv, line 9: expected a rate in Hz, found fast",
+        ),
+        ("Trajectories\r\n120", "Trajectories\r\n0", "v.csv: rate_hz"),
+        (
+            ",X,Y,Z,X,Y,Z,X,Y,Z",
+            ",A,B,C",
+            "v.csv, line 11: expected columns X, Y, Z below a marker's name, found none",
+        ),
+        (
+            "\r\n,,mm",
+            "\r\n,,miles",
+            "v.csv, line 12: expected mm, cm or m, found miles",
+        ),
+        (
+            "1,0,500.0000",
+            "1,0,five",
+            "v.csv, line 13: expected a coordinate, found five",
+        ),
+    ] {
+        assert!(vicon.contains(from), "{from}");
+        let damaged = vicon.replacen(from, to, 1);
+        let said = parse_vicon_markers(&damaged, "v.csv").unwrap_err();
+        assert!(said.to_string().starts_with(expected), "{said}");
+    }
+    for (from, to, expected) in [
+        (
+            "Millimeters",
+            "Miles",
+            "m.csv, line 1: expected length units such as Meters, found Miles",
+        ),
+        (
+            "\nFrame,",
+            "\nFrames,",
+            "m.csv, line 1: expected a row of columns that begins with Frame, found none",
+        ),
+        (
+            "9,9,9,500.0000",
+            "9,9,9,five",
+            "m.csv, line 8: expected a coordinate",
+        ),
+    ] {
+        assert!(motive.contains(from), "{from}");
+        let damaged = motive.replacen(from, to, 1);
+        let said = parse_motive_markers(&damaged, "m.csv").unwrap_err();
+        assert!(said.to_string().starts_with(expected), "{said}");
+    }
+    for sample in [&vicon, &motive] {
+        common::damaged(sample.as_bytes(), 500, |bytes| {
+            let text = String::from_utf8_lossy(bytes);
+            for read in [
+                parse_vicon_markers(&text, "x"),
+                parse_motive_markers(&text, "x"),
+            ] {
+                match read {
+                    Ok(clip) => assert!(
+                        clip.frames
+                            .iter()
+                            .all(|frame| frame.len() == clip.labels.len())
+                    ),
+                    Err(said) => assert!(said.to_string().starts_with('x'), "{said}"),
+                }
+            }
+        });
     }
 }

@@ -100,7 +100,7 @@ fn files_that_cannot_be_read_are_named() {
     std::fs::write(&path, b"# a table").unwrap();
     let found = message(read_motion(&path, &MotionOptions::default()));
     assert!(
-        found.contains("motion.bvh: not a motion file: expected BVH (first word HIERARCHY), AMC, C3D, TRC or SMPL parameters"),
+        found.contains("motion.bvh: not a motion file: expected BVH (first word HIERARCHY), AMC, MVNX, C3D, TRC or SMPL parameters"),
         "{found}"
     );
     assert!(found.ends_with("found \"# a table\""), "{found}");
@@ -153,7 +153,7 @@ fn unknown_skeletons_are_described() {
     let found = message(read_motion(&own_file("a_ok.bvh"), &unknown));
     assert_eq!(
         found,
-        "skeleton map kinect is neither a file nor one of cmu, cmu_asf, daz, lafan1, mixamo, smpl, xsens"
+        "skeleton map kinect is neither a file nor one of cmu, cmu_asf, daz, lafan1, mixamo, mvn, smpl, xsens"
     );
 }
 
@@ -162,11 +162,13 @@ fn embedded_maps_are_sound_and_own_maps_are_checked() {
     let maps = SkeletonMap::embedded().unwrap();
     assert_eq!(
         maps.iter().map(SkeletonMap::name).collect::<Vec<_>>(),
-        ["cmu", "cmu_asf", "daz", "lafan1", "mixamo", "smpl", "xsens"]
+        [
+            "cmu", "cmu_asf", "daz", "lafan1", "mixamo", "mvn", "smpl", "xsens"
+        ]
     );
     assert!(maps.iter().all(|map| !map.description().is_empty()));
     let clip = parse_bvh(&xsens(), "walk.bvh").unwrap();
-    assert_eq!(maps[6].missing_in(&clip), ["Chest2"]);
+    assert_eq!(maps[7].missing_in(&clip), ["Chest2"]);
     let yaml = include_str!("../maps/xsens.yaml");
     let error = |yaml: &str| {
         SkeletonMap::from_yaml(yaml, "own.yaml")

@@ -139,7 +139,11 @@ pub fn inspect(
             problem: "the file is empty".to_owned(),
         });
     }
-    if let Some((format, recording)) = open_dataset(path, &DatasetFiles::default())? {
+    let files = DatasetFiles {
+        up_axis: options.up_axis,
+        ..DatasetFiles::default()
+    };
+    if let Some((format, recording)) = open_dataset(path, &files)? {
         return Ok(Inspection::Recording(format, recording));
     }
     match open_poses(path, PoseView::World) {

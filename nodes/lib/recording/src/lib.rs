@@ -45,6 +45,7 @@ mod quality;
 mod reference_parts;
 mod resimulation;
 pub mod rigid;
+mod rigid_bodies;
 mod simulation;
 mod static_readings;
 mod topics;
@@ -66,6 +67,7 @@ pub use resimulation::{
     Resimulated, Resimulation, outside_reference, read_effects, reading_mapping, with_stamps,
     write_resimulated,
 };
+pub use rigid_bodies::{RigidBodies, read_rigid_bodies};
 pub use simulation::{Aside, Simulation, SimulationOptions, TextureOn};
 pub use static_readings::{StaticReadings, read_static};
 pub use topics::{PoseSource, TopicMap};

@@ -8,8 +8,9 @@ use cromosim_msgs::RosMessage;
 use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_spatial::Stamp;
 
+use crate::datasets::{DatasetFiles, open_dataset};
 use crate::placement::names_between;
-use crate::rigid::{RigidContent, parse_rigid};
+use crate::rigid::{ImuSeries, RigidContent, parse_rigid};
 use crate::{RecordingError, is_bag, read_whole};
 
 /// The readings of one IMU.
@@ -23,7 +24,7 @@ pub struct StaticReadings {
     pub readings: Vec<Reading>,
 }
 
-/// The IMUs of a bag (`/imu/NAME/data_raw`, by name) or of an IMU series. Readings that are NaN or
+/// The IMUs of a bag (`/imu/NAME/data_raw`, by name), of a recording or of an IMU series. Readings that are NaN or
 /// infinite, or not later than the one before, are left out.
 ///
 /// # Errors
@@ -58,17 +59,16 @@ pub fn read_static(path: &Path) -> Result<Vec<StaticReadings>, RecordingError> {
         };
         return names.into_iter().map(read).collect();
     }
+    if let Some((_, recording)) = open_dataset(path, &DatasetFiles::default())? {
+        let imus = recording.imus.into_iter();
+        let all = imus.map(|imu| StaticReadings::of(imu.placement, &imu.series));
+        return match all.collect::<Vec<_>>() {
+            all if all.is_empty() => Err(unsuitable("a recording without an IMU")),
+            all => Ok(all),
+        };
+    }
     match parse_rigid(&read_whole(path)?, &path.display().to_string())? {
-        Some(RigidContent::Imu(series)) => {
-            let mut own = StaticReadings {
-                name: "body".to_owned(),
-                ..StaticReadings::default()
-            };
-            for (stamp, reading) in series.stamps.iter().zip(series.readings()) {
-                own.push(*stamp, reading);
-            }
-            Ok(vec![own])
-        }
+        Some(RigidContent::Imu(series)) => Ok(vec![StaticReadings::of("body".to_owned(), &series)]),
         _ => Err(unsuitable(
             "no IMU in it; expected a bag with /imu/NAME/data_raw, or an IMU series (EuRoC, or a table with a header)",
         )),
@@ -76,6 +76,17 @@ pub fn read_static(path: &Path) -> Result<Vec<StaticReadings>, RecordingError> {
 }
 
 impl StaticReadings {
+    fn of(name: String, series: &ImuSeries) -> Self {
+        let mut own = Self {
+            name,
+            ..Self::default()
+        };
+        for (stamp, reading) in series.stamps.iter().zip(series.readings()) {
+            own.push(*stamp, reading);
+        }
+        own
+    }
+
     fn push(&mut self, stamp: Stamp, reading: Reading) {
         let values = [reading.specific_force, reading.angular_velocity];
         let is_finite = values

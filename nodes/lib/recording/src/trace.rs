@@ -31,20 +31,19 @@ pub struct PlacementTrace<'a> {
 }
 
 impl DatasetRecording {
-    /// Every IMU with the reference of its name.
+    /// Every IMU with the reference of its name, and then the references without an IMU.
     pub fn traces(&self) -> Vec<PlacementTrace<'_>> {
-        let reference = |wanted: &str| {
-            let named = self.references.iter().find(|(name, _)| name == wanted);
-            named.map(|(_, poses)| poses)
+        let trace = |name| {
+            let imu = self.imus.iter().find(|imu| imu.placement == name);
+            PlacementTrace {
+                name,
+                reference: self.reference(name),
+                imu: imu.map(|imu| &imu.series),
+                orientations: imu.map_or(&[], |imu| &imu.world_from_sensor),
+                magnetic_field: imu.map_or(&[], |imu| &imu.magnetic_field),
+            }
         };
-        let traces = self.imus.iter().map(|imu| PlacementTrace {
-            name: &imu.placement,
-            reference: reference(&imu.placement),
-            imu: Some(&imu.series),
-            orientations: &imu.world_from_sensor,
-            magnetic_field: &imu.magnetic_field,
-        });
-        traces.collect()
+        self.placements().into_iter().map(trace).collect()
     }
 }
 

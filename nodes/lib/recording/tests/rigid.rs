@@ -203,6 +203,12 @@ fn bad_rows_get_a_verdict_with_line_and_column() {
         csv("time,x,y,z,qx,qy,qz,qw\n1,2,3,4,0,0,0,1\n2,2,3,,0,0,0,1\n")
             .contains("line 3, column 4")
     );
+    let windows = "time,x,y,z,qx,qy,qz,qw\r\n1,2,3,4,0,0,0,1\r\n\r\n2,2,3,,0,0,0,1\r\n";
+    assert!(
+        csv(windows).contains("line 4, column 4"),
+        "{}",
+        csv(windows)
+    );
     let imu = parse_euroc_imu(b"#t\n1,2,3\n", "data.csv")
         .unwrap_err()
         .to_string();

@@ -18,3 +18,4 @@ pub use clip::{BvhClip, BvhJoint, Channel, MAX_JOINTS};
 pub use kinematics::SkeletonPose;
 pub use parse::parse_bvh;
 pub use write::write_bvh;
+pub(crate) use write::zxy_degrees;

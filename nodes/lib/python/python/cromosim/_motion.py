@@ -116,7 +116,7 @@ class Motion:
 def read_motion(
     path: str | PathLike[str], *, body: str | PathLike[str] | None = None, **options: Any
 ) -> Motion:
-    """Read a motion file: BVH, ASF/AMC, C3D, TRC, or SMPL parameters as AMASS and video estimators write.
+    """Read a motion file: BVH, ASF/AMC, MVNX, C3D, TRC, or SMPL parameters as AMASS and video estimators write.
 
     What the file is, is told by its content.
 

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use crate::RecordingError;
 
 /// Endings of motion files, which are taken from folders and patterns.
-const ENDINGS: [&str; 9] = [
-    "bvh", "amc", "c3d", "trc", "npz", "pkl", "joblib", "pt", "pth",
+const ENDINGS: [&str; 10] = [
+    "bvh", "amc", "mvnx", "c3d", "trc", "npz", "pkl", "joblib", "pt", "pth",
 ];
 /// What AMASS has beside its motions: people's shapes.
 const NO_MOTIONS: [&str; 3] = ["shape.npz", "neutral_stagei.npz", "neutral_stagei.pkl"];

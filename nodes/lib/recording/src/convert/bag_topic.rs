@@ -11,7 +11,7 @@ use cromosim_spatial::Stamp;
 use nalgebra::Vector3;
 
 use super::{Content, Read, ReadOptions, Target, dataset, motion_topic};
-use crate::datasets::{DatasetRecording, PlacedImu};
+use crate::datasets::{DatasetFormat, DatasetRecording, PlacedImu};
 use crate::frame_tree::FrameTree;
 use crate::pose_source::stamped_poses;
 use crate::rigid::{EurocGroundTruth, ImuSeries, PoseTrajectory};
@@ -93,6 +93,7 @@ fn every_imu(path: &Path, options: &ReadOptions) -> Result<Read, RecordingError>
         imus: imus.collect(),
         ..DatasetRecording::default()
     };
+    let recording = (DatasetFormat::Columns, recording);
     dataset::chosen(path, recording, Target::Columns, options)
 }
 

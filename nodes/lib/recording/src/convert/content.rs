@@ -14,7 +14,7 @@ pub enum Content {
     Poses(EurocGroundTruth),
     /// The readings of one IMU.
     Imu(ImuSeries),
-    /// Several IMUs with their references.
+    /// Several IMUs with their references, or references alone.
     Recording(Box<DatasetRecording>),
 }
 
@@ -25,16 +25,21 @@ impl Content {
             Self::Motion(_) => "a motion",
             Self::Poses(_) => "a trajectory",
             Self::Imu(_) => "an IMU series",
-            Self::Recording(_) => "a recording of a data set",
+            Self::Recording(_) => "a recording",
         }
     }
 
-    /// Frames of a motion, else rows; of a recording those of all IMUs together.
+    /// Frames of a motion, else rows; of a recording those of all IMUs together, or of all references
+    /// where it has no IMU.
     pub fn count(&self) -> usize {
         match self {
             Self::Motion(motion) => motion.frames.len(),
             Self::Poses(poses) => poses.trajectory.stamps.len(),
             Self::Imu(series) => series.stamps.len(),
+            Self::Recording(recording) if recording.imus.is_empty() => {
+                let references = recording.references.iter();
+                references.map(|(_, poses)| poses.stamps.len()).sum()
+            }
             Self::Recording(recording) => {
                 let imus = recording.imus.iter();
                 imus.map(|imu| imu.series.stamps.len()).sum()

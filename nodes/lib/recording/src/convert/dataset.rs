@@ -5,14 +5,14 @@ use std::path::Path;
 
 use super::{Content, Read, ReadOptions, Target};
 use crate::RecordingError;
-use crate::datasets::{DatasetRecording, PlacedImu};
+use crate::datasets::{DatasetFormat, DatasetRecording, PlacedImu};
 use crate::rigid::EurocGroundTruth;
 
 /// The chosen part and placements, under another name where it is one and a name is given; of one
 /// placement what the target holds.
 pub(super) fn chosen(
     path: &Path,
-    mut recording: DatasetRecording,
+    (format, mut recording): (DatasetFormat, DatasetRecording),
     target: Target,
     options: &ReadOptions,
 ) -> Result<Read, RecordingError> {
@@ -20,15 +20,19 @@ pub(super) fn chosen(
         path: path.to_owned(),
         problem,
     };
-    if let Some(option) = options.motion_setting(false) {
+    let takes = |option: &&str| !(*option == "--up-axis" && format.takes_up_axis());
+    if let Some(option) = options.motion_settings(false).find(takes) {
         return Err(unsuitable(format!(
-            "{option} is for motions, and this is a recording of a data set; leave it out"
+            "{option} is for motions, and this is a recording; leave it out"
         )));
     }
     cut(path, &mut recording, options)?;
     choose_placements(&mut recording, target, options).map_err(unsuitable)?;
     let left_out = recording.imus.iter().filter(|imu| imu.rows_left_out > 0);
-    let notes = left_out.map(|imu| note_left_out(path, imu)).collect();
+    let left_out = left_out.map(|imu| note_left_out(path, imu));
+    let said = recording.notes.iter();
+    let said = said.map(|note| format!("{}: {note}", path.display()));
+    let notes = said.chain(left_out).collect();
     let content = held_by(target, recording).map_err(unsuitable)?;
     Ok(Read { content, notes })
 }
@@ -40,15 +44,11 @@ fn choose_placements(
     target: Target,
     options: &ReadOptions,
 ) -> Result<(), String> {
-    let known = recording
-        .imus
-        .iter()
-        .map(|imu| imu.placement.as_str())
-        .collect::<Vec<_>>()
-        .join(", ");
+    let known = recording.placements().join(", ");
     if let Some(placement) = &options.placement {
         recording.imus.retain(|imu| imu.placement == *placement);
-        if recording.imus.is_empty() {
+        recording.references.retain(|(name, _)| name == placement);
+        if recording.placements().is_empty() {
             return Err(format!(
                 "--placement {placement}: no such placement; there are {known}{}",
                 meant(placement, known.split(", "))
@@ -56,13 +56,14 @@ fn choose_placements(
         }
     }
     let holds_all = matches!(target, Target::Bag | Target::Columns);
-    if !holds_all && recording.imus.len() != 1 {
+    let is_one = recording.placements().len() == 1;
+    if !holds_all && !is_one {
         return Err(format!(
             "several placements; give --placement, one of {known}"
         ));
     }
     if let Some(name) = &options.name {
-        if recording.imus.len() != 1 {
+        if !is_one {
             return Err(format!(
                 "--name {name} is for one placement; give --placement, one of {known}"
             ));
@@ -74,23 +75,32 @@ fn choose_placements(
 
 /// What the target holds of the recording; `Err` says what is missing.
 fn held_by(target: Target, mut recording: DatasetRecording) -> Result<Content, String> {
-    Ok(match target {
-        Target::Bag | Target::Columns => Content::Recording(Box::new(recording)),
-        Target::Tum => {
-            let placement = recording.imus[0].placement.clone();
-            let mut references = recording.references.into_iter();
-            let Some((_, trajectory)) = references.find(|(name, _)| *name == placement) else {
-                return Err(format!(
-                    "the recording has no reference of {placement}, and a TUM trajectory holds no readings"
-                ));
-            };
-            Content::Poses(EurocGroundTruth {
-                trajectory,
-                ..EurocGroundTruth::default()
-            })
-        }
-        _ => Content::Imu(recording.imus.swap_remove(0).series),
-    })
+    if target == Target::Bag {
+        return Ok(Content::Recording(Box::new(recording)));
+    }
+    if target == Target::Columns {
+        return match recording.imus.is_empty() {
+            true => Err("it has no IMU, and columns hold readings alone".to_owned()),
+            false => Ok(Content::Recording(Box::new(recording))),
+        };
+    }
+    if target != Target::Tum
+        && let Some(imu) = recording.imus.pop()
+    {
+        return Ok(Content::Imu(imu.series));
+    }
+    let placements = recording.placements();
+    let placement = placements.first().copied().unwrap_or_default().to_owned();
+    let mut references = recording.references.into_iter();
+    let Some((_, trajectory)) = references.find(|(name, _)| *name == placement) else {
+        return Err(format!(
+            "the recording has no reference of {placement}, and a TUM trajectory holds no readings"
+        ));
+    };
+    Ok(Content::Poses(EurocGroundTruth {
+        trajectory,
+        ..EurocGroundTruth::default()
+    }))
 }
 
 /// The part of the recording from `start_s` on, `duration_s` long.
@@ -126,7 +136,11 @@ fn cut(
 
 /// Another name for the only placement and its reference.
 fn rename(recording: &mut DatasetRecording, name: &str) {
-    let old = std::mem::replace(&mut recording.imus[0].placement, name.to_owned());
+    let placements = recording.placements();
+    let old = placements.first().copied().unwrap_or_default().to_owned();
+    for imu in &mut recording.imus {
+        name.clone_into(&mut imu.placement);
+    }
     for (reference, _) in &mut recording.references {
         if *reference == old {
             name.clone_into(reference);

@@ -19,6 +19,7 @@ use std::path::Path;
 use cromosim_body::BodyModel;
 
 use crate::RecordingError;
+use crate::datasets::{DatasetFiles, open_dataset};
 use crate::rigid::{EurocGroundTruth, ImuSeries, RigidContent, parse_rigid};
 
 pub use content::{Content, Read};
@@ -104,6 +105,18 @@ fn followed(
 
 /// The IMU series beside a trajectory.
 fn read_imu_series(path: &Path) -> Result<ImuSeries, RecordingError> {
+    if let Some((_, mut recording)) = open_dataset(path, &DatasetFiles::default())? {
+        let (imu, others) = (recording.imus.pop(), recording.imus.len());
+        return imu.filter(|_| others == 0).map(|imu| imu.series).ok_or_else(|| {
+            RecordingError::Unsuitable {
+                path: path.to_owned(),
+                problem: format!(
+                    "a recording of {} IMUs, and --imu takes one; convert it to .csv with --placement first",
+                    if others == 0 { 0 } else { others + 1 }
+                ),
+            }
+        });
+    }
     let problem = match parse_rigid(&crate::read_whole(path)?, &path.display().to_string())? {
         Some(RigidContent::Imu(series)) => return Ok(series),
         Some(RigidContent::Poses(_)) => "a trajectory; --imu takes an IMU series",

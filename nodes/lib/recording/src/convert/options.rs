@@ -53,8 +53,13 @@ impl ReadOptions {
     /// The command line's name of the first setting of motion files that is not as by default;
     /// start and duration, which other things than motions may have too, on demand.
     pub fn motion_setting(&self, with_part: bool) -> Option<&'static str> {
+        self.motion_settings(with_part).next()
+    }
+
+    /// As [`Self::motion_setting`], all of them.
+    pub fn motion_settings(&self, with_part: bool) -> impl Iterator<Item = &'static str> + use<> {
         let motion = &self.motion;
-        first_of([
+        given([
             (motion.up_axis != UpAxis::Detect, "--up-axis"),
             (motion.unit_scale_m.is_some(), "--unit"),
             (motion.skeleton_map.is_some(), "--skeleton-map"),
@@ -73,23 +78,27 @@ impl ReadOptions {
 
     /// The command line's name of the first setting that only data sets take.
     pub(super) fn dataset_setting(&self) -> Option<&'static str> {
-        first_of([
+        let settings = [
             (self.placement.is_some(), "--placement"),
             (self.files.reference.is_some(), "--reference"),
             (self.files.gyroscope.is_some(), "--gyroscope"),
-        ])
+        ];
+        given(settings).next()
     }
 
     /// The command line's name of the first setting that only bags take.
     pub(super) fn bag_setting(&self) -> Option<&'static str> {
-        first_of([
+        let settings = [
             (self.topic.is_some(), "--topic"),
             (self.frame.is_some(), "--frame"),
-        ])
+        ];
+        given(settings).next()
     }
 }
 
-fn first_of<const N: usize>(settings: [(bool, &'static str); N]) -> Option<&'static str> {
-    let mut given = settings.into_iter().filter(|(given, _)| *given);
-    given.next().map(|(_, name)| name)
+fn given<const N: usize>(
+    settings: [(bool, &'static str); N],
+) -> impl Iterator<Item = &'static str> {
+    let given = settings.into_iter().filter(|(given, _)| *given);
+    given.map(|(_, name)| name)
 }

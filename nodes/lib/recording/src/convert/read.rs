@@ -7,7 +7,7 @@ use cromosim_body::BodyModel;
 use cromosim_motion::{MotionFormat, read_motion_for};
 
 use super::{Content, Read, ReadOptions, Target, bag_topic, dataset};
-use crate::datasets::open_dataset;
+use crate::datasets::{DatasetFiles, open_dataset};
 use crate::rigid::{RigidContent, parse_rigid, sniff_rigid};
 use crate::{RecordingError, read_head, read_whole};
 
@@ -46,13 +46,33 @@ pub fn read_content(
     if head.is_empty() {
         return Err(unsuitable("the file is empty".to_owned()));
     }
-    if let Some((_, recording)) = open_dataset(path, &options.files)? {
-        return dataset::chosen(path, recording, target, options);
+    read_file(path, &head, options, target)
+}
+
+/// Reads a file that is no bag; `head` is its beginning.
+fn read_file(
+    path: &Path,
+    head: &[u8],
+    options: &ReadOptions,
+    target: Target,
+) -> Result<Read, RecordingError> {
+    let files = DatasetFiles {
+        up_axis: options.motion.up_axis,
+        ..options.files.clone()
+    };
+    let motion_format = MotionFormat::of(head);
+    // Some recordings are motions, too; a bag takes what was recorded.
+    let wants_motion =
+        options.followed.is_some() || (target.takes_motions() && target != Target::Bag);
+    if !(motion_format.is_some() && wants_motion)
+        && let Some((format, recording)) = open_dataset(path, &files)?
+    {
+        return dataset::chosen(path, (format, recording), target, options);
     }
     refuse_dataset_settings(path, options)?;
     // Motions first: an AMC's frame can look like a row of numbers.
-    if MotionFormat::of(&head).is_none()
-        && sniff_rigid(&head).is_some()
+    if motion_format.is_none()
+        && sniff_rigid(head).is_some()
         && let Some(rigid) = parse_rigid(&read_whole(path)?, &path.display().to_string())?
     {
         let content = match rigid {

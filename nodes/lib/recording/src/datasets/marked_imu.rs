@@ -69,7 +69,7 @@ pub fn parse_marked_imu<R: Read + Seek>(
         rate_hz: imu_hz,
         imus,
         references,
-        activities: Vec::new(),
+        ..DatasetRecording::default()
     })
 }
 

@@ -5,11 +5,13 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use cromosim_arrays::{Container, Format, Limits};
+use cromosim_motion::{MotionFormat, UpAxis};
 
 use super::{
-    DatasetRecording, broad, columns, har_spsw, marked_imu, parse_broad, parse_columns,
-    parse_har_spsw, parse_marked_imu, parse_pamap2, parse_realworld, parse_totalcapture_reference,
-    parse_totalcapture_sensors, realworld, totalcapture,
+    DatasetRecording, broad, columns, har_spsw, marked_imu, movella, optitrack, parse_broad,
+    parse_columns, parse_har_spsw, parse_marked_imu, parse_movella, parse_mvnx_sensors,
+    parse_optitrack, parse_pamap2, parse_realworld, parse_totalcapture_reference,
+    parse_totalcapture_sensors, parse_vicon, realworld, totalcapture, vicon,
 };
 use crate::rigid::RigidError;
 
@@ -37,6 +39,21 @@ pub enum DatasetFormat {
     HarSpsw,
     /// [`parse_columns`].
     Columns,
+    /// [`parse_optitrack`].
+    OptiTrack,
+    /// [`parse_vicon`].
+    Vicon,
+    /// [`parse_movella`].
+    Movella,
+    /// [`parse_mvnx_sensors`].
+    Mvnx,
+}
+
+impl DatasetFormat {
+    /// Whether its files may have any axis up.
+    pub const fn takes_up_axis(self) -> bool {
+        matches!(self, Self::OptiTrack | Self::Vicon)
+    }
 }
 
 impl std::fmt::Display for DatasetFormat {
@@ -49,25 +66,44 @@ impl std::fmt::Display for DatasetFormat {
             Self::MarkedImu => "IMU on a segment with markers",
             Self::HarSpsw => "smartphone and smartwatch (HAR)",
             Self::Columns => "columns (Parquet)",
+            Self::OptiTrack => "OptiTrack (CSV)",
+            Self::Vicon => "Vicon (CSV)",
+            Self::Movella => "Movella DOT or MT Manager (table)",
+            Self::Mvnx => "Xsens MVN (MVNX)",
         })
     }
 }
 
-/// Files that belong to a recording where they do not lie beside it under the data set's own names.
+/// Files that belong to a recording where they do not lie beside it under the data set's own names,
+/// and what its file does not say.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DatasetFiles {
     /// TotalCapture: the folder of `gt_skel_gbl_pos.txt` and `gt_skel_gbl_ori.txt`.
     pub reference: Option<PathBuf>,
     /// RealWorld: the gyroscope's zip.
     pub gyroscope: Option<PathBuf>,
+    /// The axis that points up; where it is to be found out, OptiTrack's y and Vicon's z.
+    pub up_axis: UpAxis,
 }
 
-/// What a text file (its first 64 KiB are plenty) is: a row of 54 numbers, or TotalCapture's three
-/// kinds of lines.
+/// What a text file (its first 64 KiB are plenty) is: the header of an export, a row of 54 numbers,
+/// or TotalCapture's three kinds of lines.
 pub fn sniff_dataset(bytes: &[u8]) -> Option<DatasetFormat> {
     let start = String::from_utf8_lossy(&bytes[..bytes.len().min(LOOKED_AT)]);
+    let start = start.trim_start_matches('\u{feff}');
+    match MotionFormat::of(bytes) {
+        // Without bodies they are motions alone.
+        Some(MotionFormat::Motive) => {
+            return optitrack::has_bodies(start).then_some(DatasetFormat::OptiTrack);
+        }
+        Some(MotionFormat::Vicon) => return Some(DatasetFormat::Vicon),
+        Some(MotionFormat::Mvnx) => return Some(DatasetFormat::Mvnx),
+        _ => {}
+    }
+    if movella::is_movella(start) {
+        return Some(DatasetFormat::Movella);
+    }
     let mut lines = start
-        .trim_start_matches('\u{feff}')
         .lines()
         .map(str::trim)
         .filter(|line| !line.is_empty() && !line.starts_with('#'));
@@ -160,6 +196,16 @@ fn text(
     };
     let recording = match format {
         DatasetFormat::Pamap2 => parse_pamap2(&bytes(path)?, name)?,
+        DatasetFormat::OptiTrack => parse_optitrack(&bytes(path)?, name, beside.up_axis)?,
+        DatasetFormat::Vicon => {
+            let bytes = bytes(path)?;
+            if !vicon::has_poses(&String::from_utf8_lossy(&bytes)) {
+                return Ok(None);
+            }
+            parse_vicon(&bytes, name, beside.up_axis)?
+        }
+        DatasetFormat::Movella => parse_movella(&bytes(path)?, name)?,
+        DatasetFormat::Mvnx => parse_mvnx_sensors(&bytes(path)?, name)?,
         _ => totalcapture(path, name, beside)?,
     };
     Ok(Some((format, recording)))

@@ -43,7 +43,7 @@ fn cut<T>(values: &mut Vec<T>, range: &Range<usize>) {
     values.drain(..range.start.min(values.len()));
 }
 
-/// One recording of a data set.
+/// One recording of a data set, or of a motion capture system.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DatasetRecording {
     /// The file.
@@ -56,9 +56,26 @@ pub struct DatasetRecording {
     pub references: Vec<(String, PoseTrajectory)>,
     /// What was done when, where the data set says it.
     pub activities: Vec<ActivitySpan>,
+    /// What a user should know of the file, a line each.
+    pub notes: Vec<String>,
 }
 
 impl DatasetRecording {
+    /// The names of the IMUs, and then of the references without one.
+    pub fn placements(&self) -> Vec<&str> {
+        let imus = self.imus.iter().map(|imu| imu.placement.as_str());
+        let has_imu = |name: &str| self.imus.iter().any(|imu| imu.placement == name);
+        let references = self.references.iter().map(|(name, _)| name.as_str());
+        imus.chain(references.filter(|name| !has_imu(name)))
+            .collect()
+    }
+
+    /// The reference of that name.
+    pub fn reference(&self, wanted: &str) -> Option<&PoseTrajectory> {
+        let mut references = self.references.iter();
+        references.find_map(|(name, poses)| (name == wanted).then_some(poses))
+    }
+
     /// From its first reading or pose to its last; `None` where there is none.
     pub fn span(&self) -> Option<(Stamp, Stamp)> {
         let imus = self.imus.iter().map(|imu| &imu.series.stamps);

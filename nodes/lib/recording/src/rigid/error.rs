@@ -109,6 +109,9 @@ pub enum RigidError {
         /// The reason, with its line.
         source: csv::Error,
     },
+    /// A motion that is a recording, too, refuses.
+    #[error(transparent)]
+    Motion(Box<cromosim_motion::MotionError>),
     /// An array or its archive refuses.
     #[error(transparent)]
     Arrays(#[from] cromosim_arrays::ArraysError),

@@ -52,6 +52,18 @@ pub(super) fn table_reader(text: &str) -> csv::Reader<&[u8]> {
         .from_reader(text.as_bytes())
 }
 
+/// The line (1-based) of a record of the text. The crate counts a line when it reads its last byte, which of
+/// `\r\n` is the next record's first.
+pub(crate) fn line_of(record: &csv::StringRecord, text: &str) -> usize {
+    let Some(place) = record.position() else {
+        return 0;
+    };
+    let start = usize::try_from(place.byte()).unwrap_or(usize::MAX);
+    let rest = text.as_bytes().get(start..).unwrap_or_default();
+    let before = rest.iter().take_while(|byte| matches!(byte, b'\r' | b'\n'));
+    place.line() as usize + before.filter(|byte| **byte == b'\n').count()
+}
+
 /// The column with the first of the names that is there.
 pub(super) fn find(titles: &[Title], names: &[String]) -> Option<usize> {
     names

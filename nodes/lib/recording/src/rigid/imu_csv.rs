@@ -3,7 +3,7 @@
 
 use std::fmt::Write;
 
-use super::header::{TimeColumn, Title, need, table_reader};
+use super::header::{TimeColumn, Title, line_of, need, table_reader};
 use super::table::{Row, text};
 use super::{ImuSeries, RigidError};
 
@@ -38,7 +38,8 @@ pub(super) const FORCES: [&str; 8] = [
 /// [`RigidError::Header`], [`RigidError::Value`], [`RigidError::Order`], [`RigidError::Empty`],
 /// [`RigidError::Csv`].
 pub fn parse_imu_csv(bytes: &[u8], name: &str) -> Result<ImuSeries, RigidError> {
-    let mut reader = table_reader(text(bytes, name)?);
+    let text = text(bytes, name)?;
+    let mut reader = table_reader(text);
     let csv_error = |source| RigidError::Csv {
         name: name.to_owned(),
         source,
@@ -66,12 +67,9 @@ pub fn parse_imu_csv(bytes: &[u8], name: &str) -> Result<ImuSeries, RigidError> 
     let mut digits = time.digits;
     let mut record = csv::StringRecord::new();
     while reader.read_record(&mut record).map_err(csv_error)? {
-        let line = record
-            .position()
-            .map_or(0, |position| position.line() as usize);
         let row = Row {
             name,
-            line,
+            line: line_of(&record, text),
             cells: record.iter().collect(),
         };
         let stamp = time.stamp(&row, &mut digits)?;

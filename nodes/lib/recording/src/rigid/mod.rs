@@ -11,7 +11,7 @@
 mod content;
 mod error;
 mod euroc;
-mod header;
+pub(crate) mod header;
 mod imu_csv;
 mod pose_csv;
 mod series;

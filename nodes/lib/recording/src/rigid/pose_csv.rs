@@ -3,7 +3,7 @@
 
 use std::fmt::Write;
 
-use super::header::{TimeColumn, Title, find, need, table_reader};
+use super::header::{TimeColumn, Title, find, line_of, need, table_reader};
 use super::table::{Row, text};
 use super::{PoseTrajectory, RigidError};
 
@@ -21,7 +21,8 @@ use super::{PoseTrajectory, RigidError};
 /// [`RigidError::Header`], [`RigidError::Value`], [`RigidError::Order`],
 /// [`RigidError::Quaternion`], [`RigidError::Empty`], [`RigidError::Csv`].
 pub fn parse_pose_csv(bytes: &[u8], name: &str) -> Result<PoseTrajectory, RigidError> {
-    let mut reader = table_reader(text(bytes, name)?);
+    let text = text(bytes, name)?;
+    let mut reader = table_reader(text);
     let csv_error = |source| RigidError::Csv {
         name: name.to_owned(),
         source,
@@ -37,12 +38,9 @@ pub fn parse_pose_csv(bytes: &[u8], name: &str) -> Result<PoseTrajectory, RigidE
     let mut digits = columns.time.digits;
     let mut record = csv::StringRecord::new();
     while reader.read_record(&mut record).map_err(csv_error)? {
-        let line = record
-            .position()
-            .map_or(0, |position| position.line() as usize);
         let row = Row {
             name,
-            line,
+            line: line_of(&record, text),
             cells: record.iter().collect(),
         };
         let stamp = columns.time.stamp(&row, &mut digits)?;
