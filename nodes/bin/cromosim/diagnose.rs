@@ -21,6 +21,7 @@ use serde_json::Value;
 use crate::diagnose_recordings::{OneRecording, Selected, file_names, of_recording, select};
 use crate::files::refuse_existing;
 use crate::list;
+use crate::memory;
 use crate::named::Named;
 use crate::output::{self, remark, say};
 use crate::progress::{self, Interrupt};
@@ -107,6 +108,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Some(out) = &arguments.out else {
         return list::effects();
     };
+    memory::share_one_pool();
     let config = arguments
         .config
         .as_deref()

@@ -26,6 +26,7 @@ mod inspect;
 mod inspect_json;
 mod list;
 mod map;
+mod memory;
 mod motion_arguments;
 mod named;
 mod node;
