@@ -4,8 +4,9 @@
 usage: cyclone_listener.py TOPIC... [--messages N] [--timeout S] [--domain D] [--any-network]
 
 Ends when every topic has N messages and the node behind every publisher is known, or after S seconds, or at SIGINT or SIGTERM.
-Prints one JSON object: for each topic the messages, the frame ids, the mean rate by the stamps and
-the publishing nodes as `ros_discovery_info` names them; and all nodes. Exit code 0 where everything asked for came, 1 where not.
+Prints one JSON object: for each topic the messages, the frame ids, the mean rate by the stamps, the first and the last of them,
+where between them some are missing (message number, seconds after the first), and the publishing nodes as `ros_discovery_info` names
+them; and all nodes. Exit code 0 where everything asked for came, 1 where not.
 Needs the PyPI package cyclonedds. Listens on the loopback interface unless --any-network is given or CYCLONEDDS_URI is set.
 """
 
@@ -109,6 +110,19 @@ class ParticipantEntitiesInfo(IdlStruct, typename=ros("rmw_dds_common/msg/Partic
     node_entities_info_seq: types.sequence[NodeEntitiesInfo]
 
 
+def gaps(stamps):
+    """Where an interval is half as long again as the usual one: message number and seconds after the first stamp."""
+    intervals = [after - before for before, after in zip(stamps, stamps[1:])]
+    if not intervals:
+        return []
+    usual = sorted(intervals)[len(intervals) // 2]
+    return [
+        [number, round(stamps[number] - stamps[0], 3)]
+        for number, interval in enumerate(intervals, 1)
+        if not 0.5 * usual <= interval <= 1.5 * usual
+    ]
+
+
 RELIABLE = Policy.Reliability.Reliable(duration(milliseconds=100))
 
 
@@ -164,6 +178,8 @@ class Listener:
                 "messages": len(received),
                 "frame_ids": sorted({frame for _, frame in received}),
                 "rate_hz": round((len(received) - 1) / span, 3) if span > 0 else None,
+                "stamps_s": [received[0][0], received[-1][0]] if received else None,
+                "gaps": gaps([stamp for stamp, _ in received]),
                 "nodes": self.nodes_behind(name),
             }
         return {"topics": topics, "nodes": sorted(set(self.node_of.values()))}

@@ -4,15 +4,16 @@
 
 mod config;
 mod node;
+mod parts;
 
 use std::path::Path;
 use std::str::FromStr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use cromosim_body::BodyModel;
-use cromosim_imu::{MAX_RATE_HZ, Placement, PlacementSet, Scheme};
+use cromosim_imu::{ImuMessages, MAX_RATE_HZ, Placement, PlacementSet, Scheme};
 use cromosim_learned::scheme_for_networks;
 use cromosim_msgs::RosMessage;
 use cromosim_msgs::builtin_interfaces::Time;
@@ -28,6 +29,10 @@ pub use config::Config;
 pub use node::{Refusal, Step, VirtualImuNode};
 
 const ABOUT: &str = "virtual_imu: what IMUs on the body would measure, one sensor_msgs/Imu publisher for each placement";
+
+/// How long the other readings of a state may stay behind `data_raw`, all placements together, as a
+/// part of the interval between states: 1 ms at 100 Hz.
+const RAW_AHEAD: f64 = 0.1;
 
 /// What the node publishes.
 struct Publishers {
@@ -92,11 +97,17 @@ impl Publishers {
         })
     }
 
-    fn publish(&self, step: &Step) {
-        // What most stacks listen to goes first, and what nobody listens to stays here: each
-        // message costs the later ones some 30 us.
-        for (placement, reading) in &step.readings {
-            publish_if_heard(&self.data_raw[*placement], &reading.data_raw);
+    /// What most stacks listen to goes first; what nobody listens to stays here. Each message costs
+    /// those on their way with it some 30 us.
+    fn publish_raw(&self, placement: usize, reading: &ImuMessages) {
+        publish_if_heard(&self.data_raw[placement], &reading.data_raw);
+    }
+
+    /// All but `data_raw`.
+    fn publish_rest(&self, step: &Step, state_interval: Duration) {
+        let has_more = || step.readings.iter().any(|(it, _)| self.is_more_heard(*it));
+        if step.readings.len() > 1 && has_more() {
+            self.wait_until_raw_is_there(step, state_interval.mul_f64(RAW_AHEAD));
         }
         for (placement, reading) in &step.readings {
             publish_if_heard(&self.data[*placement], &reading.data);
@@ -115,6 +126,29 @@ impl Publishers {
             report(publisher.publish(reference));
         }
     }
+
+    /// True where somebody listens to more of a placement than `data_raw`.
+    fn is_more_heard(&self, placement: usize) -> bool {
+        is_heard(&self.data[placement])
+            || self.mag[placement].as_ref().is_some_and(is_heard)
+            || self.temperature[placement].as_ref().is_some_and(is_heard)
+    }
+
+    /// Until every reliable subscription has confirmed this state's `data_raw`, or `patience` is
+    /// over.
+    fn wait_until_raw_is_there(&self, step: &Step, patience: Duration) {
+        let until = Instant::now() + patience;
+        for (placement, _) in &step.readings {
+            let left = until.saturating_duration_since(Instant::now());
+            if !self.data_raw[*placement].wait_for_acknowledgments(left) {
+                return;
+            }
+        }
+    }
+}
+
+fn is_heard<M: RosMessage>(publisher: &Publisher<M>) -> bool {
+    publisher.subscription_count() > 0
 }
 
 /// Publishers of the placements that have something to say; `topics` are in their order.
@@ -132,9 +166,7 @@ fn some<M: RosMessage>(
 
 fn publish_if_heard<M: RosMessage>(publisher: &Publisher<M>, message: &M) {
     // A transient-local publisher keeps its messages for those who come late.
-    if publisher.subscription_count() > 0
-        || publisher.qos().durability == Durability::TransientLocal
-    {
+    if is_heard(publisher) || publisher.qos().durability == Durability::TransientLocal {
         report(publisher.publish(message));
     }
 }
@@ -167,10 +199,17 @@ pub fn run(arguments: &[String]) -> anyhow::Result<()> {
     let name = node.name().to_string();
     while !node.shutdown().is_requested() {
         match states.recv_timeout(schedule.left().unwrap_or(Duration::from_secs(1))) {
-            Ok(Some(state)) => match lock(&logic).step(&state.message) {
-                Ok(step) => publishers.publish(&step),
-                Err(refusal) => log::warn!("a state is left out: {refusal}"),
-            },
+            Ok(Some(state)) => {
+                let mut publish_raw = |it, reading: &_| publishers.publish_raw(it, reading);
+                let mut logic = lock(&logic);
+                let step = logic.step_and_tell(&state.message, &mut publish_raw);
+                let interval = logic.state_interval();
+                drop(logic);
+                match step {
+                    Ok(step) => publishers.publish_rest(&step, interval),
+                    Err(refusal) => log::warn!("a state is left out: {refusal}"),
+                }
+            }
             Ok(None) => {}
             Err(error) => log::warn!("{error}"),
         }

@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
 
 use cromosim_body::{BodyError, BodyModel, BodyPose, Joint, ShapedBody};
 use cromosim_imu::{
-    AmbientField, Device, EffectKind, Follow, ImuError, ImuMessages, ImuOptions, MountedSensors,
-    OrientationSource, Placement, PlacementSet, PoseStd, ReadingMapping, StreamOptions,
-    StreamingImu, VirtualImu, measure_all,
+    AmbientField, Device, EffectKind, Follow, ImuError, ImuMessages, MountedSensors, Placement,
+    PlacementSet, PoseStd, StreamOptions, StreamingImu, VirtualImu, measure_all,
 };
 use cromosim_learned::{LearnedError, LearnedSimulator, LivePlacements, MappingFile};
 use cromosim_msgs::NotABody;
@@ -21,6 +21,9 @@ use cromosim_spatial::{PoseSource, Stamp};
 use nalgebra::Isometry3;
 
 use crate::config::Config;
+use crate::parts::{
+    fresh_imus, fresh_networks, pose_source, read_mapping, read_networks, resolved_devices,
+};
 
 /// States that are looked at before the rate of the states is known.
 const RATE_STATES: usize = 13;
@@ -219,6 +222,11 @@ impl VirtualImuNode {
             .contains(EffectKind::WarmUp)
     }
 
+    /// Time between states; zero before it is known.
+    pub fn state_interval(&self) -> Duration {
+        Duration::try_from_secs_f64(self.state_rate_hz.recip()).unwrap_or_default()
+    }
+
     /// Delay of each placement's scheme and networks, s; none before the rate of the states is
     /// known.
     pub fn delays_seconds(&self) -> Vec<Option<f64>> {
@@ -233,7 +241,20 @@ impl VirtualImuNode {
     /// # Errors
     /// [`Refusal`]; the state is then left out, and the node goes on with the next.
     pub fn step(&mut self, state: &SmplState) -> Result<Step, Refusal> {
-        let result = self.try_step(state);
+        self.step_and_tell(state, &mut |_, _| {})
+    }
+
+    /// As [`Self::step`]; each reading is told, with its placement's number, as soon as it is known,
+    /// while those of the other placements are still to be computed.
+    ///
+    /// # Errors
+    /// As [`Self::step`]. What was told before stays said.
+    pub fn step_and_tell(
+        &mut self,
+        state: &SmplState,
+        tell: &mut dyn FnMut(usize, &ImuMessages),
+    ) -> Result<Step, Refusal> {
+        let result = self.try_step(state, tell);
         match &result {
             Ok(step) => {
                 self.counts.states += 1;
@@ -251,7 +272,11 @@ impl VirtualImuNode {
         result
     }
 
-    fn try_step(&mut self, state: &SmplState) -> Result<Step, Refusal> {
+    fn try_step(
+        &mut self,
+        state: &SmplState,
+        tell: &mut dyn FnMut(usize, &ImuMessages),
+    ) -> Result<Step, Refusal> {
         let (root_position, local_rotations) = state.root_and_rotations()?;
         let body = BodyPose {
             root_position,
@@ -280,7 +305,7 @@ impl VirtualImuNode {
         let mut step = self.frames_of(state, &body);
         self.last = Some(stamp);
         if !self.streams.is_empty() {
-            self.push((stamp, &body, pose_std), &mut step.readings)?;
+            self.push((stamp, &body, pose_std), &mut step.readings, tell)?;
             return Ok(step);
         }
         self.early.push((stamp, body, pose_std));
@@ -292,7 +317,7 @@ impl VirtualImuNode {
             };
             self.open_streams(rate_hz)?;
             for (stamp, body, pose_std) in std::mem::take(&mut self.early) {
-                self.push((stamp, &body, pose_std), &mut step.readings)?;
+                self.push((stamp, &body, pose_std), &mut step.readings, tell)?;
             }
         }
         Ok(step)
@@ -330,18 +355,32 @@ impl VirtualImuNode {
         &mut self,
         (stamp, body, pose_std): (Stamp, &BodyPose, PoseStd),
         readings: &mut Vec<(usize, ImuMessages)>,
+        tell: &mut dyn FnMut(usize, &ImuMessages),
     ) -> Result<(), Refusal> {
         let poses = self.sensors.poses(body);
-        let motions = self
-            .streams
-            .iter_mut()
-            .zip(&poses)
-            .map(|(stream, pose)| stream.push_kinematics(pose.at(stamp).with_pose_std(pose_std)))
-            .collect::<Result<Vec<_>, _>>()?;
+        let poses_of = poses
+            .iter()
+            .map(|pose| pose.at(stamp).with_pose_std(pose_std));
+        let streams = self.streams.iter_mut().zip(poses_of);
         if let Some(live) = &mut self.live {
+            // The networks see all placements at once.
+            let motions = streams
+                .map(|(stream, pose)| stream.push_kinematics(pose))
+                .collect::<Result<Vec<_>, _>>()?;
             live.push(stamp, body, &poses);
+            let measured = measure_all(&mut self.imus, motions, Some(live))?;
+            measured.iter().for_each(|(it, reading)| tell(*it, reading));
+            readings.extend(measured);
+            return Ok(());
         }
-        readings.extend(measure_all(&mut self.imus, motions, self.live.as_mut())?);
+        for (placement, ((stream, pose), imu)) in streams.zip(&mut self.imus).enumerate() {
+            for motion in stream.push_kinematics(pose)? {
+                if let Some(reading) = imu.measure(&motion) {
+                    tell(placement, &reading);
+                    readings.push((placement, reading));
+                }
+            }
+        }
         Ok(())
     }
 
@@ -477,79 +516,6 @@ impl VirtualImuNode {
     }
 }
 
-/// The placements' own, or that of the parameter, which is found from where the node runs.
-fn resolved_devices(
-    config: &Config,
-    placements: &[Placement],
-    folder: &Path,
-) -> Result<Vec<Device>, ImuError> {
-    let resolve = |placement: &Placement| match config.device.as_str() {
-        "" => Device::resolve(placement.device(), folder),
-        device => Device::resolve(Some(device), Path::new(".")),
-    };
-    placements.iter().map(resolve).collect()
-}
-
-fn fresh_imus(
-    config: &Config,
-    mapping: &MappingFile,
-    (placements, devices): (&[Placement], &[Device]),
-    field: Option<&Arc<AmbientField>>,
-) -> Result<Vec<VirtualImu>, ImuError> {
-    let orientation: OrientationSource = config.orientation.parse()?;
-    let imu = |(placement, device): (&Placement, &Device)| {
-        let mapping = mapping.placements.get(placement.name()).cloned();
-        let options = ImuOptions {
-            rate_hz: placement.rate_hz(),
-            seed: config.seed as u64,
-            // Several bodies' devices err each on its own.
-            name: config.frame(placement.name()),
-            noise: config.noise,
-            frame_id: config.frame(&format!("{}_imu", placement.name())),
-            mapping: mapping.map(|mapping| Box::new(mapping) as Box<dyn ReadingMapping>),
-            field: field.cloned(),
-            orientation,
-        };
-        VirtualImu::new(device, options)
-    };
-    placements.iter().zip(devices).map(imu).collect()
-}
-
-fn fresh_networks(
-    learned: Option<&LearnedSimulator>,
-    shaped: &ShapedBody,
-    placements: &[Placement],
-    config: &Config,
-) -> Result<Option<LivePlacements>, LearnedError> {
-    learned
-        .map(|networks| LivePlacements::new(networks, shaped, placements, config.gap_seconds))
-        .transpose()
-}
-
-/// None where no folder is named.
-fn read_networks(folder: &str) -> Result<Option<LearnedSimulator>, LearnedError> {
-    (!folder.is_empty())
-        .then(|| LearnedSimulator::find(Path::new(folder)))
-        .transpose()
-}
-
-/// A mapping of these placements at least in part; that of no file changes nothing.
-fn read_mapping(file: &str, placements: &[Placement]) -> Result<MappingFile, Refusal> {
-    if file.is_empty() {
-        return Ok(MappingFile::default());
-    }
-    let mapping = MappingFile::read(Path::new(file))?;
-    let maps = |placement: &Placement| mapping.placements.contains_key(placement.name());
-    if placements.iter().any(maps) {
-        return Ok(mapping);
-    }
-    let known: Vec<&str> = mapping.placements.keys().map(String::as_str).collect();
-    Err(Refusal::Unmapped {
-        file: file.to_owned(),
-        known: known.join(", "),
-    })
-}
-
 /// Rate of states by the median of their intervals, Hz.
 fn median_rate(states: &[(Stamp, BodyPose, PoseStd)]) -> f64 {
     let mut intervals: Vec<f64> = states
@@ -560,14 +526,4 @@ fn median_rate(states: &[(Stamp, BodyPose, PoseStd)]) -> f64 {
     intervals
         .get(intervals.len() / 2)
         .map_or(f64::NAN, |interval| interval.recip())
-}
-
-fn pose_source(name: &str) -> Result<PoseSource, Refusal> {
-    if name.is_empty() {
-        return Ok(PoseSource::default());
-    }
-    PoseSource::ALL
-        .into_iter()
-        .find(|source| source.name() == name)
-        .ok_or_else(|| Refusal::Source(name.to_owned()))
 }

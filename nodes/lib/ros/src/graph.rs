@@ -186,10 +186,11 @@ impl Graph {
         matched.is_some_and(|(peers, _)| peers.contains(&peer))
     }
 
-    /// Sleeps until the peers of a local endpoint have surely matched it too. They do so some
-    /// milliseconds after it has matched them, and what is sent in between is not for them.
+    /// Sleeps until the peers of a local endpoint have matched it too. They do so some milliseconds
+    /// after it has matched them, or, where an announcement was lost on its way, once it has been
+    /// sent again, after 100 to 150 ms; what is sent in between is not for them.
     pub(crate) fn settle(&self, local: Gid) {
-        const SETTLED: Duration = Duration::from_millis(100);
+        const SETTLED: Duration = Duration::from_millis(300);
         let since = lock(&self.state)
             .matched
             .get(&local)

@@ -95,7 +95,7 @@ impl RawPublisher {
         self.core.graph.matched(self.gid)
     }
 
-    /// Waits for `count` matched subscriptions, and until 100 ms after the last match, for peers
+    /// Waits for `count` matched subscriptions, and until 300 ms after the last match, for peers
     /// match a little later than this side and would lose the first messages. False where `timeout`
     /// was over or the process is ending.
     pub fn wait_for_subscriptions(&self, count: usize, timeout: Duration) -> bool {
