@@ -17,7 +17,7 @@ use crate::whiten::Whitener;
 #[derive(Clone, Debug)]
 pub(crate) struct FitModel<'a> {
     pub prepared: &'a PreparedPlacement,
-    pub track: KinematicTrack,
+    pub track: Arc<KinematicTrack>,
     pub basis: NoiseBasis,
     pub noise: NoiseModel,
     pub whitener: Whitener,
@@ -137,7 +137,7 @@ pub(crate) fn slices(columns: &[Vec<f64>]) -> Vec<&[f64]> {
 impl<'a> FitModel<'a> {
     pub fn new(
         prepared: &'a PreparedPlacement,
-        track: KinematicTrack,
+        track: Arc<KinematicTrack>,
         basis: NoiseBasis,
         noise: NoiseModel,
     ) -> Self {
