@@ -114,10 +114,10 @@ def simulation_seconds(cromosim, recordings, folder):
 
 def session_of(label, effects_path):
     """The session that the answer is about: that of its epoch, else the last. A diagnosis of several recordings writes one file of effects,
-    and the contract does not say for which of them."""
+    and the contract does not say for which of them. Epochs of list items are those of `other_sessions`."""
     try:
         with open(effects_path) as stream:
-            epochs = [int(whole) for whole in re.findall(r"epoch:\s*['\"]?(\d+)\.?\d*", stream.read())]
+            epochs = [int(whole) for whole in re.findall(r"^\s*epoch:\s*['\"]?(\d+)\.?\d*", stream.read(), re.MULTILINE)]
     except OSError:
         epochs = []
     for index, placements in enumerate(label["sessions"]):

@@ -84,6 +84,14 @@ def test_a_sign_is_half_a_turn():
     assert (result["inside"], result["scalars"]) == (10, 10)
 
 
+def test_the_session_graded_is_that_of_the_answer_not_one_of_the_others_beside_it(tmp_path):
+    label = {"sessions": [{"wrist": {"epoch_ns": epoch * 1_000_000_000}} for epoch in (1_700_000_000, 1_700_100_000, 1_700_200_000)]}
+    said = tmp_path / "effects.yaml"
+    said.write_text("placements:\n  wrist:\n    epoch: 1700100000.5\n    other_sessions:\n      - epoch: 1700000000.1\n")
+    assert grade.session_of(label, said) == 1
+    assert grade.session_of(label, tmp_path / "missing.yaml") == 2
+
+
 def test_every_effect_draws_at_every_strength():
     rng = np.random.default_rng(0)
     context = {"sigmas": (0.014, 0.0012), "rate": 100.0, "reference_rate": 120.0, "start": 0.5, "seconds": 60.0}

@@ -129,16 +129,18 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         (arguments.namespace.as_deref(), &arguments.topics.map()?),
     )?;
 
-    let results = diagnose_all(&placements, &options);
     let mut answers = BTreeMap::new();
-    for ((name, recorded), result) in placements.iter().zip(results) {
+    for (name, result) in diagnose_all(placements, &options) {
         match result {
-            Ok((answer, errors)) => {
+            Ok(Answered {
+                answer,
+                errors,
+                notes: own,
+            }) => {
                 failures.extend(errors);
-                let of_placement = |note: &String| format!("placement {name}: {note}");
-                let own = recorded.iter().flat_map(|one| &one.notes);
-                notes.extend(own.map(of_placement));
-                answers.insert(name.clone(), answer);
+                let of_placement = |note: String| format!("placement {name}: {note}");
+                notes.extend(own.into_iter().map(of_placement));
+                answers.insert(name, answer);
             }
             Err(error) => failures.push(error),
         }
@@ -181,12 +183,20 @@ fn options(arguments: &Arguments, config: &Config) -> anyhow::Result<DiagnoseOpt
     })
 }
 
-/// Each placement on whatever core is free; with its answer what is wrong with some of its
-/// recordings.
+/// What is said of a placement.
+struct Answered {
+    answer: PlacementAnswer,
+    /// What is wrong with some of its recordings.
+    errors: Vec<String>,
+    /// What a user should know of the others.
+    notes: Vec<String>,
+}
+
+/// Each placement on whatever core is free; its recordings are let go once it has its answer.
 fn diagnose_all(
-    placements: &BTreeMap<String, Vec<OneRecording>>,
+    placements: BTreeMap<String, Vec<OneRecording>>,
     options: &DiagnoseOptions,
-) -> Vec<Result<(PlacementAnswer, Vec<String>), String>> {
+) -> Vec<(String, Result<Answered, String>)> {
     // Until the files are written a signal may end the process as it likes: there is nothing to
     // clear away.
     let doing = match placements.len() {
@@ -194,31 +204,35 @@ fn diagnose_all(
         count => format!("diagnosing {count} placements"),
     };
     let bar = progress::shares(placements.len(), &doing);
-    let diagnose = |recorded: &Vec<OneRecording>| {
+    let diagnose = |(name, recorded): (String, Vec<OneRecording>)| {
         let one = bar.of_one();
         let told = DiagnoseOptions {
             progress: Progress::new(move |share| one.reached(share)),
             ..options.clone()
         };
-        diagnose_placement(recorded, &told)
+        (name, diagnose_placement(recorded, &told))
     };
-    let in_order: Vec<&Vec<OneRecording>> = placements.values().collect();
+    let in_order: Vec<(String, Vec<OneRecording>)> = placements.into_iter().collect();
     let results = in_order.into_par_iter().map(diagnose).collect();
     bar.finish();
     results
 }
 
 fn diagnose_placement(
-    recorded: &[OneRecording],
+    recorded: Vec<OneRecording>,
     options: &DiagnoseOptions,
-) -> Result<(PlacementAnswer, Vec<String>), String> {
+) -> Result<Answered, String> {
     let named: Vec<_> = recorded
         .iter()
         .map(|one| (one.file.as_str(), &one.record))
         .collect();
     let text = |(file, error): &OfRecording| of_recording(file, &error.to_string());
     match cromosim_gap::diagnose_together(&named, options) {
-        Ok((answer, errors)) => Ok((answer, errors.iter().map(text).collect())),
+        Ok((answer, errors)) => Ok(Answered {
+            answer,
+            errors: errors.iter().map(text).collect(),
+            notes: recorded.iter().flat_map(|one| one.notes.clone()).collect(),
+        }),
         Err(error) => Err(text(&error)),
     }
 }

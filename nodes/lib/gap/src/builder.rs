@@ -98,9 +98,12 @@ impl<'a> Part<'a> {
 
     /// Values of an effect and their standard errors in a fit, by the names of its parameters.
     fn values(&self, effect: &Effect, fit: &Fit) -> [BTreeMap<String, serde_json::Value>; 2] {
-        let errors = fit.standard_errors(effect);
-        let rate_hz = self.simulations.whole.rate_hz;
         let kind = effect.kind();
+        let mut errors = fit.standard_errors(effect);
+        for error in errors.iter_mut().filter(|error| **error > 0.0) {
+            *error = error.hypot(kind.error_of_reference());
+        }
+        let rate_hz = self.simulations.whole.rate_hz;
         [
             described(kind, effect.values()),
             described_errors(kind, &errors, rate_hz),

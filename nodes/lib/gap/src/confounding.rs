@@ -1,5 +1,7 @@
 //! Which fitted effects only pass for something unknown.
 
+use std::collections::BTreeMap;
+
 use cromosim_imu::{Channel, Dependence, EffectKind, EffectSet, Search};
 
 use crate::findings::Findings;
@@ -10,32 +12,44 @@ use crate::residual_regressions::{ResidualRegression, with_regressions};
 use crate::search::score;
 use crate::trace::trace;
 
-/// What becomes of the fitted effects beside something unknown.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Judgement {
-    /// Only pass for it.
-    pub confounded: Vec<EffectKind>,
-    /// Stand beside it.
-    pub sound: Vec<EffectKind>,
+/// What becomes of a fitted effect beside something unknown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Standing {
+    /// Only passes for it.
+    Confounded,
+    /// Stands beside it.
+    Sound,
+    /// Neither is certain.
+    Open,
 }
 
-/// The fitted effects that are confounded with what the strongest regressions describe, and the
-/// special cases of these; and those that are not. `strong` are those of `all` that tell, the
-/// strongest first.
-pub(crate) fn judged_effects(
+/// Of the members of a fitted set.
+pub(crate) type Standings = BTreeMap<EffectKind, Standing>;
+
+/// The suspects among the fitted effects that are confounded with what the strongest regressions
+/// describe, and the special cases of these. `strong` are those of `all` that tell, the strongest
+/// first. What is known of members is not judged anew, and what is judged becomes known.
+pub(crate) fn confounded_effects(
     findings: &Findings,
     strong: &[&ResidualRegression],
     all: &[ResidualRegression],
-) -> Judgement {
-    let mut judgement = judged_members(findings, strong);
-    let Judgement { confounded, sound } = &mut judgement;
+    is_suspect: impl Fn(EffectKind) -> bool,
+    known: &mut Standings,
+) -> Vec<EffectKind> {
+    let members = findings.scored.fit.set.iter().map(|effect| effect.kind());
+    let suspects: Vec<EffectKind> = members.filter(|kind| is_suspect(*kind)).collect();
+    judge_members(findings, strong, &suspects, known);
+    let is = |kind: &EffectKind, standing| known.get(kind) == Some(&standing);
+    let mut confounded = suspects;
+    confounded.retain(|kind| is(kind, Standing::Confounded));
     let most = strong.first().map_or(0.0, |regression| regression.gain);
     for regression in strong.iter().filter(|regression| {
         regression.gain > STRONG_PART * most && changes_over_time(regression, all)
     }) {
-        confounded.extend(special_cases(regression).filter(|kind| !sound.contains(kind)));
+        let cases = special_cases(regression);
+        confounded.extend(cases.filter(|kind| is_suspect(*kind) && !is(kind, Standing::Sound)));
     }
-    judgement
+    confounded
 }
 
 /// Whether an effect is one that every sensor has to be calibrated for.
@@ -70,9 +84,15 @@ fn special_cases(regression: &ResidualRegression) -> impl Iterator<Item = Effect
         })
 }
 
-/// Fitted effects which beside the strongest regressions gain less than a tenth of what they gain
-/// without them; and those that explain nearly all that the regressions in their place would.
-fn judged_members(findings: &Findings, strong: &[&ResidualRegression]) -> Judgement {
+/// Judges those of some members of which nothing is known: those which beside the strongest
+/// regressions gain less than a tenth of what they gain without them are confounded, those that
+/// explain nearly all that the regressions in their place would are sound.
+fn judge_members(
+    findings: &Findings,
+    strong: &[&ResidualRegression],
+    members: &[EffectKind],
+    known: &mut Standings,
+) {
     let (model, fit) = (&findings.model, &findings.scored.fit);
     let chosen: Vec<&Vec<Vec<f64>>> = Channel::ALL
         .into_iter()
@@ -87,14 +107,15 @@ fn judged_members(findings: &Findings, strong: &[&ResidualRegression]) -> Judgem
         })
         .map(|regression| &regression.columns)
         .collect();
-    let mut judgement = Judgement::default();
-    if chosen.is_empty() {
-        return judgement;
+    let open = members.iter().copied();
+    let open: Vec<EffectKind> = open.filter(|kind| !known.contains_key(kind)).collect();
+    if chosen.is_empty() || open.is_empty() {
+        return;
     }
     let together = with_regressions(findings, fit, &chosen).held_out;
     let nominal = score(model, EffectSet::new());
     let explained = together - nominal.fit.linear.held_out;
-    for kind in fit.set.iter().map(|effect| effect.kind()) {
+    for kind in open {
         let smaller = score(model, fit.set.without(kind));
         let instead = with_regressions(findings, &smaller.fit, &chosen).held_out;
         let alone = fit.linear.held_out - smaller.fit.linear.held_out;
@@ -111,12 +132,14 @@ fn judged_members(findings: &Findings, strong: &[&ResidualRegression]) -> Judgem
         } else {
             ALL_BUT_LITTLE
         };
-        if findings.is_mostly_explained && alone > needed * gain_of_regressions {
-            judgement.sound.push(kind);
+        let standing = if findings.is_mostly_explained && alone > needed * gain_of_regressions {
+            Standing::Sound
         } else if alone < MAIN_PART * explained && together - instead < OWN_GAIN * alone {
             // What explains much of the gap by itself does not pass for what little is left.
-            judgement.confounded.push(kind);
-        }
+            Standing::Confounded
+        } else {
+            Standing::Open
+        };
+        known.insert(kind, standing);
     }
-    judgement
 }

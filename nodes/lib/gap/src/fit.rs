@@ -17,7 +17,7 @@ use crate::whiten::Whitener;
 #[derive(Clone, Debug)]
 pub(crate) struct FitModel<'a> {
     pub prepared: &'a PreparedPlacement,
-    pub track: KinematicTrack,
+    pub track: Arc<KinematicTrack>,
     pub basis: NoiseBasis,
     pub noise: NoiseModel,
     pub whitener: Whitener,
@@ -121,6 +121,14 @@ pub(crate) fn layout_of(kind: EffectKind) -> impl Iterator<Item = (EffectKind, u
         .map(move |value| (kind, value.index))
 }
 
+/// Axes on which any of the readings differ.
+fn changed_axes(readings: &[Reading], others: &[Reading]) -> [bool; 6] {
+    std::array::from_fn(|axis| {
+        let mut pairs = readings.iter().zip(others);
+        pairs.any(|(one, other)| value_on_axis(one, axis) != value_on_axis(other, axis))
+    })
+}
+
 /// Columns as [`FitModel::extended`] takes them.
 pub(crate) fn slices(columns: &[Vec<f64>]) -> Vec<&[f64]> {
     columns.iter().map(Vec::as_slice).collect()
@@ -129,7 +137,7 @@ pub(crate) fn slices(columns: &[Vec<f64>]) -> Vec<&[f64]> {
 impl<'a> FitModel<'a> {
     pub fn new(
         prepared: &'a PreparedPlacement,
-        track: KinematicTrack,
+        track: Arc<KinematicTrack>,
         basis: NoiseBasis,
         noise: NoiseModel,
     ) -> Self {
@@ -156,7 +164,8 @@ impl<'a> FitModel<'a> {
 
     /// Whitened measured less predicted.
     pub fn residual(&self, readings: &[Reading]) -> Vec<f64> {
-        self.whitener.apply(&self.prepared.residual(readings))
+        self.whitener
+            .apply(&self.prepared.scattered_residual(readings))
     }
 
     /// Columns of the free values of one effect of `set`, whose prediction is `base`.
@@ -188,7 +197,8 @@ impl<'a> FitModel<'a> {
         };
         let stage = kind.spec().stage;
         let readings = self.prepared.predict_from(&self.track, base, &moved, stage);
-        let difference = self.prepared.on_sample_grid(|k, axis| {
+        let changes = changed_axes(&readings, &base.readings);
+        let difference = self.prepared.scattered(changes, |k, axis| {
             (value_on_axis(&readings[k], axis) - value_on_axis(&base.readings[k], axis)) / size
         });
         self.whitener.apply(&difference)

@@ -18,7 +18,7 @@ use crate::sensor_noise::{found_noise, white_noise};
 /// The model of the nominal simulation, with what is certain from the start.
 pub(crate) fn first_model<'a>(
     prepared: &'a PreparedPlacement,
-    track: KinematicTrack,
+    track: Arc<KinematicTrack>,
     start: &EffectSet,
     digital: &PerChannel<Digital>,
     units: PerChannel<f64>,
@@ -96,7 +96,7 @@ pub(crate) fn with_estimate<'a>(
     set: &EffectSet,
 ) -> FitModel<'a> {
     let prepared = model.prepared;
-    let track = prepared.track(&estimate);
+    let track = Arc::new(prepared.track(&estimate));
     let residual = prepared.residual(&prepared.predict(&track, set).readings);
     let basis = NoiseBasis {
         estimate: Arc::new(estimate),

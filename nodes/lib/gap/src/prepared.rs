@@ -306,27 +306,50 @@ impl PreparedPlacement {
     /// Values (by message and axis) on the sample grid, one series for each axis, with straight
     /// lines over what is not compared.
     pub fn on_sample_grid(&self, value: impl Fn(usize, usize) -> f64) -> Vec<Vec<f64>> {
-        (0..6)
-            .map(|axis| {
-                let mut series = vec![0.0; self.length];
-                let mut usable = vec![false; self.length];
-                for (k, &entry) in self.grid_index.iter().enumerate() {
-                    if self.usable[k][axis] {
-                        series[entry] = value(k, axis);
-                        usable[entry] = true;
-                    }
+        let mut series = self.scattered([true; 6], value);
+        for (axis, values) in series.iter_mut().enumerate() {
+            let messages = self.grid_index.iter().zip(&self.usable);
+            bridge(
+                values,
+                messages.filter_map(|(entry, usable)| usable[axis].then_some(*entry)),
+            );
+        }
+        series
+    }
+
+    /// The same without the straight lines, 0 where nothing is compared, as a whitener takes it; the
+    /// series of an axis that is not asked for is empty.
+    pub fn scattered(&self, axes: [bool; 6], value: impl Fn(usize, usize) -> f64) -> Vec<Vec<f64>> {
+        let mut series: Vec<Vec<f64>> = axes
+            .iter()
+            .map(|asked| vec![0.0; if *asked { self.length } else { 0 }])
+            .collect();
+        for (axis, values) in series
+            .iter_mut()
+            .enumerate()
+            .filter(|(axis, _)| axes[*axis])
+        {
+            for (k, (&entry, usable)) in self.grid_index.iter().zip(&self.usable).enumerate() {
+                if usable[axis] {
+                    values[entry] = value(k, axis);
                 }
-                bridge(&mut series, &usable);
-                series
-            })
-            .collect()
+            }
+        }
+        series
     }
 
     /// Measured less predicted, on the sample grid.
     pub fn residual(&self, predicted: &[Reading]) -> Vec<Vec<f64>> {
-        self.on_sample_grid(|k, axis| {
-            value_on_axis(&self.measured[k], axis) - value_on_axis(&predicted[k], axis)
-        })
+        self.on_sample_grid(|k, axis| self.difference(predicted, k, axis))
+    }
+
+    /// The same as [`PreparedPlacement::scattered`] has it.
+    pub fn scattered_residual(&self, predicted: &[Reading]) -> Vec<Vec<f64>> {
+        self.scattered([true; 6], |k, axis| self.difference(predicted, k, axis))
+    }
+
+    fn difference(&self, predicted: &[Reading], k: usize, axis: usize) -> f64 {
+        value_on_axis(&self.measured[k], axis) - value_on_axis(&predicted[k], axis)
     }
 
     /// Norms of the residual by channel, m/s2 and rad/s times the root of the number of values.
@@ -374,34 +397,29 @@ fn estimated(placement: &str, reference: &PoseSeries) -> Result<PoseEstimate, Ga
     })
 }
 
-/// Straight lines over entries without a usable value, held at the ends; all 0 without any.
-fn bridge(series: &mut [f64], usable: &[bool]) {
+/// Straight lines over all but some entries, which are given in their order, held at the ends; a
+/// series without any stays as it is.
+fn bridge(series: &mut [f64], entries: impl Iterator<Item = usize>) {
     let mut last: Option<usize> = None;
-    for k in 0..series.len() {
-        if !usable[k] {
-            continue;
-        }
+    for entry in entries {
         match last {
             None => {
-                let value = series[k];
-                series[..k].fill(value);
+                let value = series[entry];
+                series[..entry].fill(value);
             }
-            Some(before) if k > before + 1 => {
-                let (from, to) = (series[before], series[k]);
-                for (step, value) in series[before + 1..k].iter_mut().enumerate() {
-                    *value = from + (to - from) * (step + 1) as f64 / (k - before) as f64;
+            Some(before) if entry > before + 1 => {
+                let (from, to) = (series[before], series[entry]);
+                for (step, value) in series[before + 1..entry].iter_mut().enumerate() {
+                    *value = from + (to - from) * (step + 1) as f64 / (entry - before) as f64;
                 }
             }
             _ => {}
         }
-        last = Some(k);
+        last = Some(entry);
     }
-    match last {
-        Some(before) => {
-            let value = series[before];
-            series[before + 1..].fill(value);
-        }
-        None => series.fill(0.0),
+    if let Some(before) = last {
+        let value = series[before];
+        series[before + 1..].fill(value);
     }
 }
 

@@ -3,7 +3,6 @@
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
-use std::rc::Rc;
 use std::sync::Arc;
 
 use cromosim_imu::{EffectSet, ReadOff};
@@ -14,7 +13,7 @@ use crate::fit::FitModel;
 /// Tracks of one reference, made when they are asked for; positions in its units of length.
 pub(crate) struct ReferenceTracks<'a> {
     model: &'a FitModel<'a>,
-    tracks: RefCell<BTreeMap<Undone, Rc<KinematicTrack>>>,
+    tracks: RefCell<BTreeMap<Undone, Arc<KinematicTrack>>>,
 }
 
 /// What of the analysis' motion is undone.
@@ -33,21 +32,23 @@ impl<'a> ReferenceTracks<'a> {
     }
 
     /// The motion that a simulation under a set starts from.
-    pub fn track(&self, set: &EffectSet) -> Rc<KinematicTrack> {
+    pub fn track(&self, set: &EffectSet) -> Arc<KinematicTrack> {
         let make = || {
             let prepared = self.model.prepared;
             let mut track = if self.is_that_of_analysis(set) {
-                self.model.track.clone()
+                Arc::clone(&self.model.track)
             } else {
-                prepared.track(&self.estimate(set))
+                Arc::new(prepared.track(&self.estimate(set)))
             };
-            for acceleration in &mut track.acceleration_in_segment {
-                *acceleration *= prepared.report.length_units;
+            if prepared.report.length_units != 1.0 {
+                for acceleration in &mut Arc::make_mut(&mut track).acceleration_in_segment {
+                    *acceleration *= prepared.report.length_units;
+                }
             }
-            Rc::new(track)
+            track
         };
         let undone = self.undone(set);
-        Rc::clone(self.tracks.borrow_mut().entry(undone).or_insert_with(make))
+        Arc::clone(self.tracks.borrow_mut().entry(undone).or_insert_with(make))
     }
 
     /// The estimate of that motion, in metres.

@@ -146,15 +146,10 @@ fn whitened(findings: &Findings, (axis, values): &Column) -> Vec<f64> {
     } else {
         0.0
     };
+    let axes = std::array::from_fn(|other| other == *axis);
     model
         .whitener
-        .apply(&model.prepared.on_sample_grid(|k, other| {
-            if other == *axis {
-                values[k] * factor
-            } else {
-                0.0
-            }
-        }))
+        .apply(&model.prepared.scattered(axes, |k, _| values[k] * factor))
 }
 
 /// The regressors of one family, before they are whitened.

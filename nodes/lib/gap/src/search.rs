@@ -98,8 +98,9 @@ pub(crate) fn search(
             break;
         }
         let mut grown_sets: Vec<ScoredEffectSet> = Vec::new();
-        for scored in &beam {
-            grow(model, scored, library, &mut grown_sets);
+        // One after the other is let go: the series of a fit fill much memory.
+        for scored in beam {
+            grow(model, &scored, library, &mut grown_sets);
         }
         trace_grown(&grown_sets);
         let Some(first) = grown_sets.first() else {
@@ -227,7 +228,10 @@ pub(crate) fn exchanged(
             scored.margins.push((kind, scored.score - rival_score));
             let best_score = best.as_ref().map_or(scored.score, |best| best.score);
             best = rival.filter(|rival| rival.score > best_score).or(best);
-            if makes_worse(model, &smaller.fit, &scored.fit) {
+            // Beside a better one it is not looked at; the series of a fit fill much memory.
+            if best.is_some() {
+                without_harm = None;
+            } else if makes_worse(model, &smaller.fit, &scored.fit) {
                 without_harm = without_harm
                     .filter(|other| other.score >= smaller.score)
                     .or(Some(smaller));

@@ -1,5 +1,7 @@
 //! One recording of a placement, brought to where the search starts.
 
+use std::sync::Arc;
+
 use cromosim_imu::{Channel, EffectSet, PerChannel, ReadOff, Reading};
 use cromosim_spatial::{FrameGrid, KinematicTrack};
 
@@ -25,7 +27,7 @@ pub(crate) struct Session {
     pub digital: PerChannel<Digital>,
     /// Factors of the device's units.
     pub units: PerChannel<f64>,
-    pub track: KinematicTrack,
+    pub track: Arc<KinematicTrack>,
 }
 
 impl Session {
@@ -72,7 +74,7 @@ impl Session {
             starts: starts.iter().map(|set| library.restrict(set)).collect(),
             digital,
             units,
-            track,
+            track: Arc::new(track),
         })
     }
 }

@@ -114,7 +114,7 @@ impl<'a> Simulations<'a> {
     /// Whitened measured less simulated, in SI units.
     pub fn whitened(&self, whitener: &Whitener, simulated: &[Reading]) -> Vec<f64> {
         let measured = self.comparison.measured;
-        whitener.apply(&self.whole.on_sample_grid(|k, axis| {
+        whitener.apply(&self.whole.scattered([true; 6], |k, axis| {
             (value_on_axis(&measured[k], axis) - value_on_axis(&simulated[k], axis))
                 / self.units[channel_of_axis(axis)]
         }))

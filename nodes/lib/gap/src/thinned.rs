@@ -1,5 +1,7 @@
 //! A recording as the search looks at it: readings at a high rate are thinned.
 
+use std::sync::Arc;
+
 use cromosim_spatial::Stamp;
 
 use crate::policy::search::SEARCH_HZ;
@@ -35,7 +37,7 @@ pub(crate) fn thinned(session: &Session) -> Option<Session> {
             ..*all
         };
         Session {
-            track: prepared.track(&prepared.estimate),
+            track: Arc::new(prepared.track(&prepared.estimate)),
             raw: kept.iter().map(|&k| session.raw[k]).collect(),
             covered: kept.iter().map(|&k| session.covered[k]).collect(),
             prepared,

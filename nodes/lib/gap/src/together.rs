@@ -13,7 +13,7 @@ use crate::policy::search::FIT_STEPS;
 use crate::progress::{ALONE, JUDGEMENT, Progress, SEARCH, TOGETHER};
 use crate::screen::sharpen_change_point;
 use crate::session::Session;
-use crate::unknown::{Suspects, detect_unmodelled_structure};
+use crate::unknown::{Rest, Suspects, detect_unmodelled_structure};
 
 /// What was found in each recording.
 pub(crate) fn analysed<'a>(
@@ -100,23 +100,31 @@ fn median_effect(effects: &[Effect]) -> Option<Effect> {
 /// recordings have to show it.
 fn judge_rest(findings: &mut [Findings], progress: &Progress) {
     let passes = [Suspects::Others, Suspects::All];
+    let is_alone = findings.len() == 1;
+    let mut known: Option<Rest> = None;
     for (index, suspects) in passes.into_iter().enumerate() {
         for one in findings.iter_mut() {
-            one.unknown = detect_unmodelled_structure(one, suspects);
+            let mut rest = known.take().unwrap_or_else(|| Rest::of(one));
+            one.unknown = detect_unmodelled_structure(one, &mut rest, suspects);
+            // Those of several recordings would fill much memory.
+            known = is_alone.then_some(rest);
         }
         let count = findings.iter().filter(|one| one.unknown.is_some()).count();
         if !is_enough(count, findings.len()) {
             findings.iter_mut().for_each(|one| one.unknown = None);
             return;
         }
-        remove_confounded_effects(findings);
+        if let Some(sets) = without_confounded_effects(findings) {
+            known = None;
+            refit(findings, sets);
+        }
         progress.one_of(index, passes.len()).reached(1.0);
     }
 }
 
 /// Takes out the effects that only pass for what is unknown (of the device's, in half of the
-/// recordings), and fits the others again.
-fn remove_confounded_effects(findings: &mut [Findings]) {
+/// recordings); the sets that are to be fitted then, where there were any in the fits.
+fn without_confounded_effects(findings: &mut [Findings]) -> Option<Vec<EffectSet>> {
     let suspected: Vec<Vec<EffectKind>> = findings
         .iter()
         .map(|one| {
@@ -140,18 +148,13 @@ fn remove_confounded_effects(findings: &mut [Findings]) {
         one.reportable = without_all(&one.reportable, &out);
         sets.push(without_all(&one.scored.fit.set, &out));
     }
-    refit(findings, sets);
+    let mut pairs = findings.iter().zip(&sets);
+    let changed = pairs.any(|(one, set)| one.scored.fit.set != *set);
+    changed.then_some(sets)
 }
 
 /// Fits other sets to all recordings.
 fn refit(findings: &mut [Findings], sets: Vec<EffectSet>) {
-    if findings
-        .iter()
-        .zip(&sets)
-        .all(|(one, set)| one.scored.fit.set == *set)
-    {
-        return;
-    }
     let models: Vec<&FitModel> = findings.iter().map(|one| &one.model).collect();
     let mut fits = fit_together(&models, sets, FIT_STEPS, |_| true);
     if let [model] = models[..] {

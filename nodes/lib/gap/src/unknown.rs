@@ -3,7 +3,7 @@
 use cromosim_imu::{Channel, EffectKind, PerChannel, ReadOff, Reading};
 
 use crate::axes::{any, axes_of_channel, larger, value_on_axis};
-use crate::confounding::{Judgement, is_calibration, judged_effects};
+use crate::confounding::{Standing, Standings, confounded_effects, is_calibration};
 use crate::findings::{Findings, ResidualDependence, Unknown};
 use crate::fit::{Fit, FitModel};
 use crate::gram::dot;
@@ -61,18 +61,40 @@ struct Structure<'a> {
     in_stamps: bool,
 }
 
+/// What is left of a fit, and what was judged beside it. It holds for as long as the fit does.
+pub(crate) struct Rest {
+    diagnostics: ResidualDiagnostics,
+    /// The strongest first.
+    regressions: Vec<ResidualRegression>,
+    /// Of the fit's members.
+    standings: Standings,
+}
+
+impl Rest {
+    /// Of the fit that was found.
+    pub fn of(findings: &Findings) -> Self {
+        let diagnostics = ResidualDiagnostics::new(&findings.model, &findings.scored.fit);
+        let mut regressions = residual_regressions(findings);
+        regressions.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        trace_regressions(&diagnostics, &regressions);
+        Self {
+            diagnostics,
+            regressions,
+            standings: Standings::new(),
+        }
+    }
+}
+
 /// Looks for structure in the whitened residual that no named effect explains.
 pub(crate) fn detect_unmodelled_structure(
     findings: &Findings,
+    rest: &mut Rest,
     suspects: Suspects,
 ) -> Option<Unknown> {
-    let diagnostics = ResidualDiagnostics::new(&findings.model, &findings.scored.fit);
-    let mut regressions = residual_regressions(findings);
-    regressions.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    trace_regressions(&diagnostics, &regressions);
-    let structure = Structure::new(findings, &diagnostics, &regressions);
+    let (diagnostics, regressions) = (&rest.diagnostics, &rest.regressions);
+    let structure = Structure::new(findings, diagnostics, regressions);
     if !structure.is_there()
-        || (structure.is_loud_alone() && !is_loud_behind_wider_filters(findings, &diagnostics))
+        || (structure.is_loud_alone() && !is_loud_behind_wider_filters(findings, diagnostics))
     {
         return None;
     }
@@ -92,19 +114,24 @@ pub(crate) fn detect_unmodelled_structure(
     let predictable = dependences
         .first()
         .map_or(0.5, |dependence| dependence.share);
-    let Judgement {
-        mut confounded,
-        sound,
-    } = judged_effects(findings, &structure.strong, &regressions);
-    confounded.extend(structure.confounded_read_off());
-    let stood = |kind: &EffectKind| {
+    let stood = |kind: EffectKind| {
         let before = findings.unknown.as_ref();
-        before.is_some_and(|unknown| unknown.sound_effects.contains(kind))
+        before.is_some_and(|unknown| unknown.sound_effects.contains(&kind))
     };
-    confounded.retain(|kind| match suspects {
-        Suspects::Others => !is_calibration(*kind),
-        Suspects::All => is_calibration(*kind) || !stood(kind),
-    });
+    let is_suspect = |kind: EffectKind| match suspects {
+        Suspects::Others => !is_calibration(kind),
+        Suspects::All => is_calibration(kind) || !stood(kind),
+    };
+    let standings = &mut rest.standings;
+    let mut confounded = confounded_effects(
+        findings,
+        &structure.strong,
+        regressions,
+        is_suspect,
+        standings,
+    );
+    confounded.extend(structure.confounded_read_off());
+    let sound = standings.iter().filter(|(_, of)| **of == Standing::Sound);
     Some(Unknown {
         predictable,
         location,
@@ -114,7 +141,7 @@ pub(crate) fn detect_unmodelled_structure(
         dependences,
         probability: structure.probability(),
         confounded_effects: confounded,
-        sound_effects: sound,
+        sound_effects: sound.map(|(kind, _)| *kind).collect(),
     })
 }
 

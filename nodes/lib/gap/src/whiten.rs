@@ -136,52 +136,66 @@ impl Whitener {
     }
 
     /// Six series on the sample grid in units of the predicted noise, one behind the other, times the square
-    /// root of their weights.
+    /// root of their weights. What is not compared may have any value; an empty series is one of zeros.
     pub fn apply(&self, series: &[Vec<f64>]) -> Vec<f64> {
-        let count = series[0].len();
+        let count = self.weight[0].len();
         let length = self.transform.length();
-        let extended = |axis: usize| {
-            let mut values = series[axis].clone();
-            values.resize(length, 0.0);
-            self.fillers[axis].fill(&mut values);
-            values
-        };
         let mut flat = vec![0.0; 6 * count];
-        let mut buffer = vec![Complex64::default(); length];
+        let mut filled = [vec![0.0; length], vec![0.0; length]];
+        let mut buffer = Vec::with_capacity(length);
         // Two axes of a channel at once; the last axes of both share one transform.
-        for (first, second) in [(0, 1), (3, 4), (2, 5)] {
+        for pair in [[0, 1], [3, 4], [2, 5]] {
             // What changes no axis of both leaves nothing, as most regressions do of most pairs.
-            if is_zero(&series[first]) && is_zero(&series[second]) {
+            if pair.iter().all(|&axis| is_zero(&series[axis])) {
                 continue;
             }
-            let (of_first, of_second) = (extended(first), extended(second));
-            for (slot, (a, b)) in buffer.iter_mut().zip(of_first.iter().zip(&of_second)) {
-                *slot = Complex64::new(*a, *b);
+            for (values, axis) in filled.iter_mut().zip(pair) {
+                let (own, rest) = values.split_at_mut(series[axis].len());
+                own.copy_from_slice(&series[axis]);
+                rest.fill(0.0);
+                self.fillers[axis].fill(values);
             }
+            let values = filled[0].iter().zip(&filled[1]);
+            buffer.clear();
+            buffer.extend(values.map(|(a, b)| Complex64::new(*a, *b)));
             self.transform.forward(&mut buffer);
-            let [of_first, of_second] = [first, second].map(channel_of_axis);
-            let (gain_a, gain_b) = (&self.gain[of_first], &self.gain[of_second]);
-            if of_first == of_second {
-                for (k, value) in buffer.iter_mut().enumerate() {
-                    *value *= gain_a[k.min(length - k)];
-                }
-            } else {
-                for k in 0..=length / 2 {
-                    let mirror = (length - k) % length;
-                    let (here, there) = (buffer[k], buffer[mirror].conj());
-                    let (even, odd) = ((here + there) * 0.5, (here - there) * 0.5);
-                    let (even, odd) = (even * gain_a[k], odd * gain_b[k]);
-                    buffer[k] = even + odd;
-                    buffer[mirror] = (even - odd).conj();
-                }
-            }
+            self.divide_by_noise(&mut buffer, pair.map(channel_of_axis));
             self.transform.inverse(&mut buffer);
-            for k in 0..count {
-                flat[first * count + k] = buffer[k].re * self.weight[first][k];
-                flat[second * count + k] = buffer[k].im * self.weight[second][k];
+            let parts: [fn(&Complex64) -> f64; 2] = [|value| value.re, |value| value.im];
+            for (axis, part) in pair.into_iter().zip(parts) {
+                let whitened = flat[axis * count..(axis + 1) * count].iter_mut();
+                let weights = self.weight[axis].iter();
+                for ((whitened, value), weight) in whitened.zip(&buffer).zip(weights) {
+                    *whitened = part(value) * weight;
+                }
             }
         }
         flat
+    }
+
+    /// Transforms of two series of some channels, as real and imaginary part, in units of the predicted
+    /// noise.
+    fn divide_by_noise(&self, transform: &mut [Complex64], channels: [Channel; 2]) {
+        let length = transform.len();
+        let [gain_a, gain_b] = channels.map(|channel| &self.gain[channel]);
+        if channels[0] == channels[1] {
+            let (positive, negative) = transform.split_at_mut(length / 2 + 1);
+            for (value, gain) in positive.iter_mut().zip(gain_a) {
+                *value *= *gain;
+            }
+            for (value, gain) in negative.iter_mut().rev().zip(&gain_a[1..]) {
+                *value *= *gain;
+            }
+            return;
+        }
+        for k in 0..=length / 2 {
+            let mirror = (length - k) % length;
+            let (here, there) = (transform[k], transform[mirror].conj());
+            let (even, odd) = ((here + there) * 0.5, (here - there) * 0.5);
+            let (even, odd) = (even * gain_a[k], odd * gain_b[k]);
+            transform[k] = even + odd;
+            transform[mirror] = (even - odd).conj();
+        }
     }
 }
 

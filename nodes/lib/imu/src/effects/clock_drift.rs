@@ -48,6 +48,18 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
 /// Up to this two clocks ordinarily drift apart.
 const ORDINARY_PPM: f64 = 30.0;
 
+impl EffectKind {
+    /// Standard deviation of each fitted value that no recording takes away, however long it is: what is
+    /// fitted is the rate of the device's clock against the reference's, which is no better than others.
+    pub fn error_of_reference(self) -> f64 {
+        match self {
+            // Evenly spread up to what is ordinary.
+            Self::ClockDrift => ORDINARY_PPM / 3.0_f64.sqrt(),
+            _ => 0.0,
+        }
+    }
+}
+
 impl EffectSet {
     /// Standard deviation of the time that a known drift leaves so long after the epoch, s: it is that of
     /// the device's clock against the diagnosed reference's, and another reference has another clock.

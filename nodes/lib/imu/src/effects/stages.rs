@@ -1,9 +1,9 @@
 //! The walk over the stages of the measurement model, which simulation, diagnosis and training
 //! share.
 
-use std::borrow::Cow;
 use std::mem::take;
 use std::ops::RangeInclusive;
+use std::sync::Arc;
 
 use cromosim_spatial::{KinematicTrack, Stamp};
 
@@ -48,7 +48,7 @@ impl SensorModel {
                 Stage::Segment
             }
             MeasurementInput::IdealReadings(trace) => {
-                work.trace = Cow::Borrowed(trace);
+                work.trace = Trace::Borrowed(trace);
                 Stage::Timing
             }
         };
@@ -82,21 +82,33 @@ impl SensorModel {
         match stage {
             Stage::Reference => {}
             Stage::Segment => {
-                work.trace = Cow::Owned(work.motion.map(|m| self.segment(m)).unwrap_or_default());
+                work.trace = Trace::from(work.motion.map(|m| self.segment(m)).unwrap_or_default());
             }
             Stage::Tissue => {
-                if let Some(motion) = work.motion {
+                if let (Some(motion), Some(_)) = (work.motion, &self.tissue) {
                     let trace = take(&mut work.trace).into_owned();
-                    work.trace = Cow::Owned(self.tissue(trace, motion));
+                    work.trace = Trace::from(self.tissue(trace, motion));
                 }
             }
             Stage::Sensor => {
-                work.trace = Cow::Owned(self.sensor(take(&mut work.trace).into_owned()))
+                if self.acts_on_sensor_axes() {
+                    let trace = take(&mut work.trace).into_owned();
+                    work.trace = Trace::from(self.sensor(trace));
+                }
             }
-            Stage::Timing => work.readings = self.sample(&work.trace, work.stamps),
+            Stage::Timing => work.readings = self.sample(work.trace.get(), work.stamps),
             Stage::Linear => self.linear(&mut work.readings, work.stamps),
             Stage::Digital => self.digital(&mut work.readings),
         }
+    }
+
+    /// Whether [`SensorModel::sensor`] changes anything.
+    fn acts_on_sensor_axes(&self) -> bool {
+        let turns = self.sensor_from_segment.is_some() || self.coupling.is_some();
+        let filters = &self.low_pass;
+        (self.slip.is_none() && turns)
+            || filters.accelerometer.is_some()
+            || filters.gyroscope.is_some()
     }
 }
 
@@ -104,17 +116,58 @@ impl SensorModel {
 struct Work<'a> {
     motion: Option<&'a KinematicTrack>,
     stamps: &'a [Stamp],
-    trace: Cow<'a, GridTrace>,
+    trace: Trace<'a>,
     readings: Vec<Reading>,
 }
 
+/// Readings on a grid; what passes a stage that changes nothing is not copied.
+enum Trace<'a> {
+    Borrowed(&'a GridTrace),
+    Shared(Arc<GridTrace>),
+}
+
+impl Trace<'_> {
+    fn get(&self) -> &GridTrace {
+        match self {
+            Self::Borrowed(trace) => trace,
+            Self::Shared(trace) => trace,
+        }
+    }
+
+    fn into_owned(self) -> GridTrace {
+        match self {
+            Self::Borrowed(trace) => trace.clone(),
+            Self::Shared(trace) => Arc::unwrap_or_clone(trace),
+        }
+    }
+
+    fn shared(&self) -> Arc<GridTrace> {
+        match self {
+            Self::Borrowed(trace) => Arc::new(GridTrace::clone(trace)),
+            Self::Shared(trace) => Arc::clone(trace),
+        }
+    }
+}
+
+impl Default for Trace<'_> {
+    fn default() -> Self {
+        Self::Shared(Arc::default())
+    }
+}
+
+impl From<GridTrace> for Trace<'_> {
+    fn from(trace: GridTrace) -> Self {
+        Self::Shared(Arc::new(trace))
+    }
+}
+
 /// The readings of a motion after each stage but the digital one, so that a change of one effect
-/// repeats only the stages from its own on.
+/// repeats only the stages from its own on. Stages that change nothing share what they leave.
 #[derive(Clone, Debug, Default)]
 pub struct StagedReadings {
-    segment: GridTrace,
-    tissue: GridTrace,
-    sensor: GridTrace,
+    segment: Arc<GridTrace>,
+    tissue: Arc<GridTrace>,
+    sensor: Arc<GridTrace>,
     sampled: Vec<Reading>,
     /// The readings before noise and the digital stage.
     pub readings: Vec<Reading>,
@@ -127,14 +180,14 @@ impl StagedReadings {
         work.motion = Some(motion);
         let mut kept = Self::default();
         let keep = |stage: Stage, work: &Work<'_>| match stage {
-            Stage::Segment => kept.segment = work.trace.clone().into_owned(),
-            Stage::Tissue => kept.tissue = work.trace.clone().into_owned(),
+            Stage::Segment => kept.segment = work.trace.shared(),
+            Stage::Tissue => kept.tissue = work.trace.shared(),
             Stage::Timing => kept.sampled = work.readings.clone(),
             _ => {}
         };
         model.pass(&mut work, Stage::Segment..=Stage::Linear, keep);
         Self {
-            sensor: work.trace.into_owned(),
+            sensor: work.trace.shared(),
             readings: work.readings,
             ..kept
         }
@@ -153,9 +206,9 @@ impl StagedReadings {
         let mut work = Work::new(stamps);
         work.motion = Some(motion);
         match first {
-            Stage::Tissue => work.trace = Cow::Borrowed(&self.segment),
-            Stage::Sensor => work.trace = Cow::Borrowed(&self.tissue),
-            Stage::Timing => work.trace = Cow::Borrowed(&self.sensor),
+            Stage::Tissue => work.trace = Trace::Shared(Arc::clone(&self.segment)),
+            Stage::Sensor => work.trace = Trace::Shared(Arc::clone(&self.tissue)),
+            Stage::Timing => work.trace = Trace::Shared(Arc::clone(&self.sensor)),
             Stage::Linear => work.readings = self.sampled.clone(),
             _ => {}
         }
@@ -169,7 +222,7 @@ impl<'a> Work<'a> {
         Self {
             motion: None,
             stamps,
-            trace: Cow::default(),
+            trace: Trace::default(),
             readings: Vec::new(),
         }
     }
