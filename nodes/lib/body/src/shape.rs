@@ -104,17 +104,19 @@ impl ShapedBody {
     /// world_from_segment of every joint (SMPL eq. 4): G_0 = [R_0 | root], G_j = G_parent [R_j |
     /// J_j - J_parent].
     pub fn world_from_segments(&self, pose: &BodyPose) -> [Isometry3<f64>; JOINT_COUNT] {
-        forward_kinematics(&self.joints_in_model, pose)
+        forward_kinematics(&self.joints_in_model, &Joint::ALL, pose)
     }
 }
 
-/// As [`ShapedBody::world_from_segments`], from the rest joints alone.
+/// As [`ShapedBody::world_from_segments`], from the rest joints alone, of some joints: each after its
+/// parent. The others' segments are the identity.
 pub(crate) fn forward_kinematics(
     joints_in_model: &[Vector3<f64>; JOINT_COUNT],
+    joints: &[Joint],
     pose: &BodyPose,
 ) -> [Isometry3<f64>; JOINT_COUNT] {
     let mut world_from_segments = [Isometry3::identity(); JOINT_COUNT];
-    for joint in Joint::ALL {
+    for joint in joints.iter().copied() {
         let rotation: UnitQuaternion<f64> = pose.local_rotations[joint.index()];
         world_from_segments[joint.index()] = match joint.parent() {
             None => Isometry3::from_parts(Translation3::from(pose.root_position), rotation),
