@@ -1,6 +1,6 @@
 //! A body with a shape: rest mesh and skeleton.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
@@ -14,8 +14,7 @@ pub struct ShapedBody {
     betas: Vec<f64>,
     rest_vertices: Vec<Vector3<f64>>,
     joints_in_model: [Vector3<f64>; JOINT_COUNT],
-    /// As the skin kernel wants it: see `skin_tables.rs`.
-    pub(crate) rest_tiles: RestTiles,
+    rest_tiles: OnceLock<RestTiles>,
 }
 
 impl ShapedBody {
@@ -60,14 +59,19 @@ impl ShapedBody {
                 .map(|&(vertex, weight)| rest_vertices[vertex as usize] * weight)
                 .sum()
         });
-        let rest_tiles = model.skin_tables.tiled(&rest_vertices);
         Ok(Self {
             betas: betas.to_vec(),
             rest_vertices,
             joints_in_model,
-            rest_tiles,
+            rest_tiles: OnceLock::new(),
             model,
         })
+    }
+
+    /// The mesh at rest as the skin kernel wants it: see `skin_tables.rs`.
+    pub(crate) fn rest_tiles(&self) -> &RestTiles {
+        let tiled = || self.model.skin_tables().tiled(&self.rest_vertices);
+        self.rest_tiles.get_or_init(tiled)
     }
 
     /// The model that was shaped.
