@@ -112,6 +112,11 @@ mod avx2 {
 /// would be called through a function of the compiler's, which is not inlined.
 pub(crate) struct Once;
 
+impl Once {
+    #[inline(always)]
+    pub(crate) fn use_up(self) {}
+}
+
 /// Runs an expression, in which a name stands for the [`Four`] that this processor has; compiled once for
 /// each kind. What the expression calls has to be inlined into it.
 macro_rules! widest {
@@ -124,7 +129,7 @@ macro_rules! widest {
                     $four,
                     #[inline(always)]
                     || {
-                        drop(once);
+                        once.use_up();
                         $work
                     },
                 )
