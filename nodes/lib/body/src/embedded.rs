@@ -9,7 +9,7 @@ use cromosim_arrays::{Container, Limits};
 use serde::Deserialize;
 
 use crate::gender::Gender;
-use crate::posedirs::{Constants, generated_pose_blocks};
+use crate::posedirs::{ClosedForm, Constants};
 use crate::read::read_without_posedirs;
 use crate::site::NamedSite;
 use crate::{BodyError, BodyModel, JOINT_COUNT, ShapeSpace};
@@ -26,7 +26,7 @@ impl BodyModel {
     /// They are not SMPL's betas: fit them to bone lengths instead of taking them from a motion
     /// file.
     ///
-    /// The first call unpacks it and makes its pose corrections; later calls share it.
+    /// The first call unpacks it; later calls share it.
     pub fn embedded() -> Arc<Self> {
         static BODY: OnceLock<Arc<BodyModel>> = OnceLock::new();
         // A broken asset is a fault of the build and not of any input: a test loads it.
@@ -50,7 +50,7 @@ fn load() -> Result<BodyModel, BodyError> {
         .map_err(BodyError::Arrays)?;
     let constants: Constants =
         serde_json::from_str(POSEDIRS).expect("the embedded constants are sound");
-    raw.pose_blocks = generated_pose_blocks(&constants, &raw, &joints.values);
+    raw.pose_blocks = ClosedForm::new(constants, &raw, &joints.values).into();
     let mut body = BodyModel::from_raw(raw)?;
     body.sites = embedded_sites(&body)?;
     Ok(body)

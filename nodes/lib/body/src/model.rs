@@ -1,11 +1,12 @@
 //! A body's arrays, checked once: every index and every size is right from here on.
 
 use std::path::Path;
+use std::sync::OnceLock;
 
 use nalgebra::Vector3;
 
 use crate::gender::Gender;
-use crate::pose_blocks::PoseBlock;
+use crate::pose_blocks::{PoseBlock, PoseBlocks};
 use crate::raw::RawModel;
 use crate::rows::Rows;
 use crate::site::NamedSite;
@@ -24,15 +25,14 @@ pub struct BodyModel {
     pub(crate) beta_count: usize,
     /// (V, 3, B), m.
     pub(crate) shape_directions: Vec<f64>,
-    /// Of each vertex, the blocks that are not zero.
-    pub(crate) pose_blocks: Rows<PoseBlock>,
+    pose_blocks: PoseBlocks,
     /// Of each joint, vertices and their weights.
     pub(crate) regressor: Rows<(u32, f64)>,
     /// Of each vertex, joints and their weights.
     pub(crate) skin_weights: Rows<(u8, f64)>,
     pub(crate) faces: Vec<[u32; 3]>,
     pub(crate) sites: Vec<NamedSite>,
-    pub(crate) skin_tables: SkinTables,
+    skin_tables: OnceLock<SkinTables>,
 }
 
 impl BodyModel {
@@ -67,7 +67,6 @@ impl BodyModel {
                 .filter(nonzero)
                 .map(|(vertex, weight)| (vertex as u32, weight))
         }));
-        let skin_tables = SkinTables::new(&raw.pose_blocks, &skin_weights, vertex_count);
         Ok(Self {
             id: raw.id,
             gender: raw.gender,
@@ -80,8 +79,24 @@ impl BodyModel {
             skin_weights,
             faces,
             sites: Vec::new(),
-            skin_tables,
+            skin_tables: OnceLock::new(),
         })
+    }
+
+    /// Of each vertex, the blocks that are not zero.
+    pub(crate) fn pose_blocks(&self) -> &Rows<PoseBlock> {
+        self.pose_blocks.all(&self.skin_weights)
+    }
+
+    /// Those of one vertex.
+    pub(crate) fn pose_blocks_of(&self, vertex: usize) -> Vec<PoseBlock> {
+        self.pose_blocks.of_vertex(vertex, &self.skin_weights)
+    }
+
+    /// What the skin kernel walks over, made when the mesh is first asked for.
+    pub(crate) fn skin_tables(&self) -> &SkinTables {
+        let made = || SkinTables::new(self.pose_blocks(), &self.skin_weights, self.vertex_count());
+        self.skin_tables.get_or_init(made)
     }
 
     /// Names the body: `cromosim_neutral` for the embedded one, else the file's stem.

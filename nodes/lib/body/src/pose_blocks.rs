@@ -1,7 +1,10 @@
 //! The sparse form of SMPL's posedirs.
 
+use std::sync::OnceLock;
+
 use crate::JOINT_COUNT;
 use crate::joint::SHARED_JOINTS;
+use crate::posedirs::ClosedForm;
 use crate::rows::Rows;
 
 /// What one joint's rotation adds to one vertex: `coefficients[9 * axis + 3 * row + column]` times
@@ -14,6 +17,53 @@ pub(crate) struct PoseBlock {
     pub joint: u8,
     /// Row-major over (3 axes, 3 rows, 3 columns), m.
     pub coefficients: [f32; 27],
+}
+
+/// Of each vertex, the blocks that are not zero. Those in closed form are made where they are asked for:
+/// sensors need some vertices, and all of them take longer than minutes of motion.
+#[derive(Debug)]
+pub(crate) struct PoseBlocks {
+    closed_form: Option<ClosedForm>,
+    all: OnceLock<Rows<PoseBlock>>,
+}
+
+impl From<Rows<PoseBlock>> for PoseBlocks {
+    fn from(all: Rows<PoseBlock>) -> Self {
+        Self {
+            closed_form: None,
+            all: all.into(),
+        }
+    }
+}
+
+impl From<ClosedForm> for PoseBlocks {
+    fn from(closed_form: ClosedForm) -> Self {
+        Self {
+            closed_form: Some(closed_form),
+            all: OnceLock::new(),
+        }
+    }
+}
+
+impl PoseBlocks {
+    /// Those of a vertex, on a body with these skin weights.
+    pub fn of_vertex(&self, vertex: usize, skin_weights: &Rows<(u8, f64)>) -> Vec<PoseBlock> {
+        match (self.all.get(), &self.closed_form) {
+            (None, Some(form)) => form.of_vertex(vertex, skin_weights.row(vertex)),
+            _ => self.all(skin_weights).row(vertex).to_vec(),
+        }
+    }
+
+    /// Those of all vertices.
+    pub fn all(&self, skin_weights: &Rows<(u8, f64)>) -> &Rows<PoseBlock> {
+        self.all.get_or_init(|| {
+            let rows = self.closed_form.iter().flat_map(|form| {
+                let vertices = skin_weights.rows().enumerate();
+                vertices.map(|(vertex, weights)| form.of_vertex(vertex, weights))
+            });
+            Rows::new(rows)
+        })
+    }
 }
 
 /// Of posedirs (V, 3, 9 (J - 1)), each vertex' blocks (3, 9) of SMPL's joints that are not zero.

@@ -12,7 +12,6 @@ use serde::Deserialize;
 
 use crate::pose_blocks::{PoseBlock, vertex_pose_blocks};
 use crate::raw::RawModel;
-use crate::rows::Rows;
 use crate::{JOINT_COUNT, Joint};
 
 /// One vertex' directions (3, 207), row-major.
@@ -24,7 +23,7 @@ const SMALLEST: f64 = 2e-6;
 const REACH_IN_SIGMA: f64 = 7.5;
 
 /// The constants of the three terms, as `assets/posedirs.json` holds them.
-#[derive(Deserialize)]
+#[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Constants {
     /// c_j of term 1.
@@ -33,7 +32,7 @@ pub(crate) struct Constants {
     rbf: Vec<Gaussians>,
 }
 
-#[derive(Deserialize)]
+#[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Bulge {
     #[serde(rename = "name")]
@@ -56,7 +55,7 @@ struct Bulge {
     _xramp: Option<f64>,
 }
 
-#[derive(Deserialize)]
+#[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Gaussians {
     joint: usize,
@@ -67,45 +66,60 @@ struct Gaussians {
     coef: Vec<[[f64; 3]; 9]>,
 }
 
-/// The blocks of every vertex of `raw`, whose joints (24, 3) stand at `joints`.
-pub(crate) fn generated_pose_blocks(
-    constants: &Constants,
-    raw: &RawModel,
-    joints: &[f64],
-) -> Rows<PoseBlock> {
-    let vertices: Vec<Vector3<f64>> = raw
-        .template
-        .as_chunks::<3>()
-        .0
-        .iter()
-        .map(|&v| Vector3::from(v))
-        .collect();
-    let normals = vertex_normals(&vertices, &raw.faces);
-    let joints: Vec<Vector3<f64>> = joints
-        .as_chunks::<3>()
-        .0
-        .iter()
-        .map(|&v| Vector3::from(v))
-        .collect();
-    let weights = raw.weights.as_chunks::<JOINT_COUNT>().0;
-    let of_vertex =
-        |((vertex, normal), weights): ((&Vector3<f64>, &Vector3<f64>), &[f64; JOINT_COUNT])| {
-            let mut directions = Directions::zeros();
-            add_blending_loss(&mut directions, &constants.lbs, vertex, weights, &joints);
-            for bulge in &constants.bulges {
-                add_bulge(&mut directions, bulge, vertex, normal, weights);
-            }
-            for gaussians in &constants.rbf {
-                add_gaussians(&mut directions, gaussians, vertex);
-            }
-            vertex_pose_blocks(
-                directions
-                    .map(|entry| if entry.abs() < SMALLEST { 0.0 } else { entry })
-                    .as_slice(),
-                JOINT_COUNT,
-            )
+/// The three terms on one body.
+#[derive(Debug)]
+pub(crate) struct ClosedForm {
+    constants: Constants,
+    vertices: Vec<Vector3<f64>>,
+    normals: Vec<Vector3<f64>>,
+    joints: Vec<Vector3<f64>>,
+}
+
+impl ClosedForm {
+    /// On `raw`, whose joints (24, 3) stand at `joints`.
+    pub fn new(constants: Constants, raw: &RawModel, joints: &[f64]) -> Self {
+        let points = |values: &[f64]| -> Vec<Vector3<f64>> {
+            let points = values.as_chunks::<3>().0.iter();
+            points.map(|&point| Vector3::from(point)).collect()
         };
-    Rows::new(vertices.iter().zip(&normals).zip(weights).map(of_vertex))
+        let vertices = points(&raw.template);
+        Self {
+            normals: vertex_normals(&vertices, &raw.faces),
+            joints: points(joints),
+            vertices,
+            constants,
+        }
+    }
+
+    /// The blocks of a vertex with these skin weights.
+    pub fn of_vertex(&self, vertex: usize, skin_weights: &[(u8, f64)]) -> Vec<PoseBlock> {
+        let mut weights = [0.0; JOINT_COUNT];
+        for &(joint, weight) in skin_weights {
+            weights[joint as usize] = weight;
+        }
+        let (normal, constants) = (&self.normals[vertex], &self.constants);
+        let vertex = &self.vertices[vertex];
+        let mut directions = Directions::zeros();
+        add_blending_loss(
+            &mut directions,
+            &constants.lbs,
+            vertex,
+            &weights,
+            &self.joints,
+        );
+        for bulge in &constants.bulges {
+            add_bulge(&mut directions, bulge, vertex, normal, &weights);
+        }
+        for gaussians in &constants.rbf {
+            add_gaussians(&mut directions, gaussians, vertex);
+        }
+        vertex_pose_blocks(
+            directions
+                .map(|entry| if entry.abs() < SMALLEST { 0.0 } else { entry })
+                .as_slice(),
+            JOINT_COUNT,
+        )
+    }
 }
 
 /// Unit normals, area-weighted over the triangles around.
@@ -247,7 +261,7 @@ mod tests {
         let mut largest: f64 = 0.0;
         for (vertex, expected) in ids.zip(expected.chunks_exact(621)) {
             let mut dense = [0.0; 621];
-            for block in body.pose_blocks.row(vertex) {
+            for block in body.pose_blocks().row(vertex) {
                 for (i, &coefficient) in block.coefficients.iter().enumerate() {
                     dense[(i / 9) * 207 + 9 * (block.joint as usize - 1) + i % 9] =
                         f64::from(coefficient);

@@ -4,8 +4,7 @@ use std::path::PathBuf;
 
 use crate::ShapeSpace;
 use crate::gender::Gender;
-use crate::pose_blocks::PoseBlock;
-use crate::rows::Rows;
+use crate::pose_blocks::PoseBlocks;
 
 /// The dense arrays of a body file, shapes checked by the reader and values not yet.
 pub(crate) struct RawModel {
@@ -19,7 +18,7 @@ pub(crate) struct RawModel {
     /// (V, 3, B).
     pub shape_directions: Vec<f64>,
     pub beta_count: usize,
-    pub pose_blocks: Rows<PoseBlock>,
+    pub pose_blocks: PoseBlocks,
     /// (24, V).
     pub regressor: Vec<f64>,
     /// (V, 24).

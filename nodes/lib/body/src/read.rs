@@ -30,7 +30,7 @@ pub(crate) fn read_model<R: Read + Seek>(arrays: &mut Container<R>) -> Result<Ra
         &[Some(vertex_count), Some(3), Some(features)],
         &format!("({vertex_count}, 3, {features}) for {joint_count} joints"),
     )?;
-    file.raw.pose_blocks = pose_blocks(&posedirs.values, joint_count);
+    file.raw.pose_blocks = pose_blocks(&posedirs.values, joint_count).into();
     file.reduced()
 }
 
@@ -78,7 +78,7 @@ pub(crate) fn read_without_posedirs<R: Read + Seek>(
         template: template.values,
         shape_directions,
         beta_count,
-        pose_blocks: Rows::new(std::iter::empty::<Vec<PoseBlock>>()),
+        pose_blocks: Rows::new(std::iter::empty::<Vec<PoseBlock>>()).into(),
         regressor: regressor.values,
         weights: weights.values,
         faces: faces.values,

@@ -1,6 +1,6 @@
 //! A body with a shape: rest mesh and skeleton.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
@@ -14,8 +14,7 @@ pub struct ShapedBody {
     betas: Vec<f64>,
     rest_vertices: Vec<Vector3<f64>>,
     joints_in_model: [Vector3<f64>; JOINT_COUNT],
-    /// As the skin kernel wants it: see `skin_tables.rs`.
-    pub(crate) rest_tiles: RestTiles,
+    rest_tiles: OnceLock<RestTiles>,
 }
 
 impl ShapedBody {
@@ -60,14 +59,19 @@ impl ShapedBody {
                 .map(|&(vertex, weight)| rest_vertices[vertex as usize] * weight)
                 .sum()
         });
-        let rest_tiles = model.skin_tables.tiled(&rest_vertices);
         Ok(Self {
             betas: betas.to_vec(),
             rest_vertices,
             joints_in_model,
-            rest_tiles,
+            rest_tiles: OnceLock::new(),
             model,
         })
+    }
+
+    /// The mesh at rest as the skin kernel wants it: see `skin_tables.rs`.
+    pub(crate) fn rest_tiles(&self) -> &RestTiles {
+        let tiled = || self.model.skin_tables().tiled(&self.rest_vertices);
+        self.rest_tiles.get_or_init(tiled)
     }
 
     /// The model that was shaped.
@@ -104,17 +108,19 @@ impl ShapedBody {
     /// world_from_segment of every joint (SMPL eq. 4): G_0 = [R_0 | root], G_j = G_parent [R_j |
     /// J_j - J_parent].
     pub fn world_from_segments(&self, pose: &BodyPose) -> [Isometry3<f64>; JOINT_COUNT] {
-        forward_kinematics(&self.joints_in_model, pose)
+        forward_kinematics(&self.joints_in_model, &Joint::ALL, pose)
     }
 }
 
-/// As [`ShapedBody::world_from_segments`], from the rest joints alone.
+/// As [`ShapedBody::world_from_segments`], from the rest joints alone, of some joints: each after its
+/// parent. The others' segments are the identity.
 pub(crate) fn forward_kinematics(
     joints_in_model: &[Vector3<f64>; JOINT_COUNT],
+    joints: &[Joint],
     pose: &BodyPose,
 ) -> [Isometry3<f64>; JOINT_COUNT] {
     let mut world_from_segments = [Isometry3::identity(); JOINT_COUNT];
-    for joint in Joint::ALL {
+    for joint in joints.iter().copied() {
         let rotation: UnitQuaternion<f64> = pose.local_rotations[joint.index()];
         world_from_segments[joint.index()] = match joint.parent() {
             None => Isometry3::from_parts(Translation3::from(pose.root_position), rotation),

@@ -38,7 +38,7 @@ impl ShapedBody {
     /// The mesh of several poses one after the other, (N, V, 3), m; each the same as from
     /// [`Self::skin`].
     pub fn skin_batch(&self, poses: &[BodyPose], vertices: &mut Vec<[f32; 3]>) {
-        let tables = &self.model().skin_tables;
+        let tables = self.model().skin_tables();
         vertices.resize(poses.len() * tables.vertex_count, [0.0; 3]);
         for (poses, vertices) in poses
             .chunks(POSES_PER_WALK)
@@ -48,7 +48,7 @@ impl ShapedBody {
                 poses.iter().map(|pose| self.pose_matrices(pose)).collect();
             pulp::Arch::new().dispatch(Walk {
                 tables,
-                rest_tiles: &self.rest_tiles,
+                rest_tiles: self.rest_tiles(),
                 poses: &matrices,
                 vertices,
             });

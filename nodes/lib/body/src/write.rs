@@ -86,7 +86,7 @@ impl BodyModel {
     fn dense_posedirs(&self) -> Vec<f64> {
         let features = 9 * (JOINT_COUNT - 1);
         let mut dense = vec![0.0; self.vertex_count() * 3 * features];
-        for (vertex, blocks) in self.pose_blocks.rows().enumerate() {
+        for (vertex, blocks) in self.pose_blocks().rows().enumerate() {
             for block in blocks {
                 for (i, &coefficient) in block.coefficients.iter().enumerate() {
                     dense[(3 * vertex + i / 9) * features

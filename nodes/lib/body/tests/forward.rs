@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use cromosim_arrays::NpzReader;
 use cromosim_body::{BodyModel, BodyPose, Joint, ShapedBody};
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
 fn data(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -170,6 +170,26 @@ fn skin_and_subset_agree_on_the_whole_mesh() {
         let difference = largest_difference(&skinned(&body, &pose), &subset.positions(&pose));
         println!("f32 against f64: {difference:.2e} m");
         assert!(difference < 2e-6, "{difference} m");
+    }
+}
+
+#[test]
+fn segments_that_are_not_asked_for_change_no_vertex() {
+    let body = ShapedBody::new(BodyModel::embedded(), &[0.5]).unwrap();
+    let vertices = [0, 1234, 5678];
+    let all = body.subset(&vertices).unwrap();
+    let few = all.clone().with_segments_of([Joint::LeftFoot]);
+    let (mut expected, mut found) = (Vec::new(), Vec::new());
+    for seed in 0..10 {
+        let pose = some_pose(seed, 0.8);
+        let segments = all.positions_and_segments_into(&pose, &mut expected);
+        let of_few = few.positions_and_segments_into(&pose, &mut found);
+        assert_eq!(expected, found);
+        let foot = Joint::LeftFoot.index();
+        assert_eq!(segments[foot], of_few[foot]);
+        assert_eq!(segments, body.world_from_segments(&pose));
+        // Else nothing was saved.
+        assert!(of_few.contains(&Isometry3::identity()));
     }
 }
 

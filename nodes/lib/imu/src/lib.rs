@@ -101,7 +101,9 @@ pub use sample::{
     GRAVITY_IN_WORLD, ImuSample, KinematicSample, STANDARD_GRAVITY, track_in_sensor_axes,
 };
 pub use schemes::Scheme;
-pub use simulate::{Differentiation, simulate, simulate_kinematics, simulate_kinematics_on};
+pub use simulate::{
+    Differentiation, simulate, simulate_kinematics, simulate_kinematics_on, simulate_several_on,
+};
 pub use stated_errors::change_per_second;
 pub use stream::{StreamOptions, StreamingImu};
 pub use texture::{DrawnTexture, TextureSegment, add_texture};

@@ -83,6 +83,7 @@ impl MountedSensor {
         }
         let vertices = model.triangle(&site).map_err(refuse)?;
         let subset = body.subset(&vertices).map_err(refuse)?;
+        let subset = subset.with_segments_of([site.joint]);
         let corners = vertices.map(|vertex| body.rest_vertices()[vertex as usize]);
         let flat = || ImuError::FlatTriangle {
             placement: placement.name().to_owned(),
@@ -242,7 +243,12 @@ impl MountedSensors {
         let subset = if sensors.is_empty() {
             None
         } else {
-            Some(body.subset(&vertices).map_err(refuse)?)
+            let joints = sensors.iter().map(MountedSensor::joint);
+            Some(
+                body.subset(&vertices)
+                    .map_err(refuse)?
+                    .with_segments_of(joints),
+            )
         };
         Ok(Self { sensors, subset })
     }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use cromosim_spatial::{PoseSmoothing, PoseTimes, Stamp, derivative_weights, so3};
+use cromosim_spatial::{PoseSmoothing, PoseSpline, PoseTimes, Stamp, derivative_weights, so3};
 use nalgebra::{Isometry3, Vector3};
 
 use crate::low_pass_error;
@@ -118,6 +118,35 @@ pub fn simulate_kinematics_on(
     Ok(samples)
 }
 
+/// As [`simulate_kinematics_on`] of several trajectories, each to its own stamps: the same samples, but
+/// splines that follow the motion are fitted at once where the trajectories come from one source.
+///
+/// # Errors
+/// As [`simulate_kinematics_on`], of the first that it is due to.
+pub fn simulate_several_on(
+    times: &PoseTimes,
+    trajectories: &[SensorTrajectory],
+    scheme: Scheme,
+    outputs: &[Vec<Stamp>],
+) -> Result<Vec<Vec<KinematicSample>>, ImuError> {
+    let source = trajectories.first().map(SensorTrajectory::source);
+    let together = trajectories.iter().all(|one| Some(one.source()) == source);
+    let several = trajectories.iter().zip(outputs);
+    if scheme == Scheme::AdaptiveSpline && together {
+        let smoothing = scheme.smoothing(source.unwrap_or_default());
+        // Where one cannot be fitted, each alone says which.
+        if let Ok(fitted) = spline::fit_all(times, trajectories, smoothing) {
+            return several
+                .zip(&fitted)
+                .map(|((one, output), fitted)| of_spline(times, one, fitted, output))
+                .collect();
+        }
+    }
+    several
+        .map(|(one, output)| simulate_kinematics_on(times, one, scheme, output))
+        .collect()
+}
+
 fn by_spline(
     times: &PoseTimes,
     trajectory: &SensorTrajectory,
@@ -125,11 +154,20 @@ fn by_spline(
     output: &[Stamp],
 ) -> Result<Vec<KinematicSample>, ImuError> {
     let fitted = spline::fit(times, trajectory.frames(), smoothing)?;
-    let errors = SplineVariance::new(times, &fitted, trajectory.frames())?;
+    of_spline(times, trajectory, &fitted, output)
+}
+
+fn of_spline(
+    times: &PoseTimes,
+    trajectory: &SensorTrajectory,
+    fitted: &PoseSpline,
+    output: &[Stamp],
+) -> Result<Vec<KinematicSample>, ImuError> {
+    let errors = SplineVariance::new(times, fitted, trajectory.frames())?;
     let sample = |&stamp: &Stamp| {
         let held = stamp.clamp(trajectory.start(), trajectory.end());
         let known = errors.as_ref().map(|errors| errors.at(held));
-        let sample = spline::sample(&fitted, held);
+        let sample = spline::sample(fitted, held);
         KinematicSample {
             stamp,
             variance: sample.variance.larger(known.unwrap_or_default()),

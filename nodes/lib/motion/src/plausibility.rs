@@ -86,31 +86,29 @@ impl SmplMotion {
             let [from, to] = [0, 1].map(|frame| pair[frame].local_rotations[joint]);
             from.angle_to(&to) * self.rate_hz
         };
-        let worst = |bound: &'static Bound, of: &dyn Fn(usize) -> Option<(String, f64)>| {
-            let values = (0..Joint::ALL.len()).filter_map(of);
-            let oddest = values.max_by(|(_, one), (_, other)| one.total_cmp(other));
+        let lasts = self.duration_s() >= LASTING_S;
+        let (mut peaks, mut lasting) = (Vec::new(), Vec::new());
+        for joint in Joint::ALL {
+            let pairs = self.frames.windows(2);
+            let speeds: Vec<f64> = pairs.map(|pair| speed(joint.index(), pair)).collect();
+            if let Some((frame, value)) = greatest(speeds.iter().copied()) {
+                peaks.push((format!("{}, {}", joint.name(), between(frame)), value));
+            }
+            if lasts {
+                lasting.push((joint.name().to_owned(), median(speeds.into_iter())));
+            }
+        }
+        let worst = |bound: &'static Bound, values: Vec<(String, f64)>| {
+            let oddest = values
+                .into_iter()
+                .max_by(|(_, one), (_, other)| one.total_cmp(other));
             oddest.and_then(|(place, value)| bound.judge(value, place))
         };
-        let name = |joint: usize| Joint::ALL[joint].name();
-        let peak = |joint| {
-            let pairs = self.frames.windows(2);
-            let (frame, value) = greatest(pairs.map(|pair| speed(joint, pair)))?;
-            Some((format!("{}, {}", name(joint), between(frame)), value))
-        };
-        let lasting = |joint| {
-            let pairs = self.frames.windows(2);
-            let value = median(pairs.map(|pair| speed(joint, pair)));
-            Some((name(joint).to_owned(), value))
-        };
-        let lasts = self.duration_s() >= LASTING_S;
-        worst(&JOINT_SPEED, &peak)
-            .into_iter()
-            .chain(
-                lasts
-                    .then(|| worst(&LASTING_JOINT_SPEED, &lasting))
-                    .flatten(),
-            )
-            .collect()
+        let judged = [
+            worst(&JOINT_SPEED, peaks),
+            worst(&LASTING_JOINT_SPEED, lasting),
+        ];
+        judged.into_iter().flatten().collect()
     }
 }
 

@@ -1,13 +1,15 @@
 //! Kinematic samples put aside: in memory while they are few, then in a file without a name, which
 //! nothing outlives.
 
+use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::vec;
 
 use cromosim_imu::{Bandwidth, KinematicSample, SampleVariance};
 use cromosim_spatial::Stamp;
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
-use tempfile::{SpooledTempFile, spooled_tempfile_in};
+use tempfile::tempfile_in;
 
 use crate::RecordingError;
 
@@ -20,41 +22,37 @@ const BUFFER: usize = 64 * 1024;
 
 /// Samples of one placement, in the order of time.
 pub struct MotionSpill {
-    file: BufReader<SpooledTempFile>,
+    kept: Kept,
     count: usize,
-    left: usize,
-    folder: PathBuf,
+}
+
+enum Kept {
+    /// All of them.
+    InMemory(vec::IntoIter<KinematicSample>),
+    InFile(BufReader<File>, usize, PathBuf),
 }
 
 impl MotionSpill {
-    /// Puts samples aside, more than `in_memory` bytes of them in a file in `folder`.
+    /// Puts samples aside: where they are more than `in_memory` bytes, in a file in `folder`.
     ///
     /// # Errors
     /// [`RecordingError::PutAside`].
     pub fn new(
-        samples: &[KinematicSample],
+        samples: Vec<KinematicSample>,
         in_memory: usize,
         folder: &Path,
     ) -> Result<Self, RecordingError> {
-        Self::written(samples, in_memory, folder).map_err(|source| RecordingError::PutAside {
-            folder: folder.to_owned(),
-            source,
-        })
-    }
-
-    fn written(samples: &[KinematicSample], in_memory: usize, folder: &Path) -> io::Result<Self> {
-        let mut file = BufWriter::with_capacity(BUFFER, spooled_tempfile_in(in_memory, folder));
-        for sample in samples {
-            file.write_all(&bytes_of(sample))?;
-        }
-        let mut file = file.into_inner().map_err(io::IntoInnerError::into_error)?;
-        file.seek(SeekFrom::Start(0))?;
-        Ok(Self {
-            file: BufReader::with_capacity(BUFFER, file),
-            count: samples.len(),
-            left: samples.len(),
-            folder: folder.to_owned(),
-        })
+        let count = samples.len();
+        let kept = if size_of_val(samples.as_slice()) <= in_memory {
+            Kept::InMemory(samples.into_iter())
+        } else {
+            let folder = folder.to_owned();
+            match written(&samples, &folder) {
+                Ok(file) => Kept::InFile(file, count, folder),
+                Err(source) => return Err(RecordingError::PutAside { folder, source }),
+            }
+        };
+        Ok(Self { kept, count })
     }
 
     /// How many there are in all.
@@ -64,7 +62,10 @@ impl MotionSpill {
 
     /// Whether all were taken.
     pub fn is_empty(&self) -> bool {
-        self.left == 0
+        match &self.kept {
+            Kept::InMemory(samples) => samples.as_slice().is_empty(),
+            Kept::InFile(_, left, _) => *left == 0,
+        }
     }
 
     /// The next sample; none after the last.
@@ -72,18 +73,31 @@ impl MotionSpill {
     /// # Errors
     /// [`RecordingError::PutAside`].
     pub fn next_sample(&mut self) -> Result<Option<KinematicSample>, RecordingError> {
-        if self.left == 0 {
-            return Ok(None);
+        match &mut self.kept {
+            Kept::InMemory(samples) => Ok(samples.next()),
+            Kept::InFile(_, 0, _) => Ok(None),
+            Kept::InFile(file, left, folder) => {
+                let mut bytes = [0; SAMPLE];
+                let read = file.read_exact(&mut bytes);
+                read.map_err(|source| RecordingError::PutAside {
+                    folder: folder.clone(),
+                    source,
+                })?;
+                *left -= 1;
+                Ok(Some(sample_of(&bytes)))
+            }
         }
-        let mut bytes = [0; SAMPLE];
-        let read = self.file.read_exact(&mut bytes);
-        read.map_err(|source| RecordingError::PutAside {
-            folder: self.folder.clone(),
-            source,
-        })?;
-        self.left -= 1;
-        Ok(Some(sample_of(&bytes)))
     }
+}
+
+fn written(samples: &[KinematicSample], folder: &Path) -> io::Result<BufReader<File>> {
+    let mut file = BufWriter::with_capacity(BUFFER, tempfile_in(folder)?);
+    for sample in samples {
+        file.write_all(&bytes_of(sample))?;
+    }
+    let mut file = file.into_inner().map_err(io::IntoInnerError::into_error)?;
+    file.seek(SeekFrom::Start(0))?;
+    Ok(BufReader::with_capacity(BUFFER, file))
 }
 
 fn bytes_of(sample: &KinematicSample) -> [u8; SAMPLE] {
@@ -201,7 +215,7 @@ mod tests {
         let samples: Vec<KinematicSample> = (0..1000).map(sample).collect();
         let folder = tempfile::tempdir().unwrap();
         for in_memory in [0, 1000, 1 << 20] {
-            let mut spill = MotionSpill::new(&samples, in_memory, folder.path()).unwrap();
+            let mut spill = MotionSpill::new(samples.clone(), in_memory, folder.path()).unwrap();
             assert_eq!(spill.count(), samples.len());
             for sample in &samples {
                 assert_eq!(spill.next_sample().unwrap().as_ref(), Some(sample));

@@ -1,13 +1,16 @@
 //! Virtual IMUs of a moving person, whole motions at once.
 
+use std::collections::BTreeSet;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use cromosim_body::{BodyModel, ShapedBody};
 use cromosim_imu::{
     AmbientField, Device, Differentiation, DrawnTexture, ImuOptions, KinematicSample,
-    MotionCorrection, MountedSensor, MountedSensors, OrientationSource, PlacementSet, PoseStd,
-    SensorTrajectory, TextureSegment, Trim, VirtualImu, add_texture, simulate_kinematics_on,
+    MotionCorrection, MountedSensor, MountedSensors, OrientationSource, Placement, PlacementSet,
+    PoseStd, SensorTrajectory, TextureSegment, Trim, VirtualImu, add_texture,
+    simulate_kinematics_on, simulate_several_on,
 };
 use cromosim_learned::{LearnedSimulator, MappingFile, Patch, SiteMotion, scheme_for_networks};
 use cromosim_spatial::{PoseTimes, uniform_stamps};
@@ -20,6 +23,12 @@ use crate::{
 
 /// Bytes of samples that a motion's placements may keep in memory until they are written.
 const IN_MEMORY: usize = 128 << 20;
+
+/// Placements that are simulated at once: their segments are found once a pose.
+const MOST_AT_ONCE: usize = 4;
+/// Poses that these may hold in memory: longer motions are simulated a placement at a time. Of a pose
+/// there are 1.5 KB.
+const POSES_AT_ONCE: usize = 1 << 16;
 
 /// Where samples are put aside until they are read.
 #[derive(Clone, Debug)]
@@ -210,31 +219,72 @@ impl Simulation {
         }
         let times = PoseTimes::new(stamps).map_err(RecordingError::from)?;
         advance();
-        let one = |index: usize| {
+        let together = |indices: Range<usize>| -> Result<Vec<SimulatedPlacement>, E> {
             check()?;
-            let trajectory = self.trajectory(person, &shaped, index)?;
-            let mounted = (&shaped, &sites.sensors()[index]);
-            let simulated =
-                self.simulate_placement(person, mounted, index, (&trajectory, &times), aside);
-            advance();
-            Ok(simulated?)
+            let motions = self.motions(person, &shaped, indices.clone(), &times);
+            let one = |(index, (trajectory, motion)): (usize, _)| {
+                check()?;
+                let mounted = (&shaped, &sites.sensors()[index]);
+                let simulated =
+                    self.simulate_placement(person, mounted, index, (&trajectory, motion), aside);
+                advance();
+                Ok(simulated?)
+            };
+            indices.zip(motions?).map(one).collect()
         };
         // Of several errors the first placement's is said, whichever comes first.
-        let indices = (0..sites.sensors().len()).into_par_iter();
-        let placements: Vec<Result<_, E>> = indices.map(one).collect();
+        let count = sites.sensors().len();
+        let groups = groups(count, stamps.len()).into_par_iter();
+        let placements: Vec<Result<_, E>> = groups.map(together).collect();
+        let placements = placements.into_iter().collect::<Result<Vec<_>, E>>()?;
         Ok(SimulatedPerson {
-            placements: placements.into_iter().collect::<Result<_, E>>()?,
+            placements: placements.into_iter().flatten().collect(),
             sites,
         })
     }
 
-    /// Of one placement at a time: the poses of all would be most of a long motion's memory.
-    fn trajectory(
+    /// Trajectories and ideal motions of some placements.
+    fn motions(
         &self,
         person: &PlayedPerson,
         shaped: &ShapedBody,
-        index: usize,
-    ) -> Result<SensorTrajectory, RecordingError> {
+        indices: Range<usize>,
+        times: &PoseTimes,
+    ) -> Result<Vec<(SensorTrajectory, Vec<KinematicSample>)>, RecordingError> {
+        let placements = &self.placements.placements()[indices];
+        let trajectories = self.trajectories(person, shaped, placements)?;
+        let [start, end] =
+            [person.played.start(), person.played.end()].map(|frame| person.stamps[*frame]);
+        let output = |placement: &Placement| uniform_stamps(start, end, placement.rate_hz());
+        let outputs: Vec<_> = placements.iter().map(output).collect::<Result<_, _>>()?;
+        let schemes: BTreeSet<_> = placements.iter().map(|one| one.scheme().name()).collect();
+        let by = |placement: &Placement| match self.options.differentiation {
+            Some(by @ Differentiation::Bandwidth(_)) => by,
+            _ => placement.scheme().into(),
+        };
+        let motions = match placements.first().map(by) {
+            Some(Differentiation::Scheme(scheme)) if schemes.len() == 1 => {
+                simulate_several_on(times, &trajectories, scheme, &outputs)?
+            }
+            _ => {
+                let several = placements.iter().zip(&trajectories).zip(&outputs);
+                several
+                    .map(|((placement, trajectory), output)| {
+                        simulate_kinematics_on(times, trajectory, by(placement), output)
+                    })
+                    .collect::<Result<_, _>>()?
+            }
+        };
+        Ok(trajectories.into_iter().zip(motions).collect())
+    }
+
+    /// Of some placements at a time: the poses of all would be most of a long motion's memory.
+    fn trajectories(
+        &self,
+        person: &PlayedPerson,
+        shaped: &ShapedBody,
+        placements: &[Placement],
+    ) -> Result<Vec<SensorTrajectory>, RecordingError> {
         let motion = &person.motion;
         let confidences = motion.confidence.as_deref().unwrap_or_default();
         let correlation_s = self.options.pose_error_correlation_s;
@@ -242,13 +292,14 @@ impl Simulation {
             .iter()
             .map(|&confidence| PoseStd::from_confidence(confidence, correlation_s))
             .collect();
-        let alone = &self.placements.placements()[index..=index];
-        let mounted = MountedSensors::new(shaped, alone)?;
-        let mut trajectories = mounted.trajectories(&person.stamps, &motion.frames)?;
-        Ok(trajectories
-            .swap_remove(0)
-            .with_pose_stds(&stds)
-            .from_source(motion.source()))
+        let mounted = MountedSensors::new(shaped, placements)?;
+        let trajectories = mounted.trajectories(&person.stamps, &motion.frames)?;
+        let finished = |trajectory: SensorTrajectory| {
+            trajectory
+                .with_pose_stds(&stds)
+                .from_source(motion.source())
+        };
+        Ok(trajectories.into_iter().map(finished).collect())
     }
 
     fn simulate_placement(
@@ -256,14 +307,11 @@ impl Simulation {
         person: &PlayedPerson,
         (shaped, mounted): (&ShapedBody, &MountedSensor),
         index: usize,
-        (trajectory, times): (&SensorTrajectory, &PoseTimes),
+        (trajectory, mut motion): (&SensorTrajectory, Vec<KinematicSample>),
         aside: &Aside,
     ) -> Result<SimulatedPlacement, RecordingError> {
         let (placement, device) = (&self.placements.placements()[index], &self.devices[index]);
         let (name, rate_hz) = (placement.name(), placement.rate_hz());
-        let [start, end] = [person.played.start(), person.played.end()]
-            .map(|frame| trajectory.frames()[*frame].stamp);
-        let output = uniform_stamps(start, end, rate_hz)?;
         let options = ImuOptions {
             rate_hz,
             seed: self.seed,
@@ -276,11 +324,6 @@ impl Simulation {
             orientation: self.options.orientation,
         };
         let imu = VirtualImu::new(device, options)?;
-        let by = match self.options.differentiation {
-            Some(by @ Differentiation::Bandwidth(_)) => by,
-            _ => placement.scheme().into(),
-        };
-        let mut motion = simulate_kinematics_on(times, trajectory, by, &output)?;
         let (mut quality, span) =
             Quality::of(&motion, self.options.trim).ok_or(RecordingError::AllTrimmed)?;
         motion.retain(|sample| span.contains(&sample.stamp));
@@ -297,7 +340,7 @@ impl Simulation {
         let [motion] = motion;
         Ok(SimulatedPlacement {
             name: name.to_owned(),
-            motion: MotionSpill::new(&motion, aside.in_memory, &aside.folder)?,
+            motion: MotionSpill::new(motion, aside.in_memory, &aside.folder)?,
             imu,
             quality,
         })
@@ -320,4 +363,16 @@ impl Simulation {
         })?;
         Ok(Some(drawn))
     }
+}
+
+/// Which placements are simulated at once: as many as memory allows, but no fewer groups than there are
+/// cores.
+fn groups(placements: usize, poses: usize) -> Vec<Range<usize>> {
+    let within_memory = (POSES_AT_ONCE / poses.max(1)).clamp(1, MOST_AT_ONCE);
+    let shared = placements.div_ceil(rayon::current_num_threads());
+    let size = within_memory.min(shared).max(1);
+    let starts = (0..placements).step_by(size);
+    starts
+        .map(|start| start..(start + size).min(placements))
+        .collect()
 }

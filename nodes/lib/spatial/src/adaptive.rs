@@ -5,6 +5,7 @@ use crate::equations::{IntervalWeights, SplineEquations};
 use crate::fourth_differences::{MEDIAN_OF_SQUARE, fourth_difference, white_noise_variance};
 use crate::local_spline::{LocalSolution, Series, Statements};
 use crate::weight_search::LOWEST_LOG_WEIGHT;
+use crate::wide::{Four, add, scale, widest};
 
 /// Time over which neighbours share one drive, standard deviation, s: shorter, a burst's own noise
 /// decides; longer, a burst's start is smoothed away. Chosen among 0.05, 0.1, 0.15 and 0.25 s on
@@ -159,8 +160,7 @@ impl<const L: usize> Adaptation<L> {
             let weights = adaptation.weights();
             // Not refined: squares are all that is wanted of it.
             solution.solve_and_state(equations, series, &weights, &mut statements)?;
-            adaptation.take_evidence(equations, &weights, &mut statements);
-            adaptation.update(equations, &mut statements, Stride::Whole);
+            adaptation.step(equations, &weights, &mut statements, Stride::Whole);
         }
         Ok(adaptation)
     }
@@ -190,8 +190,20 @@ impl<const L: usize> Adaptation<L> {
         weights: &[IntervalWeights<L>],
         statements: &mut Statements<L>,
     ) {
-        self.take_evidence(equations, weights, statements);
-        self.update(equations, statements, Stride::Half);
+        self.step(equations, weights, statements, Stride::Half);
+    }
+
+    fn step(
+        &mut self,
+        equations: &SplineEquations,
+        weights: &[IntervalWeights<L>],
+        statements: &mut Statements<L>,
+        stride: Stride,
+    ) {
+        widest!(s => {
+            self.take_evidence(equations, weights, statements);
+            self.update(s, equations, statements, stride);
+        });
     }
 
     /// Variance of each sample's noise, unit^2.
@@ -203,28 +215,30 @@ impl<const L: usize> Adaptation<L> {
     /// width that its quotient with the drive may stand for both.
     pub(crate) fn weights(&self) -> Vec<IntervalWeights<L>> {
         let lowest = 10f64.powf(LOWEST_LOG_WEIGHT);
-        let of_interval = |k: usize| {
-            let noise: [f64; L] = std::array::from_fn(|lane| self.noise_over(k, lane));
-            [
-                std::array::from_fn(|lane| {
-                    (noise[lane] / self.drive[k][lane]).clamp(lowest, LARGEST_WEIGHT)
-                }),
-                std::array::from_fn(|lane| {
-                    noise[lane] / (self.vigour[k][lane] + noise[lane] * self.least_vigour)
-                }),
-            ]
-        };
-        (0..self.drive.len()).map(of_interval).collect()
+        let mut weights = vec![[[0.0; L]; 2]; self.drive.len()];
+        widest!(_s => {
+            for (k, [fifth, second]) in weights.iter_mut().enumerate() {
+                for lane in 0..L {
+                    let noise = self.noise_over(k, lane);
+                    fifth[lane] = (noise / self.drive[k][lane]).clamp(lowest, LARGEST_WEIGHT);
+                    second[lane] = noise / (self.vigour[k][lane] + noise * self.least_vigour);
+                }
+            }
+        });
+        weights
     }
 
     /// Variance of the noise over a knot interval.
+    #[inline(always)]
     fn noise_over(&self, interval: usize, lane: usize) -> f64 {
         (self.noise[interval][lane] * self.noise[interval + 1][lane]).sqrt()
     }
 
     /// A step towards the greatest likelihood.
+    #[inline(always)]
     fn update(
         &mut self,
+        s: impl Four,
         equations: &SplineEquations,
         Statements {
             drives,
@@ -234,8 +248,8 @@ impl<const L: usize> Adaptation<L> {
         stride: Stride,
     ) {
         let mut near = drives.clone();
-        Kernel::new(NEAR_DRIVE_INTERVALS).smooth(&mut near);
-        let around = local_means(drives, SHARED_DRIVE_S / equations.interval);
+        Kernel::new(NEAR_DRIVE_INTERVALS).smooth(s, &mut near);
+        let around = local_means(s, drives, SHARED_DRIVE_S / equations.interval);
         for ((drive, near), around) in self.drive.iter_mut().zip(near).zip(around) {
             let found = with_expected(near, around, NEAR_DRIVE_COUNT);
             *drive = match stride {
@@ -243,19 +257,25 @@ impl<const L: usize> Adaptation<L> {
                 Stride::Half => std::array::from_fn(|lane| (drive[lane] * found[lane]).sqrt()),
             };
         }
-        self.learn_vigour(equations, accelerations);
-        take_fourth_roots(residuals);
-        let found = local_means(residuals, SHARED_NOISE_S / equations.interval)
+        self.learn_vigour(s, equations, accelerations);
+        take_fourth_roots(s, residuals);
+        let found = local_means(s, residuals, SHARED_NOISE_S / equations.interval)
             .map(|roots| roots.map(|root| root.powi(4)));
         for (noise, found) in self.noise.iter_mut().zip(found) {
             *noise = std::array::from_fn(|lane| found[lane].max(self.least_noise[lane]));
         }
     }
 
-    fn learn_vigour(&mut self, equations: &SplineEquations, accelerations: &mut [Evidence<L>]) {
+    #[inline(always)]
+    fn learn_vigour(
+        &mut self,
+        s: impl Four,
+        equations: &SplineEquations,
+        accelerations: &mut [Evidence<L>],
+    ) {
         // White up to half the samples' rate, the same square would be less dense.
         let denser = 0.5 / (equations.interval * VIGOUR_BAND_HZ);
-        let found = local_means(accelerations, SHARED_VIGOUR_S / equations.interval);
+        let found = local_means(s, accelerations, SHARED_VIGOUR_S / equations.interval);
         for (vigour, found) in self.vigour.iter_mut().zip(found) {
             *vigour = found.map(|square| denser * square);
         }
@@ -263,6 +283,7 @@ impl<const L: usize> Adaptation<L> {
 
     /// Turns what each knot interval says about the drive, and each sample about the noise, into
     /// sums of squares and what they count.
+    #[inline(always)]
     fn take_evidence(
         &self,
         equations: &SplineEquations,
@@ -300,17 +321,20 @@ enum Stride {
 type Evidence<const L: usize> = [[f64; L]; 2];
 
 /// Means around each entry, by a kernel of this standard deviation.
+#[inline(always)]
 fn local_means<const L: usize>(
+    s: impl Four,
     evidence: &mut [Evidence<L>],
     intervals: f64,
 ) -> impl Iterator<Item = [f64; L]> {
-    Kernel::new(intervals.max(LEAST_SHARED_INTERVALS)).smooth(evidence);
+    Kernel::new(intervals.max(LEAST_SHARED_INTERVALS)).smooth(s, evidence);
     evidence.iter().map(|[square, count]| {
         std::array::from_fn(|lane| (square[lane] / count[lane]).max(f64::MIN_POSITIVE))
     })
 }
 
 /// The mean that evidence gives together with what is expected, which counts so much.
+#[inline(always)]
 fn with_expected<const L: usize>(
     [square, count]: Evidence<L>,
     expected: [f64; L],
@@ -325,9 +349,10 @@ fn with_expected<const L: usize>(
 
 /// In place of each sum of squares the fourth root of the mean over the nearest entries, times what
 /// the entry counts.
-fn take_fourth_roots<const L: usize>(evidence: &mut [Evidence<L>]) {
+#[inline(always)]
+fn take_fourth_roots<const L: usize>(s: impl Four, evidence: &mut [Evidence<L>]) {
     let mut near = evidence.to_vec();
-    Kernel::new(NEAR_NOISE_INTERVALS).smooth(&mut near);
+    Kernel::new(NEAR_NOISE_INTERVALS).smooth(s, &mut near);
     for ([square, count], [near_square, near_count]) in evidence.iter_mut().zip(near) {
         for lane in 0..L {
             let mean = near_square[lane] / near_count[lane];
@@ -374,24 +399,27 @@ impl Kernel {
     }
 
     /// Weighted sums in place; a quotient of two of them is a weighted mean.
-    fn smooth<const L: usize>(&self, values: &mut [Evidence<L>]) {
+    #[inline(always)]
+    fn smooth<const L: usize>(&self, s: impl Four, values: &mut [Evidence<L>]) {
         let mut before = vec![[[0.0; L]; 2]; values.len()];
         for _ in 0..2 {
             let mut sum = [[0.0; L]; 2];
             for (before, own) in before.iter_mut().zip(&*values) {
                 for (sum, own) in sum.iter_mut().zip(own) {
-                    (0..L).for_each(|lane| sum[lane] = sum[lane] * self.decay + own[lane]);
+                    scale(s, sum, self.decay);
+                    add(s, sum, own);
                 }
                 *before = sum;
             }
             let mut after = [[0.0; L]; 2];
             for (value, before) in values.iter_mut().zip(&before).rev() {
                 for ((value, before), after) in value.iter_mut().zip(before).zip(&mut after) {
-                    for lane in 0..L {
-                        let own = value[lane];
-                        value[lane] = before[lane] + after[lane];
-                        after[lane] = (after[lane] + own) * self.decay;
-                    }
+                    let mut next = *after;
+                    add(s, &mut next, value);
+                    scale(s, &mut next, self.decay);
+                    *value = *before;
+                    add(s, value, after);
+                    *after = next;
                 }
             }
         }

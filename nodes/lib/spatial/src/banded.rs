@@ -1,6 +1,7 @@
 //! Symmetric positive definite band matrices: factorisation, solution, determinant.
 
 use crate::SpatialError;
+use crate::wide::{Four, Plain, add_scaled, divided, multiply, subtract_product};
 
 /// Bands stored beside the diagonal: a quintic B-spline overlaps five neighbours on each side.
 pub(crate) const BANDWIDTH: usize = 5;
@@ -47,7 +48,8 @@ pub(crate) struct Factor<const L: usize = 1> {
     /// zeros follow. From [`Factor::invert`] on, row `i + 5` is the inverse's row i.
     rows: Vec<Row<L>>,
     size: usize,
-    log_determinant: [f64; L],
+    /// Of one lane alone.
+    log_determinant: f64,
 }
 
 /// Rows below the last that inverting reads.
@@ -58,7 +60,7 @@ impl<const L: usize> Default for Factor<L> {
         Self {
             rows: Vec::new(),
             size: 0,
-            log_determinant: [0.0; L],
+            log_determinant: 0.0,
         }
     }
 }
@@ -66,8 +68,10 @@ impl<const L: usize> Default for Factor<L> {
 impl<const L: usize> Factor<L> {
     /// Factors matrices in O(N), reusing this factor's memory, and on the way down does the first
     /// half of [`Factor::solve`] to `right` (empty where nothing is to be solved).
+    #[inline(always)]
     pub(crate) fn factor_and_solve_down<const C: usize>(
         &mut self,
+        s: impl Four,
         size: usize,
         matrix_row: impl Fn(usize) -> Row<L>,
         right: &mut [[f64; C]],
@@ -75,52 +79,55 @@ impl<const L: usize> Factor<L> {
         self.rows.clear();
         self.rows.reserve(size + PADDING);
         self.size = size;
-        let (mut log_determinant, mut product) = ([0.0; L], [1.0_f64; L]);
+        let (mut log_determinant, mut product) = (0.0, 1.0_f64);
         for i in 0..size {
             let given = matrix_row(i);
             let (mut row, diagonal) = match self.rows.last_chunk() {
-                Some(above) => eliminate(above, &given),
-                None => eliminate(&after_zeros(&self.rows), &given),
+                Some(above) => eliminate(s, above, &given),
+                None => eliminate(s, &after_zeros(&self.rows), &given),
             };
-            if !diagonal.iter().all(|d| *d > 0.0 && d.is_finite()) {
+            let is_positive = |fine: bool, d: &f64| fine & (*d > 0.0) & (*d < f64::INFINITY);
+            if !diagonal.iter().fold(true, is_positive) {
                 return Err(SpatialError::Singular { index: i });
             }
-            row[0] = diagonal.map(|d| 1.0 / d);
+            row[0] = divided(s, &[1.0; L], &diagonal);
             self.rows.push(row);
-            for lane in 0..L {
-                product[lane] *= diagonal[lane];
-                if !(1e-100..1e100).contains(&product[lane]) {
-                    log_determinant[lane] += product[lane].ln();
-                    product[lane] = 1.0;
+            // Nobody asks for those of several.
+            if L == 1 {
+                product *= diagonal[0];
+                if !(1e-100..1e100).contains(&product) {
+                    log_determinant += product.ln();
+                    product = 1.0;
                 }
             }
             if i < right.len() {
-                solve_row_down(&row, i, right);
+                solve_row_down(s, &row, i, right);
             }
         }
         self.rows.resize(size + PADDING, [[0.0; L]; BANDWIDTH + 1]);
-        self.log_determinant =
-            std::array::from_fn(|lane| log_determinant[lane] + product[lane].ln());
+        self.log_determinant = log_determinant + product.ln();
         Ok(())
     }
 
     /// Turns into the entries of `M^-1` within the band, the last row first, in O(N) (Takahashi,
     /// Fagan and Chin 1973): from `Z = D^-1 L^-1 + (1 - L^T) Z`. On the way up finishes `x` where it
     /// has only been solved down, and visits each row of the inverse with those after it.
+    #[inline(always)]
     pub(crate) fn invert<const C: usize>(
         &mut self,
+        s: impl Four,
         x: &mut [[f64; C]],
         solved: Solved,
         mut visit: impl FnMut(usize, &[[f64; C]], &InverseBlock<L>),
     ) {
         for i in (0..self.size).rev() {
             if solved == Solved::Down {
-                self.solve_row_up(i, x);
+                self.solve_row_up(s, i, x);
             }
             let Some(window) = self.rows[i..].first_chunk() else {
                 return;
             };
-            let row = inverse_row(window);
+            let row = inverse_row(s, window);
             self.rows[i + BANDWIDTH] = row;
             if let Some(block) = self.rows[i + BANDWIDTH..].first_chunk() {
                 visit(i, x, block);
@@ -137,32 +144,36 @@ impl<const L: usize> Factor<L> {
     }
 
     /// Solves `M x = right` in place, all channels at once; channel c belongs to lane c modulo L.
-    pub(crate) fn solve<const C: usize>(&self, right: &mut [[f64; C]]) {
+    #[inline(always)]
+    pub(crate) fn solve<const C: usize>(&self, s: impl Four, right: &mut [[f64; C]]) {
         for i in 0..right.len() {
-            solve_row_down(&self.rows[i], i, right);
+            solve_row_down(s, &self.rows[i], i, right);
         }
-        self.solve_up(right);
+        self.solve_up(s, right);
     }
 
     /// The second half of solving.
-    pub(crate) fn solve_up<const C: usize>(&self, right: &mut [[f64; C]]) {
+    #[inline(always)]
+    pub(crate) fn solve_up<const C: usize>(&self, s: impl Four, right: &mut [[f64; C]]) {
         for i in (0..right.len()).rev() {
-            self.solve_row_up(i, right);
+            self.solve_row_up(s, i, right);
         }
     }
 
     #[inline(always)]
-    fn solve_row_up<const C: usize>(&self, i: usize, right: &mut [[f64; C]]) {
+    fn solve_row_up<const C: usize>(&self, s: impl Four, i: usize, right: &mut [[f64; C]]) {
         // L^T: row i scatters into the rows above it once it is final; dividing by D first.
         let (here, below) = right[i..].split_at_mut(1);
         let x = &mut here[0];
-        (0..C).for_each(|c| x[c] *= self.rows[i][0][c % L]);
+        for x in x.as_chunks_mut::<L>().0 {
+            multiply(s, x, &self.rows[i][0]);
+        }
         let rows = &self.rows[i + 1..];
         match (rows.first_chunk(), below.first_chunk()) {
             (Some(rows), Some(below)) => {
-                solve_up_from::<L, C>(x, rows as &[_; BANDWIDTH], below as &[_; BANDWIDTH])
+                solve_up_from::<L, C>(s, x, rows as &[_; BANDWIDTH], below as &[_; BANDWIDTH])
             }
-            _ => solve_up_from(x, rows, below),
+            _ => solve_up_from(s, x, rows, below),
         }
     }
 }
@@ -195,12 +206,12 @@ impl Factor {
         size: usize,
         matrix_row: impl Fn(usize) -> Row<1>,
     ) -> Result<(), SpatialError> {
-        self.factor_and_solve_down::<0>(size, matrix_row, &mut [])
+        self.factor_and_solve_down::<0>(Plain, size, matrix_row, &mut [])
     }
 
     /// Natural logarithm of the determinant.
     pub(crate) fn log_determinant(&self) -> f64 {
-        self.log_determinant[0]
+        self.log_determinant
     }
 
     /// The part that counts of `M^-1 right`, for a right side that is zero but for the rows from
@@ -294,23 +305,25 @@ impl InverseBands {
 /// `row^T Z row` in each lane, Z the block or, for rows of five, its upper left part.
 #[inline(always)]
 pub(crate) fn quadratic_form<const L: usize, const W: usize>(
+    s: impl Four,
     block: &InverseBlock<L>,
     row: &[f64; W],
 ) -> [f64; L] {
     let mut form = [0.0; L];
-    add_column::<L, W, 0>(&mut form, block, row);
-    add_column::<L, W, 1>(&mut form, block, row);
-    add_column::<L, W, 2>(&mut form, block, row);
-    add_column::<L, W, 3>(&mut form, block, row);
-    add_column::<L, W, 4>(&mut form, block, row);
+    add_column::<L, W, 0>(s, &mut form, block, row);
+    add_column::<L, W, 1>(s, &mut form, block, row);
+    add_column::<L, W, 2>(s, &mut form, block, row);
+    add_column::<L, W, 3>(s, &mut form, block, row);
+    add_column::<L, W, 4>(s, &mut form, block, row);
     if W > BANDWIDTH {
-        add_column::<L, W, 5>(&mut form, block, row);
+        add_column::<L, W, 5>(s, &mut form, block, row);
     }
     form
 }
 
 #[inline(always)]
 fn add_column<const L: usize, const W: usize, const J: usize>(
+    s: impl Four,
     form: &mut [f64; L],
     block: &InverseBlock<L>,
     row: &[f64; W],
@@ -318,13 +331,9 @@ fn add_column<const L: usize, const W: usize, const J: usize>(
     let mut product = [0.0; L];
     for i in 0..W {
         let entry = &block[i.min(J)][i.abs_diff(J)];
-        for lane in 0..L {
-            product[lane] += row[i] * entry[lane];
-        }
+        add_scaled(s, &mut product, row[i], entry);
     }
-    for lane in 0..L {
-        form[lane] += product[lane] * row[J];
-    }
+    add_scaled(s, form, row[J], &product);
 }
 
 /// Fewer rows than the band is wide, after rows of zeros, which change nothing.
@@ -337,18 +346,22 @@ fn after_zeros<const L: usize>(rows: &[Row<L>]) -> [Row<L>; BANDWIDTH] {
 /// A row of L, its diagonal left out, and the row's entry of D, from the rows above it (the nearest
 /// last) and the matrix' own row.
 #[inline(always)]
-fn eliminate<const L: usize>(above: &[Row<L>; BANDWIDTH], given: &Row<L>) -> (Row<L>, [f64; L]) {
+fn eliminate<const L: usize>(
+    s: impl Four,
+    above: &[Row<L>; BANDWIDTH],
+    given: &Row<L>,
+) -> (Row<L>, [f64; L]) {
     let mut made = Eliminated {
         scaled: *given,
         row: [[0.0; L]; BANDWIDTH + 1],
         diagonal: given[0],
     };
     // Each by its own name: all places are then known when this is compiled.
-    made.column::<5>(above);
-    made.column::<4>(above);
-    made.column::<3>(above);
-    made.column::<2>(above);
-    made.column::<1>(above);
+    made.column::<5>(s, above);
+    made.column::<4>(s, above);
+    made.column::<3>(s, above);
+    made.column::<2>(s, above);
+    made.column::<1>(s, above);
     (made.row, made.diagonal)
 }
 
@@ -362,83 +375,101 @@ struct Eliminated<const L: usize> {
 
 impl<const L: usize> Eliminated<L> {
     #[inline(always)]
-    fn column<const K: usize>(&mut self, above: &[Row<L>; BANDWIDTH]) {
+    fn column<const K: usize>(&mut self, s: impl Four, above: &[Row<L>; BANDWIDTH]) {
         let other = &above[BANDWIDTH - K];
+        let mut own = self.scaled[K];
         for n in K + 1..=BANDWIDTH {
-            let other = &other[n - K];
-            (0..L).for_each(|lane| self.scaled[K][lane] -= self.scaled[n][lane] * other[lane]);
+            subtract_product(s, &mut own, &self.scaled[n], &other[n - K]);
         }
-        (0..L).for_each(|lane| {
-            self.row[K][lane] = self.scaled[K][lane] * other[0][lane];
-            self.diagonal[lane] -= self.scaled[K][lane] * self.row[K][lane];
-        });
+        self.scaled[K] = own;
+        self.row[K] = own;
+        multiply(s, &mut self.row[K], &other[0]);
+        subtract_product(s, &mut self.diagonal, &own, &self.row[K]);
     }
 }
 
 /// The first half of solving, row i after those above it.
 #[inline(always)]
-fn solve_row_down<const L: usize, const C: usize>(row: &Row<L>, i: usize, right: &mut [[f64; C]]) {
+fn solve_row_down<const L: usize, const C: usize>(
+    s: impl Four,
+    row: &Row<L>,
+    i: usize,
+    right: &mut [[f64; C]],
+) {
     let (above, here) = right.split_at_mut(i);
     let x = &mut here[0];
     match above.last_chunk::<BANDWIDTH>() {
-        Some(above) => solve_down_from(x, row, above),
-        None => solve_down_from(x, row, above),
+        Some(above) => solve_down_from(s, x, row, above),
+        None => solve_down_from(s, x, row, above),
     }
 }
 
 #[inline(always)]
 fn solve_down_from<const L: usize, const C: usize>(
+    s: impl Four,
     x: &mut [f64; C],
     row: &Row<L>,
     above: &[[f64; C]],
 ) {
     for (l, other) in row[1..].iter().zip(above.iter().rev()) {
-        for c in 0..C {
-            x[c] -= l[c % L] * other[c];
-        }
+        subtract_from_channels(s, x, l, other);
     }
 }
 
 #[inline(always)]
 fn solve_up_from<const L: usize, const C: usize>(
+    s: impl Four,
     x: &mut [f64; C],
     rows: &[Row<L>],
     below: &[[f64; C]],
 ) {
     for (k, (row, other)) in rows.iter().zip(below).take(BANDWIDTH).enumerate() {
-        for c in 0..C {
-            x[c] -= row[k + 1][c % L] * other[c];
-        }
+        subtract_from_channels(s, x, &row[k + 1], other);
+    }
+}
+
+/// `x -= l other`, each channel by its lane's factor.
+#[inline(always)]
+fn subtract_from_channels<const L: usize, const C: usize>(
+    s: impl Four,
+    x: &mut [f64; C],
+    l: &[f64; L],
+    other: &[f64; C],
+) {
+    let channels = x.as_chunks_mut::<L>().0.iter_mut();
+    for (x, other) in channels.zip(other.as_chunks::<L>().0) {
+        subtract_product(s, x, l, other);
     }
 }
 
 /// A row of the inverse from L's own row and the five below it, and the inverse's five rows below.
 #[inline(always)]
-fn inverse_row<const L: usize>(window: &[Row<L>; 1 + PADDING]) -> Row<L> {
+fn inverse_row<const L: usize>(s: impl Four, window: &[Row<L>; 1 + PADDING]) -> Row<L> {
     let mut row = [
         window[0][0],
-        inverse_entry::<L, 1>(window),
-        inverse_entry::<L, 2>(window),
-        inverse_entry::<L, 3>(window),
-        inverse_entry::<L, 4>(window),
-        inverse_entry::<L, 5>(window),
+        inverse_entry::<L, 1>(s, window),
+        inverse_entry::<L, 2>(s, window),
+        inverse_entry::<L, 3>(s, window),
+        inverse_entry::<L, 4>(s, window),
+        inverse_entry::<L, 5>(s, window),
     ];
+    let mut diagonal = row[0];
     for k in 1..=BANDWIDTH {
-        for lane in 0..L {
-            row[0][lane] -= window[k][k][lane] * row[k][lane];
-        }
+        subtract_product(s, &mut diagonal, &window[k][k], &row[k]);
     }
+    row[0] = diagonal;
     row
 }
 
 #[inline(always)]
-fn inverse_entry<const L: usize, const J: usize>(window: &[Row<L>; 1 + PADDING]) -> [f64; L] {
+fn inverse_entry<const L: usize, const J: usize>(
+    s: impl Four,
+    window: &[Row<L>; 1 + PADDING],
+) -> [f64; L] {
     let mut entry = [0.0; L];
     for k in 1..=BANDWIDTH {
         let (l, z) = (&window[k][k], &window[BANDWIDTH + k.min(J)][k.abs_diff(J)]);
-        for lane in 0..L {
-            entry[lane] -= l[lane] * z[lane];
-        }
+        subtract_product(s, &mut entry, l, z);
     }
     entry
 }

@@ -23,7 +23,7 @@ fn factor_solve_and_determinant_agree_with_dense_matrices() {
     assert!((factor.log_determinant() - dense.determinant().ln()).abs() < 1e-10);
     let mut x: Vec<[f64; 2]> = (0..size).map(|i| [(i as f64).sin(), 1.0]).collect();
     let given = x.clone();
-    factor.solve(&mut x);
+    factor.solve(Plain, &mut x);
     for c in 0..2 {
         let product = &dense * DMatrix::from_iterator(size, 1, x.iter().map(|v| v[c]));
         assert!((0..size).all(|i| (product[i] - given[i][c]).abs() < 1e-12));
@@ -45,7 +45,7 @@ fn the_inverse_within_the_band_is_that_of_dense_matrices() {
     let mut factor = Factor::default();
     let row = |i: usize| banded.rows[i].map(|entry| [entry]);
     factor.factor_rows(size, row).unwrap();
-    factor.invert::<0>(&mut [], Solved::Whole, |_, _, _| {});
+    factor.invert::<0>(Plain, &mut [], Solved::Whole, |_, _, _| {});
     let found = factor.into_inverse();
     let inverse = dense.try_inverse().unwrap();
     for i in 0..size {
@@ -81,16 +81,17 @@ fn lanes_do_what_each_does_alone_to_the_bit() {
     let mut right: Vec<[f64; 2]> = (0..size).map(|i| [channel(i, 1), channel(i, 2)]).collect();
     let mut both = Factor::<2>::default();
     let rows = |i: usize| std::array::from_fn(|k| [row(i, 1)[k][0], row(i, 2)[k][0]]);
-    both.factor_and_solve_down(size, rows, &mut right).unwrap();
-    both.invert(&mut right, Solved::Down, |_, _, _| {});
+    both.factor_and_solve_down(Plain, size, rows, &mut right)
+        .unwrap();
+    both.invert(Plain, &mut right, Solved::Down, |_, _, _| {});
     let inverses = both.into_inverse();
     for (lane, seed) in [1, 2].into_iter().enumerate() {
         let mut alone = Factor::default();
         alone.factor_rows(size, |i| row(i, seed)).unwrap();
         let mut x: Vec<[f64; 1]> = (0..size).map(|i| [channel(i, seed)]).collect();
-        alone.solve(&mut x);
+        alone.solve(Plain, &mut x);
         assert!((0..size).all(|i| right[i][lane].to_bits() == x[i][0].to_bits()));
-        alone.invert(&mut x, Solved::Whole, |_, _, _| {});
+        alone.invert(Plain, &mut x, Solved::Whole, |_, _, _| {});
         let of_lane = inverses.entries.chunks_exact(2).map(|lanes| lanes[lane]);
         let inverse = alone.into_inverse().entries;
         // Before them stands what the inversion left of the factor's first rows.
@@ -117,7 +118,7 @@ fn a_local_solution_is_the_whole_one_where_it_counts() {
     for first in [0, 3, 200, 397] {
         let mut whole = vec![[0.0; 2]; size];
         whole[first..first + 3].copy_from_slice(&right);
-        factor.solve(&mut whole);
+        factor.solve(Plain, &mut whole);
         let (start, near) = factor.solve_near(first, &right);
         assert!(near.len() < 200, "{} rows of {size}", near.len());
         for (i, row) in whole.iter().enumerate() {

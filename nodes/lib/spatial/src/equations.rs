@@ -5,6 +5,7 @@ use crate::banded::{Banded, Factor, Row};
 use crate::basis::{AT_KNOT, Basis, BasisValues, DEGREE, ORDER};
 use crate::difference::MAX_STENCIL;
 use crate::end_derivatives::{EndDerivative, end_derivatives};
+use crate::wide::{Four, Plain, add_scaled, multiply, scaled, subtract_scaled};
 
 /// Derivative that smoothing penalises. Five is the highest that a quintic has; the response to
 /// noise, `1 / (1 + weight w^10)`, then falls the most sharply, and motion below the cutoff passes
@@ -163,6 +164,7 @@ impl SplineEquations {
     }
 
     /// What these weights of the knot intervals make of each row.
+    #[inline(always)]
     pub(crate) fn local_weights<const L: usize>(
         &self,
         weights: &[IntervalWeights<L>],
@@ -186,7 +188,12 @@ impl SplineEquations {
 
     /// Row i of `B^T B + P` for local weights.
     #[inline(always)]
-    pub(crate) fn local_row<const L: usize>(&self, i: usize, weights: &LocalWeights<L>) -> Row<L> {
+    pub(crate) fn local_row<const L: usize>(
+        &self,
+        s: impl Four,
+        i: usize,
+        weights: &LocalWeights<L>,
+    ) -> Row<L> {
         let mut entries = [[0.0; L]; ORDER];
         for (entry, given) in entries.iter_mut().zip(&self.gram.rows[i]) {
             *entry = [*given; L];
@@ -194,7 +201,7 @@ impl SplineEquations {
         if i < ORDER || i + ORDER >= self.basis.count() {
             for (end, weight) in self.ends.iter().zip(&weights.ends) {
                 if (end.first..end.first + ORDER).contains(&i) {
-                    add_products(&mut entries, i - end.first, &end.row, weight);
+                    add_products(s, &mut entries, i - end.first, &end.row, weight);
                 }
             }
         }
@@ -206,6 +213,7 @@ impl SplineEquations {
         ] {
             let place = i - first;
             add_all_products(
+                s,
                 &mut entries,
                 place,
                 &rows[intervals.clone()],
@@ -234,7 +242,7 @@ impl SplineEquations {
         scratch.coefficients.resize(self.basis.count(), [0.0; C]);
         for _ in 0..=refinements(weight) {
             self.residual(values, weight, scratch);
-            scratch.factor.solve(&mut scratch.correction);
+            scratch.factor.solve(Plain, &mut scratch.correction);
             for (coefficient, correction) in
                 scratch.coefficients.iter_mut().zip(&scratch.correction)
             {
@@ -259,7 +267,7 @@ impl SplineEquations {
                     .map(|weight| [[weight.fifth], [weight.second]])
                     .collect();
                 let weights = self.local_weights(&weights);
-                let row = |i: usize| self.local_row(i, &weights);
+                let row = |i: usize| self.local_row(Plain, i, &weights);
                 factor.factor_rows(self.basis.count(), row)?;
             }
         }
@@ -330,11 +338,12 @@ impl SplineEquations {
         let mut sum = 0.0;
         for (k, (value, row)) in values.iter().zip(&self.collocation).enumerate() {
             let near = &mut correction[k..];
-            sum += add_residual(&coefficients[k..], row, value, &[1.0], near);
+            sum += add_residual(Plain, &coefficients[k..], row, value, &[1.0], near);
         }
         for end in &self.ends {
             let target = end.target(values);
             sum += add_residual(
+                Plain,
                 &coefficients[end.first..],
                 &end.row,
                 &target,
@@ -344,6 +353,7 @@ impl SplineEquations {
         }
         for (first, row) in self.penalty_rows.iter().enumerate() {
             sum += add_residual(
+                Plain,
                 &coefficients[first..],
                 row,
                 &[0.0; C],
@@ -455,6 +465,7 @@ fn local_end_weight(end: &EndDerivative, weight: f64) -> f64 {
 /// of them, one less of the next, and so on.
 #[inline(always)]
 fn add_all_products<const L: usize>(
+    s: impl Four,
     entries: &mut Row<L>,
     place: usize,
     rows: &[[f64; ORDER]],
@@ -462,16 +473,16 @@ fn add_all_products<const L: usize>(
 ) {
     match (rows.first_chunk::<ORDER>(), weights.first_chunk::<ORDER>()) {
         (Some(rows), Some(weights)) => {
-            add_products(entries, 5, &rows[0], &weights[0]);
-            add_products(entries, 4, &rows[1], &weights[1]);
-            add_products(entries, 3, &rows[2], &weights[2]);
-            add_products(entries, 2, &rows[3], &weights[3]);
-            add_products(entries, 1, &rows[4], &weights[4]);
-            add_products(entries, 0, &rows[5], &weights[5]);
+            add_products(s, entries, 5, &rows[0], &weights[0]);
+            add_products(s, entries, 4, &rows[1], &weights[1]);
+            add_products(s, entries, 3, &rows[2], &weights[2]);
+            add_products(s, entries, 2, &rows[3], &weights[3]);
+            add_products(s, entries, 1, &rows[4], &weights[4]);
+            add_products(s, entries, 0, &rows[5], &weights[5]);
         }
         _ => {
             for (k, (row, weight)) in rows.iter().zip(weights).enumerate() {
-                add_products(entries, place - k, row, weight);
+                add_products(s, entries, place - k, row, weight);
             }
         }
     }
@@ -480,22 +491,23 @@ fn add_all_products<const L: usize>(
 /// Adds `weight * row row^T` to a row of a band matrix, of which it is entry m.
 #[inline(always)]
 fn add_products<const L: usize>(
+    s: impl Four,
     entries: &mut Row<L>,
     m: usize,
     row: &[f64; ORDER],
     weight: &[f64; L],
 ) {
+    let weighted = scaled(s, weight, row[m]);
     for j in 0..=m {
-        for lane in 0..L {
-            entries[m - j][lane] += weight[lane] * row[m] * row[j];
-        }
+        add_scaled(s, &mut entries[m - j], row[j], &weighted);
     }
 }
 
 /// Residual of one row: its weighted square is returned, its weighted product with the row added to
 /// `correction`; the weight of channel c is that of lane c modulo L.
-#[inline]
+#[inline(always)]
 pub(crate) fn add_residual<const C: usize, const W: usize, const L: usize>(
+    s: impl Four,
     coefficients: &[[f64; C]],
     row: &[f64; W],
     value: &[f64; C],
@@ -504,16 +516,14 @@ pub(crate) fn add_residual<const C: usize, const W: usize, const L: usize>(
 ) -> f64 {
     let mut residual = *value;
     for (coefficient, b) in coefficients[..W].iter().zip(row) {
-        for c in 0..C {
-            residual[c] -= b * coefficient[c];
-        }
+        subtract_scaled(s, &mut residual, *b, coefficient);
     }
     let mut weighted = residual;
-    (0..C).for_each(|c| weighted[c] *= weight[c % L]);
+    for weighted in weighted.as_chunks_mut::<L>().0 {
+        multiply(s, weighted, weight);
+    }
     for (entry, b) in correction[..W].iter_mut().zip(row) {
-        for c in 0..C {
-            entry[c] += b * weighted[c];
-        }
+        add_scaled(s, entry, *b, &weighted);
     }
     (0..C).map(|c| residual[c] * weighted[c]).sum()
 }

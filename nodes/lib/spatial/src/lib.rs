@@ -68,6 +68,7 @@ mod stamp;
 mod system;
 mod track;
 mod weight_search;
+mod wide;
 mod zero_phase_smoothing;
 
 pub use adaptive::ExpectedNoise;
@@ -91,8 +92,8 @@ pub use influence::{Influence, SampleWeights};
 pub use nearest_name::{in_plain_words, meant, nearest_name};
 pub use pose_series::PoseSeries;
 pub use pose_spline::{
-    Bandwidth, Motion, MotionEstimate, PoseAdaptation, PoseSmoothing, PoseSource, PoseSpline,
-    PoseTimes, SampleVariance, position_channels, rotation_channels,
+    Bandwidth, Motion, MotionEstimate, POSES_AT_ONCE, PoseAdaptation, PoseSmoothing, PoseSource,
+    PoseSpline, PoseTimes, SampleVariance, position_channels, rotation_channels,
 };
 pub use rustfft::num_complex::Complex64;
 pub use spectrum::{FourierPair, Spectrum, welch};

@@ -4,6 +4,7 @@
 use crate::SpatialError;
 use crate::banded::{Factor, InverseBands, InverseBlock, Solved, quadratic_form};
 use crate::equations::{IntervalWeights, LocalWeights, SplineEquations, add_residual, refinements};
+use crate::wide::{Four, add_product, add_scaled, widest};
 
 /// Series on the same times, a lane each: channel c belongs to lane c modulo L, and where a lane has
 /// fewer channels than others, those that it lacks are zero.
@@ -25,9 +26,11 @@ impl<const C: usize, const L: usize> Series<C, L> {
         channels: [usize; L],
     ) -> Self {
         let mut projected = vec![[0.0; C]; equations.basis.count()];
-        for (k, (value, row)) in values.iter().zip(&equations.collocation).enumerate() {
-            add_multiples(row, value, &mut projected[k..]);
-        }
+        widest!(s => {
+            for (k, (value, row)) in values.iter().zip(&equations.collocation).enumerate() {
+                add_multiples(s, row, value, &mut projected[k..]);
+            }
+        });
         Self {
             targets: equations.ends.map(|end| end.target(&values)),
             values,
@@ -74,10 +77,12 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
         weights: &[IntervalWeights<L>],
         statements: &mut Statements<L>,
     ) -> Result<(), SpatialError> {
-        let weights = equations.local_weights(weights);
-        self.solve_down(equations, series, &weights)?;
-        self.invert_and_state(equations, series, Solved::Down, statements);
-        Ok(())
+        widest!(s => {
+            let weights = equations.local_weights(weights);
+            self.solve_down(s, equations, series, &weights)?;
+            self.invert_and_state(s, equations, series, Solved::Down, statements);
+            Ok(())
+        })
     }
 
     /// Solves with all digits, see [`SplineEquations::solve`].
@@ -87,17 +92,31 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
         series: &Series<C, L>,
         weights: &[IntervalWeights<L>],
     ) -> Result<(), SpatialError> {
+        widest!(s => self.solve_refined(s, equations, series, weights))
+    }
+
+    #[inline(always)]
+    fn solve_refined(
+        &mut self,
+        s: impl Four,
+        equations: &SplineEquations,
+        series: &Series<C, L>,
+        weights: &[IntervalWeights<L>],
+    ) -> Result<(), SpatialError> {
         let weights = equations.local_weights(weights);
-        self.solve_down(equations, series, &weights)?;
-        self.factor.solve_up(&mut self.coefficients);
+        self.solve_down(s, equations, series, &weights)?;
+        self.factor.solve_up(s, &mut self.coefficients);
         let refined = weights.largest.map(refinements);
         for round in 1..=refined.into_iter().max().unwrap_or(0) {
-            self.residual(equations, series, &weights);
-            self.factor.solve(&mut self.correction);
+            self.residual(s, equations, series, &weights);
+            self.factor.solve(s, &mut self.correction);
             for (coefficient, correction) in self.coefficients.iter_mut().zip(&self.correction) {
-                for c in 0..C {
-                    if round <= refined[c % L] {
-                        coefficient[c] += correction[c];
+                let channels = coefficient.as_chunks_mut::<L>().0.iter_mut();
+                for (own, correction) in channels.zip(correction.as_chunks::<L>().0) {
+                    for lane in 0..L {
+                        if round <= refined[lane] {
+                            own[lane] += correction[lane];
+                        }
                     }
                 }
             }
@@ -106,8 +125,10 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
     }
 
     /// `B^T y`, the derivatives at the ends included, and the first half of the solution.
+    #[inline(always)]
     fn solve_down(
         &mut self,
+        s: impl Four,
         equations: &SplineEquations,
         series: &Series<C, L>,
         weights: &LocalWeights<L>,
@@ -120,12 +141,16 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
             .zip(&series.targets)
         {
             let weighted = std::array::from_fn(|c| target[c] * weight[c % L]);
-            add_multiples(&end.row, &weighted, &mut self.coefficients[end.first..]);
+            add_multiples(s, &end.row, &weighted, &mut self.coefficients[end.first..]);
         }
-        let row = |i: usize| equations.local_row(i, weights);
         let size = equations.basis.count();
-        self.factor
-            .factor_and_solve_down(size, row, &mut self.coefficients)
+        self.factor.factor_and_solve_down(
+            s,
+            size,
+            #[inline(always)]
+            |i: usize| equations.local_row(s, i, weights),
+            &mut self.coefficients,
+        )
     }
 
     /// Inverts what was solved with, and fills in what the solution says.
@@ -135,11 +160,13 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
         series: &Series<C, L>,
         statements: &mut Statements<L>,
     ) {
-        self.invert_and_state(equations, series, Solved::Whole, statements);
+        widest!(s => self.invert_and_state(s, equations, series, Solved::Whole, statements));
     }
 
+    #[inline(always)]
     fn invert_and_state(
         &mut self,
+        s: impl Four,
         equations: &SplineEquations,
         series: &Series<C, L>,
         solved: Solved,
@@ -153,23 +180,28 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
         accelerations.resize(equations.interval_count(), [[1.0; L]; 2]);
         drives.resize(equations.interval_count(), [[0.0; L]; 2]);
         residuals.resize(equations.sample_count, [[0.0; L]; 2]);
-        self.factor
-            .invert(&mut self.coefficients, solved, |i, coefficients, block| {
+        self.factor.invert(
+            s,
+            &mut self.coefficients,
+            solved,
+            #[inline(always)]
+            |i, coefficients, block| {
                 if i < drives.len() {
-                    drives[i] = drive_over(i, equations, series, coefficients, block);
-                    let second = combined(&coefficients[i..], &equations.second_rows[i]);
-                    accelerations[i] = [mean_squares(&second, &series.channels), [1.0; L]];
+                    drives[i] = drive_over(s, i, equations, series, coefficients, block);
+                    let second = combined(s, &coefficients[i..], &equations.second_rows[i]);
+                    accelerations[i] = [mean_squares(s, &second, &series.channels), [1.0; L]];
                 }
                 if i < residuals.len() {
-                    residuals[i] = residual_at(i, equations, series, coefficients, block);
+                    residuals[i] = residual_at(s, i, equations, series, coefficients, block);
                 }
-            });
+            },
+        );
     }
 
     /// Inverts what was solved with, and no more.
     pub(crate) fn invert(&mut self) {
         let nothing: &mut [[f64; 0]] = &mut [];
-        self.factor.invert(nothing, Solved::Whole, |_, _, _| {});
+        widest!(s => self.factor.invert(s, nothing, Solved::Whole, |_, _, _| {}));
     }
 
     /// The coefficients and, of what was inverted, `(B^T B + P)^-1`.
@@ -178,8 +210,10 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
     }
 
     /// `B^T (y - B c) - P c`, into the correction.
+    #[inline(always)]
     fn residual(
         &mut self,
+        s: impl Four,
         equations: &SplineEquations,
         series: &Series<C, L>,
         weights: &LocalWeights<L>,
@@ -188,7 +222,7 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
         correction.clear();
         correction.resize(x.len(), [0.0; C]);
         for (k, (value, row)) in series.values.iter().zip(&equations.collocation).enumerate() {
-            add_residual(&x[k..], row, value, &[1.0; L], &mut correction[k..]);
+            add_residual(s, &x[k..], row, value, &[1.0; L], &mut correction[k..]);
         }
         for ((end, weight), target) in equations
             .ends
@@ -197,21 +231,22 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
             .zip(&series.targets)
         {
             let near = &mut correction[end.first..];
-            add_residual(&x[end.first..], &end.row, target, weight, near);
+            add_residual(s, &x[end.first..], &end.row, target, weight, near);
         }
         let rows = equations.penalty_rows.iter().zip(&weights.penalty);
         for (k, (row, weight)) in rows.enumerate() {
-            add_residual(&x[k..], row, &[0.0; C], weight, &mut correction[k..]);
+            add_residual(s, &x[k..], row, &[0.0; C], weight, &mut correction[k..]);
         }
         let rows = equations.second_rows.iter().zip(&weights.second);
         for (k, (row, weight)) in rows.enumerate() {
-            add_residual(&x[k..], row, &[0.0; C], weight, &mut correction[k..]);
+            add_residual(s, &x[k..], row, &[0.0; C], weight, &mut correction[k..]);
         }
     }
 }
 
 #[inline(always)]
 fn drive_over<const C: usize, const L: usize>(
+    s: impl Four,
     interval: usize,
     equations: &SplineEquations,
     series: &Series<C, L>,
@@ -219,16 +254,17 @@ fn drive_over<const C: usize, const L: usize>(
     block: &InverseBlock<L>,
 ) -> Stated<L> {
     let (row, ease) = (&equations.penalty_rows[interval], equations.eased[interval]);
-    let fifth = combined(&coefficients[interval..], row);
+    let fifth = combined(s, &coefficients[interval..], row);
     [
-        mean_squares(&fifth, &series.channels),
-        quadratic_form(block, row),
+        mean_squares(s, &fifth, &series.channels),
+        quadratic_form(s, block, row),
     ]
     .map(|stated| stated.map(|lane| lane / ease))
 }
 
 #[inline(always)]
 fn residual_at<const C: usize, const L: usize>(
+    s: impl Four,
     sample: usize,
     equations: &SplineEquations,
     series: &Series<C, L>,
@@ -236,40 +272,48 @@ fn residual_at<const C: usize, const L: usize>(
     block: &InverseBlock<L>,
 ) -> Stated<L> {
     let (row, value) = (&equations.collocation[sample], &series.values[sample]);
-    let mut residual = combined(&coefficients[sample..], row);
+    let mut residual = combined(s, &coefficients[sample..], row);
     (0..C).for_each(|c| residual[c] = value[c] - residual[c]);
     [
-        mean_squares(&residual, &series.channels),
-        quadratic_form(block, row),
+        mean_squares(s, &residual, &series.channels),
+        quadratic_form(s, block, row),
     ]
 }
 
 #[inline(always)]
 fn add_multiples<const C: usize, const W: usize>(
+    s: impl Four,
     row: &[f64; W],
     value: &[f64; C],
     entries: &mut [[f64; C]],
 ) {
     for (entry, b) in entries[..W].iter_mut().zip(row) {
-        (0..C).for_each(|c| entry[c] += b * value[c]);
+        add_scaled(s, entry, *b, value);
     }
 }
 
 #[inline(always)]
-fn combined<const C: usize, const W: usize>(coefficients: &[[f64; C]], row: &[f64; W]) -> [f64; C] {
+fn combined<const C: usize, const W: usize>(
+    s: impl Four,
+    coefficients: &[[f64; C]],
+    row: &[f64; W],
+) -> [f64; C] {
     let mut sum = [0.0; C];
     for (coefficient, b) in coefficients[..W].iter().zip(row) {
-        (0..C).for_each(|c| sum[c] += b * coefficient[c]);
+        add_scaled(s, &mut sum, *b, coefficient);
     }
     sum
 }
 
 #[inline(always)]
 fn mean_squares<const C: usize, const L: usize>(
+    s: impl Four,
     values: &[f64; C],
     channels: &[usize; L],
 ) -> [f64; L] {
     let mut sum = [0.0; L];
-    (0..C).for_each(|c| sum[c % L] += values[c] * values[c]);
+    for values in values.as_chunks::<L>().0 {
+        add_product(s, &mut sum, values, values);
+    }
     std::array::from_fn(|lane| sum[lane] / channels[lane] as f64)
 }

@@ -53,6 +53,17 @@ impl PoseSmoothing {
             .map(|expected| Smoothing::Adaptive { expected });
         Self { position, rotation }
     }
+
+    /// The noise that is expected of both, where both are adaptive.
+    fn expected(self) -> Option<[ExpectedNoise; 2]> {
+        match (self.position, self.rotation) {
+            (
+                Smoothing::Adaptive { expected: position },
+                Smoothing::Adaptive { expected: rotation },
+            ) => Some([position, rotation]),
+            _ => None,
+        }
+    }
 }
 
 /// Where poses come from, which says what their noise is like.
@@ -162,8 +173,15 @@ const QUATERNION_PER_ROTVEC: f64 = 0.433_012_701_892_219_3;
 #[derive(Clone, Debug, Default)]
 pub struct PoseAdaptation(Option<Adaptation<2>>);
 
-/// Channels of position and rotation as two lanes, see [`pose_channels`].
-const CHANNELS: [usize; 2] = [3, 4];
+/// Most series of poses that are fitted at once: position and rotation of two are four lanes, which fill a
+/// register of AVX2. Of a clip of 870 poses each then takes 730 ns a pose rather than 1000; four at once
+/// take 770, and twice the memory.
+pub const POSES_AT_ONCE: usize = 2;
+
+/// Number of channels of each lane, see [`pose_channels`].
+fn channel_counts<const L: usize>() -> [usize; L] {
+    std::array::from_fn(|lane| [3, 4][lane % 2])
+}
 
 /// The spline equations for a series of stamps; made once and shared by every series of poses on
 /// them.
@@ -234,19 +252,11 @@ impl PoseSpline {
         world_from_body: &[Isometry3<f64>],
         smoothing: PoseSmoothing,
     ) -> Result<Self, SpatialError> {
-        if let (
-            Smoothing::Adaptive { expected: position },
-            Smoothing::Adaptive { expected: rotation },
-        ) = (smoothing.position, smoothing.rotation)
+        if let Some(expected) = smoothing.expected()
             && world_from_body.len() >= FEWEST_ADAPTIVE
         {
-            let fit = AdaptiveFit::learn(
-                &times.system.equations,
-                pose_channels(world_from_body),
-                CHANNELS,
-                [position, rotation],
-            )?;
-            return Ok(Self::of_lanes(times, &fit));
+            let [fitted] = Self::learn::<1, 2, 8>(times, [world_from_body], expected)?;
+            return Ok(fitted);
         }
         let positions = position_channels(world_from_body);
         let rotations = rotation_channels(world_from_body);
@@ -257,6 +267,52 @@ impl PoseSpline {
             position,
             rotation,
         })
+    }
+
+    /// As [`PoseSpline::fit_on`] of several series of poses, each as if it were alone, to the last
+    /// bit: up to [`POSES_AT_ONCE`] adaptive fits take their steps at the same time.
+    ///
+    /// # Errors
+    /// As [`SmoothingSpline::fit`], of any of them.
+    pub fn fit_all_on(
+        times: &PoseTimes,
+        series: &[Vec<Isometry3<f64>>],
+        smoothing: PoseSmoothing,
+    ) -> Result<Vec<Self>, SpatialError> {
+        let long = series.iter().all(|poses| poses.len() >= FEWEST_ADAPTIVE);
+        let Some(expected) = smoothing.expected().filter(|_| long) else {
+            let alone = |poses: &Vec<_>| Self::fit_on(times, poses, smoothing);
+            return series.iter().map(alone).collect();
+        };
+        let mut fitted = Vec::with_capacity(series.len());
+        for series in series.chunks(POSES_AT_ONCE) {
+            match series {
+                [one, other] => {
+                    fitted.extend(Self::learn::<2, 4, 16>(times, [one, other], expected)?)
+                }
+                alone => {
+                    for poses in alone {
+                        fitted.extend(Self::learn::<1, 2, 8>(times, [poses], expected)?);
+                    }
+                }
+            }
+        }
+        Ok(fitted)
+    }
+
+    /// Adaptive fits of P series in L lanes, C channels in all.
+    fn learn<const P: usize, const L: usize, const C: usize>(
+        times: &PoseTimes,
+        series: [&[Isometry3<f64>]; P],
+        expected: [ExpectedNoise; 2],
+    ) -> Result<[Self; P], SpatialError> {
+        let fit = AdaptiveFit::<C, L>::learn(
+            &times.system.equations,
+            pose_channels(series),
+            channel_counts(),
+            std::array::from_fn(|lane| expected[lane % 2]),
+        )?;
+        Ok(std::array::from_fn(|k| Self::of_lanes(times, &fit, k)))
     }
 
     /// As [`PoseSpline::fit_on`] with [`PoseSmoothing::adaptive`], over a window of poses that moves
@@ -278,12 +334,12 @@ impl PoseSpline {
         }
         let fit = AdaptiveFit::follow(
             &times.system.equations,
-            pose_channels(world_from_body),
-            CHANNELS,
+            pose_channels::<8, 1>([world_from_body]),
+            channel_counts::<2>(),
             source.expected(),
             (learnt, dropped),
         )?;
-        Ok(Self::of_lanes(times, &fit))
+        Ok(Self::of_lanes(times, &fit, 0))
     }
 
     /// Standard deviations of each pose's noise along and about each axis, m and rad, as
@@ -301,8 +357,8 @@ impl PoseSpline {
         }
         let noise = AdaptiveFit::learn_noise(
             &times.system.equations,
-            pose_channels(world_from_body),
-            CHANNELS,
+            pose_channels::<8, 1>([world_from_body]),
+            channel_counts::<2>(),
             source.expected(),
         )?;
         let of_turns =
@@ -310,11 +366,16 @@ impl PoseSpline {
         Ok(Some(noise.into_iter().map(of_turns).collect()))
     }
 
-    fn of_lanes(times: &PoseTimes, fit: &AdaptiveFit<8, 2>) -> Self {
+    /// Of series k of those that were fitted.
+    fn of_lanes<const C: usize, const L: usize>(
+        times: &PoseTimes,
+        fit: &AdaptiveFit<C, L>,
+        k: usize,
+    ) -> Self {
         Self {
             times: times.clone(),
-            position: SmoothingSpline::of_lane(&times.system, fit, 0),
-            rotation: SmoothingSpline::of_lane(&times.system, fit, 1),
+            position: SmoothingSpline::of_lane(&times.system, fit, 2 * k),
+            rotation: SmoothingSpline::of_lane(&times.system, fit, 2 * k + 1),
         }
     }
 
@@ -398,14 +459,24 @@ pub fn rotation_channels(world_from_body: &[Isometry3<f64>]) -> Vec<[f64; 4]> {
         .collect()
 }
 
-/// Both in turn: x, i, y, j, z, k, 0, w.
-fn pose_channels(world_from_body: &[Isometry3<f64>]) -> Vec<[f64; 8]> {
-    let rotations = rotation_channels(world_from_body);
-    let positions = world_from_body.iter().map(|isometry| isometry.translation);
-    positions
-        .zip(rotations)
-        .map(|(p, [i, j, k, w])| [p.x, i, p.y, j, p.z, k, 0.0, w])
-        .collect()
+/// Both of each series in turn: its position and its rotation are a lane each. Of one series: x, i, y,
+/// j, z, k, 0, w.
+fn pose_channels<const C: usize, const P: usize>(series: [&[Isometry3<f64>]; P]) -> Vec<[f64; C]> {
+    let count = series.iter().map(|poses| poses.len()).max().unwrap_or(0);
+    let mut channels = vec![[0.0; C]; count];
+    for (k, poses) in series.into_iter().enumerate() {
+        let rotations = rotation_channels(poses);
+        for ((row, pose), rotation) in channels.iter_mut().zip(poses).zip(rotations) {
+            let position: [f64; 3] = pose.translation.vector.into();
+            for (axis, own) in position.into_iter().enumerate() {
+                row[2 * P * axis + 2 * k] = own;
+            }
+            for (component, own) in rotation.into_iter().enumerate() {
+                row[2 * P * component + 2 * k + 1] = own;
+            }
+        }
+    }
+    channels
 }
 
 #[cfg(test)]

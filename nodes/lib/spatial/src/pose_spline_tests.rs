@@ -141,3 +141,44 @@ fn both_halves_learn_at_once_what_each_learns_alone_to_the_bit() {
         assert_eq!(both.rotation.variance(t), rotation.variance(t));
     }
 }
+
+#[test]
+fn series_that_are_fitted_at_once_are_what_each_is_alone_to_the_bit() {
+    let start = Stamp::from_nanos(1_700_000_000_000_000_000);
+    let stamps: Vec<Stamp> = (0..150)
+        .map(|k| start.plus_seconds(f64::from(k) / 120.0))
+        .collect();
+    // Rests, turns, and jitter of another size in each.
+    let series: Vec<Vec<Isometry3<f64>>> = (0..5)
+        .map(|whose| {
+            let pose = |k: i32| {
+                let (t, own) = (f64::from(k) / 120.0, f64::from(whose));
+                let jitter = 1e-3 * own * (f64::from(k) * (12.9898 + own)).sin();
+                let swing = (t - 0.5).max(0.0) * (9.0 * t + own).sin();
+                Isometry3::new(
+                    Vector3::new(swing + jitter, own, 1.0 - jitter),
+                    Vector3::new(0.2 * own, swing - jitter, t),
+                )
+            };
+            (0..150).map(pose).collect()
+        })
+        .collect();
+    let times = PoseTimes::new(&stamps).unwrap();
+    for smoothing in [
+        PoseSmoothing::adaptive(PoseSource::Tracked),
+        PoseSmoothing::adaptive(PoseSource::Fitted),
+        PoseSmoothing::cutoff_hz(10.0),
+    ] {
+        let together = PoseSpline::fit_all_on(&times, &series, smoothing).unwrap();
+        assert_eq!(together.len(), series.len());
+        for (poses, found) in series.iter().zip(&together) {
+            let alone = PoseSpline::fit_on(&times, poses, smoothing).unwrap();
+            for k in 0..=300 {
+                let at = start.plus_seconds(f64::from(k) / 240.0);
+                // All bits of all numbers: `Debug` tells -0 from 0.
+                let [found, alone] = [found, &alone].map(|one| format!("{:?}", one.estimate(at)));
+                assert_eq!(found, alone, "{k}");
+            }
+        }
+    }
+}

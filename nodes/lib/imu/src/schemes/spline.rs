@@ -4,7 +4,7 @@ use cromosim_spatial::{Influence, MotionEstimate, PoseSmoothing, PoseSpline, Pos
 use nalgebra::Isometry3;
 
 use crate::uncertainty::{FrameWeights, any_error};
-use crate::{ImuError, KinematicSample, SampleVariance, SensorFrame};
+use crate::{ImuError, KinematicSample, SampleVariance, SensorFrame, SensorTrajectory};
 
 /// The spline of a series of frames.
 pub(crate) fn fit(
@@ -12,9 +12,22 @@ pub(crate) fn fit(
     frames: &[SensorFrame],
     smoothing: PoseSmoothing,
 ) -> Result<PoseSpline, ImuError> {
-    let world_from_sensor: Vec<Isometry3<f64>> =
-        frames.iter().map(|frame| frame.world_from_sensor).collect();
-    Ok(PoseSpline::fit_on(times, &world_from_sensor, smoothing)?)
+    Ok(PoseSpline::fit_on(times, &poses(frames), smoothing)?)
+}
+
+/// Those of several, each as if it were alone.
+pub(crate) fn fit_all(
+    times: &PoseTimes,
+    trajectories: &[SensorTrajectory],
+    smoothing: PoseSmoothing,
+) -> Result<Vec<PoseSpline>, ImuError> {
+    let frames = trajectories.iter().map(SensorTrajectory::frames);
+    let series: Vec<Vec<Isometry3<f64>>> = frames.map(poses).collect();
+    Ok(PoseSpline::fit_all_on(times, &series, smoothing)?)
+}
+
+fn poses(frames: &[SensorFrame]) -> Vec<Isometry3<f64>> {
+    frames.iter().map(|frame| frame.world_from_sensor).collect()
 }
 
 /// The motion at a stamp, and how far it may be off where the spline has learnt that.

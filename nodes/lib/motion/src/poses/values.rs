@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use cromosim_arrays::{Array, ArraysError, Entry, Value};
 use cromosim_body::{Gender, JOINT_COUNT};
-use cromosim_spatial::plausible::{JOINT_ANGLE, PELVIS_ANGLE};
+use cromosim_spatial::plausible::{JOINT_ANGLE, Oddity, PELVIS_ANGLE};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use super::format::MAX_POSES;
@@ -144,8 +144,10 @@ pub(super) fn check_angles(
                 &JOINT_ANGLE
             };
             let angle = Vector3::from_column_slice(vector).norm();
-            if let Some(oddity) = bound.judge(angle, format!("frame {frame}, joint {joint}")) {
-                return Err(wrong(entry, oddity.to_string()));
+            // The place is spelt out where it is odd alone.
+            if let Some(odd) = bound.judge(angle, "") {
+                let place = format!("frame {frame}, joint {joint}");
+                return Err(wrong(entry, Oddity { place, ..odd }.to_string()));
             }
         }
     }

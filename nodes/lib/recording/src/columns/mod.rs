@@ -6,6 +6,7 @@
 //! are split by byte before they are compressed, which noise allows least of all numbers. Rows are
 //! float32: its 2e-7 is below any device's resolution.
 
+mod channel_pages;
 mod people;
 mod schema;
 mod write;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use parquet::basic::{Compression, Encoding, LogicalType, Repetition, Type as Physical, ZstdLevel};
+use parquet::basic::{Encoding, LogicalType, Repetition, Type as Physical};
 use parquet::errors::Result;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
@@ -80,12 +80,11 @@ pub fn properties(metadata: &BTreeMap<String, String>) -> Result<WriterPropertie
     properties = properties
         .set_column_dictionary_enabled(stamp.clone(), false)
         .set_column_encoding(stamp, Encoding::DELTA_BINARY_PACKED);
-    // What else is small already is not compressed; nobody looks for readings by their size.
+    // Their pages are compressed on their way, see [`super::channel_pages`]; what else is small already is not. Nobody looks for readings by their size.
     for channel in CHANNELS.map(ColumnPath::from) {
         properties = properties
             .set_column_dictionary_enabled(channel.clone(), false)
             .set_column_encoding(channel.clone(), Encoding::BYTE_STREAM_SPLIT)
-            .set_column_compression(channel.clone(), Compression::ZSTD(ZstdLevel::try_new(1)?))
             .set_column_statistics_enabled(channel, EnabledStatistics::None);
     }
     Ok(properties.build())

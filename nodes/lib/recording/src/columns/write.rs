@@ -5,12 +5,14 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use parquet::data_type::{ByteArray, ByteArrayType, DataType, FloatType, Int32Type, Int64Type};
+use parquet::data_type::{ByteArray, ByteArrayType, DataType, Int32Type, Int64Type};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
+use parquet::schema::types::ColumnDescPtr;
 
-use super::schema::{properties, schema};
+use super::channel_pages::ChannelPages;
+use super::schema::{CHANNELS, properties, schema};
 use crate::datasets::{ActivitySpan, DatasetRecording};
 use crate::{RecordingError, write_file_with};
 
@@ -63,6 +65,9 @@ impl ColumnsGroup {
 /// Writes groups of rows one after the other.
 pub struct ColumnsWriter<'a> {
     file: SerializedFileWriter<&'a mut (dyn Write + Send)>,
+    /// Of the channels, in their order.
+    columns: Vec<ColumnDescPtr>,
+    pages: ChannelPages,
     recording: ByteArray,
     rows: u64,
     path: PathBuf,
@@ -80,10 +85,21 @@ impl<'a> ColumnsWriter<'a> {
     ) -> Result<Self, RecordingError> {
         let begin = || {
             let properties = Arc::new(properties(&header.metadata)?);
-            SerializedFileWriter::new(file, schema()?, properties)
+            let pages = ChannelPages::new(properties.clone())?;
+            Ok((
+                SerializedFileWriter::new(file, schema()?, properties)?,
+                pages,
+            ))
         };
+        let (file, pages) = begin().map_err(cannot_write(path))?;
+        let columns = file.schema_descr().columns().iter();
         Ok(Self {
-            file: begin().map_err(cannot_write(path))?,
+            columns: columns
+                .filter(|it| CHANNELS.contains(&it.name()))
+                .cloned()
+                .collect(),
+            pages,
+            file,
             recording: header.recording.as_str().into(),
             rows: 0,
             path: path.to_owned(),
@@ -113,8 +129,8 @@ impl<'a> ColumnsWriter<'a> {
         }
         column::<Int32Type>(&mut rows, &vec![group.draw; count], None)?;
         column::<Int64Type>(&mut rows, &group.stamps, None)?;
-        for channel in &group.channels {
-            column::<FloatType>(&mut rows, channel, None)?;
+        for (column, channel) in self.columns.iter().zip(&group.channels) {
+            self.pages.write(&mut rows, column.clone(), channel)?;
         }
         let known = group.activities.iter().flatten();
         let known: Vec<ByteArray> = known.map(|activity| activity.as_str().into()).collect();
