@@ -132,15 +132,11 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let mut answers = BTreeMap::new();
     for (name, result) in diagnose_all(placements, &options) {
         match result {
-            Ok(Answered {
-                answer,
-                errors,
-                notes: own,
-            }) => {
-                failures.extend(errors);
-                let of_placement = |note: String| format!("placement {name}: {note}");
-                notes.extend(own.into_iter().map(of_placement));
-                answers.insert(name, answer);
+            Ok(found) => {
+                failures.extend(found.errors);
+                let of_placement = |note: &String| format!("placement {name}: {note}");
+                notes.extend(found.notes.iter().map(of_placement));
+                answers.insert(name, found.answer);
             }
             Err(error) => failures.push(error),
         }
