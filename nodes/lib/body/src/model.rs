@@ -89,7 +89,7 @@ impl BodyModel {
     }
 
     /// Those of one vertex.
-    pub(crate) fn pose_blocks_of(&self, vertex: usize) -> Vec<PoseBlock> {
+    pub(crate) fn pose_blocks_of(&self, vertex: usize) -> &[PoseBlock] {
         self.pose_blocks.of_vertex(vertex, &self.skin_weights)
     }
 

@@ -23,41 +23,45 @@ pub(crate) struct PoseBlock {
 /// sensors need some vertices, and all of them take longer than minutes of motion.
 #[derive(Debug)]
 pub(crate) struct PoseBlocks {
-    closed_form: Option<ClosedForm>,
     all: OnceLock<Rows<PoseBlock>>,
+    /// Where they are in closed form: that, and of each vertex what was asked for.
+    closed_form: Option<(ClosedForm, Vec<OnceLock<Vec<PoseBlock>>>)>,
 }
 
 impl From<Rows<PoseBlock>> for PoseBlocks {
     fn from(all: Rows<PoseBlock>) -> Self {
         Self {
-            closed_form: None,
             all: all.into(),
+            closed_form: None,
         }
     }
 }
 
 impl From<ClosedForm> for PoseBlocks {
     fn from(closed_form: ClosedForm) -> Self {
+        let made = vec![OnceLock::new(); closed_form.vertex_count()];
         Self {
-            closed_form: Some(closed_form),
             all: OnceLock::new(),
+            closed_form: Some((closed_form, made)),
         }
     }
 }
 
 impl PoseBlocks {
     /// Those of a vertex, on a body with these skin weights.
-    pub fn of_vertex(&self, vertex: usize, skin_weights: &Rows<(u8, f64)>) -> Vec<PoseBlock> {
+    pub fn of_vertex(&self, vertex: usize, skin_weights: &Rows<(u8, f64)>) -> &[PoseBlock] {
         match (self.all.get(), &self.closed_form) {
-            (None, Some(form)) => form.of_vertex(vertex, skin_weights.row(vertex)),
-            _ => self.all(skin_weights).row(vertex).to_vec(),
+            (None, Some((form, made))) => {
+                made[vertex].get_or_init(|| form.of_vertex(vertex, skin_weights.row(vertex)))
+            }
+            _ => self.all(skin_weights).row(vertex),
         }
     }
 
     /// Those of all vertices.
     pub fn all(&self, skin_weights: &Rows<(u8, f64)>) -> &Rows<PoseBlock> {
         self.all.get_or_init(|| {
-            let rows = self.closed_form.iter().flat_map(|form| {
+            let rows = self.closed_form.iter().flat_map(|(form, _)| {
                 let vertices = skin_weights.rows().enumerate();
                 vertices.map(|(vertex, weights)| form.of_vertex(vertex, weights))
             });

@@ -91,6 +91,10 @@ impl ClosedForm {
         }
     }
 
+    pub fn vertex_count(&self) -> usize {
+        self.vertices.len()
+    }
+
     /// The blocks of a vertex with these skin weights.
     pub fn of_vertex(&self, vertex: usize, skin_weights: &[(u8, f64)]) -> Vec<PoseBlock> {
         let mut weights = [0.0; JOINT_COUNT];
