@@ -5,6 +5,7 @@
 mod config;
 mod node;
 mod parts;
+mod refusal;
 
 use std::path::Path;
 use std::str::FromStr;
@@ -26,7 +27,8 @@ use cromosim_msgs::tf2_msgs::TFMessage;
 use cromosim_ros::{Durability, Node, Publisher, Qos, RosError, prepare};
 
 pub use config::Config;
-pub use node::{Refusal, Step, VirtualImuNode};
+pub use node::{Step, VirtualImuNode};
+pub use refusal::Refusal;
 
 const ABOUT: &str = "virtual_imu: what IMUs on the body would measure, one sensor_msgs/Imu publisher for each placement";
 

@@ -4,13 +4,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use cromosim_body::{BodyError, BodyModel, BodyPose, Joint, ShapedBody};
+use cromosim_body::{BodyModel, BodyPose, Joint, ShapedBody};
 use cromosim_imu::{
     AmbientField, Device, EffectKind, Follow, ImuError, ImuMessages, MountedSensors, Placement,
     PlacementSet, PoseStd, StreamOptions, StreamingImu, VirtualImu, measure_all,
 };
-use cromosim_learned::{LearnedError, LearnedSimulator, LivePlacements, MappingFile};
-use cromosim_msgs::NotABody;
+use cromosim_learned::{LearnedSimulator, LivePlacements, MappingFile};
 use cromosim_msgs::builtin_interfaces::Time;
 use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_msgs::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue};
@@ -24,6 +23,7 @@ use crate::config::Config;
 use crate::parts::{
     fresh_imus, fresh_networks, pose_source, read_mapping, read_networks, resolved_devices,
 };
+use crate::refusal::Refusal;
 
 /// States that are looked at before the rate of the states is known.
 const RATE_STATES: usize = 13;
@@ -37,37 +37,6 @@ pub struct Step {
     pub frames: TFMessage,
     /// For `reference/NAME`, in the order of the placements.
     pub references: Vec<PoseStamped>,
-}
-
-/// Why a state was left out.
-#[derive(Debug, thiserror::Error)]
-pub enum Refusal {
-    /// The state is no body.
-    #[error(transparent)]
-    State(#[from] NotABody),
-    /// The shape does not suit the body.
-    #[error(transparent)]
-    Body(#[from] BodyError),
-    /// A state of the same time has been there.
-    #[error("a second state at {} ns", .0.nanos)]
-    Repeated(Stamp),
-    /// A frame cannot be used.
-    #[error(transparent)]
-    Imu(#[from] ImuError),
-    /// Networks or a mapping that cannot be used.
-    #[error(transparent)]
-    Learned(#[from] LearnedError),
-    /// A source of poses that there is not.
-    #[error("parameter 'pose_source': `{0}`; expected tracked, fitted or nothing")]
-    Source(String),
-    /// A mapping for other placements.
-    #[error("mapping {file}: it names {known}, none of the placements")]
-    Unmapped {
-        /// The file.
-        file: String,
-        /// The placements that it names.
-        known: String,
-    },
 }
 
 /// The node: a function of the states so far.

@@ -12,7 +12,7 @@ use cromosim_learned::{LearnedError, LearnedSimulator, LivePlacements, MappingFi
 use cromosim_spatial::PoseSource;
 
 use crate::config::Config;
-use crate::node::Refusal;
+use crate::refusal::Refusal;
 
 /// The placements' own, or that of the parameter, which is found from where the node runs.
 pub(crate) fn resolved_devices(

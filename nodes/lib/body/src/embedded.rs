@@ -50,7 +50,7 @@ fn load() -> Result<BodyModel, BodyError> {
         .map_err(BodyError::Arrays)?;
     let constants: Constants =
         serde_json::from_str(POSEDIRS).expect("the embedded constants are sound");
-    raw.pose_blocks = ClosedForm::new(constants, &raw, &joints.values).into();
+    raw.pose_blocks = ClosedForm::new(constants, &raw.template, &raw.faces, &joints.values).into();
     let mut body = BodyModel::from_raw(raw)?;
     body.sites = embedded_sites(&body)?;
     Ok(body)

@@ -36,6 +36,7 @@ mod joint;
 mod model;
 mod pose;
 mod pose_blocks;
+mod pose_corrections;
 mod posedirs;
 mod raw;
 mod read;

@@ -6,7 +6,8 @@ use std::sync::OnceLock;
 use nalgebra::Vector3;
 
 use crate::gender::Gender;
-use crate::pose_blocks::{PoseBlock, PoseBlocks};
+use crate::pose_blocks::PoseBlock;
+use crate::pose_corrections::PoseBlocks;
 use crate::raw::RawModel;
 use crate::rows::Rows;
 use crate::site::NamedSite;

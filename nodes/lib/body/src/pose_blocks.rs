@@ -1,10 +1,7 @@
 //! The sparse form of SMPL's posedirs.
 
-use std::sync::OnceLock;
-
 use crate::JOINT_COUNT;
 use crate::joint::SHARED_JOINTS;
-use crate::posedirs::ClosedForm;
 use crate::rows::Rows;
 
 /// What one joint's rotation adds to one vertex: `coefficients[9 * axis + 3 * row + column]` times
@@ -17,57 +14,6 @@ pub(crate) struct PoseBlock {
     pub joint: u8,
     /// Row-major over (3 axes, 3 rows, 3 columns), m.
     pub coefficients: [f32; 27],
-}
-
-/// Of each vertex, the blocks that are not zero. Those in closed form are made where they are asked for:
-/// sensors need some vertices, and all of them take longer than minutes of motion.
-#[derive(Debug)]
-pub(crate) struct PoseBlocks {
-    all: OnceLock<Rows<PoseBlock>>,
-    /// Where they are in closed form: that, and of each vertex what was asked for.
-    closed_form: Option<(ClosedForm, Vec<OnceLock<Vec<PoseBlock>>>)>,
-}
-
-impl From<Rows<PoseBlock>> for PoseBlocks {
-    fn from(all: Rows<PoseBlock>) -> Self {
-        Self {
-            all: all.into(),
-            closed_form: None,
-        }
-    }
-}
-
-impl From<ClosedForm> for PoseBlocks {
-    fn from(closed_form: ClosedForm) -> Self {
-        let made = vec![OnceLock::new(); closed_form.vertex_count()];
-        Self {
-            all: OnceLock::new(),
-            closed_form: Some((closed_form, made)),
-        }
-    }
-}
-
-impl PoseBlocks {
-    /// Those of a vertex, on a body with these skin weights.
-    pub fn of_vertex(&self, vertex: usize, skin_weights: &Rows<(u8, f64)>) -> &[PoseBlock] {
-        match (self.all.get(), &self.closed_form) {
-            (None, Some((form, made))) => {
-                made[vertex].get_or_init(|| form.of_vertex(vertex, skin_weights.row(vertex)))
-            }
-            _ => self.all(skin_weights).row(vertex),
-        }
-    }
-
-    /// Those of all vertices.
-    pub fn all(&self, skin_weights: &Rows<(u8, f64)>) -> &Rows<PoseBlock> {
-        self.all.get_or_init(|| {
-            let rows = self.closed_form.iter().flat_map(|(form, _)| {
-                let vertices = skin_weights.rows().enumerate();
-                vertices.map(|(vertex, weights)| form.of_vertex(vertex, weights))
-            });
-            Rows::new(rows)
-        })
-    }
 }
 
 /// Of posedirs (V, 3, 9 (J - 1)), each vertex' blocks (3, 9) of SMPL's joints that are not zero.

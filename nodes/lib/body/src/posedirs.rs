@@ -11,7 +11,6 @@ use nalgebra::{SMatrix, Vector3};
 use serde::Deserialize;
 
 use crate::pose_blocks::{PoseBlock, vertex_pose_blocks};
-use crate::raw::RawModel;
 use crate::{JOINT_COUNT, Joint};
 
 /// One vertex' directions (3, 207), row-major.
@@ -76,15 +75,15 @@ pub(crate) struct ClosedForm {
 }
 
 impl ClosedForm {
-    /// On `raw`, whose joints (24, 3) stand at `joints`.
-    pub fn new(constants: Constants, raw: &RawModel, joints: &[f64]) -> Self {
+    /// On a body of vertices (V, 3), triangles (F, 3) and joints (24, 3), m.
+    pub fn new(constants: Constants, template: &[f64], faces: &[i64], joints: &[f64]) -> Self {
         let points = |values: &[f64]| -> Vec<Vector3<f64>> {
             let points = values.as_chunks::<3>().0.iter();
             points.map(|&point| Vector3::from(point)).collect()
         };
-        let vertices = points(&raw.template);
+        let vertices = points(template);
         Self {
-            normals: vertex_normals(&vertices, &raw.faces),
+            normals: vertex_normals(&vertices, faces),
             joints: points(joints),
             vertices,
             constants,

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::ShapeSpace;
 use crate::gender::Gender;
-use crate::pose_blocks::PoseBlocks;
+use crate::pose_corrections::PoseBlocks;
 
 /// The dense arrays of a body file, shapes checked by the reader and values not yet.
 pub(crate) struct RawModel {
