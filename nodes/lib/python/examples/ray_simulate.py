@@ -5,6 +5,7 @@ rows of its blocks to OUT. Needs `ray[data]` and the package on every machine, a
 path on all. Locally it starts Ray by itself; RAY_ADDRESS names a cluster.
 """
 
+import os
 import sys
 from pathlib import Path
 
@@ -20,6 +21,8 @@ SEED = 0
 
 def simulate(batch: dict[str, np.ndarray]) -> pa.Table:
     """One motion's readings, all placements one after the other, with the columns of `cromosim simulate`."""
+    # A task has as many cores as Ray gave it, not all of its machine; what was set before, stays.
+    os.environ.setdefault("RAYON_NUM_THREADS", os.environ.get("OMP_NUM_THREADS", "1"))
     (path,) = batch["path"]
     motion = cromosim.read_motion(str(path))
     imus = cromosim.simulate(motion, PLACEMENTS, rate_hz=60, device="consumer_mems", seed=SEED)
