@@ -125,7 +125,8 @@ fn missed(heard: &serde_json::Value, reader: &BagReader) -> Vec<String> {
 }
 
 /// CycloneDDS receives every message, under names that resolve. One message in 5000 was lost to it
-/// once, on a busy machine, in more than fifty demos; the second demo is not let off.
+/// once, on a busy machine, and in none of more than thirty demos since; the second demo is not
+/// let off.
 fn check_listener(heard: &serde_json::Value, reader: &BagReader) {
     for name in PLACEMENTS {
         assert_eq!(
