@@ -6,8 +6,8 @@
 //! sample's latency is the time from just before the publication of the state that released it to
 //! its reception here, so two hops of DDS are in it. Goal: p99 under 2 ms at 5 and at 17
 //! placements. The last case also receives `data`, whose orientation VQF fuses, and `mag`. The
-//! subscriptions are as deep as a filter's: where RustDDS holds a thousand messages for one, it goes
-//! through those older than 5 s at every 64th, on all topics at once.
+//! subscriptions are a second deep: where RustDDS holds a recorder's thousand messages, it goes through
+//! those older than 5 s at every 64th, on all topics at once.
 #![allow(missing_docs)]
 
 use std::process::{Child, Command, Stdio};

@@ -187,8 +187,9 @@ impl Graph {
     }
 
     /// Sleeps until the peers of a local endpoint have matched it too. They do so some milliseconds
-    /// after it has matched them, or, where an announcement was lost on its way, once it has been
-    /// sent again, after 100 to 150 ms; what is sent in between is not for them.
+    /// after it has matched them; where an announcement was lost on its way, once it has been sent
+    /// again, which took 100 to 200 ms as a rule and 350 at most (CycloneDDS with a receive buffer
+    /// of 3 kB, busy cores). What is sent in between is not for them.
     pub(crate) fn settle(&self, local: Gid) {
         const SETTLED: Duration = Duration::from_millis(300);
         let since = lock(&self.state)
