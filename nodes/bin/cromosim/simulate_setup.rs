@@ -221,19 +221,19 @@ impl Setup {
                     ..self.motion.clone()
                 };
                 let motion = read_motion_for(path, self.simulation.model(), &whole)?;
-                vec![self.part(&motion)?]
+                vec![self.part(motion)?]
             }
             None if several => {
                 bail!("--person: the embedded walk has one person; name a motion file")
             }
-            None => vec![self.part(&embedded_walk())?],
+            None => vec![self.part(embedded_walk())?],
         })
     }
 
     /// The part of a motion that is asked for.
-    fn part(&self, motion: &SmplMotion) -> anyhow::Result<PlayedPerson> {
+    fn part(&self, motion: SmplMotion) -> anyhow::Result<PlayedPerson> {
         let (start_s, duration_s) = (self.motion.start_s, self.motion.duration_s);
-        Ok(PlayedPerson::part(motion, start_s, duration_s)?)
+        Ok(PlayedPerson::part(&Arc::new(motion), start_s, duration_s)?)
     }
 
     pub fn simulate(

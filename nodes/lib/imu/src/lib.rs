@@ -110,6 +110,6 @@ pub use texture::{DrawnTexture, TextureSegment, add_texture};
 pub use trajectory::{SensorFrame, SensorTrajectory};
 pub use trim::{LONGEST_TRIM_S, Trim, median_bandwidth};
 pub use virtual_imu::{
-    ImuMessages, ImuOptions, MotionCorrection, ReadingMapping, RecordedMotion, VirtualImu,
-    measure_all, measure_recording,
+    ImuMessages, ImuOptions, Measured, MotionCorrection, ReadingMapping, RecordedMotion,
+    VirtualImu, measure_all, measure_recording,
 };

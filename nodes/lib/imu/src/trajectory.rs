@@ -110,6 +110,11 @@ impl SensorTrajectory {
         &self.frames
     }
 
+    /// The frames alone.
+    pub fn into_frames(self) -> Vec<SensorFrame> {
+        self.frames
+    }
+
     /// Stamp of the first frame.
     pub fn start(&self) -> Stamp {
         self.frames[0].stamp

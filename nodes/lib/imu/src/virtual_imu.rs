@@ -77,6 +77,19 @@ pub struct ImuMessages {
     pub temperature: Option<Temperature>,
 }
 
+/// What a device says of one sample: the values of its messages.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measured {
+    /// By the device's clock, with the orientation that it states.
+    pub sample: ImuSample,
+    /// As `data` states them.
+    pub covariances: Covariances,
+    /// In the sensor's axes, T; of devices that have a magnetometer, in a known field.
+    pub magnetic_field: Option<Vector3<f64>>,
+    /// Degrees Celsius, once a second, of devices that warm up.
+    pub temperature: Option<f64>,
+}
+
 /// The last steps: from a reading to messages.
 struct Output {
     mapping: Option<Box<dyn ReadingMapping>>,
@@ -131,46 +144,83 @@ impl VirtualImu {
 
     /// The messages of a sample; `None` where the device loses it.
     pub fn measure(&mut self, motion: &KinematicSample) -> Option<ImuMessages> {
+        let measured = self.read(motion)?;
+        Some(self.messages(&measured))
+    }
+
+    /// Stamp and reading of these messages alone, of whose samples no other method is asked.
+    pub fn read_channels(&mut self, motion: &KinematicSample) -> Option<(Stamp, Reading)> {
+        let (stamp, reading) = self.effects.step_reading(motion)?;
+        Some((stamp, self.output.mapped(reading)))
+    }
+
+    /// The values of these messages.
+    pub fn read(&mut self, motion: &KinematicSample) -> Option<Measured> {
         let sample = self.effects.step(motion);
-        // A magnetometer that is late needs the samples that are lost.
+        let magnetic_field = self.read_field(motion);
+        let mut sample = self.output.mapped_sample(sample?);
+        let variance = self
+            .stated
+            .of_motion(motion.variance, self.effects.walked_seconds());
+        let mut covariances = self.output.covariances.with_motion(&variance, &sample);
+        self.orient(&mut sample, magnetic_field.as_ref(), &mut covariances);
+        let thermometer = self.thermometer.as_mut();
+        Some(Measured {
+            sample,
+            covariances,
+            magnetic_field,
+            temperature: thermometer.and_then(|it| it.read(sample.stamp)),
+        })
+    }
+
+    /// Of every sample: a magnetometer that is late needs those that are lost.
+    fn read_field(&mut self, motion: &KinematicSample) -> Option<Vector3<f64>> {
+        let magnetic = self.magnetic.as_mut()?;
         let world_from_sensor = Isometry3::from_parts(
             motion.world_from_sensor.translation,
             self.effects.world_from_sensor(motion),
         );
-        let read = |sensor: &mut MagneticSensor| sensor.read(&world_from_sensor, motion.stamp);
-        let field = self.magnetic.as_mut().map(read);
-        let sample = self.output.mapped(sample?);
-        let variance = self
-            .stated
-            .of_motion(motion.variance, self.effects.walked_seconds());
-        let mut messages = self.output.messages(&sample, &variance);
-        self.orient(&sample, field.as_ref(), &mut messages.data);
-        messages.mag = self
-            .magnetic
-            .as_ref()
-            .zip(field)
-            .map(|(sensor, field)| sensor.message(field, sample.stamp, &self.output.frame_id));
-        let temperature = self
-            .thermometer
-            .as_mut()
-            .and_then(|it| it.read(sample.stamp));
-        messages.temperature = temperature.map(|temperature| Temperature {
-            header: Header::new(sample.stamp.nanos, &self.output.frame_id),
-            temperature,
-            variance: 0.0,
-        });
-        Some(messages)
+        Some(magnetic.read(&world_from_sensor, motion.stamp))
     }
 
     /// Puts the orientation that is asked for in the place of the true one.
-    fn orient(&mut self, sample: &ImuSample, field: Option<&Vector3<f64>>, data: &mut Imu) {
+    fn orient(
+        &mut self,
+        sample: &mut ImuSample,
+        field: Option<&Vector3<f64>>,
+        covariances: &mut Covariances,
+    ) {
         if let Some(filter) = &mut self.filter {
             let reading = self.stated.in_si(&sample.reading());
-            data.orientation = filter.update(&reading, field, sample.stamp).into();
-            data.orientation_covariance = filter.covariance(field.is_some());
+            sample.world_from_sensor = filter.update(&reading, field, sample.stamp);
+            covariances.orientation = filter.covariance(field.is_some());
         } else if self.orientation == OrientationSource::None {
-            data.orientation = UnitQuaternion::identity().into();
-            data.orientation_covariance = self.output.covariances.without_orientation().orientation;
+            sample.world_from_sensor = UnitQuaternion::identity();
+            *covariances = covariances.without_orientation();
+        }
+    }
+
+    /// The messages that say it.
+    pub fn messages(&self, measured: &Measured) -> ImuMessages {
+        let Measured {
+            sample,
+            covariances,
+            ..
+        } = measured;
+        let frame_id = &self.output.frame_id;
+        let mag = |(sensor, field): (&MagneticSensor, Vector3<f64>)| {
+            sensor.message(field, sample.stamp, frame_id)
+        };
+        let temperature = |temperature| Temperature {
+            header: Header::new(sample.stamp.nanos, frame_id),
+            temperature,
+            variance: 0.0,
+        };
+        ImuMessages {
+            data_raw: self.output.data_raw(sample, covariances),
+            data: self.output.message(sample, covariances),
+            mag: self.magnetic.as_ref().zip(measured.magnetic_field).map(mag),
+            temperature: measured.temperature.map(temperature),
         }
     }
 
@@ -268,7 +318,10 @@ pub fn measure_recording(
             specific_force: reading.specific_force,
             angular_velocity: reading.angular_velocity,
         };
-        (!lost).then(|| output.messages(&output.mapped(sample), variance).data_raw)
+        (!lost).then(|| {
+            let sample = output.mapped_sample(sample);
+            output.data_raw(&sample, &output.covariances.with_motion(variance, &sample))
+        })
     };
     let variances = motion.variances.iter().chain(std::iter::repeat(&none));
     Ok((0..readings.len())
@@ -305,36 +358,35 @@ fn noisy_readings(
 }
 
 impl Output {
-    fn mapped(&self, mut sample: ImuSample) -> ImuSample {
-        if let Some(mapping) = &self.mapping {
-            let mapped = mapping.map(&sample.reading());
-            (sample.specific_force, sample.angular_velocity) =
-                (mapped.specific_force, mapped.angular_velocity);
-        }
-        sample
-    }
-
-    fn messages(&self, sample: &ImuSample, variance: &SampleVariance) -> ImuMessages {
-        let covariances = self.covariances.with_motion(variance, sample);
-        let raw = covariances.without_orientation();
-        let none = UnitQuaternion::identity();
-        ImuMessages {
-            data_raw: self.message(sample, none, &raw),
-            data: self.message(sample, sample.world_from_sensor, &covariances),
-            mag: None,
-            temperature: None,
+    fn mapped(&self, reading: Reading) -> Reading {
+        match &self.mapping {
+            Some(mapping) => mapping.map(&reading),
+            None => reading,
         }
     }
 
-    fn message(
-        &self,
-        sample: &ImuSample,
-        orientation: UnitQuaternion<f64>,
-        covariances: &Covariances,
-    ) -> Imu {
+    fn mapped_sample(&self, sample: ImuSample) -> ImuSample {
+        let mapped = self.mapped(sample.reading());
+        ImuSample {
+            specific_force: mapped.specific_force,
+            angular_velocity: mapped.angular_velocity,
+            ..sample
+        }
+    }
+
+    /// Without orientation.
+    fn data_raw(&self, sample: &ImuSample, covariances: &Covariances) -> Imu {
+        let sample = ImuSample {
+            world_from_sensor: UnitQuaternion::identity(),
+            ..*sample
+        };
+        self.message(&sample, &covariances.without_orientation())
+    }
+
+    fn message(&self, sample: &ImuSample, covariances: &Covariances) -> Imu {
         Imu {
             header: Header::new(sample.stamp.nanos, &self.frame_id),
-            orientation: orientation.into(),
+            orientation: sample.world_from_sensor.into(),
             orientation_covariance: covariances.orientation,
             angular_velocity: sample.angular_velocity.into(),
             angular_velocity_covariance: covariances.angular_velocity,

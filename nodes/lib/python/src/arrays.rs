@@ -1,7 +1,7 @@
 //! Between NumPy's arrays and the libraries' types.
 
-use cromosim_msgs::geometry_msgs::{PoseStamped, Quaternion};
-use cromosim_msgs::sensor_msgs::{Imu, MagneticField};
+use cromosim_imu::{Measured, SensorFrame};
+use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_recording::rigid::unit_quaternion;
 use cromosim_spatial::Stamp;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -81,66 +81,113 @@ pub fn stamps(array: &PyReadonlyArray1<'_, f64>, name: &str) -> PyResult<Vec<Sta
     Ok(view.iter().map(|&s| Stamp::from_seconds(s)).collect())
 }
 
-/// The arrays of messages by name: `stamps_ns` (N,), `specific_force`, `angular_velocity` (N, 3),
-/// `orientation` (N, 4) where `oriented`, and the three covariances (N, 9).
-pub fn readings<'py>(
-    py: Python<'py>,
-    messages: &[Imu],
-    orientations: Option<&[Imu]>,
-) -> PyResult<Bound<'py, PyDict>> {
-    let vector = |of: fn(&Imu) -> [f64; 3]| messages.iter().flat_map(of).collect::<Vec<f64>>();
-    let matrix = |of: fn(&Imu) -> [f64; 9]| messages.iter().flat_map(of).collect::<Vec<f64>>();
-    let stamps: Vec<i64> = messages.iter().map(|m| m.header.stamp.nanos()).collect();
-    let arrays = PyDict::new(py);
-    arrays.set_item("stamps_ns", PyArray1::from_vec(py, stamps))?;
-    let forces = vector(|m| {
-        let v = &m.linear_acceleration;
-        [v.x, v.y, v.z]
-    });
-    arrays.set_item("specific_force", rows(py, forces, 3)?)?;
-    let rates = vector(|m| {
-        let v = &m.angular_velocity;
-        [v.x, v.y, v.z]
-    });
-    arrays.set_item("angular_velocity", rows(py, rates, 3)?)?;
-    let covariance = matrix(|m| m.linear_acceleration_covariance);
-    arrays.set_item("specific_force_covariance", rows(py, covariance, 9)?)?;
-    let covariance = matrix(|m| m.angular_velocity_covariance);
-    arrays.set_item("angular_velocity_covariance", rows(py, covariance, 9)?)?;
-    if let Some(oriented) = orientations {
-        let values = oriented.iter().flat_map(|m| xyzw(&m.orientation)).collect();
-        arrays.set_item("orientation", rows(py, values, 4)?)?;
-    }
-    Ok(arrays)
+/// Readings on their way to arrays.
+#[derive(Default)]
+pub struct Columns {
+    stamps: Vec<i64>,
+    forces: Vec<f64>,
+    rates: Vec<f64>,
+    force_covariances: Vec<f64>,
+    rate_covariances: Vec<f64>,
+    orientations: Vec<f64>,
+    fields: Vec<f64>,
+    /// Whether a device said anything of an orientation.
+    oriented: bool,
 }
 
-/// Magnetometer readings, (N, 3), T.
-pub fn magnetic_fields<'py>(
-    py: Python<'py>,
-    messages: &[MagneticField],
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let values = messages.iter().flat_map(|message| {
-        let v = &message.magnetic_field;
-        [v.x, v.y, v.z]
-    });
-    rows(py, values.collect(), 3)
+impl Columns {
+    /// With room for so many readings.
+    pub fn with_capacity(count: usize) -> Self {
+        Self {
+            stamps: Vec::with_capacity(count),
+            forces: Vec::with_capacity(3 * count),
+            rates: Vec::with_capacity(3 * count),
+            force_covariances: Vec::with_capacity(9 * count),
+            rate_covariances: Vec::with_capacity(9 * count),
+            orientations: Vec::with_capacity(4 * count),
+            ..Self::default()
+        }
+    }
+
+    /// Adds what a device said of a sample.
+    pub fn push(&mut self, measured: &Measured) {
+        let (sample, covariances) = (&measured.sample, &measured.covariances);
+        self.stamps.push(sample.stamp.nanos);
+        self.forces
+            .extend_from_slice(sample.specific_force.as_slice());
+        self.rates
+            .extend_from_slice(sample.angular_velocity.as_slice());
+        self.force_covariances
+            .extend_from_slice(&covariances.linear_acceleration);
+        self.rate_covariances
+            .extend_from_slice(&covariances.angular_velocity);
+        self.orientations
+            .extend_from_slice(sample.world_from_sensor.coords.as_slice());
+        self.oriented |= covariances.orientation[0] >= 0.0;
+        if let Some(field) = &measured.magnetic_field {
+            self.fields.extend_from_slice(field.as_slice());
+        }
+    }
+
+    /// Of messages without orientation.
+    pub fn of_messages(messages: &[Imu]) -> Self {
+        let mut columns = Self::with_capacity(messages.len());
+        for message in messages {
+            let (f, w) = (message.linear_acceleration, message.angular_velocity);
+            columns.stamps.push(message.header.stamp.nanos());
+            columns.forces.extend([f.x, f.y, f.z]);
+            columns.rates.extend([w.x, w.y, w.z]);
+            columns
+                .force_covariances
+                .extend(message.linear_acceleration_covariance);
+            columns
+                .rate_covariances
+                .extend(message.angular_velocity_covariance);
+        }
+        columns
+    }
+
+    /// Whether a device stated any orientation.
+    pub fn are_oriented(&self) -> bool {
+        self.oriented
+    }
+
+    /// The arrays by name: `stamps_ns` (N,), `specific_force`, `angular_velocity` (N, 3), the covariances
+    /// of both (N, 9), `orientation` (N, 4) where it is asked for, and `magnetic_field` (N, 3), T, where a
+    /// device read one.
+    pub fn into_arrays(self, py: Python<'_>, oriented: bool) -> PyResult<Bound<'_, PyDict>> {
+        let arrays = PyDict::new(py);
+        arrays.set_item("stamps_ns", PyArray1::from_vec(py, self.stamps))?;
+        arrays.set_item("specific_force", rows(py, self.forces, 3)?)?;
+        arrays.set_item("angular_velocity", rows(py, self.rates, 3)?)?;
+        let covariances = rows(py, self.force_covariances, 9)?;
+        arrays.set_item("specific_force_covariance", covariances)?;
+        let covariances = rows(py, self.rate_covariances, 9)?;
+        arrays.set_item("angular_velocity_covariance", covariances)?;
+        if oriented {
+            arrays.set_item("orientation", rows(py, self.orientations, 4)?)?;
+        }
+        if !self.fields.is_empty() {
+            arrays.set_item("magnetic_field", rows(py, self.fields, 3)?)?;
+        }
+        Ok(arrays)
+    }
 }
 
 /// The arrays of a reference: `stamps_ns` (N,), `positions` (N, 3), `orientations` (N, 4).
-pub fn poses<'py>(py: Python<'py>, poses: &[PoseStamped]) -> PyResult<Bound<'py, PyDict>> {
-    let stamps: Vec<i64> = poses.iter().map(|p| p.header.stamp.nanos()).collect();
-    let positions = poses.iter().flat_map(|p| {
-        let at = &p.pose.position;
-        [at.x, at.y, at.z]
-    });
-    let orientations = poses.iter().flat_map(|p| xyzw(&p.pose.orientation));
+pub fn poses<'py>(py: Python<'py>, frames: &[SensorFrame]) -> PyResult<Bound<'py, PyDict>> {
+    let mut stamps = Vec::with_capacity(frames.len());
+    let mut positions = Vec::with_capacity(3 * frames.len());
+    let mut orientations = Vec::with_capacity(4 * frames.len());
+    for frame in frames {
+        let pose = &frame.world_from_sensor;
+        stamps.push(frame.stamp.nanos);
+        positions.extend_from_slice(pose.translation.vector.as_slice());
+        orientations.extend_from_slice(pose.rotation.coords.as_slice());
+    }
     let arrays = PyDict::new(py);
     arrays.set_item("stamps_ns", PyArray1::from_vec(py, stamps))?;
-    arrays.set_item("positions", rows(py, positions.collect(), 3)?)?;
-    arrays.set_item("orientations", rows(py, orientations.collect(), 4)?)?;
+    arrays.set_item("positions", rows(py, positions, 3)?)?;
+    arrays.set_item("orientations", rows(py, orientations, 4)?)?;
     Ok(arrays)
-}
-
-fn xyzw(q: &Quaternion) -> [f64; 4] {
-    [q.x, q.y, q.z, q.w]
 }

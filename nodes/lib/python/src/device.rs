@@ -7,7 +7,6 @@ use cromosim_imu::{
     OrientationSource, SampleVariance, VirtualImu,
 };
 use cromosim_learned::MappingFile;
-use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_recording::reading_mapping;
 use cromosim_spatial::Stamp;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
@@ -16,7 +15,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::json;
 
-use crate::arrays::{readings, rotations, stamps, vectors};
+use crate::arrays::{Columns, rotations, stamps, vectors};
 use crate::error::raise;
 
 /// A device of its name, of its file, or of a file's text.
@@ -169,7 +168,7 @@ pub fn apply_device<'py>(
     )?;
     let mapping = mapping.map(|path| MappingFile::read(Path::new(path)));
     let mapping = mapping.transpose().map_err(raise)?.unwrap_or_default();
-    let messages = py.detach(|| {
+    let columns = py.detach(|| {
         let options = ImuOptions {
             rate_hz: rate_hz.map_or_else(|| ideal.rate_hz(), Ok)?,
             seed,
@@ -182,13 +181,10 @@ pub fn apply_device<'py>(
         };
         let mut imu = VirtualImu::new(&device, options).map_err(raise)?;
         let samples = (0..ideal.stamps.len()).map(|k| ideal.sample(k));
-        let measured = samples.filter_map(|sample| imu.measure(&sample));
-        Ok::<_, PyErr>(
-            measured
-                .map(|m| (m.data_raw, m.data))
-                .unzip::<Imu, Imu, Vec<_>, Vec<_>>(),
-        )
+        let mut columns = Columns::with_capacity(ideal.stamps.len());
+        let measured = samples.filter_map(|sample| imu.read(&sample));
+        measured.for_each(|it| columns.push(&it));
+        Ok::<_, PyErr>(columns)
     })?;
-    let (raw, full) = messages;
-    readings(py, &raw, oriented.then_some(full.as_slice()))
+    columns.into_arrays(py, oriented)
 }

@@ -16,7 +16,7 @@ use crate::error::raise;
 /// A person's motion.
 #[pyclass(frozen, module = "cromosim._native")]
 pub struct Motion {
-    pub motion: SmplMotion,
+    pub motion: Arc<SmplMotion>,
     pub model: Arc<BodyModel>,
     /// The part that is simulated, s; the rest is there for its derivatives.
     pub start_s: f64,
@@ -54,7 +54,7 @@ pub fn read_motion(
             .part(options.start_s, options.duration_s)
             .map_err(raise)?;
         Ok(Motion {
-            motion,
+            motion: Arc::new(motion),
             model,
             start_s: options.start_s,
             duration_s: options.duration_s,
@@ -66,7 +66,7 @@ pub fn read_motion(
 #[pyfunction]
 pub fn walk(py: Python<'_>) -> Motion {
     py.detach(|| Motion {
-        motion: embedded_walk(),
+        motion: Arc::new(embedded_walk()),
         model: BodyModel::embedded(),
         start_s: 0.0,
         duration_s: None,
@@ -141,7 +141,7 @@ impl Motion {
             poses: None,
         };
         Ok(Self {
-            motion,
+            motion: Arc::new(motion),
             model,
             start_s: 0.0,
             duration_s: None,

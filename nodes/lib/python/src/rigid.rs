@@ -5,7 +5,6 @@ use cromosim_imu::{
     StreamOptions, StreamingImu, TextureSegment, VirtualImu,
 };
 use cromosim_learned::scheme_for_networks;
-use cromosim_msgs::sensor_msgs::Imu;
 use cromosim_recording::{RecordedPlacement, Resimulation};
 use cromosim_spatial::Stamp;
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
@@ -13,7 +12,7 @@ use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{readings, rotations, stamps, vectors};
+use crate::arrays::{Columns, rotations, stamps, vectors};
 use crate::device::device;
 use crate::error::raise;
 use crate::simulate::Options;
@@ -67,7 +66,7 @@ pub fn simulate_rigid<'py>(
         };
         how.simulate(&recorded).map_err(raise)
     })?;
-    let arrays = readings(py, &resimulated.messages, None)?;
+    let arrays = Columns::of_messages(&resimulated.messages).into_arrays(py, false)?;
     let quality = &resimulated.quality;
     arrays.set_item(
         "bandwidth_hz",
@@ -207,9 +206,9 @@ impl Stream {
         py: Python<'py>,
         samples: &[cromosim_imu::KinematicSample],
     ) -> PyResult<Bound<'py, PyDict>> {
-        let measured = samples.iter().filter_map(|sample| self.imu.measure(sample));
-        let (raw, full): (Vec<Imu>, Vec<Imu>) =
-            measured.map(|both| (both.data_raw, both.data)).unzip();
-        readings(py, &raw, Some(&full))
+        let mut columns = Columns::with_capacity(samples.len());
+        let measured = samples.iter().filter_map(|sample| self.imu.read(sample));
+        measured.for_each(|it| columns.push(&it));
+        columns.into_arrays(py, true)
     }
 }

@@ -6,21 +6,19 @@ use std::str::FromStr;
 use std::sync::Arc;
 
 use cromosim_imu::{
-    AmbientField, Device, Differentiation, ImuMessages, OrientationSource, PlacementSet, Scheme,
-    TextureSegment, Trim,
+    AmbientField, Device, Differentiation, OrientationSource, PlacementSet, Scheme, TextureSegment,
+    Trim,
 };
 use cromosim_learned::{LearnedSimulator, MappingFile};
-use cromosim_msgs::geometry_msgs::PoseStamped;
-use cromosim_msgs::sensor_msgs::{Imu, MagneticField};
 use cromosim_recording::{
-    Aside, PlayedPerson, Quality, RecordingError, Simulation, SimulationOptions, TextureOn,
+    Aside, PlayedPerson, RecordingError, Simulation, SimulationOptions, TextureOn,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
 use serde::Deserialize;
 
-use crate::arrays::{magnetic_fields, poses, readings};
+use crate::arrays::{Columns, poses};
 use crate::error::raise;
 use crate::motion::Motion;
 
@@ -149,44 +147,28 @@ pub fn simulate<'py>(
         let simulated = simulation
             .simulate::<RecordingError>(&person, &Aside::in_memory(), || Ok(()), || ())
             .map_err(raise)?;
-        let references = simulated.references(&person);
-        let measured = simulated
-            .placements
-            .into_par_iter()
-            .map(|mut placement| Ok((placement.messages()?, placement)))
-            .collect::<Result<Vec<_>, RecordingError>>()
-            .map_err(raise)?;
-        Ok::<_, PyErr>(measured.into_iter().zip(references).collect::<Vec<_>>())
+        let measured = simulated.placements.into_par_iter().map(|mut placement| {
+            let mut columns = Columns::with_capacity(placement.motion.count());
+            while let Some(measured) = placement.next_measured()? {
+                columns.push(&measured);
+            }
+            Ok((columns, placement))
+        });
+        let measured = measured.collect::<Result<Vec<_>, RecordingError>>();
+        measured.map_err(raise)
     })?;
     let imus = PyDict::new(py);
-    for ((messages, placement), reference) in simulated {
-        let arrays = arrays_of(py, messages, &reference, &placement.quality)?;
+    for (columns, placement) in simulated {
+        let oriented = columns.are_oriented();
+        let arrays = columns.into_arrays(py, oriented)?;
+        arrays.set_item("reference", poses(py, &placement.frames)?)?;
+        let quality = &placement.quality;
+        arrays.set_item(
+            "bandwidth_hz",
+            quality.bandwidth.map(|it| it.acceleration_hz),
+        )?;
+        arrays.set_item("trimmed_s", quality.trimmed_s)?;
         imus.set_item(&placement.name, arrays)?;
     }
     Ok(imus)
-}
-
-fn arrays_of<'py>(
-    py: Python<'py>,
-    messages: Vec<ImuMessages>,
-    reference: &[PoseStamped],
-    quality: &Quality,
-) -> PyResult<Bound<'py, PyDict>> {
-    let fields: Vec<MagneticField> = messages.iter().filter_map(|it| it.mag.clone()).collect();
-    let (raw, full): (Vec<Imu>, Vec<Imu>) = messages
-        .into_iter()
-        .map(|both| (both.data_raw, both.data))
-        .unzip();
-    let is_known = full.iter().any(|it| it.orientation_covariance[0] >= 0.0);
-    let arrays = readings(py, &raw, is_known.then_some(&full[..]))?;
-    if !fields.is_empty() {
-        arrays.set_item("magnetic_field", magnetic_fields(py, &fields)?)?;
-    }
-    arrays.set_item("reference", poses(py, reference)?)?;
-    arrays.set_item(
-        "bandwidth_hz",
-        quality.bandwidth.map(|it| it.acceleration_hz),
-    )?;
-    arrays.set_item("trimmed_s", quality.trimmed_s)?;
-    Ok(arrays)
 }

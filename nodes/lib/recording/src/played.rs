@@ -3,13 +3,12 @@
 use std::fs;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use cromosim_bag::{BagReader, write_imu_csv};
-use cromosim_imu::{ImuMessages, MountedSensors, VirtualImu};
+use cromosim_imu::{ImuMessages, Measured, MountedSensors, Reading, SensorFrame, VirtualImu};
 use cromosim_motion::{MotionError, PersonPart, SmplMotion};
 use cromosim_msgs::cromosim_msgs::SmplState;
-use cromosim_msgs::geometry_msgs::PoseStamped;
-use cromosim_msgs::std_msgs::Header;
 use cromosim_spatial::Stamp;
 
 use crate::motion_spill::MotionSpill;
@@ -21,7 +20,7 @@ use crate::{
 /// One person of a motion file.
 pub struct PlayedPerson {
     /// What the person does.
-    pub motion: SmplMotion,
+    pub motion: Arc<SmplMotion>,
     /// Before topics (`/person_7`) and frames; empty for a file's only or chosen person.
     pub label: String,
     /// As the states' `body_id`.
@@ -42,29 +41,38 @@ pub struct SimulatedPlacement {
     pub imu: VirtualImu,
     /// What they are good for.
     pub quality: Quality,
+    /// `world_from_sensor` at the frames that are played; empty unless everything stays in memory.
+    pub frames: Vec<SensorFrame>,
 }
 
 impl SimulatedPlacement {
-    /// The messages of the samples that were not taken yet and that the device does not lose.
+    /// What the device says of the next sample that it does not lose; none after the last.
     ///
     /// # Errors
     /// [`RecordingError::PutAside`] where what was put aside is lost.
-    pub fn messages(&mut self) -> Result<Vec<ImuMessages>, RecordingError> {
-        let mut messages = Vec::new();
-        while let Some(next) = self.next_messages()? {
-            messages.push(next);
-        }
-        Ok(messages)
-    }
-
-    /// The messages of the next sample that the device does not lose; none after the last.
-    pub(crate) fn next_messages(&mut self) -> Result<Option<ImuMessages>, RecordingError> {
+    pub fn next_measured(&mut self) -> Result<Option<Measured>, RecordingError> {
         while let Some(sample) = self.motion.next_sample()? {
-            if let Some(messages) = self.imu.measure(&sample) {
-                return Ok(Some(messages));
+            if let Some(measured) = self.imu.read(&sample) {
+                return Ok(Some(measured));
             }
         }
         Ok(None)
+    }
+
+    /// Stamp and channels of the same; whoever takes these takes nothing else of this placement.
+    pub(crate) fn next_channels(&mut self) -> Result<Option<(Stamp, Reading)>, RecordingError> {
+        while let Some(sample) = self.motion.next_sample()? {
+            if let Some(read) = self.imu.read_channels(&sample) {
+                return Ok(Some(read));
+            }
+        }
+        Ok(None)
+    }
+
+    /// The same as messages.
+    pub(crate) fn next_messages(&mut self) -> Result<Option<ImuMessages>, RecordingError> {
+        let measured = self.next_measured()?;
+        Ok(measured.map(|it| self.imu.messages(&it)))
     }
 }
 
@@ -74,24 +82,6 @@ pub struct SimulatedPerson {
     pub sites: MountedSensors,
     /// In the order of `sites`.
     pub placements: Vec<SimulatedPlacement>,
-}
-
-impl SimulatedPerson {
-    /// Of each placement `world_from_sensor` at the frames that are played.
-    pub fn references(&self, person: &PlayedPerson) -> Vec<Vec<PoseStamped>> {
-        let mut references = vec![Vec::new(); self.placements.len()];
-        for frame in person.played.clone() {
-            let stamp = person.stamps[frame];
-            let poses = self.sites.poses(&person.motion.frames[frame]);
-            for (own, pose) in references.iter_mut().zip(&poses) {
-                own.push(PoseStamped {
-                    header: Header::new(stamp.nanos, "world"),
-                    pose: pose.world_from_sensor.into(),
-                });
-            }
-        }
-        references
-    }
 }
 
 /// Poses on either side of a part that are differentiated with it, s: several times what neighbours
@@ -104,7 +94,7 @@ impl PlayedPerson {
         Self {
             stamps: stamps(&motion, 0.0),
             played: 0..=motion.frames.len().saturating_sub(1),
-            motion,
+            motion: Arc::new(motion),
             label: String::new(),
             body_id: "0".to_owned(),
         }
@@ -116,7 +106,7 @@ impl PlayedPerson {
     /// # Errors
     /// Where the part lies outside the motion.
     pub fn part(
-        motion: &SmplMotion,
+        motion: &Arc<SmplMotion>,
         start_s: f64,
         duration_s: Option<f64>,
     ) -> Result<Self, MotionError> {
@@ -129,13 +119,13 @@ impl PlayedPerson {
     pub fn varied(&self, betas: Option<&[f64]>, speed: f64) -> Self {
         let begin = FIRST_STAMP;
         let faster = |stamp: &Stamp| begin.plus_seconds((*stamp - begin) / speed);
-        let mut motion = self.motion.clone();
+        let mut motion = SmplMotion::clone(&self.motion);
         motion.rate_hz *= speed;
         if let Some(betas) = betas {
             betas.clone_into(&mut motion.betas);
         }
         Self {
-            motion,
+            motion: Arc::new(motion),
             label: self.label.clone(),
             body_id: self.body_id.clone(),
             stamps: self.stamps.iter().map(faster).collect(),
@@ -149,16 +139,21 @@ impl PlayedPerson {
         Self {
             label: person.label,
             body_id: person.name,
-            ..Self::of_frames(&person.motion, frames, begins_s)
+            ..Self::of_frames(&Arc::new(person.motion), frames, begins_s)
         }
     }
 
-    /// These frames, the first of which stands at `begins_s`, with those beside them.
-    fn of_frames(motion: &SmplMotion, frames: RangeInclusive<usize>, begins_s: f64) -> Self {
+    /// These frames, the first of which stands at `begins_s`, with those beside them; a whole motion is
+    /// shared.
+    fn of_frames(motion: &Arc<SmplMotion>, frames: RangeInclusive<usize>, begins_s: f64) -> Self {
         let beside = (BESIDE_S * motion.rate_hz) as usize;
         let first = frames.start().saturating_sub(beside);
         let last = (frames.end() + beside).min(motion.frames.len().saturating_sub(1));
-        let motion = motion.of_frames(first..=last);
+        let motion = if last - first + 1 == motion.frames.len() {
+            motion.clone()
+        } else {
+            Arc::new(motion.of_frames(first..=last))
+        };
         let lead = frames.start() - first;
         Self {
             stamps: stamps(&motion, begins_s - lead as f64 / motion.rate_hz),

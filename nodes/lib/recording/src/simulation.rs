@@ -29,6 +29,9 @@ const MOST_AT_ONCE: usize = 4;
 /// Poses that these may hold in memory: longer motions are simulated a placement at a time. Of a pose
 /// there are 1.5 KB.
 const POSES_AT_ONCE: usize = 1 << 16;
+/// Frames of all placements that may be in memory at once, of 120 bytes each: then the skeleton is found
+/// once a pose, not once for each of the groups.
+const FRAMES_AT_ONCE: usize = 1 << 18;
 
 /// Where samples are put aside until they are read.
 #[derive(Clone, Debug)]
@@ -36,6 +39,8 @@ pub struct Aside {
     /// Bytes a placement that stay in memory.
     in_memory: usize,
     folder: PathBuf,
+    /// Whether the placements' frames stay too.
+    frames: bool,
 }
 
 impl Aside {
@@ -45,14 +50,16 @@ impl Aside {
         Self {
             in_memory: IN_MEMORY / placements.max(1),
             folder: folder.unwrap_or(Path::new(".")).to_owned(),
+            frames: false,
         }
     }
 
-    /// All in memory.
+    /// All in memory, the placements' frames too.
     pub fn in_memory() -> Self {
         Self {
             in_memory: usize::MAX,
             folder: PathBuf::new(),
+            frames: true,
         }
     }
 }
@@ -219,23 +226,32 @@ impl Simulation {
         }
         let times = PoseTimes::new(stamps).map_err(RecordingError::from)?;
         advance();
-        let together = |indices: Range<usize>| -> Result<Vec<SimulatedPlacement>, E> {
+        let count = sites.sensors().len();
+        let groups = groups(count, stamps.len());
+        let mut trajectories = Vec::new();
+        if count * stamps.len() <= FRAMES_AT_ONCE {
+            trajectories = self.trajectories(person, &sites)?;
+        }
+        let mut trajectories = trajectories.into_iter();
+        let own = |indices: Range<usize>| {
+            let own: Vec<_> = trajectories.by_ref().take(indices.len()).collect();
+            (indices, own)
+        };
+        let groups: Vec<_> = groups.into_iter().map(own).collect();
+        let together = |(indices, own): (Range<usize>, _)| -> Result<Vec<SimulatedPlacement>, E> {
             check()?;
-            let motions = self.motions(person, &shaped, indices.clone(), &times);
-            let one = |(index, (trajectory, motion)): (usize, _)| {
+            let motions = self.motions(person, &shaped, (indices.clone(), own), &times);
+            let one = |(index, motion): (usize, _)| {
                 check()?;
                 let mounted = (&shaped, &sites.sensors()[index]);
-                let simulated =
-                    self.simulate_placement(person, mounted, index, (&trajectory, motion), aside);
+                let simulated = self.simulate_placement(person, mounted, index, motion, aside);
                 advance();
                 Ok(simulated?)
             };
             indices.zip(motions?).map(one).collect()
         };
         // Of several errors the first placement's is said, whichever comes first.
-        let count = sites.sensors().len();
-        let groups = groups(count, stamps.len()).into_par_iter();
-        let placements: Vec<Result<_, E>> = groups.map(together).collect();
+        let placements: Vec<Result<_, E>> = groups.into_par_iter().map(together).collect();
         let placements = placements.into_iter().collect::<Result<Vec<_>, E>>()?;
         Ok(SimulatedPerson {
             placements: placements.into_iter().flatten().collect(),
@@ -243,16 +259,18 @@ impl Simulation {
         })
     }
 
-    /// Trajectories and ideal motions of some placements.
+    /// Trajectories and ideal motions of some placements; the trajectories are found where none are given.
     fn motions(
         &self,
         person: &PlayedPerson,
         shaped: &ShapedBody,
-        indices: Range<usize>,
+        (indices, mut trajectories): (Range<usize>, Vec<SensorTrajectory>),
         times: &PoseTimes,
     ) -> Result<Vec<(SensorTrajectory, Vec<KinematicSample>)>, RecordingError> {
         let placements = &self.placements.placements()[indices];
-        let trajectories = self.trajectories(person, shaped, placements)?;
+        if trajectories.is_empty() {
+            trajectories = self.trajectories(person, &MountedSensors::new(shaped, placements)?)?;
+        }
         let [start, end] =
             [person.played.start(), person.played.end()].map(|frame| person.stamps[*frame]);
         let output = |placement: &Placement| uniform_stamps(start, end, placement.rate_hz());
@@ -278,12 +296,11 @@ impl Simulation {
         Ok(trajectories.into_iter().zip(motions).collect())
     }
 
-    /// Of some placements at a time: the poses of all would be most of a long motion's memory.
+    /// Of a long motion of some placements at a time: the frames of all would be most of its memory.
     fn trajectories(
         &self,
         person: &PlayedPerson,
-        shaped: &ShapedBody,
-        placements: &[Placement],
+        mounted: &MountedSensors,
     ) -> Result<Vec<SensorTrajectory>, RecordingError> {
         let motion = &person.motion;
         let confidences = motion.confidence.as_deref().unwrap_or_default();
@@ -292,7 +309,6 @@ impl Simulation {
             .iter()
             .map(|&confidence| PoseStd::from_confidence(confidence, correlation_s))
             .collect();
-        let mounted = MountedSensors::new(shaped, placements)?;
         let trajectories = mounted.trajectories(&person.stamps, &motion.frames)?;
         let finished = |trajectory: SensorTrajectory| {
             trajectory
@@ -307,7 +323,7 @@ impl Simulation {
         person: &PlayedPerson,
         (shaped, mounted): (&ShapedBody, &MountedSensor),
         index: usize,
-        (trajectory, mut motion): (&SensorTrajectory, Vec<KinematicSample>),
+        (trajectory, mut motion): (SensorTrajectory, Vec<KinematicSample>),
         aside: &Aside,
     ) -> Result<SimulatedPlacement, RecordingError> {
         let (placement, device) = (&self.placements.placements()[index], &self.devices[index]);
@@ -334,11 +350,18 @@ impl Simulation {
             let patch = Patch::new(shaped, mounted.site())?;
             let poses = person.motion.frames.iter();
             let points: Vec<_> = poses.map(|pose| patch.points(pose)).collect();
-            let seen = SiteMotion::new(trajectory, placement.scheme(), &points)?;
+            let seen = SiteMotion::new(&trajectory, placement.scheme(), &points)?;
             networks.correction(seen).correct(&mut motion)?;
         }
         let [motion] = motion;
+        let mut frames = Vec::new();
+        if aside.frames {
+            frames = trajectory.into_frames();
+            frames.truncate(person.played.end() + 1);
+            frames.drain(..person.played.start());
+        }
         Ok(SimulatedPlacement {
+            frames,
             name: name.to_owned(),
             motion: MotionSpill::new(motion, aside.in_memory, &aside.folder)?,
             imu,

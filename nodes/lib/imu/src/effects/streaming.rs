@@ -21,8 +21,8 @@ use crate::{Channel, Device, ImuError, ImuSample, KinematicSample, NoiseSource, 
 pub struct StreamingEffects {
     device: Device,
     rate_hz: f64,
-    /// None before the first sample.
-    model: Option<SensorModel>,
+    /// None before the first sample; every step takes it and puts it back.
+    model: Option<Box<SensorModel>>,
     noise: Option<NoiseSource>,
     biases: Option<DrawnBiases>,
     dropouts: Option<Dropouts>,
@@ -108,9 +108,24 @@ impl StreamingEffects {
     /// The device's reading of a sample, by the device's own clock; none where it is lost. One call
     /// a sample, in order of time; after a pause of more than ten intervals the filters begin anew.
     pub fn step(&mut self, sample: &KinematicSample) -> Option<ImuSample> {
+        let read = self.step_reading(sample);
+        let mut world_from_sensor = self.world_from_sensor(sample);
+        if let Some(noise) = &mut self.noise {
+            world_from_sensor *= noise.draw_turn();
+        }
+        read.map(|(stamp, reading)| ImuSample {
+            stamp,
+            world_from_sensor,
+            specific_force: reading.specific_force,
+            angular_velocity: reading.angular_velocity,
+        })
+    }
+
+    /// As [`StreamingEffects::step`], without an orientation: for a device that says none of any sample.
+    pub fn step_reading(&mut self, sample: &KinematicSample) -> Option<(Stamp, Reading)> {
         let model = match self.model.take() {
             Some(model) => model,
-            None => SensorModel::new(self.device.effects(), sample.stamp),
+            None => Box::new(SensorModel::new(self.device.effects(), sample.stamp)),
         };
         let reading = self.reading(&model, sample);
         let lost = self.dropouts.as_mut().is_some_and(Dropouts::next_is_lost);
@@ -127,7 +142,7 @@ impl StreamingEffects {
         sample.world_from_sensor.rotation * orientation(turn.as_ref())
     }
 
-    fn reading(&mut self, model: &SensorModel, sample: &KinematicSample) -> ImuSample {
+    fn reading(&mut self, model: &SensorModel, sample: &KinematicSample) -> (Stamp, Reading) {
         let seconds = sample.stamp - model.epoch;
         let interval = self.previous.map_or(0.0, |(stamp, _)| sample.stamp - stamp);
         if !(0.0..=10.0 / self.rate_hz).contains(&interval) {
@@ -136,8 +151,6 @@ impl StreamingEffects {
         let sensor_from_segment = sensor_from_segment(model, seconds);
         let (mut reading, mut turning) = (Reading::default(), Turning::default());
         let mut stamp = sample.stamp;
-        let mut world_from_sensor =
-            sample.world_from_sensor.rotation * orientation(sensor_from_segment.as_ref());
         for stage in Stage::ORDER {
             match stage {
                 Stage::Reference => {}
@@ -168,18 +181,12 @@ impl StreamingEffects {
                     }
                     if let Some(noise) = &mut self.noise {
                         noise.add_to(std::slice::from_mut(&mut reading));
-                        world_from_sensor *= noise.draw_turn();
                     }
                     model.digital(std::slice::from_mut(&mut reading));
                 }
             }
         }
-        ImuSample {
-            stamp,
-            world_from_sensor,
-            specific_force: reading.specific_force,
-            angular_velocity: reading.angular_velocity,
-        }
+        (stamp, reading)
     }
 
     /// The vibration, with what the gyroscope feels of it, and the low-pass.

@@ -26,11 +26,9 @@ impl ColumnsWriter<'_> {
                 ..ColumnsGroup::default()
             };
             check()?;
-            while let Some(messages) = placement.next_messages()? {
-                let message = &messages.data_raw;
-                let (f, w) = (message.linear_acceleration, message.angular_velocity);
-                let values = [f.x, f.y, f.z, w.x, w.y, w.z];
-                group.push(message.header.stamp.nanos(), values);
+            while let Some((stamp, reading)) = placement.next_channels()? {
+                let (f, w) = (reading.specific_force, reading.angular_velocity);
+                group.push(stamp.nanos, [f.x, f.y, f.z, w.x, w.y, w.z]);
                 if group.stamps.len() == MAX_GROUP {
                     check()?;
                     self.write(&mut group)?;
