@@ -29,8 +29,8 @@ def simulate(batch: dict[str, np.ndarray]) -> pa.Table:
     parts = []
     for name, readings in imus.items():
         columns: dict[str, object] = {
-            "recording": [Path(str(path)).stem] * len(readings),
-            "placement": [name] * len(readings),
+            "recording": pa.repeat(Path(str(path)).stem, len(readings)),
+            "placement": pa.repeat(name, len(readings)),
             "stamp_ns": readings.stamps_ns,
         }
         for quantity in ("specific_force", "angular_velocity"):

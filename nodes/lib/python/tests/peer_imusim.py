@@ -2,8 +2,9 @@
 
 For the Python of an environment of its own, with the fork of IMUSim that runs on Python 3
 (github.com/hyeokhyen/imusim_py3: Python 3.9, numpy < 1.24, scipy < 1.11, cython < 3, setuptools < 58,
-simpy < 3, its readme's steps; an empty module `mayavi` does). Prints what the simulation alone took,
-and the whole process; ideal sensors, 100 Hz, the motion in IMUSim's own splines.
+simpy < 3, its readme's steps; an empty module `mayavi` does). Prints what
+IMUSim's splines through the motion took, the simulation after them, and the whole process; ideal
+sensors, 100 Hz.
 """
 
 import resource
@@ -23,7 +24,10 @@ def cpu() -> float:
 
 def main() -> None:
     path, joints = sys.argv[1], sys.argv[2:]
-    model = SplinedBodyModel(loadBVHFile(path))
+    read = loadBVHFile(path)
+    before = cpu()
+    model = SplinedBodyModel(read)
+    splines = cpu() - before
     simulation = Simulation()
     simulation.time = model.startTime
     imus = []
@@ -36,7 +40,7 @@ def main() -> None:
     alone = cpu() - before
     counts = [imu.accelerometer.rawMeasurements.timestamps.size for imu in imus]
     assert min(counts) > 5900, counts
-    print(f"{alone:.2f} {cpu():.2f}")
+    print(f"{splines:.2f} {alone:.2f} {cpu():.2f}")
 
 
 if __name__ == "__main__":
