@@ -2,16 +2,18 @@
 //! read off the readings, the stamps and the reference.
 
 use cromosim_imu::{
-    Channel, Effect, EffectKind, EffectSet, Ordinary, PerChannel, ReadOff, Rounding, Search,
+    Channel, Effect, EffectKind, EffectSet, Ordinary, PerChannel, ReadOff, Reading, Rounding,
+    Search,
 };
-use cromosim_spatial::PoseEstimate;
+use cromosim_spatial::PoseNoise;
 
+use crate::axes::{axes_of_channel, value_on_axis};
 use crate::digital::Digital;
 use crate::fit::FitModel;
 use crate::library::Library;
 use crate::policy::report::{
     COARSE_STEPS, DOUBTFUL_EXCESS_NOISE, EXCESS_NOISE, MANY_MISSING,
-    ORDINARY_BESIDE_REFERENCE_NOISE, ORDINARY_BESIDE_SMOOTHING, REFERENCE_NOISE,
+    ORDINARY_BESIDE_REFERENCE_NOISE, ORDINARY_BESIDE_SMOOTHING, REFERENCE_NOISE, ROUNDING_SIGMAS,
     ROUNDING_UNCERTAINTY, STEP,
 };
 
@@ -36,6 +38,7 @@ pub(crate) fn reportable_effects(
     let mut set = fitted.filtered(|effect| {
         !is_ordinary(effect, ordinary_factor(model)) && !is_rounding(effect, model)
     });
+    set.take_values_of(fitted);
     for kind in EffectKind::ALL {
         let Search::ReadOff(search) = kind.spec().search else {
             continue;
@@ -49,14 +52,16 @@ pub(crate) fn reportable_effects(
 }
 
 /// Whether the reference scatters so much that this is a cause. Frames too slow for the motion seem to
-/// scatter where the poses interpolated between them do not.
+/// scatter where the poses on the chords between them do not.
 fn is_reference_noisy(model: &FitModel) -> bool {
     let prepared = model.prepared;
-    let is_noisy = |estimate: &PoseEstimate| {
-        let noise = estimate.noise();
+    let is_noisy = |noise: PoseNoise| {
         noise.position >= REFERENCE_NOISE.position || noise.rotation >= REFERENCE_NOISE.rotation
     };
-    is_noisy(&prepared.estimate) && prepared.interpolated.as_ref().is_none_or(is_noisy)
+    let interpolated = prepared.interpolated.as_ref();
+    is_noisy(prepared.estimate.noise())
+        && interpolated.is_none_or(|poses| is_noisy(poses.noise()))
+        && prepared.noise_behind_frames.is_none_or(is_noisy)
 }
 
 /// Factor on what is ordinary: what is fitted to a poor reference is that much poorer.
@@ -94,27 +99,39 @@ pub(crate) fn is_ordinary(effect: &Effect, factor: f64) -> bool {
     }
 }
 
-/// Whether an offset or ramp stays below half a step of a coarse rounding: slow motion dwells on
-/// one side of a step.
+/// Whether an offset or ramp may come from a coarse rounding alone: below half a step, slow motion dwells
+/// on one side of it. Readings that go from step to step round anew with each, by step / sqrt(12); so many
+/// of them leave an offset of that over the root of their number, and over a recording a ramp of sqrt(12)
+/// times as much.
 fn is_rounding(effect: &Effect, model: &FitModel) -> bool {
     let spec = effect.kind().spec();
     let Search::Fitted(search) = spec.search else {
         return false;
     };
-    let size = effect
-        .values()
-        .iter()
-        .map(|value| value.abs())
-        .fold(0.0, f64::max);
     let seconds = model.prepared.length as f64 / model.prepared.rate_hz;
-    let offset = match search.rounding {
+    let (factor, of_rounding) = match search.rounding {
         None => return false,
-        Some(Rounding::Offset) => size,
-        Some(Rounding::Ramp) => size * seconds,
+        Some(Rounding::Offset) => (1.0, 12.0_f64.sqrt().recip()),
+        Some(Rounding::Ramp) => (seconds, 1.0),
     };
-    spec.channels
-        .iter()
-        .any(|channel| offset < 0.5 * coarse_step(model, *channel))
+    let passes = |channel: Channel| {
+        let step = coarse_step(model, channel);
+        let axes = axes_of_channel(channel).zip(effect.values());
+        step > 0.0
+            && axes.into_iter().all(|(axis, value)| {
+                let size = factor * value.abs();
+                let by_chance = of_rounding * step / (steps_taken(model, axis) as f64).sqrt();
+                size < 0.5 * step && size < ROUNDING_SIGMAS * by_chance
+            })
+    };
+    spec.channels.iter().any(|channel| passes(*channel))
+}
+
+/// How often an axis goes from step to step, and 1.
+fn steps_taken(model: &FitModel, axis: usize) -> usize {
+    let readings = model.prepared.measured.windows(2);
+    let goes = |pair: &&[Reading]| value_on_axis(&pair[0], axis) != value_on_axis(&pair[1], axis);
+    1 + readings.filter(goes).count()
 }
 
 /// Step of a coarse rounding in SI units; 0 where the rounding is none or fine.
