@@ -51,22 +51,27 @@ pub(crate) fn reportable_effects(
     set
 }
 
-/// Whether the reference scatters so much that this is a cause. Frames too slow for the motion seem to
-/// scatter where the poses on the chords between them do not.
-fn is_reference_noisy(model: &FitModel) -> bool {
+/// Whether a reference scatters so much that this is a cause.
+fn is_noisy(noise: PoseNoise) -> bool {
+    noise.position >= REFERENCE_NOISE.position || noise.rotation >= REFERENCE_NOISE.rotation
+}
+
+/// Whether the reference scatters as much, or seems to: frames too slow for the motion do, and so do the
+/// poses between them.
+fn is_reference_poor(model: &FitModel) -> bool {
     let prepared = model.prepared;
-    let is_noisy = |noise: PoseNoise| {
-        noise.position >= REFERENCE_NOISE.position || noise.rotation >= REFERENCE_NOISE.rotation
-    };
     let interpolated = prepared.interpolated.as_ref();
-    is_noisy(prepared.estimate.noise())
-        && interpolated.is_none_or(|poses| is_noisy(poses.noise()))
-        && prepared.noise_behind_frames.is_none_or(is_noisy)
+    is_noisy(prepared.estimate.noise()) && interpolated.is_none_or(|poses| is_noisy(poses.noise()))
+}
+
+/// Whether it does: noise behind frames shows on the chords between them.
+fn is_reference_noisy(model: &FitModel) -> bool {
+    is_reference_poor(model) && model.prepared.noise_behind_frames.is_none_or(is_noisy)
 }
 
 /// Factor on what is ordinary: what is fitted to a poor reference is that much poorer.
 fn ordinary_factor(model: &FitModel) -> f64 {
-    if is_reference_noisy(model) {
+    if is_reference_poor(model) {
         ORDINARY_BESIDE_REFERENCE_NOISE
     } else if model.basis.undone_smoothing.is_some() {
         ORDINARY_BESIDE_SMOOTHING
