@@ -105,7 +105,7 @@ pub(crate) fn is_ordinary(effect: &Effect, factor: f64) -> bool {
 }
 
 /// Whether an offset or ramp may come from a coarse rounding alone: below half a step, slow motion dwells
-/// on one side of it. Readings that go from step to step round anew with each, by step / sqrt(12); so many
+/// on one side of it. Readings that go on from step to step round anew with each, by step / sqrt(12); so many
 /// of them leave an offset of that over the root of their number, and over a recording a ramp of sqrt(12)
 /// times as much.
 fn is_rounding(effect: &Effect, model: &FitModel) -> bool {
@@ -125,18 +125,25 @@ fn is_rounding(effect: &Effect, model: &FitModel) -> bool {
         step > 0.0
             && axes.into_iter().all(|(axis, value)| {
                 let size = factor * value.abs();
-                let by_chance = of_rounding * step / (steps_taken(model, axis) as f64).sqrt();
+                let by_chance = of_rounding * step / (steps_taken(model, axis, step) as f64).sqrt();
                 size < 0.5 * step && size < ROUNDING_SIGMAS * by_chance
             })
     };
     spec.channels.iter().any(|channel| passes(*channel))
 }
 
-/// How often an axis goes from step to step, and 1.
-fn steps_taken(model: &FitModel, axis: usize) -> usize {
-    let readings = model.prepared.measured.windows(2);
-    let goes = |pair: &&[Reading]| value_on_axis(&pair[0], axis) != value_on_axis(&pair[1], axis);
-    1 + readings.filter(goes).count()
+/// How often an axis goes on by more than a step, and 1: noise that takes it to and fro between two
+/// neighbours rounds nothing anew.
+fn steps_taken(model: &FitModel, axis: usize, step: f64) -> usize {
+    let (mut count, mut last) = (1, f64::NEG_INFINITY);
+    for reading in &model.prepared.measured {
+        let value = value_on_axis(reading, axis);
+        if (value - last).abs() > 1.5 * step {
+            count += usize::from(last.is_finite());
+            last = value;
+        }
+    }
+    count
 }
 
 /// Step of a coarse rounding in SI units; 0 where the rounding is none or fine.
