@@ -2,8 +2,7 @@
 //! read off the readings, the stamps and the reference.
 
 use cromosim_imu::{
-    Channel, Effect, EffectKind, EffectSet, Ordinary, PerChannel, ReadOff, Reading, Rounding,
-    Search,
+    Channel, Effect, EffectKind, EffectSet, Ordinary, PerChannel, ReadOff, Rounding, Search,
 };
 use cromosim_spatial::PoseNoise;
 
