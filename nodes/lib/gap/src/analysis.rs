@@ -2,6 +2,7 @@
 
 use cromosim_imu::{Effect, EffectKind, EffectSet, ReadOff};
 
+use crate::axes_choice::with_chosen_axes;
 use crate::confounding::is_calibration;
 use crate::findings::Findings;
 use crate::fit::FitModel;
@@ -37,6 +38,7 @@ impl<'a> Analysis<'a> {
         let (model, scored) = self.searched(&fitted);
         self.progress.reached(progress::ROUNDS.end);
         let scored = exchanged(&model, scored, &fitted);
+        let scored = with_chosen_axes(&model, scored, self.library);
         self.progress.reached(1.0);
         (model, scored)
     }
@@ -196,7 +198,7 @@ pub(crate) fn refit_beside_unknown(findings: &mut Findings) {
     take_over(&mut findings.reportable, set, &found.fit.set);
     let margins = std::mem::take(&mut findings.scored.margins);
     // The values are no surer than what is left there allows.
-    let covariance = found.fit.linear.covariance;
+    let covariance = model.covariance_by_blocks(&found.fit, &findings.reportable);
     findings.scored = ScoredEffectSet {
         margins,
         ..score_as_it_is(&findings.model, found.fit.set)
@@ -220,6 +222,7 @@ fn take_over(reportable: &mut EffectSet, before: &EffectSet, after: &EffectSet) 
             _ => {}
         }
     }
+    reportable.take_values_of(after);
 }
 
 fn trace_scored(step: &str, scored: &ScoredEffectSet) {

@@ -14,9 +14,11 @@ use crate::fit::Fit;
 use crate::identify::unidentifiable;
 use crate::location::locate;
 use crate::probability::{calibrate, probability_of};
+use crate::screen::is_change;
 use crate::session::Session;
 use crate::shares::{Shares, shares};
 use crate::simulations::Simulations;
+use crate::standard_errors::error_of_time;
 use crate::together::reported_by_the_others;
 use crate::unexplained::unexplained_errors;
 use crate::words::{described, described_errors, unknown_cause, verdict};
@@ -96,17 +98,39 @@ impl<'a> Part<'a> {
             .metrics(set, &self.simulations.simulate(set))
     }
 
+    /// Standard deviations that no recording takes away, of each value: the reference's clock is no better
+    /// than others. It is right where the recording begins, and off by as much as is ordinary since.
+    fn errors_of_reference(&self, effect: &Effect) -> Vec<f64> {
+        let rate = EffectKind::ClockDrift.error_of_reference();
+        let whole = &self.simulations.whole;
+        let mut errors = vec![0.0; effect.values().len()];
+        errors[0] = match effect.kind() {
+            EffectKind::ClockDrift => rate,
+            EffectKind::TimeOffset => 1e-6 * rate * (whole.epoch - whole.estimate.start()).abs(),
+            // By the reference's clock where the device's is said to drift, else by the device's.
+            EffectKind::Vibration if self.findings.reportable.contains(EffectKind::ClockDrift) => {
+                1e-6 * rate * effect.values()[0]
+            }
+            _ => 0.0,
+        };
+        errors
+    }
+
     /// Values of an effect and their standard errors in a fit, by the names of its parameters.
     fn values(&self, effect: &Effect, fit: &Fit) -> [BTreeMap<String, serde_json::Value>; 2] {
         let kind = effect.kind();
         let mut errors = fit.standard_errors(effect);
-        for error in errors.iter_mut().filter(|error| **error > 0.0) {
-            *error = error.hypot(kind.error_of_reference());
+        let of_reference = self.errors_of_reference(effect);
+        for (error, of_reference) in errors.iter_mut().zip(of_reference) {
+            if *error > 0.0 {
+                *error = error.hypot(of_reference);
+            }
         }
-        let rate_hz = self.simulations.whole.rate_hz;
+        let of_time =
+            is_change(kind).then(|| error_of_time(&self.simulations, effect, &self.after));
         [
             described(kind, effect.values()),
-            described_errors(kind, &errors, rate_hz),
+            described_errors(kind, &errors, of_time),
         ]
     }
 }

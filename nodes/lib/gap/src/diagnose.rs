@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use cromosim_imu::{
     Channel, DeclaredNoise, EffectKind, OtherSession, PerChannel, PlacementEffects,
-    UnexplainedErrors,
+    UnexplainedErrors, unit_factors,
 };
 
 use crate::builder::DiagnosisBuilder;
@@ -99,7 +99,19 @@ pub fn diagnose_together<'r>(
     }
     let names: Vec<&str> = kept.iter().map(|part| part.name.as_str()).collect();
     let fields: Vec<&MeasuredField> = kept.iter().map(|part| &part.record.field).collect();
-    let mut answer = answer(&sessions, &fields, &names, &library, options);
+    let findings = analysed(&sessions, &library, &options.progress.part(&ANALYSIS));
+    let others = in_neighbouring_units(&findings, &sessions, &kept, &library);
+    let of_others = if others.is_empty() {
+        Vec::new()
+    } else {
+        analysed(&others, &library, &Progress::default())
+    };
+    let (sessions, findings) = if is_without_scale(&of_others) {
+        (&others, of_others)
+    } else {
+        (&sessions, findings)
+    };
+    let mut answer = answer(&findings, sessions, &fields, &names, options);
     if !jumps.is_empty() {
         let verdict = &answer.diagnosis.verdict;
         answer.diagnosis.verdict = format!("{}; {verdict}", jumps_in_words(&jumps));
@@ -164,18 +176,56 @@ fn commonest_units(sessions: &[Session]) -> PerChannel<f64> {
     })
 }
 
+/// Whether a scale of the accelerometer is among no causes.
+fn is_without_scale(findings: &[Findings]) -> bool {
+    let has = |one: &Findings| one.reportable.contains(EffectKind::AccelScale);
+    !findings.is_empty() && !findings.iter().any(has)
+}
+
+/// The sessions in units of the accelerometer next to those that the closed forms found, where these
+/// leave a scale that brings them there: hundredths of m/s2 and thousandths of g are 2 % apart. None
+/// where there is nothing to try.
+fn in_neighbouring_units(
+    findings: &[Findings],
+    sessions: &[Session],
+    parts: &[&Part],
+    library: &Library,
+) -> Vec<Session> {
+    let units = sessions[0].units;
+    let scale = |one: &Findings| {
+        let effect = one.reportable.get(EffectKind::AccelScale)?;
+        Some(effect.values().iter().sum::<f64>() / 3.0)
+    };
+    let found = findings.iter().find_map(scale);
+    let off = |factor: f64, scale: f64| (units.accelerometer * scale / factor).ln().abs();
+    let nearest = found.and_then(|scale| {
+        let factors = unit_factors(Channel::Accelerometer).iter().copied();
+        let nearest = factors.min_by(|a, b| off(*a, scale).total_cmp(&off(*b, scale)))?;
+        (nearest != units.accelerometer).then_some(nearest)
+    });
+    let Some(accelerometer) = nearest.filter(|_| library.allows(EffectKind::AccelUnits)) else {
+        return Vec::new();
+    };
+    let units = PerChannel {
+        accelerometer,
+        ..units
+    };
+    let in_units = |part: &&Part| Session::new(&part.record, library, Some(units)).ok();
+    let all: Option<Vec<Session>> = parts.iter().map(in_units).collect();
+    all.unwrap_or_default()
+}
+
 fn answer(
+    findings: &[Findings],
     sessions: &[Session],
     fields: &[&MeasuredField],
     recordings: &[&str],
-    library: &Library,
     options: &DiagnoseOptions,
 ) -> PlacementAnswer {
-    let findings = analysed(sessions, library, &options.progress.part(&ANALYSIS));
-    for one in &findings {
+    for one in findings {
         trace(|| eprintln!("{}: {:?}", one.model.prepared.name, names(&one.reportable)));
     }
-    let builder = DiagnosisBuilder::new(&findings, sessions, options.seed);
+    let builder = DiagnosisBuilder::new(findings, sessions, options.seed);
     let unexplained = builder.unexplained_errors();
     let magnetic: Vec<MagneticRecording> = findings
         .iter()
@@ -184,7 +234,7 @@ fn answer(
         .collect();
     let mut answer = PlacementAnswer {
         diagnosis: builder.diagnosis(recordings),
-        effects: simulated_effects(&findings, &unexplained),
+        effects: simulated_effects(findings, &unexplained),
         evidence: builder.evidence(recordings),
     };
     if let Some(found) = diagnose_magnetometer(&magnetic) {

@@ -254,12 +254,7 @@ impl<'a> FitModel<'a> {
     ) -> Gram {
         let own = fit.columns.iter().map(Vec::as_slice);
         let slices: Vec<&[f64]> = own.chain(extra.iter().copied()).collect();
-        let prior = fit
-            .set
-            .iter()
-            .flat_map(|effect| prior_weights(effect.kind()))
-            .chain(extra_prior.iter().copied())
-            .collect();
+        let prior = fit.prior().chain(extra_prior.iter().copied()).collect();
         let series = self.series(&slices, residual.unwrap_or(&fit.residual));
         fit.gram.extended(&series, prior, residual.is_none())
     }
@@ -304,6 +299,15 @@ impl Fit {
     /// The set as it would be fitted without one part of time.
     pub fn excluding_fold(&self, fold: usize) -> EffectSet {
         stepped(&self.set, &self.layout, &self.linear.fold_steps[fold], 1.0)
+    }
+
+    /// 1 / variance of the weak prior of each fitted value.
+    pub fn prior(&self) -> impl Iterator<Item = f64> {
+        self.layout.iter().flat_map(|&(kind, index)| {
+            let values = free_values(kind).into_iter();
+            let own = values.filter(move |value| value.index == index);
+            own.map(|value| value.prior_weight())
+        })
     }
 
     /// Standard errors of an effect's values; 0 for those that are not fitted.

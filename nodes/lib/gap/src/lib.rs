@@ -3,6 +3,7 @@
 
 mod analysis;
 mod axes;
+mod axes_choice;
 mod builder;
 mod calibration;
 mod clock_jumps;
@@ -51,6 +52,7 @@ mod session;
 mod shares;
 mod simulations;
 mod smoothing;
+mod standard_errors;
 mod thinned;
 mod together;
 mod trace;

@@ -141,6 +141,8 @@ pub(crate) mod report {
     pub const MANY_MISSING: f64 = 0.02;
     /// Uncertainty of the variance that rounding adds, as a part of it.
     pub const ROUNDING_UNCERTAINTY: f64 = 0.2;
+    /// Offsets of a coarse rounding's chance, in its standard deviations, from which on they are none.
+    pub const ROUNDING_SIGMAS: f64 = 5.0;
     /// Steps of quantisation in units of the white noise from which on they are a cause.
     pub const STEP: f64 = 1.0;
     /// Steps of quantisation in units of the white noise from which on a residual holds rounding
@@ -158,6 +160,9 @@ pub(crate) mod report {
     /// Factor on the standard errors of the normal equations: the predicted noise is stationary,
     /// that of real motion is not. From withheld cases.
     pub const STANDARD_ERROR_FACTOR: f64 = 1.12;
+    /// Length of the blocks of time over which residuals are summed for standard errors, s: longer than
+    /// what errors of a reference's derivatives resemble each other, short enough for sixty of a minute.
+    pub const ERROR_BLOCK_S: f64 = 1.0;
 }
 
 /// When a residual holds structure that no named effect explains.

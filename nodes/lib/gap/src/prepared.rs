@@ -3,7 +3,9 @@
 use cromosim_imu::{
     AXES, Channel, EffectSet, PerChannel, Reading, ResidualView, SensorModel, Stage, StagedReadings,
 };
-use cromosim_spatial::{FrameGrid, KinematicTrack, PoseEstimate, Spectrum, Stamp, welch};
+use cromosim_spatial::{
+    FrameGrid, KinematicTrack, PoseEstimate, PoseNoise, Spectrum, Stamp, welch,
+};
 
 use crate::axes::{axes_of_channel, value_on_axis};
 use crate::error::GapError;
@@ -57,6 +59,8 @@ pub(crate) struct PreparedPlacement {
     pub estimate: PoseEstimate,
     /// The same from poses that were interpolated between these frames; none where they were not.
     pub interpolated: Option<PoseEstimate>,
+    /// White noise that these have beyond that of the frames; none where it does not show.
+    pub noise_behind_frames: Option<PoseNoise>,
     pub report: ReferenceReport,
     pub missing: MissingMessages,
 }
@@ -169,6 +173,7 @@ impl PreparedPlacement {
             declared: record.imu.declared,
             estimate,
             interpolated: None,
+            noise_behind_frames: None,
             report: ReferenceReport::default(),
         };
         prepared.refuse_stuck_axes()?;
@@ -190,6 +195,7 @@ impl PreparedPlacement {
             self.estimate = estimated(&self.name, &poses)?;
         }
         if let Some(frames) = report.frames {
+            self.noise_behind_frames = frames.noise_within(&poses);
             let restored = estimated(&self.name, &frames.frames(&poses))?;
             self.interpolated = Some(std::mem::replace(&mut self.estimate, restored));
         }

@@ -4,14 +4,15 @@
 use cromosim_imu::{
     Channel, Effect, EffectKind, EffectSet, Ordinary, PerChannel, ReadOff, Rounding, Search,
 };
-use cromosim_spatial::PoseEstimate;
+use cromosim_spatial::PoseNoise;
 
+use crate::axes::{axes_of_channel, value_on_axis};
 use crate::digital::Digital;
 use crate::fit::FitModel;
 use crate::library::Library;
 use crate::policy::report::{
     COARSE_STEPS, DOUBTFUL_EXCESS_NOISE, EXCESS_NOISE, MANY_MISSING,
-    ORDINARY_BESIDE_REFERENCE_NOISE, ORDINARY_BESIDE_SMOOTHING, REFERENCE_NOISE,
+    ORDINARY_BESIDE_REFERENCE_NOISE, ORDINARY_BESIDE_SMOOTHING, REFERENCE_NOISE, ROUNDING_SIGMAS,
     ROUNDING_UNCERTAINTY, STEP,
 };
 
@@ -36,6 +37,7 @@ pub(crate) fn reportable_effects(
     let mut set = fitted.filtered(|effect| {
         !is_ordinary(effect, ordinary_factor(model)) && !is_rounding(effect, model)
     });
+    set.take_values_of(fitted);
     for kind in EffectKind::ALL {
         let Search::ReadOff(search) = kind.spec().search else {
             continue;
@@ -48,20 +50,27 @@ pub(crate) fn reportable_effects(
     set
 }
 
-/// Whether the reference scatters so much that this is a cause. Frames too slow for the motion seem to
-/// scatter where the poses interpolated between them do not.
-fn is_reference_noisy(model: &FitModel) -> bool {
+/// Whether a reference scatters so much that this is a cause.
+fn is_noisy(noise: PoseNoise) -> bool {
+    noise.position >= REFERENCE_NOISE.position || noise.rotation >= REFERENCE_NOISE.rotation
+}
+
+/// Whether the reference scatters as much, or seems to: frames too slow for the motion do, and so do the
+/// poses between them.
+fn is_reference_poor(model: &FitModel) -> bool {
     let prepared = model.prepared;
-    let is_noisy = |estimate: &PoseEstimate| {
-        let noise = estimate.noise();
-        noise.position >= REFERENCE_NOISE.position || noise.rotation >= REFERENCE_NOISE.rotation
-    };
-    is_noisy(&prepared.estimate) && prepared.interpolated.as_ref().is_none_or(is_noisy)
+    let interpolated = prepared.interpolated.as_ref();
+    is_noisy(prepared.estimate.noise()) && interpolated.is_none_or(|poses| is_noisy(poses.noise()))
+}
+
+/// Whether it does: noise behind frames shows on the chords between them.
+fn is_reference_noisy(model: &FitModel) -> bool {
+    is_reference_poor(model) && model.prepared.noise_behind_frames.is_none_or(is_noisy)
 }
 
 /// Factor on what is ordinary: what is fitted to a poor reference is that much poorer.
 fn ordinary_factor(model: &FitModel) -> f64 {
-    if is_reference_noisy(model) {
+    if is_reference_poor(model) {
         ORDINARY_BESIDE_REFERENCE_NOISE
     } else if model.basis.undone_smoothing.is_some() {
         ORDINARY_BESIDE_SMOOTHING
@@ -94,27 +103,46 @@ pub(crate) fn is_ordinary(effect: &Effect, factor: f64) -> bool {
     }
 }
 
-/// Whether an offset or ramp stays below half a step of a coarse rounding: slow motion dwells on
-/// one side of a step.
+/// Whether an offset or ramp may come from a coarse rounding alone: below half a step, slow motion dwells
+/// on one side of it. Readings that go on from step to step round anew with each, by step / sqrt(12); so many
+/// of them leave an offset of that over the root of their number, and over a recording a ramp of sqrt(12)
+/// times as much.
 fn is_rounding(effect: &Effect, model: &FitModel) -> bool {
     let spec = effect.kind().spec();
     let Search::Fitted(search) = spec.search else {
         return false;
     };
-    let size = effect
-        .values()
-        .iter()
-        .map(|value| value.abs())
-        .fold(0.0, f64::max);
     let seconds = model.prepared.length as f64 / model.prepared.rate_hz;
-    let offset = match search.rounding {
+    let (factor, of_rounding) = match search.rounding {
         None => return false,
-        Some(Rounding::Offset) => size,
-        Some(Rounding::Ramp) => size * seconds,
+        Some(Rounding::Offset) => (1.0, 12.0_f64.sqrt().recip()),
+        Some(Rounding::Ramp) => (seconds, 1.0),
     };
-    spec.channels
-        .iter()
-        .any(|channel| offset < 0.5 * coarse_step(model, *channel))
+    let passes = |channel: Channel| {
+        let step = coarse_step(model, channel);
+        let axes = axes_of_channel(channel).zip(effect.values());
+        step > 0.0
+            && axes.into_iter().all(|(axis, value)| {
+                let size = factor * value.abs();
+                let by_chance = of_rounding * step / (steps_taken(model, axis, step) as f64).sqrt();
+                size < 0.5 * step && size < ROUNDING_SIGMAS * by_chance
+            })
+    };
+    spec.channels.iter().any(|channel| passes(*channel))
+}
+
+/// How often an axis goes on by more than a step, and 1: noise that takes it to and fro between two
+/// neighbours rounds nothing anew.
+fn steps_taken(model: &FitModel, axis: usize, step: f64) -> usize {
+    let (mut count, mut last) = (1, f64::NEG_INFINITY);
+    for reading in &model.prepared.measured {
+        let value = value_on_axis(reading, axis);
+        if (value - last).abs() > 1.5 * step {
+            count += usize::from(last.is_finite());
+            last = value;
+        }
+    }
+    count
 }
 
 /// Step of a coarse rounding in SI units; 0 where the rounding is none or fine.

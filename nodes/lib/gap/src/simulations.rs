@@ -64,6 +64,11 @@ impl<'a> Simulations<'a> {
         }
     }
 
+    /// All that a simulation takes over.
+    pub fn applied(&self) -> EffectSet {
+        self.findings.applied()
+    }
+
     /// The readings in the device's units under a set of effects, without noise.
     pub fn simulate(&self, set: &EffectSet) -> Vec<Reading> {
         let track = self.tracks.track(set);

@@ -34,6 +34,7 @@ pub(crate) fn thinned(session: &Session) -> Option<Session> {
             name: all.name.clone(),
             estimate: all.estimate.clone(),
             interpolated: all.interpolated.clone(),
+            noise_behind_frames: all.noise_behind_frames,
             ..*all
         };
         Session {

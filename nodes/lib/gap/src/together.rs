@@ -45,6 +45,11 @@ pub(crate) fn analysed<'a>(
         .collect();
     agree_on_device(&mut findings);
     judge_rest(&mut findings, &progress.part(&JUDGEMENT));
+    for one in &mut findings {
+        one.scored.fit.linear.covariance = one
+            .model
+            .covariance_by_blocks(&one.scored.fit, &one.reportable);
+    }
     if let [alone] = findings.as_mut_slice() {
         refit_beside_unknown(alone);
     }

@@ -30,19 +30,18 @@ pub(crate) fn described(kind: EffectKind, values: &[f64]) -> BTreeMap<String, Va
     named
 }
 
-/// Standard errors in the form of [`described`]; an instant is known to half a sample. Empty where
+/// Standard errors in the form of [`described`], with that of an instant where there is one. Empty where
 /// nothing was fitted.
 pub(crate) fn described_errors(
     kind: EffectKind,
     errors: &[f64],
-    rate_hz: f64,
+    of_time: Option<f64>,
 ) -> BTreeMap<String, Value> {
-    let times = kind
-        .spec()
-        .parameters
-        .iter()
+    let parameters = kind.spec().parameters.iter();
+    let times = parameters
         .filter(|parameter| parameter.shape == Shape::Time)
-        .map(|parameter| (parameter.name.to_owned(), json!(0.5 / rate_hz)));
+        .zip(of_time)
+        .map(|(parameter, error)| (parameter.name.to_owned(), json!(error)));
     let mut named = if errors.iter().any(|error| *error > 0.0) {
         described(kind, errors)
     } else {

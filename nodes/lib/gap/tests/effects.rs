@@ -79,6 +79,22 @@ followed! {
 }
 
 #[test]
+fn an_offset_below_half_a_step_is_found_where_readings_go_from_step_to_step() {
+    let scene = Scene::new(51).with(K::GyroBias, &[0.016, -0.02, 0.012]);
+    let diagnosis = answer(&scene.with(K::GyroQuantization, &[0.06]).record()).diagnosis;
+    assert_eq!(names(&diagnosis), ["gyro_bias", "gyro_quantization"]);
+}
+
+#[test]
+fn units_two_percent_apart_are_told_apart_where_readings_clip() {
+    for factor in [100.0, 1000.0 / STANDARD_GRAVITY] {
+        let scene = Scene::new(52).with(K::AccelSaturation, &[11.0]);
+        let diagnosis = answer(&scene.with(K::AccelUnits, &[factor]).record()).diagnosis;
+        assert_eq!(names(&diagnosis), ["accel_saturation", "accel_units"]);
+    }
+}
+
+#[test]
 fn every_unit_of_length_is_known() {
     for (seed, factor) in [
         (43, 100.0),

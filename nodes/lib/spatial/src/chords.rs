@@ -8,7 +8,7 @@ use crate::{PoseSeries, Stamp, so3};
 const STEPS: usize = 2;
 /// Added to the normal matrix's diagonal: frames between few poses stay near the straight line through
 /// these, where they begin. No source for the number.
-const RIDGE: f64 = 1e-2;
+const RIDGE: f64 = 1e-6;
 /// Weight of poses, in whole ones, below which a frame is left out as missing. No source.
 const LEAST_SUPPORT: f64 = 0.3;
 

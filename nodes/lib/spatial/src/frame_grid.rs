@@ -2,10 +2,10 @@
 
 use std::f64::consts::TAU;
 
-use crate::PoseSeries;
 use crate::chords::Chords;
 use crate::golden::greatest_near;
 use crate::kinks::{Kinks, second_differences};
+use crate::{PoseNoise, PoseSeries};
 
 /// Poses per frame below which frames cannot be told from poses. No source.
 const LEAST_POSES_PER_FRAME: f64 = 1.5;
@@ -32,6 +32,9 @@ const RELEVANT_PART: f64 = 1e-2;
 /// are found. No source.
 const NEAR_TURNS: f64 = 0.2;
 const PRECISION_TURNS: f64 = 3e-3;
+/// The same once rate and offset are found that sharply. No source.
+const SHARP_TURNS: f64 = 0.03;
+const SHARPEST_TURNS: f64 = 1e-4;
 /// Poses that the frames' offset is found from: more only cost time.
 const ENOUGH_POSES: usize = 3000;
 /// Second differences within a chord that tell how noisy the poses are; with fewer nothing does.
@@ -69,7 +72,7 @@ impl FrameGrid {
                 best = Some((misfit, grid));
             }
         }
-        best.map(|(_, grid)| grid)
+        best.map(|(_, grid)| grid.sharpened(poses))
             .filter(|grid| grid.is_convincing(&kinks, poses))
     }
 
@@ -77,8 +80,11 @@ impl FrameGrid {
     pub fn at_rate(poses: &PoseSeries, rate_hz: f64) -> Option<Self> {
         let kinks = Kinks::new(poses)?;
         let is_possible = rate_hz * LEAST_POSES_PER_FRAME <= kinks.poses_hz();
-        (is_possible && kinks.have_rate(rate_hz))
-            .then(|| Self::through(&kinks, poses, kinks.sharpened(rate_hz)).1)
+        (is_possible && kinks.have_rate(rate_hz)).then(|| {
+            Self::through(&kinks, poses, kinks.sharpened(rate_hz))
+                .1
+                .sharpened(poses)
+        })
     }
 
     /// Frames per second.
@@ -114,6 +120,40 @@ impl FrameGrid {
         (misfit(turns), grid(turns))
     }
 
+    /// With the rate and the offset at which the first and the last poses are least off the chords. Kinks
+    /// tell of them to a sample's fraction; a thousandth of an interval moves poses without noise by more
+    /// than all else does.
+    fn sharpened(self, poses: &PoseSeries) -> Self {
+        let count = poses.stamps.len().min(ENOUGH_POSES);
+        let last = poses.stamps.len() - count;
+        let late = |first: usize| {
+            let part = part(poses, first, count);
+            let since = part.stamps[0] - poses.stamps[0];
+            let off = |turns: f64| {
+                let offset_s = self.offset_s - since + turns / self.rate_hz;
+                let offset_s = offset_s.rem_euclid(1.0 / self.rate_hz);
+                let [place, turn] = Chords::fit(&part, self.rate_hz, offset_s).misfit;
+                -(place + f64::MIN_POSITIVE).ln() - (turn + f64::MIN_POSITIVE).ln()
+            };
+            let turns = greatest_near(off, 0.0, SHARP_TURNS, SHARPEST_TURNS);
+            let middle = since + 0.5 * (part.stamps[count - 1] - part.stamps[0]);
+            (middle, turns / self.rate_hz)
+        };
+        let (at_first, first) = late(0);
+        let slope = if last > 0 {
+            let (at_last, last) = late(last);
+            (last - first) / (at_last - at_first)
+        } else {
+            0.0
+        };
+        let rate_hz = self.rate_hz / (1.0 + slope);
+        let offset_s = self.offset_s + first + slope * (self.offset_s - at_first);
+        Self {
+            rate_hz,
+            offset_s: offset_s.rem_euclid(1.0 / rate_hz),
+        }
+    }
+
     /// ln of how far poses are off the chords, both kinds of misfit together.
     fn misfit(&self, kinks: &Kinks, poses: &PoseSeries) -> f64 {
         let chords = Chords::fit(poses, self.rate_hz, self.offset_s);
@@ -135,9 +175,26 @@ impl FrameGrid {
             && self.is_straight(poses)
     }
 
-    /// Whether the poses lie on the chords as well as their noise lets them, which their second
-    /// differences within a chord tell: white noise has six times its variance there.
+    /// Whether the poses lie on the chords as well as their noise lets them.
     fn is_straight(&self, poses: &PoseSeries) -> bool {
+        let scatter = self.scatter(poses);
+        let Some(within) = scatter.within else {
+            return true;
+        };
+        let chords = Chords::fit(poses, self.rate_hz, self.offset_s);
+        (0..2)
+            .all(|of| chords.misfit[of] <= MOST_OFF * within[of] + MOST_OFF_PART * scatter.all[of])
+    }
+
+    /// White noise of poses between two frames, which their second differences within a chord tell: what
+    /// was added behind the interpolation. None where too few are within one.
+    pub fn noise_within(&self, poses: &PoseSeries) -> Option<PoseNoise> {
+        let [position, rotation] = self.scatter(poses).within?.map(f64::sqrt);
+        Some(PoseNoise { position, rotation })
+    }
+
+    /// White noise has six times its variance in second differences, along or about each of three axes.
+    fn scatter(&self, poses: &PoseSeries) -> Scatter {
         let seconds = poses.seconds();
         let frame = |k: usize| ((seconds[k] - self.offset_s) * self.rate_hz).floor();
         let (mut within, mut all) = ([0.0; 2], [0.0; 2]);
@@ -155,15 +212,19 @@ impl FrameGrid {
                 within[of] += if is_within { square } else { 0.0 };
             }
         }
-        if within_count < LEAST_WITHIN {
-            return true;
+        Scatter {
+            within: (within_count >= LEAST_WITHIN)
+                .then(|| within.map(|sum| sum / within_count as f64)),
+            all: all.map(|sum| sum / count.max(1) as f64),
         }
-        let chords = Chords::fit(poses, self.rate_hz, self.offset_s);
-        (0..2).all(|of| {
-            let noise = within[of] / within_count as f64;
-            chords.misfit[of] <= MOST_OFF * noise + MOST_OFF_PART * all[of] / count as f64
-        })
     }
+}
+
+/// Variances that second differences show as if they were those of white noise: m2, rad2.
+struct Scatter {
+    /// Of those within a chord; none where these are few.
+    within: Option<[f64; 2]>,
+    all: [f64; 2],
 }
 
 /// Rates of kinks that show as a line, the lowest first: as itself or, above half the poses' rate, as
@@ -186,7 +247,10 @@ fn candidates(kinks: &Kinks, shown_hz: f64) -> Vec<f64> {
 /// A stretch of poses that is long enough to place the frames by.
 fn middle(poses: &PoseSeries) -> PoseSeries {
     let count = poses.stamps.len().min(ENOUGH_POSES);
-    let first = (poses.stamps.len() - count) / 2;
+    part(poses, (poses.stamps.len() - count) / 2, count)
+}
+
+fn part(poses: &PoseSeries, first: usize, count: usize) -> PoseSeries {
     let own = first..first + count;
     PoseSeries {
         stamps: poses.stamps[own.clone()].to_vec(),

@@ -74,6 +74,8 @@ fn frames_are_found_and_come_back() {
         (120.0, 60.0, 0.0, ORDINARY),
         (286.0, 120.0, 0.001, [1e-5, 1e-4]),
         (200.0, 40.0, 0.004, [0.0, 0.0]),
+        // Two poses alone tell of the frame before the first pose.
+        (290.6, 17.807, 0.0051, [0.0, 0.0]),
     ] {
         let case = format!("{frames_hz} Hz at {poses_hz} Hz");
         let poses = poses(poses_hz, Some(frames_hz), first, noise);

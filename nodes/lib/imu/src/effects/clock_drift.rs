@@ -81,6 +81,15 @@ pub(super) struct Clock {
 }
 
 impl Clock {
+    /// With the offset and the drift of a set.
+    pub(super) fn of(effects: &EffectSet) -> Self {
+        let value = |kind| effects.get(kind).map_or(0.0, |effect| effect.scalar(0));
+        Self {
+            offset: value(EffectKind::TimeOffset),
+            ppm: value(EffectKind::ClockDrift),
+        }
+    }
+
     /// True seconds since the epoch, of a stamp's seconds since the epoch.
     #[inline]
     pub(super) fn true_seconds(&self, stamp: f64) -> f64 {

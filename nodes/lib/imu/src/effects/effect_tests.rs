@@ -248,3 +248,32 @@ fn sets_hold_one_of_each_kind_in_order() {
     assert_eq!(set.remove(EffectKind::LeverArm), None);
     assert!(!set.is_empty() && set.get(EffectKind::LeverArm).is_none());
 }
+
+/// A vibration beside a drift that the other set alone has is the same one at the same stamps.
+#[test]
+fn vibration_goes_by_the_stamps_where_a_drift_is_left_out() {
+    let mut wave = vec![28.0, 1.0, 0.5, 2.0, 0.3, 1.0, 2.0];
+    wave.extend([0.1, 0.2, 0.3, 2.0, 1.0, 0.5]);
+    let vibration = |values| Effect::new(EffectKind::Vibration, values).unwrap();
+    let offset = Effect::time_offset(0.002).unwrap();
+    let mut fitted = EffectSet::new().with(vibration(wave));
+    fitted.insert(offset.clone());
+    fitted.insert(Effect::new(EffectKind::ClockDrift, vec![25.0]).unwrap());
+    for kept in [EffectSet::new(), EffectSet::new().with(offset)] {
+        let mut own = kept.with(Effect::neutral(EffectKind::Vibration));
+        own.take_values_of(&fitted);
+        let line = |set: &EffectSet, stamp: f64| {
+            let clock = super::clock_drift::Clock::of(set);
+            let effect = set.get(EffectKind::Vibration).unwrap();
+            effect
+                .spectral_line()
+                .unwrap()
+                .at(clock.true_seconds(stamp))
+        };
+        for stamp in [0.0, 31.7, 118.3] {
+            let (one, other) = (line(&own, stamp), line(&fitted, stamp));
+            assert!((one.specific_force - other.specific_force).norm() < 1e-9);
+            assert!((one.angular_velocity - other.angular_velocity).norm() < 1e-9);
+        }
+    }
+}

@@ -105,10 +105,7 @@ impl SensorModel {
                 filter(effect, low_pass::DAMPING_RATIO)
             }),
             vibration: effects.get(Kind::Vibration).and_then(Effect::spectral_line),
-            clock: Clock {
-                offset: scalar(Kind::TimeOffset).unwrap_or(0.0),
-                ppm: scalar(Kind::ClockDrift).unwrap_or(0.0),
-            },
+            clock: Clock::of(effects),
             channel_delay: scalar(Kind::ChannelDelay).unwrap_or(0.0),
             warm_up: WarmUp::new(effects),
             accelerometer: Readout::new(effects, Channel::Accelerometer),

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::Vector3;
 
 use super::Effect;
+use super::clock_drift::Clock;
 use crate::{Channel, PerChannel, Reading};
 
 /// `amplitude sin(2 pi hz (t - t0) + phase)` of each axis and channel, parsed.
@@ -95,6 +96,16 @@ impl SpectralLine {
     /// Mean square of a channel, summed over the axes, m2/s4 or rad2/s2.
     pub fn power(&self, channel: Channel) -> f64 {
         self.waves[channel].power()
+    }
+
+    /// The same at the same stamps, by another clock.
+    pub(super) fn by_clock(&self, own: Clock, other: Clock) -> Self {
+        let slowed = (1.0 + other.ppm * 1e-6) / (1.0 + own.ppm * 1e-6);
+        let turned = TAU * self.hz * (other.offset - own.offset) / (1.0 + own.ppm * 1e-6);
+        Self {
+            hz: self.hz * slowed,
+            waves: PerChannel::from_fn(|channel| self.waves[channel].filtered(1.0, turned)),
+        }
     }
 
     /// What each channel's filter, of this gain and phase, leaves of it.
