@@ -33,6 +33,8 @@ pub(crate) struct Posterior {
 pub(crate) struct Beyond {
     /// Of the derivative.
     order: i32,
+    /// `(pi / 10) / sin(pi (2m + 1) / 10)`.
+    integral: f64,
     /// No unit.
     most: f64,
     /// Hz.
@@ -42,11 +44,13 @@ pub(crate) struct Beyond {
 impl Beyond {
     pub(crate) const ACCELERATION: Self = Self {
         order: 2,
+        integral: 0.1 * PI,
         most: 36.0,
         from_hz: 8.4,
     };
     pub(crate) const ANGULAR_VELOCITY: Self = Self {
         order: 1,
+        integral: 0.388_322_207_745_093_3,
         most: 7.0,
         from_hz: 6.4,
     };
@@ -67,9 +71,8 @@ impl Beyond {
         }: Posterior,
         cutoff_hz: f64,
     ) -> f64 {
-        let integral = 0.1 * PI / (0.1 * PI * f64::from(2 * self.order + 1)).sin();
         let slope = (TAU * cutoff_hz).powi(2 * self.order);
-        2.0 * noise * interval * cutoff_hz * slope * integral
+        2.0 * noise * interval * cutoff_hz * slope * self.integral
     }
 }
 
