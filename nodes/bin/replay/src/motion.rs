@@ -181,7 +181,9 @@ impl Track {
             .unwrap_or_default();
         let source = match motion.source() {
             PoseSource::Tracked => "",
+            PoseSource::InertialSuit => "; of a suit: virtual_imu needs pose_source:=inertial_suit",
             PoseSource::Fitted => "; fitted to markers: virtual_imu needs pose_source:=fitted",
+            PoseSource::Video => "; from a video: virtual_imu needs pose_source:=video",
         };
         let oddities = motion.oddities();
         let odd: String = oddities.iter().map(|odd| format!("; {odd}")).collect();

@@ -16,8 +16,9 @@ node_config! {
         /// Rate of the states, Hz; 0: found out from the first ones. It sets the schemes' delay.
         pub state_rate_hz: f64 = 0.0,
         /// Where the states' poses come from, which says what noise the adaptive spline expects of
-        /// them: `tracked` (optical capture, inertial suits, video), `fitted` (fitted to markers
-        /// and smoothed before, as AMASS). Empty: tracked, as no message says it.
+        /// them and what of their errors it cannot see: `tracked` (optical capture), `fitted` (fitted
+        /// to markers and smoothed before, as AMASS), `inertial_suit`, `video`. Empty: tracked, as no
+        /// message says it.
         pub pose_source: String = String::new(),
         /// Add the random part of the device's errors: white noise and lost samples. Without it
         /// biases and all other effects stay. May change at run time.

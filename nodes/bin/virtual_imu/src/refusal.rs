@@ -25,7 +25,9 @@ pub enum Refusal {
     #[error(transparent)]
     Learned(#[from] LearnedError),
     /// A source of poses that there is not.
-    #[error("parameter 'pose_source': `{0}`; expected tracked, fitted or nothing")]
+    #[error(
+        "parameter 'pose_source': `{0}`; expected tracked, fitted, inertial_suit, video or nothing"
+    )]
     Source(String),
     /// A mapping for other placements.
     #[error("mapping {file}: it names {known}, none of the placements")]

@@ -167,7 +167,7 @@ fn of_spline(
     let sample = |&stamp: &Stamp| {
         let held = stamp.clamp(trajectory.start(), trajectory.end());
         let known = errors.as_ref().map(|errors| errors.at(held));
-        let sample = spline::sample(fitted, held);
+        let sample = spline::sample(fitted, trajectory.source(), held);
         KinematicSample {
             stamp,
             variance: sample.variance.larger(known.unwrap_or_default()),

@@ -1,7 +1,7 @@
 //! The spline scheme, live: a window with a fixed lag, smoothed as the frames so far ask for.
 
 use cromosim_spatial::{
-    PoseSmoothing, PoseSpline, PoseTimes, Smoothing, SplineSystem, Stamp, WeightSearch,
+    PoseSmoothing, PoseSource, PoseSpline, PoseTimes, Smoothing, SplineSystem, Stamp, WeightSearch,
     position_channels, rotation_channels,
 };
 use nalgebra::Isometry3;
@@ -106,7 +106,7 @@ impl FixedLag {
         };
         samples.extend(due.iter().map(|&stamp| KinematicSample {
             variance: variance(stamp),
-            ..sample(&spline, stamp)
+            ..sample(&spline, PoseSource::default(), stamp)
         }));
         Ok(())
     }

@@ -8,6 +8,9 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::{MarkerReport, MotionError, PoseReport, RetargetReport};
 
+/// The skeleton maps of suits of IMUs, see `maps`.
+const SUIT_MAPS: [&str; 2] = ["mvn", "xsens"];
+
 /// A clip: poses at a constant rate, in a world with z up.
 #[derive(Clone, Debug)]
 pub struct SmplMotion {
@@ -40,11 +43,15 @@ impl SmplMotion {
         self.frames.len().saturating_sub(1) as f64 / self.rate_hz
     }
 
-    /// What the poses' noise is like: SMPL parameters that are not a video's were fitted to markers.
+    /// What the poses' errors are like: SMPL parameters that are not a video's were fitted to markers,
+    /// and skeletons of MVN are those of a suit.
     pub fn source(&self) -> PoseSource {
+        let of_suit = |report: &RetargetReport| SUIT_MAPS.contains(&report.map.as_str());
         match &self.poses {
-            Some(report) if !report.format.is_video() => PoseSource::Fitted,
-            _ => PoseSource::Tracked,
+            Some(report) if report.format.is_video() => PoseSource::Video,
+            Some(_) => PoseSource::Fitted,
+            None if self.report.as_ref().is_some_and(of_suit) => PoseSource::InertialSuit,
+            None => PoseSource::Tracked,
         }
     }
 

@@ -12,6 +12,7 @@ use cromosim_body::{BodyModel, Joint, ShapedBody};
 use cromosim_motion::{
     MotionFormat, MotionOptions, Mvnx, SmplMotion, embedded_walk, parse_mvnx, read_motion, retarget,
 };
+use cromosim_spatial::PoseSource;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 /// MVN's segments and the joints of SMPL that they begin at; T12, which SMPL has none of, stands
@@ -110,6 +111,7 @@ fn a_known_motion_comes_back() {
     let report = read.report.clone().unwrap();
     assert_eq!(read.frames.len(), known.frames.len(), "{report}");
     assert!(report.to_string().contains("mvn"), "{report}");
+    assert_eq!(read.source(), PoseSource::InertialSuit);
     let mut all = Vec::new();
     for (a, b) in read.frames.iter().zip(&known.frames) {
         for (one, other) in a.local_rotations.iter().zip(&b.local_rotations) {

@@ -33,8 +33,13 @@ pub(crate) struct Uncertainty {
 impl Uncertainty {
     /// Of a lane, `r b^T (B^T B + P)^-1 b` for basis functions b from `first` on.
     pub(crate) fn variance(&self, lane: usize, first: usize, b: &[f64; ORDER]) -> f64 {
+        self.noise_over(lane, first) * self.inverse.quadratic_form(lane, first, b)
+    }
+
+    /// Variance of a lane's noise over a knot interval, unit^2.
+    pub(crate) fn noise_over(&self, lane: usize, interval: usize) -> f64 {
         let noise = |sample: usize| self.noise[sample * self.lanes + lane];
-        (noise(first) * noise(first + 1)).sqrt() * self.inverse.quadratic_form(lane, first, b)
+        (noise(interval) * noise(interval + 1)).sqrt()
     }
 }
 

@@ -33,6 +33,7 @@ mod adaptive;
 mod adaptive_fit;
 mod banded;
 mod basis;
+mod beyond;
 mod chords;
 mod confidence;
 mod derivative;
@@ -57,9 +58,11 @@ mod noise_floor;
 mod noise_shape;
 pub mod plausible;
 mod pose_series;
+mod pose_source;
 mod pose_spectra;
 mod pose_spline;
 mod sample_grid;
+mod sample_variance;
 mod segments;
 pub mod so3;
 mod spectrum;
@@ -91,11 +94,13 @@ pub use grid::{check_times, relative_seconds, uniform_stamps};
 pub use influence::{Influence, SampleWeights};
 pub use nearest_name::{in_plain_words, meant, nearest_name};
 pub use pose_series::PoseSeries;
+pub use pose_source::PoseSource;
 pub use pose_spline::{
-    Bandwidth, Motion, MotionEstimate, POSES_AT_ONCE, PoseAdaptation, PoseSmoothing, PoseSource,
-    PoseSpline, PoseTimes, SampleVariance, position_channels, rotation_channels,
+    Motion, MotionEstimate, POSES_AT_ONCE, PoseAdaptation, PoseSmoothing, PoseSpline, PoseTimes,
+    position_channels, rotation_channels,
 };
 pub use rustfft::num_complex::Complex64;
+pub use sample_variance::{Bandwidth, SampleVariance};
 pub use spectrum::{FourierPair, Spectrum, welch};
 pub use spline::{Smoothing, SmoothingSpline, SplineWeight};
 pub use stamp::Stamp;

@@ -7,8 +7,13 @@ use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 use crate::adaptive::{Adaptation, ExpectedNoise, FEWEST_ADAPTIVE};
 use crate::adaptive_fit::AdaptiveFit;
 use crate::basis::BasisValues;
+use crate::beyond::{Beyond, Posterior};
 use crate::grid::relative_seconds;
-use crate::{Derivative, Smoothing, SmoothingSpline, SpatialError, SplineSystem, Stamp, so3};
+use crate::so3::{QUATERNION_PER_ROTVEC, ROTVEC_PER_QUATERNION};
+use crate::{
+    Bandwidth, Derivative, PoseSource, SampleVariance, Smoothing, SmoothingSpline, SpatialError,
+    SplineSystem, Stamp, so3,
+};
 
 /// How a frame moves at one time, against the world and in the world's axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,46 +71,6 @@ impl PoseSmoothing {
     }
 }
 
-/// Where poses come from, which says what their noise is like.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum PoseSource {
-    /// Tracked, as they are: their noise is white and shows in them.
-    #[default]
-    Tracked,
-    /// Fitted to markers and smoothed before they were handed out, as AMASS: what is left of their
-    /// noise looks like motion.
-    Fitted,
-}
-
-impl PoseSource {
-    /// All sources.
-    pub const ALL: [Self; 2] = [Self::Tracked, Self::Fitted];
-
-    /// The name in parameters.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Tracked => "tracked",
-            Self::Fitted => "fitted",
-        }
-    }
-
-    /// The noise of position, m, and of a quaternion's component.
-    ///
-    /// Tracked: of the size that optical capture has, 0.3 mm and 0.1 degrees; the count was chosen
-    /// among 0.003 to 0.1 on seeds 300 to 347 of `tests/bursts`, which scores others too, and on ten
-    /// trials of a tracked IMU (BROAD). Fitted: a millimetre and a third of a degree within 6 Hz are
-    /// as dense as 3 mm and 1 degree up to 50 Hz; the count was chosen among 0.01 to 1 on the study
-    /// `physics, marker fit, 60 Hz` of `evaluate fidelity`, which has others.
-    fn expected(self) -> [ExpectedNoise; 2] {
-        let (position, degrees, count) = match self {
-            Self::Tracked => (3e-4, 0.1_f64, 0.01),
-            Self::Fitted => (3e-3, 1.0, 0.1),
-        };
-        [position, degrees.to_radians() * QUATERNION_PER_ROTVEC]
-            .map(|std| ExpectedNoise { std, count })
-    }
-}
-
 impl Default for PoseSmoothing {
     /// As much as the samples ask for, so that acceleration and angular velocity err least.
     fn default() -> Self {
@@ -114,28 +79,6 @@ impl Default for PoseSmoothing {
             rotation: Smoothing::AutomaticFor(Derivative::First),
         }
     }
-}
-
-/// Variances, along or about each axis, that errors of the poses leave in a sample; 0 where none
-/// are known of, infinite where the sample rests on poses that are not known.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SampleVariance {
-    /// (m/s2)2.
-    pub acceleration: f64,
-    /// (rad/s)2.
-    pub angular_velocity: f64,
-    /// Of the body's orientation, rad2.
-    pub orientation: f64,
-}
-
-/// Up to which frequency a sample resolves the motion: where the smoothing's response is one half,
-/// at most half the rate of the poses, Hz.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bandwidth {
-    /// Of the acceleration.
-    pub acceleration_hz: f64,
-    /// Of the angular velocity.
-    pub angular_velocity_hz: f64,
 }
 
 /// How a frame moves at one time, and what is known about it.
@@ -149,25 +92,6 @@ pub struct MotionEstimate {
     /// Up to which frequency it is resolved.
     pub bandwidth: Bandwidth,
 }
-
-impl SampleVariance {
-    /// The larger of each: two statements about the same errors.
-    #[must_use]
-    pub fn larger(self, other: Self) -> Self {
-        Self {
-            acceleration: self.acceleration.max(other.acceleration),
-            angular_velocity: self.angular_velocity.max(other.angular_velocity),
-            orientation: self.orientation.max(other.orientation),
-        }
-    }
-}
-
-/// Variance of a rotation vector per axis over the mean of a quaternion's four components: `q = (1, v
-/// / 2)` for a small v, so that their sum is 3 / 4 of the former.
-const ROTVEC_PER_QUATERNION: f64 = 16.0 / 3.0;
-/// Standard deviation of a quaternion's component over that of a rotation vector: the root of 3 /
-/// 16.
-const QUATERNION_PER_ROTVEC: f64 = 0.433_012_701_892_219_3;
 
 /// What [`PoseSpline::fit_following`] has learnt of the poses so far.
 #[derive(Clone, Debug, Default)]
@@ -389,13 +313,14 @@ impl PoseSpline {
     pub fn estimate(&self, stamp: Stamp) -> MotionEstimate {
         let (first, values) = self.basis_at(stamp);
         let highest_hz = 0.5 / self.times.system.equations.interval;
+        let bandwidth = Bandwidth {
+            acceleration_hz: self.position.cutoff_over(first).min(highest_hz),
+            angular_velocity_hz: self.rotation.cutoff_over(first).min(highest_hz),
+        };
         MotionEstimate {
             motion: self.motion(first, &values),
-            variance: self.variance(first, &values),
-            bandwidth: Bandwidth {
-                acceleration_hz: self.position.cutoff_over(first).min(highest_hz),
-                angular_velocity_hz: self.rotation.cutoff_over(first).min(highest_hz),
-            },
+            variance: self.variance(first, &values, &bandwidth),
+            bandwidth,
         }
     }
 
@@ -418,13 +343,29 @@ impl PoseSpline {
         }
     }
 
-    fn variance(&self, first: usize, values: &BasisValues) -> Option<SampleVariance> {
+    fn variance(
+        &self,
+        first: usize,
+        values: &BasisValues,
+        bandwidth: &Bandwidth,
+    ) -> Option<SampleVariance> {
         let [value, slope, second] = values;
-        let rotation = |row| self.rotation.variance_of(first, row);
+        let interval = self.times.system.equations.interval;
+        let position = Posterior {
+            variance: self.position.variance_of(first, second)?,
+            noise: self.position.noise_over(first)?,
+            interval,
+        };
+        let rotation = Posterior {
+            variance: self.rotation.variance_of(first, slope)?,
+            noise: self.rotation.noise_over(first)?,
+            interval,
+        };
         Some(SampleVariance {
-            acceleration: self.position.variance_of(first, second)?,
-            angular_velocity: ROTVEC_PER_QUATERNION * rotation(slope)?,
-            orientation: ROTVEC_PER_QUATERNION * rotation(value)?,
+            acceleration: Beyond::ACCELERATION.stated(position, bandwidth.acceleration_hz),
+            angular_velocity: ROTVEC_PER_QUATERNION
+                * Beyond::ANGULAR_VELOCITY.stated(rotation, bandwidth.angular_velocity_hz),
+            orientation: ROTVEC_PER_QUATERNION * self.rotation.variance_of(first, value)?,
         })
     }
 

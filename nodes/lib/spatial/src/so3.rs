@@ -13,6 +13,13 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 use crate::SpatialError;
 
+/// Variance of a rotation vector per axis over the mean of a quaternion's four components: `q = (1, v
+/// / 2)` for a small v, so that their sum is 3 / 4 of the former.
+pub(crate) const ROTVEC_PER_QUATERNION: f64 = 16.0 / 3.0;
+/// Standard deviation of a quaternion's component over that of a rotation vector: the root of 3 /
+/// 16.
+pub(crate) const QUATERNION_PER_ROTVEC: f64 = 0.433_012_701_892_219_3;
+
 /// Below this square of an angle, rad^2, the series of [`exp`] are exact: their next terms are 1e-19 of
 /// the first.
 const SERIES_BELOW: f64 = 1e-8;

@@ -228,6 +228,13 @@ impl<const C: usize> SmoothingSpline<C> {
         Some(uncertainty.variance(*lane, first, row))
     }
 
+    /// Variance of the samples' noise over a knot interval, unit^2; none but for
+    /// [`Smoothing::Adaptive`].
+    pub(crate) fn noise_over(&self, interval: usize) -> Option<f64> {
+        let (uncertainty, lane) = self.uncertainty.as_ref()?;
+        Some(uncertainty.noise_over(*lane, interval))
+    }
+
     /// The penalty's weight.
     pub fn weight(&self) -> &SplineWeight {
         &self.weight

@@ -1,6 +1,8 @@
 //! Smoothing quintic splines of position and quaternion, see [`cromosim_spatial::PoseSpline`].
 
-use cromosim_spatial::{Influence, MotionEstimate, PoseSmoothing, PoseSpline, PoseTimes, Stamp};
+use cromosim_spatial::{
+    Influence, MotionEstimate, PoseSmoothing, PoseSource, PoseSpline, PoseTimes, Stamp,
+};
 use nalgebra::Isometry3;
 
 use crate::uncertainty::{FrameWeights, any_error};
@@ -30,8 +32,9 @@ fn poses(frames: &[SensorFrame]) -> Vec<Isometry3<f64>> {
     frames.iter().map(|frame| frame.world_from_sensor).collect()
 }
 
-/// The motion at a stamp, and how far it may be off where the spline has learnt that.
-pub(crate) fn sample(spline: &PoseSpline, stamp: Stamp) -> KinematicSample {
+/// The motion at a stamp, and how far it may be off where the spline has learnt that: by the noise that it
+/// has learnt, by the motion beyond it and by what poses of this source hide.
+pub(crate) fn sample(spline: &PoseSpline, source: PoseSource, stamp: Stamp) -> KinematicSample {
     let MotionEstimate {
         motion,
         variance,
@@ -43,7 +46,9 @@ pub(crate) fn sample(spline: &PoseSpline, stamp: Stamp) -> KinematicSample {
         acceleration_in_world: motion.acceleration,
         angular_velocity_in_world: motion.angular_velocity,
         angular_acceleration_in_world: Some(motion.angular_acceleration),
-        variance: variance.unwrap_or_default(),
+        variance: variance
+            .map(|learnt| learnt.plus(source.unseen_errors(&bandwidth)))
+            .unwrap_or_default(),
         bandwidth: Some(bandwidth),
     }
 }

@@ -9,7 +9,7 @@ use super::alignment::{Lagged, aligned, all_lags};
 use super::analytic::analytic_motions;
 use super::method::{JUDGED, RigidMethod};
 use super::pose_errors::PoseErrors;
-use super::stated::StatedErrors;
+use super::stated::{OwnErrors, StatedErrors};
 use super::truth::{KnownMotion, POSITIONS, known_motions};
 use crate::EvaluationError;
 use crate::error::At;
@@ -86,6 +86,10 @@ impl RigidCase {
             }
         };
         let measured = self.measured(&samples)?;
+        let own = match self.measured {
+            Measured::Known(_) => OwnErrors::default(),
+            Measured::Real(_) => OwnErrors::of_any_device(self.reading_rate_hz()),
+        };
         let mut found = CaseErrors::default();
         for (sample, measured) in samples.iter().zip(&measured) {
             let Some(measured) = measured else { continue };
@@ -93,7 +97,7 @@ impl RigidCase {
             let simulated = sample.imu().reading();
             found.errors[place].add(&SquaredErrors::between(&[simulated], &[Some(*measured)]));
             if method == JUDGED {
-                found.stated[place].add_reading(sample, measured);
+                found.stated[place].add_reading(sample, measured, &own);
                 found.measured.push(*measured);
             }
         }
@@ -122,6 +126,12 @@ impl RigidCase {
                 })
             }
         }
+    }
+
+    /// Readings per second, Hz.
+    fn reading_rate_hz(&self) -> f64 {
+        let seconds = self.stamps[self.stamps.len() - 1] - self.stamps[0];
+        (self.stamps.len() - 1) as f64 / seconds
     }
 
     /// Time to the nearer end of the poses, s.

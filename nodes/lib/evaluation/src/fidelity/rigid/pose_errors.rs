@@ -73,8 +73,10 @@ impl PoseErrors {
     /// What a simulation is told of where the poses come from.
     pub(super) fn source(self) -> PoseSource {
         match self {
+            Self::Markers => PoseSource::Tracked,
             Self::MarkerFit => PoseSource::Fitted,
-            _ => PoseSource::Tracked,
+            Self::InertialSuit => PoseSource::InertialSuit,
+            Self::Vibe | Self::Wham => PoseSource::Video,
         }
     }
 

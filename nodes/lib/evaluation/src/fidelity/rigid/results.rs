@@ -75,7 +75,8 @@ pub struct PracticeResults {
     pub ends_rmse: [f64; 2],
 }
 
-/// Means of squared errors over the variances that the readings' covariances state: 1 where they
+/// Means of squared errors over the variances that the readings' covariances state (and, of real IMUs, over
+/// these and what data sheets allow such devices): 1 where they
 /// state what they err. Specific force, angular velocity; none where nothing is stated.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct StatedResults {

@@ -1,0 +1,192 @@
+//! Where poses come from: what noise is expected of them, and what no smoothing can see of their errors.
+
+use std::f64::consts::TAU;
+
+use crate::adaptive::ExpectedNoise;
+use crate::so3::QUATERNION_PER_ROTVEC;
+use crate::{Bandwidth, SampleVariance};
+
+/// Where poses come from, which says what their errors are like.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PoseSource {
+    /// Tracked, as they are: their noise is white and shows in them.
+    #[default]
+    Tracked,
+    /// Fitted to markers and smoothed before they were handed out, as AMASS: what is left of their
+    /// noise looks like motion.
+    Fitted,
+    /// Of a suit of IMUs: orientations drift.
+    InertialSuit,
+    /// Estimated from a video: body and place are slowly off.
+    Video,
+}
+
+/// Errors that wander: two first-order lags behind white noise, standard deviation along or about
+/// each axis.
+#[derive(Clone, Copy, Debug)]
+struct SlowError {
+    size: f64,
+    /// Of each lag, s.
+    memory_s: f64,
+}
+
+impl SlowError {
+    const NONE: Self = Self {
+        size: 0.0,
+        memory_s: 1.0,
+    };
+
+    /// Of its first derivative.
+    fn slope_variance(self) -> f64 {
+        (self.size / self.memory_s).powi(2)
+    }
+
+    /// Of its second derivative below a cutoff: its density `8 s^2 T / (1 + w^2 T^2)^2` times w^4 is
+    /// level beyond the memory.
+    fn bend_variance(self, cutoff_hz: f64) -> f64 {
+        8.0 * self.size.powi(2) / self.memory_s.powi(3) * cutoff_hz
+    }
+}
+
+/// What a low-pass of second order, run both ways, has left of the errors of fitted poses: root mean square
+/// over sizes of 0.5 to 1.5 mm and 0.2 to 0.5 degrees and corners of 6 to 10 Hz, uniform in their logarithms,
+/// those that `evaluate fidelity` draws for marker fits.
+const FITTED_POSITION_M: f64 = 0.95e-3;
+const FITTED_ROTATION_DEG: f64 = 0.34;
+const FITTED_CORNER_HZ: f64 = 8.1;
+
+impl PoseSource {
+    /// All sources.
+    pub const ALL: [Self; 4] = [Self::Tracked, Self::Fitted, Self::InertialSuit, Self::Video];
+
+    /// The name in parameters.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tracked => "tracked",
+            Self::Fitted => "fitted",
+            Self::InertialSuit => "inertial_suit",
+            Self::Video => "video",
+        }
+    }
+
+    /// The noise of position, m, and of a quaternion's component.
+    ///
+    /// Tracked: of the size that optical capture has, 0.3 mm and 0.1 degrees; the count was chosen
+    /// among 0.003 to 0.1 on seeds 300 to 347 of `tests/bursts`, which scores others too, and on ten
+    /// trials of a tracked IMU (BROAD). Fitted: a millimetre and a third of a degree within 6 Hz are
+    /// as dense as 3 mm and 1 degree up to 50 Hz; the count was chosen among 0.01 to 1 on the study
+    /// `physics, marker fit, 60 Hz` of `evaluate fidelity`, which has others. Suits and video show
+    /// their white noise, as what is tracked.
+    pub(crate) fn expected(self) -> [ExpectedNoise; 2] {
+        let (position, degrees, count) = match self {
+            Self::Fitted => (3e-3, 1.0_f64, 0.1),
+            Self::Tracked | Self::InertialSuit | Self::Video => (3e-4, 0.1, 0.01),
+        };
+        [position, degrees.to_radians() * QUATERNION_PER_ROTVEC]
+            .map(|std| ExpectedNoise { std, count })
+    }
+
+    /// What slow errors of position, m, and rotation, rad, are like: root mean square over the sizes
+    /// that `evaluate fidelity` draws.
+    ///
+    /// Fitted: 2 to 5 mm and 0.5 to 1.5 degrees. Suit: 10 to 20 mm, and a drift of 1 to 3 degrees that
+    /// magnetometer and contact pull back. Video: the root's 0.10 to 0.15 m; the rotation is what
+    /// VIBE's and WHAM's errors leave of a sensor's on average, fitted to other draws of them than the
+    /// studies'. Tracked: none is known of.
+    fn slow_errors(self) -> [SlowError; 2] {
+        let slow = |size, memory_s| SlowError { size, memory_s };
+        match self {
+            Self::Tracked => [SlowError::NONE; 2],
+            Self::Fitted => [slow(3.4e-3, 0.7), slow(0.95_f64.to_radians(), 0.7)],
+            Self::InertialSuit => [slow(0.0147, 0.7), slow(1.91_f64.to_radians(), 4.0)],
+            Self::Video => [slow(0.125, 0.7), slow(10.0_f64.to_radians(), 0.7)],
+        }
+    }
+
+    /// What errors that look like motion leave in samples of this bandwidth, beside those that are
+    /// learnt from the poses.
+    pub fn unseen_errors(self, bandwidth: &Bandwidth) -> SampleVariance {
+        let [position, rotation] = self.slow_errors();
+        let slow = SampleVariance {
+            acceleration: position.bend_variance(bandwidth.acceleration_hz),
+            angular_velocity: rotation.slope_variance(),
+            orientation: rotation.size.powi(2),
+        };
+        match self {
+            Self::Fitted => slow.plus(left_by_a_low_pass(bandwidth)),
+            Self::Tracked | Self::InertialSuit | Self::Video => slow,
+        }
+    }
+}
+
+/// With the density `S / (1 + (f / c)^4)^2` of errors of variance s^2 the derivatives' variances are
+/// `s^2 (2 pi c)^2 / 3` and `s^2 (2 pi c)^4 / 3`; a smoothing that cuts far below c leaves the parts
+/// `z = (f / c)^3 / 1.022` and `(f / c)^5 / 1.768` of these, else z / (1 + z).
+fn left_by_a_low_pass(bandwidth: &Bandwidth) -> SampleVariance {
+    let part = |z: f64| z / (1.0 + z) / 3.0;
+    let corner = TAU * FITTED_CORNER_HZ;
+    let of_corner = |hz: f64| hz / FITTED_CORNER_HZ;
+    let bends = (FITTED_POSITION_M * corner.powi(2)).powi(2);
+    let slopes = (FITTED_ROTATION_DEG.to_radians() * corner).powi(2);
+    SampleVariance {
+        acceleration: bends * part(of_corner(bandwidth.acceleration_hz).powi(5) / 1.768),
+        angular_velocity: slopes * part(of_corner(bandwidth.angular_velocity_hz).powi(3) / 1.022),
+        orientation: 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BANDWIDTH: Bandwidth = Bandwidth {
+        acceleration_hz: 10.0,
+        angular_velocity_hz: 10.0,
+    };
+
+    #[test]
+    fn nothing_is_known_of_beyond_what_tracked_poses_show() {
+        let found = PoseSource::Tracked.unseen_errors(&BANDWIDTH);
+        assert_eq!(found, SampleVariance::default());
+    }
+
+    /// Sums over the spectra of the errors themselves.
+    #[test]
+    fn variances_are_those_of_the_spectra() {
+        let hz = |k: usize| 0.002 * (k as f64 + 0.5);
+        let sum = |density: &dyn Fn(f64) -> f64| {
+            (0..100_000).map(|k| 0.002 * density(hz(k))).sum::<f64>()
+        };
+        let slow = SlowError {
+            size: 2.0,
+            memory_s: 0.7,
+        };
+        let own = |f: f64| 8.0 * 4.0 * 0.7 / (1.0 + (TAU * f * 0.7).powi(2)).powi(2);
+        assert!((sum(&own) / 4.0 - 1.0).abs() < 0.01);
+        let slopes = sum(&|f| (TAU * f).powi(2) * own(f));
+        assert!(
+            (slopes / slow.slope_variance() - 1.0).abs() < 0.01,
+            "{slopes}"
+        );
+        let passed = |f: f64| (1.0 + (f / 10.0).powi(10)).powi(-2);
+        let bends = sum(&|f| (TAU * f).powi(4) * own(f) * passed(f));
+        assert!(
+            (bends / slow.bend_variance(10.0) - 1.0).abs() < 0.15,
+            "{bends}"
+        );
+        for cutoff_hz in [3.0, 8.0, 30.0] {
+            let low_passed = |f: f64| (1.0 + (f / FITTED_CORNER_HZ).powi(4)).powi(-2);
+            let passed = |f: f64| (1.0 + (f / cutoff_hz).powi(10)).powi(-2);
+            let bends = sum(&|f| (TAU * f).powi(4) * low_passed(f) * passed(f)) / sum(&low_passed);
+            let bandwidth = Bandwidth {
+                acceleration_hz: cutoff_hz,
+                angular_velocity_hz: cutoff_hz,
+            };
+            let stated = left_by_a_low_pass(&bandwidth).acceleration / FITTED_POSITION_M.powi(2);
+            assert!(
+                (stated / bends - 1.0).abs() < 0.4,
+                "{cutoff_hz}: {stated} {bends}"
+            );
+        }
+    }
+}
