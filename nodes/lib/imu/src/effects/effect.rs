@@ -107,19 +107,6 @@ impl EffectSet {
         )
     }
 
-    /// Of the kinds that are in both sets, takes the values of the other; a vibration beside a drift of
-    /// the clocks that only the other set has goes by the stamps then, as it does in the readings.
-    pub fn take_values_of(&mut self, other: &Self) {
-        for effect in &mut self.0 {
-            if let Some(new) = other.get(effect.kind) {
-                effect.clone_from(new);
-            }
-        }
-        if let Some(vibration) = self.vibration_by_own_clock(other) {
-            self.insert(vibration);
-        }
-    }
-
     /// The set with an effect, which replaces that of its kind.
     #[must_use]
     pub fn with(mut self, effect: Effect) -> Self {

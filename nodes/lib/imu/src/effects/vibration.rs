@@ -92,10 +92,23 @@ impl Effect {
 }
 
 impl EffectSet {
+    /// Of the kinds that are in both sets, takes the values of the other; a vibration beside a drift of
+    /// the clocks that only the other set has goes by the stamps then, as it does in the readings.
+    pub fn take_values_of(&mut self, other: &Self) {
+        let shared: Vec<Effect> = self
+            .iter()
+            .filter_map(|effect| other.get(effect.kind()).cloned())
+            .collect();
+        self.extend(&shared);
+        if let Some(vibration) = self.vibration_by_own_clock(other) {
+            self.insert(vibration);
+        }
+    }
+
     /// The vibration of a set as it is by this set's clock, where a drift of the clocks is in that set
     /// alone: one that is no cause is the reference's, and a vibration of the device is steady by the
     /// device's clock. 20 ppm of 30 Hz are a tenth of a turn in three minutes.
-    pub(super) fn vibration_by_own_clock(&self, fitted: &Self) -> Option<Effect> {
+    fn vibration_by_own_clock(&self, fitted: &Self) -> Option<Effect> {
         let drift = EffectKind::ClockDrift;
         if self.contains(drift) || !fitted.contains(drift) || !self.contains(EffectKind::Vibration)
         {
