@@ -79,6 +79,7 @@ fn between(before: &SampleVariance, after: &SampleVariance, part: f64) -> Sample
         acceleration: mix(|variance| variance.acceleration),
         angular_velocity: mix(|variance| variance.angular_velocity),
         orientation: mix(|variance| variance.orientation),
+        ..SampleVariance::default()
     }
 }
 

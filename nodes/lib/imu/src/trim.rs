@@ -6,7 +6,7 @@ use cromosim_spatial::Stamp;
 
 use crate::{Bandwidth, KinematicSample};
 
-/// Variance, over the median of the clip and that of the stretch behind the end, from which samples
+/// Variance that was learnt from the poses, over the median of the clip and that of the stretch behind the end, from which samples
 /// at an end are left out. Chosen among 3, 5 and 10 on the clips of `mocap_cmu`, by how often the
 /// largest specific force stands at an end; `tests/every_clip.rs` has others.
 const UNCERTAIN: f64 = 3.0;
@@ -98,11 +98,11 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 fn acceleration(sample: &KinematicSample) -> f64 {
-    sample.variance.acceleration
+    sample.variance.acceleration - sample.variance.unseen[0]
 }
 
 fn angular_velocity(sample: &KinematicSample) -> f64 {
-    sample.variance.angular_velocity
+    sample.variance.angular_velocity - sample.variance.unseen[1]
 }
 
 #[cfg(test)]

@@ -117,6 +117,7 @@ impl FrameWeights {
             orientation: sum(0, |std| std.rotation_rad),
             angular_velocity: sum(1, |std| std.rotation_rad),
             acceleration: sum(2, |std| std.position_m),
+            ..SampleVariance::default()
         }
     }
 }

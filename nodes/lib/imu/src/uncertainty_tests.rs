@@ -78,6 +78,7 @@ fn monte_carlo(
         orientation: of(&|sample| {
             so3::log(&(sample.world_from_sensor.rotation * turned.inverse()))
         }),
+        ..SampleVariance::default()
     };
     let mean = |field: &dyn Fn(&SampleVariance) -> f64| {
         samples
@@ -90,6 +91,7 @@ fn monte_carlo(
         acceleration: mean(&|variance| variance.acceleration),
         angular_velocity: mean(&|variance| variance.angular_velocity),
         orientation: mean(&|variance| variance.orientation),
+        ..SampleVariance::default()
     };
     [found, stated]
 }

@@ -119,6 +119,7 @@ fn a_device_states_live_what_it_states_offline() {
         acceleration: 0.04,
         angular_velocity: 1e-4,
         orientation: 0.0,
+        ..SampleVariance::default()
     };
     let stated = StatedErrors::of_device(&device(rest), 100.0).of_motion(of_poses, 0.0);
     assert!((stated.acceleration - 0.04 * 1.5 * 0.01).abs() < 1e-15);

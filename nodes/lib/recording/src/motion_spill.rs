@@ -14,7 +14,7 @@ use tempfile::tempfile_in;
 use crate::RecordingError;
 
 /// Numbers of a sample beside its stamp.
-const VALUES: usize = 21;
+const VALUES: usize = 23;
 /// Bytes of a sample: stamp, numbers, and which of its options are there.
 const SAMPLE: usize = 8 * (VALUES + 1) + 1;
 /// Bytes that are read or written at once.
@@ -139,6 +139,8 @@ fn bytes_of(sample: &KinematicSample) -> [u8; SAMPLE] {
             v.orientation,
             b.acceleration_hz,
             b.angular_velocity_hz,
+            v.unseen[0],
+            v.unseen[1],
         ]
     };
     let mut bytes = [0; SAMPLE];
@@ -174,6 +176,7 @@ fn sample_of(bytes: &[u8; SAMPLE]) -> KinematicSample {
             acceleration: value(16),
             angular_velocity: value(17),
             orientation: value(18),
+            unseen: [value(21), value(22)],
         },
         bandwidth: (options & 2 != 0).then(|| Bandwidth {
             acceleration_hz: value(19),
@@ -205,6 +208,7 @@ mod tests {
                     acceleration: x,
                     angular_velocity: f64::INFINITY,
                     orientation: -x,
+                    unseen: [x, 2.0 * x],
                 },
                 bandwidth: (k % 3 == 0).then_some(Bandwidth {
                     acceleration_hz: 5.0 + x,

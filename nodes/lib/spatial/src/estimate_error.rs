@@ -46,6 +46,7 @@ impl PoseEstimate {
                     + 2.0 / 3.0 * path.lever_arm_m.powi(2) * spinning_up,
                 angular_velocity: turning,
                 orientation: rotation,
+                ..SampleVariance::default()
             }
         };
         stamps.iter().map(at).collect()

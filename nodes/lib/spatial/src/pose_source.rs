@@ -107,11 +107,11 @@ impl PoseSource {
     /// learnt from the poses.
     pub fn unseen_errors(self, bandwidth: &Bandwidth) -> SampleVariance {
         let [position, rotation] = self.slow_errors();
-        let slow = SampleVariance {
-            acceleration: position.bend_variance(bandwidth.acceleration_hz),
-            angular_velocity: rotation.slope_variance(),
-            orientation: rotation.size.powi(2),
-        };
+        let slow = unseen(
+            position.bend_variance(bandwidth.acceleration_hz),
+            rotation.slope_variance(),
+            rotation.size.powi(2),
+        );
         match self {
             Self::Fitted => slow.plus(left_by_a_low_pass(bandwidth)),
             Self::Tracked | Self::InertialSuit | Self::Video => slow,
@@ -128,10 +128,19 @@ fn left_by_a_low_pass(bandwidth: &Bandwidth) -> SampleVariance {
     let of_corner = |hz: f64| hz / FITTED_CORNER_HZ;
     let bends = (FITTED_POSITION_M * corner.powi(2)).powi(2);
     let slopes = (FITTED_ROTATION_DEG.to_radians() * corner).powi(2);
+    unseen(
+        bends * part(of_corner(bandwidth.acceleration_hz).powi(5) / 1.768),
+        slopes * part(of_corner(bandwidth.angular_velocity_hz).powi(3) / 1.022),
+        0.0,
+    )
+}
+
+fn unseen(acceleration: f64, angular_velocity: f64, orientation: f64) -> SampleVariance {
     SampleVariance {
-        acceleration: bends * part(of_corner(bandwidth.acceleration_hz).powi(5) / 1.768),
-        angular_velocity: slopes * part(of_corner(bandwidth.angular_velocity_hz).powi(3) / 1.022),
-        orientation: 0.0,
+        acceleration,
+        angular_velocity,
+        orientation,
+        unseen: [acceleration, angular_velocity],
     }
 }
 

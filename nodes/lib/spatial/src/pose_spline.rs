@@ -361,10 +361,16 @@ impl PoseSpline {
             noise: self.rotation.noise_over(first)?,
             interval,
         };
+        let acceleration = Beyond::ACCELERATION.stated(position, bandwidth.acceleration_hz);
+        let angular_velocity = ROTVEC_PER_QUATERNION
+            * Beyond::ANGULAR_VELOCITY.stated(rotation, bandwidth.angular_velocity_hz);
         Some(SampleVariance {
-            acceleration: Beyond::ACCELERATION.stated(position, bandwidth.acceleration_hz),
-            angular_velocity: ROTVEC_PER_QUATERNION
-                * Beyond::ANGULAR_VELOCITY.stated(rotation, bandwidth.angular_velocity_hz),
+            acceleration,
+            angular_velocity,
+            unseen: [
+                acceleration - position.variance,
+                angular_velocity - ROTVEC_PER_QUATERNION * rotation.variance,
+            ],
             orientation: ROTVEC_PER_QUATERNION * self.rotation.variance_of(first, value)?,
         })
     }

@@ -10,6 +10,9 @@ pub struct SampleVariance {
     pub angular_velocity: f64,
     /// Of the body's orientation, rad2.
     pub orientation: f64,
+    /// What of the first two is not learnt from the poses: motion beyond the bandwidth and what a source
+    /// hides; below 0 where less motion is beyond than the smoothing expects.
+    pub unseen: [f64; 2],
 }
 
 /// Up to which frequency a sample resolves the motion: where the smoothing's response is one half,
@@ -26,7 +29,15 @@ impl SampleVariance {
     /// The larger of each: two statements about the same errors.
     #[must_use]
     pub fn larger(self, other: Self) -> Self {
+        let of_larger = |own: f64, others: f64, k: usize| {
+            let larger = if own < others { other } else { self };
+            larger.unseen[k]
+        };
         Self {
+            unseen: [
+                of_larger(self.acceleration, other.acceleration, 0),
+                of_larger(self.angular_velocity, other.angular_velocity, 1),
+            ],
             acceleration: self.acceleration.max(other.acceleration),
             angular_velocity: self.angular_velocity.max(other.angular_velocity),
             orientation: self.orientation.max(other.orientation),
@@ -37,6 +48,7 @@ impl SampleVariance {
     #[must_use]
     pub fn plus(self, other: Self) -> Self {
         Self {
+            unseen: [0, 1].map(|k| self.unseen[k] + other.unseen[k]),
             acceleration: self.acceleration + other.acceleration,
             angular_velocity: self.angular_velocity + other.angular_velocity,
             orientation: self.orientation + other.orientation,
