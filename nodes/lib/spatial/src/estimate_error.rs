@@ -58,7 +58,8 @@ fn through(floor: &NoiseFloor, filter: &Filter, passed: &dyn Fn(f64) -> [f64; 2]
     let mut sums = Variances::default();
     for (k, weight) in filter.weights.iter().enumerate() {
         let frequency_hz = k as f64 * filter.spacing_hz;
-        let mut power = floor.noise_at(frequency_hz) * weight * filter.spacing_hz;
+        let noise = floor.noise_at(frequency_hz) * filter.noise;
+        let mut power = noise * weight * filter.spacing_hz;
         let [of_rate, of_acceleration] = passed(frequency_hz);
         for (sum, passed) in sums.iter_mut().zip([1.0, of_rate, of_acceleration]) {
             *sum += power * passed;

@@ -425,3 +425,38 @@ fn the_ends_are_sound() {
     // The motion reaches 27 m/s2; an odd continuation errs by as much.
     assert!(worst < 5.0, "{worst}");
 }
+
+#[test]
+fn noise_that_is_louder_for_some_seconds_is_kept_out() {
+    let usual = PoseNoise {
+        position: 5e-5,
+        rotation: 5e-4,
+    };
+    let is_loud = |t: f64| (20.0..28.0).contains(&t);
+    let (stamps, mut positions, rotations) = poses(usual, 120.0, |_| true);
+    let mut random = Normal(11);
+    for (k, position) in positions.iter_mut().enumerate() {
+        let sigma = if is_loud(k as f64 / 120.0) { 4e-4 } else { 0.0 };
+        *position += Vector3::new(random.draw(), random.draw(), random.draw()) * sigma;
+    }
+    let track = PoseEstimate::fit(&stamps, &positions, &rotations)
+        .unwrap()
+        .track(120.0);
+    let error = |inside: &dyn Fn(f64) -> bool| {
+        let errors: Vec<f64> = (0..track.len())
+            .filter(|k| inside(*k as f64 / track.rate_hz))
+            .map(|k| {
+                let own = track.world_from_segment[k] * track.acceleration_in_segment[k];
+                (own - motion(k as f64 / track.rate_hz).2).norm_squared()
+            })
+            .collect();
+        (errors.iter().sum::<f64>() / errors.len() as f64).sqrt()
+    };
+    // Twice differentiated at the full band, this noise alone would be 30 m/s2.
+    let (loud, quiet) = (
+        error(&|t| (22.0..26.0).contains(&t)),
+        error(&|t| (34.0..54.0).contains(&t)),
+    );
+    println!("{loud:.3} m/s2 where the noise is loud, {quiet:.3} elsewhere");
+    assert!(loud < 1.0 && quiet < 0.2, "{loud} {quiet}");
+}

@@ -52,6 +52,7 @@ mod golden;
 mod grid;
 mod influence;
 mod kinks;
+mod local_noise;
 mod local_spline;
 mod nearest_name;
 mod noise_floor;

@@ -1,5 +1,6 @@
 //! What is noise and what is motion in a spectrum of poses.
 
+use crate::local_noise::local_noise;
 use crate::noise_shape::NoiseShape;
 use crate::pose_spectra::mean_spectrum;
 use crate::segments::Filter;
@@ -149,8 +150,9 @@ impl NoiseFloor {
         }
     }
 
-    /// A filter for each window from its own spectrum; motion comes in bursts, and rests let noise
-    /// through that the mean motion would hide. The band ends where three neighbours lie near the
+    /// A filter for each window from its own spectrum, and from its own noise where that is louder (unless a
+    /// smoothing is undone, whose gain hides it); motion comes in bursts, and rests let noise through that
+    /// the mean motion would hide. The band ends where three neighbours lie near the
     /// noise; within it, lines that the long windows resolve keep their full height; every frequency is
     /// as open as those up to `reach` entries away.
     pub fn localise(
@@ -164,9 +166,14 @@ impl NoiseFloor {
         self.windows = local
             .iter()
             .map(|spectrum| {
+                let noise = match undone {
+                    Some(_) => 1.0,
+                    None => local_noise(spectrum, rate_hz, self.spectrum()),
+                };
                 let filter = Filter {
                     spacing_hz: spectrum.spacing_hz,
-                    weights: self.local_weights(spectrum, rate_hz, undone, reach),
+                    weights: self.local_weights(spectrum, rate_hz, (undone, reach), noise),
+                    noise,
                 };
                 for (k, sum) in mean.iter_mut().enumerate() {
                     *sum += filter.at(k as f64 * self.spacing_hz) / local.len() as f64;
@@ -177,14 +184,16 @@ impl NoiseFloor {
         self.filter = mean;
     }
 
-    /// The filter's weights at the frequencies of one window's spectrum.
+    /// The filter's weights at the frequencies of one window's spectrum, whose noise is so many times as
+    /// dense as that of the whole series.
     fn local_weights(
         &self,
         spectrum: &Spectrum,
         rate_hz: f64,
-        undone: Option<ZeroPhaseSmoothing>,
-        reach: usize,
+        (undone, reach): (Option<ZeroPhaseSmoothing>, usize),
+        noise: f64,
     ) -> Vec<f64> {
+        let noise_at = |hz: f64| noise * self.noise_at(hz);
         let gain2 = |hz: f64| undoing_gain(hz, undone, rate_hz).powi(2);
         let ratio: Vec<f64> = spectrum
             .density
@@ -192,7 +201,7 @@ impl NoiseFloor {
             .enumerate()
             .map(|(k, density)| {
                 let hz = spectrum.frequency(k);
-                density * gain2(hz) / self.noise_at(hz).max(TINY)
+                density * gain2(hz) / noise_at(hz).max(TINY)
             })
             .collect();
         let bins = ratio.len();
@@ -207,8 +216,8 @@ impl NoiseFloor {
             / 3.0
             - 1.0;
         let beyond = |hz: f64| {
-            let motion = last.max(0.0) * self.noise_at(edge_hz) * (edge_hz / hz).powf(MOTION_FALL);
-            motion / (motion + self.noise_at(hz)).max(TINY)
+            let motion = last.max(0.0) * noise_at(edge_hz) * (edge_hz / hz).powf(MOTION_FALL);
+            motion / (motion + noise_at(hz)).max(TINY)
         };
         let weight = |k: usize| {
             let hz = spectrum.frequency(k);

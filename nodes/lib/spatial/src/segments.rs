@@ -21,6 +21,8 @@ pub(crate) struct Filter {
     pub spacing_hz: f64,
     /// Gains from 0 Hz on.
     pub weights: Vec<f64>,
+    /// Density of the window's noise, in units of that of the whole series.
+    pub noise: f64,
 }
 
 impl Filter {
