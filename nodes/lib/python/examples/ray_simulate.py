@@ -44,8 +44,10 @@ def main(out: str, paths: list[str]) -> int:
     """Writes OUT/*.parquet; the number of rows."""
     motions = ray.data.from_items([{"path": str(Path(path).resolve())} for path in paths], override_num_blocks=len(paths))
     # A lost machine is no fault of a motion: it is simulated again.
-    tables = motions.map_batches(simulate, batch_size=1, max_retries=-1)
-    tables.write_parquet(out, mode=ray.data.SaveMode.OVERWRITE)
+    # Writing asks for the same, so that Ray makes one task of both and keeps no processor aside for writing.
+    again = {"max_retries": -1}
+    tables = motions.map_batches(simulate, batch_size=1, **again)
+    tables.write_parquet(out, mode=ray.data.SaveMode.OVERWRITE, ray_remote_args=again)
     return ray.data.read_parquet(out).count()
 
 
