@@ -9,7 +9,6 @@ for in $CROMOSIM_DATA, else in ../shared/data beside the repository; where there
 """
 import argparse
 import json
-import os
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -284,7 +283,7 @@ def main():
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--json", type=Path, help="write all numbers here")
     given = parser.parse_args()
-    data = Path(os.environ.get("CROMOSIM_DATA") or Path(__file__).resolve().parents[2].parent / "shared" / "data")
+    data = real.shared_data()
     found = sorted((name, *how) for name, how in real.trials(data).items() if how[0] is real.broad)
     if not found:
         print("skipped: no recordings; CROMOSIM_DATA names the folder that holds paired_broad")

@@ -131,6 +131,11 @@ def gaitmap(file):
     return cut("gaitmap_foot", "foot", 10.0, recording)
 
 
+def shared_data():
+    """Where the recordings are looked for."""
+    return Path(os.environ.get("CROMOSIM_DATA") or Path(__file__).resolve().parents[2].parent / "shared" / "data")
+
+
 def trials(data):
     """(name, how to read it) of every trial that is there."""
     found = {file.stem: (broad, file) for file in sorted((data / "paired_broad").glob("*.npz"))}
@@ -545,7 +550,7 @@ def arguments():
 def main():
     """Evaluates the trials and prints the table."""
     given = arguments()
-    data = Path(os.environ.get("CROMOSIM_DATA") or Path(__file__).resolve().parents[2].parent / "shared" / "data")
+    data = shared_data()
     found = trials(data)
     if not found:
         print("skipped: no recordings; CROMOSIM_DATA names the folder that holds paired_broad and paired_gaitmap_foot")

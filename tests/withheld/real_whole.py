@@ -8,7 +8,6 @@ The data and what else it needs are real.py's. real_README.md says what is done.
 
 import argparse
 import json
-import os
 import sys
 from dataclasses import fields, replace
 from pathlib import Path
@@ -152,7 +151,7 @@ def main():
     parser.add_argument("--only", choices=["whole", "leave-one-out"])
     parser.add_argument("--json", type=Path, help="write all numbers here")
     given = parser.parse_args()
-    data = Path(os.environ.get("CROMOSIM_DATA") or Path(__file__).resolve().parents[2].parent / "shared" / "data")
+    data = real.shared_data()
     found = {name: how for name, how in real.trials(data).items() if not given.trial or any(part in name for part in given.trial)}
     if not found:
         print("skipped: no recordings; CROMOSIM_DATA names the folder that holds paired_broad and paired_gaitmap_foot")

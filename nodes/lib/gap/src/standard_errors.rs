@@ -16,7 +16,8 @@ const BEFORE_ALL_S: f64 = 1.0;
 /// A fit's errors as the normal equations of its own recording have them, with what is ordinary beside
 /// it.
 struct Beside {
-    columns: Vec<Vec<f64>>,
+    /// The columns of what is beside it.
+    extra: Vec<Vec<f64>>,
     covariance: DMatrix<f64>,
     /// 1 / variance of the prior of each value.
     prior: Vec<f64>,
@@ -49,7 +50,6 @@ impl FitModel<'_> {
     /// or not, and an offset of the clocks moves with it.
     fn beside_ordinary_drift(&self, fit: &Fit) -> Beside {
         let kind = EffectKind::ClockDrift;
-        let mut columns = fit.columns.to_vec();
         let mut prior: Vec<f64> = fit.prior().collect();
         let extra = if fit.set.contains(kind) || !fit.set.contains(EffectKind::TimeOffset) {
             Vec::new()
@@ -59,17 +59,17 @@ impl FitModel<'_> {
         };
         let weights = vec![kind.error_of_reference().powi(-2); extra.len()];
         let gram = self.extended(fit, None, &slices(&extra), &weights);
-        columns.extend(extra);
         prior.extend(weights);
         Beside {
             covariance: gram.solve().covariance,
-            columns,
+            extra,
             prior,
         }
     }
 
     /// `C (P + sum X^T r r^T X) C` over blocks of time, each channel in units of its own residual.
     fn sum_over_blocks(&self, fit: &Fit, beside: &Beside) -> DMatrix<f64> {
+        let columns: Vec<_> = fit.columns.iter().chain(&beside.extra).collect();
         let length = self.prepared.length;
         let counts = self.whitener.count;
         let weights = PerChannel::from_fn(|channel| {
@@ -84,8 +84,8 @@ impl FitModel<'_> {
         for from in (0..length).step_by(entries) {
             let to = (from + entries).min(length);
             let pull = DVector::from_iterator(
-                beside.columns.len(),
-                beside.columns.iter().map(|column| {
+                columns.len(),
+                columns.iter().map(|column| {
                     (0..6)
                         .map(|axis| {
                             let block = axis * length + from..axis * length + to;

@@ -2,6 +2,7 @@
 
 use cromosim_imu::{Measured, SensorFrame};
 use cromosim_msgs::sensor_msgs::Imu;
+use cromosim_recording::Quality;
 use cromosim_recording::rigid::unit_quaternion;
 use cromosim_spatial::Stamp;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -190,4 +191,13 @@ pub fn poses<'py>(py: Python<'py>, frames: &[SensorFrame]) -> PyResult<Bound<'py
     arrays.set_item("positions", rows(py, positions, 3)?)?;
     arrays.set_item("orientations", rows(py, orientations, 4)?)?;
     Ok(arrays)
+}
+
+/// Beside the arrays: `bandwidth_hz` and `trimmed_s`.
+pub fn set_quality(arrays: &Bound<'_, PyDict>, quality: &Quality) -> PyResult<()> {
+    arrays.set_item(
+        "bandwidth_hz",
+        quality.bandwidth.map(|it| it.acceleration_hz),
+    )?;
+    arrays.set_item("trimmed_s", quality.trimmed_s)
 }

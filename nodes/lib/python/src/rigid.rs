@@ -12,7 +12,7 @@ use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{Columns, rotations, stamps, vectors};
+use crate::arrays::{Columns, rotations, set_quality, stamps, vectors};
 use crate::device::device;
 use crate::error::raise;
 use crate::simulate::Options;
@@ -67,12 +67,7 @@ pub fn simulate_rigid<'py>(
         how.simulate(&recorded).map_err(raise)
     })?;
     let arrays = Columns::of_messages(&resimulated.messages).into_arrays(py, false)?;
-    let quality = &resimulated.quality;
-    arrays.set_item(
-        "bandwidth_hz",
-        quality.bandwidth.map(|it| it.acceleration_hz),
-    )?;
-    arrays.set_item("trimmed_s", quality.trimmed_s)?;
+    set_quality(&arrays, &resimulated.quality)?;
     Ok(arrays)
 }
 

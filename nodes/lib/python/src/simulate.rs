@@ -18,7 +18,7 @@ use pyo3::types::PyDict;
 use rayon::prelude::*;
 use serde::Deserialize;
 
-use crate::arrays::{Columns, poses};
+use crate::arrays::{Columns, poses, set_quality};
 use crate::error::raise;
 use crate::motion::Motion;
 
@@ -162,12 +162,7 @@ pub fn simulate<'py>(
         let oriented = columns.are_oriented();
         let arrays = columns.into_arrays(py, oriented)?;
         arrays.set_item("reference", poses(py, &placement.frames)?)?;
-        let quality = &placement.quality;
-        arrays.set_item(
-            "bandwidth_hz",
-            quality.bandwidth.map(|it| it.acceleration_hz),
-        )?;
-        arrays.set_item("trimmed_s", quality.trimmed_s)?;
+        set_quality(&arrays, &placement.quality)?;
         imus.set_item(&placement.name, arrays)?;
     }
     Ok(imus)

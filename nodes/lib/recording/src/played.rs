@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use cromosim_bag::{BagReader, write_imu_csv};
-use cromosim_imu::{ImuMessages, Measured, MountedSensors, Reading, SensorFrame, VirtualImu};
+use cromosim_imu::{
+    ImuMessages, KinematicSample, Measured, MountedSensors, Reading, SensorFrame, VirtualImu,
+};
 use cromosim_motion::{MotionError, PersonPart, SmplMotion};
 use cromosim_msgs::cromosim_msgs::SmplState;
 use cromosim_spatial::Stamp;
@@ -51,18 +53,20 @@ impl SimulatedPlacement {
     /// # Errors
     /// [`RecordingError::PutAside`] where what was put aside is lost.
     pub fn next_measured(&mut self) -> Result<Option<Measured>, RecordingError> {
-        while let Some(sample) = self.motion.next_sample()? {
-            if let Some(measured) = self.imu.read(&sample) {
-                return Ok(Some(measured));
-            }
-        }
-        Ok(None)
+        self.next_read(VirtualImu::read)
     }
 
     /// Stamp and channels of the same; whoever takes these takes nothing else of this placement.
     pub(crate) fn next_channels(&mut self) -> Result<Option<(Stamp, Reading)>, RecordingError> {
+        self.next_read(VirtualImu::read_channels)
+    }
+
+    fn next_read<T>(
+        &mut self,
+        read: impl Fn(&mut VirtualImu, &KinematicSample) -> Option<T>,
+    ) -> Result<Option<T>, RecordingError> {
         while let Some(sample) = self.motion.next_sample()? {
-            if let Some(read) = self.imu.read_channels(&sample) {
+            if let Some(read) = read(&mut self.imu, &sample) {
                 return Ok(Some(read));
             }
         }
