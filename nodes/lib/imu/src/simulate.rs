@@ -2,7 +2,9 @@
 
 use std::fmt;
 
-use cromosim_spatial::{PoseSmoothing, PoseSpline, PoseTimes, Stamp, derivative_weights, so3};
+use cromosim_spatial::{
+    Located, PoseSmoothing, PoseSource, PoseSpline, PoseTimes, Stamp, derivative_weights, so3,
+};
 use nalgebra::{Isometry3, Vector3};
 
 use crate::low_pass_error;
@@ -131,17 +133,14 @@ pub fn simulate_several_on(
 ) -> Result<Vec<Vec<KinematicSample>>, ImuError> {
     let source = trajectories.first().map(SensorTrajectory::source);
     let together = trajectories.iter().all(|one| Some(one.source()) == source);
-    let several = trajectories.iter().zip(outputs);
     if scheme == Scheme::AdaptiveSpline && together {
         let smoothing = scheme.smoothing(source.unwrap_or_default());
         // Where one cannot be fitted, each alone says which.
         if let Ok(fitted) = spline::fit_all(times, trajectories, smoothing) {
-            return several
-                .zip(&fitted)
-                .map(|((one, output), fitted)| of_spline(times, one, fitted, output))
-                .collect();
+            return of_splines(times, trajectories, &fitted, outputs);
         }
     }
+    let several = trajectories.iter().zip(outputs);
     several
         .map(|(one, output)| simulate_kinematics_on(times, one, scheme, output))
         .collect()
@@ -157,24 +156,83 @@ fn by_spline(
     of_spline(times, trajectory, &fitted, output)
 }
 
+/// Samples of each spline to its own stamps. Where these are the same, each is located once.
+fn of_splines(
+    times: &PoseTimes,
+    trajectories: &[SensorTrajectory],
+    fitted: &[PoseSpline],
+    outputs: &[Vec<Stamp>],
+) -> Result<Vec<Vec<KinematicSample>>, ImuError> {
+    let span = |one: &SensorTrajectory| (one.start(), one.end());
+    let same_span = trajectories
+        .array_windows()
+        .all(|[a, b]| span(a) == span(b));
+    let same = same_span && outputs.array_windows().all(|[a, b]| a == b);
+    let several = trajectories.iter().zip(fitted).zip(outputs);
+    let (true, Some(output)) = (same, outputs.first()) else {
+        return several
+            .map(|((one, fitted), output)| of_spline(times, one, fitted, output))
+            .collect();
+    };
+    let samplers = several.map(|((one, fitted), _)| Sampler::new(times, one, fitted));
+    let samplers = samplers.collect::<Result<Vec<_>, _>>()?;
+    let room = || Vec::with_capacity(output.len());
+    let mut samples: Vec<_> = samplers.iter().map(|_| room()).collect();
+    for &stamp in output {
+        let held = stamp.clamp(trajectories[0].start(), trajectories[0].end());
+        let located = times.locate(held);
+        for (sampler, samples) in samplers.iter().zip(&mut samples) {
+            samples.push(sampler.sample(stamp, (held, &located)));
+        }
+    }
+    Ok(samples)
+}
+
 fn of_spline(
     times: &PoseTimes,
     trajectory: &SensorTrajectory,
     fitted: &PoseSpline,
     output: &[Stamp],
 ) -> Result<Vec<KinematicSample>, ImuError> {
-    let errors = SplineVariance::new(times, fitted, trajectory.frames())?;
+    let sampler = Sampler::new(times, trajectory, fitted)?;
     let sample = |&stamp: &Stamp| {
         let held = stamp.clamp(trajectory.start(), trajectory.end());
-        let known = errors.as_ref().map(|errors| errors.at(held));
-        let sample = spline::sample(fitted, trajectory.source(), held);
+        sampler.sample(stamp, (held, &times.locate(held)))
+    };
+    Ok(output.iter().map(sample).collect())
+}
+
+/// A spline with what is known about its frames.
+struct Sampler<'a> {
+    fitted: &'a PoseSpline,
+    source: PoseSource,
+    /// What errors of the frames leave, where any are known of.
+    errors: Option<SplineVariance<'a>>,
+}
+
+impl<'a> Sampler<'a> {
+    fn new(
+        times: &PoseTimes,
+        trajectory: &'a SensorTrajectory,
+        fitted: &'a PoseSpline,
+    ) -> Result<Self, ImuError> {
+        Ok(Self {
+            fitted,
+            source: trajectory.source(),
+            errors: SplineVariance::new(times, fitted, trajectory.frames())?,
+        })
+    }
+
+    /// What is read at a stamp; it is held within the frames, and lies there.
+    fn sample(&self, stamp: Stamp, (held, located): (Stamp, &Located)) -> KinematicSample {
+        let known = self.errors.as_ref().map(|errors| errors.at(held));
+        let sample = spline::sample(self.fitted, self.source, (held, located));
         KinematicSample {
             stamp,
             variance: sample.variance.larger(known.unwrap_or_default()),
             ..sample
         }
-    };
-    Ok(output.iter().map(sample).collect())
+    }
 }
 
 fn by_differences(

@@ -106,7 +106,11 @@ impl FixedLag {
         };
         samples.extend(due.iter().map(|&stamp| KinematicSample {
             variance: variance(stamp),
-            ..sample(&spline, PoseSource::default(), stamp)
+            ..sample(
+                &spline,
+                PoseSource::default(),
+                (stamp, &times.locate(stamp)),
+            )
         }));
         Ok(())
     }

@@ -1,7 +1,9 @@
 //! Symmetric positive definite band matrices: factorisation, solution, determinant.
 
 use crate::SpatialError;
-use crate::wide::{Four, Plain, add_scaled, divided, multiply, subtract_product};
+use crate::wide::{
+    Four, Plain, add_scaled, divided, multiply, subtract_product, subtract_product_rows,
+};
 
 /// Bands stored beside the diagonal: a quintic B-spline overlaps five neighbours on each side.
 pub(crate) const BANDWIDTH: usize = 5;
@@ -170,10 +172,16 @@ impl<const L: usize> Factor<L> {
         }
         let rows = &self.rows[i + 1..];
         match (rows.first_chunk(), below.first_chunk()) {
-            (Some(rows), Some(below)) => {
-                solve_up_from::<L, C>(s, x, rows as &[_; BANDWIDTH], below as &[_; BANDWIDTH])
+            (Some([a, b, c, d, e]), Some(below)) => {
+                let factors = [&a[1], &b[2], &c[3], &d[4], &e[5]];
+                let below: &[_; BANDWIDTH] = below;
+                subtract_product_rows(s, x, factors, below.each_ref());
             }
-            _ => solve_up_from(s, x, rows, below),
+            _ => {
+                for (k, (row, other)) in rows.iter().zip(below).take(BANDWIDTH).enumerate() {
+                    subtract_product_rows(s, x, [&row[k + 1]], [other]);
+                }
+            }
         }
     }
 }
@@ -398,47 +406,14 @@ fn solve_row_down<const L: usize, const C: usize>(
 ) {
     let (above, here) = right.split_at_mut(i);
     let x = &mut here[0];
+    let [_, row @ ..] = row;
     match above.last_chunk::<BANDWIDTH>() {
-        Some(above) => solve_down_from(s, x, row, above),
-        None => solve_down_from(s, x, row, above),
-    }
-}
-
-#[inline(always)]
-fn solve_down_from<const L: usize, const C: usize>(
-    s: impl Four,
-    x: &mut [f64; C],
-    row: &Row<L>,
-    above: &[[f64; C]],
-) {
-    for (l, other) in row[1..].iter().zip(above.iter().rev()) {
-        subtract_from_channels(s, x, l, other);
-    }
-}
-
-#[inline(always)]
-fn solve_up_from<const L: usize, const C: usize>(
-    s: impl Four,
-    x: &mut [f64; C],
-    rows: &[Row<L>],
-    below: &[[f64; C]],
-) {
-    for (k, (row, other)) in rows.iter().zip(below).take(BANDWIDTH).enumerate() {
-        subtract_from_channels(s, x, &row[k + 1], other);
-    }
-}
-
-/// `x -= l other`, each channel by its lane's factor.
-#[inline(always)]
-fn subtract_from_channels<const L: usize, const C: usize>(
-    s: impl Four,
-    x: &mut [f64; C],
-    l: &[f64; L],
-    other: &[f64; C],
-) {
-    let channels = x.as_chunks_mut::<L>().0.iter_mut();
-    for (x, other) in channels.zip(other.as_chunks::<L>().0) {
-        subtract_product(s, x, l, other);
+        Some([e, d, c, b, a]) => subtract_product_rows(s, x, row.each_ref(), [a, b, c, d, e]),
+        None => {
+            for (l, other) in row.iter().zip(above.iter().rev()) {
+                subtract_product_rows(s, x, [l], [other]);
+            }
+        }
     }
 }
 

@@ -51,6 +51,7 @@ mod gaps;
 mod golden;
 mod grid;
 mod influence;
+mod kernel;
 mod kinks;
 mod local_noise;
 mod local_spline;
@@ -97,8 +98,8 @@ pub use nearest_name::{in_plain_words, meant, nearest_name};
 pub use pose_series::PoseSeries;
 pub use pose_source::PoseSource;
 pub use pose_spline::{
-    Motion, MotionEstimate, POSES_AT_ONCE, PoseAdaptation, PoseSmoothing, PoseSpline, PoseTimes,
-    position_channels, rotation_channels,
+    Located, Motion, MotionEstimate, POSES_AT_ONCE, PoseAdaptation, PoseSmoothing, PoseSpline,
+    PoseTimes, position_channels, rotation_channels,
 };
 pub use rustfft::num_complex::Complex64;
 pub use sample_variance::{Bandwidth, SampleVariance};

@@ -138,10 +138,24 @@ impl PoseTimes {
         })
     }
 
+    /// Where a stamp lies among the times; stamps outside them are moved to the nearest end.
+    pub fn locate(&self, stamp: Stamp) -> Located {
+        let (first, values) = self.system.equations.basis_at(stamp - self.origin);
+        Located { first, values }
+    }
+
     /// The equations, with times in seconds since the first stamp.
     pub fn system(&self) -> &Arc<SplineSystem> {
         &self.system
     }
+}
+
+/// What every spline on the same times needs of a stamp: see [`PoseTimes::locate`].
+#[derive(Clone, Copy, Debug)]
+pub struct Located {
+    /// The knot interval, and the first basis function over it.
+    first: usize,
+    values: BasisValues,
 }
 
 /// Position (3 channels) and rotation (the 4 components of the sign-continuous quaternion,
@@ -305,13 +319,17 @@ impl PoseSpline {
 
     /// The motion at a stamp; stamps outside the samples are moved to the nearest end.
     pub fn evaluate(&self, stamp: Stamp) -> Motion {
-        let (first, values) = self.basis_at(stamp);
+        let Located { first, values } = self.times.locate(stamp);
         self.motion(first, &values)
     }
 
     /// As [`PoseSpline::evaluate`], with what is known about it.
     pub fn estimate(&self, stamp: Stamp) -> MotionEstimate {
-        let (first, values) = self.basis_at(stamp);
+        self.estimate_at(&self.times.locate(stamp))
+    }
+
+    /// As [`PoseSpline::estimate`], at a stamp that the spline's times have located.
+    pub fn estimate_at(&self, &Located { first, values }: &Located) -> MotionEstimate {
         let highest_hz = 0.5 / self.times.system.equations.interval;
         let bandwidth = Bandwidth {
             acceleration_hz: self.position.cutoff_over(first).min(highest_hz),
@@ -322,11 +340,6 @@ impl PoseSpline {
             variance: self.variance(first, &values, &bandwidth),
             bandwidth,
         }
-    }
-
-    fn basis_at(&self, stamp: Stamp) -> (usize, BasisValues) {
-        let equations = &self.times.system.equations;
-        equations.basis_at(stamp - self.times.origin)
     }
 
     fn motion(&self, first: usize, values: &BasisValues) -> Motion {

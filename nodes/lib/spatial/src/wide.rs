@@ -248,3 +248,70 @@ pub(crate) fn divided<const L: usize>(s: impl Four, a: &[f64; L], divisor: &[f64
     lane_by_lane!(s, x, divisor; s.divide(x, divisor); x / divisor);
     quotient
 }
+
+/// `x += sum_k factors_k rows_k`, lane by lane, the first row first. A lane stays in its register meanwhile,
+/// which it does not where [`add_scaled`] is called for each row.
+#[inline(always)]
+pub(crate) fn add_scaled_rows<const L: usize, const W: usize>(
+    s: impl Four,
+    x: &mut [f64; L],
+    factors: &[f64; W],
+    rows: &[[f64; L]; W],
+) {
+    let (whole, rest) = x.as_chunks_mut::<4>();
+    for (k, own) in whole.iter_mut().enumerate() {
+        let mut sum = s.load(own);
+        for (factor, row) in factors.iter().zip(rows) {
+            let row = s.load(&row.as_chunks::<4>().0[k]);
+            sum = s.add(sum, s.multiply(s.splat(*factor), row));
+        }
+        *own = s.store(sum);
+    }
+    for (k, own) in rest.iter_mut().enumerate() {
+        for (factor, row) in factors.iter().zip(rows) {
+            *own += factor * row.as_chunks::<4>().1[k];
+        }
+    }
+}
+
+/// `x -= sum_k factors_k rows_k`, the first row first, for channels of which number c has the factors of lane
+/// c modulo L.
+#[inline(always)]
+pub(crate) fn subtract_product_rows<const L: usize, const C: usize, const W: usize>(
+    s: impl Four,
+    x: &mut [f64; C],
+    factors: [&[f64; L]; W],
+    rows: [&[f64; C]; W],
+) {
+    if L == 2 && C.is_multiple_of(4) {
+        // Two channels of each lane at a time.
+        let twice = factors.map(|own| [own[0], own[1], own[0], own[1]]);
+        for (k, own) in x.as_chunks_mut::<4>().0.iter_mut().enumerate() {
+            let mut left = s.load(own);
+            for (factor, row) in twice.iter().zip(rows) {
+                let row = s.load(&row.as_chunks::<4>().0[k]);
+                left = s.subtract(left, s.multiply(s.load(factor), row));
+            }
+            *own = s.store(left);
+        }
+        return;
+    }
+    for (channel, x) in x.as_chunks_mut::<L>().0.iter_mut().enumerate() {
+        let (whole, rest) = x.as_chunks_mut::<4>();
+        for (k, own) in whole.iter_mut().enumerate() {
+            let mut left = s.load(own);
+            for (factor, row) in factors.iter().zip(rows) {
+                let factor = s.load(&factor.as_chunks::<4>().0[k]);
+                let row = s.load(&row.as_chunks::<L>().0[channel].as_chunks::<4>().0[k]);
+                left = s.subtract(left, s.multiply(factor, row));
+            }
+            *own = s.store(left);
+        }
+        for (k, own) in rest.iter_mut().enumerate() {
+            for (factor, row) in factors.iter().zip(rows) {
+                let row = row.as_chunks::<L>().0[channel].as_chunks::<4>().1[k];
+                *own -= factor.as_chunks::<4>().1[k] * row;
+            }
+        }
+    }
+}

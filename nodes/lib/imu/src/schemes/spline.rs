@@ -1,7 +1,7 @@
 //! Smoothing quintic splines of position and quaternion, see [`cromosim_spatial::PoseSpline`].
 
 use cromosim_spatial::{
-    Influence, MotionEstimate, PoseSmoothing, PoseSource, PoseSpline, PoseTimes, Stamp,
+    Influence, Located, MotionEstimate, PoseSmoothing, PoseSource, PoseSpline, PoseTimes, Stamp,
 };
 use nalgebra::Isometry3;
 
@@ -32,14 +32,18 @@ fn poses(frames: &[SensorFrame]) -> Vec<Isometry3<f64>> {
     frames.iter().map(|frame| frame.world_from_sensor).collect()
 }
 
-/// The motion at a stamp, and how far it may be off where the spline has learnt that: by the noise that it
+/// The motion at a stamp that lies there, and how far it may be off where the spline has learnt that: by the noise that it
 /// has learnt, by the motion beyond it and by what poses of this source hide.
-pub(crate) fn sample(spline: &PoseSpline, source: PoseSource, stamp: Stamp) -> KinematicSample {
+pub(crate) fn sample(
+    spline: &PoseSpline,
+    source: PoseSource,
+    (stamp, located): (Stamp, &Located),
+) -> KinematicSample {
     let MotionEstimate {
         motion,
         variance,
         bandwidth,
-    } = spline.estimate(stamp);
+    } = spline.estimate_at(located);
     KinematicSample {
         stamp,
         world_from_sensor: Isometry3::from_parts(motion.position.into(), motion.rotation),
