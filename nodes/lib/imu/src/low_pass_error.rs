@@ -23,7 +23,8 @@ pub(crate) fn state(
 ) -> Result<(), ImuError> {
     let frames = trajectory.frames();
     let poses: Vec<Isometry3<f64>> = frames.iter().map(|it| it.world_from_sensor).collect();
-    let Some(noise) = PoseSpline::noise_of(times, &poses, trajectory.source())? else {
+    let source = trajectory.source();
+    let Some(noise) = PoseSpline::noise_of(times, &poses, source, bandwidth_hz)? else {
         return Ok(());
     };
     let noisy = |(frame, [position_m, rotation_rad]): (&SensorFrame, [f64; 2])| {

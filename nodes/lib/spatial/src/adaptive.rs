@@ -5,6 +5,7 @@ use crate::equations::{IntervalWeights, SplineEquations};
 use crate::fourth_differences::{MEDIAN_OF_SQUARE, fourth_difference, white_noise_variance};
 use crate::kernel::{Evidence, Kernel, means};
 use crate::local_spline::{LocalSolution, Series, Statements};
+use crate::low_passed::{LowPassed, LowPassedSamples};
 use crate::weight_search::LOWEST_LOG_WEIGHT;
 use crate::wide::{Four, widest};
 
@@ -50,10 +51,14 @@ const EXPECTED_COUNT: f64 = 0.01;
 const FIRST_CUTOFF_HZ: f64 = 12.0;
 /// Rate at which a noise is stated, Hz: white noise of the same density has a variance that grows
 /// with the rate.
-const STATED_AT_HZ: f64 = 100.0;
+pub(crate) const STATED_AT_HZ: f64 = 100.0;
 /// Steps towards the greatest likelihood. More hardly change the error, and carry what a clip's ends
 /// say farther inwards. Chosen among 3 to 40 as [`FIRST_CUTOFF_HZ`].
 const STEPS: usize = 4;
+/// After so many of them noise that was low-passed before is taken for what it is. From the first on, white
+/// noise beside it is taken for motion above the corner and passed (0.3 mm at 120 Hz: six times the
+/// practice's error), only in the last, a foot that chatters is not found. Chosen as `FLOOR` in `low_passed.rs`.
+const STEPS_AS_WHITE: usize = 2;
 /// With fewer samples noise and motion cannot be told apart; live, the first sample is due with the
 /// eleventh frame.
 pub(crate) const FEWEST_ADAPTIVE: usize = 8;
@@ -76,6 +81,9 @@ pub struct ExpectedNoise {
     /// What it counts beside the samples around each time, in samples: little where they show their
     /// noise, more where it was filtered before.
     pub count: f64,
+    /// What a low-pass has made of it; none where it is white. The standard deviation is then that of
+    /// white noise as dense at low frequencies.
+    pub low_passed: Option<LowPassed>,
 }
 
 /// What is learnt of a series: how strongly the motion is driven around each time, and how large
@@ -117,6 +125,9 @@ pub(crate) struct Adaptation<const L: usize> {
     expected_noise: [[f64; 2]; L],
     /// Variance of the noise over each knot interval when the weights were last made, unit^2.
     noise_over: Vec<[f64; L]>,
+    /// Where noise was low-passed before; r is then its variance as white noise of the density that it
+    /// has at low frequencies.
+    low_passed: [Option<LowPassedSamples>; L],
 }
 
 impl<const L: usize> Adaptation<L> {
@@ -149,6 +160,7 @@ impl<const L: usize> Adaptation<L> {
                 [variance, if variance > 0.0 { expected.count } else { 0.0 }]
             }),
             noise_over: Vec::new(),
+            low_passed: [None; L],
         }
     }
 
@@ -161,7 +173,11 @@ impl<const L: usize> Adaptation<L> {
     ) -> Result<Self, SpatialError> {
         let mut adaptation = Self::start(equations, series, expected);
         let (mut statements, mut weights) = (Statements::default(), Vec::new());
-        for _ in 0..STEPS {
+        for step in 0..STEPS {
+            if step == STEPS_AS_WHITE {
+                adaptation.low_passed =
+                    expected.map(|it| it.low_passed.map(|own| own.among(equations)));
+            }
             adaptation.weights_into(&mut weights);
             // Not refined: squares are all that is wanted of it.
             solution.solve_and_state(equations, series, &weights, &mut statements)?;
@@ -245,6 +261,27 @@ impl<const L: usize> Adaptation<L> {
                 }
             }
         });
+        for (lane, low_passed) in self.low_passed.iter().enumerate() {
+            if let Some(low_passed) = low_passed {
+                self.weigh_low_passed(low_passed, lane, weights);
+            }
+        }
+    }
+
+    /// Makes weights for white noise those for noise behind a low-pass.
+    fn weigh_low_passed(
+        &self,
+        low_passed: &LowPassedSamples,
+        lane: usize,
+        weights: &mut [IntervalWeights<L>],
+    ) {
+        let lowest = 10f64.powf(LOWEST_LOG_WEIGHT);
+        for (k, [fifth, second]) in weights.iter_mut().enumerate() {
+            let at_cutoff = low_passed.at_cutoff(fifth[lane]);
+            let noise = self.noise_over[k][lane] * at_cutoff;
+            fifth[lane] = (fifth[lane] * at_cutoff).max(lowest);
+            second[lane] = noise / (self.vigour[k][lane] + noise * self.least_vigour);
+        }
     }
 
     /// A step towards the greatest likelihood.
@@ -294,6 +331,21 @@ impl<const L: usize> Adaptation<L> {
         }
     }
 
+    /// The share of the residuals that is not free, of noise behind a low-pass.
+    fn take_low_passed(
+        &self,
+        low_passed: &LowPassedSamples,
+        lane: usize,
+        residuals: &mut [Evidence<L>],
+    ) {
+        let last = self.drive.len() - 1;
+        for (k, [_, share]) in residuals.iter_mut().enumerate() {
+            let interval = k.min(last);
+            let for_white = self.noise_over[interval][lane] / self.drive[interval][lane];
+            share[lane] = 1.0 - low_passed.left_over(for_white, 1.0 - share[lane]);
+        }
+    }
+
     /// Turns what each knot interval says about the drive, and each sample about the noise, into
     /// sums of squares and what they count.
     #[inline(always)]
@@ -312,6 +364,11 @@ impl<const L: usize> Adaptation<L> {
             for lane in 0..L {
                 square[lane] += expected * noise[lane];
                 variance[lane] = free(fifth[lane] * variance[lane]) + EXPECTED_COUNT;
+            }
+        }
+        for (lane, low_passed) in self.low_passed.iter().enumerate() {
+            if let Some(low_passed) = low_passed {
+                self.take_low_passed(low_passed, lane, residuals);
             }
         }
         for [square, variance] in residuals {

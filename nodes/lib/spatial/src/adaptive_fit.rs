@@ -8,6 +8,7 @@ use crate::banded::InverseBands;
 use crate::basis::ORDER;
 use crate::equations::{IntervalWeights, SplineEquations};
 use crate::local_spline::{LocalSolution, Series, Statements};
+use crate::low_passed::LowPassed;
 use crate::system::centre;
 
 /// Splines of [`Adaptation`]'s weights, a lane each, see [`Series`].
@@ -27,7 +28,8 @@ pub(crate) struct Uncertainty {
     inverse: InverseBands,
     /// Variance of each sample's noise, unit^2, lane by lane.
     noise: Vec<f64>,
-    lanes: usize,
+    /// What a low-pass has made of each lane's noise.
+    low_passed: Vec<Option<LowPassed>>,
 }
 
 impl Uncertainty {
@@ -38,8 +40,13 @@ impl Uncertainty {
 
     /// Variance of a lane's noise over a knot interval, unit^2.
     pub(crate) fn noise_over(&self, lane: usize, interval: usize) -> f64 {
-        let noise = |sample: usize| self.noise[sample * self.lanes + lane];
+        let noise = |sample: usize| self.noise[sample * self.low_passed.len() + lane];
         (noise(interval) * noise(interval + 1)).sqrt()
+    }
+
+    /// What a low-pass has made of a lane's noise before.
+    pub(crate) fn low_passed(&self, lane: usize) -> Option<LowPassed> {
+        self.low_passed[lane]
     }
 }
 
@@ -60,7 +67,8 @@ impl<const C: usize, const L: usize> AdaptiveFit<C, L> {
         solution.solve(equations, &series, &weights)?;
         solution.invert();
         let noise = learnt.into_noise();
-        Ok(Self::of(constant, weights, noise, solution.finish()))
+        let finished = solution.finish();
+        Ok(Self::of(constant, weights, (noise, expected), finished))
     }
 
     /// Standard deviation of each sample's noise, unit, as [`AdaptiveFit::learn`] learns it.
@@ -106,13 +114,14 @@ impl<const C: usize, const L: usize> AdaptiveFit<C, L> {
         solution.state(equations, &series, &mut statements);
         learnt.learn_from(equations, &weights, &mut statements);
         *adaptation = Some(learnt);
-        Ok(Self::of(constant, weights, noise, solution.finish()))
+        let finished = solution.finish();
+        Ok(Self::of(constant, weights, (noise, expected), finished))
     }
 
     fn of(
         constant: [f64; C],
         weights: Vec<IntervalWeights<L>>,
-        noise: Vec<[f64; L]>,
+        (noise, expected): (Vec<[f64; L]>, [ExpectedNoise; L]),
         (coefficients, inverse): (Vec<[f64; C]>, InverseBands),
     ) -> Self {
         Self {
@@ -122,7 +131,7 @@ impl<const C: usize, const L: usize> AdaptiveFit<C, L> {
             uncertainty: Arc::new(Uncertainty {
                 inverse,
                 noise: noise.into_flattened(),
-                lanes: L,
+                low_passed: expected.map(|expected| expected.low_passed).to_vec(),
             }),
         }
     }

@@ -13,15 +13,28 @@
 
 use std::f64::consts::{PI, TAU};
 
+use crate::LowPassed;
+
 /// What a spline says of itself at one time.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Posterior {
-    /// Of the derivative, unit^2.
+    /// Of the derivative, unit^2, for white noise.
     pub variance: f64,
     /// Variance of the samples' noise, unit^2.
     pub noise: f64,
     /// Between samples, s.
     pub interval: f64,
+    /// What a low-pass has made of the noise before.
+    pub low_passed: Option<LowPassed>,
+}
+
+impl Posterior {
+    /// The variance that noise of its own spectrum leaves in the derivative of an order.
+    pub(crate) fn learnt(self, order: i32, cutoff_hz: f64) -> f64 {
+        self.low_passed.map_or(self.variance, |noise| {
+            self.variance * noise.passed(order, cutoff_hz)
+        })
+    }
 }
 
 /// What motion has beyond the cutoff over what the prior has there: `most z / (1 + z)`, z = (fc /
@@ -60,17 +73,22 @@ impl Beyond {
         let part = 0.1 * f64::from(2 * self.order + 1);
         let z = (cutoff_hz / self.from_hz).powi(8);
         let heavier = self.most * z / (1.0 + z);
-        (1.0 - part) * posterior.variance + part * heavier * self.amid(posterior, cutoff_hz)
+        (1.0 - part) * posterior.learnt(self.order, cutoff_hz)
+            + part * heavier * self.amid(posterior, cutoff_hz)
     }
 
-    /// V above.
+    /// V above, for white noise as dense as that at the cutoff.
     fn amid(
         self,
         Posterior {
-            noise, interval, ..
+            noise,
+            interval,
+            low_passed,
+            ..
         }: Posterior,
         cutoff_hz: f64,
     ) -> f64 {
+        let noise = low_passed.map_or(noise, |own| noise * own.density(cutoff_hz));
         let slope = (TAU * cutoff_hz).powi(2 * self.order);
         2.0 * noise * interval * cutoff_hz * slope * self.integral
     }
@@ -97,6 +115,7 @@ mod tests {
                     variance: 0.0,
                     noise: 1.0,
                     interval: 0.01,
+                    low_passed: None,
                 };
                 let part = 1.0 - 0.1 * (2.0 * m as f64 + 1.0);
                 let expected = part * kind.amid(posterior, cutoff_hz);
@@ -116,6 +135,7 @@ mod tests {
                 variance: 0.0,
                 noise: 1e-6,
                 interval: 0.01,
+                low_passed: None,
             };
             let variance = kind.amid(bare, cutoff_hz);
             kind.stated(Posterior { variance, ..bare }, cutoff_hz) / variance

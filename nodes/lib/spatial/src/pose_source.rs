@@ -1,10 +1,8 @@
 //! Where poses come from: what noise is expected of them, and what no smoothing can see of their errors.
 
-use std::f64::consts::TAU;
-
-use crate::adaptive::ExpectedNoise;
+use crate::adaptive::{ExpectedNoise, STATED_AT_HZ};
 use crate::so3::QUATERNION_PER_ROTVEC;
-use crate::{Bandwidth, SampleVariance};
+use crate::{Bandwidth, LowPassed, SampleVariance};
 
 /// Where poses come from, which says what their errors are like.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -73,17 +71,29 @@ impl PoseSource {
     ///
     /// Tracked: of the size that optical capture has, 0.3 mm and 0.1 degrees; the count was chosen
     /// among 0.003 to 0.1 on seeds 300 to 347 of `tests/bursts`, which scores others too, and on ten
-    /// trials of a tracked IMU (BROAD). Fitted: a millimetre and a third of a degree within 6 Hz are
-    /// as dense as 3 mm and 1 degree up to 50 Hz; the count was chosen among 0.01 to 1 on the study
-    /// `physics, marker fit, 60 Hz` of `evaluate fidelity`, which has others. Suits and video show
-    /// their white noise, as what is tracked.
+    /// trials of a tracked IMU (BROAD). Suits and video show their white noise, as what is tracked.
+    /// Fitted: a low-pass has left [`FITTED_POSITION_M`] and [`FITTED_ROTATION_DEG`]; the count was chosen
+    /// among 0.03 to 1 on the motions of `tests/physics` with other paces, forces and sways.
     pub(crate) fn expected(self) -> [ExpectedNoise; 2] {
-        let (position, degrees, count) = match self {
-            Self::Fitted => (3e-3, 1.0_f64, 0.1),
-            Self::Tracked | Self::InertialSuit | Self::Video => (3e-4, 0.1, 0.01),
+        let (sizes, count, low_passed) = match self {
+            Self::Fitted => {
+                let own = LowPassed {
+                    corner_hz: FITTED_CORNER_HZ,
+                };
+                let sizes = [FITTED_POSITION_M, FITTED_ROTATION_DEG.to_radians()];
+                let white = sizes.map(|size| own.white_std(size, STATED_AT_HZ));
+                (white, 0.3, Some(own))
+            }
+            Self::Tracked | Self::InertialSuit | Self::Video => {
+                ([3e-4, 0.1_f64.to_radians()], 0.01, None)
+            }
         };
-        [position, degrees.to_radians() * QUATERNION_PER_ROTVEC]
-            .map(|std| ExpectedNoise { std, count })
+        let [position, rotation] = sizes;
+        [position, rotation * QUATERNION_PER_ROTVEC].map(|std| ExpectedNoise {
+            std,
+            count,
+            low_passed,
+        })
     }
 
     /// What slow errors of position, m, and rotation, rad, are like: root mean square over the sizes
@@ -107,32 +117,12 @@ impl PoseSource {
     /// learnt from the poses.
     pub fn unseen_errors(self, bandwidth: &Bandwidth) -> SampleVariance {
         let [position, rotation] = self.slow_errors();
-        let slow = unseen(
+        unseen(
             position.bend_variance(bandwidth.acceleration_hz),
             rotation.slope_variance(),
             rotation.size.powi(2),
-        );
-        match self {
-            Self::Fitted => slow.plus(left_by_a_low_pass(bandwidth)),
-            Self::Tracked | Self::InertialSuit | Self::Video => slow,
-        }
+        )
     }
-}
-
-/// With the density `S / (1 + (f / c)^4)^2` of errors of variance s^2 the derivatives' variances are
-/// `s^2 (2 pi c)^2 / 3` and `s^2 (2 pi c)^4 / 3`; a smoothing that cuts far below c leaves the parts
-/// `z = (f / c)^3 / 1.022` and `(f / c)^5 / 1.768` of these, else z / (1 + z).
-fn left_by_a_low_pass(bandwidth: &Bandwidth) -> SampleVariance {
-    let part = |z: f64| z / (1.0 + z) / 3.0;
-    let corner = TAU * FITTED_CORNER_HZ;
-    let of_corner = |hz: f64| hz / FITTED_CORNER_HZ;
-    let bends = (FITTED_POSITION_M * corner.powi(2)).powi(2);
-    let slopes = (FITTED_ROTATION_DEG.to_radians() * corner).powi(2);
-    unseen(
-        bends * part(of_corner(bandwidth.acceleration_hz).powi(5) / 1.768),
-        slopes * part(of_corner(bandwidth.angular_velocity_hz).powi(3) / 1.022),
-        0.0,
-    )
 }
 
 fn unseen(acceleration: f64, angular_velocity: f64, orientation: f64) -> SampleVariance {
@@ -146,6 +136,8 @@ fn unseen(acceleration: f64, angular_velocity: f64, orientation: f64) -> SampleV
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::TAU;
+
     use super::*;
 
     const BANDWIDTH: Bandwidth = Bandwidth {
@@ -183,19 +175,5 @@ mod tests {
             (bends / slow.bend_variance(10.0) - 1.0).abs() < 0.15,
             "{bends}"
         );
-        for cutoff_hz in [3.0, 8.0, 30.0] {
-            let low_passed = |f: f64| (1.0 + (f / FITTED_CORNER_HZ).powi(4)).powi(-2);
-            let passed = |f: f64| (1.0 + (f / cutoff_hz).powi(10)).powi(-2);
-            let bends = sum(&|f| (TAU * f).powi(4) * low_passed(f) * passed(f)) / sum(&low_passed);
-            let bandwidth = Bandwidth {
-                acceleration_hz: cutoff_hz,
-                angular_velocity_hz: cutoff_hz,
-            };
-            let stated = left_by_a_low_pass(&bandwidth).acceleration / FITTED_POSITION_M.powi(2);
-            assert!(
-                (stated / bends - 1.0).abs() < 0.4,
-                "{cutoff_hz}: {stated} {bends}"
-            );
-        }
     }
 }

@@ -281,7 +281,8 @@ impl PoseSpline {
     }
 
     /// Standard deviations of each pose's noise along and about each axis, m and rad, as
-    /// [`PoseSmoothing::adaptive`] learns them; none of too few poses.
+    /// [`PoseSmoothing::adaptive`] learns them; none of too few poses. They are those of white noise that
+    /// leaves as much behind a low-pass of this bandwidth, Hz, in acceleration and angular velocity.
     ///
     /// # Errors
     /// As [`SmoothingSpline::fit`].
@@ -289,6 +290,7 @@ impl PoseSpline {
         times: &PoseTimes,
         world_from_body: &[Isometry3<f64>],
         source: PoseSource,
+        bandwidth_hz: f64,
     ) -> Result<Option<Vec<[f64; 2]>>, SpatialError> {
         if world_from_body.len() < FEWEST_ADAPTIVE {
             return Ok(None);
@@ -299,9 +301,19 @@ impl PoseSpline {
             channel_counts::<2>(),
             source.expected(),
         )?;
-        let of_turns =
-            |[position, quaternion]: [f64; 2]| [position, quaternion / QUATERNION_PER_ROTVEC];
-        Ok(Some(noise.into_iter().map(of_turns).collect()))
+        let [position, rotation] = source.expected();
+        let passed = |expected: ExpectedNoise, order: i32| {
+            let low_passed = expected.low_passed;
+            low_passed.map_or(1.0, |own| own.passed(order, bandwidth_hz).sqrt())
+        };
+        let (places, turns) = (passed(position, 2), passed(rotation, 1));
+        let as_white = |[position, quaternion]: [f64; 2]| {
+            [
+                position * places,
+                quaternion / QUATERNION_PER_ROTVEC * turns,
+            ]
+        };
+        Ok(Some(noise.into_iter().map(as_white).collect()))
     }
 
     /// Of series k of those that were fitted.
@@ -368,23 +380,33 @@ impl PoseSpline {
             variance: self.position.variance_of(first, second)?,
             noise: self.position.noise_over(first)?,
             interval,
+            low_passed: self.position.low_passed(),
         };
         let rotation = Posterior {
             variance: self.rotation.variance_of(first, slope)?,
             noise: self.rotation.noise_over(first)?,
             interval,
+            low_passed: self.rotation.low_passed(),
         };
-        let acceleration = Beyond::ACCELERATION.stated(position, bandwidth.acceleration_hz);
-        let angular_velocity = ROTVEC_PER_QUATERNION
-            * Beyond::ANGULAR_VELOCITY.stated(rotation, bandwidth.angular_velocity_hz);
+        let orientation = Posterior {
+            variance: self.rotation.variance_of(first, value)?,
+            ..rotation
+        };
+        let (bends_hz, turns_hz) = (
+            asked_hz(&self.position, first, bandwidth.acceleration_hz),
+            asked_hz(&self.rotation, first, bandwidth.angular_velocity_hz),
+        );
+        let acceleration = Beyond::ACCELERATION.stated(position, bends_hz);
+        let angular_velocity =
+            ROTVEC_PER_QUATERNION * Beyond::ANGULAR_VELOCITY.stated(rotation, turns_hz);
         Some(SampleVariance {
             acceleration,
             angular_velocity,
             unseen: [
-                acceleration - position.variance,
-                angular_velocity - ROTVEC_PER_QUATERNION * rotation.variance,
+                acceleration - position.learnt(2, bends_hz),
+                angular_velocity - ROTVEC_PER_QUATERNION * rotation.learnt(1, turns_hz),
             ],
-            orientation: ROTVEC_PER_QUATERNION * self.rotation.variance_of(first, value)?,
+            orientation: ROTVEC_PER_QUATERNION * orientation.learnt(0, turns_hz),
         })
     }
 
@@ -396,6 +418,15 @@ impl PoseSpline {
     /// The spline of the quaternion (channels i, j, k, w; not normalised).
     pub fn rotation(&self) -> &SmoothingSpline<4> {
         &self.rotation
+    }
+}
+
+/// The cutoff that says how much motion is beyond it, Hz. Where noise was low-passed before, weights soon ask
+/// for more than half the rate, and how much more says what of the motion no sample shows.
+fn asked_hz<const C: usize>(spline: &SmoothingSpline<C>, interval: usize, resolved_hz: f64) -> f64 {
+    match spline.low_passed() {
+        Some(_) => spline.cutoff_over(interval),
+        None => resolved_hz,
     }
 }
 
@@ -442,3 +473,7 @@ fn pose_channels<const C: usize, const P: usize>(series: [&[Isometry3<f64>]; P])
 #[cfg(test)]
 #[path = "pose_spline_tests.rs"]
 mod tests;
+
+#[cfg(test)]
+#[path = "pose_spline_fitted_tests.rs"]
+mod fitted_tests;

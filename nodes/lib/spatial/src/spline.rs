@@ -8,6 +8,7 @@ use crate::adaptive_fit::{AdaptiveFit, Uncertainty};
 use crate::basis::{BasisValues, ORDER};
 use crate::derivative::Derivative;
 use crate::equations::{LocalWeight, PenaltyWeights, Scratch};
+use crate::low_passed::LowPassed;
 use crate::system::{LIGHT, LIGHTER, SplineSystem, centred};
 use crate::weight_search::LOWEST_LOG_WEIGHT;
 
@@ -214,7 +215,7 @@ impl<const C: usize> SmoothingSpline<C> {
     }
 
     /// Variance, mean over the channels, of value, first and second derivative (per s, per s^2) at a
-    /// time: `r b^T (B^T B + P)^-1 b`, r the variance of the samples' noise, b the basis there. None
+    /// time: `r b^T (B^T B + P)^-1 b`, r the variance of the samples' noise, taken to be white, b the basis there. None
     /// but for [`Smoothing::Adaptive`]: the others do not tell noise from motion.
     pub fn variance(&self, seconds: f64) -> Option<[f64; 3]> {
         let (first, values) = self.system.equations.basis_at(seconds);
@@ -233,6 +234,12 @@ impl<const C: usize> SmoothingSpline<C> {
     pub(crate) fn noise_over(&self, interval: usize) -> Option<f64> {
         let (uncertainty, lane) = self.uncertainty.as_ref()?;
         Some(uncertainty.noise_over(*lane, interval))
+    }
+
+    /// What a low-pass has made of the samples' noise before.
+    pub(crate) fn low_passed(&self) -> Option<LowPassed> {
+        let (uncertainty, lane) = self.uncertainty.as_ref()?;
+        uncertainty.low_passed(*lane)
     }
 
     /// The penalty's weight.

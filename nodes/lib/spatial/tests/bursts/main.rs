@@ -14,6 +14,7 @@ const ADAPTIVE: Smoothing = Smoothing::Adaptive {
     expected: ExpectedNoise {
         std: 3e-4,
         count: 0.01,
+        low_passed: None,
     },
 };
 const CUTOFFS_HZ: [f64; 5] = [4.0, 6.0, 10.0, 15.0, 20.0];
