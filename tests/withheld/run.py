@@ -10,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import generate
 import grade
+import other_origin
 import tables
 
 
@@ -75,12 +76,15 @@ def write_cases(options, out, suite):
     if suite == "mechanics":
         import mechanics  # MuJoCo is no requirement of the others
         return mechanics.generate(out, options.seed, options.count, options.jobs)
+    if suite in other_origin.SUITES:
+        return other_origin.generate(out, suite, options.seed, options.count, options.jobs)
     return generate.generate(out, suite, options.seed, options.count, jobs=options.jobs, seconds=options.seconds)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--suite", action="append", choices=[*generate.SUITES, "mechanics"], help="may be repeated; default all but mechanics, which needs MuJoCo")
+    parser.add_argument("--suite", action="append", choices=[*generate.SUITES, *other_origin.SUITES, "mechanics"],
+                        help="may be repeated; default all but those of another origin, and mechanics, which needs MuJoCo")
     parser.add_argument("--count", type=int, help="cases of each suite; default the suite's own")
     parser.add_argument("--seconds", type=float, help="length of the fit recordings; default the suite's own")
     parser.add_argument("--jobs", type=int, default=2)

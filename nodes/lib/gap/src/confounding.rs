@@ -112,12 +112,12 @@ fn judge_members(
     if chosen.is_empty() || open.is_empty() {
         return;
     }
-    let together = with_regressions(findings, fit, &chosen).held_out;
+    let together = with_regressions(model, fit, &chosen).held_out;
     let nominal = score(model, EffectSet::new());
     let explained = together - nominal.fit.linear.held_out;
     for kind in open {
         let smaller = score(model, fit.set.without(kind));
-        let instead = with_regressions(findings, &smaller.fit, &chosen).held_out;
+        let instead = with_regressions(model, &smaller.fit, &chosen).held_out;
         let alone = fit.linear.held_out - smaller.fit.linear.held_out;
         let gain_of_regressions = instead - smaller.fit.linear.held_out;
         trace(|| {

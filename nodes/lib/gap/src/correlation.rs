@@ -8,6 +8,9 @@ use cromosim_spatial::{Complex64, FourierPair};
 pub(crate) struct Correlations {
     /// `sum measured[k] reference[k - offset]`, means taken out, circular.
     products: Vec<Complex64>,
+    /// Sum of squares of the measured series where the reference is known, at every offset; none where it is
+    /// known everywhere.
+    energy_where_known: Option<Vec<Complex64>>,
     energy_measured: Vec<f64>,
     energy_reference: Vec<f64>,
     /// Entries that have to overlap.
@@ -25,28 +28,46 @@ pub(crate) struct Peak {
 
 impl Correlations {
     pub fn new(measured: &[f64], reference: &[f64]) -> Self {
+        Self::of_known(measured, reference, &vec![true; reference.len()])
+    }
+
+    /// Of the entries at which the reference is known: what is filled in elsewhere is not its motion.
+    pub fn of_known(measured: &[f64], reference: &[f64], is_known: &[bool]) -> Self {
         let length = FourierPair::good_length(measured.len() + reference.len());
         let transform = FourierPair::new(length);
-        let spectrum = |series: &[f64]| {
-            let mean = series.iter().sum::<f64>() / series.len() as f64;
-            let mut values: Vec<Complex64> = series
-                .iter()
-                .map(|value| Complex64::new(value - mean, 0.0))
-                .collect();
+        let mean_of = |series: &[f64]| series.iter().sum::<f64>() / series.len().max(1) as f64;
+        let spectrum = |values: &mut dyn Iterator<Item = f64>| {
+            let mut values: Vec<Complex64> =
+                values.map(|value| Complex64::new(value, 0.0)).collect();
             values.resize(length, Complex64::default());
             transform.forward(&mut values);
             values
         };
-        let mut products: Vec<Complex64> = spectrum(reference)
-            .iter()
-            .zip(spectrum(measured))
-            .map(|(a, b)| a.conj() * b)
+        let product = |reference: Vec<Complex64>, measured: Vec<Complex64>| {
+            let pairs = reference.iter().zip(measured);
+            let mut products: Vec<Complex64> = pairs.map(|(a, b)| a.conj() * b).collect();
+            transform.inverse(&mut products);
+            products
+        };
+        let known = || reference.iter().zip(is_known);
+        let of_known: Vec<f64> = known().filter(|(_, is)| **is).map(|(x, _)| *x).collect();
+        let (mean, mean_of_known) = (mean_of(measured), mean_of(&of_known));
+        let kept: Vec<f64> = known()
+            .map(|(value, is)| if *is { value - mean_of_known } else { 0.0 })
             .collect();
-        transform.inverse(&mut products);
+        let centred = || measured.iter().map(|value| value - mean);
+        let energy_measured = (of_known.len() < reference.len()).then(|| {
+            let mask = spectrum(&mut is_known.iter().map(|is| f64::from(u8::from(*is))));
+            product(mask, spectrum(&mut centred().map(|value| value * value)))
+        });
         Self {
-            products,
-            energy_measured: cumulated_energy(measured),
-            energy_reference: cumulated_energy(reference),
+            products: product(
+                spectrum(&mut kept.iter().copied()),
+                spectrum(&mut centred()),
+            ),
+            energy_where_known: energy_measured,
+            energy_measured: cumulated_energy(centred()),
+            energy_reference: cumulated_energy(kept.iter().copied()),
             least: measured.len().min(reference.len()) / 2,
         }
     }
@@ -63,11 +84,15 @@ impl Correlations {
             return f64::NEG_INFINITY;
         }
         let between = |energy: &[f64], a: i64, b: i64| energy[b as usize] - energy[a as usize];
-        let scale = (between(&self.energy_measured, from, to)
-            * between(&self.energy_reference, from - offset, to - offset))
-        .sqrt();
+        let place = offset.rem_euclid(self.products.len() as i64) as usize;
+        let of_measured = match &self.energy_where_known {
+            Some(energy) => energy[place].re.max(0.0),
+            None => between(&self.energy_measured, from, to),
+        };
+        let scale =
+            (of_measured * between(&self.energy_reference, from - offset, to - offset)).sqrt();
         if scale > 0.0 {
-            self.products[offset.rem_euclid(self.products.len() as i64) as usize].re / scale
+            self.products[place].re / scale
         } else {
             f64::NEG_INFINITY
         }
@@ -95,13 +120,12 @@ impl Correlations {
     }
 }
 
-/// Sums of the squared deviations from the mean of the first 0, 1, 2, ... entries.
-fn cumulated_energy(series: &[f64]) -> Vec<f64> {
-    let mean = series.iter().sum::<f64>() / series.len() as f64;
+/// Sums of the squares of the first 0, 1, 2, ... entries.
+fn cumulated_energy(series: impl Iterator<Item = f64>) -> Vec<f64> {
     let mut sum = 0.0;
     std::iter::once(0.0)
-        .chain(series.iter().map(|value| {
-            sum += (value - mean).powi(2);
+        .chain(series.map(|value| {
+            sum += value.powi(2);
             sum
         }))
         .collect()
@@ -115,6 +139,27 @@ mod tests {
     fn pulse(middle: f64) -> Vec<f64> {
         let value = |k: i32| (-0.02 * (f64::from(k) - middle).powi(2)).exp();
         (0..100).map(value).collect()
+    }
+
+    #[test]
+    fn what_was_filled_in_does_not_hide_the_offset() {
+        // The same motion twice, of which one time the reference was lost.
+        let twice = |middle: f64| -> Vec<f64> {
+            let halves = pulse(middle).into_iter().zip(pulse(middle + 45.0));
+            halves.map(|(a, b)| a + b).collect()
+        };
+        let (measured, mut reference) = (twice(27.0), twice(20.0));
+        let is_known: Vec<bool> = (0..100).map(|k| !(8..32).contains(&k)).collect();
+        reference[8..32].fill(1.0);
+        let offset = |correlations: Correlations| {
+            correlations.peak(-50..50, |_| 0.0).map(|peak| peak.offset)
+        };
+        assert!(
+            offset(Correlations::new(&measured, &reference))
+                .is_some_and(|at| (at - 7.0).abs() > 1.0)
+        );
+        let known = offset(Correlations::of_known(&measured, &reference, &is_known));
+        assert!(known.is_some_and(|at| (at - 7.0).abs() < 0.1), "{known:?}");
     }
 
     #[test]

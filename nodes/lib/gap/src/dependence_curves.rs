@@ -248,7 +248,7 @@ impl Scene<'_> {
 
     /// Components of up as the segment sees it.
     fn against_up(&self, channel: Channel) -> Vec<Candidate> {
-        let up = up_in_segment(self.findings, &self.comparison.prepared.stamps);
+        let up = up_in_segment(&self.findings.model, &self.comparison.prepared.stamps);
         axes_of_channel(channel)
             .flat_map(|axis| (0..3).map(move |i| (axis, i)))
             .map(|(axis, i)| Candidate {

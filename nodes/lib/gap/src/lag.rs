@@ -1,7 +1,7 @@
 //! The lag of the IMU's stamps from the magnitudes of the angular velocity: no axes, units or
 //! gravity enter.
 
-use cromosim_spatial::KinematicTrack;
+use cromosim_spatial::{KinematicTrack, Stamp};
 
 use crate::correlation::Correlations;
 use crate::prepared::PreparedPlacement;
@@ -20,6 +20,7 @@ pub(crate) fn lag_of_angular_speeds(prepared: &PreparedPlacement, track: &Kinema
     let rate_hz = prepared.rate_hz;
     let measured = measured_speeds(prepared);
     let reference = reference_speeds(track, rate_hz);
+    let is_known = is_known(prepared, track, reference.len());
     // Entry k of the measured sample grid is at the reference's entry k + shift when nothing is
     // late.
     let shift = (prepared.epoch - track.start) * rate_hz;
@@ -32,7 +33,7 @@ pub(crate) fn lag_of_angular_speeds(prepared: &PreparedPlacement, track: &Kinema
         }
     };
     let offsets = -(reference.len() as i64) + 1..measured.len() as i64;
-    Correlations::new(&measured, &reference)
+    Correlations::of_known(&measured, &reference, &is_known)
         .peak(offsets, bonus)
         .filter(|peak| peak.correlation >= LEAST_CORRELATION)
         .map_or(0.0, |peak| seconds(peak.offset))
@@ -62,4 +63,15 @@ fn reference_speeds(track: &KinematicTrack, rate_hz: f64) -> Vec<f64> {
             .norm()
         })
         .collect()
+}
+
+/// Whether each of so many entries at the IMU's rate lies where the reference has poses.
+fn is_known(prepared: &PreparedPlacement, track: &KinematicTrack, count: usize) -> Vec<bool> {
+    let mut is_known = vec![true; count];
+    for (from, to) in prepared.estimate.gaps() {
+        let entry = |stamp: Stamp| ((stamp - track.start) * prepared.rate_hz).max(0.0);
+        let (from, to) = (entry(*from).ceil() as usize, entry(*to).ceil() as usize);
+        is_known[from.min(count)..to.min(count)].fill(false);
+    }
+    is_known
 }

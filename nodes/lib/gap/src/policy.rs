@@ -187,6 +187,12 @@ pub(crate) mod unknown {
     /// Part of a band's or burst's size that has to stay where the reference is filtered less. Set on
     /// withheld cases of seed 35, whose spurious ones fall to a third and less.
     pub const STAYS: f64 = 0.5;
+    /// By how much less the reference is filtered then on either side of a frequency, Hz, where the residual is
+    /// loud; no source.
+    pub const WIDER_HZ: f64 = 0.5;
+    /// And where only a regression tells: motion of bodies falls to the noise within so many hertz, and
+    /// what is slow (all that the regressions are on) is hardly touched by the noise that comes in.
+    pub const MUCH_WIDER_HZ: f64 = 4.0;
     /// Factor on [`BAND`], [`REGRESSION_NATS`] and [`BURST`] beside a smoothing of the reference
     /// that is undone: its shape is only guessed, which leaves much that is none of its own.
     pub const UNDONE_SMOOTHING_FACTOR: f64 = 20.0;

@@ -25,6 +25,8 @@ pub(crate) struct Observations<'a> {
     pub found_noise: PerChannel<f64>,
     /// Whether the top of the residual's spectrum is level.
     pub is_white: PerChannel<bool>,
+    /// Whether its noise is there at all times.
+    pub is_steady: PerChannel<bool>,
 }
 
 /// The causes: fitted effects beyond what is ordinary, and those that are read off.
@@ -217,7 +219,8 @@ fn excess_noise(model: &FitModel, observations: &Observations, channel: Channel)
         EXCESS_NOISE
     };
     let needed = factor * declared.powi(2) + ROUNDING_UNCERTAINTY * step * step / 12.0;
-    (observations.is_white[channel] && beyond > needed).then(|| (beyond / prepared.rate_hz).sqrt())
+    let is_noise = observations.is_white[channel] && observations.is_steady[channel];
+    (is_noise && beyond > needed).then(|| (beyond / prepared.rate_hz).sqrt())
 }
 
 impl Observations<'_> {

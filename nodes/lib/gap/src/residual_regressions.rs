@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 
 use crate::axes::{axes_of_channel, channel_of_axis, value_on_axis};
 use crate::findings::Findings;
-use crate::fit::{Fit, slices};
+use crate::fit::{Fit, FitModel, slices};
 use crate::gram::Linear;
 use crate::policy::unknown::REGRESSION_NATS;
 
@@ -44,39 +44,47 @@ type Column = (usize, Vec<f64>);
 
 /// Every family, tried beside the fit.
 pub(crate) fn residual_regressions(findings: &Findings) -> Vec<ResidualRegression> {
-    let fit = &findings.scored.fit;
-    let mut list = Vec::new();
-    for channel in Channel::ALL {
-        for dependence in Dependence::ALL {
-            // At rest nothing can depend on the motion, and time is all that passes.
-            let moving = || {
-                Channel::ALL
-                    .into_iter()
-                    .all(|channel| moves(findings, channel))
-            };
-            if dependence != Dependence::Time && !moving() {
-                continue;
-            }
-            let columns: Vec<Vec<f64>> = regressors(findings, dependence, channel)
-                .iter()
-                .map(|column| whitened(findings, column))
-                .collect();
-            let gain = with_regressions(findings, fit, &[&columns]).held_out
-                - fit.linear.held_out
-                - COLUMN_NATS * columns.len() as f64;
-            list.push(ResidualRegression {
-                dependence,
-                channel,
-                columns: if gain > REGRESSION_NATS {
-                    columns
-                } else {
-                    Vec::new()
-                },
-                gain,
-            });
-        }
+    let (model, fit) = (&findings.model, &findings.scored.fit);
+    let families = Channel::ALL
+        .into_iter()
+        .flat_map(|channel| Dependence::ALL.map(|dependence| (dependence, channel)));
+    let try_family = |(dependence, channel)| residual_regression(model, fit, dependence, channel);
+    families.filter_map(try_family).collect()
+}
+
+/// One family, tried beside a fit; none where it cannot be there: at rest nothing can depend on the motion, and
+/// time is all that passes.
+pub(crate) fn residual_regression(
+    model: &FitModel,
+    fit: &Fit,
+    dependence: Dependence,
+    channel: Channel,
+) -> Option<ResidualRegression> {
+    let moving = || {
+        Channel::ALL
+            .into_iter()
+            .all(|channel| moves(model, fit, channel))
+    };
+    if dependence != Dependence::Time && !moving() {
+        return None;
     }
-    list
+    let columns: Vec<Vec<f64>> = regressors(model, fit, dependence, channel)
+        .iter()
+        .map(|column| whitened(model, column))
+        .collect();
+    let gain = with_regressions(model, fit, &[&columns]).held_out
+        - fit.linear.held_out
+        - COLUMN_NATS * columns.len() as f64;
+    Some(ResidualRegression {
+        dependence,
+        channel,
+        columns: if gain > REGRESSION_NATS {
+            columns
+        } else {
+            Vec::new()
+        },
+        gain,
+    })
 }
 
 /// What a residual depends on, in the words of diagnosis.json.
@@ -99,8 +107,8 @@ pub(crate) fn dependence_name(dependence: Dependence, channel: Channel) -> &'sta
 }
 
 /// Whether the prediction of a channel varies by more than its white noise.
-fn moves(findings: &Findings, channel: Channel) -> bool {
-    let readings = &findings.scored.fit.prediction.readings;
+fn moves(model: &FitModel, fit: &Fit, channel: Channel) -> bool {
+    let readings = &fit.prediction.readings;
     let count = readings.len() as f64;
     let variance: f64 = axes_of_channel(channel)
         .map(|axis| {
@@ -116,26 +124,21 @@ fn moves(findings: &Findings, channel: Channel) -> bool {
                 / count
         })
         .sum();
-    variance > 3.0 * (MOVING * findings.model.basis.sigma[channel]).powi(2)
+    variance > 3.0 * (MOVING * model.basis.sigma[channel]).powi(2)
 }
 
 /// A fit's linear step with regressions beside its own values.
-pub(crate) fn with_regressions(
-    findings: &Findings,
-    fit: &Fit,
-    families: &[&Vec<Vec<f64>>],
-) -> Linear {
+pub(crate) fn with_regressions(model: &FitModel, fit: &Fit, families: &[&Vec<Vec<f64>>]) -> Linear {
     let columns: Vec<&[f64]> = families
         .iter()
         .flat_map(|columns| slices(columns))
         .collect();
     let prior = vec![PRIOR_WEIGHT; columns.len()];
-    findings.model.extended(fit, None, &columns, &prior).solve()
+    model.extended(fit, None, &columns, &prior).solve()
 }
 
 /// Scaled to a root mean square of the axis' white noise.
-fn whitened(findings: &Findings, (axis, values): &Column) -> Vec<f64> {
-    let model = &findings.model;
+fn whitened(model: &FitModel, (axis, values): &Column) -> Vec<f64> {
     let rms = (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64)
         .sqrt()
         .max(1e-12);
@@ -153,24 +156,27 @@ fn whitened(findings: &Findings, (axis, values): &Column) -> Vec<f64> {
 }
 
 /// The regressors of one family, before they are whitened.
-fn regressors(findings: &Findings, dependence: Dependence, channel: Channel) -> Vec<Column> {
-    let readings = &findings.scored.fit.prediction.readings;
+fn regressors(
+    model: &FitModel,
+    fit: &Fit,
+    dependence: Dependence,
+    channel: Channel,
+) -> Vec<Column> {
+    let readings = &fit.prediction.readings;
     let axes = axes_of_channel(channel);
     match dependence {
         Dependence::OwnReading => curves(readings, axes),
         Dependence::OtherChannel => other_channel(readings, channel),
         Dependence::OtherChannelSquared => other_channel_squared(readings, channel),
-        Dependence::Orientation => orientation(findings, axes),
+        Dependence::Orientation => orientation(model, axes),
         Dependence::OtherAxes => all_axes(readings, channel),
-        Dependence::RateOfChange => changes(findings, axes),
-        Dependence::Time => over_time(findings, axes, &|_, _| 1.0),
+        Dependence::RateOfChange => changes(fit, axes),
+        Dependence::Time => over_time(fit, axes, &|_, _| 1.0),
         Dependence::GainOverTime => {
-            over_time(findings, axes, &|axis, k| value_on_axis(&readings[k], axis))
+            over_time(fit, axes, &|axis, k| value_on_axis(&readings[k], axis))
         }
-        Dependence::DelayOverTime => {
-            over_time(findings, axes, &|axis, k| change(findings, axis, k))
-        }
-        Dependence::MountOverTime => mount_over_time(findings, channel),
+        Dependence::DelayOverTime => over_time(fit, axes, &|axis, k| change(fit, axis, k)),
+        Dependence::MountOverTime => mount_over_time(fit, channel),
     }
 }
 
@@ -246,8 +252,8 @@ fn curves(readings: &[Reading], axes: Range<usize>) -> Vec<Column> {
 }
 
 /// Up in the axes of the reference, for each stamp.
-pub(crate) fn up_in_segment(findings: &Findings, stamps: &[Stamp]) -> Vec<Vector3<f64>> {
-    let track = &findings.model.track;
+pub(crate) fn up_in_segment(model: &FitModel, stamps: &[Stamp]) -> Vec<Vector3<f64>> {
+    let track = &model.track;
     let up = |stamp: &Stamp| {
         let entry = ((*stamp - track.start) * track.rate_hz)
             .clamp(0.0, (track.len() - 1) as f64)
@@ -258,8 +264,8 @@ pub(crate) fn up_in_segment(findings: &Findings, stamps: &[Stamp]) -> Vec<Vector
 }
 
 /// Up as the sensor sees it.
-fn orientation(findings: &Findings, axes: Range<usize>) -> Vec<Column> {
-    let up = up_in_segment(findings, &findings.model.prepared.stamps);
+fn orientation(model: &FitModel, axes: Range<usize>) -> Vec<Column> {
+    let up = up_in_segment(model, &model.prepared.stamps);
     let of = |axis: usize, i: usize| (axis, up.iter().map(|up| up[i]).collect());
     axes.flat_map(|axis| (0..3).map(move |i| (axis, i)))
         .map(|(axis, i)| of(axis, i))
@@ -267,8 +273,8 @@ fn orientation(findings: &Findings, axes: Range<usize>) -> Vec<Column> {
 }
 
 /// First and second differences of the prediction: delays and filters.
-fn changes(findings: &Findings, axes: Range<usize>) -> Vec<Column> {
-    let readings = &findings.scored.fit.prediction.readings;
+fn changes(fit: &Fit, axes: Range<usize>) -> Vec<Column> {
+    let readings = &fit.prediction.readings;
     let second = |axis: usize, k: usize| {
         let at = |k: usize| value_on_axis(&readings[k.min(readings.len() - 1)], axis);
         at(k + 1) - 2.0 * at(k) + at(k.saturating_sub(1))
@@ -276,10 +282,7 @@ fn changes(findings: &Findings, axes: Range<usize>) -> Vec<Column> {
     let count = readings.len();
     axes.flat_map(|axis| {
         [
-            (
-                axis,
-                (0..count).map(|k| change(findings, axis, k)).collect(),
-            ),
+            (axis, (0..count).map(|k| change(fit, axis, k)).collect()),
             (axis, (0..count).map(|k| second(axis, k)).collect()),
         ]
     })
@@ -287,8 +290,8 @@ fn changes(findings: &Findings, axes: Range<usize>) -> Vec<Column> {
 }
 
 /// Central difference of the prediction.
-fn change(findings: &Findings, axis: usize, k: usize) -> f64 {
-    let readings = &findings.scored.fit.prediction.readings;
+fn change(fit: &Fit, axis: usize, k: usize) -> f64 {
+    let readings = &fit.prediction.readings;
     value_on_axis(&readings[(k + 1).min(readings.len() - 1)], axis)
         - value_on_axis(&readings[k.saturating_sub(1)], axis)
 }
@@ -301,12 +304,8 @@ fn knots_over_time(count: usize) -> Vec<f64> {
 }
 
 /// Slow changes of the strength of something: hats over time.
-fn over_time(
-    findings: &Findings,
-    axes: Range<usize>,
-    of: &dyn Fn(usize, usize) -> f64,
-) -> Vec<Column> {
-    let count = findings.model.prepared.stamps.len();
+fn over_time(fit: &Fit, axes: Range<usize>, of: &dyn Fn(usize, usize) -> f64) -> Vec<Column> {
+    let count = fit.prediction.readings.len();
     let knots = knots_over_time(count);
     let mut columns = Vec::new();
     for axis in axes {
@@ -326,8 +325,8 @@ fn over_time(
 }
 
 /// Small turns of the channel that change over time: what each axis would see of the two others.
-fn mount_over_time(findings: &Findings, channel: Channel) -> Vec<Column> {
-    let readings = &findings.scored.fit.prediction.readings;
+fn mount_over_time(fit: &Fit, channel: Channel) -> Vec<Column> {
+    let readings = &fit.prediction.readings;
     let knots = knots_over_time(readings.len());
     let first = axes_of_channel(channel).start;
     let mut columns = Vec::new();

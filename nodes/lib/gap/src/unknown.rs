@@ -1,6 +1,6 @@
 //! Whether what is left is noise.
 
-use cromosim_imu::{Channel, EffectKind, PerChannel, ReadOff, Reading};
+use cromosim_imu::{Channel, Dependence, EffectKind, PerChannel, ReadOff, Reading};
 
 use crate::axes::{any, axes_of_channel, larger, value_on_axis};
 use crate::confounding::{Standing, Standings, confounded_effects, is_calibration};
@@ -12,11 +12,13 @@ use crate::noise_updates::with_estimate;
 use crate::policy::probability::{MOST_UNKNOWN, NATS_PER_BAND, UNKNOWN_GAIN_NATS};
 use crate::policy::report::COARSE_STEPS;
 use crate::policy::unknown::{
-    AXIS_SHARE, BAND, BURST, FROZEN, JITTER, OUTLIERS, REGRESSION_NATS, STAYS,
-    UNDONE_SMOOTHING_FACTOR, USUAL_S,
+    AXIS_SHARE, BAND, BURST, FROZEN, JITTER, MUCH_WIDER_HZ, OUTLIERS, REGRESSION_NATS, STAYS,
+    UNDONE_SMOOTHING_FACTOR, USUAL_S, WIDER_HZ,
 };
 use crate::prepared::PreparedPlacement;
-use crate::residual_regressions::{ResidualRegression, dependence_name, residual_regressions};
+use crate::residual_regressions::{
+    ResidualRegression, dependence_name, residual_regression, residual_regressions,
+};
 use crate::search::excess;
 use crate::trace::trace;
 
@@ -95,6 +97,8 @@ pub(crate) fn detect_unmodelled_structure(
     let structure = Structure::new(findings, diagnostics, regressions);
     if !structure.is_there()
         || (structure.is_loud_alone() && !is_loud_behind_wider_filters(findings, diagnostics))
+        || (structure.is_regression_alone(&findings.model)
+            && !structure.stays_behind_wider_filters(findings))
     {
         return None;
     }
@@ -157,7 +161,9 @@ impl<'a> Structure<'a> {
             .iter()
             .filter(|regression| {
                 let needed = REGRESSION_NATS * factor * longer_than_usual(findings);
-                regression.gain > needed && !is_coarse(model, regression.channel)
+                regression.gain > needed
+                    && !is_coarse(model, regression.channel)
+                    && !may_be_references(model, diagnostics, regression)
             })
             .collect();
         let stuck = PerChannel::from_fn(|channel| {
@@ -189,6 +195,31 @@ impl<'a> Structure<'a> {
     /// Whether nothing but the size of the residual tells.
     fn is_loud_alone(&self) -> bool {
         !self.in_stamps && !any(self.stuck) && self.strong.is_empty()
+    }
+
+    /// Whether nothing but regressions tells.
+    fn is_regression_alone(&self, model: &FitModel) -> bool {
+        let is_loud = |channel| self.diagnostics.is_loud(model, channel);
+        !self.in_stamps && !any(self.stuck) && !Channel::ALL.into_iter().any(is_loud)
+    }
+
+    /// Whether any of the regressions keeps its gain where the reference is filtered much less: what its filters
+    /// keep out of the motion depends on the motion as well, and comes back then.
+    fn stays_behind_wider_filters(&self, findings: &Findings) -> bool {
+        let set = &findings.scored.fit.set;
+        let estimate = findings
+            .model
+            .basis
+            .estimate
+            .with_wider_filters(MUCH_WIDER_HZ);
+        let model = with_estimate(&findings.model, estimate, set);
+        let fit = model.fit_steps(set.clone(), 0);
+        self.strong.iter().any(|before| {
+            let after = residual_regression(&model, &fit, before.dependence, before.channel);
+            let gain = after.map_or(0.0, |after| after.gain);
+            trace(|| eprintln!("behind much wider filters {gain:.0} of {:.0}", before.gain));
+            gain > STAYS * before.gain
+        })
     }
 
     fn depends_on(&self) -> &'static str {
@@ -265,6 +296,18 @@ fn bar_factor(model: &FitModel) -> f64 {
     }
 }
 
+/// Whether a regression may be on errors of the reference: what its filters keep out of the motion, and
+/// noise of it that wanders, goes with the motion's rate of change as what a delay leaves does. They are no
+/// louder than a band may be.
+fn may_be_references(
+    model: &FitModel,
+    diagnostics: &ResidualDiagnostics,
+    regression: &ResidualRegression,
+) -> bool {
+    regression.dependence == Dependence::RateOfChange
+        && !diagnostics.is_loud(model, regression.channel)
+}
+
 /// Rounding errors of slow motion are no noise at all.
 fn is_coarse(model: &FitModel, channel: Channel) -> bool {
     model.basis.steps[channel] > COARSE_STEPS
@@ -274,7 +317,7 @@ fn is_coarse(model: &FitModel, channel: Channel) -> bool {
 /// own, which cut bursts off and ring where motion ends.
 fn is_loud_behind_wider_filters(findings: &Findings, before: &ResidualDiagnostics) -> bool {
     let set = &findings.scored.fit.set;
-    let estimate = findings.model.basis.estimate.with_wider_filters();
+    let estimate = findings.model.basis.estimate.with_wider_filters(WIDER_HZ);
     let model = with_estimate(&findings.model, estimate, set);
     let fit = model.fit_steps(set.clone(), 0);
     let after = ResidualDiagnostics::new(&model, &fit);

@@ -20,8 +20,6 @@ const LARGEST_LEAD: usize = 300;
 const LEAST_SERIES_PER_LEAD: usize = 4;
 /// Zeros after a series in its transforms, s, so that its ends do not meet. No source.
 const PADDING_S: f64 = 4.0;
-/// By how much wider filters pass more on either side of a frequency, Hz; no source.
-const WIDER_HZ: f64 = 0.5;
 /// Fewest poses that a spectrum is learnt from; no source.
 const FEWEST_POSES: usize = 16;
 /// Least rate of the kinematics that an IMU model starts from, Hz: it resolves all motion that poses
@@ -201,11 +199,11 @@ impl PoseEstimate {
         self.filtered_anew(Some(smoothing), 0)
     }
 
-    /// The estimate with filters that are half a hertz wider around each frequency that they pass: they let
+    /// The estimate with filters that are so many hertz wider around each frequency that they pass: they let
     /// more of the noise through, and ring less where motion begins and ends.
     #[must_use]
-    pub fn with_wider_filters(&self) -> Self {
-        let reach = (WIDER_HZ / self.local[0][0].spacing_hz).ceil() as usize;
+    pub fn with_wider_filters(&self, wider_hz: f64) -> Self {
+        let reach = (wider_hz / self.local[0][0].spacing_hz).ceil() as usize;
         self.filtered_anew(self.undone, reach)
     }
 

@@ -46,6 +46,12 @@ const SLOWEST_ENTRIES: usize = 3;
 pub(crate) const LARGEST_GAIN: f64 = 32.0;
 /// Largest gain that is still reported where more would be needed. No source.
 pub(crate) const LARGEST_REPORTED_GAIN: f64 = 1000.0;
+/// What of a neighbouring window's motion may ring in a window whose filter keeps it out, as a power: a filter
+/// that ends sharply at B rings as sin(2 pi B t) / (pi t), and is 1 / (pi B t) of its height t later; a tenth
+/// of the power at a second and a hertz.
+const RINGING: f64 = 0.1;
+/// Windows on either side that a window's stretch reaches into.
+const RINGING_REACH: usize = 2;
 /// Stands for a density of nothing in divisions.
 const TINY: f64 = 1e-300;
 
@@ -163,16 +169,17 @@ impl NoiseFloor {
         reach: usize,
     ) {
         let mut mean = vec![0.0; self.filter.len()];
-        self.windows = local
-            .iter()
-            .map(|spectrum| {
+        self.windows = (0..local.len())
+            .map(|window| {
+                let spectrum = &local[window];
                 let noise = match undone {
                     Some(_) => 1.0,
                     None => local_noise(spectrum, rate_hz, self.spectrum()),
                 };
+                let spectrum = with_ringing(local, window);
                 let filter = Filter {
                     spacing_hz: spectrum.spacing_hz,
-                    weights: self.local_weights(spectrum, rate_hz, (undone, reach), noise),
+                    weights: self.local_weights(&spectrum, rate_hz, (undone, reach), noise),
                     noise,
                 };
                 for (k, sum) in mean.iter_mut().enumerate() {
@@ -320,6 +327,20 @@ fn mean_filter(
         }
     }
     filter
+}
+
+/// The spectrum of a window with what its neighbours' motion rings there: a rest beside a burst would
+/// otherwise have a filter that is narrow, and the burst would be smeared over it.
+fn with_ringing(local: &[Spectrum], window: usize) -> Spectrum {
+    let mut spectrum = local[window].clone();
+    let from = window.saturating_sub(RINGING_REACH);
+    let to = (window + RINGING_REACH).min(local.len() - 1);
+    for other in &local[from..=to] {
+        for (own, density) in spectrum.density.iter_mut().zip(&other.density) {
+            *own = own.max(RINGING * density);
+        }
+    }
+    spectrum
 }
 
 /// Density of the noise that was there before a smoothing: where the undone spectrum is least, beyond
