@@ -72,8 +72,14 @@ impl CoarseAlignment {
             })
             .collect();
         let (axes, gyro) = gyro_axes(&rows, track);
-        let turn = axes.unwrap_or_else(Matrix3::identity);
-        let scales = ForceSlopes::new(&rows, track, &turn).scales();
+        let slopes = |turn: &Matrix3<f64>| ForceSlopes::new(&rows, track, turn);
+        let as_it_is = slopes(&Matrix3::identity());
+        // Angular velocities about one axis tell axes badly: what leaves less of the force unexplained holds.
+        let scales = axes
+            .map(|axes| slopes(&axes))
+            .filter(|turned| turned.unexplained() <= as_it_is.unexplained())
+            .unwrap_or(as_it_is)
+            .scales();
         Self {
             lag_s,
             units: PerChannel {
@@ -223,22 +229,35 @@ impl ForceSlopes {
         sums
     }
 
-    /// The known factors that the slopes are nearest to.
-    fn scales(&self) -> Scales {
+    /// The slopes `s_a`, `s_g`; none at rest.
+    fn slopes(&self) -> Option<(f64, f64)> {
         let Self {
             aa, ag, gg, ya, yg, ..
         } = *self;
         let determinant = aa * gg - ag * ag;
-        if gg <= 0.0 || determinant <= 1e-9 * gg * gg {
+        (gg > 0.0 && determinant > 1e-9 * gg * gg).then(|| {
+            (
+                (ya * gg - yg * ag) / determinant,
+                (yg * aa - ya * ag) / determinant,
+            )
+        })
+    }
+
+    /// Sum of squares of the measured specific force that no slopes explain.
+    fn unexplained(&self) -> f64 {
+        let explained = |(of_a, of_g): (f64, f64)| of_a * self.ya + of_g * self.yg;
+        (self.yy - self.slopes().map_or(0.0, explained)).max(0.0)
+    }
+
+    /// The known factors that the slopes are nearest to.
+    fn scales(&self) -> Scales {
+        let Self { aa, gg, .. } = *self;
+        let Some((of_a, of_g)) = self.slopes() else {
             return self.at_rest();
-        }
-        let (of_a, of_g) = (
-            (ya * gg - yg * ag) / determinant,
-            (yg * aa - ya * ag) / determinant,
-        );
+        };
         let likeness = self.likeness();
         // Of what is measured, in units of gravity's power.
-        let unexplained = (self.yy - of_a * ya - of_g * yg).max(0.0) / gg;
+        let unexplained = self.unexplained() / gg;
         let lengths = if likeness > LEAST_LIKENESS_FOR_LENGTH {
             length_factors()
         } else {
