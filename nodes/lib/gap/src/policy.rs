@@ -170,6 +170,8 @@ pub(crate) mod unknown {
     /// Mean square of a whitened residual in a band from which on it is structure. Without any
     /// effect none of a hundred placements reached 3.
     pub const BAND: f64 = 12.0;
+    /// And up to which a channel is as loud as is expected (see [`BAND`]).
+    pub const ORDINARY_BAND: f64 = 3.0;
     /// Held-out gain of a regression, nats, likewise; without any effect none reached 0.
     pub const REGRESSION_NATS: f64 = 200.0;
     /// Length of the recordings that [`REGRESSION_NATS`] was set on, s; in longer ones a regression has to

@@ -12,8 +12,8 @@ use crate::noise_updates::with_estimate;
 use crate::policy::probability::{MOST_UNKNOWN, NATS_PER_BAND, UNKNOWN_GAIN_NATS};
 use crate::policy::report::COARSE_STEPS;
 use crate::policy::unknown::{
-    AXIS_SHARE, BAND, BURST, FROZEN, JITTER, MUCH_WIDER_HZ, OUTLIERS, REGRESSION_NATS, STAYS,
-    UNDONE_SMOOTHING_FACTOR, USUAL_S, WIDER_HZ,
+    AXIS_SHARE, BAND, BURST, FROZEN, JITTER, MUCH_WIDER_HZ, ORDINARY_BAND, OUTLIERS,
+    REGRESSION_NATS, STAYS, UNDONE_SMOOTHING_FACTOR, USUAL_S, WIDER_HZ,
 };
 use crate::prepared::PreparedPlacement;
 use crate::residual_regressions::{
@@ -163,7 +163,7 @@ impl<'a> Structure<'a> {
                 let needed = REGRESSION_NATS * factor * longer_than_usual(findings);
                 regression.gain > needed
                     && !is_coarse(model, regression.channel)
-                    && !may_be_references(model, diagnostics, regression)
+                    && !may_be_references(diagnostics, regression)
             })
             .collect();
         let stuck = PerChannel::from_fn(|channel| {
@@ -296,16 +296,11 @@ fn bar_factor(model: &FitModel) -> f64 {
     }
 }
 
-/// Whether a regression may be on errors of the reference: what its filters keep out of the motion, and
-/// noise of it that wanders, goes with the motion's rate of change as what a delay leaves does. They are no
-/// louder than a band may be.
-fn may_be_references(
-    model: &FitModel,
-    diagnostics: &ResidualDiagnostics,
-    regression: &ResidualRegression,
-) -> bool {
+/// Whether a regression may be on errors of the reference: what its filters keep out of the motion goes with
+/// the motion's rate of change as what a delay leaves does, and is no louder than is expected of it.
+fn may_be_references(diagnostics: &ResidualDiagnostics, regression: &ResidualRegression) -> bool {
     regression.dependence == Dependence::RateOfChange
-        && !diagnostics.is_loud(model, regression.channel)
+        && diagnostics.band[regression.channel] < ORDINARY_BAND
 }
 
 /// Rounding errors of slow motion are no noise at all.
