@@ -3,11 +3,10 @@
 use crate::SpatialError;
 use crate::equations::{IntervalWeights, SplineEquations};
 use crate::fourth_differences::{MEDIAN_OF_SQUARE, fourth_difference, white_noise_variance};
-use crate::kernel::{Evidence, Kernel, means};
 use crate::local_spline::{LocalSolution, Series, Statements};
 use crate::low_passed::{LowPassed, LowPassedSamples};
 use crate::weight_search::LOWEST_LOG_WEIGHT;
-use crate::wide::{Four, widest};
+use crate::wide::{Four, add, scale, widest};
 
 /// Time over which neighbours share one drive, standard deviation, s: shorter, a burst's own noise
 /// decides; longer, a burst's start is smoothed away. Chosen among 0.05, 0.1, 0.15 and 0.25 s on
@@ -123,8 +122,6 @@ pub(crate) struct Adaptation<const L: usize> {
     least_noise: [f64; L],
     /// Variance that is expected of the noise, unit^2, and what it counts, in samples.
     expected_noise: [[f64; 2]; L],
-    /// Variance of the noise over each knot interval when the weights were last made, unit^2.
-    noise_over: Vec<[f64; L]>,
     /// Where noise was low-passed before; r is then its variance as white noise of the density that it
     /// has at low frequencies.
     low_passed: [Option<LowPassedSamples>; L],
@@ -142,9 +139,8 @@ impl<const L: usize> Adaptation<L> {
                 .max(LEAST_NOISE_AT_ALL)
                 .powi(2)
         });
-        let mut differences = Vec::new();
         let noise: [f64; L] = std::array::from_fn(|lane| {
-            fourth_difference_variance(series, lane, &mut differences).max(least_noise[lane])
+            fourth_difference_variance(series, lane).max(least_noise[lane])
         });
         let drive = noise.map(|noise| noise / equations.weight_of_cutoff(FIRST_CUTOFF_HZ));
         Self {
@@ -159,7 +155,6 @@ impl<const L: usize> Adaptation<L> {
                 let variance = expected.std.powi(2) / (STATED_AT_HZ * equations.interval);
                 [variance, if variance > 0.0 { expected.count } else { 0.0 }]
             }),
-            noise_over: Vec::new(),
             low_passed: [None; L],
         }
     }
@@ -172,13 +167,13 @@ impl<const L: usize> Adaptation<L> {
         solution: &mut LocalSolution<C, L>,
     ) -> Result<Self, SpatialError> {
         let mut adaptation = Self::start(equations, series, expected);
-        let (mut statements, mut weights) = (Statements::default(), Vec::new());
+        let mut statements = Statements::default();
         for step in 0..STEPS {
             if step == STEPS_AS_WHITE {
                 adaptation.low_passed =
                     expected.map(|it| it.low_passed.map(|own| own.among(equations)));
             }
-            adaptation.weights_into(&mut weights);
+            let weights = adaptation.weights();
             // Not refined: squares are all that is wanted of it.
             solution.solve_and_state(equations, series, &weights, &mut statements)?;
             adaptation.step(equations, &weights, &mut statements, Stride::Whole);
@@ -234,38 +229,24 @@ impl<const L: usize> Adaptation<L> {
 
     /// The penalty's weight over each knot interval: the noise changes so little over a spline's
     /// width that its quotient with the drive may stand for both.
-    pub(crate) fn weights(&mut self) -> Vec<IntervalWeights<L>> {
-        let mut weights = Vec::new();
-        self.weights_into(&mut weights);
-        weights
-    }
-
-    /// The same in memory to reuse.
-    fn weights_into(&mut self, weights: &mut Vec<IntervalWeights<L>>) {
+    pub(crate) fn weights(&self) -> Vec<IntervalWeights<L>> {
         let lowest = 10f64.powf(LOWEST_LOG_WEIGHT);
-        weights.resize(self.drive.len(), [[0.0; L]; 2]);
-        self.noise_over.resize(self.drive.len(), [0.0; L]);
-        let learnt = self.drive.iter().zip(&self.vigour);
-        let learnt = learnt.zip(self.noise.array_windows::<2>());
-        let made = weights.iter_mut().zip(&mut self.noise_over);
+        let mut weights = vec![[[0.0; L]; 2]; self.drive.len()];
         widest!(_s => {
-            for (((drive, vigour), [one, next]), ([fifth, second], over)) in learnt.zip(made) {
+            for (k, [fifth, second]) in weights.iter_mut().enumerate() {
                 for lane in 0..L {
-                    let noise = (one[lane] * next[lane]).sqrt();
-                    let weight = noise / drive[lane];
-                    // As `clamp` has it, which would be done lane after lane.
-                    let weight = if weight < lowest { lowest } else { weight };
-                    fifth[lane] = if weight > LARGEST_WEIGHT { LARGEST_WEIGHT } else { weight };
-                    second[lane] = noise / (vigour[lane] + noise * self.least_vigour);
-                    over[lane] = noise;
+                    let noise = self.noise_over(k, lane);
+                    fifth[lane] = (noise / self.drive[k][lane]).clamp(lowest, LARGEST_WEIGHT);
+                    second[lane] = noise / (self.vigour[k][lane] + noise * self.least_vigour);
                 }
             }
         });
         for (lane, low_passed) in self.low_passed.iter().enumerate() {
             if let Some(low_passed) = low_passed {
-                self.weigh_low_passed(low_passed, lane, weights);
+                self.weigh_low_passed(low_passed, lane, &mut weights);
             }
         }
+        weights
     }
 
     /// Makes weights for white noise those for noise behind a low-pass.
@@ -278,10 +259,16 @@ impl<const L: usize> Adaptation<L> {
         let lowest = 10f64.powf(LOWEST_LOG_WEIGHT);
         for (k, [fifth, second]) in weights.iter_mut().enumerate() {
             let at_cutoff = low_passed.at_cutoff(fifth[lane]);
-            let noise = self.noise_over[k][lane] * at_cutoff;
+            let noise = self.noise_over(k, lane) * at_cutoff;
             fifth[lane] = (fifth[lane] * at_cutoff).max(lowest);
             second[lane] = noise / (self.vigour[k][lane] + noise * self.least_vigour);
         }
+    }
+
+    /// Variance of the noise over a knot interval.
+    #[inline(always)]
+    fn noise_over(&self, interval: usize, lane: usize) -> f64 {
+        (self.noise[interval][lane] * self.noise[interval + 1][lane]).sqrt()
     }
 
     /// A step towards the greatest likelihood.
@@ -294,40 +281,40 @@ impl<const L: usize> Adaptation<L> {
             drives,
             accelerations,
             residuals,
-            scratch: [near, scratch @ ..],
         }: &mut Statements<L>,
         stride: Stride,
     ) {
-        near.clone_from(drives);
-        let shared =
-            |seconds: f64| Kernel::new((seconds / equations.interval).max(LEAST_SHARED_INTERVALS));
-        Kernel::smooth_together(
-            s,
-            [
-                (Kernel::new(NEAR_DRIVE_INTERVALS), near),
-                (shared(SHARED_DRIVE_S), drives),
-                (shared(SHARED_VIGOUR_S), accelerations),
-            ],
-            scratch,
-        );
-        for ((drive, near), around) in self.drive.iter_mut().zip(&*near).zip(means(drives)) {
-            let found = with_expected(*near, around, NEAR_DRIVE_COUNT);
+        let mut near = drives.clone();
+        Kernel::new(NEAR_DRIVE_INTERVALS).smooth(s, &mut near);
+        let around = local_means(s, drives, SHARED_DRIVE_S / equations.interval);
+        for ((drive, near), around) in self.drive.iter_mut().zip(near).zip(around) {
+            let found = with_expected(near, around, NEAR_DRIVE_COUNT);
             *drive = match stride {
                 Stride::Whole => found,
                 Stride::Half => std::array::from_fn(|lane| (drive[lane] * found[lane]).sqrt()),
             };
         }
+        self.learn_vigour(s, equations, accelerations);
+        take_fourth_roots(s, residuals);
+        let found = local_means(s, residuals, SHARED_NOISE_S / equations.interval)
+            .map(|roots| roots.map(|root| root.powi(4)));
+        for (noise, found) in self.noise.iter_mut().zip(found) {
+            *noise = std::array::from_fn(|lane| found[lane].max(self.least_noise[lane]));
+        }
+    }
+
+    #[inline(always)]
+    fn learn_vigour(
+        &mut self,
+        s: impl Four,
+        equations: &SplineEquations,
+        accelerations: &mut [Evidence<L>],
+    ) {
         // White up to half the samples' rate, the same square would be less dense.
         let denser = 0.5 / (equations.interval * VIGOUR_BAND_HZ);
-        for (vigour, found) in self.vigour.iter_mut().zip(means(accelerations)) {
+        let found = local_means(s, accelerations, SHARED_VIGOUR_S / equations.interval);
+        for (vigour, found) in self.vigour.iter_mut().zip(found) {
             *vigour = found.map(|square| denser * square);
-        }
-        let [before, ..] = scratch;
-        take_fourth_roots(s, residuals, near, before);
-        let around = [(shared(SHARED_NOISE_S), residuals.as_mut_slice())];
-        Kernel::smooth_together(s, around, std::array::from_mut(before));
-        for (noise, roots) in self.noise.iter_mut().zip(means(residuals)) {
-            *noise = std::array::from_fn(|lane| roots[lane].powi(4).max(self.least_noise[lane]));
         }
     }
 
@@ -341,7 +328,7 @@ impl<const L: usize> Adaptation<L> {
         let last = self.drive.len() - 1;
         for (k, [_, share]) in residuals.iter_mut().enumerate() {
             let interval = k.min(last);
-            let for_white = self.noise_over[interval][lane] / self.drive[interval][lane];
+            let for_white = self.noise_over(interval, lane) / self.drive[interval][lane];
             share[lane] = 1.0 - low_passed.left_over(for_white, 1.0 - share[lane]);
         }
     }
@@ -359,11 +346,10 @@ impl<const L: usize> Adaptation<L> {
     ) {
         let free = |share: f64| (1.0 - share).max(LEAST_FREE);
         let expected = EXPECTED_COUNT / equations.weight_of_cutoff(EXPECTED_CUTOFF_HZ);
-        let known = weights.iter().zip(&self.noise_over);
-        for ([square, variance], ([fifth, _], noise)) in drives.iter_mut().zip(known) {
+        for (k, [square, variance]) in drives.iter_mut().enumerate() {
             for lane in 0..L {
-                square[lane] += expected * noise[lane];
-                variance[lane] = free(fifth[lane] * variance[lane]) + EXPECTED_COUNT;
+                square[lane] += expected * self.noise_over(k, lane);
+                variance[lane] = free(weights[k][0][lane] * variance[lane]) + EXPECTED_COUNT;
             }
         }
         for (lane, low_passed) in self.low_passed.iter().enumerate() {
@@ -388,6 +374,22 @@ enum Stride {
     Half,
 }
 
+/// A sum of squares, and what it counts, of each lane.
+type Evidence<const L: usize> = [[f64; L]; 2];
+
+/// Means around each entry, by a kernel of this standard deviation.
+#[inline(always)]
+fn local_means<const L: usize>(
+    s: impl Four,
+    evidence: &mut [Evidence<L>],
+    intervals: f64,
+) -> impl Iterator<Item = [f64; L]> {
+    Kernel::new(intervals.max(LEAST_SHARED_INTERVALS)).smooth(s, evidence);
+    evidence.iter().map(|[square, count]| {
+        std::array::from_fn(|lane| (square[lane] / count[lane]).max(f64::MIN_POSITIVE))
+    })
+}
+
 /// The mean that evidence gives together with what is expected, which counts so much.
 #[inline(always)]
 fn with_expected<const L: usize>(
@@ -403,18 +405,12 @@ fn with_expected<const L: usize>(
 }
 
 /// In place of each sum of squares the fourth root of the mean over the nearest entries, times what
-/// the entry counts; `near` and `before` are memory to reuse.
+/// the entry counts.
 #[inline(always)]
-fn take_fourth_roots<const L: usize>(
-    s: impl Four,
-    evidence: &mut Vec<Evidence<L>>,
-    near: &mut Vec<Evidence<L>>,
-    before: &mut Vec<Evidence<L>>,
-) {
-    near.clone_from(evidence);
-    let nearest = [(Kernel::new(NEAR_NOISE_INTERVALS), near.as_mut_slice())];
-    Kernel::smooth_together(s, nearest, std::array::from_mut(before));
-    for ([square, count], [near_square, near_count]) in evidence.iter_mut().zip(&*near) {
+fn take_fourth_roots<const L: usize>(s: impl Four, evidence: &mut [Evidence<L>]) {
+    let mut near = evidence.to_vec();
+    Kernel::new(NEAR_NOISE_INTERVALS).smooth(s, &mut near);
+    for ([square, count], [near_square, near_count]) in evidence.iter_mut().zip(near) {
         for lane in 0..L {
             let mean = near_square[lane] / near_count[lane];
             square[lane] = count[lane] * mean.max(f64::MIN_POSITIVE).sqrt().sqrt();
@@ -430,18 +426,59 @@ fn range<const C: usize, const L: usize>(series: &Series<C, L>, lane: usize) -> 
         .fold(0.0, |most, v| v.abs().max(most))
 }
 
-/// Variance of white noise from the fourth differences of all channels; `differences` is memory to
-/// reuse.
+/// Variance of white noise from the fourth differences of all channels.
 fn fourth_difference_variance<const C: usize, const L: usize>(
     series: &Series<C, L>,
     lane: usize,
-    differences: &mut Vec<f64>,
 ) -> f64 {
     let of_channel =
         |run: &[[f64; C]], c: usize| fourth_difference(std::array::from_fn(|k| run[k][c]));
-    let runs = series.values.windows(5);
-    differences.clear();
-    differences
-        .extend(runs.flat_map(|run| series.channels_of(lane).map(move |c| of_channel(run, c))));
-    white_noise_variance(differences, MEDIAN_OF_SQUARE).unwrap_or(0.0)
+    let mut differences: Vec<f64> = series
+        .values
+        .windows(5)
+        .flat_map(|run| series.channels_of(lane).map(move |c| of_channel(run, c)))
+        .collect();
+    white_noise_variance(&mut differences, MEDIAN_OF_SQUARE).unwrap_or(0.0)
+}
+
+/// `a^|k|` convolved with itself, a so chosen that the standard deviation is as wanted: two
+/// recursions each way.
+struct Kernel {
+    decay: f64,
+}
+
+impl Kernel {
+    /// Of this standard deviation, in entries. One pass has the variance `2 a / (1 - a)^2`.
+    fn new(std: f64) -> Self {
+        let variance = 0.5 * std * std;
+        let decay = (1.0 + variance - (1.0 + 2.0 * variance).sqrt()) / variance;
+        Self { decay }
+    }
+
+    /// Weighted sums in place; a quotient of two of them is a weighted mean.
+    #[inline(always)]
+    fn smooth<const L: usize>(&self, s: impl Four, values: &mut [Evidence<L>]) {
+        let mut before = vec![[[0.0; L]; 2]; values.len()];
+        for _ in 0..2 {
+            let mut sum = [[0.0; L]; 2];
+            for (before, own) in before.iter_mut().zip(&*values) {
+                for (sum, own) in sum.iter_mut().zip(own) {
+                    scale(s, sum, self.decay);
+                    add(s, sum, own);
+                }
+                *before = sum;
+            }
+            let mut after = [[0.0; L]; 2];
+            for (value, before) in values.iter_mut().zip(&before).rev() {
+                for ((value, before), after) in value.iter_mut().zip(before).zip(&mut after) {
+                    let mut next = *after;
+                    add(s, &mut next, value);
+                    scale(s, &mut next, self.decay);
+                    *value = *before;
+                    add(s, value, after);
+                    *after = next;
+                }
+            }
+        }
+    }
 }

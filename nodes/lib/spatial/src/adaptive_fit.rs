@@ -62,7 +62,7 @@ impl<const C: usize, const L: usize> AdaptiveFit<C, L> {
         let constant = centre(&mut values);
         let series = Series::new(equations, values, channels);
         let mut solution = LocalSolution::default();
-        let mut learnt = Adaptation::learn(equations, &series, expected, &mut solution)?;
+        let learnt = Adaptation::learn(equations, &series, expected, &mut solution)?;
         let weights = learnt.weights();
         solution.solve(equations, &series, &weights)?;
         solution.invert();

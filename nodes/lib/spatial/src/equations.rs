@@ -74,13 +74,13 @@ pub(crate) type IntervalWeights<const L: usize> = [[f64; L]; 2];
 
 /// The weights of all knot intervals, for as many series at once as there are lanes.
 #[derive(Clone, Debug)]
-pub(crate) struct LocalWeights<'a, const L: usize> {
+pub(crate) struct LocalWeights<const L: usize> {
     /// Of each lane.
     pub(crate) largest: [f64; L],
     /// What each penalty row counts.
-    pub(crate) penalty: &'a [[f64; L]],
+    pub(crate) penalty: Vec<[f64; L]>,
     /// What each second derivative counts.
-    pub(crate) second: &'a [[f64; L]],
+    pub(crate) second: Vec<[f64; L]>,
     /// What each derivative at the ends counts.
     pub(crate) ends: [[f64; L]; 4],
 }
@@ -163,30 +163,23 @@ impl SplineEquations {
         }
     }
 
-    /// What these weights of the knot intervals make of each row, in memory to reuse.
+    /// What these weights of the knot intervals make of each row.
     #[inline(always)]
-    pub(crate) fn local_weights<'a, const L: usize>(
+    pub(crate) fn local_weights<const L: usize>(
         &self,
         weights: &[IntervalWeights<L>],
-        [penalty, second]: &'a mut [Vec<[f64; L]>; 2],
-    ) -> LocalWeights<'a, L> {
-        penalty.resize(weights.len(), [0.0; L]);
-        second.resize(weights.len(), [0.0; L]);
-        let (penalty, second) = (penalty.as_mut_slice(), second.as_mut_slice());
+    ) -> LocalWeights<L> {
         let mut largest = [0.0_f64; L];
-        let rows = penalty.iter_mut().zip(&mut *second);
-        for (([fifth, own], ease), (penalty, second)) in weights.iter().zip(&self.eased).zip(rows) {
-            (0..L).for_each(|lane| largest[lane] = largest[lane].max(fifth[lane]));
-            *penalty = *fifth;
-            if *ease != 1.0 {
-                penalty.iter_mut().for_each(|weight| *weight /= ease);
-            }
-            *second = *own;
+        for [weight, _] in weights {
+            (0..L).for_each(|lane| largest[lane] = largest[lane].max(weight[lane]));
         }
+        let penalty = weights.iter().zip(&self.eased);
         LocalWeights {
             largest,
-            penalty,
-            second,
+            penalty: penalty
+                .map(|([weight, _], ease)| weight.map(|weight| weight / ease))
+                .collect(),
+            second: weights.iter().map(|[_, second]| *second).collect(),
             ends: self
                 .ends
                 .map(|end| weights[end.first][0].map(|weight| local_end_weight(&end, weight))),
@@ -199,7 +192,7 @@ impl SplineEquations {
         &self,
         s: impl Four,
         i: usize,
-        weights: &LocalWeights<'_, L>,
+        weights: &LocalWeights<L>,
     ) -> Row<L> {
         let mut entries = [[0.0; L]; ORDER];
         for (entry, given) in entries.iter_mut().zip(&self.gram.rows[i]) {
@@ -215,8 +208,8 @@ impl SplineEquations {
         let first = i.saturating_sub(DEGREE);
         let intervals = first..self.interval_count().min(i + 1);
         for (rows, weights) in [
-            (&self.penalty_rows, weights.penalty),
-            (&self.second_rows, weights.second),
+            (&self.penalty_rows, &weights.penalty),
+            (&self.second_rows, &weights.second),
         ] {
             let place = i - first;
             add_all_products(
@@ -273,8 +266,7 @@ impl SplineEquations {
                     .iter()
                     .map(|weight| [[weight.fifth], [weight.second]])
                     .collect();
-                let mut memory = Default::default();
-                let weights = self.local_weights(&weights, &mut memory);
+                let weights = self.local_weights(&weights);
                 let row = |i: usize| self.local_row(Plain, i, &weights);
                 factor.factor_rows(self.basis.count(), row)?;
             }

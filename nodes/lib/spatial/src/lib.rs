@@ -51,7 +51,6 @@ mod gaps;
 mod golden;
 mod grid;
 mod influence;
-mod kernel;
 mod kinks;
 mod local_noise;
 mod local_spline;

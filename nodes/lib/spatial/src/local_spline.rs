@@ -58,8 +58,6 @@ pub(crate) struct Statements<const L: usize> {
     pub(crate) accelerations: Vec<Stated<L>>,
     /// Of each sample: its distance from the spline.
     pub(crate) residuals: Vec<Stated<L>>,
-    /// Memory that learning from them reuses.
-    pub(crate) scratch: [Vec<Stated<L>>; 4],
 }
 
 /// A solution of the equations in each lane, and memory that solving reuses.
@@ -68,7 +66,6 @@ pub(crate) struct LocalSolution<const C: usize, const L: usize> {
     pub(crate) coefficients: Vec<[f64; C]>,
     factor: Factor<L>,
     correction: Vec<[f64; C]>,
-    weights: [Vec<[f64; L]>; 2],
 }
 
 impl<const C: usize, const L: usize> LocalSolution<C, L> {
@@ -81,10 +78,8 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
         statements: &mut Statements<L>,
     ) -> Result<(), SpatialError> {
         widest!(s => {
-            let mut memory = std::mem::take(&mut self.weights);
-            let weights = equations.local_weights(weights, &mut memory);
+            let weights = equations.local_weights(weights);
             self.solve_down(s, equations, series, &weights)?;
-            self.weights = memory;
             self.invert_and_state(s, equations, series, Solved::Down, statements);
             Ok(())
         })
@@ -108,8 +103,7 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
         series: &Series<C, L>,
         weights: &[IntervalWeights<L>],
     ) -> Result<(), SpatialError> {
-        let mut memory = std::mem::take(&mut self.weights);
-        let weights = equations.local_weights(weights, &mut memory);
+        let weights = equations.local_weights(weights);
         self.solve_down(s, equations, series, &weights)?;
         self.factor.solve_up(s, &mut self.coefficients);
         let refined = weights.largest.map(refinements);
@@ -137,7 +131,7 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
         s: impl Four,
         equations: &SplineEquations,
         series: &Series<C, L>,
-        weights: &LocalWeights<'_, L>,
+        weights: &LocalWeights<L>,
     ) -> Result<(), SpatialError> {
         self.coefficients.clone_from(&series.projected);
         for ((end, weight), target) in equations
@@ -182,7 +176,6 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
             drives,
             accelerations,
             residuals,
-            ..
         } = statements;
         accelerations.resize(equations.interval_count(), [[1.0; L]; 2]);
         drives.resize(equations.interval_count(), [[0.0; L]; 2]);
@@ -223,7 +216,7 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
         s: impl Four,
         equations: &SplineEquations,
         series: &Series<C, L>,
-        weights: &LocalWeights<'_, L>,
+        weights: &LocalWeights<L>,
     ) {
         let (x, correction) = (&self.coefficients, &mut self.correction);
         correction.clear();
@@ -240,11 +233,11 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
             let near = &mut correction[end.first..];
             add_residual(s, &x[end.first..], &end.row, target, weight, near);
         }
-        let rows = equations.penalty_rows.iter().zip(weights.penalty);
+        let rows = equations.penalty_rows.iter().zip(&weights.penalty);
         for (k, (row, weight)) in rows.enumerate() {
             add_residual(s, &x[k..], row, &[0.0; C], weight, &mut correction[k..]);
         }
-        let rows = equations.second_rows.iter().zip(weights.second);
+        let rows = equations.second_rows.iter().zip(&weights.second);
         for (k, (row, weight)) in rows.enumerate() {
             add_residual(s, &x[k..], row, &[0.0; C], weight, &mut correction[k..]);
         }
@@ -260,19 +253,13 @@ fn drive_over<const C: usize, const L: usize>(
     coefficients: &[[f64; C]],
     block: &InverseBlock<L>,
 ) -> Stated<L> {
-    let (row, ease) = (
-        &equations.penalty_rows[interval],
-        &equations.eased[interval],
-    );
+    let (row, ease) = (&equations.penalty_rows[interval], equations.eased[interval]);
     let fifth = combined(s, &coefficients[interval..], row);
-    let stated = [
+    [
         mean_squares(s, &fifth, &series.channels),
         quadratic_form(s, block, row),
-    ];
-    if *ease == 1.0 {
-        return stated;
-    }
-    stated.map(|stated| stated.map(|lane| lane / ease))
+    ]
+    .map(|stated| stated.map(|lane| lane / ease))
 }
 
 #[inline(always)]
