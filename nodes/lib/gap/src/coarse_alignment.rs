@@ -13,6 +13,10 @@ use crate::prepared::PreparedPlacement;
 
 /// Lags below this are left to the search, s.
 const LEAST_LAG_S: f64 = 0.1;
+/// Part of the angular velocity's square that may stay unexplained without a lag, and over that with the lag that
+/// the speeds tell, where no lag is believed; no source. A lag of a twentieth of a period leaves a tenth.
+const ON_TIME: f64 = 0.5;
+const ON_TIME_LEAVES: f64 = 1.2;
 /// Distance of a rotation (Frobenius norm over sqrt(2)) from the identity or from a signed
 /// permutation below which it is left to the search.
 const NEAR_AXES: f64 = 0.25;
@@ -60,18 +64,27 @@ pub(crate) struct CoarseAlignment {
 
 impl CoarseAlignment {
     pub fn find(prepared: &PreparedPlacement, track: &KinematicTrack) -> Self {
-        let lag_s = lag_of_angular_speeds(prepared, track);
-        let rows: Vec<(&Reading, usize)> = prepared
-            .measured
-            .iter()
-            .zip(&prepared.stamps)
-            .filter_map(|(reading, stamp)| {
+        let rows_at = |lag_s: f64| -> Vec<(&Reading, usize)> {
+            let rows = prepared.measured.iter().zip(&prepared.stamps);
+            rows.filter_map(|(reading, stamp)| {
                 let entry = ((*stamp - track.start) - lag_s) * track.rate_hz;
                 (entry >= 0.0 && entry < (track.len() - 1) as f64)
                     .then_some((reading, entry.round() as usize))
             })
-            .collect();
-        let (axes, gyro) = gyro_axes(&rows, track);
+            .collect()
+        };
+        let mut lag_s = lag_of_angular_speeds(prepared, track);
+        let mut rows = rows_at(lag_s);
+        let mut turns = Turns::new(&rows, track);
+        // What sways has the same speed half a period and a period later: the clocks' own word holds where it
+        // explains as much.
+        let on_time = rows_at(0.0);
+        let turns_on_time = Turns::new(&on_time, track);
+        let unexplained = turns_on_time.unexplained();
+        if unexplained < ON_TIME && unexplained <= ON_TIME_LEAVES * turns.unexplained() {
+            (lag_s, rows, turns) = (0.0, on_time, turns_on_time);
+        }
+        let (axes, gyro) = gyro_axes(&turns);
         let slopes = |turn: &Matrix3<f64>| ForceSlopes::new(&rows, track, turn);
         let as_it_is = slopes(&Matrix3::identity());
         // Angular velocities about one axis tell axes badly: what leaves less of the force unexplained holds.
@@ -132,47 +145,73 @@ fn insert_valid(set: &mut EffectSet, effect: Result<Effect, EffectError>) {
     }
 }
 
-/// Axes and units of the gyroscope from `y = A w + b` by least squares: A's polar factor and the
+/// Sums over rows of products of the measured angular velocity y and the reference's w, means taken out, for the
+/// matrix of `y = A w + b` by least squares.
+struct Turns {
+    count: f64,
+    yw: Matrix3<f64>,
+    ww: Matrix3<f64>,
+    yy: f64,
+    /// With the means.
+    squares: [f64; 2],
+}
+
+impl Turns {
+    fn new(rows: &[(&Reading, usize)], track: &KinematicTrack) -> Self {
+        let count = rows.len().max(1) as f64;
+        let measured = |row: &(&Reading, usize)| row.0.angular_velocity;
+        let predicted = |row: &(&Reading, usize)| track.angular_velocity_in_segment[row.1];
+        let mean_of = |of: &dyn Fn(&(&Reading, usize)) -> Vector3<f64>| {
+            rows.iter().map(of).sum::<Vector3<f64>>() / count
+        };
+        let (mean_y, mean_w) = (mean_of(&measured), mean_of(&predicted));
+        let mut sums = Self {
+            count,
+            yw: Matrix3::zeros(),
+            ww: Matrix3::zeros(),
+            yy: 0.0,
+            squares: [0.0; 2],
+        };
+        for row in rows {
+            let (y, w) = (measured(row), predicted(row));
+            sums.squares[0] += y.norm_squared();
+            sums.squares[1] += w.norm_squared();
+            let (y, w) = (y - mean_y, w - mean_w);
+            sums.yw += y * w.transpose();
+            sums.ww += w * w.transpose();
+            sums.yy += y.norm_squared();
+        }
+        sums
+    }
+
+    /// Part of the measured angular velocity's square that no matrix explains; all of it where the reference
+    /// does not turn about all axes.
+    fn unexplained(&self) -> f64 {
+        let explained = self.ww.try_inverse().map_or(0.0, |inverse| {
+            (self.yw * inverse * self.yw.transpose()).trace()
+        });
+        1.0 - explained / self.yy.max(f64::MIN_POSITIVE)
+    }
+}
+
+/// Axes and units of the gyroscope from the matrix of [`Turns`]: its polar factor and the
 /// cube root of its determinant.
-fn gyro_axes(rows: &[(&Reading, usize)], track: &KinematicTrack) -> (Option<Matrix3<f64>>, f64) {
-    let count = rows.len().max(1) as f64;
-    let mean = |of: &dyn Fn(&(&Reading, usize)) -> Vector3<f64>| {
-        rows.iter().map(of).sum::<Vector3<f64>>() / count
-    };
-    let measured = |row: &(&Reading, usize)| row.0.angular_velocity;
-    let predicted = |row: &(&Reading, usize)| track.angular_velocity_in_segment[row.1];
-    let (mean_m, mean_p) = (mean(&measured), mean(&predicted));
-    let (mut cross, mut own) = (Matrix3::zeros(), Matrix3::zeros());
-    for row in rows {
-        let (m, p) = (measured(row) - mean_m, predicted(row) - mean_p);
-        cross += m * p.transpose();
-        own += p * p.transpose();
-    }
-    let spread = own.symmetric_eigenvalues() / count;
+fn gyro_axes(turns: &Turns) -> (Option<Matrix3<f64>>, f64) {
+    let spread = turns.ww.symmetric_eigenvalues() / turns.count;
     if spread.min() < LEAST_SPREAD {
-        let ratio = (rows
-            .iter()
-            .map(|row| measured(row).norm_squared())
-            .sum::<f64>()
-            / rows
-                .iter()
-                .map(|row| predicted(row).norm_squared())
-                .sum::<f64>()
-                .max(1e-12))
-        .sqrt();
-        return (
-            None,
-            if !(0.05..=5.0).contains(&ratio) {
-                known_factor(ratio, Channel::Gyroscope)
-            } else {
-                1.0
-            },
-        );
+        let [measured, predicted] = turns.squares;
+        let ratio = (measured / predicted.max(1e-12)).sqrt();
+        let factor = if (0.05..=5.0).contains(&ratio) {
+            1.0
+        } else {
+            known_factor(ratio, Channel::Gyroscope)
+        };
+        return (None, factor);
     }
-    let Some(inverse) = own.try_inverse() else {
+    let Some(inverse) = turns.ww.try_inverse() else {
         return (None, 1.0);
     };
-    let matrix = cross * inverse;
+    let matrix = turns.yw * inverse;
     let scale = matrix.determinant().abs().cbrt();
     let svd = matrix.svd(true, true);
     let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else {
@@ -268,8 +307,15 @@ impl ForceSlopes {
         for &length in lengths {
             // An acceleration that is small in the reference weighs little, and so does one that is
             // not found again in the readings.
-            let weight = likeness * (aa / length.powi(2) / gg * 50.0).min(1.0);
+            let in_metres = aa / length.powi(2);
             for &accel in unit_factors(Channel::Accelerometer) {
+                // In other units as much of it has to be in the readings as the slope says.
+                let in_readings = if length == 1.0 {
+                    0.0
+                } else {
+                    aa * (of_a / accel).powi(2)
+                };
+                let weight = likeness * (in_metres.max(in_readings) / gg * 50.0).min(1.0);
                 let scatter =
                     GRAVITY_SCATTER.powi(2) + CHANCE_LIKENESS * unexplained / accel.powi(2);
                 for gravity in GravityMode::ALL {

@@ -56,6 +56,27 @@ fn no_effect_has_no_cause() {
 }
 
 #[test]
+fn what_sways_has_neither_a_lag_nor_other_units() {
+    // The angular speed is the same after each half of a period.
+    for (hz, seed) in [(0.8, 5), (1.93, 6), (1.93, 7)] {
+        let scene = Scene {
+            motion: Motion::sway(hz),
+            ..Scene::new(seed)
+        };
+        let diagnosis = answer(&scene.record()).diagnosis;
+        let named = names(&diagnosis);
+        // What the reference's filter leaves of its noise has the one frequency too, and goes with the motion.
+        let is_known = |name: &&str| *name != "unknown";
+        assert!(!named.iter().any(is_known), "{hz} Hz: {named:?}");
+        let (before, after) = (
+            diagnosis.gap.before.accel_rmse,
+            diagnosis.gap.after.accel_rmse,
+        );
+        near(after, before, 1e-3, "no worse");
+    }
+}
+
+#[test]
 fn undeclared_noise_counts_as_declared() {
     let mut scene = Scene::new(4);
     scene.declared = PerChannel::default();

@@ -63,6 +63,20 @@ impl Motion {
         Self::default()
     }
 
+    /// To and fro at one frequency: some 0.6 m/s2, and a twentieth of a radian a second about one axis.
+    pub fn sway(hz: f64) -> Self {
+        let term = |amplitude: Vector3<f64>, phase: f64| Term {
+            hz,
+            amplitude,
+            phase: Vector3::repeat(phase),
+        };
+        let (rate, place) = (TAU * hz, Vector3::new(0.1, 0.85, -0.2));
+        Self {
+            position: vec![term(place / rate.powi(2), 0.4)],
+            rotation: vec![term(Vector3::new(0.02, 0.07, 0.02) / rate, 1.1)],
+        }
+    }
+
     /// The same motion some seconds on: other poses, the same spectrum.
     pub fn later(&self, seconds: f64) -> Self {
         let shifted = |terms: &[Term]| {
