@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-use crate::gaps::fill_gaps;
+use crate::filled::{Filled, all_filled, fill, lengthen};
 use crate::noise_floor::{LARGEST_GAIN, LARGEST_REPORTED_GAIN, LARGEST_RISE, NoiseFloor};
 use crate::pose_spectra::local_spectra;
 use crate::sample_grid::SampleGrid;
 use crate::segments::Segments;
 use crate::zero_phase_smoothing::undoing_gain;
-use crate::{FourierPair, KinematicTrack, SpatialError, Spectrum, Stamp, ZeroPhaseSmoothing, so3};
+use crate::{KinematicTrack, SpatialError, Spectrum, Stamp, ZeroPhaseSmoothing, so3};
 
 /// How far the poses are continued beyond their ends, s; no source.
 const LEAD_S: f64 = 1.5;
@@ -18,8 +18,6 @@ const LEAD_S: f64 = 1.5;
 /// with the third power of its length. No source.
 const LARGEST_LEAD: usize = 300;
 const LEAST_SERIES_PER_LEAD: usize = 4;
-/// Zeros after a series in its transforms, s, so that its ends do not meet. No source.
-const PADDING_S: f64 = 4.0;
 /// Fewest poses that a spectrum is learnt from; no source.
 const FEWEST_POSES: usize = 16;
 /// Least rate of the kinematics that an IMU model starts from, Hz: it resolves all motion that poses
@@ -62,6 +60,8 @@ pub struct PoseEstimate {
     pub(crate) position: NoiseFloor,
     pub(crate) rotation: NoiseFloor,
     gaps: Vec<(Stamp, Stamp)>,
+    /// What is filled in between and beyond the poses.
+    pub(crate) filled: Arc<Vec<Filled>>,
     /// A smoothing that is undone.
     undone: Option<ZeroPhaseSmoothing>,
 }
@@ -106,37 +106,29 @@ impl PoseEstimate {
             ]
         };
         let mut floors = learn(&coordinates);
+        let mut of_gaps = [Vec::new(), Vec::new()];
         // Twice, because the first spectra saw straight lines across the gaps.
         for _ in 0..if gaps.is_empty() { 0 } else { 2 } {
-            let transform = FourierPair::new(FourierPair::good_length(
-                grid.count + (PADDING_S * rate_hz) as usize,
-            ));
-            let (positions, quaternions) = coordinates.split_at_mut(3);
-            fill_gaps(positions, &gaps, floors[0].spectrum(), &transform, rate_hz);
-            fill_gaps(
-                quaternions,
-                &gaps,
-                floors[1].spectrum(),
-                &transform,
-                rate_hz,
-            );
+            of_gaps = fill(&mut coordinates, &gaps, &floors, rate_hz);
             floors = learn(&coordinates);
         }
         let local = [
             local_spectra(&coordinates[..3], rate_hz),
             local_spectra(&coordinates[3..], rate_hz),
         ];
-        let [mut position, mut rotation] = floors;
         // Beyond the ends as well: what is likely there keeps the last poses' derivatives sound.
         let lead = ((LEAD_S * rate_hz) as usize)
             .min(LARGEST_LEAD)
             .min(grid.count / LEAST_SERIES_PER_LEAD);
-        let (positions, quaternions) = coordinates.split_at_mut(3);
-        lengthen(positions, lead, position.spectrum(), rate_hz);
-        lengthen(quaternions, lead, rotation.spectrum(), rate_hz);
+        lengthen(&mut coordinates, lead);
+        let count = grid.count;
+        let beyond = [0..lead, lead + count..count + 2 * lead];
+        let of_ends = fill(&mut coordinates, &beyond, &floors, rate_hz);
+        let [mut position, mut rotation] = floors;
         position.localise(&local[0], rate_hz, None, 0);
         rotation.localise(&local[1], rate_hz, None, 0);
-        let (start, count, gaps) = (grid.start, grid.count, grid.gap_stamps());
+        let (start, gaps) = (grid.start, grid.gap_stamps());
+        let filled = Arc::new(all_filled(grid, &gaps, of_gaps, of_ends));
         Self {
             start,
             rate_hz,
@@ -147,6 +139,7 @@ impl PoseEstimate {
             position,
             rotation,
             gaps,
+            filled,
             undone: None,
         }
     }
@@ -300,30 +293,6 @@ impl PoseEstimate {
         }
         track
     }
-}
-
-/// Continues series by `lead` entries at both ends: oddly, then by what is likeliest under their
-/// spectrum.
-fn lengthen(series: &mut [Vec<f64>], lead: usize, spectrum: &Spectrum, rate_hz: f64) {
-    let count = series[0].len();
-    for values in series.iter_mut() {
-        let last = count - 1;
-        let before = (1..=lead)
-            .rev()
-            .map(|k| 2.0 * values[0] - values[k.min(last)]);
-        let after = (1..=lead).map(|k| 2.0 * values[last] - values[last - k.min(last)]);
-        *values = before.chain(values.iter().copied()).chain(after).collect();
-    }
-    let transform = FourierPair::new(FourierPair::good_length(
-        count + 2 * lead + (PADDING_S * rate_hz) as usize,
-    ));
-    fill_gaps(
-        series,
-        &[0..lead, lead + count..count + 2 * lead],
-        spectrum,
-        &transform,
-        rate_hz,
-    );
 }
 
 /// Refuses poses that do not go together, are too few or are not finite.

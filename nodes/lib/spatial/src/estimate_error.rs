@@ -10,6 +10,12 @@ use crate::{PoseEstimate, SampleVariance, Stamp};
 /// Variances around one window's centre: of the value, and of its first and second derivative.
 type Variances = [f64; 3];
 
+/// How far the errors of what is filled in reach into the poses beside it, s: their variance falls by a
+/// factor of e within so much.
+const REACH_S: f64 = 0.012;
+/// Seen no more after so many of it.
+const FARTHEST: f64 = 6.0;
+
 /// How errors of poses come to a sensor.
 pub struct ErrorPath<'p> {
     /// Of which units of the positions a metre has so many.
@@ -28,7 +34,9 @@ impl PoseEstimate {
     /// With N the noise's density, W a window's filter (see [`PoseEstimate`]) and P what the sensor passes
     /// the n-th derivative errs by `integral N W P (2 pi f)^(2 n) df`; windows are cross-faded as the
     /// motion is. An error of the angular acceleration moves the sensor by two thirds of its square times
-    /// the arm's, mean over directions. What the filter takes for noise though it is motion is not in it.
+    /// the arm's, mean over directions. Where poses are missing, or beyond their ends, the errors of what is filled in
+    /// (its covariance under the mean spectrum) come on top. What the filter takes for noise though it is motion is
+    /// not in it.
     pub fn variances(&self, stamps: &[Stamp], path: &ErrorPath<'_>) -> Vec<SampleVariance> {
         let of_windows = |floor: &NoiseFloor| -> Vec<Variances> {
             let windows = floor.windows.iter();
@@ -38,9 +46,10 @@ impl PoseEstimate {
         let (positions, rotations) = (of_windows(&self.position), of_windows(&self.rotation));
         let at = |stamp: &Stamp| {
             let place = ((*stamp - self.start) / HOP_S).max(0.0);
-            let [_, _, acceleration] = faded(&positions, place);
-            let [rotation, turning, spinning_up] =
-                faded(&rotations, place).map(|variance| variance / QUATERNION_PER_ROTVEC);
+            let [of_position, of_rotation] = self.filled_in(*stamp);
+            let [_, _, acceleration] = sum(faded(&positions, place), of_position);
+            let [rotation, turning, spinning_up] = sum(faded(&rotations, place), of_rotation)
+                .map(|variance| variance / QUATERNION_PER_ROTVEC);
             SampleVariance {
                 acceleration: acceleration / path.units_per_metre.powi(2)
                     + 2.0 / 3.0 * path.lever_arm_m.powi(2) * spinning_up,
@@ -50,6 +59,44 @@ impl PoseEstimate {
             }
         };
         stamps.iter().map(at).collect()
+    }
+}
+
+impl PoseEstimate {
+    /// What is added where poses are missing, or close by: of position, of the quaternion.
+    fn filled_in(&self, stamp: Stamp) -> [Variances; 2] {
+        let next = self.filled.partition_point(|filled| filled.to < stamp);
+        // The one before is done with, and may still reach here.
+        let near = self.filled[next.saturating_sub(1)..].iter().take(2);
+        let mut added = [Variances::default(); 2];
+        for filled in near {
+            let inside = (stamp - filled.from).min(filled.to - stamp);
+            let reach = (inside.min(0.0) / REACH_S).exp();
+            if inside > -FARTHEST * REACH_S {
+                for (sums, errors) in added.iter_mut().zip(&filled.errors) {
+                    *sums = sum(*sums, at_depth(errors, inside).map(|own| own * reach));
+                }
+            }
+        }
+        added
+    }
+}
+
+fn sum(one: Variances, other: Variances) -> Variances {
+    std::array::from_fn(|n| one[n] + other[n])
+}
+
+/// Between the depths that are known, straight; beyond them the nearest one's.
+fn at_depth(errors: &[(f64, Variances)], depth: f64) -> Variances {
+    let next = errors.partition_point(|(known, _)| *known < depth);
+    match (next.checked_sub(1).map(|k| errors[k]), errors.get(next)) {
+        (Some((before, own)), Some((after, others))) => {
+            let share = (depth - before) / (after - before);
+            std::array::from_fn(|n| own[n] * (1.0 - share) + others[n] * share)
+        }
+        (Some((_, only)), None) => only,
+        (None, Some((_, only))) => *only,
+        (None, None) => Variances::default(),
     }
 }
 

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::*;
-use crate::{Complex64, ErrorPath, SmoothingKernel};
+use crate::{Complex64, ErrorPath, FourierPair, SmoothingKernel};
 
 /// Deterministic noise: sums of twelve uniform numbers.
 struct Normal(u64);

@@ -45,6 +45,7 @@ mod error;
 mod estimate;
 mod estimate_error;
 mod file;
+mod filled;
 mod fourth_differences;
 mod frame_grid;
 mod gaps;
