@@ -13,7 +13,7 @@ use crate::policy::search::{MOST, MOST_AT_FIRST, ROUNDS};
 use crate::progress::{self, Progress, THINNED};
 use crate::reportable::{Observations, is_ordinary, reportable_effects};
 use crate::search::{ScoredEffectSet, excess, exchanged, score, score_as_it_is, search};
-use crate::sensor_noise::{found_noise, is_steady, is_white};
+use crate::sensor_noise::{found_noise, is_steady, is_white, most_noise};
 use crate::session::Session;
 use crate::smoothing::{try_smoothing, with_undone_smoothing};
 use crate::thinned::{is_folded, thinned};
@@ -72,6 +72,7 @@ impl<'a> Analysis<'a> {
             scored,
             digital: *digital,
             found_noise,
+            most_noise: most_noise(prepared, &residual),
             reportable,
             kept: None,
             library: self.library.clone(),

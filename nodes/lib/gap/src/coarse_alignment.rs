@@ -20,6 +20,10 @@ const ON_TIME_LEAVES: f64 = 1.2;
 /// Distance of a rotation (Frobenius norm over sqrt(2)) from the identity or from a signed
 /// permutation below which it is left to the search.
 const NEAR_AXES: f64 = 0.25;
+/// Part of the measured angular velocity's square that the reference's most turned axis has to explain, for their
+/// ratio to be a unit's; no source. Noise that has nothing to do with it explains one part in as many as there
+/// are readings.
+const FOLLOWED: f64 = 0.2;
 /// Mean square of the angular velocity about the least moved axis below which nothing is told of
 /// the axes, rad2/s2: 0.05 rad/s.
 const LEAST_SPREAD: f64 = 0.0025;
@@ -184,6 +188,15 @@ impl Turns {
         sums
     }
 
+    /// Whether the readings turn when the reference does about its most turned axis: what rests has the noise of
+    /// both, whose ratio is anything.
+    fn are_followed(&self) -> bool {
+        let turned = self.ww.symmetric_eigen();
+        let (most, square) = turned.eigenvalues.argmax();
+        let along = self.yw * turned.eigenvectors.column(most);
+        along.norm_squared() > FOLLOWED * square * self.yy
+    }
+
     /// Part of the measured angular velocity's square that no matrix explains; all of it where the reference
     /// does not turn about all axes.
     fn unexplained(&self) -> f64 {
@@ -201,7 +214,7 @@ fn gyro_axes(turns: &Turns) -> (Option<Matrix3<f64>>, f64) {
     if spread.min() < LEAST_SPREAD {
         let [measured, predicted] = turns.squares;
         let ratio = (measured / predicted.max(1e-12)).sqrt();
-        let factor = if (0.05..=5.0).contains(&ratio) {
+        let factor = if (0.05..=5.0).contains(&ratio) || !turns.are_followed() {
             1.0
         } else {
             known_factor(ratio, Channel::Gyroscope)

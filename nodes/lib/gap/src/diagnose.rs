@@ -247,13 +247,12 @@ fn answer(
 }
 
 /// What a simulation of the device takes: the named effects of the last recording (and those of the
-/// other sessions), the declared noise, where none is declared the one that was found, and what
-/// stayed unexplained in all of them.
+/// other sessions), its noise ([`Findings::simulated_sigma`]), and what stayed unexplained in all of them.
 fn simulated_effects(findings: &[Findings], unexplained: &[UnexplainedErrors]) -> PlacementEffects {
     let (others, last) = findings.split_at(findings.len() - 1);
     let last = &last[0];
     let prepared = last.model.prepared;
-    let density = |channel| last.declared_sigma(channel) / prepared.rate_hz.sqrt();
+    let density = |channel| last.simulated_sigma(channel) / prepared.rate_hz.sqrt();
     let mean = |of: fn(&UnexplainedErrors) -> PerChannel<f64>| {
         PerChannel::from_fn(|channel| {
             let all = unexplained.iter().map(|own| of(own)[channel]);

@@ -15,6 +15,8 @@ pub(crate) struct Findings<'a> {
     pub digital: PerChannel<Digital>,
     /// White noise per sample that the residual shows, in SI units.
     pub found_noise: PerChannel<f64>,
+    /// The most of it that the residual leaves room for.
+    pub most_noise: PerChannel<f64>,
     /// All named causes but `unknown`.
     pub reportable: EffectSet,
     /// A fit of the named causes' values as they are, and of the calibrations that a simulation takes
@@ -93,5 +95,15 @@ impl Findings<'_> {
     /// declared.
     pub fn declared_sigma(&self, channel: Channel) -> f64 {
         self.model.prepared.declared[channel].unwrap_or(self.found_noise[channel])
+    }
+
+    /// White noise per sample that a simulation of the device has, in SI units: what it declares, or less where
+    /// its readings scatter less. Steps hide how much they scatter.
+    pub fn simulated_sigma(&self, channel: Channel) -> f64 {
+        let declared = self.declared_sigma(channel);
+        match self.digital[channel].lsb {
+            Some(_) => declared,
+            None => declared.min(self.most_noise[channel]),
+        }
     }
 }

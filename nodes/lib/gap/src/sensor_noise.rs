@@ -6,12 +6,21 @@ use cromosim_spatial::{ROUNDED_MEDIAN_OF_SQUARE, fourth_difference, white_noise_
 use crate::axes::{axes_of_channel, value_on_axis};
 use crate::digital::Digital;
 use crate::library::Library;
+use crate::policy::sensor_noise::{LEVEL, OF_LOWER_BANDS, QUIET_PART, STEADY, STEADY_BLOCK_S};
 use crate::prepared::PreparedPlacement;
 
 /// Runs of five neighbours below which fourth differences say nothing.
 const LEAST_RUNS: usize = 300;
 /// Bands in the upper half of a spectrum, in units of the Nyquist frequency.
 const UPPER_BANDS: [(f64, f64); 4] = [(0.5, 0.62), (0.62, 0.74), (0.74, 0.86), (0.86, 0.97)];
+/// And below it, where a reference resolves more of the motion.
+const LOWER_BANDS: [(f64, f64); 5] = [
+    (0.03, 0.06),
+    (0.06, 0.12),
+    (0.12, 0.2),
+    (0.2, 0.32),
+    (0.32, 0.5),
+];
 
 /// The declared noise in SI units. Whether a device in other units declares its covariances in them
 /// is nowhere said: what is nearer to the noise of the readings holds.
@@ -55,31 +64,49 @@ pub(crate) fn white_noise(
 }
 
 /// White noise per sample of each channel: the least of four bands in the upper half of the
-/// residual's spectrum and of fourth differences of neighbours; whatever else is there only adds to
-/// each.
+/// residual's spectrum and of fourth differences of neighbours, or of bands below with a margin
+/// ([`OF_LOWER_BANDS`]); whatever else is there only adds to each.
 pub(crate) fn found_noise(prepared: &PreparedPlacement, residual: &[Vec<f64>]) -> PerChannel<f64> {
     PerChannel::from_fn(|channel| {
-        let spectrum = prepared.channel_spectrum(residual, channel);
-        let nyquist_hz = prepared.rate_hz / 2.0;
-        let least = UPPER_BANDS
-            .iter()
-            .filter_map(|(a, b)| spectrum.median(a * nyquist_hz, b * nyquist_hz))
+        let lower = band_variances(prepared, residual, channel, &LOWER_BANDS);
+        let found = noise_variances(prepared, residual, channel)
+            .chain(lower.map(|variance| OF_LOWER_BANDS * variance))
             .fold(f64::INFINITY, f64::min);
-        let variance = least * prepared.rate_hz / 2.0;
-        fourth_differences(prepared, residual, channel)
-            .map_or(variance, |other| variance.min(other))
-            .sqrt()
+        found.sqrt()
     })
 }
 
-/// Length of the stretches that are asked whether noise is there at all times, s: at 25 Hz two seconds
-/// have some 130 fourth differences, whose median scatters by a fifth.
-const STEADY_BLOCK_S: f64 = 2.0;
-/// The quietest part of them that is looked at.
-const QUIET_PART: f64 = 0.1;
-/// Part of the variance in the median stretch that noise has in the quiet ones too: by chance a tenth of
-/// stretches at 25 Hz are below three quarters of it, and motion that rests is far below.
-const STEADY: f64 = 0.4;
+/// The largest of the same: what a device has at most, where it declares more.
+pub(crate) fn most_noise(prepared: &PreparedPlacement, residual: &[Vec<f64>]) -> PerChannel<f64> {
+    PerChannel::from_fn(|channel| {
+        let found = noise_variances(prepared, residual, channel).fold(0.0, f64::max);
+        found.sqrt()
+    })
+}
+
+/// The variance of white noise as each band and the fourth differences have it.
+fn noise_variances(
+    prepared: &PreparedPlacement,
+    residual: &[Vec<f64>],
+    channel: Channel,
+) -> impl Iterator<Item = f64> {
+    band_variances(prepared, residual, channel, &UPPER_BANDS)
+        .chain(fourth_differences(prepared, residual, channel))
+}
+
+fn band_variances(
+    prepared: &PreparedPlacement,
+    residual: &[Vec<f64>],
+    channel: Channel,
+    bands: &'static [(f64, f64)],
+) -> impl Iterator<Item = f64> {
+    let spectrum = prepared.channel_spectrum(residual, channel);
+    let nyquist_hz = prepared.rate_hz / 2.0;
+    bands.iter().filter_map(move |(a, b)| {
+        let density = spectrum.median(a * nyquist_hz, b * nyquist_hz)?;
+        Some(density * nyquist_hz)
+    })
+}
 
 /// Whether the noise of a channel is there at all times: impacts are broad and read at 25 or 50 Hz
 /// as level as noise, but a body that is struck rests too.
@@ -105,17 +132,21 @@ pub(crate) fn is_steady(prepared: &PreparedPlacement, residual: &[Vec<f64>]) -> 
     })
 }
 
-/// Whether the top of a channel's spectrum is level: motion that the reference does not resolve
-/// falls steeply there.
+/// Whether a channel's spectrum is level: motion that the reference does not resolve falls steeply at its
+/// top, and is not in the lower bands, where the reference resolves it.
 pub(crate) fn is_white(prepared: &PreparedPlacement, residual: &[Vec<f64>]) -> PerChannel<bool> {
     PerChannel::from_fn(|channel| {
+        let least = |bands| {
+            band_variances(prepared, residual, channel, bands).fold(f64::INFINITY, f64::min)
+        };
+        let is_everywhere = least(&LOWER_BANDS) > LEVEL * least(&UPPER_BANDS);
         let spectrum = prepared.channel_spectrum(residual, channel);
         let level = |from: f64, to: f64| {
             spectrum
                 .median(from * prepared.rate_hz / 2.0, to * prepared.rate_hz / 2.0)
                 .unwrap_or(0.0)
         };
-        level(0.70, 0.83) < 1.5 * level(0.84, 0.97)
+        is_everywhere && level(0.70, 0.83) < 1.5 * level(0.84, 0.97)
     })
 }
 

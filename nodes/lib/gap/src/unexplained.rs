@@ -1,18 +1,23 @@
 //! How far readings are off beyond all that is known of.
 
-use cromosim_imu::{Channel, Lateness, PerChannel, Reading, UnexplainedErrors, change_per_second};
+use cromosim_imu::{
+    Channel, Lateness, PerChannel, Reading, UnexplainedErrors, change_per_second,
+    rounding_difference,
+};
 use nalgebra::{Matrix2, Vector2};
 
 use crate::axes::{axes_of_channel, value_on_axis};
 use crate::diagnosis::Metrics;
 use crate::findings::Findings;
-use crate::policy::report::{MOST_REFERENCE_EXCESS, REFERENCE_SHARE};
+use crate::policy::report::{LEAST_REFERENCE_EXCESS, MOST_REFERENCE_EXCESS, REFERENCE_SHARE};
 use crate::simulations::Simulations;
 
 /// Variance, mean over the axes and in SI units, that readings have on time that was not fitted to
 /// (`after`), less the device's own noise and what errors of this reference leave: what a simulation
 /// of another recording has to add to what it knows of that one. Where nothing is `unknown`
-/// [`REFERENCE_SHARE`] of it is taken for motion that the reference's errors cover, and goes with these.
+/// [`REFERENCE_SHARE`] of it is taken for motion that the reference's errors cover, and goes with these. Where it is
+/// below zero these errors are smaller than their model has them (a pure sway has no motion beyond the band
+/// that the reference resolves), and are taken for that much smaller.
 pub(crate) fn unexplained_errors(
     findings: &Findings,
     simulations: &Simulations,
@@ -28,10 +33,15 @@ pub(crate) fn unexplained_errors(
         of_reference[channel] + clocks[channel].1 / units.powi(2)
     });
     let rest = rest_variances(findings, simulations, after, &known);
-    let reference_excess = PerChannel::from_fn(|channel| match findings.unknown {
-        Some(_) => 0.0,
-        None => (REFERENCE_SHARE * rest[channel] / of_derivatives[channel].max(f64::MIN_POSITIVE))
-            .min(MOST_REFERENCE_EXCESS),
+    let reference_excess = PerChannel::from_fn(|channel| {
+        let part = rest[channel] / of_derivatives[channel].max(f64::MIN_POSITIVE);
+        if part < 0.0 {
+            return part.max(LEAST_REFERENCE_EXCESS);
+        }
+        match findings.unknown {
+            Some(_) => 0.0,
+            None => (REFERENCE_SHARE * part).min(MOST_REFERENCE_EXCESS),
+        }
     });
     let left = |channel| rest[channel] - reference_excess[channel] * of_derivatives[channel];
     UnexplainedErrors {
@@ -41,7 +51,8 @@ pub(crate) fn unexplained_errors(
     }
 }
 
-/// The part of that variance which neither the device's noise nor what is `known` beside it explains.
+/// That variance less the device's noise and what is `known` beside it; below zero where these are stated too
+/// large.
 fn rest_variances(
     findings: &Findings,
     simulations: &Simulations,
@@ -55,9 +66,26 @@ fn rest_variances(
             Channel::Gyroscope => after.gyro_rmse,
         };
         let found = (rmse / set.unit_factor(channel)).powi(2) / 3.0;
-        let own = simulations.white_variance(set, channel) + set.lsb(channel).powi(2) / 12.0;
-        (found - own - known[channel]).max(0.0)
+        let own = findings.simulated_sigma(channel).powi(2)
+            + set.noise_density(channel).powi(2) * simulations.whole.rate_hz;
+        let found = before_rounding(found, set.lsb(channel));
+        found - own - known[channel]
     })
+}
+
+/// The mean square difference of two values that, rounded to steps, differ by `found`.
+fn before_rounding(found: f64, step: f64) -> f64 {
+    let (mut least, mut most) = (0.0, found);
+    // 50 halvings leave 1e-15 of it.
+    for _ in 0..50 {
+        let middle = 0.5 * (least + most);
+        if middle + rounding_difference(middle, step) < found {
+            least = middle;
+        } else {
+            most = middle;
+        }
+    }
+    most
 }
 
 /// How late a channel stays against the simulation, and the variance that this leaves, mean over the compared

@@ -104,7 +104,7 @@ pub use schemes::Scheme;
 pub use simulate::{
     Differentiation, simulate, simulate_kinematics, simulate_kinematics_on, simulate_several_on,
 };
-pub use stated_errors::change_per_second;
+pub use stated_errors::{change_per_second, rounding_difference};
 pub use stream::{StreamOptions, StreamingImu};
 pub use texture::{DrawnTexture, TextureSegment, add_texture};
 pub use trajectory::{SensorFrame, SensorTrajectory};

@@ -1,5 +1,7 @@
 //! What messages state of their errors, live and offline.
 
+use std::f64::consts::{FRAC_2_PI, PI};
+
 use cromosim_spatial::Stamp;
 use nalgebra::Vector3;
 
@@ -16,6 +18,8 @@ pub(crate) struct StatedErrors {
     /// white noise, its rounding (step^2 / 12), the spread of its turn-on bias and bias instability, and
     /// what stays unexplained.
     pub own: PerChannel<f64>,
+    /// Its steps, in the units that it reports.
+    steps: PerChannel<f64>,
     unexplained: UnexplainedErrors,
     /// What the walk of its biases adds per second, SI units squared.
     walk: PerChannel<f64>,
@@ -47,6 +51,7 @@ impl StatedErrors {
         });
         Self {
             own,
+            steps: PerChannel::from_fn(|channel| effects.lsb(channel) * units[channel]),
             unexplained,
             walk: biases.per_second,
             units,
@@ -57,6 +62,36 @@ impl StatedErrors {
     pub fn of_device(device: &Device, rate_hz: f64) -> Self {
         let declared = device.declared_noise();
         Self::new(device.effects(), &declared, device.unexplained(), rate_hz)
+    }
+
+    /// [`StatedErrors::own`] without the rounding.
+    pub fn own_unrounded(&self) -> PerChannel<f64> {
+        PerChannel::from_fn(|channel| self.own[channel] - self.steps[channel].powi(2) / 12.0)
+    }
+
+    /// The variance of a reading's motion with what rounding adds where the simulated reading and the real one
+    /// are both rounded, see [`rounding_difference`].
+    pub fn with_rounding(&self, variance: SampleVariance, reading: &Reading) -> SampleVariance {
+        let own = self.own_unrounded();
+        let added = |channel: Channel, of_motion: f64, vector: &Vector3<f64>| {
+            let turned = 2.0 / 3.0 * variance.orientation * vector.norm_squared();
+            rounding_difference(own[channel] + of_motion + turned, self.steps[channel])
+        };
+        let of_force = added(
+            Channel::Accelerometer,
+            variance.acceleration,
+            &reading.specific_force,
+        );
+        let of_rate = added(
+            Channel::Gyroscope,
+            variance.angular_velocity,
+            &reading.angular_velocity,
+        );
+        SampleVariance {
+            acceleration: variance.acceleration + of_force,
+            angular_velocity: variance.angular_velocity + of_rate,
+            ..variance
+        }
     }
 
     /// A reading as the device knows it, SI units, whatever it reports.
@@ -90,6 +125,30 @@ impl StatedErrors {
             ..variance
         }
     }
+}
+
+/// What rounding to whole steps l adds to the mean square difference of two values that are anywhere between two
+/// steps and differ by a normal error e of variance s2:
+/// ```text
+/// E[l^2 f (1 - f)] = l^2 (1/6 - sum over n of exp(-2 pi^2 n^2 s2 / l^2) / (pi^2 n^2)),    f the fraction of |e| / l
+/// ```
+/// nothing without an error, `l sqrt(2 s2 / pi)` where it is small, l^2 / 6 where it is large: each of the two
+/// is rounded.
+pub fn rounding_difference(variance: f64, step: f64) -> f64 {
+    if step <= 0.0 || variance <= 0.0 {
+        return 0.0;
+    }
+    let squared = variance / (step * step);
+    // Below a twentieth of a step its mean fraction is itself; the series would be long.
+    if squared < 0.0025 {
+        return step * step * ((FRAC_2_PI * squared).sqrt() - squared);
+    }
+    let term = |n: u32| {
+        let order = f64::from(n * n) * PI * PI;
+        (-2.0 * order * squared).exp() / order
+    };
+    // exp(-2 pi^2 30^2 / 400) is 5e-20.
+    step * step * (1.0 / 6.0 - (1..=30).map(term).sum::<f64>())
 }
 
 /// What readings change by per second around one of them, from its neighbours but one; none where these have
@@ -127,5 +186,38 @@ pub(crate) fn with_clock_errors(
         angular_velocity: variance.angular_velocity
             + added(Channel::Gyroscope, &change.angular_velocity),
         ..variance
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::RngExt;
+
+    use super::*;
+    use crate::random::stream;
+
+    #[test]
+    fn two_roundings_differ_as_stated() {
+        let step = 0.3;
+        for error in [0.001, 0.01, 0.014, 0.016, 0.05, 0.2, 1.0] {
+            let mut random = stream(5, "rounding", 0);
+            let count = 200_000;
+            let mut sum = 0.0;
+            for _ in 0..count {
+                // Of twelve uniform numbers.
+                let normal: f64 = (0..12).map(|_| random.random_range(-0.5..0.5)).sum();
+                let value = random.random_range(0.0..step);
+                let rounded = |value: f64| step * (value / step).round();
+                sum += (rounded(value + error * normal) - rounded(value)).powi(2);
+            }
+            let found = sum / f64::from(count);
+            let stated = error * error + rounding_difference(error * error, step);
+            assert!(
+                (found / stated - 1.0).abs() < 0.06,
+                "{error}: {found} {stated}"
+            );
+        }
+        assert_eq!(rounding_difference(0.0, step), 0.0);
+        assert_eq!(rounding_difference(0.01, 0.0), 0.0);
     }
 }

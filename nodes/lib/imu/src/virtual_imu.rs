@@ -296,7 +296,7 @@ pub fn measure_recording(
     let stated = StatedErrors::new(&effects.effects, &declared, effects.unexplained, rate_hz);
     let output = Output {
         mapping,
-        covariances: Covariances::white(stated.own),
+        covariances: Covariances::white(stated.own_unrounded()),
         frame_id,
     };
     let none = SampleVariance::default();
@@ -310,7 +310,8 @@ pub fn measure_recording(
             0.0
         };
         let variance = stated.of_motion(*variance, walked);
-        let variance = &with_clock_errors(variance, late_squared, k, motion.stamps, &readings);
+        let variance = with_clock_errors(variance, late_squared, k, motion.stamps, &readings);
+        let variance = &stated.with_rounding(variance, reading);
         let lost = dropouts.as_mut().is_some_and(Dropouts::next_is_lost);
         let sample = ImuSample {
             stamp: *stamp,

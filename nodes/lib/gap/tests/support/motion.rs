@@ -77,6 +77,24 @@ impl Motion {
         }
     }
 
+    /// The same with a shiver that no reference resolves: forty lines from 6 to 24 Hz, their accelerations (m/s2
+    /// in all) in proportion to the frequency.
+    #[must_use]
+    pub fn shivering(mut self, acceleration: f64, seed: u64) -> Self {
+        let mut random = ChaCha12Rng::seed_from_u64(seed);
+        let lines: Vec<f64> = (0..40).map(|k| 6.0 + 0.45 * f64::from(k)).collect();
+        let all = lines.iter().map(|hz| hz * hz).sum::<f64>().sqrt();
+        self.position.extend(lines.iter().map(|hz| {
+            let size = acceleration * hz / all / (TAU * hz).powi(2);
+            Term {
+                hz: *hz,
+                amplitude: Vector3::repeat(size),
+                phase: Vector3::from_fn(|_, _| random.random_range(0.0..TAU)),
+            }
+        }));
+        self
+    }
+
     /// The same motion some seconds on: other poses, the same spectrum.
     pub fn later(&self, seconds: f64) -> Self {
         let shifted = |terms: &[Term]| {

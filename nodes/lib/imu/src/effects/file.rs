@@ -71,7 +71,7 @@ pub struct UnexplainedErrors {
     /// Variance, mean over the axes, whatever the reference: (m/s2)2 and (rad/s)2.
     pub variance: PerChannel<f64>,
     /// And as a part of the variance that the errors of a reference leave: for motion that they cover,
-    /// which a better reference shows.
+    /// which a better reference shows. Above -1; below zero where the errors turned out smaller.
     pub reference_excess: PerChannel<f64>,
     /// And what readings change by in the time that clocks are apart.
     pub late: PerChannel<Lateness>,
@@ -185,13 +185,21 @@ pub(crate) struct RawUnexplained {
 }
 
 impl RawUnexplained {
-    /// Names and sizes, for checks.
+    /// Names and sizes, for checks: none may be below zero.
     pub(crate) fn fields(&self) -> [(&'static str, f64); 8] {
+        // What an excess of -1 leaves is no variance.
+        let of_excess = |excess: f64| if excess > -1.0 { excess.abs() } else { excess };
         [
             ("accel_variance", self.accel_variance),
             ("gyro_variance", self.gyro_variance),
-            ("accel_reference_excess", self.accel_reference_excess),
-            ("gyro_reference_excess", self.gyro_reference_excess),
+            (
+                "accel_reference_excess",
+                of_excess(self.accel_reference_excess),
+            ),
+            (
+                "gyro_reference_excess",
+                of_excess(self.gyro_reference_excess),
+            ),
             ("accel_late", self.accel_late.abs()),
             ("gyro_late", self.gyro_late.abs()),
             ("accel_late_per_second", self.accel_late_per_second.abs()),

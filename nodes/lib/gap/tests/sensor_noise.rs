@@ -1,0 +1,63 @@
+//! What is taken for the noise of a sensor, and what it is taken for.
+#![allow(clippy::unwrap_used)]
+
+mod support;
+
+use cromosim_imu::{EffectKind as K, PerChannel};
+use support::judge::{answer, names, near};
+use support::motion::Motion;
+use support::{IMU_HZ, SIGMA, Scene};
+
+#[test]
+fn noise_beside_rest_is_no_unit() {
+    // A twentieth of a radian a second about one axis, and noise of as much in degrees.
+    let scene = Scene {
+        motion: Motion::sway(0.5),
+        declared: PerChannel::default(),
+        seconds: 30.0,
+        ..Scene::new(11)
+    };
+    let diagnosis = answer(&scene.with(K::GyroNoise, &[0.176]).record()).diagnosis;
+    let named = names(&diagnosis);
+    assert!(!named.contains(&"gyro_units"), "{named:?}");
+}
+
+#[test]
+fn less_noise_than_declared_is_simulated() {
+    let scene = Scene {
+        declared: PerChannel {
+            accelerometer: Some(3.0 * SIGMA[0]),
+            gyroscope: Some(3.0 * SIGMA[1]),
+        },
+        ..Scene::new(12)
+    };
+    let answer = answer(&scene.record());
+    assert_eq!(names(&answer.diagnosis), [""; 0]);
+    let noise = answer.effects.declared_noise;
+    // By the loudest of four bands, which scatter.
+    for (density, sigma) in [noise.accel_density, noise.gyro_density]
+        .into_iter()
+        .zip(SIGMA)
+    {
+        near(density * IMU_HZ.sqrt() / sigma, 1.05, 0.1, "noise");
+    }
+}
+
+#[test]
+fn motion_that_no_reference_resolves_is_no_noise() {
+    let scene = Scene {
+        motion: Motion::random(13).shivering(0.3, 13),
+        imu_hz: 50.0,
+        ..Scene::new(13)
+    };
+    let diagnosis = answer(&scene.record()).diagnosis;
+    let named = names(&diagnosis);
+    assert!(!named.contains(&"accel_noise"), "{named:?}");
+    // Noise of as much is.
+    let noisy = Scene {
+        motion: Motion::random(13),
+        ..scene
+    };
+    let diagnosis = answer(&noisy.with(K::AccelNoise, &[0.02]).record()).diagnosis;
+    assert_eq!(names(&diagnosis), ["accel_noise"]);
+}
