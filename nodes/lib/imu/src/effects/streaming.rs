@@ -8,7 +8,7 @@ use super::drawn_biases::DrawnBiases;
 use super::dropped_samples::Dropouts;
 use super::filter::Streamed;
 use super::tissue::{StreamedTissue, Turning};
-use super::{EffectKind, Reading, SensorModel, Stage, lever_arm};
+use super::{EffectKind, Reading, SensorModel, lever_arm};
 use crate::{Channel, Device, ImuError, ImuSample, KinematicSample, NoiseSource, PerChannel};
 
 /// A device's effects and white noise on samples as they come; the stages of [`SensorModel`],
@@ -148,44 +148,28 @@ impl StreamingEffects {
         if !(0.0..=10.0 / self.rate_hz).contains(&interval) {
             self.forget();
         }
-        let sensor_from_segment = sensor_from_segment(model, seconds);
-        let (mut reading, mut turning) = (Reading::default(), Turning::default());
-        let mut stamp = sample.stamp;
-        for stage in Stage::ORDER {
-            match stage {
-                Stage::Reference => {}
-                Stage::Segment => {
-                    turning = self.turning(sample);
-                    reading = self.segment(model, sample, &turning);
-                }
-                Stage::Tissue => {
-                    if let Some(tissue) = &mut self.tissue {
-                        reading.specific_force =
-                            tissue.push(reading.specific_force, &turning, interval);
-                    }
-                }
-                Stage::Sensor => {
-                    reading = model.turned(sensor_from_segment.as_ref(), &reading);
-                    self.shake_and_filter(model, &mut reading, seconds, interval);
-                }
-                Stage::Timing => {
-                    if let Some(delay) = &mut self.delay {
-                        reading.angular_velocity = delay.push(seconds, reading.angular_velocity);
-                    }
-                    stamp = model.epoch.plus_seconds(model.clock.stamp_seconds(seconds));
-                }
-                Stage::Linear => reading = model.linear_reading(&reading, seconds),
-                Stage::Digital => {
-                    if let Some(biases) = &mut self.biases {
-                        biases.add_to(&mut reading, stamp);
-                    }
-                    if let Some(noise) = &mut self.noise {
-                        noise.add_to(std::slice::from_mut(&mut reading));
-                    }
-                    model.digital(std::slice::from_mut(&mut reading));
-                }
-            }
+        // The stages in the order of Stage::ORDER, one after the other: a loop over them has the compiler compute what
+        // none of them changes ahead, on the values of effects that are not there.
+        let turning = self.turning(sample);
+        let mut reading = self.segment(model, sample, &turning);
+        if let Some(tissue) = &mut self.tissue {
+            reading.specific_force = tissue.push(reading.specific_force, &turning, interval);
         }
+        let sensor_from_segment = sensor_from_segment(model, seconds);
+        reading = model.turned(sensor_from_segment.as_ref(), &reading);
+        self.shake_and_filter(model, &mut reading, seconds, interval);
+        if let Some(delay) = &mut self.delay {
+            reading.angular_velocity = delay.push(seconds, reading.angular_velocity);
+        }
+        let stamp = model.epoch.plus_seconds(model.clock.stamp_seconds(seconds));
+        reading = model.linear_reading(&reading, seconds);
+        if let Some(biases) = &mut self.biases {
+            biases.add_to(&mut reading, stamp);
+        }
+        if let Some(noise) = &mut self.noise {
+            noise.add_to(std::slice::from_mut(&mut reading));
+        }
+        model.digital(std::slice::from_mut(&mut reading));
         (stamp, reading)
     }
 
@@ -226,7 +210,7 @@ impl StreamingEffects {
         }
     }
 
-    /// [`Stage::Segment`]; in segment axes.
+    /// [`super::Stage::Segment`]; in segment axes.
     fn segment(&self, model: &SensorModel, sample: &KinematicSample, turning: &Turning) -> Reading {
         let acceleration = sample.acceleration_in_world * model.inverse_scale;
         let mut specific_force =
