@@ -34,6 +34,12 @@ const LEAST_LIKENESS: f64 = 0.3;
 /// length: a turned mount or a poor reference halves a slope too, but not along with a good
 /// correlation.
 const LEAST_LIKENESS_FOR_LENGTH: f64 = 0.5;
+/// The same where the reference is louder than the readings by [`MUCH_TOO_LOUD`]: nothing but its units does that.
+const LEAST_LIKENESS_WHERE_LOUD: f64 = 0.1;
+/// Natural logarithm of how much louder: a hundred times; no source.
+const MUCH_TOO_LOUD: f64 = 4.6;
+/// Scatter of the acceleration's slope, see [`slope_off`].
+const SLOPE_SCATTER: f64 = 0.4;
 /// Cost of a device with other units, and of one with other gravity, in units of a slope's squared
 /// scatter.
 const UNUSUAL_DEVICE: f64 = 1.0;
@@ -236,6 +242,19 @@ fn gyro_axes(turns: &Turns) -> (Option<Matrix3<f64>>, f64) {
     (Some(u * v_t), known_factor(scale, Channel::Gyroscope))
 }
 
+/// How far a slope of the acceleration is off 1: noise and turned axes make it less in proportion; a smoothed
+/// reference makes it more, by factors.
+fn slope_off(slope: f64) -> f64 {
+    if slope > 1.0 { slope.ln() } else { slope - 1.0 }
+}
+
+/// What many units to one of the SI cost: the scatter of gravity's slope is a part of the unit, so that in fine
+/// units almost any slope would be near one of the three that gravity can have. Its logarithm, twice, as of a normal
+/// density's width.
+fn fine_units(factor: f64) -> f64 {
+    2.0 * factor.max(1.0).ln()
+}
+
 /// The known factor of a unit that a scale is, else 1.
 pub(crate) fn known_factor(scale: f64, channel: Channel) -> f64 {
     unit_factors(channel)
@@ -310,7 +329,13 @@ impl ForceSlopes {
         let likeness = self.likeness();
         // Of what is measured, in units of gravity's power.
         let unexplained = self.unexplained() / gg;
-        let lengths = if likeness > LEAST_LIKENESS_FOR_LENGTH {
+        let too_loud = self.loudness(1.0, GravityMode::Kept, 1.0) < -MUCH_TOO_LOUD;
+        let least_likeness = if too_loud {
+            LEAST_LIKENESS_WHERE_LOUD
+        } else {
+            LEAST_LIKENESS_FOR_LENGTH
+        };
+        let lengths = if likeness > least_likeness {
             length_factors()
         } else {
             &length_factors()[..1]
@@ -342,11 +367,12 @@ impl ForceSlopes {
                         .filter(|(is, _)| *is)
                         .map(|(_, cost)| cost)
                         .sum();
-                    // Scatter of the acceleration's slope: 0.4.
+                    let off = slope_off(of_a * length / accel) / SLOPE_SCATTER;
                     let cost = (of_g / accel - gravity.factor()).powi(2) / scatter
-                        + weight * ((of_a * length / accel - 1.0) / 0.4).powi(2)
+                        + weight * off.powi(2)
                         + (self.loudness(accel, gravity, length) / LOUDNESS_SCATTER).powi(2)
-                        + unusual;
+                        + unusual
+                        + fine_units(accel);
                     if cost < best {
                         best = cost;
                         scales = Scales {

@@ -396,7 +396,7 @@ impl PreparedPlacement {
 }
 
 /// The motion behind the poses of a reference.
-fn estimated(placement: &str, reference: &PoseSeries) -> Result<PoseEstimate, GapError> {
+pub(crate) fn estimated(placement: &str, reference: &PoseSeries) -> Result<PoseEstimate, GapError> {
     PoseEstimate::fit(
         &reference.stamps,
         &reference.positions,

@@ -9,7 +9,7 @@ use crate::coarse_alignment::CoarseAlignment;
 use crate::digital::{Digital, mask_clipped};
 use crate::error::GapError;
 use crate::library::Library;
-use crate::prepared::{PreparedPlacement, ReferenceReport};
+use crate::prepared::{PreparedPlacement, ReferenceReport, estimated};
 use crate::record::PlacementRecord;
 use crate::sensor_noise::declared_in_si;
 use crate::trace::trace;
@@ -40,8 +40,7 @@ impl Session {
         let mut prepared = PreparedPlacement::new(record)?;
         let raw = prepared.measured.clone();
         let mut track = prepared.track(&prepared.estimate);
-        let alignment = CoarseAlignment::find(&prepared, &track);
-        let report = reference_report(record, &alignment, library);
+        let (alignment, report) = aligned(record, &prepared, &track, library)?;
         if report.length_units != 1.0 || report.frames.is_some() {
             prepared.restore_reference(&record.reference, report)?;
             track = prepared.track(&prepared.estimate);
@@ -99,22 +98,34 @@ fn allowed_units(alignment: &CoarseAlignment, library: &Library) -> PerChannel<f
     })
 }
 
-/// How the reference reports its poses, as far as the library may name it.
-fn reference_report(
+/// The closed forms, and how the reference reports its poses as far as the library may name it.
+fn aligned(
     record: &PlacementRecord,
-    alignment: &CoarseAlignment,
+    prepared: &PreparedPlacement,
+    track: &KinematicTrack,
     library: &Library,
-) -> ReferenceReport {
-    let nominal = ReferenceReport::default();
-    ReferenceReport {
-        length_units: if library.allows_read_off(ReadOff::ReferenceLength) {
-            alignment.length_units
-        } else {
-            nominal.length_units
-        },
-        frames: library
-            .allows_read_off(ReadOff::ReferenceFrames)
-            .then(|| FrameGrid::find(&record.reference))
-            .flatten(),
-    }
+) -> Result<(CoarseAlignment, ReferenceReport), GapError> {
+    let frames = library
+        .allows_read_off(ReadOff::ReferenceFrames)
+        .then(|| FrameGrid::find(&record.reference))
+        .flatten();
+    // Chords between frames have accelerations at their ends alone: units are told by the frames'.
+    let of_frames = match &frames {
+        Some(frames) => {
+            let estimate = estimated(&prepared.name, &frames.frames(&record.reference))?;
+            Some(prepared.track(&estimate))
+        }
+        None => None,
+    };
+    let alignment = CoarseAlignment::find(prepared, of_frames.as_ref().unwrap_or(track));
+    let length_units = if library.allows_read_off(ReadOff::ReferenceLength) {
+        alignment.length_units
+    } else {
+        1.0
+    };
+    let report = ReferenceReport {
+        length_units,
+        frames,
+    };
+    Ok((alignment, report))
 }

@@ -77,6 +77,26 @@ impl Motion {
         }
     }
 
+    /// To and fro at one frequency, widely: some 5 m/s2, and a radian a second about all axes.
+    pub fn swing(hz: f64) -> Self {
+        let rate = TAU * hz;
+        let term = |amplitude: Vector3<f64>, phase: Vector3<f64>| Term {
+            hz,
+            amplitude,
+            phase,
+        };
+        Self {
+            position: vec![term(
+                Vector3::new(4.0, 5.0, 3.0) / rate.powi(2),
+                Vector3::new(0.3, 1.2, 2.5),
+            )],
+            rotation: vec![term(
+                Vector3::new(0.9, 0.7, 1.0) / rate,
+                Vector3::new(0.1, 2.0, 4.1),
+            )],
+        }
+    }
+
     /// The same with a shiver that no reference resolves: forty lines from 6 to 24 Hz, their accelerations (m/s2
     /// in all) in proportion to the frequency.
     #[must_use]

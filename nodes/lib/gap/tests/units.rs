@@ -1,0 +1,36 @@
+//! Units beside what makes a reference poor.
+#![allow(clippy::unwrap_used)]
+
+mod support;
+
+use cromosim_imu::EffectKind as K;
+use support::Scene;
+use support::judge::{answer, names, names_exactly};
+use support::motion::Motion;
+
+#[test]
+fn frames_in_other_units_are_told_from_a_device_in_other_units() {
+    for (units, seed) in [(1000.0, 21), (39.370_078_740_157_48, 22)] {
+        let scene = Scene::new(seed)
+            .with(K::ReferenceUnits, &[units])
+            .with(K::ReferenceInterpolation, &[11.9]);
+        names_exactly(&answer(&scene.record()).diagnosis, &scene.effects);
+    }
+}
+
+#[test]
+fn a_smoothed_reference_is_in_metres() {
+    // What is left of the acceleration is 1 / 2.4 to 1 / 2.8: as of inches beside thousandths of g.
+    for (cutoff_hz, seed) in [(0.86, 23), (0.89, 24), (0.92, 25)] {
+        let scene = Scene {
+            motion: Motion::swing(1.0),
+            ..Scene::new(seed)
+        };
+        let scene = scene.with(K::ReferenceSmoothing, &[cutoff_hz, 0.0]);
+        let diagnosis = answer(&scene.record()).diagnosis;
+        let named = names(&diagnosis);
+        for other in ["reference_units", "accel_units", "gravity_convention"] {
+            assert!(!named.contains(&other), "{cutoff_hz} Hz: {named:?}");
+        }
+    }
+}
