@@ -2,17 +2,21 @@
 //! fit can go on from.
 
 use cromosim_imu::{
-    Channel, Effect, EffectError, EffectSet, GRAVITY_IN_WORLD, GravityMode, PerChannel, Reading,
-    length_factors, nearest_signed_permutation, unit_factors,
+    Channel, Effect, EffectError, EffectSet, GravityMode, PerChannel, Reading,
+    nearest_signed_permutation,
 };
 use cromosim_spatial::{KinematicTrack, so3};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
+use crate::force_slopes::{ForceSlopes, known_factor};
 use crate::lag::lag_of_angular_speeds;
 use crate::prepared::PreparedPlacement;
 
-/// Lags below this are left to the search, s.
-const LEAST_LAG_S: f64 = 0.1;
+/// Lags above this are certain, s.
+const CERTAIN_LAG_S: f64 = 0.1;
+/// From here on the search starts with the lag, too, and without it, s: a filter is as late as that; and steps from no lag
+/// may not reach it, as motion of 4 Hz has turned round in 0.12 s.
+const LEAST_LAG_S: f64 = 0.03;
 /// Part of the angular velocity's square that may stay unexplained without a lag, and over that with the lag that
 /// the speeds tell, where no lag is believed; no source. A lag of a twentieth of a period leaves a tenth.
 const ON_TIME: f64 = 0.5;
@@ -30,32 +34,6 @@ const LEAST_SPREAD: f64 = 0.0025;
 /// Smallest over largest singular value below which readings have too little to do with the
 /// reference to have axes.
 const LEAST_LIKENESS: f64 = 0.3;
-/// Squared correlation of the accelerations below which nothing is told of the reference's units of
-/// length: a turned mount or a poor reference halves a slope too, but not along with a good
-/// correlation.
-const LEAST_LIKENESS_FOR_LENGTH: f64 = 0.5;
-/// The same where the reference is louder than the readings by [`MUCH_TOO_LOUD`]: nothing but its units does that.
-const LEAST_LIKENESS_WHERE_LOUD: f64 = 0.1;
-/// Natural logarithm of how much louder: a hundred times; no source.
-const MUCH_TOO_LOUD: f64 = 4.6;
-/// Scatter of the acceleration's slope, see [`slope_off`].
-const SLOPE_SCATTER: f64 = 0.4;
-/// Cost of a device with other units, and of one with other gravity, in units of a slope's squared
-/// scatter.
-const UNUSUAL_DEVICE: f64 = 1.0;
-/// Cost of a reference that is not in metres: it is met less often.
-const UNUSUAL_LENGTH: f64 = 1.5;
-/// Scatter of the ratio of the measured and the predicted specific forces' root mean squares (natural
-/// logarithm): a filter, a smoothing or a mass on a spring changes it by a factor of two, units of
-/// either by ten and more.
-const LOUDNESS_SCATTER: f64 = 0.7;
-/// Scatter of gravity's slope, in units of gravity, where the reference explains the readings.
-const GRAVITY_SCATTER: f64 = 0.15;
-/// Squared correlation with gravity's direction that what the reference does not explain (an effect
-/// beyond every formula, fast motion that a smoothing took away) may well have: it moves the slope.
-const CHANCE_LIKENESS: f64 = 0.2;
-/// A scale is a known unit's factor when it is within 12 % of it (natural logarithm).
-const FACTOR_TOLERANCE: f64 = 0.12;
 
 /// What the closed forms say.
 #[derive(Clone, Debug)]
@@ -116,12 +94,22 @@ impl CoarseAlignment {
     }
 
     /// Sets of effects to start the search from: what is certain, with the axes as they are, as a
-    /// signed permutation, or as a rotation.
+    /// signed permutation, or as a rotation; without a lag first where that is not certain.
     pub fn starts(&self) -> Vec<EffectSet> {
-        let mut certain = EffectSet::new();
-        if self.lag_s.abs() > LEAST_LAG_S {
-            insert_valid(&mut certain, Effect::time_offset(self.lag_s));
+        let mut late = EffectSet::new();
+        insert_valid(&mut late, Effect::time_offset(self.lag_s));
+        match self.lag_s.abs() {
+            lag_s if lag_s > CERTAIN_LAG_S => self.starts_with(late),
+            lag_s if lag_s > LEAST_LAG_S => {
+                let mut starts = self.starts_with(EffectSet::new());
+                starts.extend(self.starts_with(late));
+                starts
+            }
+            _ => self.starts_with(EffectSet::new()),
         }
+    }
+
+    fn starts_with(&self, mut certain: EffectSet) -> Vec<EffectSet> {
         if self.gravity != GravityMode::Kept {
             insert_valid(&mut certain, Effect::gravity_convention(self.gravity));
         }
@@ -240,183 +228,4 @@ fn gyro_axes(turns: &Turns) -> (Option<Matrix3<f64>>, f64) {
         return (None, 1.0);
     }
     (Some(u * v_t), known_factor(scale, Channel::Gyroscope))
-}
-
-/// How far a slope of the acceleration is off 1: noise and turned axes make it less in proportion; a smoothed
-/// reference makes it more, by factors.
-fn slope_off(slope: f64) -> f64 {
-    if slope > 1.0 { slope.ln() } else { slope - 1.0 }
-}
-
-/// What many units to one of the SI cost: the scatter of gravity's slope is a part of the unit, so that in fine
-/// units almost any slope would be near one of the three that gravity can have. Its logarithm, twice, as of a normal
-/// density's width.
-fn fine_units(factor: f64) -> f64 {
-    2.0 * factor.max(1.0).ln()
-}
-
-/// The known factor of a unit that a scale is, else 1.
-pub(crate) fn known_factor(scale: f64, channel: Channel) -> f64 {
-    unit_factors(channel)
-        .iter()
-        .copied()
-        .find(|factor| (scale / factor).ln().abs() < FACTOR_TOLERANCE)
-        .unwrap_or(1.0)
-}
-
-/// Factors of the accelerometer's units, gravity, and units per metre of the reference.
-struct Scales {
-    accel: f64,
-    gravity: GravityMode,
-    length: f64,
-}
-
-/// Inner products of the measured specific force y, the reference's acceleration `R^T a` and its
-/// gravity `-R^T g`, for the slopes of `y = s_a R^T a + s_g (-R^T g)`.
-#[derive(Default)]
-struct ForceSlopes {
-    aa: f64,
-    ag: f64,
-    gg: f64,
-    ya: f64,
-    yg: f64,
-    yy: f64,
-}
-
-impl ForceSlopes {
-    fn new(rows: &[(&Reading, usize)], track: &KinematicTrack, turn: &Matrix3<f64>) -> Self {
-        let mut sums = Self::default();
-        for (reading, entry) in rows {
-            let a = turn * track.acceleration_in_segment[*entry];
-            let g = turn * (track.world_from_segment[*entry].inverse() * -GRAVITY_IN_WORLD);
-            let y = reading.specific_force;
-            sums.aa += a.dot(&a);
-            sums.ag += a.dot(&g);
-            sums.gg += g.dot(&g);
-            sums.ya += y.dot(&a);
-            sums.yg += y.dot(&g);
-            sums.yy += y.dot(&y);
-        }
-        sums
-    }
-
-    /// The slopes `s_a`, `s_g`; none at rest.
-    fn slopes(&self) -> Option<(f64, f64)> {
-        let Self {
-            aa, ag, gg, ya, yg, ..
-        } = *self;
-        let determinant = aa * gg - ag * ag;
-        (gg > 0.0 && determinant > 1e-9 * gg * gg).then(|| {
-            (
-                (ya * gg - yg * ag) / determinant,
-                (yg * aa - ya * ag) / determinant,
-            )
-        })
-    }
-
-    /// Sum of squares of the measured specific force that no slopes explain.
-    fn unexplained(&self) -> f64 {
-        let explained = |(of_a, of_g): (f64, f64)| of_a * self.ya + of_g * self.yg;
-        (self.yy - self.slopes().map_or(0.0, explained)).max(0.0)
-    }
-
-    /// The known factors that the slopes are nearest to.
-    fn scales(&self) -> Scales {
-        let Self { aa, gg, .. } = *self;
-        let Some((of_a, of_g)) = self.slopes() else {
-            return self.at_rest();
-        };
-        let likeness = self.likeness();
-        // Of what is measured, in units of gravity's power.
-        let unexplained = self.unexplained() / gg;
-        let too_loud = self.loudness(1.0, GravityMode::Kept, 1.0) < -MUCH_TOO_LOUD;
-        let least_likeness = if too_loud {
-            LEAST_LIKENESS_WHERE_LOUD
-        } else {
-            LEAST_LIKENESS_FOR_LENGTH
-        };
-        let lengths = if likeness > least_likeness {
-            length_factors()
-        } else {
-            &length_factors()[..1]
-        };
-        let mut best = f64::INFINITY;
-        let mut scales = self.at_rest();
-        for &length in lengths {
-            // An acceleration that is small in the reference weighs little, and so does one that is
-            // not found again in the readings.
-            let in_metres = aa / length.powi(2);
-            for &accel in unit_factors(Channel::Accelerometer) {
-                // In other units as much of it has to be in the readings as the slope says.
-                let in_readings = if length == 1.0 {
-                    0.0
-                } else {
-                    aa * (of_a / accel).powi(2)
-                };
-                let weight = likeness * (in_metres.max(in_readings) / gg * 50.0).min(1.0);
-                let scatter =
-                    GRAVITY_SCATTER.powi(2) + CHANCE_LIKENESS * unexplained / accel.powi(2);
-                for gravity in GravityMode::ALL {
-                    let unusual = [
-                        (accel != 1.0, UNUSUAL_DEVICE),
-                        (gravity != GravityMode::Kept, UNUSUAL_DEVICE),
-                        (length != 1.0, UNUSUAL_LENGTH),
-                    ];
-                    let unusual: f64 = unusual
-                        .iter()
-                        .filter(|(is, _)| *is)
-                        .map(|(_, cost)| cost)
-                        .sum();
-                    let off = slope_off(of_a * length / accel) / SLOPE_SCATTER;
-                    let cost = (of_g / accel - gravity.factor()).powi(2) / scatter
-                        + weight * off.powi(2)
-                        + (self.loudness(accel, gravity, length) / LOUDNESS_SCATTER).powi(2)
-                        + unusual
-                        + fine_units(accel);
-                    if cost < best {
-                        best = cost;
-                        scales = Scales {
-                            accel,
-                            gravity,
-                            length,
-                        };
-                    }
-                }
-            }
-        }
-        scales
-    }
-
-    /// Natural logarithm of the ratio of the measured and the predicted root mean square.
-    fn loudness(&self, accel: f64, gravity: GravityMode, length: f64) -> f64 {
-        let (of_a, of_g) = (accel / length, accel * gravity.factor());
-        let predicted = of_a * of_a * self.aa + 2.0 * of_a * of_g * self.ag + of_g * of_g * self.gg;
-        0.5 * (self.yy.max(f64::MIN_POSITIVE) / predicted.max(f64::MIN_POSITIVE)).ln()
-    }
-
-    /// Without acceleration: gravity alone tells.
-    fn at_rest(&self) -> Scales {
-        let slope = if self.gg > 0.0 {
-            self.yg / self.gg
-        } else {
-            1.0
-        };
-        Scales {
-            accel: known_factor(slope.abs(), Channel::Accelerometer),
-            gravity: if slope < 0.0 {
-                GravityMode::Negated
-            } else {
-                GravityMode::Kept
-            },
-            length: 1.0,
-        }
-    }
-
-    /// Squared correlation of what is measured with the reference's acceleration, gravity taken out
-    /// of both.
-    fn likeness(&self) -> f64 {
-        let y = self.yy - self.yg * self.yg / self.gg;
-        let a = self.aa - self.ag * self.ag / self.gg;
-        (self.ya - self.yg * self.ag / self.gg).powi(2) / (y * a).max(f64::MIN_POSITIVE)
-    }
 }

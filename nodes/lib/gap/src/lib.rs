@@ -20,6 +20,7 @@ mod evidence;
 mod fill;
 mod findings;
 mod fit;
+mod force_slopes;
 mod gauss_newton;
 mod gram;
 mod identify;

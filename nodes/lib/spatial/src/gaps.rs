@@ -50,36 +50,7 @@ pub(crate) fn fill_gaps(
     gaps: &[Range<usize>],
     filling: &Filling<'_>,
 ) -> Vec<FillErrors> {
-    let Filling {
-        spectrum,
-        transform,
-        rate_hz,
-        ..
-    } = *filling;
-    let length = transform.length();
-    let positive = || {
-        spectrum
-            .density
-            .iter()
-            .copied()
-            .filter(|value| *value > 0.0)
-    };
-    let least = positive()
-        .fold(f64::INFINITY, f64::min)
-        .max(LEAST_DENSITY * positive().fold(0.0, f64::max));
-    let mut kernel: Vec<Complex64> = (0..length)
-        .map(|k| {
-            let frequency_hz = k.min(length - k) as f64 * rate_hz / length as f64;
-            Complex64::new(
-                least
-                    / spectrum
-                        .at(frequency_hz.max(spectrum.spacing_hz))
-                        .max(least),
-                0.0,
-            )
-        })
-        .collect();
-    transform.inverse(&mut kernel);
+    let (kernel, least) = inverse_covariance(filling);
     // Never cut short: what is smooth and large has to cancel over its whole length.
     let kernel = |distance: usize| kernel[distance].re;
     let count = series[0].len();
@@ -110,9 +81,44 @@ pub(crate) fn fill_gaps(
             values[gap.clone()].copy_from_slice(&filled);
         }
         // C^-1 is the matrix over `least rate / 2`.
-        errors(&factor, least * rate_hz / 2.0, gap, count, filling)
+        errors(&factor, least * filling.rate_hz / 2.0, gap, count, filling)
     };
     gaps.iter().map(fill).collect()
+}
+
+/// The first column of C^-1, times the least density that counts, which comes with it.
+fn inverse_covariance(filling: &Filling<'_>) -> (Vec<Complex64>, f64) {
+    let Filling {
+        spectrum,
+        transform,
+        rate_hz,
+        ..
+    } = *filling;
+    let length = transform.length();
+    let positive = || {
+        spectrum
+            .density
+            .iter()
+            .copied()
+            .filter(|value| *value > 0.0)
+    };
+    let least = positive()
+        .fold(f64::INFINITY, f64::min)
+        .max(LEAST_DENSITY * positive().fold(0.0, f64::max));
+    let mut kernel: Vec<Complex64> = (0..length)
+        .map(|k| {
+            let frequency_hz = k.min(length - k) as f64 * rate_hz / length as f64;
+            Complex64::new(
+                least
+                    / spectrum
+                        .at(frequency_hz.max(spectrum.spacing_hz))
+                        .max(least),
+                0.0,
+            )
+        })
+        .collect();
+    transform.inverse(&mut kernel);
+    (kernel, least)
 }
 
 /// The variances that the conditional covariance `scale factor^-1` of a gap's entries leaves, less their own

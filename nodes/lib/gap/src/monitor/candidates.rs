@@ -9,7 +9,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::columns;
 use super::lag::Lag;
 use super::scene::Scene;
-use crate::coarse_alignment::known_factor;
+use crate::force_slopes::known_factor;
 
 /// Effects of one channel that have columns.
 const BIAS: PerChannel<EffectKind> = PerChannel {

@@ -1,0 +1,22 @@
+//! IMUs that are late by a part of what the motion takes to turn round.
+#![allow(clippy::unwrap_used)]
+
+mod support;
+
+use cromosim_imu::EffectKind as K;
+use support::Scene;
+use support::judge::{answer, names_exactly};
+use support::motion::Motion;
+
+#[test]
+fn a_lag_of_a_third_of_a_period_is_no_low_pass() {
+    // Motion up to 8 Hz turns round in 0.06 s.
+    for (seconds, seed) in [(0.05, 31), (0.0886, 32), (-0.0886, 33), (0.095, 34)] {
+        let scene = Scene {
+            motion: Motion::random(seed).faster(2.0),
+            ..Scene::new(seed)
+        };
+        let scene = scene.with(K::TimeOffset, &[seconds]);
+        names_exactly(&answer(&scene.record()).diagnosis, &scene.effects);
+    }
+}
