@@ -49,9 +49,10 @@ pub(crate) fn try_smoothing<'a>(
     let Some(smoothing) = trial.best_smoothing() else {
         return (model, scored);
     };
+    if reaches_no_motion(&smoothing, 1.0) {
+        return (model, scored);
+    }
     let undone = with_undone_smoothing(&model, &starts[0], smoothing);
-    // A cutoff that no motion reaches explains nothing; this search decides whether something
-    // beside it does.
     let searched = search(&undone, &sets, library, BESIDE);
     let gained = evidence(&undone, &searched);
     trace(|| {
@@ -60,9 +61,6 @@ pub(crate) fn try_smoothing<'a>(
             names(&searched.fit.set),
         )
     });
-    if smoothing.cutoff_hz > CUTOFFS_HZ[CUTOFFS_HZ.len() - 1] {
-        return (model, scored);
-    }
     let needed = trial.plain + LEAST_GAIN_NATS + LEAST_SHARE * excess(&model, &scored.fit);
     let beside = score(&model, searched.fit.set.clone());
     if gained > needed && comes_closer(&model, &beside, &searched) {
@@ -70,6 +68,11 @@ pub(crate) fn try_smoothing<'a>(
     } else {
         (model, scored)
     }
+}
+
+/// Whether a cutoff is above all that explain something, and would be were it lower by a factor.
+fn reaches_no_motion(smoothing: &ZeroPhaseSmoothing, factor: f64) -> bool {
+    smoothing.cutoff_hz > factor * CUTOFFS_HZ[CUTOFFS_HZ.len() - 1]
 }
 
 /// What cutoffs are tried beside.
@@ -94,6 +97,10 @@ impl Trial<'_, '_> {
         } else {
             butterworth
         };
+        // Then nothing finer does, either.
+        if reaches_no_motion(&better.1, FINE.iter().product()) {
+            return None;
+        }
         Some(self.refined(better, &FINE).1)
     }
 

@@ -319,6 +319,7 @@ impl<const L: usize> Adaptation<L> {
     }
 
     /// The share of the residuals that is not free, of noise behind a low-pass.
+    #[inline(always)]
     fn take_low_passed(
         &self,
         low_passed: &LowPassedSamples,
