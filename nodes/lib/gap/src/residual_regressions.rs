@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use cromosim_imu::{Channel, Dependence, Reading};
+use cromosim_imu::{Channel, Dependence, PerChannel, Reading};
 use cromosim_spatial::Stamp;
 use nalgebra::Vector3;
 
@@ -11,6 +11,7 @@ use crate::findings::Findings;
 use crate::fit::{Fit, FitModel, slices};
 use crate::gram::Linear;
 use crate::policy::unknown::REGRESSION_NATS;
+use crate::whiten::Whitener;
 
 /// Root mean square of a regressor, in units of the white noise, below which it is left out.
 const LEAST_MOTION: f64 = 0.02;
@@ -68,13 +69,8 @@ pub(crate) fn residual_regression(
     if dependence != Dependence::Time && !moving() {
         return None;
     }
-    let columns: Vec<Vec<f64>> = regressors(model, fit, dependence, channel)
-        .iter()
-        .map(|column| whitened(model, column))
-        .collect();
-    let gain = with_regressions(model, fit, &[&columns]).held_out
-        - fit.linear.held_out
-        - COLUMN_NATS * columns.len() as f64;
+    let columns = all_whitened(model, &regressors(model, fit, dependence, channel));
+    let gain = gain(model, fit, &columns);
     Some(ResidualRegression {
         dependence,
         channel,
@@ -85,6 +81,36 @@ pub(crate) fn residual_regression(
         },
         gain,
     })
+}
+
+/// What a residual gains by the rate of change of the readings themselves, nats. That of their prediction holds the
+/// reference's errors, and so does the residual: it goes with their second differences whatever the device does.
+/// The readings hold none of them. Their own noise, which the residual holds as well, is kept out as far as the
+/// reference's filters keep out all beyond the motion's band.
+pub(crate) fn gain_by_measured_changes(model: &FitModel, fit: &Fit, channel: Channel) -> f64 {
+    let columns = changes(&model.prepared.measured, axes_of_channel(channel));
+    let spacing_hz = model.noise.spacing_hz;
+    let passed = PerChannel::from_fn(|channel| {
+        let hz = (0..model.noise.power[channel].len()).map(|k| k as f64 * spacing_hz);
+        let through = hz.map(|hz| model.basis.estimate.filter_at(hz));
+        match channel {
+            Channel::Accelerometer => through.map(|(position, ..)| position).collect(),
+            Channel::Gyroscope => through
+                .map(|(_, rotation, _)| rotation)
+                .collect::<Vec<f64>>(),
+        }
+    });
+    let whitener = model.whitener.behind(&passed);
+    let columns = columns.iter();
+    let columns = columns.map(|column| whitened(model, &whitener, column));
+    gain(model, fit, &columns.collect())
+}
+
+/// Held-out gain of columns beside a fit, nats, less their price.
+fn gain(model: &FitModel, fit: &Fit, columns: &Vec<Vec<f64>>) -> f64 {
+    with_regressions(model, fit, &[columns]).held_out
+        - fit.linear.held_out
+        - COLUMN_NATS * columns.len() as f64
 }
 
 /// What a residual depends on, in the words of diagnosis.json.
@@ -137,8 +163,14 @@ pub(crate) fn with_regressions(model: &FitModel, fit: &Fit, families: &[&Vec<Vec
     model.extended(fit, None, &columns, &prior).solve()
 }
 
+fn all_whitened(model: &FitModel, columns: &[Column]) -> Vec<Vec<f64>> {
+    let columns = columns.iter();
+    let whitened = columns.map(|column| whitened(model, &model.whitener, column));
+    whitened.collect()
+}
+
 /// Scaled to a root mean square of the axis' white noise.
-fn whitened(model: &FitModel, (axis, values): &Column) -> Vec<f64> {
+fn whitened(model: &FitModel, whitener: &Whitener, (axis, values): &Column) -> Vec<f64> {
     let rms = (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64)
         .sqrt()
         .max(1e-12);
@@ -150,9 +182,7 @@ fn whitened(model: &FitModel, (axis, values): &Column) -> Vec<f64> {
         0.0
     };
     let axes = std::array::from_fn(|other| other == *axis);
-    model
-        .whitener
-        .apply(&model.prepared.scattered(axes, |k, _| values[k] * factor))
+    whitener.apply(&model.prepared.scattered(axes, |k, _| values[k] * factor))
 }
 
 /// The regressors of one family, before they are whitened.
@@ -170,12 +200,12 @@ fn regressors(
         Dependence::OtherChannelSquared => other_channel_squared(readings, channel),
         Dependence::Orientation => orientation(model, axes),
         Dependence::OtherAxes => all_axes(readings, channel),
-        Dependence::RateOfChange => changes(fit, axes),
+        Dependence::RateOfChange => changes(readings, axes),
         Dependence::Time => over_time(fit, axes, &|_, _| 1.0),
         Dependence::GainOverTime => {
             over_time(fit, axes, &|axis, k| value_on_axis(&readings[k], axis))
         }
-        Dependence::DelayOverTime => over_time(fit, axes, &|axis, k| change(fit, axis, k)),
+        Dependence::DelayOverTime => over_time(fit, axes, &|axis, k| change(readings, axis, k)),
         Dependence::MountOverTime => mount_over_time(fit, channel),
     }
 }
@@ -272,9 +302,8 @@ fn orientation(model: &FitModel, axes: Range<usize>) -> Vec<Column> {
         .collect()
 }
 
-/// First and second differences of the prediction: delays and filters.
-fn changes(fit: &Fit, axes: Range<usize>) -> Vec<Column> {
-    let readings = &fit.prediction.readings;
+/// First and second differences of the prediction, or of the readings themselves: delays and filters.
+fn changes(readings: &[Reading], axes: Range<usize>) -> Vec<Column> {
     let second = |axis: usize, k: usize| {
         let at = |k: usize| value_on_axis(&readings[k.min(readings.len() - 1)], axis);
         at(k + 1) - 2.0 * at(k) + at(k.saturating_sub(1))
@@ -282,16 +311,18 @@ fn changes(fit: &Fit, axes: Range<usize>) -> Vec<Column> {
     let count = readings.len();
     axes.flat_map(|axis| {
         [
-            (axis, (0..count).map(|k| change(fit, axis, k)).collect()),
+            (
+                axis,
+                (0..count).map(|k| change(readings, axis, k)).collect(),
+            ),
             (axis, (0..count).map(|k| second(axis, k)).collect()),
         ]
     })
     .collect()
 }
 
-/// Central difference of the prediction.
-fn change(fit: &Fit, axis: usize, k: usize) -> f64 {
-    let readings = &fit.prediction.readings;
+/// Central difference.
+fn change(readings: &[Reading], axis: usize, k: usize) -> f64 {
     value_on_axis(&readings[(k + 1).min(readings.len() - 1)], axis)
         - value_on_axis(&readings[k.saturating_sub(1)], axis)
 }

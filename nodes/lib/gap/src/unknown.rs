@@ -17,7 +17,8 @@ use crate::policy::unknown::{
 };
 use crate::prepared::PreparedPlacement;
 use crate::residual_regressions::{
-    ResidualRegression, dependence_name, residual_regression, residual_regressions,
+    ResidualRegression, dependence_name, gain_by_measured_changes, residual_regression,
+    residual_regressions,
 };
 use crate::search::excess;
 use crate::trace::trace;
@@ -65,11 +66,18 @@ struct Structure<'a> {
 
 /// What is left of a fit, and what was judged beside it. It holds for as long as the fit does.
 pub(crate) struct Rest {
+    seen: Seen,
+    /// Of the fit's members.
+    standings: Standings,
+}
+
+/// What is left of a fit.
+struct Seen {
     diagnostics: ResidualDiagnostics,
     /// The strongest first.
     regressions: Vec<ResidualRegression>,
-    /// Of the fit's members.
-    standings: Standings,
+    /// Channels whose readings' own rate of change tells what that of the prediction does.
+    changes_tell: PerChannel<bool>,
 }
 
 impl Rest {
@@ -79,9 +87,13 @@ impl Rest {
         let mut regressions = residual_regressions(findings);
         regressions.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         trace_regressions(&diagnostics, &regressions);
+        let changes_tell = changes_tell(findings, &regressions);
         Self {
-            diagnostics,
-            regressions,
+            seen: Seen {
+                diagnostics,
+                regressions,
+                changes_tell,
+            },
             standings: Standings::new(),
         }
     }
@@ -93,8 +105,8 @@ pub(crate) fn detect_unmodelled_structure(
     rest: &mut Rest,
     suspects: Suspects,
 ) -> Option<Unknown> {
-    let (diagnostics, regressions) = (&rest.diagnostics, &rest.regressions);
-    let structure = Structure::new(findings, diagnostics, regressions);
+    let structure = Structure::new(findings, &rest.seen);
+    let (diagnostics, regressions) = (&rest.seen.diagnostics, &rest.seen.regressions);
     if !structure.is_there()
         || (structure.is_loud_alone() && !is_loud_behind_wider_filters(findings, diagnostics))
         || (structure.is_regression_alone(&findings.model)
@@ -150,11 +162,8 @@ pub(crate) fn detect_unmodelled_structure(
 }
 
 impl<'a> Structure<'a> {
-    fn new(
-        findings: &Findings,
-        diagnostics: &'a ResidualDiagnostics,
-        regressions: &'a [ResidualRegression],
-    ) -> Self {
+    fn new(findings: &Findings, seen: &'a Seen) -> Self {
+        let (diagnostics, regressions) = (&seen.diagnostics, &seen.regressions);
         let model = &findings.model;
         let factor = bar_factor(model);
         let strong: Vec<&ResidualRegression> = regressions
@@ -163,7 +172,7 @@ impl<'a> Structure<'a> {
                 let needed = REGRESSION_NATS * factor * longer_than_usual(findings);
                 regression.gain > needed
                     && !is_coarse(model, regression.channel)
-                    && !may_be_references(diagnostics, regression)
+                    && !may_be_references(seen, regression)
             })
             .collect();
         let stuck = PerChannel::from_fn(|channel| {
@@ -297,10 +306,28 @@ fn bar_factor(model: &FitModel) -> f64 {
 }
 
 /// Whether a regression may be on errors of the reference: what its filters keep out of the motion goes with
-/// the motion's rate of change as what a delay leaves does, and is no louder than is expected of it.
-fn may_be_references(diagnostics: &ResidualDiagnostics, regression: &ResidualRegression) -> bool {
+/// the motion's rate of change as what a delay leaves does, and is no louder than is expected of it; what they
+/// let through is in the prediction's rate of change, and not in the readings'.
+fn may_be_references(seen: &Seen, regression: &ResidualRegression) -> bool {
+    let channel = regression.channel;
     regression.dependence == Dependence::RateOfChange
-        && diagnostics.band[regression.channel] < ORDINARY_BAND
+        && (seen.diagnostics.band[channel] < ORDINARY_BAND || !seen.changes_tell[channel])
+}
+
+/// Channels in which a strong regression on the prediction's rate of change keeps its gain on the readings' own.
+fn changes_tell(findings: &Findings, regressions: &[ResidualRegression]) -> PerChannel<bool> {
+    let (model, fit) = (&findings.model, &findings.scored.fit);
+    PerChannel::from_fn(|channel| {
+        let found = regressions.iter().find(|regression| {
+            regression.dependence == Dependence::RateOfChange && regression.channel == channel
+        });
+        let Some(of_prediction) = found.filter(|found| found.gain > REGRESSION_NATS) else {
+            return false;
+        };
+        let gain = gain_by_measured_changes(model, fit, channel);
+        trace(|| eprintln!("by measured changes {gain:.0} of {:.0}", of_prediction.gain));
+        gain > STAYS * of_prediction.gain
+    })
 }
 
 /// Rounding errors of slow motion are no noise at all.

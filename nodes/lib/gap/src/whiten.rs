@@ -135,6 +135,18 @@ impl Whitener {
         values.iter().map(|value| value.re).collect()
     }
 
+    /// The same behind a zero-phase filter of each channel, stated at the transform's frequencies.
+    #[must_use]
+    pub fn behind(&self, filter: &PerChannel<Vec<f64>>) -> Self {
+        let mut filtered = self.clone();
+        for channel in Channel::ALL {
+            let gain = filtered.gain[channel].iter_mut();
+            gain.zip(&filter[channel])
+                .for_each(|(gain, own)| *gain *= own);
+        }
+        filtered
+    }
+
     /// Six series on the sample grid in units of the predicted noise, one behind the other, times the square
     /// root of their weights. What is not compared may have any value; an empty series is one of zeros.
     pub fn apply(&self, series: &[Vec<f64>]) -> Vec<f64> {
