@@ -5,11 +5,12 @@ use cromosim_imu::{
     Channel, Effect, EffectError, EffectSet, GravityMode, PerChannel, Reading,
     nearest_signed_permutation,
 };
-use cromosim_spatial::{KinematicTrack, so3};
+use cromosim_spatial::{KinematicTrack, PoseNoise, so3};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use crate::force_slopes::{ForceSlopes, known_factor};
 use crate::lag::lag_of_angular_speeds;
+use crate::policy::report::REFERENCE_NOISE;
 use crate::prepared::PreparedPlacement;
 
 /// Lags above this are certain, s.
@@ -34,6 +35,10 @@ const LEAST_SPREAD: f64 = 0.0025;
 /// Smallest over largest singular value below which readings have too little to do with the
 /// reference to have axes.
 const LEAST_LIKENESS: f64 = 0.3;
+
+/// White noise of positions, "m", that is taken for millimetres where the rotation scatters as ordinarily, and
+/// nothing moves: 50 m away, a cluster of markers of 50 mm would have it. No source.
+const MILLIMETRES_NOISE: f64 = 0.05;
 
 /// What the closed forms say.
 #[derive(Clone, Debug)]
@@ -76,11 +81,16 @@ impl CoarseAlignment {
         let slopes = |turn: &Matrix3<f64>| ForceSlopes::new(&rows, track, turn);
         let as_it_is = slopes(&Matrix3::identity());
         // Angular velocities about one axis tell axes badly: what leaves less of the force unexplained holds.
-        let scales = axes
+        let slopes = axes
             .map(|axes| slopes(&axes))
             .filter(|turned| turned.unexplained() <= as_it_is.unexplained())
-            .unwrap_or(as_it_is)
-            .scales();
+            .unwrap_or(as_it_is);
+        let scales = slopes.scales();
+        let length_units = if slopes.tells_length() {
+            scales.length
+        } else {
+            length_units_at_rest(prepared.estimate.noise())
+        };
         Self {
             lag_s,
             units: PerChannel {
@@ -88,7 +98,7 @@ impl CoarseAlignment {
                 gyroscope: gyro,
             },
             gravity: scales.gravity,
-            length_units: scales.length,
+            length_units,
             axes,
         }
     }
@@ -134,6 +144,13 @@ impl CoarseAlignment {
         }
         starts
     }
+}
+
+/// Units per metre of a reference at rest, by its noise alone.
+fn length_units_at_rest(noise: PoseNoise) -> f64 {
+    let is_in_millimetres =
+        noise.position > MILLIMETRES_NOISE && noise.rotation < REFERENCE_NOISE.rotation;
+    if is_in_millimetres { 1000.0 } else { 1.0 }
 }
 
 /// Inserts an effect where its values are within its bounds.
@@ -191,6 +208,24 @@ impl Turns {
         along.norm_squared() > FOLLOWED * square * self.yy
     }
 
+    /// The matrix; none where the reference does not turn about all axes.
+    fn matrix(&self) -> Option<Matrix3<f64>> {
+        let spread = self.ww.symmetric_eigenvalues() / self.count;
+        let inverse = self.ww.try_inverse()?;
+        (spread.min() >= LEAST_SPREAD).then(|| self.yw * inverse)
+    }
+
+    /// The factor of the gyroscope's units where noise hides how the reference turns about other axes.
+    fn factor_about_one_axis(&self) -> f64 {
+        let [measured, predicted] = self.squares;
+        let ratio = (measured / predicted.max(1e-12)).sqrt();
+        if (0.05..=5.0).contains(&ratio) || !self.are_followed() {
+            1.0
+        } else {
+            known_factor(ratio, Channel::Gyroscope)
+        }
+    }
+
     /// Part of the measured angular velocity's square that no matrix explains; all of it where the reference
     /// does not turn about all axes.
     fn unexplained(&self) -> f64 {
@@ -204,28 +239,14 @@ impl Turns {
 /// Axes and units of the gyroscope from the matrix of [`Turns`]: its polar factor and the
 /// cube root of its determinant.
 fn gyro_axes(turns: &Turns) -> (Option<Matrix3<f64>>, f64) {
-    let spread = turns.ww.symmetric_eigenvalues() / turns.count;
-    if spread.min() < LEAST_SPREAD {
-        let [measured, predicted] = turns.squares;
-        let ratio = (measured / predicted.max(1e-12)).sqrt();
-        let factor = if (0.05..=5.0).contains(&ratio) || !turns.are_followed() {
-            1.0
-        } else {
-            known_factor(ratio, Channel::Gyroscope)
-        };
-        return (None, factor);
+    let of_all_axes = turns.matrix().and_then(|matrix| {
+        let svd = matrix.svd(true, true);
+        let is_alike = svd.singular_values.min() >= LEAST_LIKENESS * svd.singular_values.max();
+        let axes = svd.u? * svd.v_t?;
+        is_alike.then(|| (axes, matrix.determinant().abs().cbrt()))
+    });
+    match of_all_axes {
+        Some((axes, scale)) => (Some(axes), known_factor(scale, Channel::Gyroscope)),
+        None => (None, turns.factor_about_one_axis()),
     }
-    let Some(inverse) = turns.ww.try_inverse() else {
-        return (None, 1.0);
-    };
-    let matrix = turns.yw * inverse;
-    let scale = matrix.determinant().abs().cbrt();
-    let svd = matrix.svd(true, true);
-    let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else {
-        return (None, 1.0);
-    };
-    if svd.singular_values.min() < LEAST_LIKENESS * svd.singular_values.max() {
-        return (None, 1.0);
-    }
-    (Some(u * v_t), known_factor(scale, Channel::Gyroscope))
 }

@@ -116,13 +116,7 @@ impl ForceSlopes {
             return self.at_rest();
         };
         let likeness = self.likeness();
-        let too_loud = self.loudness(1.0, GravityMode::Kept, 1.0) < -MUCH_TOO_LOUD;
-        let least_likeness = if too_loud {
-            LEAST_LIKENESS_WHERE_LOUD
-        } else {
-            LEAST_LIKENESS_FOR_LENGTH
-        };
-        let lengths = if likeness > least_likeness {
+        let lengths = if self.tells_length() {
             length_factors()
         } else {
             &length_factors()[..1]
@@ -145,6 +139,17 @@ impl ForceSlopes {
             }
         }
         scales
+    }
+
+    /// Whether the readings move enough with the reference to tell its units of length.
+    pub fn tells_length(&self) -> bool {
+        let too_loud = self.loudness(1.0, GravityMode::Kept, 1.0) < -MUCH_TOO_LOUD;
+        let least_likeness = if too_loud {
+            LEAST_LIKENESS_WHERE_LOUD
+        } else {
+            LEAST_LIKENESS_FOR_LENGTH
+        };
+        self.slopes().is_some() && self.likeness() > least_likeness
     }
 
     /// How unlikely such units are, in squared scatters.
