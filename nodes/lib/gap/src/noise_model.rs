@@ -10,6 +10,9 @@ use crate::prepared::PreparedPlacement;
 
 /// Share of the motion from which on a frequency counts as resolved by the reference.
 const RESOLVED: f64 = 0.9;
+/// Motion beyond this is none that a reference could have lost, Hz: blows of a tool reach it, and the noise of
+/// acceleration there would cover whatever is unknown. No source.
+const FASTEST_LOST_HZ: f64 = 30.0;
 /// Predicted noise of a residual: white noise of the sensor and the reference's own error.
 ///
 /// One-sided densities, with N_p, N_r the error densities of the pose estimate, l the lever arm, s
@@ -20,7 +23,8 @@ const RESOLVED: f64 = 0.9;
 /// gyroscope      2 sigma_g^2 / fs + (s + 2/3 w2) N_r + lost_g(f)
 /// ```
 /// `lost` is motion that drowns in the reference's noise, as the residual itself shows it above the
-/// band that the reference resolves; it is never taken for larger than that noise allows.
+/// band that the reference resolves; it is never taken for larger than that noise allows. What the reference's error
+/// has beyond half of the IMU's rate folds over, and so does what is lost up to [`FASTEST_LOST_HZ`].
 #[derive(Clone, Debug)]
 pub(crate) struct NoiseModel {
     /// Two-sided per-sample variance spectra (density times rate / 2) at the transform's
@@ -81,7 +85,7 @@ impl NoiseBasis {
 
 /// One-sided densities at a frequency, by channel.
 struct Expected {
-    /// Sensor noise and the error of the estimate.
+    /// The error of the estimate, and the sensor's noise once it is added.
     known: PerChannel<f64>,
     /// Most that motion which the estimate leaves out can be.
     hidden: PerChannel<f64>,
@@ -89,14 +93,54 @@ struct Expected {
     through: PerChannel<f64>,
 }
 
+impl Expected {
+    /// Nothing is hidden where the reference resolves the motion.
+    fn keep_unresolved(&mut self) {
+        for channel in Channel::ALL {
+            let hidden = &mut self.hidden[channel];
+            *hidden = if self.through[channel] >= RESOLVED {
+                0.0
+            } else {
+                hidden.max(0.0)
+            };
+        }
+    }
+}
+
 impl NoiseBasis {
-    /// The densities that [`NoiseModel`] states, before what is lost is added.
-    fn expected(
+    /// The densities that [`NoiseModel`] states, with what folds over from beyond half of the IMU's rate.
+    fn expected_folded(
         &self,
         frequency_hz: f64,
         rate_hz: f64,
-        (position, rotation): &(Spectrum, Spectrum),
+        reported: &(Spectrum, Spectrum),
     ) -> Expected {
+        let mut sum = self.expected(frequency_hz, reported);
+        sum.keep_unresolved();
+        let white = |channel: Channel| 2.0 * self.sigma[channel] * self.sigma[channel] / rate_hz;
+        let nyquist_hz = self.estimate.rate_hz() / 2.0;
+        let folded = (1..).flat_map(|turn| {
+            let turned_hz = f64::from(turn) * rate_hz;
+            [turned_hz - frequency_hz, turned_hz + frequency_hz]
+        });
+        for hz in folded.take_while(|hz| *hz < nyquist_hz) {
+            let mut beyond = self.expected(hz, reported);
+            beyond.keep_unresolved();
+            for channel in Channel::ALL {
+                sum.known[channel] += beyond.known[channel];
+                if hz < FASTEST_LOST_HZ {
+                    sum.hidden[channel] += beyond.hidden[channel];
+                }
+            }
+        }
+        for channel in Channel::ALL {
+            sum.known[channel] += white(channel);
+        }
+        sum
+    }
+
+    /// The densities of the reference's error, before what is lost is added.
+    fn expected(&self, frequency_hz: f64, (position, rotation): &(Spectrum, Spectrum)) -> Expected {
         let squared = (TAU * frequency_hz).powi(2);
         let (error_p, error_r) = self.estimate.error_density(frequency_hz);
         let (error_p, error_r) = (
@@ -110,12 +154,9 @@ impl NoiseBasis {
             self.force_squared,
         );
         let lever = 2.0 / 3.0 * lever2 * (squared * squared + 3.0 * squared * w2 + w2 * w2);
-        let white = |channel: Channel| 2.0 * self.sigma[channel] * self.sigma[channel] / rate_hz;
         let known = PerChannel {
-            accelerometer: white(Channel::Accelerometer)
-                + squared * squared * error_p
-                + (2.0 / 3.0 * f2 + lever) * error_r,
-            gyroscope: white(Channel::Gyroscope) + (squared + 2.0 / 3.0 * w2) * error_r,
+            accelerometer: squared * squared * error_p + (2.0 / 3.0 * f2 + lever) * error_r,
+            gyroscope: (squared + 2.0 / 3.0 * w2) * error_r,
         };
         // Motion below the reference's noise: at most that noise itself.
         let hidden_p =
@@ -154,14 +195,12 @@ impl NoiseModel {
             (0..=length / 2)
                 .map(|k| {
                     let frequency_hz = k as f64 * spacing_hz;
-                    let expected = basis.expected(frequency_hz, prepared.rate_hz, &reported);
-                    let (known, most) =
-                        (expected.known[channel], expected.hidden[channel].max(0.0));
-                    let resolved = expected.through[channel] >= RESOLVED;
-                    let seen = if resolved {
-                        0.0
-                    } else {
+                    let expected = basis.expected_folded(frequency_hz, prepared.rate_hz, &reported);
+                    let (known, most) = (expected.known[channel], expected.hidden[channel]);
+                    let seen = if most > 0.0 {
                         local(&spectrum, frequency_hz, basis.line_hz) - known
+                    } else {
+                        0.0
                     };
                     let lost = seen.clamp(0.0, most);
                     (known + lost) * to_variance
