@@ -13,7 +13,7 @@ use crate::policy::search::{MOST, MOST_AT_FIRST, ROUNDS};
 use crate::progress::{self, Progress, THINNED};
 use crate::reportable::{Observations, is_ordinary, reportable_effects};
 use crate::search::{ScoredEffectSet, excess, exchanged, score, score_as_it_is, search};
-use crate::sensor_noise::{found_noise, is_steady, is_white, most_noise};
+use crate::sensor_noise::{found_noise, has_tails, is_steady, is_white, most_noise};
 use crate::session::Session;
 use crate::smoothing::{try_smoothing, with_undone_smoothing};
 use crate::thinned::{is_folded, thinned};
@@ -52,7 +52,7 @@ impl<'a> Analysis<'a> {
             ..
         } = self.session;
         let residual = prepared.residual(&scored.fit.prediction.readings);
-        let found_noise = found_noise(prepared, &residual);
+        let found_noise = found_noise(prepared, &residual, digital);
         let reportable = reportable_effects(
             &model,
             &scored.fit.set,
@@ -62,6 +62,7 @@ impl<'a> Analysis<'a> {
                 found_noise,
                 is_white: is_white(prepared, &residual),
                 is_steady: is_steady(prepared, &residual),
+                has_tails: has_tails(prepared, &residual),
             },
             self.library,
         );

@@ -26,7 +26,12 @@ pub(crate) fn first_model<'a>(
 ) -> FitModel<'a> {
     let readings = prepared.predict(&track, start).readings;
     let residual = prepared.residual(&readings);
-    let sigma = white_noise(prepared, found_noise(prepared, &residual), digital, library);
+    let sigma = white_noise(
+        prepared,
+        found_noise(prepared, &residual, digital),
+        digital,
+        library,
+    );
     let mut basis = NoiseBasis::new(prepared.estimate.clone(), sigma);
     basis.rate_squared = track
         .angular_velocity_in_segment
@@ -69,7 +74,12 @@ pub(crate) fn with_updated_noise<'a>(
         None => suspicious_line(prepared, &basis, readings),
     };
     let residual = prepared.residual(readings);
-    basis.sigma = white_noise(prepared, found_noise(prepared, &residual), digital, library);
+    basis.sigma = white_noise(
+        prepared,
+        found_noise(prepared, &residual, digital),
+        digital,
+        library,
+    );
     let noise = NoiseModel::new(prepared, &basis, &residual);
     FitModel::new(prepared, model.track.clone(), basis, noise)
 }

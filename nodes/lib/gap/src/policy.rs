@@ -78,10 +78,19 @@ pub(crate) mod sensor_noise {
     /// the upper half is white noise: white noise is in all bands, and what a reference does not resolve of
     /// the motion in the upper ones alone. A few dozen values give each level to within a fifth.
     pub const OF_LOWER_BANDS: f64 = 1.4;
+    /// Factor on the variance that the quiet fifth of fourth differences shows, above which no level is white noise:
+    /// it is the same for noise that is there at all times, to within a seventh for two thousand of them.
+    pub const OF_QUIET_DIFFERENCES: f64 = 1.5;
     /// Part of the least band in the upper half that the least one in the lower half has to reach, for the
     /// channel to be as loud as it is by noise: a third of it was reached where blows at 25 Hz passed for noise
     /// (tests/withheld/other_origin.py, seed 4), and white noise reaches all of it.
     pub const LEVEL: f64 = 0.5;
+    /// Mean square of fourth differences over what their median says, from which on they are no normal noise, whose
+    /// ratio is 1 to within a fifth for a few hundred of them. No source for the number.
+    pub const TAILS: f64 = 2.5;
+    /// The same of the readings, motion included: blows at 25 Hz have 20 000 (tests/withheld/other_origin.py, seed
+    /// 6). No source for the number.
+    pub const TAILS_OF_READINGS: f64 = 300.0;
     /// Length of the stretches that are asked whether noise is there at all times, s: at 25 Hz two seconds
     /// have some 130 fourth differences, whose median scatters by a fifth.
     pub const STEADY_BLOCK_S: f64 = 2.0;

@@ -27,6 +27,8 @@ pub(crate) struct Observations<'a> {
     pub is_white: PerChannel<bool>,
     /// Whether its noise is there at all times.
     pub is_steady: PerChannel<bool>,
+    /// Whether it scatters farther than noise does now and then.
+    pub has_tails: PerChannel<bool>,
 }
 
 /// The causes: fitted effects beyond what is ordinary, and those that are read off.
@@ -210,9 +212,10 @@ fn excess_noise(model: &FitModel, observations: &Observations, channel: Channel)
     let step = observations.step(channel);
     // Rounding adds step^2 / 12 of noise of its own.
     let beyond = observations.found_noise[channel].powi(2) - step * step / 12.0 - declared.powi(2);
-    // What a smoothed reference lacks is broad enough to pass for noise.
-    let is_doubtful =
-        model.basis.undone_smoothing.is_some() || prepared.missing.fraction > MANY_MISSING;
+    // What a smoothed reference lacks is broad enough to pass for noise, and so are blows.
+    let is_doubtful = model.basis.undone_smoothing.is_some()
+        || prepared.missing.fraction > MANY_MISSING
+        || observations.has_tails[channel];
     let factor = if is_doubtful {
         DOUBTFUL_EXCESS_NOISE
     } else {

@@ -1,16 +1,24 @@
 //! The white noise of a sensor, as its readings and residuals show it.
 
 use cromosim_imu::{Channel, PerChannel, ReadOff};
-use cromosim_spatial::{ROUNDED_MEDIAN_OF_SQUARE, fourth_difference, white_noise_variance};
+use cromosim_spatial::{
+    FOURTH_DIFFERENCE_GAIN, ROUNDED_MEDIAN_OF_SQUARE, fourth_difference, white_noise_variance,
+};
 
 use crate::axes::{axes_of_channel, value_on_axis};
 use crate::digital::Digital;
 use crate::library::Library;
-use crate::policy::sensor_noise::{LEVEL, OF_LOWER_BANDS, QUIET_PART, STEADY, STEADY_BLOCK_S};
+use crate::policy::sensor_noise::{
+    LEVEL, OF_LOWER_BANDS, OF_QUIET_DIFFERENCES, QUIET_PART, STEADY, STEADY_BLOCK_S, TAILS,
+    TAILS_OF_READINGS,
+};
 use crate::prepared::PreparedPlacement;
 
 /// Runs of five neighbours below which fourth differences say nothing.
 const LEAST_RUNS: usize = 300;
+/// A quantile of their sizes, and where a standard normal number has it.
+const QUIET_QUANTILE: f64 = 0.2;
+const QUIET_SIGMAS: f64 = 0.253_347_1;
 /// Bands in the upper half of a spectrum, in units of the Nyquist frequency.
 const UPPER_BANDS: [(f64, f64); 4] = [(0.5, 0.62), (0.62, 0.74), (0.74, 0.86), (0.86, 0.97)];
 /// And below it, where a reference resolves more of the motion.
@@ -64,15 +72,28 @@ pub(crate) fn white_noise(
 }
 
 /// White noise per sample of each channel: the least of four bands in the upper half of the
-/// residual's spectrum and of fourth differences of neighbours, or of bands below with a margin
-/// ([`OF_LOWER_BANDS`]); whatever else is there only adds to each.
-pub(crate) fn found_noise(prepared: &PreparedPlacement, residual: &[Vec<f64>]) -> PerChannel<f64> {
+/// residual's spectrum and of fourth differences of neighbours, or with a margin of bands below
+/// ([`OF_LOWER_BANDS`]) and of the least of these differences and the readings' own ([`OF_QUIET_DIFFERENCES`]);
+/// whatever else is there only adds to each.
+pub(crate) fn found_noise(
+    prepared: &PreparedPlacement,
+    residual: &[Vec<f64>],
+    digital: &PerChannel<Digital>,
+) -> PerChannel<f64> {
+    let measured = prepared.on_sample_grid(|k, axis| value_on_axis(&prepared.measured[k], axis));
     PerChannel::from_fn(|channel| {
         let lower = band_variances(prepared, residual, channel, &LOWER_BANDS);
         let found = noise_variances(prepared, residual, channel)
             .chain(lower.map(|variance| OF_LOWER_BANDS * variance))
             .fold(f64::INFINITY, f64::min);
-        found.sqrt()
+        // What is rounded is quieter than its noise wherever it stays on a step. Where nothing is declared there
+        // is no excess to be sure of.
+        let is_asked = prepared.declared[channel].is_some() && digital[channel].lsb.is_none();
+        let quiet = [residual, &measured]
+            .into_iter()
+            .filter(|_| is_asked)
+            .filter_map(|series| quiet_differences(prepared, series, channel));
+        quiet.fold(found, f64::min).sqrt()
     })
 }
 
@@ -132,6 +153,23 @@ pub(crate) fn is_steady(prepared: &PreparedPlacement, residual: &[Vec<f64>]) -> 
     })
 }
 
+/// Whether a channel's residual has tails that no normal noise has, or its readings have much longer ones: blows
+/// that a slow device cannot follow lift all bands alike, and come and go.
+pub(crate) fn has_tails(prepared: &PreparedPlacement, residual: &[Vec<f64>]) -> PerChannel<bool> {
+    let measured = prepared.on_sample_grid(|k, axis| value_on_axis(&prepared.measured[k], axis));
+    PerChannel::from_fn(|channel| {
+        let has_longer = |series: &[Vec<f64>], most: f64| {
+            let differences = differences(prepared, series, channel);
+            let mut differences: Vec<f64> = differences.map(|(_, difference)| difference).collect();
+            let squares: f64 = differences.iter().map(|value| value * value).sum();
+            let mean = squares / differences.len().max(1) as f64 / FOURTH_DIFFERENCE_GAIN;
+            white_noise_variance(&mut differences, ROUNDED_MEDIAN_OF_SQUARE)
+                .is_some_and(|variance| mean > most * variance)
+        };
+        has_longer(residual, TAILS) || has_longer(&measured, TAILS_OF_READINGS)
+    })
+}
+
 /// Whether a channel's spectrum is level: motion that the reference does not resolve falls steeply at its
 /// top, and is not in the lower bands, where the reference resolves it.
 pub(crate) fn is_white(prepared: &PreparedPlacement, residual: &[Vec<f64>]) -> PerChannel<bool> {
@@ -164,6 +202,24 @@ fn fourth_differences(
         return None;
     }
     white_noise_variance(&mut differences, ROUNDED_MEDIAN_OF_SQUARE)
+}
+
+/// The same by a low quantile of them, with a margin: blows that come every half second are in most of them at
+/// 25 Hz, errors of the reference are in all of the residual's, and noise is in all.
+fn quiet_differences(
+    prepared: &PreparedPlacement,
+    residual: &[Vec<f64>],
+    channel: Channel,
+) -> Option<f64> {
+    let mut differences: Vec<f64> = differences(prepared, residual, channel)
+        .map(|(_, difference)| difference)
+        .collect();
+    if differences.len() < LEAST_RUNS {
+        return None;
+    }
+    let place = (QUIET_QUANTILE * differences.len() as f64) as usize;
+    let quiet = *differences.select_nth_unstable_by(place, f64::total_cmp).1;
+    Some(OF_QUIET_DIFFERENCES * (quiet / QUIET_SIGMAS).powi(2) / FOURTH_DIFFERENCE_GAIN)
 }
 
 /// Fourth differences of five neighbours that are all there, each with the entry of the sample grid where it begins.

@@ -2,7 +2,7 @@
 //! their median little of impacts.
 
 /// `x0 - 4 x1 + 6 x2 - 4 x3 + x4` of white noise has this times its variance: 1 + 16 + 36 + 16 + 1.
-const GAIN: f64 = 70.0;
+pub const FOURTH_DIFFERENCE_GAIN: f64 = 70.0;
 /// Median of the square of a standard normal number: the square of its third quartile.
 pub const MEDIAN_OF_SQUARE: f64 = 0.674_489_75 * 0.674_489_75;
 /// The same as the diagnosis has always had it: more digits would change the seventh of its results,
@@ -22,7 +22,7 @@ pub fn white_noise_variance(differences: &mut [f64], median_of_square: f64) -> O
     }
     let middle = differences.len() / 2;
     let median = *differences.select_nth_unstable_by(middle, f64::total_cmp).1;
-    Some(median.powi(2) / (GAIN * median_of_square))
+    Some(median.powi(2) / (FOURTH_DIFFERENCE_GAIN * median_of_square))
 }
 
 #[cfg(test)]

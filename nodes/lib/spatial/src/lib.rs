@@ -89,7 +89,8 @@ pub use estimate::{PoseEstimate, PoseNoise};
 pub use estimate_error::ErrorPath;
 pub use file::{open_file, read_text};
 pub use fourth_differences::{
-    MEDIAN_OF_SQUARE, ROUNDED_MEDIAN_OF_SQUARE, fourth_difference, white_noise_variance,
+    FOURTH_DIFFERENCE_GAIN, MEDIAN_OF_SQUARE, ROUNDED_MEDIAN_OF_SQUARE, fourth_difference,
+    white_noise_variance,
 };
 pub use frame_grid::FrameGrid;
 pub use golden::greatest_near;
