@@ -1,13 +1,14 @@
 //! Whether fitted effects look like what they are named after.
 
 use cromosim_imu::{Channel, EffectSet, PerChannel, Search, SpectralLine, Stage};
-use cromosim_spatial::Spectrum;
+use cromosim_spatial::{PoseLine, Spectrum};
 
 use crate::fit::{Fit, FitModel};
 use crate::policy::vibration::{
-    ABOVE_HZ, BELOW_HZ, LEAST_HEIGHT, LEAST_HZ, LEAST_POWER, MOST_HEIGHT_LEFT, MOST_LEFT,
-    SURROUNDINGS_HZ,
+    ABOVE_HZ, BELOW_HZ, IN_REFERENCE_HEIGHT, IN_REFERENCE_PART, LEAST_HEIGHT, LEAST_HZ,
+    LEAST_POWER, MOST_HEIGHT_LEFT, MOST_LEFT, SURROUNDINGS_HZ,
 };
+use crate::trace::trace;
 
 /// Whether fitted effects are what they are named after.
 pub(crate) fn is_sound(model: &FitModel, fit: &Fit) -> bool {
@@ -67,7 +68,21 @@ fn is_true_vibration(model: &FitModel, fit: &Fit) -> bool {
         }
         stands_out |= is_high;
     }
-    stands_out
+    stands_out && !is_in_reference(model, &line)
+}
+
+/// Whether the reference has the line too, if below its noise: what goes on for minutes at one frequency (a gait,
+/// a machine) shows in all of its poses together where no filter passes it.
+fn is_in_reference(model: &FitModel, line: &SpectralLine) -> bool {
+    let Some(lines) = model.prepared.estimate.lines_at(line.hz) else {
+        return false;
+    };
+    let of = |channel: Channel, own: &PoseLine| {
+        own.height > IN_REFERENCE_HEIGHT && own.power > IN_REFERENCE_PART * line.power(channel)
+    };
+    trace(|| eprintln!("  line of {:.3} Hz, of the reference {lines:?}", line.hz));
+    of(Channel::Accelerometer, &lines[0]) && line.power(Channel::Accelerometer) > 0.0
+        || of(Channel::Gyroscope, &lines[1]) && line.power(Channel::Gyroscope) > 0.0
 }
 
 /// Whether a line is strong against the white noise (per sample) of either channel.

@@ -135,6 +135,11 @@ pub(crate) mod vibration {
     /// Most height that may stay in a channel where the sinusoid takes little away: a segment that
     /// moves at this frequency shows there too, and no sinusoid follows it.
     pub const MOST_HEIGHT_LEFT: f64 = 8.0;
+    /// Height of the line in the reference's poses, over the median of its surroundings, from which on it is
+    /// theirs: noise of three axes hardly ever reaches it. No source.
+    pub const IN_REFERENCE_HEIGHT: f64 = 6.0;
+    /// And the part of the vibration's power that the reference has then; no source.
+    pub const IN_REFERENCE_PART: f64 = 0.3;
     /// Most of the line's power that one sinusoid may leave.
     pub const MOST_LEFT: f64 = 0.3;
 }

@@ -160,6 +160,16 @@ impl PoseEstimate {
         self.rate_hz
     }
 
+    /// Poses on the sample grid, those that are filled in among them.
+    pub(crate) fn len(&self) -> usize {
+        self.count
+    }
+
+    /// One coordinate of them: three of the position, four of the sign-continuous quaternion.
+    pub(crate) fn poses_of(&self, coordinate: usize) -> &[f64] {
+        &self.coordinates[coordinate][self.lead..self.lead + self.count]
+    }
+
     /// Where poses are missing: the stamps of the poses before and after.
     pub fn gaps(&self) -> &[(Stamp, Stamp)] {
         &self.gaps

@@ -44,6 +44,7 @@ mod equations;
 mod error;
 mod estimate;
 mod estimate_error;
+mod estimate_line;
 mod file;
 mod filled;
 mod fourth_differences;
@@ -87,6 +88,7 @@ pub use equations::LocalWeight;
 pub use error::SpatialError;
 pub use estimate::{PoseEstimate, PoseNoise};
 pub use estimate_error::ErrorPath;
+pub use estimate_line::PoseLine;
 pub use file::{open_file, read_text};
 pub use fourth_differences::{
     FOURTH_DIFFERENCE_GAIN, MEDIAN_OF_SQUARE, ROUNDED_MEDIAN_OF_SQUARE, fourth_difference,
