@@ -59,6 +59,7 @@ mod together;
 mod trace;
 mod unexplained;
 mod unknown;
+mod variance_split;
 mod whiten;
 mod words;
 

@@ -188,6 +188,8 @@ pub(crate) mod report {
     /// Part of what stays unexplained beside nothing `unknown` that goes with the reference's errors.
     /// Chosen among 0, a half and 1 on the withheld cases of seed 35.
     pub const REFERENCE_SHARE: f64 = 0.5;
+    /// Log-likelihood by which another share has to be better, nats; no source.
+    pub const LEAST_SPLIT_NATS: f64 = 5.0;
     /// Most that motion covered by the reference's errors is taken for, in units of the variance that
     /// these leave; what is more has another source. No source.
     pub const MOST_REFERENCE_EXCESS: f64 = 10.0;

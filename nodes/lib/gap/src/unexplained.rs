@@ -4,6 +4,7 @@ use cromosim_imu::{
     Channel, Lateness, PerChannel, Reading, UnexplainedErrors, change_per_second,
     rounding_difference,
 };
+use cromosim_spatial::SampleVariance;
 use nalgebra::{Matrix2, Vector2};
 
 use crate::axes::{axes_of_channel, value_on_axis};
@@ -11,11 +12,11 @@ use crate::diagnosis::Metrics;
 use crate::findings::Findings;
 use crate::policy::report::{LEAST_REFERENCE_EXCESS, MOST_REFERENCE_EXCESS, REFERENCE_SHARE};
 use crate::simulations::Simulations;
+use crate::variance_split::{BLOCK_S, Split, StatedReading};
 
 /// Variance, mean over the axes and in SI units, that readings have on time that was not fitted to
 /// (`after`), less the device's own noise and what errors of this reference leave: what a simulation
-/// of another recording has to add to what it knows of that one. Where nothing is `unknown`
-/// [`REFERENCE_SHARE`] of it is taken for motion that the reference's errors cover, and goes with these. Where it is
+/// of another recording has to add to what it knows of that one, split as [`Split`] says. Where it is
 /// below zero these errors are smaller than their model has them (a pure sway has no motion beyond the band
 /// that the reference resolves), and are taken for that much smaller.
 pub(crate) fn unexplained_errors(
@@ -24,53 +25,119 @@ pub(crate) fn unexplained_errors(
     after_readings: &[Reading],
     after: &Metrics,
 ) -> UnexplainedErrors {
-    let [of_derivatives, of_orientation] = reference_variances(findings, simulations);
-    let of_reference =
-        PerChannel::from_fn(|channel| of_derivatives[channel] + of_orientation[channel]);
-    let clocks = PerChannel::from_fn(|channel| lateness(simulations, after_readings, channel));
-    let known = PerChannel::from_fn(|channel| {
-        let units = findings.applied().unit_factor(channel);
-        of_reference[channel] + clocks[channel].1 / units.powi(2)
-    });
-    let rest = rest_variances(findings, simulations, after, &known);
-    let reference_excess = PerChannel::from_fn(|channel| {
-        let part = rest[channel] / of_derivatives[channel].max(f64::MIN_POSITIVE);
-        if part < 0.0 {
-            return part.max(LEAST_REFERENCE_EXCESS);
+    let set = findings.applied();
+    let of_reference = ReferenceVariances::new(findings, simulations);
+    let late = PerChannel::from_fn(|channel| lateness(simulations, after_readings, channel));
+    let splits = PerChannel::from_fn(|channel| {
+        let stated = Stated {
+            findings,
+            simulations,
+            of_reference: &of_reference,
+            after_readings,
+            late: late[channel],
+            channel,
+        };
+        let readings = stated.readings(after);
+        if set.lsb(channel) > 0.0 {
+            stated.split_of_rounded(&readings, after)
+        } else {
+            Split::of(&readings)
         }
-        match findings.unknown {
-            Some(_) => 0.0,
-            None => (REFERENCE_SHARE * part).min(MOST_REFERENCE_EXCESS),
-        }
     });
-    let left = |channel| rest[channel] - reference_excess[channel] * of_derivatives[channel];
     UnexplainedErrors {
-        variance: PerChannel::from_fn(|channel| left(channel).max(0.0)),
-        reference_excess,
-        late: PerChannel::from_fn(|channel| clocks[channel].0),
+        variance: PerChannel::from_fn(|channel| splits[channel].variance),
+        reference_excess: PerChannel::from_fn(|channel| splits[channel].reference_excess),
+        late,
     }
 }
 
-/// That variance less the device's noise and what is `known` beside it; below zero where these are stated too
-/// large.
-fn rest_variances(
-    findings: &Findings,
-    simulations: &Simulations,
-    after: &Metrics,
-    known: &PerChannel<f64>,
-) -> PerChannel<f64> {
-    let set = &findings.applied();
-    PerChannel::from_fn(|channel| {
-        let rmse = match channel {
+/// What is known of one channel's readings.
+struct Stated<'a> {
+    findings: &'a Findings<'a>,
+    simulations: &'a Simulations<'a>,
+    of_reference: &'a ReferenceVariances<'a>,
+    after_readings: &'a [Reading],
+    late: Lateness,
+    channel: Channel,
+}
+
+impl Stated<'_> {
+    /// Compared readings with their squared differences, as large in the mean as on time that was not fitted to.
+    fn readings(&self, after: &Metrics) -> Vec<StatedReading> {
+        let (whole, channel) = (&self.simulations.whole, self.channel);
+        let comparison = &self.simulations.comparison;
+        let units = self.findings.applied().unit_factor(channel).powi(2);
+        let own = self.own_variance();
+        let axes = axes_of_channel(channel);
+        let reading = |k: usize| {
+            let difference = |axis: usize| {
+                value_on_axis(&comparison.measured[k], axis)
+                    - value_on_axis(&self.after_readings[k], axis)
+            };
+            let covered = axes.clone().filter(|axis| comparison.covered[k][*axis]);
+            let squares: Vec<f64> = covered.map(|axis| difference(axis).powi(2)).collect();
+            let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+            let seconds = whole.stamps[k] - whole.stamps[0];
+            let late = self.late.at(seconds).powi(2) * self.change_squared(k) / units;
+            (!squares.is_empty()).then(|| StatedReading {
+                block: (seconds / BLOCK_S) as usize,
+                squared: mean / units,
+                of_reference: self.of_reference.of_derivatives(channel, k),
+                known: own + self.of_reference.of_orientation(channel, k) + late,
+            })
+        };
+        let mut readings: Vec<StatedReading> =
+            (0..whole.stamps.len()).filter_map(reading).collect();
+        let mean = readings.iter().map(|one| one.squared).sum::<f64>() / readings.len() as f64;
+        let held_out = self.held_out(after) / mean.max(f64::MIN_POSITIVE);
+        readings.iter_mut().for_each(|one| one.squared *= held_out);
+        readings
+    }
+
+    /// Mean square on time that was not fitted to.
+    fn held_out(&self, after: &Metrics) -> f64 {
+        let rmse = match self.channel {
             Channel::Accelerometer => after.accel_rmse,
             Channel::Gyroscope => after.gyro_rmse,
         };
-        let found = (rmse / set.unit_factor(channel)).powi(2) / 3.0;
-        let own = findings.simulated_sigma(channel).powi(2)
-            + set.noise_density(channel).powi(2) * simulations.whole.rate_hz;
-        let found = before_rounding(found, set.lsb(channel));
-        found - own - known[channel]
-    })
+        (rmse / self.findings.applied().unit_factor(self.channel)).powi(2) / 3.0
+    }
+
+    /// The device's own noise.
+    fn own_variance(&self) -> f64 {
+        self.findings.simulated_sigma(self.channel).powi(2)
+            + self.findings.applied().noise_density(self.channel).powi(2)
+                * self.simulations.whole.rate_hz
+    }
+
+    /// Of the simulated reading per second, mean over the axes.
+    fn change_squared(&self, k: usize) -> f64 {
+        change_per_second(k, &self.simulations.whole.stamps, self.after_readings)
+            .map_or(0.0, |change| change[self.channel].norm_squared() / 3.0)
+    }
+
+    /// Where readings are rounded, whose steps say nothing of single ones: by means alone.
+    fn split_of_rounded(&self, readings: &[StatedReading], after: &Metrics) -> Split {
+        let mean = |of: fn(&StatedReading) -> f64| {
+            readings.iter().map(of).sum::<f64>() / readings.len().max(1) as f64
+        };
+        let of_reference = mean(|one| one.of_reference);
+        let step = self.findings.applied().lsb(self.channel);
+        let found = before_rounding(self.held_out(after), step);
+        let rest = found - mean(|one| one.known) - of_reference;
+        let part = rest / of_reference.max(f64::MIN_POSITIVE);
+        let reference_excess = if part < 0.0 {
+            part.max(LEAST_REFERENCE_EXCESS)
+        } else if self.findings.unknown.is_some() {
+            0.0
+        } else {
+            (REFERENCE_SHARE * part).min(MOST_REFERENCE_EXCESS)
+        };
+        Split {
+            reference_excess,
+            variance: (rest - reference_excess * of_reference).max(0.0),
+        }
+    }
 }
 
 /// The mean square difference of two values that, rounded to steps, differ by `found`.
@@ -88,14 +155,13 @@ fn before_rounding(found: f64, step: f64) -> f64 {
     most
 }
 
-/// How late a channel stays against the simulation, and the variance that this leaves, mean over the compared
-/// readings and their axes, in units of the device.
+/// How late a channel stays against the simulation.
 ///
 /// Least squares of `measured - simulated = -(seconds + per_second t) d simulated / dt`, t from the first message.
 /// Two values of thousands of readings: what they take of mere noise does not count.
-fn lateness(simulations: &Simulations, simulated: &[Reading], channel: Channel) -> (Lateness, f64) {
+fn lateness(simulations: &Simulations, simulated: &[Reading], channel: Channel) -> Lateness {
     let (stamps, comparison) = (&simulations.whole.stamps, &simulations.comparison);
-    let (mut normal, mut right, mut count) = (Matrix2::zeros(), Vector2::zeros(), 0.0);
+    let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
     for k in 0..simulated.len() {
         let Some(change) = change_per_second(k, stamps, simulated) else {
             continue;
@@ -107,43 +173,43 @@ fn lateness(simulations: &Simulations, simulated: &[Reading], channel: Channel) 
             let residual = of(&comparison.measured[k]) - of(&simulated[k]);
             normal += regressors * regressors.transpose() * change.powi(2);
             right -= regressors * change * residual;
-            count += 1.0;
         }
     }
     let Some(values) = normal.cholesky().map(|factor| factor.solve(&right)) else {
         return Default::default();
     };
-    let late = Lateness {
+    Lateness {
         seconds: values.x,
         per_second: values.y,
-    };
-    (late, values.dot(&(normal * values)) / count)
+    }
 }
 
-/// What errors of the reference's derivatives and of its orientation leave, mean over the compared
-/// readings and their axes: an error of the orientation turns a vector, by two thirds of its square
-/// over the axes.
-fn reference_variances(findings: &Findings, simulations: &Simulations) -> [PerChannel<f64>; 2] {
-    let (whole, set) = (&simulations.whole, findings.applied());
-    let estimate = &findings.model.basis.estimate;
-    let variances = set.reference_variances(estimate, 1.0, &whole.stamps);
-    let of_sample = |channel: Channel, k: usize| {
-        let (reading, variance) = (&whole.measured[k], &variances[k]);
-        let (own, vector) = match channel {
-            Channel::Accelerometer => (variance.acceleration, &reading.specific_force),
-            Channel::Gyroscope => (variance.angular_velocity, &reading.angular_velocity),
-        };
-        [
-            own,
-            2.0 / 3.0 * variance.orientation * vector.norm_squared(),
-        ]
-    };
-    [0, 1].map(|part| {
-        PerChannel::from_fn(|channel| {
-            let axis = axes_of_channel(channel).start;
-            let compared = (0..variances.len()).filter(|k| whole.usable[*k][axis]);
-            let all: Vec<f64> = compared.map(|k| of_sample(channel, k)[part]).collect();
-            all.iter().sum::<f64>() / all.len().max(1) as f64
-        })
-    })
+/// What errors of the reference leave in each reading, per axis, in SI units.
+struct ReferenceVariances<'a> {
+    of_samples: Vec<SampleVariance>,
+    measured: &'a [Reading],
+}
+
+impl<'a> ReferenceVariances<'a> {
+    fn new(findings: &Findings, simulations: &'a Simulations) -> Self {
+        let (whole, set) = (&simulations.whole, findings.applied());
+        let estimate = &findings.model.basis.estimate;
+        Self {
+            of_samples: set.reference_variances(estimate, 1.0, &whole.stamps),
+            measured: &whole.measured,
+        }
+    }
+
+    /// By its derivatives.
+    fn of_derivatives(&self, channel: Channel, k: usize) -> f64 {
+        match channel {
+            Channel::Accelerometer => self.of_samples[k].acceleration,
+            Channel::Gyroscope => self.of_samples[k].angular_velocity,
+        }
+    }
+
+    /// An error of the orientation turns a vector, by two thirds of its square over the axes.
+    fn of_orientation(&self, channel: Channel, k: usize) -> f64 {
+        2.0 / 3.0 * self.of_samples[k].orientation * self.measured[k][channel].norm_squared()
+    }
 }
