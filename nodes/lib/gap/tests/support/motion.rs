@@ -97,6 +97,23 @@ impl Motion {
         }
     }
 
+    /// Half a radian to and fro about one axis, a hundredth of it about the others; some 3 m/s2.
+    pub fn turning_about_one_axis() -> Self {
+        let term = |hz: f64, amplitude: Vector3<f64>, phase: Vector3<f64>| Term {
+            hz,
+            amplitude,
+            phase,
+        };
+        let phases = Vector3::new(0.7, 2.1, 3.9);
+        Self {
+            position: vec![
+                term(0.9, Vector3::new(0.08, 0.03, 0.05), phases),
+                term(1.7, Vector3::new(0.01, 0.02, 0.01), phases),
+            ],
+            rotation: vec![term(1.1, Vector3::new(0.008, 0.5, 0.006), phases)],
+        }
+    }
+
     /// The same with a shiver that no reference resolves: forty lines from 6 to 24 Hz, their accelerations (m/s2
     /// in all) in proportion to the frequency.
     #[must_use]

@@ -1,0 +1,61 @@
+//! References whose noise has a memory, or hides what would tell.
+#![allow(clippy::unwrap_used)]
+
+mod support;
+
+use cromosim_gap::PlacementRecord;
+use cromosim_imu::{EffectKind as K, normal_pair};
+use cromosim_spatial::so3;
+use nalgebra::Vector3;
+use rand::SeedableRng;
+use rand_chacha::ChaCha12Rng;
+use support::judge::{answer, names};
+use support::motion::Motion;
+use support::{REFERENCE_HZ, Scene};
+
+/// Noise of first order beside that of the record: m, rad, and its memory, s.
+fn with_memory(mut record: PlacementRecord, sizes: [f64; 2], memory_s: f64) -> PlacementRecord {
+    let mut random = ChaCha12Rng::seed_from_u64(7);
+    let pole = (-1.0 / (memory_s * REFERENCE_HZ)).exp();
+    let mut noise = [Vector3::zeros(); 2];
+    let series = &mut record.reference;
+    for (position, rotation) in series.positions.iter_mut().zip(&mut series.rotations) {
+        for (value, size) in noise.iter_mut().zip(sizes) {
+            let ([x, y], [z, _]) = (normal_pair(&mut random), normal_pair(&mut random));
+            *value = *value * pole + Vector3::new(x, y, z) * size * (1.0 - pole * pole).sqrt();
+        }
+        *position += noise[0];
+        *rotation *= so3::exp(&noise[1]);
+    }
+    record
+}
+
+#[test]
+fn noise_with_a_memory_is_nothing_unknown() {
+    for (seed, memory_s) in [(31, 0.005), (32, 0.009), (33, 0.012)] {
+        let record = with_memory(Scene::new(seed).record(), [2.5e-4, 8e-4], memory_s);
+        let diagnosis = answer(&record).diagnosis;
+        assert_eq!(names(&diagnosis), [""; 0], "{}", diagnosis.verdict);
+    }
+}
+
+#[test]
+fn at_rest_noise_tells_millimetres() {
+    let scene = Scene {
+        motion: Motion::rest(),
+        ..Scene::new(34)
+    };
+    let record = scene.with(K::ReferenceUnits, &[1000.0]).record();
+    assert_eq!(names(&answer(&record).diagnosis), ["reference_units"]);
+}
+
+#[test]
+fn degrees_are_told_where_noise_hides_all_axes_but_one() {
+    let scene = Scene {
+        motion: Motion::turning_about_one_axis(),
+        ..Scene::new(35)
+    };
+    let record = scene.with(K::GyroUnits, &[57.295_779_513_082_32]).record();
+    let record = with_memory(record, [1e-4, 1.4e-3], 1e-3);
+    assert_eq!(names(&answer(&record).diagnosis), ["gyro_units"]);
+}
