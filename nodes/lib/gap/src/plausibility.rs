@@ -77,12 +77,12 @@ fn is_in_reference(model: &FitModel, line: &SpectralLine) -> bool {
     let Some(lines) = model.prepared.estimate.lines_at(line.hz) else {
         return false;
     };
-    let of = |channel: Channel, own: &PoseLine| {
-        own.height > IN_REFERENCE_HEIGHT && own.power > IN_REFERENCE_PART * line.power(channel)
+    let has_it = |(channel, own): (Channel, &PoseLine)| {
+        let power = line.power(channel);
+        power > 0.0 && own.height > IN_REFERENCE_HEIGHT && own.power > IN_REFERENCE_PART * power
     };
     trace(|| eprintln!("  line of {:.3} Hz, of the reference {lines:?}", line.hz));
-    of(Channel::Accelerometer, &lines[0]) && line.power(Channel::Accelerometer) > 0.0
-        || of(Channel::Gyroscope, &lines[1]) && line.power(Channel::Gyroscope) > 0.0
+    Channel::ALL.into_iter().zip(&lines).any(has_it)
 }
 
 /// Whether a line is strong against the white noise (per sample) of either channel.

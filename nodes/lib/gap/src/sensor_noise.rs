@@ -195,13 +195,8 @@ fn fourth_differences(
     residual: &[Vec<f64>],
     channel: Channel,
 ) -> Option<f64> {
-    let mut differences: Vec<f64> = differences(prepared, residual, channel)
-        .map(|(_, difference)| difference)
-        .collect();
-    if differences.len() < LEAST_RUNS {
-        return None;
-    }
-    white_noise_variance(&mut differences, ROUNDED_MEDIAN_OF_SQUARE)
+    let mut sizes = enough_differences(prepared, residual, channel)?;
+    white_noise_variance(&mut sizes, ROUNDED_MEDIAN_OF_SQUARE)
 }
 
 /// The same by a low quantile of them, with a margin: blows that come every half second are in most of them at
@@ -211,15 +206,21 @@ fn quiet_differences(
     residual: &[Vec<f64>],
     channel: Channel,
 ) -> Option<f64> {
-    let mut differences: Vec<f64> = differences(prepared, residual, channel)
-        .map(|(_, difference)| difference)
-        .collect();
-    if differences.len() < LEAST_RUNS {
-        return None;
-    }
-    let place = (QUIET_QUANTILE * differences.len() as f64) as usize;
-    let quiet = *differences.select_nth_unstable_by(place, f64::total_cmp).1;
+    let mut sizes = enough_differences(prepared, residual, channel)?;
+    let place = (QUIET_QUANTILE * sizes.len() as f64) as usize;
+    let quiet = *sizes.select_nth_unstable_by(place, f64::total_cmp).1;
     Some(OF_QUIET_DIFFERENCES * (quiet / QUIET_SIGMAS).powi(2) / FOURTH_DIFFERENCE_GAIN)
+}
+
+/// Fourth differences of a channel; none where they are too few to say anything.
+fn enough_differences(
+    prepared: &PreparedPlacement,
+    residual: &[Vec<f64>],
+    channel: Channel,
+) -> Option<Vec<f64>> {
+    let sizes = differences(prepared, residual, channel).map(|(_, difference)| difference);
+    let sizes: Vec<f64> = sizes.collect();
+    (sizes.len() >= LEAST_RUNS).then_some(sizes)
 }
 
 /// Fourth differences of five neighbours that are all there, each with the entry of the sample grid where it begins.

@@ -61,16 +61,7 @@ impl Split {
             reference_excess,
             variance: 0.0,
         };
-        let (mut least, mut most) = (LEAST_REFERENCE_EXCESS, 0.0);
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (least + most);
-            if at(middle).ratio(readings) > 1.0 {
-                least = middle;
-            } else {
-                most = middle;
-            }
-        }
-        at(most)
+        Self::where_they_average_one(readings, at, [LEAST_REFERENCE_EXCESS, 0.0])
     }
 
     /// Where more is, of which a share goes with these errors, whose mean is `mean`.
@@ -87,7 +78,16 @@ impl Split {
         while at(most).ratio(readings) > 1.0 {
             most *= 2.0;
         }
-        let mut least = 0.0;
+        Self::where_they_average_one(readings, at, [0.0, most])
+    }
+
+    /// Of splits that state the more, the larger a value, the one between two values with which squared differences
+    /// over variances average 1.
+    fn where_they_average_one(
+        readings: &[StatedReading],
+        at: impl Fn(f64) -> Self,
+        [mut least, mut most]: [f64; 2],
+    ) -> Self {
         for _ in 0..HALVINGS {
             let middle = 0.5 * (least + most);
             if at(middle).ratio(readings) > 1.0 {
