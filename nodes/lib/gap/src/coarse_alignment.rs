@@ -83,7 +83,7 @@ impl CoarseAlignment {
         // Angular velocities about one axis tell axes badly: what leaves less of the force unexplained holds.
         let slopes = axes
             .map(|axes| slopes(&axes))
-            .filter(|turned| turned.unexplained() <= as_it_is.unexplained())
+            .filter(|turned| turned.explains_as_much_as(&as_it_is))
             .unwrap_or(as_it_is);
         let scales = slopes.scales();
         let length_units = if slopes.tells_length() {

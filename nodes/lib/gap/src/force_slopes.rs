@@ -29,6 +29,8 @@ const GRAVITY_SCATTER: f64 = 0.15;
 /// Squared correlation with gravity's direction that what the reference does not explain (an effect
 /// beyond every formula, fast motion that a smoothing took away) may well have: it moves the slope.
 const CHANCE_LIKENESS: f64 = 0.2;
+/// Part of the readings' square that axes which are 0.04 rad off leave unexplained.
+const OF_AXES: f64 = 1.5e-3;
 /// A scale is a known unit's factor when it is within 12 % of it (natural logarithm).
 const FACTOR_TOLERANCE: f64 = 0.12;
 
@@ -104,8 +106,14 @@ impl ForceSlopes {
         })
     }
 
+    /// Whether these axes leave no more unexplained than others of the same readings, but for small errors of the
+    /// axes: all three as they are leave nothing of what has them reversed, by slopes below zero.
+    pub fn explains_as_much_as(&self, others: &Self) -> bool {
+        self.unexplained() <= others.unexplained() + OF_AXES * self.yy
+    }
+
     /// Sum of squares of the measured specific force that no slopes explain.
-    pub fn unexplained(&self) -> f64 {
+    fn unexplained(&self) -> f64 {
         let explained = |(of_a, of_g): (f64, f64)| of_a * self.ya + of_g * self.yg;
         (self.yy - self.slopes().map_or(0.0, explained)).max(0.0)
     }

@@ -34,3 +34,13 @@ fn a_smoothed_reference_is_in_metres() {
         }
     }
 }
+
+#[test]
+fn three_reversed_axes_are_no_negated_gravity() {
+    // The force follows the reference by slopes below zero as well as the reversed reference by slopes above.
+    for seed in 41..46 {
+        let reversed = [-1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0];
+        let scene = Scene::new(seed).with(K::AxisConvention, &reversed);
+        names_exactly(&answer(&scene.record()).diagnosis, &scene.effects);
+    }
+}
