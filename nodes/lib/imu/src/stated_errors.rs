@@ -103,11 +103,9 @@ impl StatedErrors {
     }
 
     /// Mean square of the time that each channel may be late at some time after a recording's first
-    /// message, s2; `clock_s` is how uncertain the clock is then.
-    pub fn late_squared(&self, after_s: f64, clock_s: f64) -> PerChannel<f64> {
-        PerChannel::from_fn(|channel| {
-            self.unexplained.late[channel].at(after_s).powi(2) + clock_s.powi(2)
-        })
+    /// message, s2.
+    pub fn late_squared(&self, after_s: f64) -> PerChannel<f64> {
+        PerChannel::from_fn(|channel| self.unexplained.late[channel].at(after_s).powi(2))
     }
 
     /// What errors of the poses leave (`variance`, in SI units), motion that they cover included, in the

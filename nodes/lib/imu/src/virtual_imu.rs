@@ -302,8 +302,7 @@ pub fn measure_recording(
     let none = SampleVariance::default();
     let message = |(k, variance): (usize, &SampleVariance)| {
         let (stamp, reading) = (&motion.stamps[k], &readings[k]);
-        let clock_s = effects.effects.clock_uncertainty(*stamp - effects.epoch);
-        let late_squared = stated.late_squared(*stamp - motion.stamps[0], clock_s);
+        let late_squared = stated.late_squared(*stamp - motion.stamps[0]);
         let walked = if walks {
             *stamp - motion.stamps[0]
         } else {

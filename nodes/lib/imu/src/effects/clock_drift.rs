@@ -60,19 +60,6 @@ impl EffectKind {
     }
 }
 
-impl EffectSet {
-    /// Standard deviation of the time that a known drift leaves so long after the epoch, s: it is that of
-    /// the device's clock against the diagnosed reference's, and another reference has another clock.
-    pub(crate) fn clock_uncertainty(&self, seconds: f64) -> f64 {
-        if self.contains(EffectKind::ClockDrift) {
-            // Evenly spread up to what is ordinary.
-            ORDINARY_PPM * 1e-6 / 3.0_f64.sqrt() * seconds.abs()
-        } else {
-            0.0
-        }
-    }
-}
-
 /// Stamps and true times: `stamp = t0 + (t - t0) (1 + ppm 1e-6) + seconds`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Clock {
