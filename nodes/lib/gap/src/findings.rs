@@ -98,11 +98,15 @@ impl Findings<'_> {
     }
 
     /// White noise per sample that a simulation of the device has, in SI units: what it declares, or less where
-    /// its readings scatter less. Steps hide how much they scatter.
+    /// its readings scatter less. Steps hide how much they scatter; what was found of it where nothing is declared
+    /// has their rounding (step^2 / 12) in it, which a simulation has of its own.
     pub fn simulated_sigma(&self, channel: Channel) -> f64 {
         let declared = self.declared_sigma(channel);
+        let step = self.applied().lsb(channel);
+        let is_declared = self.model.prepared.declared[channel].is_some();
         match self.digital[channel].lsb {
-            Some(_) => declared,
+            Some(_) if is_declared => declared,
+            Some(_) => (declared.powi(2) - step.powi(2) / 12.0).max(0.0).sqrt(),
             None => declared.min(self.most_noise[channel]),
         }
     }

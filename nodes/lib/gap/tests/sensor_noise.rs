@@ -61,3 +61,16 @@ fn motion_that_no_reference_resolves_is_no_noise() {
     let diagnosis = answer(&noisy.with(K::AccelNoise, &[0.02]).record()).diagnosis;
     assert_eq!(names(&diagnosis), ["accel_noise"]);
 }
+
+#[test]
+fn rounding_is_no_noise_beside_the_rounding() {
+    // Steps of 0.5 m/s2 leave 0.144 m/s2 of their own, of which an undeclared noise has nothing.
+    let scene = Scene {
+        declared: PerChannel::default(),
+        ..Scene::new(14)
+    };
+    let answer = answer(&scene.with(K::AccelQuantization, &[0.5]).record());
+    assert_eq!(names(&answer.diagnosis), ["accel_quantization"]);
+    let noise = answer.effects.declared_noise.accel_density * IMU_HZ.sqrt();
+    assert!(noise < 0.05, "{noise}");
+}
