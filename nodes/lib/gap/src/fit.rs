@@ -195,8 +195,7 @@ impl<'a> FitModel<'a> {
         let Some(moved) = changed(set, kind, value, size) else {
             return vec![0.0; 6 * self.prepared.length];
         };
-        let stage = kind.spec().stage;
-        let readings = self.prepared.predict_from(&self.track, base, &moved, stage);
+        let readings = self.prepared.predict_from(&self.track, base, &moved, kind);
         let changes = changed_axes(&readings, &base.readings);
         let difference = self.prepared.scattered(changes, |k, axis| {
             (value_on_axis(&readings[k], axis) - value_on_axis(&base.readings[k], axis)) / size

@@ -1,7 +1,8 @@
 //! One placement, made ready to be compared: sample grid, masks, units.
 
 use cromosim_imu::{
-    AXES, Channel, EffectSet, PerChannel, Reading, ResidualView, SensorModel, Stage, StagedReadings,
+    AXES, Channel, EffectKind, EffectSet, PerChannel, Reading, ResidualView, SensorModel,
+    StagedReadings,
 };
 use cromosim_spatial::{
     FrameGrid, KinematicTrack, PoseEstimate, PoseNoise, Spectrum, Stamp, welch,
@@ -286,16 +287,16 @@ impl PreparedPlacement {
         Prediction::new(&model, track, &self.stamps)
     }
 
-    /// The readings under `set`, which differs from the set of `base` in effects of `stage` alone.
+    /// The readings under `set`, which differs from the set of `base` in the values of one effect alone.
     pub fn predict_from(
         &self,
         track: &KinematicTrack,
         base: &Prediction,
         set: &EffectSet,
-        stage: Stage,
+        kind: EffectKind,
     ) -> Vec<Reading> {
         let model = SensorModel::new(set, self.epoch);
-        base.repeated_from(stage, &model, track, &self.stamps)
+        base.with_other(kind, &model, track, &self.stamps)
     }
 
     /// Which part of time an entry of the sample grid belongs to.

@@ -3,7 +3,7 @@
 #![allow(missing_docs)]
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use cromosim_imu::{Effect, EffectKind, EffectSet, SensorModel, Stage, StagedReadings};
+use cromosim_imu::{Effect, EffectKind, EffectSet, SensorModel, StagedReadings};
 use cromosim_spatial::{KinematicTrack, Stamp, so3};
 use nalgebra::Vector3;
 
@@ -73,7 +73,7 @@ fn effects(criterion: &mut Criterion) {
     });
     let staged = StagedReadings::new(&model, &track, &stamps);
     criterion.bench_function("fourteen effects: again from the timing on", |bencher| {
-        bencher.iter(|| staged.repeated_from(Stage::Timing, &model, &track, &stamps))
+        bencher.iter(|| staged.with_other(EffectKind::TimeOffset, &model, &track, &stamps))
     });
 }
 

@@ -219,11 +219,7 @@ impl SensorModel {
     /// [`SensorModel::sensor`]. Before and after the grid its ends are held.
     pub(super) fn sample(&self, trace: &GridTrace, stamps: &[Stamp]) -> Vec<Reading> {
         let start = trace.start - self.epoch;
-        let vibration = self.vibration.map(|line| {
-            line.filtered(PerChannel::from_fn(|channel| {
-                self.low_pass[channel].map(|filter| low_pass::response(filter.natural_hz, line.hz))
-            }))
-        });
+        let vibration = self.filtered_vibration();
         let slip = self
             .slip
             .map(|(at, after)| Slip::new(self, trace, start, at, after));
@@ -261,6 +257,50 @@ impl SensorModel {
         stamps.iter().map(read).collect()
     }
 
+    /// The same of one channel beside what the other reads, which no effect of this channel changes; none where the
+    /// mount slips, which turns whole readings.
+    pub(super) fn sample_one(
+        &self,
+        channel: Channel,
+        trace: &GridTrace,
+        stamps: &[Stamp],
+        others: &[Reading],
+    ) -> Option<Vec<Reading>> {
+        if self.slip.is_some() {
+            return None;
+        }
+        let start = trace.start - self.epoch;
+        let vibration = self.filtered_vibration();
+        let (series, delay) = match channel {
+            Channel::Accelerometer => (&trace.specific_force, 0.0),
+            Channel::Gyroscope => (&trace.angular_velocity, self.channel_delay),
+        };
+        let read = |(stamp, other): (&Stamp, &Reading)| {
+            let mut seconds = self.clock.true_seconds(*stamp - self.epoch);
+            if delay != 0.0 {
+                seconds -= delay;
+            }
+            let mut own = Reading::default();
+            own[channel] = sampling::interpolate(series, (seconds - start) * trace.rate_hz);
+            if let Some(line) = &vibration {
+                self.shake(line, &mut own, seconds);
+            }
+            let mut reading = *other;
+            reading[channel] = own[channel];
+            reading
+        };
+        Some(stamps.iter().zip(others).map(read).collect())
+    }
+
+    /// The vibration as it comes out of the low-pass.
+    fn filtered_vibration(&self) -> Option<SpectralLine> {
+        self.vibration.map(|line| {
+            line.filtered(PerChannel::from_fn(|channel| {
+                self.low_pass[channel].map(|filter| low_pass::response(filter.natural_hz, line.hz))
+            }))
+        })
+    }
+
     /// Adds a vibration, with what the gyroscope feels of it.
     #[inline]
     pub(super) fn shake(&self, line: &SpectralLine, reading: &mut Reading, seconds: f64) {
@@ -280,19 +320,34 @@ impl SensorModel {
         }
     }
 
+    /// The same of one channel.
+    pub(super) fn linear_one(&self, channel: Channel, readings: &mut [Reading], stamps: &[Stamp]) {
+        for (reading, stamp) in readings.iter_mut().zip(stamps) {
+            let seconds = self.clock.true_seconds(*stamp - self.epoch);
+            reading[channel] = self.linear_value(channel, reading, seconds);
+        }
+    }
+
     /// The same for one reading, true seconds since the epoch.
     #[inline]
     pub(super) fn linear_reading(&self, reading: &Reading, seconds: f64) -> Reading {
-        let mut reading = Reading {
-            specific_force: self.accelerometer.linear(&reading.specific_force, seconds),
-            angular_velocity: self.gyroscope.linear(&reading.angular_velocity, seconds),
-        };
-        if let Some(warm_up) = &self.warm_up {
-            let bias = warm_up.bias(seconds);
-            reading.specific_force += bias.specific_force;
-            reading.angular_velocity += bias.angular_velocity;
+        Reading {
+            specific_force: self.linear_value(Channel::Accelerometer, reading, seconds),
+            angular_velocity: self.linear_value(Channel::Gyroscope, reading, seconds),
         }
-        reading
+    }
+
+    #[inline]
+    fn linear_value(&self, channel: Channel, reading: &Reading, seconds: f64) -> Vector3<f64> {
+        let readout = match channel {
+            Channel::Accelerometer => &self.accelerometer,
+            Channel::Gyroscope => &self.gyroscope,
+        };
+        let value = readout.linear(&reading[channel], seconds);
+        match &self.warm_up {
+            Some(warm_up) => value + warm_up.bias(seconds)[channel],
+            None => value,
+        }
     }
 
     /// White noise of the readings: the declared and what effects add to it; variances add.

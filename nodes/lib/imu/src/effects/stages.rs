@@ -7,7 +7,8 @@ use std::sync::Arc;
 
 use cromosim_spatial::{KinematicTrack, Stamp};
 
-use super::{GridTrace, Reading, SensorModel, Stage};
+use super::{EffectKind, GridTrace, Reading, SensorModel, Stage};
+use crate::Channel;
 
 impl Stage {
     /// The stages that a recording passes, in their order: the one place that states it. What acts
@@ -96,9 +97,34 @@ impl SensorModel {
                     work.trace = Trace::from(self.sensor(trace));
                 }
             }
-            Stage::Timing => work.readings = self.sample(work.trace.get(), work.stamps),
-            Stage::Linear => self.linear(&mut work.readings, work.stamps),
+            Stage::Timing => {
+                let (trace, stamps) = (work.trace.get(), work.stamps);
+                let one = work.only.and_then(|(channel, before)| {
+                    self.sample_one(channel, trace, stamps, &before.sampled)
+                });
+                work.readings = one.unwrap_or_else(|| self.sample(trace, stamps));
+            }
+            Stage::Linear => match work.only {
+                Some((channel, before)) => {
+                    self.linear_one(channel, &mut work.readings, work.stamps);
+                    take_channel(other(channel), &before.readings, &mut work.readings);
+                }
+                None => self.linear(&mut work.readings, work.stamps),
+            },
             Stage::Digital => self.digital(&mut work.readings),
+        }
+    }
+
+    /// The channel that an effect changes, where it is one.
+    fn only_channel_of(&self, kind: EffectKind) -> Option<Channel> {
+        let spec = kind.spec();
+        match spec.channels {
+            // The gyroscope feels what the sensor does.
+            [Channel::Accelerometer] if self.coupling.is_some() && spec.stage < Stage::Linear => {
+                None
+            }
+            [channel] => Some(*channel),
+            _ => None,
         }
     }
 
@@ -118,6 +144,8 @@ struct Work<'a> {
     stamps: &'a [Stamp],
     trace: Trace<'a>,
     readings: Vec<Reading>,
+    /// The one channel that differs from readings before.
+    only: Option<(Channel, &'a StagedReadings)>,
 }
 
 /// Readings on a grid; what passes a stage that changes nothing is not copied.
@@ -194,17 +222,18 @@ impl StagedReadings {
     }
 
     /// The readings before noise and the digital stage of `model`, whose effects differ from the
-    /// ones of these readings in `stage` and later stages alone.
-    pub fn repeated_from(
+    /// ones of these readings in the values of one alone.
+    pub fn with_other(
         &self,
-        stage: Stage,
+        kind: EffectKind,
         model: &SensorModel,
         motion: &KinematicTrack,
         stamps: &[Stamp],
     ) -> Vec<Reading> {
-        let first = stage.clamp(Stage::Segment, Stage::Linear);
+        let first = kind.spec().stage.clamp(Stage::Segment, Stage::Linear);
         let mut work = Work::new(stamps);
         work.motion = Some(motion);
+        work.only = model.only_channel_of(kind).map(|channel| (channel, self));
         match first {
             Stage::Tissue => work.trace = Trace::Shared(Arc::clone(&self.segment)),
             Stage::Sensor => work.trace = Trace::Shared(Arc::clone(&self.tissue)),
@@ -224,6 +253,24 @@ impl<'a> Work<'a> {
             stamps,
             trace: Trace::default(),
             readings: Vec::new(),
+            only: None,
         }
     }
 }
+
+fn other(channel: Channel) -> Channel {
+    match channel {
+        Channel::Accelerometer => Channel::Gyroscope,
+        Channel::Gyroscope => Channel::Accelerometer,
+    }
+}
+
+fn take_channel(channel: Channel, from: &[Reading], to: &mut [Reading]) {
+    for (from, to) in from.iter().zip(to) {
+        to[channel] = from[channel];
+    }
+}
+
+#[cfg(test)]
+#[path = "stages_tests.rs"]
+mod tests;
