@@ -12,7 +12,9 @@ use crate::policy::report::MOSTLY_EXPLAINED;
 use crate::policy::search::{MOST, MOST_AT_FIRST, ROUNDS};
 use crate::progress::{self, Progress, THINNED};
 use crate::reportable::{Observations, is_ordinary, reportable_effects};
-use crate::search::{ScoredEffectSet, excess, exchanged, score, score_as_it_is, search};
+use crate::search::{
+    ScoredEffectSet, excess, exchanged, score, score_as_it_is, search, search_down_to_noise,
+};
 use crate::sensor_noise::{found_noise, has_tails, is_steady, is_white, most_noise};
 use crate::session::Session;
 use crate::smoothing::{try_smoothing, with_undone_smoothing};
@@ -35,9 +37,22 @@ impl<'a> Analysis<'a> {
             return refined;
         }
         let fitted = self.library.fitted();
-        let (model, scored) = self.searched(&fitted);
+        let (mut model, scored) = self.searched(&fitted);
         self.progress.reached(progress::ROUNDS.end);
-        let scored = exchanged(&model, scored, &fitted);
+        let found = names(&scored.fit.set);
+        let mut scored = exchanged(&model, scored, &fitted);
+        // What did not grow beside the wrong member may grow beside the right one; what was left out would come again.
+        let are_others = names(&scored.fit.set) != found;
+        if are_others && scored.fit.set.len() >= found.len() {
+            let updated = with_updated_noise(&model, &scored, &self.session.digital, self.library);
+            let set = std::slice::from_ref(&scored.fit.set);
+            let grown = search(&updated, set, &fitted, MOST);
+            trace_scored("exchanged and grown", &grown);
+            if grown.fit.set.len() > scored.fit.set.len() {
+                model = updated;
+                scored = exchanged(&model, grown, &fitted);
+            }
+        }
         let scored = with_chosen_axes(&model, scored, self.library);
         self.progress.reached(1.0);
         (model, scored)
@@ -148,7 +163,7 @@ impl<'a> Analysis<'a> {
             starts, digital, ..
         } = self.session;
         let mut model = self.first_model();
-        let mut scored = search(&model, starts, fitted, MOST_AT_FIRST);
+        let mut scored = search_down_to_noise(&model, starts, fitted, MOST_AT_FIRST);
         trace_scored("first", &scored);
         self.progress.reached(progress::ROUNDS.start);
         if self.library.allows_read_off(ReadOff::ReferenceSpectrum) {
@@ -158,7 +173,12 @@ impl<'a> Analysis<'a> {
         for round in 0..ROUNDS {
             model = with_updated_noise(&model, &scored, digital, self.library);
             let before = scored.fit.set.clone();
-            scored = search(&model, std::slice::from_ref(&before), fitted, MOST);
+            let start = std::slice::from_ref(&before);
+            scored = if round + 1 < ROUNDS {
+                search_down_to_noise(&model, start, fitted, MOST)
+            } else {
+                search(&model, start, fitted, MOST)
+            };
             trace_scored(&format!("round {round}"), &scored);
             rounds.one_of(round, ROUNDS).reached(1.0);
             if names(&before) == names(&scored.fit.set) {

@@ -78,8 +78,6 @@ pub(crate) fn search_together(
     }
     progress.reached(1.0);
     let with_margins = |(session, fit): (usize, Fit)| ScoredEffectSet {
-        fit,
-        score: best.score,
         margins: margins
             .iter()
             .filter_map(|(member, margin)| match *member {
@@ -87,6 +85,7 @@ pub(crate) fn search_together(
                 Member::Session(own, kind) => (own == session).then_some((kind, *margin)),
             })
             .collect(),
+        ..ScoredEffectSet::new(fit, best.score)
     };
     best.fits
         .iter()

@@ -19,6 +19,25 @@ pub(crate) struct Candidate {
     pub set: EffectSet,
     /// Held-out log-likelihood after the step, nats.
     pub predicted_gain: f64,
+    /// Normal equations of an effect's columns beside the fit's, where the step is from its neutral values.
+    pub beside: Option<Beside>,
+}
+
+/// An effect, alone or with its companion, with their columns beside a fit's.
+#[derive(Clone, Debug)]
+pub(crate) struct Beside {
+    kinds: Vec<EffectKind>,
+    gram: Gram,
+}
+
+impl Beside {
+    fn new(model: &FitModel, fit: &Fit, kinds: Vec<EffectKind>) -> Self {
+        let starts: Vec<Effect> = kinds.iter().copied().map(Effect::neutral).collect();
+        let mut set = fit.set.clone();
+        set.extend(&starts);
+        let gram = beside(model, fit, &set, &starts, None);
+        Self { kinds, gram }
+    }
 }
 
 /// The best start of one effect beside `fit`, and that together with its companion; none where it is
@@ -59,11 +78,14 @@ fn candidate(model: &FitModel, fit: &Fit, starts: &[Effect]) -> Candidate {
         .all(|start| *start == Effect::neutral(start.kind()));
     let mut set = fit.set.clone();
     set.extend(starts);
-    let linear = if are_neutral {
-        beside(model, fit, &set, starts, None).solve()
+    let (linear, beside) = if are_neutral {
+        let kinds = starts.iter().map(Effect::kind).collect();
+        let neutral = Beside::new(model, fit, kinds);
+        (neutral.gram.solve(), Some(neutral))
     } else {
         let prediction = model.prepared.predict(&model.track, &set);
-        beside(model, fit, &set, starts, Some(&prediction)).solve()
+        let gram = beside(model, fit, &set, starts, Some(&prediction));
+        (gram.solve(), None)
     };
     let layout: Vec<_> = fit
         .layout
@@ -74,6 +96,7 @@ fn candidate(model: &FitModel, fit: &Fit, starts: &[Effect]) -> Candidate {
     Candidate {
         set: stepped(&set, &layout, &linear.step, 1.0),
         predicted_gain: linear.held_out,
+        beside,
     }
 }
 
@@ -100,8 +123,7 @@ fn beside(
 /// one pass over the library serves all members.
 pub(crate) struct Substitutes<'a> {
     fit: &'a Fit,
-    /// Effects, alone or with their companion, with their columns beside the fit's.
-    beside: Vec<(Vec<EffectKind>, Gram)>,
+    beside: Vec<Beside>,
 }
 
 impl<'a> Substitutes<'a> {
@@ -112,16 +134,18 @@ impl<'a> Substitutes<'a> {
             let together = companion(kind, fit, library).map(|other| vec![kind, other]);
             std::iter::once(vec![kind]).chain(together)
         });
-        let with_columns = |kinds: Vec<EffectKind>| {
-            let starts: Vec<Effect> = kinds.iter().copied().map(Effect::neutral).collect();
-            let mut set = fit.set.clone();
-            set.extend(&starts);
-            let gram = beside(model, fit, &set, &starts, None);
-            (kinds, gram)
-        };
         Self {
             fit,
-            beside: sets.map(with_columns).collect(),
+            beside: sets.map(|kinds| Beside::new(model, fit, kinds)).collect(),
+        }
+    }
+
+    /// The same from what a screen of the library around the fit had.
+    pub fn of_screen(fit: &'a Fit, screened: &[Beside]) -> Self {
+        let are_asked = |one: &&Beside| starts_neutral(one.kinds[0]);
+        Self {
+            fit,
+            beside: screened.iter().filter(are_asked).cloned().collect(),
         }
     }
 
@@ -137,11 +161,11 @@ impl<'a> Substitutes<'a> {
             return None;
         }
         let without = self.fit.held_out_without(member);
-        let of_other = self.beside.iter().filter(|(kinds, _)| kinds[0] == other);
+        let of_other = self.beside.iter().filter(|one| one.kinds[0] == other);
         of_other
-            .map(|(kinds, gram)| {
-                let price: f64 = kinds.iter().map(|kind| price(*kind)).sum();
-                self.fit.held_out_in_place_of(member, gram) - without - price
+            .map(|one| {
+                let price: f64 = one.kinds.iter().map(|kind| price(*kind)).sum();
+                self.fit.held_out_in_place_of(member, &one.gram) - without - price
             })
             .max_by(f64::total_cmp)
     }

@@ -7,10 +7,10 @@ use crate::fit::{Fit, FitModel, free_values};
 use crate::plausibility::is_sound;
 use crate::policy::price;
 use crate::policy::search::{
-    BEAM, EXCHANGES, MOST_LOSS_NATS, MOST_MEMBERS, MOST_RISE, NEAR_BEST_NATS,
+    BEAM, EXCHANGES, FAR_BEHIND, MOST_LOSS_NATS, MOST_MEMBERS, MOST_RISE, NEAR_BEST_NATS,
     PART_OF_BEST_PREDICTION, PART_OF_LOSS_AT_A_DISTANCE, REFITS, RIVALS, SURE_PRICES,
 };
-use crate::screen::{Candidate, Substitutes, screen, sharpen_change_point, starts_neutral};
+use crate::screen::{Beside, Candidate, Substitutes, screen, sharpen_change_point, starts_neutral};
 use crate::trace::{names, trace};
 
 /// A fitted set and its worth.
@@ -21,6 +21,19 @@ pub(crate) struct ScoredEffectSet {
     pub score: f64,
     /// By how much each member beats the best set without it, nats.
     pub margins: Vec<(EffectKind, f64)>,
+    /// What the library looks like beside it, where a search ended with that.
+    pub screened: Vec<Beside>,
+}
+
+impl ScoredEffectSet {
+    pub fn new(fit: Fit, score: f64) -> Self {
+        Self {
+            fit,
+            score,
+            margins: Vec::new(),
+            screened: Vec::new(),
+        }
+    }
 }
 
 /// What a set costs.
@@ -53,26 +66,28 @@ pub(crate) fn price_of_effect(model: &FitModel, kind: EffectKind) -> f64 {
 /// from.
 pub(crate) fn score(model: &FitModel, set: EffectSet) -> ScoredEffectSet {
     let fit = sharpen_change_point(model, model.fit(set));
+    of_fit(model, fit)
+}
+
+/// The same after at most so many steps.
+pub(crate) fn score_after(model: &FitModel, set: EffectSet, steps: usize) -> ScoredEffectSet {
+    of_fit(model, model.fit_steps(set, steps))
+}
+
+fn of_fit(model: &FitModel, fit: Fit) -> ScoredEffectSet {
     let score = if is_sound(model, &fit) {
         fit.linear.held_out - price_of(model, &fit.set)
     } else {
         f64::NEG_INFINITY
     };
-    ScoredEffectSet {
-        fit,
-        score,
-        margins: Vec::new(),
-    }
+    ScoredEffectSet::new(fit, score)
 }
 
 /// A set with the values that it has.
 pub(crate) fn score_as_it_is(model: &FitModel, set: EffectSet) -> ScoredEffectSet {
     let fit = model.fit_steps(set, 0);
-    ScoredEffectSet {
-        score: fit.linear.held_out - price_of(model, &fit.set),
-        fit,
-        margins: Vec::new(),
-    }
+    let score = fit.linear.held_out - price_of(model, &fit.set);
+    ScoredEffectSet::new(fit, score)
 }
 
 /// Log-likelihood that is still to be gained: of the held-out residual down to noise alone.
@@ -88,19 +103,50 @@ pub(crate) fn search(
     library: &[EffectKind],
     most: usize,
 ) -> ScoredEffectSet {
+    searched(model, starts, library, most, |_| false)
+}
+
+/// As [`search`], but adds no more to what leaves no more than noise: for a search that another one follows, with
+/// the noise that this one leaves.
+pub(crate) fn search_down_to_noise(
+    model: &FitModel,
+    starts: &[EffectSet],
+    library: &[EffectKind],
+    most: usize,
+) -> ScoredEffectSet {
+    let is_noise = |fit: &Fit| larger(fit.held_out_ratio()) <= 1.0;
+    searched(model, starts, library, most, is_noise)
+}
+
+fn searched(
+    model: &FitModel,
+    starts: &[EffectSet],
+    library: &[EffectKind],
+    most: usize,
+    is_enough: impl Fn(&Fit) -> bool,
+) -> ScoredEffectSet {
     let mut beam: Vec<ScoredEffectSet> =
         starts.iter().map(|set| score(model, set.clone())).collect();
     sort(&mut beam);
+    beam.dedup_by(|a, b| names(&a.fit.set) == names(&b.fit.set));
     let mut best = pruned(model, beam[0].clone());
     beam[0] = best.clone();
-    for _ in 0..most {
+    for grown_before in 0..most {
         if best.fit.set.len() >= MOST_MEMBERS {
             break;
         }
         let mut grown_sets: Vec<ScoredEffectSet> = Vec::new();
-        // One after the other is let go: the series of a fit fill much memory.
-        for scored in beam {
-            grow(model, &scored, library, &mut grown_sets);
+        // One after the other is let go: the series of a fit fill much memory. The best comes first.
+        let far_behind = FAR_BEHIND * excess(model, &best.fit);
+        for (place, scored) in beam.into_iter().enumerate() {
+            if grown_before > 0 && best.score - scored.score > far_behind {
+                trace(|| eprintln!("  far behind: {:?}", names(&scored.fit.set)));
+                continue;
+            }
+            let screened = grow(model, &scored, library, &mut grown_sets);
+            if place == 0 {
+                best.screened = screened;
+            }
         }
         trace_grown(&grown_sets);
         let Some(first) = grown_sets.first() else {
@@ -111,6 +157,9 @@ pub(crate) fn search(
             break;
         }
         best = pruned(model, first.clone());
+        if is_enough(&best.fit) {
+            break;
+        }
         grown_sets[0] = best.clone();
         beam = grown_sets;
     }
@@ -135,13 +184,13 @@ fn candidates(model: &FitModel, fit: &Fit, library: &[EffectKind]) -> Vec<(f64, 
 }
 
 /// The set with one more effect, for the candidates that promise most. Only the best of all are kept
-/// in `grown_sets`: the series of a fit fill much memory.
+/// in `grown_sets`: the series of a fit fill much memory. What the library looks like beside the set.
 fn grow(
     model: &FitModel,
     scored: &ScoredEffectSet,
     library: &[EffectKind],
     grown_sets: &mut Vec<ScoredEffectSet>,
-) {
+) -> Vec<Beside> {
     let candidates = candidates(model, &scored.fit, library);
     trace(|| {
         let list: Vec<String> = candidates
@@ -163,8 +212,11 @@ fn grow(
     let needed = (PART_OF_BEST_PREDICTION * best)
         .min(best - NEAR_BEST_NATS)
         .max(-MOST_LOSS_NATS);
-    for (predicted, candidate) in candidates.into_iter().take(REFITS) {
-        if predicted <= scored.score + needed {
+    let is_promising = |predicted: f64| predicted > scored.score + needed;
+    let mut screened = Vec::new();
+    for (place, (predicted, candidate)) in candidates.into_iter().enumerate() {
+        screened.extend(candidate.beside);
+        if place >= REFITS || !is_promising(predicted) {
             continue;
         }
         let grown = score(model, candidate.set);
@@ -175,6 +227,7 @@ fn grow(
             grown_sets.truncate(BEAM);
         }
     }
+    screened
 }
 
 /// Whether an effect earns its place by so much that no fit without it is needed to see it: one
@@ -218,7 +271,10 @@ pub(crate) fn exchanged(
         let mut without_harm: Option<ScoredEffectSet> = None;
         scored.margins.clear();
         let kept = scored.clone();
-        let substitutes = Substitutes::new(model, &kept.fit, library);
+        let substitutes = match &kept.screened[..] {
+            [] => Substitutes::new(model, &kept.fit, library),
+            screened => Substitutes::of_screen(&kept.fit, screened),
+        };
         for kind in members {
             let smaller = score(model, scored.fit.set.without(kind));
             let rival = best_rival(model, &scored, &smaller, kind, library, &substitutes);

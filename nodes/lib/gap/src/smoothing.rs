@@ -8,9 +8,10 @@ use crate::fit::FitModel;
 use crate::noise_updates::with_estimate;
 use crate::plausibility::told_from_smoothing;
 use crate::policy::smoothing::{
-    BESIDE, CLOSER, LEAST_GAIN_NATS, LEAST_SHARE, NOT_FARTHER, SUSPICIOUS,
+    BESIDE, BEST_RATIO, CLOSER, LEAST_GAIN_NATS, LEAST_SHARE, MUCH_FARTHER, NOT_FARTHER,
+    SUSPICIOUS, TRIAL_STEPS,
 };
-use crate::search::{ScoredEffectSet, excess, score, search};
+use crate::search::{ScoredEffectSet, excess, score, score_after, search_down_to_noise};
 use crate::trace::{names, trace};
 
 /// Cutoffs that are tried first, Hz. Beyond the last nothing is undone but noise.
@@ -40,20 +41,28 @@ pub(crate) fn try_smoothing<'a>(
     if !starts.contains(&found) {
         sets.push(found);
     }
+    let plain = evidence(&model, &scored);
+    let needed = plain + LEAST_GAIN_NATS + LEAST_SHARE * excess(&model, &scored.fit);
     let trial = Trial {
-        plain: evidence(&model, &scored),
+        plain,
+        needed,
+        plain_ratio: scored.fit.held_out_ratio(),
         model: &model,
         start: &starts[0],
         sets: &sets,
     };
-    let Some(smoothing) = trial.best_smoothing() else {
+    let Some(Tried { smoothing, set, .. }) = trial.best_smoothing() else {
         return (model, scored);
     };
     if reaches_no_motion(&smoothing, 1.0) {
         return (model, scored);
     }
     let undone = with_undone_smoothing(&model, &starts[0], smoothing);
-    let searched = search(&undone, &sets, library, BESIDE);
+    let [plain_fit, undone_fit] = [&model, &undone].map(|model| score(model, set.clone()));
+    if larger(distance(&model, &plain_fit, &undone_fit)) > MUCH_FARTHER {
+        return (model, scored);
+    }
+    let searched = search_down_to_noise(&undone, &sets, library, BESIDE);
     let gained = evidence(&undone, &searched);
     trace(|| {
         eprintln!(
@@ -61,7 +70,6 @@ pub(crate) fn try_smoothing<'a>(
             names(&searched.fit.set),
         )
     });
-    let needed = trial.plain + LEAST_GAIN_NATS + LEAST_SHARE * excess(&model, &scored.fit);
     let beside = score(&model, searched.fit.set.clone());
     if gained > needed && comes_closer(&model, &beside, &searched) {
         (undone, searched)
@@ -83,66 +91,82 @@ struct Trial<'t, 'a> {
     sets: &'t [EffectSet],
     /// Evidence of the reference as it is, nats.
     plain: f64,
+    /// Evidence from which on a smoothing is believed.
+    needed: f64,
+    /// Held-out mean square of the whitened residual of the reference as it is.
+    plain_ratio: PerChannel<f64>,
+}
+
+/// A smoothing that was tried.
+struct Tried {
+    evidence: f64,
+    smoothing: ZeroPhaseSmoothing,
+    /// The best of the starting sets beside it.
+    set: EffectSet,
 }
 
 impl Trial<'_, '_> {
     /// The smoothing with the most evidence: Butterworth's from a grid, a Gaussian from around it,
     /// the better one refined.
-    fn best_smoothing(&self) -> Option<ZeroPhaseSmoothing> {
+    fn best_smoothing(&self) -> Option<Tried> {
         let butterworth = self.best_of(SmoothingKernel::Butterworth, &CUTOFFS_HZ)?;
-        let parts = GAUSSIAN_PARTS.map(|part| part * butterworth.1.cutoff_hz);
-        let gaussian = self.best_of(SmoothingKernel::Gaussian, &parts)?;
-        let better = if gaussian.0 > butterworth.0 {
-            gaussian
-        } else {
-            butterworth
-        };
+        let butterworth = self.refined(butterworth, &COARSE);
+        let parts = GAUSSIAN_PARTS.map(|part| part * butterworth.smoothing.cutoff_hz);
+        let gaussian = self
+            .best_of(SmoothingKernel::Gaussian, &parts)
+            .map(|gaussian| self.refined(gaussian, &COARSE))
+            .filter(|gaussian| gaussian.evidence > butterworth.evidence);
+        let better = gaussian.unwrap_or(butterworth);
         // Then nothing finer does, either.
-        if reaches_no_motion(&better.1, FINE.iter().product()) {
+        if reaches_no_motion(&better.smoothing, FINE.iter().product()) {
             return None;
         }
-        Some(self.refined(better, &FINE).1)
+        Some(self.refined(better, &FINE))
     }
 
-    /// The cutoff with the most evidence, from some and around their best.
-    fn best_of(
-        &self,
-        kernel: SmoothingKernel,
-        cutoffs_hz: &[f64],
-    ) -> Option<(f64, ZeroPhaseSmoothing)> {
-        let best = cutoffs_hz
+    /// The cutoff with the most evidence; none where none has more than the reference as it is: of a smoothing
+    /// that is there even a cutoff next to it explains far more.
+    fn best_of(&self, kernel: SmoothingKernel, cutoffs_hz: &[f64]) -> Option<Tried> {
+        cutoffs_hz
             .iter()
-            .filter_map(|&cutoff_hz| self.evidence_of(ZeroPhaseSmoothing { cutoff_hz, kernel }))
-            .max_by(|a, b| a.0.total_cmp(&b.0))?;
-        Some(self.refined(best, &COARSE))
+            .filter_map(|&cutoff_hz| self.tried(ZeroPhaseSmoothing { cutoff_hz, kernel }))
+            .max_by(|a, b| a.evidence.total_cmp(&b.evidence))
+            .filter(|best| best.evidence > self.plain)
     }
 
     /// The best of a smoothing and those whose cutoffs lie on either side of it by some factors.
-    fn refined(
-        &self,
-        mut best: (f64, ZeroPhaseSmoothing),
-        factors: &[f64],
-    ) -> (f64, ZeroPhaseSmoothing) {
+    fn refined(&self, mut best: Tried, factors: &[f64]) -> Tried {
         for factor in factors {
-            let middle = best.1;
+            let middle = best.smoothing;
             for cutoff_hz in [middle.cutoff_hz / factor, middle.cutoff_hz * factor] {
-                let other = self.evidence_of(ZeroPhaseSmoothing {
+                let other = self.tried(ZeroPhaseSmoothing {
                     cutoff_hz,
                     ..middle
                 });
-                best = other.filter(|other| other.0 > best.0).unwrap_or(best);
+                best = other
+                    .filter(|other| other.evidence > best.evidence)
+                    .unwrap_or(best);
             }
         }
         best
     }
 
-    /// Evidence of a smoothing with the best of the starting sets, nats, and the smoothing.
-    fn evidence_of(&self, smoothing: ZeroPhaseSmoothing) -> Option<(f64, ZeroPhaseSmoothing)> {
+    /// A smoothing with the best of the starting sets; none where the noise that undoing it brings lets no set
+    /// have the evidence that is needed.
+    fn tried(&self, smoothing: ZeroPhaseSmoothing) -> Option<Tried> {
         let undone = with_undone_smoothing(self.model, self.start, smoothing);
+        let most = -sum_over_channels(|channel| {
+            let whitener = &undone.whitener;
+            let best_ratio = self.plain_ratio[channel].min(BEST_RATIO);
+            whitener.count[channel] * (0.5 * best_ratio + whitener.log_scale[channel])
+        });
+        if most < self.needed {
+            return None;
+        }
         let found = self
             .sets
             .iter()
-            .map(|set| score(&undone, set.clone()))
+            .map(|set| score_after(&undone, set.clone(), TRIAL_STEPS))
             .max_by(|a, b| a.score.total_cmp(&b.score))?;
         let evidence = evidence(&undone, &found);
         trace(|| {
@@ -152,7 +176,11 @@ impl Trial<'_, '_> {
                 found.fit.held_out_ratio()
             )
         });
-        Some((evidence, smoothing))
+        Some(Tried {
+            evidence,
+            smoothing,
+            set: found.fit.set,
+        })
     }
 }
 
@@ -180,12 +208,21 @@ pub(crate) fn with_undone_smoothing<'a>(
 /// Whether the simulation itself comes closer in one channel than with the same effects alone, and in
 /// none moves away: what is undone must not cost more than it gives.
 fn comes_closer(model: &FitModel, plain: &ScoredEffectSet, undone: &ScoredEffectSet) -> bool {
+    let ratio = distance(model, plain, undone);
+    trace(|| eprintln!("  smoothing comes closer by {ratio:.3?}"));
+    smaller(ratio) < CLOSER && larger(ratio) < NOT_FARTHER
+}
+
+/// Root mean squares of the residuals of what is undone, over those of what is not.
+fn distance(
+    model: &FitModel,
+    plain: &ScoredEffectSet,
+    undone: &ScoredEffectSet,
+) -> PerChannel<f64> {
     let norms = |scored: &ScoredEffectSet| {
         let readings = &scored.fit.prediction.readings;
         model.prepared.residual_norms(readings)
     };
     let (undone, plain) = (norms(undone), norms(plain));
-    let ratio = PerChannel::from_fn(|channel| undone[channel] / plain[channel].max(1e-30));
-    trace(|| eprintln!("  smoothing comes closer by {ratio:.3?}"));
-    smaller(ratio) < CLOSER && larger(ratio) < NOT_FARTHER
+    PerChannel::from_fn(|channel| undone[channel] / plain[channel].max(1e-30))
 }
