@@ -1,6 +1,8 @@
 //! What is found in closed form before any fit: lag, units, axes and gravity, each to within what a
 //! fit can go on from.
 
+use std::ops::RangeInclusive;
+
 use cromosim_imu::{
     Channel, Effect, EffectError, EffectSet, GravityMode, PerChannel, Reading,
     nearest_signed_permutation,
@@ -25,6 +27,8 @@ const ON_TIME_LEAVES: f64 = 1.2;
 /// Distance of a rotation (Frobenius norm over sqrt(2)) from the identity or from a signed
 /// permutation below which it is left to the search.
 const NEAR_AXES: f64 = 0.25;
+/// Scales of the gyroscope that are no other units: noise and a lag take away half.
+const NEARLY_ONE: RangeInclusive<f64> = 0.5..=2.0;
 /// Part of the measured angular velocity's square that the reference's most turned axis has to explain, for their
 /// ratio to be a unit's; no source. Noise that has nothing to do with it explains one part in as many as there
 /// are readings.
@@ -199,13 +203,20 @@ impl Turns {
         sums
     }
 
+    /// The reference's most turned axis: the readings per unit of its angular velocity about it, and the part of
+    /// their square that these explain.
+    fn about_most_turned_axis(&self) -> (f64, f64) {
+        let turned = self.ww.symmetric_eigen();
+        let (most, square) = turned.eigenvalues.argmax();
+        let along = (self.yw * turned.eigenvectors.column(most)).norm();
+        let square = square.max(f64::MIN_POSITIVE);
+        (along / square, along.powi(2) / (square * self.yy))
+    }
+
     /// Whether the readings turn when the reference does about its most turned axis: what rests has the noise of
     /// both, whose ratio is anything.
     fn are_followed(&self) -> bool {
-        let turned = self.ww.symmetric_eigen();
-        let (most, square) = turned.eigenvalues.argmax();
-        let along = self.yw * turned.eigenvectors.column(most);
-        along.norm_squared() > FOLLOWED * square * self.yy
+        self.about_most_turned_axis().1 > FOLLOWED
     }
 
     /// The matrix; none where the reference does not turn about all axes.
@@ -246,7 +257,50 @@ fn gyro_axes(turns: &Turns) -> (Option<Matrix3<f64>>, f64) {
         is_alike.then(|| (axes, matrix.determinant().abs().cbrt()))
     });
     match of_all_axes {
-        Some((axes, scale)) => (Some(axes), known_factor(scale, Channel::Gyroscope)),
+        // Noise of the reference makes the axes that it turns least about count for less.
+        Some((axes, scale)) if !NEARLY_ONE.contains(&scale) => {
+            let factors = [scale, turns.about_most_turned_axis().0]
+                .map(|scale| known_factor(scale, Channel::Gyroscope));
+            let known = factors.into_iter().find(|factor| *factor != 1.0);
+            (Some(axes), known.unwrap_or(1.0))
+        }
+        Some((axes, _)) => (Some(axes), 1.0),
         None => (None, turns.factor_about_one_axis()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_about_axes_that_hardly_turn_hides_no_units() {
+        // Turns of 1 rad/s about one axis and 0.08 rad/s about the others, where the reference's own errors are nearly
+        // as large: slopes of one and of 0.57.
+        let mut track = KinematicTrack::default();
+        let mut readings = Vec::new();
+        for k in 0..2000 {
+            let t = 0.02 * f64::from(k);
+            let turns = Vector3::new(
+                (3.0 * t).sin(),
+                0.08 * (4.1 * t).sin(),
+                0.08 * (5.3 * t).sin(),
+            );
+            let errors = Vector3::new((17.0 * t).sin(), (19.3 * t).sin(), (23.7 * t).sin()) * 0.07;
+            track.angular_velocity_in_segment.push(turns + errors);
+            readings.push(Reading {
+                angular_velocity: turns.map(f64::to_degrees),
+                ..Reading::default()
+            });
+        }
+        let rows: Vec<(&Reading, usize)> = readings.iter().zip(0..).collect();
+        let turns = Turns::new(&rows, &track);
+        let attenuated = turns
+            .matrix()
+            .map_or(0.0, |matrix| matrix.determinant().cbrt());
+        assert!((30.0..50.0).contains(&attenuated), "{attenuated}");
+        let (axes, factor) = gyro_axes(&turns);
+        assert!(axes.is_some());
+        assert_eq!(factor, 1.0_f64.to_degrees());
     }
 }
