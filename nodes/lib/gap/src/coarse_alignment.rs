@@ -4,14 +4,14 @@
 use std::ops::RangeInclusive;
 
 use cromosim_imu::{
-    Channel, Effect, EffectError, EffectSet, GravityMode, PerChannel, Reading,
+    Channel, Effect, EffectError, EffectKind, EffectSet, GravityMode, PerChannel, Reading,
     nearest_signed_permutation,
 };
 use cromosim_spatial::{KinematicTrack, PoseNoise, so3};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use crate::force_slopes::{ForceSlopes, known_factor};
-use crate::lag::lag_of_angular_speeds;
+use crate::lag::{Drift, drift_of_angular_speeds, lag_of_angular_speeds};
 use crate::policy::report::REFERENCE_NOISE;
 use crate::prepared::PreparedPlacement;
 
@@ -49,6 +49,8 @@ const MILLIMETRES_NOISE: f64 = 0.05;
 pub(crate) struct CoarseAlignment {
     /// IMU stamps late by this, s.
     pub lag_s: f64,
+    /// How that grows, where it does by more than a fit finds; `lag_s` is that of the first message then.
+    pub drift: Option<Drift>,
     /// Factors of the units.
     pub units: PerChannel<f64>,
     pub gravity: GravityMode,
@@ -61,24 +63,36 @@ pub(crate) struct CoarseAlignment {
 
 impl CoarseAlignment {
     pub fn find(prepared: &PreparedPlacement, track: &KinematicTrack) -> Self {
-        let rows_at = |lag_s: f64| -> Vec<(&Reading, usize)> {
+        let rows_along = |drift: Drift| -> Vec<(&Reading, usize)> {
             let rows = prepared.measured.iter().zip(&prepared.stamps);
             rows.filter_map(|(reading, stamp)| {
+                let lag_s = drift.lag_s + drift.per_second * (*stamp - prepared.epoch);
                 let entry = ((*stamp - track.start) - lag_s) * track.rate_hz;
                 (entry >= 0.0 && entry < (track.len() - 1) as f64)
                     .then_some((reading, entry.round() as usize))
             })
             .collect()
         };
+        let rows_at = |lag_s: f64| {
+            let per_second = 0.0;
+            rows_along(Drift { lag_s, per_second })
+        };
         let mut lag_s = lag_of_angular_speeds(prepared, track);
+        let drift = drift_of_angular_speeds(prepared, track, lag_s);
         let mut rows = rows_at(lag_s);
+        if let Some(drift) = drift {
+            lag_s = drift.lag_s;
+            rows = rows_along(drift);
+        }
         let mut turns = Turns::new(&rows, track);
         // What sways has the same speed half a period and a period later: the clocks' own word holds where it
         // explains as much.
         let on_time = rows_at(0.0);
         let turns_on_time = Turns::new(&on_time, track);
         let unexplained = turns_on_time.unexplained();
-        if unexplained < ON_TIME && unexplained <= ON_TIME_LEAVES * turns.unexplained() {
+        let is_on_time =
+            unexplained < ON_TIME && unexplained <= ON_TIME_LEAVES * turns.unexplained();
+        if drift.is_none() && is_on_time {
             (lag_s, rows, turns) = (0.0, on_time, turns_on_time);
         }
         let (axes, gyro) = gyro_axes(&turns);
@@ -97,6 +111,7 @@ impl CoarseAlignment {
         };
         Self {
             lag_s,
+            drift,
             units: PerChannel {
                 accelerometer: scales.accel,
                 gyroscope: gyro,
@@ -112,6 +127,11 @@ impl CoarseAlignment {
     pub fn starts(&self) -> Vec<EffectSet> {
         let mut late = EffectSet::new();
         insert_valid(&mut late, Effect::time_offset(self.lag_s));
+        if let Some(drift) = self.drift {
+            let ppm = vec![1e6 * drift.per_second];
+            insert_valid(&mut late, Effect::new(EffectKind::ClockDrift, ppm));
+            return self.starts_with(late);
+        }
         match self.lag_s.abs() {
             lag_s if lag_s > CERTAIN_LAG_S => self.starts_with(late),
             lag_s if lag_s > LEAST_LAG_S => {

@@ -14,6 +14,97 @@ const NEAR_S: f64 = 0.3;
 /// A best correlation below this tells no lag.
 const LEAST_CORRELATION: f64 = 0.3;
 
+/// Length of the pieces whose lags tell a drift of the clocks, s; no source.
+const PIECE_S: f64 = 20.0;
+/// Fewest pieces that do.
+const LEAST_PIECES: usize = 6;
+/// How far the lag of a piece may be from that of the whole, s: it drifts by as much at most in either direction.
+const REACH_S: f64 = 2.0;
+/// A best correlation of a piece below this tells no lag.
+const LEAST_OF_PIECE: f64 = 0.6;
+/// Distance of a piece's lag from the line of the drift, s, within which it lies on it: half of a quarter turn of motion
+/// at 4 Hz.
+const ON_LINE_S: f64 = 0.03;
+/// Drift over the recording from which on fits from one lag may not reach it, s: as of a lag.
+const LEAST_DRIFT_S: f64 = 0.1;
+
+/// How the lag grows.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Drift {
+    /// Of the first message, s.
+    pub lag_s: f64,
+    pub per_second: f64,
+}
+
+/// The line on which the lags of pieces of the recording lie around that of the whole; none where it is level, or most
+/// of them lie elsewhere.
+pub(crate) fn drift_of_angular_speeds(
+    prepared: &PreparedPlacement,
+    track: &KinematicTrack,
+    lag_s: f64,
+) -> Option<Drift> {
+    let rate_hz = prepared.rate_hz;
+    let measured = measured_speeds(prepared);
+    let piece = (PIECE_S * rate_hz) as usize;
+    let count = measured.len() / piece.max(1);
+    if count < LEAST_PIECES {
+        return None;
+    }
+    let reference = reference_speeds(track, rate_hz);
+    let is_known = is_known(prepared, track, reference.len());
+    let shift = (prepared.epoch - track.start) * rate_hz;
+    let reach = REACH_S * rate_hz;
+    let lag_of = |index: usize| {
+        let from = index * piece;
+        // Where the reference is to be found, one reach further on either side.
+        let there = from as f64 + shift - lag_s * rate_hz;
+        let first = (there - 2.0 * reach).max(0.0) as usize;
+        let last = ((there + piece as f64 + 2.0 * reach).max(0.0) as usize).min(reference.len());
+        if last < first + piece {
+            return None;
+        }
+        let of_piece = &measured[from..from + piece];
+        let correlations =
+            Correlations::of_known(of_piece, &reference[first..last], &is_known[first..last]);
+        // Entry k of the piece is at entry k + from + shift - first of this part when nothing is late.
+        let nothing_late = from as f64 + shift - first as f64;
+        let middle = lag_s * rate_hz - nothing_late;
+        let offsets = (middle - reach) as i64..(middle + reach) as i64;
+        let peak = correlations.peak(offsets, |_| 0.0)?;
+        let lag = (peak.offset + nothing_late) / rate_hz;
+        let seconds = (from as f64 + 0.5 * piece as f64) / rate_hz;
+        (peak.correlation >= LEAST_OF_PIECE).then_some((seconds, lag))
+    };
+    let lags: Vec<(f64, f64)> = (0..count).filter_map(lag_of).collect();
+    let drift = line_of_most(&lags)?;
+    let is_on_line = |(seconds, lag): &&(f64, f64)| {
+        (lag - drift.lag_s - drift.per_second * seconds).abs() < ON_LINE_S
+    };
+    let on_line = lags.iter().filter(is_on_line).count();
+    let seconds = measured.len() as f64 / rate_hz;
+    let is_steady = on_line >= LEAST_PIECES && 2 * on_line > lags.len();
+    (is_steady && drift.per_second.abs() * seconds > LEAST_DRIFT_S).then_some(drift)
+}
+
+/// The line with the median slope of all pairs (Theil and Sen), and the median of what is above it.
+fn line_of_most(points: &[(f64, f64)]) -> Option<Drift> {
+    let median = |mut values: Vec<f64>| {
+        values.sort_unstable_by(f64::total_cmp);
+        values.get(values.len() / 2).copied()
+    };
+    let after = |k: usize| points[k + 1..].iter();
+    let slopes = points
+        .iter()
+        .enumerate()
+        .flat_map(|(k, one)| after(k).map(move |other| (other.1 - one.1) / (other.0 - one.0)));
+    let per_second = median(slopes.collect())?;
+    let above = points
+        .iter()
+        .map(|(seconds, lag)| lag - per_second * seconds);
+    let lag_s = median(above.collect())?;
+    Some(Drift { lag_s, per_second })
+}
+
 /// Lag at which the angular speeds correlate best, s (stamps late when positive); 0 where the
 /// motion does not tell.
 pub(crate) fn lag_of_angular_speeds(prepared: &PreparedPlacement, track: &KinematicTrack) -> f64 {

@@ -48,6 +48,10 @@ impl Session {
         let digital =
             PerChannel::from_fn(|channel| Digital::read_off(&prepared.measured, channel, library));
         prepared.cover(alignment.lag_s)?;
+        if let Some(drift) = alignment.drift {
+            let seconds = prepared.length as f64 / prepared.rate_hz;
+            prepared.cover(alignment.lag_s + drift.per_second * seconds)?;
+        }
         let covered = prepared.usable.clone();
         for channel in Channel::ALL {
             mask_clipped(&mut prepared, channel, &digital[channel]);
