@@ -23,11 +23,12 @@ fn a_lag_of_a_third_of_a_period_is_no_low_pass() {
 
 #[test]
 fn a_drift_of_more_than_a_period_is_found() {
-    // From 0 to 0.36 s in four minutes, of a motion that has turned round in half of that.
+    // From 0 to 0.96 s in four minutes, of a motion that has turned round in a tenth of that.
     let scene = Scene {
+        motion: Motion::random(33).faster(2.0),
         seconds: 240.0,
         ..Scene::new(33)
     };
-    let scene = scene.with(K::ClockDrift, &[-1500.0]);
+    let scene = scene.with(K::ClockDrift, &[-4000.0]);
     names_exactly(&answer(&scene.record()).diagnosis, &scene.effects);
 }
