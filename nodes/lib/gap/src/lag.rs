@@ -44,12 +44,12 @@ pub(crate) fn drift_of_angular_speeds(
     lag_s: f64,
 ) -> Option<Drift> {
     let rate_hz = prepared.rate_hz;
-    let measured = measured_speeds(prepared);
     let piece = (PIECE_S * rate_hz) as usize;
-    let count = measured.len() / piece.max(1);
+    let count = prepared.length / piece.max(1);
     if count < LEAST_PIECES {
         return None;
     }
+    let measured = measured_speeds(prepared);
     let reference = reference_speeds(track, rate_hz);
     let is_known = is_known(prepared, track, reference.len());
     let shift = (prepared.epoch - track.start) * rate_hz;
