@@ -32,3 +32,15 @@ fn a_drift_of_more_than_a_period_is_found() {
     let scene = scene.with(K::ClockDrift, &[-4000.0]);
     names_exactly(&answer(&scene.record()).diagnosis, &scene.effects);
 }
+
+#[test]
+fn motion_that_is_played_again_and_again_is_no_lag_of_a_loop() {
+    for (seconds, seed) in [(-0.4, 35), (0.6, 36), (-0.9, 37)] {
+        let scene = Scene {
+            motion: Motion::random(seed).repeated(10.0),
+            ..Scene::new(seed)
+        };
+        let scene = scene.with(K::TimeOffset, &[seconds]);
+        names_exactly(&answer(&scene.record()).diagnosis, &scene.effects);
+    }
+}

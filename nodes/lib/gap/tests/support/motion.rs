@@ -146,6 +146,15 @@ impl Motion {
         self
     }
 
+    /// As good as the same, again and again after so many seconds.
+    #[must_use]
+    pub fn repeated(mut self, after_s: f64) -> Self {
+        for term in self.position.iter_mut().chain(&mut self.rotation) {
+            term.hz = (term.hz * after_s).round() / after_s;
+        }
+        self
+    }
+
     /// The same motion some seconds on: other poses, the same spectrum.
     pub fn later(&self, seconds: f64) -> Self {
         let shifted = |terms: &[Term]| {
