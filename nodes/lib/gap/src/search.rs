@@ -7,8 +7,9 @@ use crate::fit::{Fit, FitModel, free_values};
 use crate::plausibility::is_sound;
 use crate::policy::price;
 use crate::policy::search::{
-    BEAM, EXCHANGES, FAR_BEHIND, MOST_LOSS_NATS, MOST_MEMBERS, MOST_RISE, NEAR_BEST_NATS,
-    PART_OF_BEST_PREDICTION, PART_OF_LOSS_AT_A_DISTANCE, REFITS, RIVALS, SURE_PRICES,
+    BEAM, EXCHANGES, FAR_BEHIND, FAR_LOWER, MOST_LOSS_NATS, MOST_MEMBERS, MOST_RISE,
+    NEAR_BEST_NATS, PART_OF_BEST_PREDICTION, PART_OF_LOSS_AT_A_DISTANCE, REFITS, RIVALS,
+    SURE_PRICES,
 };
 use crate::screen::{Beside, Candidate, Substitutes, screen, sharpen_change_point, starts_neutral};
 use crate::trace::{names, trace};
@@ -287,7 +288,7 @@ pub(crate) fn exchanged(
             // Beside a better one it is not looked at; the series of a fit fill much memory.
             if best.is_some() {
                 without_harm = None;
-            } else if makes_worse(model, &smaller.fit, &scored.fit) {
+            } else if does_harm(model, kind, &smaller.fit, &scored.fit) {
                 without_harm = without_harm
                     .filter(|other| other.score >= smaller.score)
                     .or(Some(smaller));
@@ -336,6 +337,15 @@ fn best_rival(
         .map(|(_, candidate)| score(model, candidate.set))
         .filter(|rival| !makes_worse(model, &scored.fit, &rival.fit))
         .max_by(|a, b| a.score.total_cmp(&b.score))
+}
+
+/// Whether a channel's residual rises where a member is added. What far lowers all the channels that it acts on is not to
+/// blame for another, in which it is the other members that give way.
+fn does_harm(model: &FitModel, kind: EffectKind, without: &Fit, with: &Fit) -> bool {
+    let norms = |fit: &Fit| model.prepared.residual_norms(&fit.prediction.readings);
+    let (before, after) = (norms(without), norms(with));
+    let far_lowers = |channel: &Channel| after[*channel] < FAR_LOWER * before[*channel];
+    makes_worse(model, without, with) && !kind.spec().channels.iter().all(far_lowers)
 }
 
 /// Whether a channel's residual rises from one fit to another.

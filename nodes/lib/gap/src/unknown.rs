@@ -12,7 +12,7 @@ use crate::noise_updates::with_estimate;
 use crate::policy::probability::{MOST_UNKNOWN, NATS_PER_BAND, UNKNOWN_GAIN_NATS};
 use crate::policy::report::COARSE_STEPS;
 use crate::policy::unknown::{
-    AXIS_SHARE, BAND, BURST, FROZEN, JITTER, MUCH_WIDER_HZ, ORDINARY_BAND, OUTLIERS,
+    AXIS_SHARE, BAND, BURST, FROZEN, JITTER, MOST_GROWTH, MUCH_WIDER_HZ, ORDINARY_BAND, OUTLIERS,
     REGRESSION_NATS, STAYS, UNDONE_SMOOTHING_FACTOR, USUAL_S, WIDER_HZ,
 };
 use crate::prepared::PreparedPlacement;
@@ -213,7 +213,8 @@ impl<'a> Structure<'a> {
     }
 
     /// Whether any of the regressions keeps its gain where the reference is filtered much less: what its filters
-    /// keep out of the motion depends on the motion as well, and comes back then.
+    /// keep out of the motion depends on the motion as well, and comes back then; and noise that comes in can
+    /// depend on itself.
     fn stays_behind_wider_filters(&self, findings: &Findings) -> bool {
         let set = &findings.scored.fit.set;
         let estimate = findings
@@ -227,7 +228,7 @@ impl<'a> Structure<'a> {
             let after = residual_regression(&model, &fit, before.dependence, before.channel);
             let gain = after.map_or(0.0, |after| after.gain);
             trace(|| eprintln!("behind much wider filters {gain:.0} of {:.0}", before.gain));
-            gain > STAYS * before.gain
+            gain > STAYS * before.gain && gain < MOST_GROWTH * before.gain
         })
     }
 
