@@ -37,6 +37,7 @@ fn diagnosis() -> Diagnosis {
         magnetometer: None,
         clock_jumps: Vec::new(),
         calibration: Vec::new(),
+        reference_response: None,
         verdict: verdict.to_owned(),
         gap: Gap {
             before: Metrics {
@@ -70,6 +71,7 @@ fn diagnosis() -> Diagnosis {
         magnetometer: None,
         clock_jumps: Vec::new(),
         calibration: Vec::new(),
+        reference_response: None,
         causes: Vec::new(),
         ..placement("No gap beyond the declared noise.")
     };

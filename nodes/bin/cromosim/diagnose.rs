@@ -446,6 +446,13 @@ fn print(diagnosis: &Diagnosis) -> anyhow::Result<()> {
                 parameters(&kept.effect, &kept.parameters, &kept.standard_errors)
             )?;
         }
+        if let Some(response) = &placement.reference_response {
+            say!(
+                "  {:<20} no cause, but kept; the readings hold so many times the reference's motion: {}",
+                "reference_response",
+                response.in_words()
+            )?;
+        }
         if let Some(magnetometer) = &placement.magnetometer {
             print_magnetometer(magnetometer)?;
         }

@@ -165,6 +165,7 @@ fn effects_of_device(
         declared_noise: device.declared_noise(),
         effects: device.effects().clone(),
         unexplained: device.unexplained(),
+        reference_response: None,
         other_sessions: Vec::new(),
         magnetometer: device.magnetometer().cloned(),
         field_in_world: None,

@@ -3,10 +3,11 @@
 use std::collections::BTreeMap;
 
 use cromosim_imu::{Effect, EffectKind, EffectSet, Reading, UnexplainedErrors};
+use cromosim_spatial::MotionResponse;
 
 use crate::diagnosis::{
     Cause, Gap, GapLocation, KeptCalibration, Metrics, PlacementDiagnosis, RecordingCause,
-    RecordingDiagnosis, Unexplained, Unidentifiable,
+    RecordingDiagnosis, ReferenceResponse, Unexplained, Unidentifiable,
 };
 use crate::evidence::{Evidence, collect};
 use crate::findings::{Findings, Unknown};
@@ -14,6 +15,7 @@ use crate::fit::Fit;
 use crate::identify::unidentifiable;
 use crate::location::locate;
 use crate::probability::{calibrate, probability_of};
+use crate::response::kept;
 use crate::screen::is_change;
 use crate::session::Session;
 use crate::shares::{Shares, shares};
@@ -30,6 +32,8 @@ pub(crate) struct DiagnosisBuilder<'a> {
     parts: Vec<Part<'a>>,
     /// Of the recording with the most to explain.
     heaviest: usize,
+    /// Of the reference's motion, in all recordings.
+    response: Option<MotionResponse>,
 }
 
 /// One recording.
@@ -48,16 +52,21 @@ struct Part<'a> {
 }
 
 impl<'a> Part<'a> {
-    fn new(findings: &'a Findings<'a>, session: &'a Session, seed: u64) -> Self {
-        let simulations = Simulations::new(findings, &session.raw, &session.covered, seed);
+    fn new(
+        findings: &'a Findings<'a>,
+        simulations: Simulations<'a>,
+        response: Option<&MotionResponse>,
+        held_out: &[Reading],
+    ) -> Self {
         let reportable = &findings.reportable;
         let named: Vec<Effect> = reportable.iter().cloned().collect();
         let shares = shares(findings, &simulations, &named);
         let nominal = EffectSet::new();
         let before_readings = simulations.simulate(&nominal);
         let before = simulations.metrics(&nominal, &before_readings);
-        let after_readings = simulations.simulate(&findings.applied());
-        let after = simulations.cross_validated_metrics(&after_readings);
+        let applied = findings.applied();
+        let after_readings = simulations.simulate_with(&applied, response);
+        let after = simulations.metrics(&applied, held_out);
         let whitener = simulations.whitener(&nominal);
         let white = simulations.whitened(&whitener, &before_readings);
         Self {
@@ -96,6 +105,12 @@ impl<'a> Part<'a> {
     fn under(&self, set: &EffectSet) -> Metrics {
         self.simulations
             .metrics(set, &self.simulations.simulate(set))
+    }
+
+    /// With a device that other recordings show; the reference is this one's.
+    fn left_out(&self, set: &EffectSet, response: Option<&MotionResponse>) -> Metrics {
+        let readings = self.simulations.simulate_with(set, response);
+        self.simulations.metrics(set, &readings)
     }
 
     /// Standard deviations that no recording takes away, of each value: the reference's clock is no better
@@ -138,9 +153,21 @@ impl<'a> Part<'a> {
 impl<'a> DiagnosisBuilder<'a> {
     /// `seed` is that of the simulated noise.
     pub fn new(findings: &'a [Findings<'a>], sessions: &'a [Session], seed: u64) -> Self {
-        let pairs = findings.iter().zip(sessions);
-        let parts: Vec<Part> = pairs
-            .map(|(findings, session)| Part::new(findings, session, seed))
+        let simulations: Vec<Simulations> = findings
+            .iter()
+            .zip(sessions)
+            .map(|(findings, session)| {
+                Simulations::new(findings, &session.raw, &session.covered, seed)
+            })
+            .collect();
+        let pairs: Vec<_> = findings.iter().zip(&simulations).collect();
+        let (response, held_out) = kept(&pairs);
+        let parts: Vec<Part> = findings
+            .iter()
+            .zip(simulations.into_iter().zip(held_out))
+            .map(|(findings, (simulations, held_out))| {
+                Part::new(findings, simulations, response.as_ref(), &held_out)
+            })
             .collect();
         let heavier = |best: usize, other: usize| {
             if parts[other].shares.total > parts[best].shares.total {
@@ -153,7 +180,13 @@ impl<'a> DiagnosisBuilder<'a> {
             heaviest: (0..parts.len()).fold(0, heavier),
             findings,
             parts,
+            response,
         }
+    }
+
+    /// What the readings hold of the motion that the reference shows, by frequency; none where it is all of it.
+    pub fn reference_response(&self) -> Option<&MotionResponse> {
+        self.response.as_ref()
     }
 
     /// The diagnosis; `recordings` are the names of the recordings.
@@ -180,6 +213,7 @@ impl<'a> DiagnosisBuilder<'a> {
             gap: Gap { before, after },
             location: self.parts[self.heaviest].location.clone(),
             calibration: self.calibration(),
+            reference_response: self.reference_response().map(ReferenceResponse::from),
             unidentifiable: self.unidentifiable(),
             unexplained: Unexplained {
                 significant: unknown.is_some(),
@@ -225,7 +259,8 @@ impl<'a> DiagnosisBuilder<'a> {
                 after,
                 ..
             } = part;
-            unexplained_errors(findings, simulations, &part.after_readings, after)
+            let response = self.reference_response();
+            unexplained_errors(findings, simulations, &part.after_readings, after, response)
         };
         self.parts.iter().map(of).collect()
     }
@@ -360,7 +395,10 @@ impl<'a> DiagnosisBuilder<'a> {
                 before: part.before,
                 after: part.after,
             },
-            left_out: part.under(&reported_by_the_others(self.findings, index)),
+            left_out: part.left_out(
+                &reported_by_the_others(self.findings, index),
+                self.reference_response(),
+            ),
             location: part.location.clone(),
             causes,
         }

@@ -234,7 +234,10 @@ fn answer(
         .collect();
     let mut answer = PlacementAnswer {
         diagnosis: builder.diagnosis(recordings),
-        effects: simulated_effects(findings, &unexplained),
+        effects: PlacementEffects {
+            reference_response: builder.reference_response().cloned(),
+            ..simulated_effects(findings, &unexplained)
+        },
         evidence: builder.evidence(recordings),
     };
     if let Some(found) = diagnose_magnetometer(&magnetic) {
@@ -279,6 +282,7 @@ fn simulated_effects(findings: &[Findings], unexplained: &[UnexplainedErrors]) -
                 effects: one.applied(),
             })
             .collect(),
+        reference_response: None,
         magnetometer: None,
         field_in_world: None,
     }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use cromosim_spatial::MotionResponse;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -36,6 +37,10 @@ pub struct PlacementDiagnosis {
     /// beside the causes, and `gap.after` counts on them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub calibration: Vec<KeptCalibration>,
+    /// What the readings hold of the motion that the reference shows, by frequency; no cause, but in effects.yaml and
+    /// counted on by `gap.after`. None where it is all of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference_response: Option<ReferenceResponse>,
     /// What this motion cannot tell.
     pub unidentifiable: Vec<Unidentifiable>,
     /// What no cause explains.
@@ -263,6 +268,50 @@ pub struct KeptCalibration {
     pub parameters: BTreeMap<String, Value>,
     /// In the form of the parameters.
     pub standard_errors: BTreeMap<String, Value>,
+}
+
+/// Factors on the reference's motion, by frequency: below 1 where a part of what it shows is no motion of the
+/// sensor, above 1 where it shows less than there is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ReferenceResponse {
+    /// Hz; straight lines in between.
+    pub hz: Vec<f64>,
+    /// Of the position, as the accelerometer shows it.
+    pub accel: Vec<f64>,
+    /// Of the rotation, as the gyroscope shows it.
+    pub gyro: Vec<f64>,
+}
+
+impl From<&MotionResponse> for ReferenceResponse {
+    fn from(response: &MotionResponse) -> Self {
+        Self {
+            hz: response.hz.clone(),
+            accel: response.position.clone(),
+            gyro: response.rotation.clone(),
+        }
+    }
+}
+
+impl ReferenceResponse {
+    /// `accel 0.48 at 14.5 Hz to 1.00; gyro 1.00 to 1.09 at 14.5 Hz`: the extremes of what is not 1 throughout.
+    pub fn in_words(&self) -> String {
+        let channels = [("accel", &self.accel), ("gyro", &self.gyro)];
+        let of = |(name, factors): (&str, &Vec<f64>)| {
+            let pairs = || factors.iter().copied().zip(self.hz.iter().copied());
+            let least = pairs().min_by(|a, b| a.0.total_cmp(&b.0))?;
+            let most = pairs().max_by(|a, b| a.0.total_cmp(&b.0))?;
+            let place = |(factor, hz): (f64, f64)| {
+                if factor == 1.0 {
+                    "1.00".to_owned()
+                } else {
+                    format!("{factor:.2} at {hz} Hz")
+                }
+            };
+            (least.0 < most.0).then(|| format!("{name} {} to {}", place(least), place(most)))
+        };
+        let said: Vec<String> = channels.into_iter().filter_map(of).collect();
+        said.join("; ")
+    }
 }
 
 /// An effect that this motion cannot show.

@@ -45,6 +45,7 @@ mod reference_tracks;
 pub mod report;
 mod reportable;
 mod residual_regressions;
+mod response;
 mod same_motion;
 mod screen;
 mod search;
@@ -68,7 +69,7 @@ pub use diagnose::{DiagnoseOptions, OfRecording, PlacementAnswer, diagnose, diag
 pub use diagnosis::{
     Cause, ClockJump, Diagnosis, Gap, GapLocation, Interval, KeptCalibration, MagneticCause,
     MagneticGap, MagnetometerDiagnosis, Metrics, PlacementDiagnosis, RecordingCause,
-    RecordingDiagnosis, SCHEMA, Unexplained, Unidentifiable,
+    RecordingDiagnosis, ReferenceResponse, SCHEMA, Unexplained, Unidentifiable,
 };
 pub use error::GapError;
 pub use evidence::{CoursePoint, Evidence, MagneticCurves, Spectra};

@@ -1,6 +1,6 @@
 //! Distances of measured and simulated readings.
 
-use cromosim_imu::{Channel, Reading};
+use cromosim_imu::{Channel, PerChannel, Reading};
 use cromosim_spatial::welch;
 
 use crate::axes::{axes_of_channel, value_on_axis};
@@ -18,8 +18,18 @@ pub(crate) struct Comparison<'a> {
 }
 
 impl Comparison<'_> {
+    /// Sums of the squared vector residuals.
+    pub fn squares(&self, simulated: &[Reading]) -> PerChannel<f64> {
+        PerChannel::from_fn(|channel| self.squares_and_count(simulated, channel).0)
+    }
+
     /// Root mean square of the vector residual of a channel.
     fn rmse(&self, simulated: &[Reading], channel: Channel) -> f64 {
+        let (sum, count) = self.squares_and_count(simulated, channel);
+        (sum / count.max(1.0)).sqrt()
+    }
+
+    fn squares_and_count(&self, simulated: &[Reading], channel: Channel) -> (f64, f64) {
         let (mut sum, mut count) = (0.0, 0.0_f64);
         for (k, covered) in self.covered.iter().enumerate() {
             if covered[axes_of_channel(channel).start] {
@@ -32,7 +42,7 @@ impl Comparison<'_> {
                 count += 1.0;
             }
         }
-        (sum / count.max(1.0)).sqrt()
+        (sum, count)
     }
 
     /// All distances; `simulated` without noise, `noisy` with it.

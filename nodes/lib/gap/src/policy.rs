@@ -134,6 +134,21 @@ pub(crate) mod smoothing {
     pub const MUCH_FARTHER: f64 = 1.3;
 }
 
+/// When readings hold more or less of the reference's motion than it shows, by frequency.
+pub(crate) mod response {
+    /// Part of the residual's power in a channel that factors have to take off on time that they were not learnt from:
+    /// 1.5 % of its root mean square. No source.
+    pub const LEAST_PART: f64 = 0.03;
+    /// A factor's distance from one in standard errors from which on it counts; no source.
+    pub const STANDARD_ERRORS: f64 = 2.0;
+    /// Blocks of time below which their scatter says too little.
+    pub const FEWEST_BLOCKS: usize = 6;
+    /// The largest factor: what a reference shows a half of.
+    pub const LARGEST_FACTOR: f64 = 2.0;
+    /// Part of a window's readings that have to be there; what is missing makes factors come out closer to one.
+    pub const LEAST_USABLE: f64 = 0.8;
+}
+
 /// When a vibration is more than motion that the reference does not resolve.
 pub(crate) mod vibration {
     /// Its power over the three axes, in units of the white noise's variance per axis.

@@ -411,7 +411,7 @@ pub(crate) fn estimated(placement: &str, reference: &PoseSeries) -> Result<PoseE
 
 /// Straight lines over all but some entries, which are given in their order, held at the ends; a
 /// series without any stays as it is.
-fn bridge(series: &mut [f64], entries: impl Iterator<Item = usize>) {
+pub(crate) fn bridge(series: &mut [f64], entries: impl Iterator<Item = usize>) {
     let mut last: Option<usize> = None;
     for entry in entries {
         match last {

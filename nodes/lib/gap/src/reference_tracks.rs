@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use cromosim_imu::{EffectSet, ReadOff};
-use cromosim_spatial::{KinematicTrack, PoseEstimate, ZeroPhaseSmoothing};
+use cromosim_spatial::{KinematicTrack, MotionResponse, PoseEstimate, ZeroPhaseSmoothing};
 
 use crate::fit::FitModel;
 
@@ -35,20 +35,31 @@ impl<'a> ReferenceTracks<'a> {
     pub fn track(&self, set: &EffectSet) -> Arc<KinematicTrack> {
         let make = || {
             let prepared = self.model.prepared;
-            let mut track = if self.is_that_of_analysis(set) {
+            let track = if self.is_that_of_analysis(set) {
                 Arc::clone(&self.model.track)
             } else {
                 Arc::new(prepared.track(&self.estimate(set)))
             };
-            if prepared.report.length_units != 1.0 {
-                for acceleration in &mut Arc::make_mut(&mut track).acceleration_in_segment {
-                    *acceleration *= prepared.report.length_units;
-                }
-            }
-            track
+            self.in_reported_units(track)
         };
         let undone = self.undone(set);
         Arc::clone(self.tracks.borrow_mut().entry(undone).or_insert_with(make))
+    }
+
+    /// The same motion with a response.
+    pub fn track_with(&self, set: &EffectSet, response: &MotionResponse) -> Arc<KinematicTrack> {
+        let estimate = self.estimate(set).with_response(response.clone());
+        self.in_reported_units(Arc::new(self.model.prepared.track(&estimate)))
+    }
+
+    fn in_reported_units(&self, mut track: Arc<KinematicTrack>) -> Arc<KinematicTrack> {
+        let units = self.model.prepared.report.length_units;
+        if units != 1.0 {
+            for acceleration in &mut Arc::make_mut(&mut track).acceleration_in_segment {
+                *acceleration *= units;
+            }
+        }
+        track
     }
 
     /// The estimate of that motion, in metres.

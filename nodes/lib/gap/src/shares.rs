@@ -64,7 +64,8 @@ fn mean_gains(simulations: &Simulations, causes: &[Effect]) -> Vec<f64> {
                 .for_each(|k| {
                     set.insert(causes[k].clone());
                 });
-            let simulated = simulations.simulate(&unrounded(&set));
+            // What rounding adds is in the prediction of the noise.
+            let simulated = simulations.simulate_unrounded(&set);
             simulations.likelihood(&simulations.whitener(&set), &simulated)
         })
     };
@@ -79,15 +80,6 @@ fn mean_gains(simulations: &Simulations, causes: &[Effect]) -> Vec<f64> {
         }
     }
     gains
-}
-
-/// Without rounding: rounding the simulation adds error of its own, and its noise is in the
-/// prediction.
-fn unrounded(set: &EffectSet) -> EffectSet {
-    set.iter()
-        .map(Effect::kind)
-        .filter(|kind| kind.rounds())
-        .fold(set.clone(), |set, kind| set.without(kind))
 }
 
 /// All orders of up to [`ALL_ORDERS`]; of more, each member in each position once in both directions.

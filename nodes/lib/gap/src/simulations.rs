@@ -4,7 +4,11 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-use cromosim_imu::{Channel, EffectKind, EffectSet, PerChannel, ReadOff, Reading, SensorModel};
+use cromosim_imu::{
+    Channel, Effect, EffectKind, EffectSet, PerChannel, ReadOff, Reading, SensorModel,
+};
+use cromosim_spatial::{MotionResponse, Stamp};
+use nalgebra::{Matrix3, Quaternion};
 use rand::SeedableRng;
 use rand_chacha::ChaCha12Rng;
 
@@ -33,6 +37,13 @@ pub(crate) struct Simulations<'a> {
     units: PerChannel<f64>,
     /// Seed of the simulated noise.
     seed: u64,
+}
+
+/// How a sensor is turned.
+pub(crate) struct Turn {
+    pub sensor_from_world: Matrix3<f64>,
+    /// Of one sign throughout a recording.
+    pub world_from_segment: Quaternion<f64>,
 }
 
 impl<'a> Simulations<'a> {
@@ -73,6 +84,37 @@ impl<'a> Simulations<'a> {
     pub fn simulate(&self, set: &EffectSet) -> Vec<Reading> {
         let track = self.tracks.track(set);
         SensorModel::new(set, self.whole.epoch).run(&track, &self.whole.stamps)
+    }
+
+    /// The same of a motion with a response, where there is one.
+    pub fn simulate_with(
+        &self,
+        set: &EffectSet,
+        response: Option<&MotionResponse>,
+    ) -> Vec<Reading> {
+        let Some(response) = response else {
+            return self.simulate(set);
+        };
+        let track = self.tracks.track_with(set, response);
+        SensorModel::new(set, self.whole.epoch).run(&track, &self.whole.stamps)
+    }
+
+    /// How the sensor is turned at each message.
+    pub fn turns(&self, set: &EffectSet) -> Vec<Turn> {
+        let track = self.tracks.track(set);
+        let model = SensorModel::new(set, self.whole.epoch);
+        let turned = model.sensor_from_world(&track, &self.whole.stamps, 0.0);
+        let stamps = self.whole.stamps.iter().zip(turned);
+        let of = |(stamp, sensor_from_world): (&Stamp, Matrix3<f64>)| Turn {
+            sensor_from_world,
+            world_from_segment: track.quaternion_at(model.true_time(*stamp)),
+        };
+        stamps.map(of).collect()
+    }
+
+    /// Without rounding: rounding the simulation adds error of its own.
+    pub fn simulate_unrounded(&self, set: &EffectSet) -> Vec<Reading> {
+        self.simulate(&unrounded(set))
     }
 
     /// For the noise that is predicted under those effects of `set` that change it.
@@ -176,18 +218,28 @@ impl<'a> Simulations<'a> {
             .collect()
     }
 
-    /// The metrics that another recording of the device should show: every part of time is
-    /// simulated with values fitted to the others. `after` is simulated with all values.
-    pub fn cross_validated_metrics(&self, after: &[Reading]) -> Metrics {
-        let mut held_out = after.to_vec();
+    /// What another recording of the device should show: every part of time is simulated with values fitted to the
+    /// others, and with the response that was learnt without it, where there are any.
+    pub fn held_out(&self, responses: Option<&[MotionResponse]>) -> Vec<Reading> {
+        let mut held_out = vec![Reading::default(); self.whole.stamps.len()];
         for fold in 0..FOLDS {
-            let readings = self.simulate(&self.findings.applied_excluding_fold(fold));
+            let response = responses.map(|learnt| &learnt[fold]);
+            let set = self.findings.applied_excluding_fold(fold);
+            let readings = self.simulate_with(&set, response);
             for (k, &entry) in self.whole.grid_index.iter().enumerate() {
                 if self.whole.fold(entry) == fold {
                     held_out[k] = readings[k];
                 }
             }
         }
-        self.metrics(&self.findings.applied(), &held_out)
+        held_out
     }
+}
+
+/// Without what rounds.
+fn unrounded(set: &EffectSet) -> EffectSet {
+    set.iter()
+        .map(Effect::kind)
+        .filter(|kind| kind.rounds())
+        .fold(set.clone(), |set, kind| set.without(kind))
 }

@@ -1,10 +1,12 @@
 //! How far readings are off beyond all that is known of.
 
+use std::borrow::Cow;
+
 use cromosim_imu::{
     Channel, Lateness, PerChannel, Reading, UnexplainedErrors, change_per_second,
     rounding_difference,
 };
-use cromosim_spatial::SampleVariance;
+use cromosim_spatial::{MotionResponse, SampleVariance};
 use nalgebra::{Matrix2, Vector2};
 
 use crate::axes::{axes_of_channel, value_on_axis};
@@ -24,9 +26,10 @@ pub(crate) fn unexplained_errors(
     simulations: &Simulations,
     after_readings: &[Reading],
     after: &Metrics,
+    response: Option<&MotionResponse>,
 ) -> UnexplainedErrors {
     let set = findings.applied();
-    let of_reference = ReferenceVariances::new(findings, simulations);
+    let of_reference = ReferenceVariances::new(findings, simulations, response);
     let late = PerChannel::from_fn(|channel| lateness(simulations, after_readings, channel));
     let splits = PerChannel::from_fn(|channel| {
         let stated = Stated {
@@ -191,11 +194,19 @@ struct ReferenceVariances<'a> {
 }
 
 impl<'a> ReferenceVariances<'a> {
-    fn new(findings: &Findings, simulations: &'a Simulations) -> Self {
+    fn new(
+        findings: &Findings,
+        simulations: &'a Simulations,
+        response: Option<&MotionResponse>,
+    ) -> Self {
         let (whole, set) = (&simulations.whole, findings.applied());
-        let estimate = &findings.model.basis.estimate;
+        let estimate = findings.model.basis.estimate.as_ref();
+        let estimate = match response {
+            Some(response) => Cow::Owned(estimate.with_response(response.clone())),
+            None => Cow::Borrowed(estimate),
+        };
         Self {
-            of_samples: set.reference_variances(estimate, 1.0, &whole.stamps),
+            of_samples: set.reference_variances(&estimate, 1.0, &whole.stamps),
             measured: &whole.measured,
         }
     }

@@ -40,6 +40,7 @@ fn stated(effects: EffectSet, before_s: f64, unexplained: UnexplainedErrors) -> 
         },
         effects,
         unexplained,
+        reference_response: None,
         other_sessions: Vec::new(),
         magnetometer: None,
         field_in_world: None,

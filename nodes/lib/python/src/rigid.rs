@@ -78,6 +78,7 @@ fn of_device(name: &str, device: &Device, epoch: Stamp) -> EffectsFile {
         declared_noise: device.declared_noise(),
         effects: device.effects().clone(),
         unexplained: device.unexplained(),
+        reference_response: None,
         other_sessions: Vec::new(),
         magnetometer: device.magnetometer().cloned(),
         field_in_world: None,

@@ -165,6 +165,7 @@ impl Resimulation {
             declared_noise: declared(placement, rate_hz),
             effects: EffectSet::new(),
             unexplained: UnexplainedErrors::default(),
+            reference_response: None,
             other_sessions: Vec::new(),
             magnetometer: self.field.as_ref().map(|_| Magnetometer::default()),
             field_in_world: None,
@@ -172,7 +173,7 @@ impl Resimulation {
         let effects = self.effects.placements.get(name).unwrap_or(&nominal);
         let effects = &effects.in_session_of(stamps[0]);
         let (track, known) = self
-            .track(placement, rate_hz, &effects.effects)
+            .track(placement, rate_hz, effects)
             .map_err(|error| error.at(name.clone()))?;
         let stamps_are_recorded = !placement.measured.is_empty();
         let mut quality = Quality::default();
@@ -254,14 +255,15 @@ impl Resimulation {
         }
     }
 
-    /// The reference's motion as the diagnosis estimates it, or by a scheme, at least at 200 Hz and
-    /// twice the IMU's rate; and what is known of its errors.
+    /// The reference's motion as the diagnosis estimates it (then with the response of the effects file), or by a
+    /// scheme, at least at 200 Hz and twice the IMU's rate; and what is known of its errors.
     fn track(
         &self,
         placement: &RecordedPlacement,
         imu_rate_hz: f64,
-        effects: &EffectSet,
+        known: &PlacementEffects,
     ) -> Result<(KinematicTrack, Known), RecordingError> {
+        let effects = &known.effects;
         let undone = effects.reference_smoothing();
         let rate_hz = (2.0 * imu_rate_hz).max(200.0);
         let poses = own_frames(placement.poses(), effects);
@@ -270,6 +272,10 @@ impl Resimulation {
                 .map_err(|source| RecordingError::NotEstimated { source })?;
             let estimate = undone
                 .map(|smoothing| estimate.undoing(smoothing))
+                .unwrap_or(estimate);
+            let response = known.reference_response.clone();
+            let estimate = response
+                .map(|response| estimate.with_response(response))
                 .unwrap_or(estimate);
             let track = estimate.track_for(imu_rate_hz);
             return Ok((track, Known::Estimate(Box::new(estimate))));

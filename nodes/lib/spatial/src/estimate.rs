@@ -5,6 +5,7 @@ use std::sync::Arc;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::filled::{Filled, all_filled, fill, lengthen};
+use crate::motion_response::MotionResponse;
 use crate::noise_floor::{LARGEST_GAIN, LARGEST_REPORTED_GAIN, LARGEST_RISE, NoiseFloor};
 use crate::pose_spectra::local_spectra;
 use crate::sample_grid::SampleGrid;
@@ -64,6 +65,8 @@ pub struct PoseEstimate {
     pub(crate) filled: Arc<Vec<Filled>>,
     /// A smoothing that is undone.
     undone: Option<ZeroPhaseSmoothing>,
+    /// Factors on what the filters pass.
+    response: Option<Arc<MotionResponse>>,
 }
 
 impl PoseEstimate {
@@ -141,6 +144,7 @@ impl PoseEstimate {
             gaps,
             filled,
             undone: None,
+            response: None,
         }
     }
 
@@ -210,16 +214,30 @@ impl PoseEstimate {
         self.filtered_anew(self.undone, reach)
     }
 
+    /// The estimate with factors on what its filters pass, in place of those that it has.
+    #[must_use]
+    pub fn with_response(&self, response: MotionResponse) -> Self {
+        let plain = Self {
+            response: Some(Arc::new(response)),
+            ..self.clone()
+        };
+        plain.filtered_anew(self.undone, 0)
+    }
+
     fn filtered_anew(&self, undone: Option<ZeroPhaseSmoothing>, reach: usize) -> Self {
         let rate_hz = self.rate_hz;
-        let anew = |floor: &NoiseFloor, local: &[Spectrum]| {
+        let anew = |floor: &NoiseFloor, local: &[Spectrum], factor: &dyn Fn(f64) -> f64| {
             let mut floor = floor.undoing(undone, rate_hz);
             floor.localise(local, rate_hz, undone, reach);
+            floor.multiply_filters(factor);
             floor
         };
+        let response = self.response.as_deref();
+        let of_position = |hz: f64| response.map_or(1.0, |own| own.of_position(hz));
+        let of_rotation = |hz: f64| response.map_or(1.0, |own| own.of_rotation(hz));
         Self {
-            position: anew(&self.position, &self.local[0]),
-            rotation: anew(&self.rotation, &self.local[1]),
+            position: anew(&self.position, &self.local[0], &of_position),
+            rotation: anew(&self.rotation, &self.local[1], &of_rotation),
             undone,
             ..self.clone()
         }

@@ -191,6 +191,18 @@ impl NoiseFloor {
         self.filter = mean;
     }
 
+    /// Multiplies the filters by a factor of the frequency.
+    pub fn multiply_filters(&mut self, factor: &dyn Fn(f64) -> f64) {
+        for (k, weight) in self.filter.iter_mut().enumerate() {
+            *weight *= factor(k as f64 * self.spacing_hz);
+        }
+        for filter in &mut self.windows {
+            for (k, weight) in filter.weights.iter_mut().enumerate() {
+                *weight *= factor(k as f64 * filter.spacing_hz);
+            }
+        }
+    }
+
     /// The filter's weights at the frequencies of one window's spectrum, whose noise is so many times as
     /// dense as that of the whole series.
     fn local_weights(

@@ -1,6 +1,6 @@
 //! A motion's kinematics on a uniform grid of time.
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::Stamp;
 
@@ -33,6 +33,19 @@ impl KinematicTrack {
     /// Whether the track has no entry.
     pub fn is_empty(&self) -> bool {
         self.world_from_segment.is_empty()
+    }
+
+    /// The orientation's quaternion at a time, straight between entries and held at the ends; of one sign where the
+    /// entries' are.
+    pub fn quaternion_at(&self, stamp: Stamp) -> Quaternion<f64> {
+        let Some(last) = self.len().checked_sub(1) else {
+            return Quaternion::identity();
+        };
+        let position = ((stamp - self.start) * self.rate_hz).clamp(0.0, last as f64);
+        let before = (position as usize).min(last.saturating_sub(1));
+        let share = position - before as f64;
+        let of = |index: usize| self.world_from_segment[index.min(last)].into_inner();
+        (of(before) * (1.0 - share) + of(before + 1) * share).normalize()
     }
 
     /// Time of entry `index`.

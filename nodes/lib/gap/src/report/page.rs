@@ -85,6 +85,7 @@ fn write_placement(
     page.push_str("<h3>Causes</h3>\n");
     causes::write_causes(page, placement);
     recordings::write_calibration(page, placement);
+    recordings::write_response(page, placement);
     recordings::write_recordings(page, placement);
     if let Some(evidence) = evidence.filter(|evidence| !evidence.stamps.is_empty()) {
         let window = figures::worst_window(evidence);

@@ -1,4 +1,4 @@
-//! Several recordings beside each other, and the calibrations that are kept.
+//! Several recordings beside each other; the calibrations and the response that are kept.
 
 use std::fmt::Write;
 
@@ -52,4 +52,28 @@ pub(super) fn write_calibration(page: &mut String, placement: &PlacementDiagnosi
         }
     }
     page.push_str("</ul>\n");
+}
+
+/// How much of the reference's motion the readings hold, by frequency.
+pub(super) fn write_response(page: &mut String, placement: &PlacementDiagnosis) {
+    let Some(response) = &placement.reference_response else {
+        return;
+    };
+    let rows = [
+        ("Frequency, Hz", &response.hz),
+        ("Accelerometer", &response.accel),
+        ("Gyroscope", &response.gyro),
+    ];
+    page.push_str("<h3>What the readings hold of the reference's motion</h3>\n<div class=\"scroll\"><table><tbody>\n");
+    for (name, values) in rows {
+        let _ = write!(page, "<tr><th>{name}</th>");
+        for value in values {
+            let _ = write!(page, "<td class=\"r\">{}</td>", significant(*value, 3));
+        }
+        page.push_str("</tr>\n");
+    }
+    page.push_str(
+        "</tbody></table></div>\n<p class=\"note\">Below 1: so much of what the reference shows there is no motion of the sensor. Above 1: the reference shows \
+         less than there is. No cause is named by it; simulations with effects.yaml count on it, and so does what is left of the gap.</p>\n",
+    );
 }

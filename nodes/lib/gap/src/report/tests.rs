@@ -109,6 +109,7 @@ fn placement(verdict: &str, causes: Vec<Cause>, unexplained: Unexplained) -> Pla
         magnetometer: None,
         clock_jumps: Vec::new(),
         calibration: Vec::new(),
+        reference_response: None,
         verdict: verdict.into(),
         gap,
         location,

@@ -87,6 +87,7 @@ fn offline(device: &Device, rate_hz: f64, count: usize, seed: u64) -> Vec<Readin
         declared_noise: device.declared_noise(),
         effects: device.effects().clone(),
         unexplained: UnexplainedErrors::default(),
+        reference_response: None,
         other_sessions: Vec::new(),
         magnetometer: None,
         field_in_world: None,

@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 use std::fmt::{self, Write};
 use std::path::Path;
 
-use cromosim_spatial::{Stamp, in_plain_words};
+use cromosim_spatial::{MotionResponse, Stamp, in_plain_words};
 use nalgebra::Vector3;
 use serde::de::{self, Visitor};
 use serde::{Deserialize, Deserializer};
 
 use super::number::number;
+use super::response_file::{RawResponse, write_response};
 use super::spec::Shape;
 use super::{Effect, EffectSet};
 use crate::magnetic::RawMagnetometer;
@@ -30,6 +31,7 @@ const SCHEMA: &str = "cromosim/effects/1";
 ///       - {effect: time_offset, seconds: 0.021}
 ///     unexplained: {accel_variance: 0.0021, gyro_variance: 1.2e-5}   # where something is, and
 ///     # {accel,gyro}_{reference_excess,late,late_per_second}, see [`UnexplainedErrors`]
+///     reference_response: {hz: [0.5, 7.0], accel: [1.0, 0.9], gyro: [1.0, 1.05]}   # where it is not 1
 ///     magnetometer: {hard_iron: [5.0e-6, -2.0e-6, 1.0e-6]}   # where one was diagnosed, as in a device file
 ///     field_in_world: [0.0, 1.9e-5, -4.5e-5]   # T, as that magnetometer measures it
 ///     other_sessions:   # where several recordings were diagnosed together
@@ -57,6 +59,8 @@ pub struct PlacementEffects {
     /// How far readings are off beyond all that is known of. It goes into the covariances of
     /// messages, and is never drawn.
     pub unexplained: UnexplainedErrors,
+    /// What the readings hold of the motion that the reference shows, by frequency; none where it is all of it.
+    pub reference_response: Option<MotionResponse>,
     /// What acts in other sessions of the same device.
     pub other_sessions: Vec<OtherSession>,
     /// Its magnetometer, where one is known of.
@@ -125,6 +129,7 @@ impl PlacementEffects {
             declared_noise: self.declared_noise,
             effects: effects.clone(),
             unexplained: self.unexplained,
+            reference_response: self.reference_response.clone(),
             other_sessions: Vec::new(),
             magnetometer: self.magnetometer.clone(),
             field_in_world: self.field_in_world,
@@ -157,6 +162,7 @@ struct RawPlacement {
     effects: EffectSet,
     #[serde(default)]
     unexplained: RawUnexplained,
+    reference_response: Option<RawResponse>,
     #[serde(default)]
     other_sessions: Vec<RawSession>,
     magnetometer: Option<RawMagnetometer>,
@@ -283,9 +289,15 @@ impl EffectsFile {
                 file: format!("{file}: placement `{name}`"),
                 problem,
             })?;
+            let response = placement.reference_response.map(RawResponse::parse);
+            let response = response.transpose().map_err(|problem| ImuError::Yaml {
+                file: file.to_owned(),
+                problem: format!("placement `{name}`: reference_response: {problem}"),
+            })?;
             placements.insert(
                 name,
                 PlacementEffects {
+                    reference_response: response,
                     magnetometer,
                     field_in_world: placement.field_in_world.map(Vector3::from),
                     epoch: placement.epoch.0,
@@ -348,6 +360,7 @@ impl EffectsFile {
             );
             write_effects(&mut text, "      ", &placement.effects);
             write_unexplained(&mut text, "    ", &placement.unexplained);
+            write_response(&mut text, placement.reference_response.as_ref());
             write_magnetic(&mut text, placement);
             write_sessions(&mut text, &placement.other_sessions);
         }

@@ -113,6 +113,11 @@ fn files_come_back_to_the_last_digit() {
                 ..Magnetometer::default()
             }),
             field_in_world: Some(Vector3::new(0.0, 1.9e-5, -4.5e-5)),
+            reference_response: Some(MotionResponse {
+                hz: vec![0.5, 7.0],
+                position: vec![1.0, 0.9],
+                rotation: vec![1.0, 1.05],
+            }),
             ..wrist.clone()
         },
     );
@@ -214,4 +219,38 @@ fn refusals_name_file_placement_effect_and_field() {
     assert!(refusal(&YAML.replace("1700000000.123456789", "soon")).contains("epoch: `soon`"));
     assert!(refusal(&YAML.replace("effects/1", "effects/2")).contains("cromosim/effects/2"));
     assert!(refusal(&YAML.replace("epoch", "epok")).contains("epok"));
+}
+
+#[test]
+fn a_response_that_makes_no_sense_is_refused() {
+    for (response, words) in [
+        (
+            "{hz: [], accel: [], gyro: []}",
+            "hz: expected increasing frequencies from 0 on",
+        ),
+        (
+            "{hz: [2, 1], accel: [1, 1], gyro: [1, 1]}",
+            "hz: expected increasing frequencies",
+        ),
+        (
+            "{hz: [1, 2], accel: [1], gyro: [1, 1]}",
+            "accel: expected 2 factors, one for each of hz, found 1",
+        ),
+        (
+            "{hz: [1, 2], accel: [1, 1], gyro: [1, -0.5]}",
+            "gyro: expected factors from 0 to 10, found -0.5",
+        ),
+    ] {
+        let text = YAML.replacen(
+            "    unexplained:",
+            &format!("    reference_response: {response}\n    unexplained:"),
+            1,
+        );
+        let refused = EffectsFile::parse(&text, "e.yaml").unwrap_err().to_string();
+        let place = "e.yaml: placement `wrist`: reference_response: ";
+        assert!(
+            refused.starts_with(place) && refused.contains(words),
+            "{refused}"
+        );
+    }
 }

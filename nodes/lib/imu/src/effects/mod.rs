@@ -58,6 +58,7 @@ mod reference_smoothing;
 mod reference_tilt;
 mod reference_units;
 mod residual_view;
+mod response_file;
 mod sampling;
 mod saturation;
 mod scale;

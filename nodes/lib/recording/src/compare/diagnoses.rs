@@ -239,6 +239,7 @@ mod tests {
             magnetometer: None,
             clock_jumps: Vec::new(),
             calibration: Vec::new(),
+            reference_response: None,
             verdict: String::new(),
             gap: Default::default(),
             location: Default::default(),

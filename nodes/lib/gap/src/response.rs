@@ -1,0 +1,313 @@
+//! How much of the reference's motion the readings hold, by frequency.
+
+use cromosim_imu::{Channel, PerChannel, Reading};
+use cromosim_spatial::{Complex64, FourierPair, MotionResponse};
+use nalgebra::{Quaternion, Vector3};
+
+use crate::axes::axes_of_channel;
+use crate::findings::Findings;
+use crate::policy::response::{
+    FEWEST_BLOCKS, LARGEST_FACTOR, LEAST_PART, LEAST_USABLE, STANDARD_ERRORS,
+};
+use crate::policy::search::MOST_RISE;
+use crate::prepared::{FOLDS, bridge};
+use crate::simulations::Simulations;
+use crate::trace::trace;
+
+/// Edges of the bands, Hz: thirds of an octave from 1 Hz on, one a hertz at least. Slower motion is taken as it is.
+const EDGES_HZ: [f64; 13] = [
+    1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 13.0, 16.0, 20.0, 25.0, 30.0, 40.0,
+];
+const BANDS: usize = EDGES_HZ.len() - 1;
+/// Length of a window, s.
+const WINDOW_S: f64 = 2.0;
+/// Length of the blocks of time whose windows count as one, s: neighbouring windows overlap by half.
+const BLOCK_S: f64 = 2.0;
+
+/// Factors of the bands.
+type Factors = PerChannel<[f64; BANDS]>;
+
+/// A response, and those that are learnt without one part of time.
+struct LearntResponse {
+    whole: MotionResponse,
+    /// By part of time.
+    excluding_fold: Vec<MotionResponse>,
+}
+
+/// Sums over the windows of a block of time: of the simulation's power, of that times the residual, by band; of the
+/// residual's power over all frequencies.
+#[derive(Clone, Copy, Debug, Default)]
+struct Block {
+    fold: usize,
+    simulated: [f64; BANDS],
+    both: [f64; BANDS],
+    residual: f64,
+}
+
+/// The response that lowers the residual of recordings on time that it was not learnt from; none where it is
+/// not by [`LEAST_PART`] of the residual's power in one channel.
+///
+/// In a band, with X the transforms of the simulation's windows and R those of the residual's, readings are `factor`
+/// times the simulation: `factor = 1 + sum Re(X* R) / sum |X|^2`. That is below one where a part of what the
+/// reference shows is no motion (errors in variables), and above where it shows less than there is. Factors closer
+/// to one than their error, by what they scatter over blocks of time, are one.
+fn learn(recordings: &[(&Findings, &Simulations)]) -> Option<LearntResponse> {
+    let blocks = PerChannel::from_fn(|channel| {
+        let of_recordings = recordings.iter();
+        of_recordings
+            .flat_map(|(findings, simulations)| blocks(findings, simulations, channel))
+            .collect::<Vec<Block>>()
+    });
+    let factors = |without: Option<usize>| -> Factors {
+        PerChannel::from_fn(|channel| factors(&blocks[channel], without))
+    };
+    let excluding: Vec<Factors> = (0..FOLDS).map(|fold| factors(Some(fold))).collect();
+    let helps = PerChannel::from_fn(|channel| {
+        let gain = held_out_gain(&blocks[channel], |fold| &excluding[fold][channel]);
+        trace(|| eprintln!("response of {channel:?}: {gain:.4} of the residual"));
+        gain > LEAST_PART
+    });
+    let response = |factors: Factors| {
+        let of = |channel: Channel| held_at_ends(&factors[channel], helps[channel]);
+        MotionResponse {
+            hz: centres(),
+            position: of(Channel::Accelerometer),
+            rotation: of(Channel::Gyroscope),
+        }
+    };
+    Channel::ALL
+        .into_iter()
+        .any(|channel| helps[channel])
+        .then(|| LearntResponse {
+            whole: response(factors(None)),
+            excluding_fold: excluding.into_iter().map(response).collect(),
+        })
+}
+
+/// The response that is kept, and what recordings show with it on time that was not fitted to: none where it raises
+/// a channel's distance there. The rotation's acts on the accelerometer too, by the orientation and a lever arm.
+pub(crate) fn kept(
+    recordings: &[(&Findings, &Simulations)],
+) -> (Option<MotionResponse>, Vec<Vec<Reading>>) {
+    let held_out = |responses: Option<&[MotionResponse]>| -> Vec<Vec<Reading>> {
+        let of = |(_, simulations): &(_, &Simulations)| simulations.held_out(responses);
+        recordings.iter().map(of).collect()
+    };
+    let plain = held_out(None);
+    let Some(learnt) = learn(recordings) else {
+        return (None, plain);
+    };
+    let with = held_out(Some(&learnt.excluding_fold));
+    let distances = |readings: &[Vec<Reading>]| {
+        let pairs = recordings.iter().zip(readings);
+        pairs.fold(
+            PerChannel::<f64>::default(),
+            |sum, ((_, simulations), readings)| {
+                let own = simulations.comparison.squares(readings);
+                PerChannel::from_fn(|channel| sum[channel] + own[channel])
+            },
+        )
+    };
+    let (before, after) = (distances(&plain), distances(&with));
+    let rises = |channel: Channel| after[channel] > MOST_RISE.powi(2) * before[channel];
+    if Channel::ALL.into_iter().any(rises) {
+        (None, plain)
+    } else {
+        (Some(learnt.whole), with)
+    }
+}
+
+/// The lowest frequency at which a factor stands, the bands' middles, and where the highest factor ends.
+fn centres() -> Vec<f64> {
+    let middles = EDGES_HZ.windows(2).map(|edges| 0.5 * (edges[0] + edges[1]));
+    let mut hz = vec![0.5 * EDGES_HZ[0]];
+    hz.extend(middles);
+    hz.push(EDGES_HZ[BANDS]);
+    hz
+}
+
+/// Factors at [`centres`]: one below the bands; what is faster than all of them is as in the last, but not more than
+/// it is.
+fn held_at_ends(factors: &[f64; BANDS], helps: bool) -> Vec<f64> {
+    if !helps {
+        return vec![1.0; BANDS + 2];
+    }
+    let mut all = vec![1.0];
+    all.extend(factors);
+    all.push(factors[BANDS - 1].min(1.0));
+    all
+}
+
+/// Factors from all blocks but those of one part of time.
+fn factors(blocks: &[Block], without: Option<usize>) -> [f64; BANDS] {
+    let used: Vec<&Block> = blocks
+        .iter()
+        .filter(|block| Some(block.fold) != without)
+        .collect();
+    std::array::from_fn(|band| {
+        let with: Vec<&&Block> = used
+            .iter()
+            .filter(|block| block.simulated[band] > 0.0)
+            .collect();
+        let simulated: f64 = with.iter().map(|block| block.simulated[band]).sum();
+        if with.len() < FEWEST_BLOCKS || simulated <= 0.0 {
+            return 1.0;
+        }
+        let more = with.iter().map(|block| block.both[band]).sum::<f64>() / simulated;
+        let scatter: f64 = with
+            .iter()
+            .map(|block| (block.both[band] - more * block.simulated[band]).powi(2))
+            .sum();
+        let count = with.len() as f64;
+        let error = (scatter * count / (count - 1.0)).sqrt() / simulated;
+        if more.abs() < STANDARD_ERRORS * error {
+            return 1.0;
+        }
+        (1.0 + more).clamp(0.0, LARGEST_FACTOR)
+    })
+}
+
+/// By how much factors lower the residual's power on the part of time without which they were learnt, as a part of it.
+fn held_out_gain<'f>(blocks: &[Block], factors: impl Fn(usize) -> &'f [f64; BANDS]) -> f64 {
+    let (mut gain, mut all) = (0.0, 0.0);
+    for block in blocks {
+        for (band, factor) in factors(block.fold).iter().enumerate() {
+            let more = factor - 1.0;
+            gain += 2.0 * more * block.both[band] - more * more * block.simulated[band];
+        }
+        all += block.residual;
+    }
+    gain / f64::max(all, f64::MIN_POSITIVE)
+}
+
+/// The coordinates of a channel, each over the sample grid: the simulation, and the residual (0 where it is not
+/// compared).
+struct Coordinates {
+    simulated: Vec<Vec<f64>>,
+    residual: Vec<Vec<f64>>,
+    /// How many entries are compared before each.
+    known: Vec<usize>,
+}
+
+impl Coordinates {
+    /// In the coordinates whose filters the response multiplies: of the accelerometer the specific force in the world
+    /// (where gravity stands still), of the gyroscope the derivative of the quaternion, `q' = (0, w) q / 2`. In the
+    /// sensor's axes a band of these would lie elsewhere as the sensor turns.
+    fn of(findings: &Findings, simulations: &Simulations, channel: Channel) -> Self {
+        let (prepared, set) = (findings.model.prepared, findings.applied());
+        let simulated = simulations.simulate_unrounded(&set);
+        let measured = simulations.comparison.measured;
+        let turns = simulations.turns(&set);
+        let count = if channel == Channel::Gyroscope { 4 } else { 3 };
+        let mut own = Self {
+            simulated: vec![vec![0.0; prepared.length]; count],
+            residual: vec![vec![0.0; prepared.length]; count],
+            known: vec![0; prepared.length + 1],
+        };
+        let axes = axes_of_channel(channel);
+        for (k, &entry) in prepared.grid_index.iter().enumerate() {
+            let in_coordinates = |vector: Vector3<f64>| {
+                let in_world = turns[k].sensor_from_world.transpose() * vector;
+                if channel == Channel::Gyroscope {
+                    let rate = Quaternion::from_imag(in_world) * turns[k].world_from_segment * 0.5;
+                    rate.coords.as_slice().to_vec()
+                } else {
+                    in_world.as_slice().to_vec()
+                }
+            };
+            let put = |into: &mut [Vec<f64>], vector| {
+                let values = in_coordinates(vector);
+                into.iter_mut()
+                    .zip(values)
+                    .for_each(|(series, value)| series[entry] = value);
+            };
+            put(&mut own.simulated, simulated[k][channel]);
+            if axes.clone().all(|axis| prepared.usable[k][axis]) {
+                let residual = measured[k][channel] - simulated[k][channel];
+                put(&mut own.residual, residual);
+                own.known[entry + 1] = 1;
+            }
+        }
+        for series in &mut own.simulated {
+            bridge(series, prepared.grid_index.iter().copied());
+        }
+        for entry in 0..prepared.length {
+            own.known[entry + 1] += own.known[entry];
+        }
+        own
+    }
+}
+
+/// One channel of a recording.
+fn blocks(findings: &Findings, simulations: &Simulations, channel: Channel) -> Vec<Block> {
+    let prepared = findings.model.prepared;
+    let coordinates = Coordinates::of(findings, simulations, channel);
+    let window = ((WINDOW_S * prepared.rate_hz).round() as usize).max(2);
+    let transform = Windows::new(window, prepared.rate_hz);
+    let place = |entry: usize| (entry as f64 / (BLOCK_S * prepared.rate_hz)) as usize;
+    let mut blocks = vec![Block::default(); place(prepared.length) + 1];
+    let starts = (0..).map(|index| index * (window / 2));
+    for start in starts.take_while(|start| start + window <= prepared.length) {
+        let range = start..start + window;
+        let known = coordinates.known[range.end] - coordinates.known[range.start];
+        if (known as f64) < LEAST_USABLE * window as f64 {
+            continue;
+        }
+        let middle = start + window / 2;
+        let block = &mut blocks[place(middle)];
+        block.fold = prepared.fold(middle);
+        for (motion, rest) in coordinates.simulated.iter().zip(&coordinates.residual) {
+            transform.add(&motion[range.clone()], &rest[range.clone()], block);
+        }
+    }
+    blocks.retain(|block| block.residual > 0.0);
+    blocks
+}
+
+/// Transforms of Hann windows.
+struct Windows {
+    transform: FourierPair,
+    hann: Vec<f64>,
+    spacing_hz: f64,
+}
+
+impl Windows {
+    fn new(window: usize, rate_hz: f64) -> Self {
+        let turn = std::f64::consts::TAU / window as f64;
+        Self {
+            transform: FourierPair::new(window),
+            hann: (0..window)
+                .map(|k| 0.5 - 0.5 * (turn * (k as f64 + 0.5)).cos())
+                .collect(),
+            spacing_hz: rate_hz / window as f64,
+        }
+    }
+
+    /// Both series in one complex transform, as its real and imaginary part.
+    fn add(&self, motion: &[f64], rest: &[f64], block: &mut Block) {
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+        let (level, offset) = (mean(motion), mean(rest));
+        let mut values: Vec<Complex64> = self
+            .hann
+            .iter()
+            .zip(motion.iter().zip(rest))
+            .map(|(weight, (own, other))| {
+                Complex64::new(weight * (own - level), weight * (other - offset))
+            })
+            .collect();
+        self.transform.forward(&mut values);
+        let length = values.len();
+        for k in 1..length.div_ceil(2) {
+            let (here, there) = (values[k], values[length - k].conj());
+            let motion = (here + there) * 0.5;
+            let rest = (here - there) * Complex64::new(0.0, -0.5);
+            block.residual += rest.norm_sqr();
+            let hz = k as f64 * self.spacing_hz;
+            let next = EDGES_HZ.partition_point(|edge| *edge <= hz);
+            if (1..=BANDS).contains(&next) {
+                block.simulated[next - 1] += motion.norm_sqr();
+                block.both[next - 1] += (motion.conj() * rest).re;
+            }
+        }
+    }
+}

@@ -1,0 +1,71 @@
+//! [`MotionResponse`] as effects files have it.
+
+use std::fmt::Write;
+
+use cromosim_spatial::MotionResponse;
+use serde::Deserialize;
+
+use super::number::number;
+
+/// Largest factor that a file may have: a reference that holds a tenth of a motion holds none of it.
+const LARGEST_FACTOR: f64 = 10.0;
+
+/// As it stands in the file: the position's factors by what the accelerometer shows of them, the rotation's by the gyroscope.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RawResponse {
+    hz: Vec<f64>,
+    accel: Vec<f64>,
+    gyro: Vec<f64>,
+}
+
+impl RawResponse {
+    /// Checked; in words what is wrong with it.
+    pub fn parse(self) -> Result<MotionResponse, String> {
+        let Self { hz, accel, gyro } = self;
+        let is_increasing = hz.windows(2).all(|pair| pair[0] < pair[1]);
+        let are_frequencies = hz.iter().all(|value| value.is_finite() && *value >= 0.0);
+        if hz.is_empty() || !is_increasing || !are_frequencies {
+            return Err("hz: expected increasing frequencies from 0 on".to_owned());
+        }
+        for (field, factors) in [("accel", &accel), ("gyro", &gyro)] {
+            if factors.len() != hz.len() {
+                return Err(format!(
+                    "{field}: expected {} factors, one for each of hz, found {}",
+                    hz.len(),
+                    factors.len()
+                ));
+            }
+            let is_factor = |value: &f64| (0.0..=LARGEST_FACTOR).contains(value);
+            if let Some(odd) = factors.iter().find(|value| !is_factor(value)) {
+                return Err(format!(
+                    "{field}: expected factors from 0 to {LARGEST_FACTOR}, found {odd}"
+                ));
+            }
+        }
+        Ok(MotionResponse {
+            hz,
+            position: accel,
+            rotation: gyro,
+        })
+    }
+}
+
+/// A line of the file; nothing where there is none.
+pub(crate) fn write_response(text: &mut String, response: Option<&MotionResponse>) {
+    let Some(response) = response else {
+        return;
+    };
+    let list = |values: &[f64]| {
+        let values: Vec<String> = values.iter().map(|value| number(*value)).collect();
+        values.join(", ")
+    };
+    // Writing to a string cannot fail.
+    let _ = writeln!(
+        text,
+        "    reference_response: {{hz: [{}], accel: [{}], gyro: [{}]}}",
+        list(&response.hz),
+        list(&response.position),
+        list(&response.rotation)
+    );
+}
