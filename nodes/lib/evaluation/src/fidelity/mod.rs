@@ -32,7 +32,7 @@ use crate::training_data::{DataFolder, DataSource};
 use crate::wanted::not_there;
 use cases::Case;
 use errors::SquaredErrors;
-use rigid::{RigidOutcome, run_rigid_study};
+use rigid::{RigidOutcome, check_recordings, run_rigid_study};
 
 /// What a comparison is run on.
 pub struct FidelityOptions {
@@ -54,6 +54,9 @@ pub fn evaluate_fidelity(
     options: &FidelityOptions,
     observer: &dyn Observer,
 ) -> Result<FidelityResults, EvaluationError> {
+    for study in &protocol.rigid {
+        check_recordings(study, &options.data)?;
+    }
     let mut results = FidelityResults::new(protocol, options.quick);
     for study in &protocol.studies {
         if study.optional && !options.data.folder.is_dir() {

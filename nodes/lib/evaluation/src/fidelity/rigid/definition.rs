@@ -133,10 +133,19 @@ impl AnalyticSource {
     }
 }
 
+/// Rate of all known motions, Hz.
+const TRUTH_HZ: f64 = 240.0;
+
 /// Frames per second, Hz, and draws.
 fn check_frames(rate_hz: f64, repeats: u64) -> Result<(), String> {
     if !(10.0..=240.0).contains(&rate_hz) {
         return Err(format!("rate_hz {rate_hz}: expected 10 to 240"));
+    }
+    // Said before any study is run, which may take minutes.
+    if (TRUTH_HZ / rate_hz).fract() != 0.0 {
+        return Err(format!(
+            "rate_hz {rate_hz}: the known motions have {TRUTH_HZ} Hz, of which it must be a whole part"
+        ));
     }
     if repeats == 0 {
         return Err("repeats 0: expected at least 1".to_owned());

@@ -20,5 +20,5 @@ pub use pose_errors::PoseErrors;
 pub use results::{
     PracticeResults, RigidMethodResults, RigidPartResults, RigidStudyResults, StatedResults,
 };
-pub(super) use study::{RigidOutcome, run_rigid_study};
+pub(super) use study::{RigidOutcome, check_recordings, run_rigid_study};
 pub(super) use tables::{pictures, rigid_charts, rigid_markdown, rigid_sections};

@@ -25,6 +25,20 @@ pub(in crate::fidelity) enum RigidOutcome {
     Skipped(String),
 }
 
+/// Whether all recordings are there that a study must have: said before any other study is run.
+///
+/// # Errors
+/// The first one that cannot be read.
+pub(in crate::fidelity) fn check_recordings(
+    study: &RigidStudy,
+    data: &DataFolder,
+) -> Result<(), EvaluationError> {
+    if study.optional || study.recordings.is_empty() {
+        return Ok(());
+    }
+    files(study, data).map(|_| ())
+}
+
 /// All methods on all bodies of a study.
 ///
 /// # Errors
