@@ -98,10 +98,10 @@ def hide_in_reference(rng, part, effects, filtering):
     return times[seen], position[seen] * effects.get("reference_units", {}).get("factor", 1.0), real.continuous(rotation.as_quat())[seen]
 
 
-def write(path, rng, part, t0, effects, mount, filtering):
+def write(path, rng, part, t0, effects, mount, filtering, declared):
     reference = hide_in_reference(rng, part, effects, filtering)
     stamps, force, rate = hide_in_readings(rng, part, t0, effects, attitude(part, part.imu_s, mount))
-    recording.write(path, {PLACE: {"reference": (real.nanoseconds(reference[0]), *reference[1:]), "imu": (real.nanoseconds(stamps), rate, force), "variances": (0.0, 0.0)}})
+    recording.write(path, {PLACE: {"reference": (real.nanoseconds(reference[0]), *reference[1:]), "imu": (real.nanoseconds(stamps), rate, force), "variances": declared}})
 
 
 def answer(folder):
@@ -169,11 +169,17 @@ def left(cromosim, folder, name, said):
     return result
 
 
-def diagnosed(cromosim, folder, parts, rng_seed, t0, effects, mount, filtering):
+def declared_by(said, rate_hz):
+    """Variances per sample that a device with the white noise of an answer declares: gyroscope, accelerometer."""
+    noise = said["placements"][PLACE]["declared_noise"]
+    return tuple(noise[f"{channel}_density"] ** 2 * rate_hz for channel in ("gyro", "accel"))
+
+
+def diagnosed(cromosim, folder, parts, rng_seed, t0, effects, mount, filtering, declared=(0.0, 0.0)):
     """Bags with the effects in them, and what the diagnosis says of the first."""
     folder.mkdir(parents=True, exist_ok=True)
     for index, (name, part) in enumerate(zip(("fit", "check"), parts)):
-        write(folder / f"{name}.mcap", np.random.default_rng([*rng_seed, index]), part, t0, effects, mount, filtering)
+        write(folder / f"{name}.mcap", np.random.default_rng([*rng_seed, index]), part, t0, effects, mount, filtering, declared)
     kept = (folder / "time.txt").exists() and (folder / "diagnosis.json").exists()
     if not kept and run.diagnose(cromosim, [str(folder / "fit.mcap")], str(folder)):
         return None
@@ -205,7 +211,8 @@ def case(cromosim, out, seed, index, effect, level, name, how, file):
         return record | {"failed": "base"}
     there = parameters_of(base[1])
     mount = Rotation.from_rotvec(there.get("mount_rotation", {}).get("rotvec", [0.0] * 3))
-    found = diagnosed(cromosim, folder / "hidden", parts, (seed, index), t0, {effect: injected}, mount, filtering)
+    declared = declared_by(base[1], real.rate(parts[0].imu_s))
+    found = diagnosed(cromosim, folder / "hidden", parts, (seed, index), t0, {effect: injected}, mount, filtering, declared)
     if found is None:
         return record | {"failed": "hidden"}
     said = parameters_of(found[1])
