@@ -7,7 +7,7 @@ use cromosim_spatial::MotionResponse;
 
 use crate::diagnosis::{
     Cause, Gap, GapLocation, KeptCalibration, Metrics, PlacementDiagnosis, RecordingCause,
-    RecordingDiagnosis, ReferenceResponse, Unexplained, Unidentifiable,
+    RecordingDiagnosis, ReferenceResponse, UNKNOWN, Unexplained, Unidentifiable,
 };
 use crate::evidence::{Evidence, collect};
 use crate::findings::{Findings, Unknown};
@@ -206,6 +206,12 @@ impl<'a> DiagnosisBuilder<'a> {
             let share = unexplained * predictable;
             causes.push(unknown_cause(unknown, share, after));
             causes.sort_by(|a, b| b.gap_share.total_cmp(&a.gap_share));
+            // It takes nothing away: what the causes above it leave is left below it, too.
+            let place = causes.iter().position(|cause| cause.effect == UNKNOWN);
+            if let Some(place) = place.filter(|place| place + 1 < causes.len()) {
+                let above = place.checked_sub(1).map(|above| causes[above].after);
+                causes[place].after = above.unwrap_or(before);
+            }
         }
         calibrate(&mut causes);
         PlacementDiagnosis {

@@ -33,6 +33,18 @@ fn what_explains_as_much_as_any_regression_would_stays_a_cause() {
 }
 
 #[test]
+fn what_is_unknown_takes_nothing_away() {
+    let scene = Scene::new(72).with(K::LeverArm, &[0.02, 0.0, -0.02]);
+    let diagnosis = answer(&with_squares(&scene, 0.03)).diagnosis;
+    let [first, .., last] = &diagnosis.causes[..] else {
+        panic!("{}", diagnosis.verdict)
+    };
+    assert_eq!(first.effect, "unknown", "{}", diagnosis.verdict);
+    assert_eq!(first.after, diagnosis.gap.before);
+    assert_eq!(last.after, diagnosis.gap.after);
+}
+
+#[test]
 fn what_the_unknown_part_depends_on_is_shown() {
     let factor = 0.02;
     let evidence = answer(&with_squares(&Scene::new(71), factor)).evidence;
