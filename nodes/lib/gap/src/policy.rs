@@ -202,6 +202,9 @@ pub(crate) mod report {
     /// The same where something else is broad enough to pass for noise: beside a smoothed
     /// reference, or [`MANY_MISSING`] messages.
     pub const DOUBTFUL_EXCESS_NOISE: f64 = 20.0;
+    /// The same beside something unknown in the channel: what is unknown may be broad, but hardly level and steady with
+    /// five times the declared variance. No source for the number.
+    pub const EXCESS_NOISE_BESIDE_UNKNOWN: f64 = 4.0;
     /// Fraction of missing messages that makes white noise doubtful.
     pub const MANY_MISSING: f64 = 0.02;
     /// Uncertainty of the variance that rounding adds, as a part of it.

@@ -10,7 +10,7 @@ use crate::gram::dot;
 use crate::location::{bands, locate, summed_spectrum};
 use crate::noise_updates::with_estimate;
 use crate::policy::probability::{MOST_UNKNOWN, NATS_PER_BAND, UNKNOWN_GAIN_NATS};
-use crate::policy::report::COARSE_STEPS;
+use crate::policy::report::{COARSE_STEPS, EXCESS_NOISE_BESIDE_UNKNOWN};
 use crate::policy::unknown::{
     AXIS_SHARE, BAND, BURST, FROZEN, JITTER, MOST_GROWTH, MUCH_WIDER_HZ, ORDINARY_BAND, OUTLIERS,
     REGRESSION_NATS, STAYS, UNDONE_SMOOTHING_FACTOR, USUAL_S, WIDER_HZ,
@@ -146,7 +146,7 @@ pub(crate) fn detect_unmodelled_structure(
         is_suspect,
         standings,
     );
-    confounded.extend(structure.confounded_read_off());
+    confounded.extend(structure.confounded_read_off(findings));
     let sound = standings.iter().filter(|(_, of)| **of == Standing::Sound);
     Some(Unknown {
         predictable,
@@ -276,11 +276,17 @@ impl<'a> Structure<'a> {
         MOST_UNKNOWN * (1.0 - 1.0 / (2.0 + gain / UNKNOWN_GAIN_NATS))
     }
 
-    /// Effects read off readings and stamps that are part of the structure.
-    fn confounded_read_off(&self) -> Vec<EffectKind> {
+    /// Effects read off readings and stamps that are part of the structure; noise is not that is far beyond the
+    /// declared.
+    fn confounded_read_off(&self, findings: &Findings) -> Vec<EffectKind> {
+        let is_sure = |channel: Channel| {
+            let declared = findings.declared_sigma(channel).powi(2);
+            let beyond = findings.found_noise[channel].powi(2) - declared;
+            beyond > EXCESS_NOISE_BESIDE_UNKNOWN * declared
+        };
         let noise = Channel::ALL
             .into_iter()
-            .filter(|channel| self.in_channel[*channel] || self.in_stamps)
+            .filter(|channel| (self.in_channel[*channel] && !is_sure(*channel)) || self.in_stamps)
             .map(ReadOff::ExcessNoise);
         let stamps = self.in_stamps.then_some(ReadOff::MissingMessages);
         noise

@@ -289,11 +289,7 @@ impl EffectsFile {
                 file: format!("{file}: placement `{name}`"),
                 problem,
             })?;
-            let response = placement.reference_response.map(RawResponse::parse);
-            let response = response.transpose().map_err(|problem| ImuError::Yaml {
-                file: file.to_owned(),
-                problem: format!("placement `{name}`: reference_response: {problem}"),
-            })?;
+            let response = RawResponse::parsed(placement.reference_response, file, &name)?;
             placements.insert(
                 name,
                 PlacementEffects {

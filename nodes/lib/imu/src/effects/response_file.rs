@@ -6,6 +6,7 @@ use cromosim_spatial::MotionResponse;
 use serde::Deserialize;
 
 use super::number::number;
+use crate::ImuError;
 
 /// Largest factor that a file may have: a reference that holds a tenth of a motion holds none of it.
 const LARGEST_FACTOR: f64 = 10.0;
@@ -20,8 +21,25 @@ pub(crate) struct RawResponse {
 }
 
 impl RawResponse {
+    /// The response of a placement of a file, where there is one.
+    ///
+    /// # Errors
+    /// [`ImuError::Yaml`] with what is wrong with it.
+    pub fn parsed(
+        raw: Option<Self>,
+        file: &str,
+        placement: &str,
+    ) -> Result<Option<MotionResponse>, ImuError> {
+        raw.map(Self::parse)
+            .transpose()
+            .map_err(|problem| ImuError::Yaml {
+                file: file.to_owned(),
+                problem: format!("placement `{placement}`: reference_response: {problem}"),
+            })
+    }
+
     /// Checked; in words what is wrong with it.
-    pub fn parse(self) -> Result<MotionResponse, String> {
+    fn parse(self) -> Result<MotionResponse, String> {
         let Self { hz, accel, gyro } = self;
         let is_increasing = hz.windows(2).all(|pair| pair[0] < pair[1]);
         let are_frequencies = hz.iter().all(|value| value.is_finite() && *value >= 0.0);
