@@ -15,7 +15,7 @@ use crate::fit::Fit;
 use crate::identify::unidentifiable;
 use crate::location::locate;
 use crate::probability::{calibrate, probability_of};
-use crate::response::kept;
+use crate::response::{LearntResponse, kept};
 use crate::screen::is_change;
 use crate::session::Session;
 use crate::shares::{Shares, shares};
@@ -32,8 +32,6 @@ pub(crate) struct DiagnosisBuilder<'a> {
     parts: Vec<Part<'a>>,
     /// Of the recording with the most to explain.
     heaviest: usize,
-    /// Of the reference's motion, in all recordings.
-    response: Option<MotionResponse>,
 }
 
 /// One recording.
@@ -49,15 +47,14 @@ struct Part<'a> {
     after: Metrics,
     /// Where the gap of the nominal simulation lies.
     location: GapLocation,
+    /// Of its reference's motion.
+    response: Option<LearntResponse>,
 }
 
 impl<'a> Part<'a> {
-    fn new(
-        findings: &'a Findings<'a>,
-        simulations: Simulations<'a>,
-        response: Option<&MotionResponse>,
-        held_out: &[Reading],
-    ) -> Self {
+    fn new(findings: &'a Findings<'a>, session: &'a Session, seed: u64) -> Self {
+        let simulations = Simulations::new(findings, &session.raw, &session.covered, seed);
+        let (response, held_out) = kept(findings, &simulations);
         let reportable = &findings.reportable;
         let named: Vec<Effect> = reportable.iter().cloned().collect();
         let shares = shares(findings, &simulations, &named);
@@ -65,8 +62,9 @@ impl<'a> Part<'a> {
         let before_readings = simulations.simulate(&nominal);
         let before = simulations.metrics(&nominal, &before_readings);
         let applied = findings.applied();
-        let after_readings = simulations.simulate_with(&applied, response);
-        let after = simulations.metrics(&applied, held_out);
+        let whole = response.as_ref().map(|learnt| &learnt.whole);
+        let after_readings = simulations.simulate_with(&applied, whole);
+        let after = simulations.metrics(&applied, &held_out);
         let whitener = simulations.whitener(&nominal);
         let white = simulations.whitened(&whitener, &before_readings);
         Self {
@@ -78,7 +76,13 @@ impl<'a> Part<'a> {
             after_readings,
             before,
             after,
+            response,
         }
+    }
+
+    /// What the readings hold of the motion that the reference shows, by frequency; none where it is all of it.
+    fn reference_response(&self) -> Option<&MotionResponse> {
+        self.response.as_ref().map(|learnt| &learnt.whole)
     }
 
     /// Number of messages that are compared.
@@ -108,8 +112,14 @@ impl<'a> Part<'a> {
     }
 
     /// With a device that other recordings show; the reference is this one's.
-    fn left_out(&self, set: &EffectSet, response: Option<&MotionResponse>) -> Metrics {
-        let readings = self.simulations.simulate_with(set, response);
+    fn left_out(&self, set: &EffectSet) -> Metrics {
+        let Some(response) = &self.response else {
+            return self.under(set);
+        };
+        let of_fold = |_| set.clone();
+        let readings = self
+            .simulations
+            .fold_by_fold(Some(&response.excluding_fold), of_fold);
         self.simulations.metrics(set, &readings)
     }
 
@@ -153,21 +163,9 @@ impl<'a> Part<'a> {
 impl<'a> DiagnosisBuilder<'a> {
     /// `seed` is that of the simulated noise.
     pub fn new(findings: &'a [Findings<'a>], sessions: &'a [Session], seed: u64) -> Self {
-        let simulations: Vec<Simulations> = findings
-            .iter()
-            .zip(sessions)
-            .map(|(findings, session)| {
-                Simulations::new(findings, &session.raw, &session.covered, seed)
-            })
-            .collect();
-        let pairs: Vec<_> = findings.iter().zip(&simulations).collect();
-        let (response, held_out) = kept(&pairs);
-        let parts: Vec<Part> = findings
-            .iter()
-            .zip(simulations.into_iter().zip(held_out))
-            .map(|(findings, (simulations, held_out))| {
-                Part::new(findings, simulations, response.as_ref(), &held_out)
-            })
+        let pairs = findings.iter().zip(sessions);
+        let parts: Vec<Part> = pairs
+            .map(|(findings, session)| Part::new(findings, session, seed))
             .collect();
         let heavier = |best: usize, other: usize| {
             if parts[other].shares.total > parts[best].shares.total {
@@ -180,13 +178,15 @@ impl<'a> DiagnosisBuilder<'a> {
             heaviest: (0..parts.len()).fold(0, heavier),
             findings,
             parts,
-            response,
         }
     }
 
-    /// What the readings hold of the motion that the reference shows, by frequency; none where it is all of it.
-    pub fn reference_response(&self) -> Option<&MotionResponse> {
-        self.response.as_ref()
+    /// What the readings of each recording hold of the motion that its reference shows, by frequency.
+    pub fn reference_responses(&self) -> Vec<Option<MotionResponse>> {
+        let parts = self.parts.iter();
+        parts
+            .map(|part| part.reference_response().cloned())
+            .collect()
     }
 
     /// The diagnosis; `recordings` are the names of the recordings.
@@ -219,7 +219,7 @@ impl<'a> DiagnosisBuilder<'a> {
             gap: Gap { before, after },
             location: self.parts[self.heaviest].location.clone(),
             calibration: self.calibration(),
-            reference_response: self.reference_response().map(ReferenceResponse::from),
+            reference_response: self.last_response().map(ReferenceResponse::from),
             unidentifiable: self.unidentifiable(),
             unexplained: Unexplained {
                 significant: unknown.is_some(),
@@ -265,7 +265,7 @@ impl<'a> DiagnosisBuilder<'a> {
                 after,
                 ..
             } = part;
-            let response = self.reference_response();
+            let response = part.reference_response();
             unexplained_errors(findings, simulations, &part.after_readings, after, response)
         };
         self.parts.iter().map(of).collect()
@@ -349,6 +349,11 @@ impl<'a> DiagnosisBuilder<'a> {
             .map(|(_, unknown)| unknown)
     }
 
+    /// Of the last recording.
+    fn last_response(&self) -> Option<&MotionResponse> {
+        self.parts.last().and_then(Part::reference_response)
+    }
+
     /// What is kept beside the causes, as the last recording has it.
     fn calibration(&self) -> Vec<KeptCalibration> {
         let last = self.parts.last();
@@ -401,10 +406,7 @@ impl<'a> DiagnosisBuilder<'a> {
                 before: part.before,
                 after: part.after,
             },
-            left_out: part.left_out(
-                &reported_by_the_others(self.findings, index),
-                self.reference_response(),
-            ),
+            left_out: part.left_out(&reported_by_the_others(self.findings, index)),
             location: part.location.clone(),
             causes,
         }

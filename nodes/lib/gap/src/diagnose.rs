@@ -6,6 +6,7 @@ use cromosim_imu::{
     Channel, DeclaredNoise, EffectKind, OtherSession, PerChannel, PlacementEffects,
     UnexplainedErrors, unit_factors,
 };
+use cromosim_spatial::MotionResponse;
 
 use crate::builder::DiagnosisBuilder;
 use crate::clock_jumps::{Parts, parts};
@@ -234,10 +235,7 @@ fn answer(
         .collect();
     let mut answer = PlacementAnswer {
         diagnosis: builder.diagnosis(recordings),
-        effects: PlacementEffects {
-            reference_response: builder.reference_response().cloned(),
-            ..simulated_effects(findings, &unexplained)
-        },
+        effects: simulated_effects(findings, &unexplained, builder.reference_responses()),
         evidence: builder.evidence(recordings),
     };
     if let Some(found) = diagnose_magnetometer(&magnetic) {
@@ -251,9 +249,14 @@ fn answer(
 
 /// What a simulation of the device takes: the named effects of the last recording (and those of the
 /// other sessions), its noise ([`Findings::simulated_sigma`]), and what stayed unexplained in all of them.
-fn simulated_effects(findings: &[Findings], unexplained: &[UnexplainedErrors]) -> PlacementEffects {
+fn simulated_effects(
+    findings: &[Findings],
+    unexplained: &[UnexplainedErrors],
+    mut responses: Vec<Option<MotionResponse>>,
+) -> PlacementEffects {
     let (others, last) = findings.split_at(findings.len() - 1);
     let last = &last[0];
+    let of_last = responses.pop().flatten();
     let prepared = last.model.prepared;
     let density = |channel| last.simulated_sigma(channel) / prepared.rate_hz.sqrt();
     let mean = |of: fn(&UnexplainedErrors) -> PerChannel<f64>| {
@@ -277,12 +280,14 @@ fn simulated_effects(findings: &[Findings], unexplained: &[UnexplainedErrors]) -
         },
         other_sessions: others
             .iter()
-            .map(|one| OtherSession {
+            .zip(responses)
+            .map(|(one, reference_response)| OtherSession {
                 epoch: one.model.prepared.epoch,
                 effects: one.applied(),
+                reference_response,
             })
             .collect(),
-        reference_response: None,
+        reference_response: of_last,
         magnetometer: None,
         field_in_world: None,
     }

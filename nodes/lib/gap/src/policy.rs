@@ -145,6 +145,9 @@ pub(crate) mod response {
     pub const FEWEST_BLOCKS: usize = 6;
     /// The largest factor: what a reference shows a half of.
     pub const LARGEST_FACTOR: f64 = 2.0;
+    /// Part of the motion at a frequency that the reference's filter has to let through where a factor may be above
+    /// one: as where a frequency counts as resolved.
+    pub const OPEN: f64 = 0.9;
     /// Part of a window's readings that have to be there; what is missing makes factors come out closer to one.
     pub const LEAST_USABLE: f64 = 0.8;
 }

@@ -1,13 +1,13 @@
 //! How much of the reference's motion the readings hold, by frequency.
 
 use cromosim_imu::{Channel, PerChannel, Reading};
-use cromosim_spatial::{Complex64, FourierPair, MotionResponse};
+use cromosim_spatial::{Complex64, FourierPair, MotionResponse, PoseEstimate};
 use nalgebra::{Quaternion, Vector3};
 
 use crate::axes::axes_of_channel;
 use crate::findings::Findings;
 use crate::policy::response::{
-    FEWEST_BLOCKS, LARGEST_FACTOR, LEAST_PART, LEAST_USABLE, STANDARD_ERRORS,
+    FEWEST_BLOCKS, LARGEST_FACTOR, LEAST_PART, LEAST_USABLE, OPEN, STANDARD_ERRORS,
 };
 use crate::policy::search::MOST_RISE;
 use crate::prepared::{FOLDS, bridge};
@@ -28,10 +28,10 @@ const BLOCK_S: f64 = 2.0;
 type Factors = PerChannel<[f64; BANDS]>;
 
 /// A response, and those that are learnt without one part of time.
-struct LearntResponse {
-    whole: MotionResponse,
+pub(crate) struct LearntResponse {
+    pub whole: MotionResponse,
     /// By part of time.
-    excluding_fold: Vec<MotionResponse>,
+    pub excluding_fold: Vec<MotionResponse>,
 }
 
 /// Sums over the windows of a block of time: of the simulation's power, of that times the residual, by band; of the
@@ -44,22 +44,18 @@ struct Block {
     residual: f64,
 }
 
-/// The response that lowers the residual of recordings on time that it was not learnt from; none where it is
+/// The response that lowers the residual of a recording on time that it was not learnt from; none where it is
 /// not by [`LEAST_PART`] of the residual's power in one channel.
 ///
 /// In a band, with X the transforms of the simulation's windows and R those of the residual's, readings are `factor`
 /// times the simulation: `factor = 1 + sum Re(X* R) / sum |X|^2`. That is below one where a part of what the
 /// reference shows is no motion (errors in variables), and above where it shows less than there is. Factors closer
 /// to one than their error, by what they scatter over blocks of time, are one.
-fn learn(recordings: &[(&Findings, &Simulations)]) -> Option<LearntResponse> {
-    let blocks = PerChannel::from_fn(|channel| {
-        let of_recordings = recordings.iter();
-        of_recordings
-            .flat_map(|(findings, simulations)| blocks(findings, simulations, channel))
-            .collect::<Vec<Block>>()
-    });
+fn learn(findings: &Findings, simulations: &Simulations) -> Option<LearntResponse> {
+    let blocks = PerChannel::from_fn(|channel| blocks(findings, simulations, channel));
+    let is_open = is_open(&findings.model.basis.estimate);
     let factors = |without: Option<usize>| -> Factors {
-        PerChannel::from_fn(|channel| factors(&blocks[channel], without))
+        PerChannel::from_fn(|channel| factors(&blocks[channel], &is_open[channel], without))
     };
     let excluding: Vec<Factors> = (0..FOLDS).map(|fold| factors(Some(fold))).collect();
     let helps = PerChannel::from_fn(|channel| {
@@ -84,36 +80,24 @@ fn learn(recordings: &[(&Findings, &Simulations)]) -> Option<LearntResponse> {
         })
 }
 
-/// The response that is kept, and what recordings show with it on time that was not fitted to: none where it raises
-/// a channel's distance there. The rotation's acts on the accelerometer too, by the orientation and a lever arm.
+/// The response of a recording that is kept, and what it shows with it on time that was not fitted to: none where it
+/// raises a channel's distance there. The rotation's acts on the accelerometer too, by the orientation and a lever
+/// arm.
 pub(crate) fn kept(
-    recordings: &[(&Findings, &Simulations)],
-) -> (Option<MotionResponse>, Vec<Vec<Reading>>) {
-    let held_out = |responses: Option<&[MotionResponse]>| -> Vec<Vec<Reading>> {
-        let of = |(_, simulations): &(_, &Simulations)| simulations.held_out(responses);
-        recordings.iter().map(of).collect()
-    };
-    let plain = held_out(None);
-    let Some(learnt) = learn(recordings) else {
+    findings: &Findings,
+    simulations: &Simulations,
+) -> (Option<LearntResponse>, Vec<Reading>) {
+    let plain = simulations.held_out(None);
+    let Some(learnt) = learn(findings, simulations) else {
         return (None, plain);
     };
-    let with = held_out(Some(&learnt.excluding_fold));
-    let distances = |readings: &[Vec<Reading>]| {
-        let pairs = recordings.iter().zip(readings);
-        pairs.fold(
-            PerChannel::<f64>::default(),
-            |sum, ((_, simulations), readings)| {
-                let own = simulations.comparison.squares(readings);
-                PerChannel::from_fn(|channel| sum[channel] + own[channel])
-            },
-        )
-    };
-    let (before, after) = (distances(&plain), distances(&with));
+    let with = simulations.held_out(Some(&learnt.excluding_fold));
+    let [before, after] = [&plain, &with].map(|readings| simulations.comparison.squares(readings));
     let rises = |channel: Channel| after[channel] > MOST_RISE.powi(2) * before[channel];
     if Channel::ALL.into_iter().any(rises) {
         (None, plain)
     } else {
-        (Some(learnt.whole), with)
+        (Some(learnt), with)
     }
 }
 
@@ -138,8 +122,18 @@ fn held_at_ends(factors: &[f64; BANDS], helps: bool) -> Vec<f64> {
     all
 }
 
-/// Factors from all blocks but those of one part of time.
-fn factors(blocks: &[Block], without: Option<usize>) -> [f64; BANDS] {
+/// Bands in which the filters let nearly all of the motion through.
+fn is_open(estimate: &PoseEstimate) -> PerChannel<[bool; BANDS]> {
+    let passed = |band: usize| estimate.filter_at(0.5 * (EDGES_HZ[band] + EDGES_HZ[band + 1]));
+    PerChannel {
+        accelerometer: std::array::from_fn(|band| passed(band).0 >= OPEN),
+        gyroscope: std::array::from_fn(|band| passed(band).1 >= OPEN),
+    }
+}
+
+/// Factors from all blocks but those of one part of time. Above one they are only where the filter is open: elsewhere
+/// they would undo what it keeps out of this motion, and it keeps out something else of the next one (impacts).
+fn factors(blocks: &[Block], is_open: &[bool; BANDS], without: Option<usize>) -> [f64; BANDS] {
     let used: Vec<&Block> = blocks
         .iter()
         .filter(|block| Some(block.fold) != without)
@@ -163,7 +157,8 @@ fn factors(blocks: &[Block], without: Option<usize>) -> [f64; BANDS] {
         if more.abs() < STANDARD_ERRORS * error {
             return 1.0;
         }
-        (1.0 + more).clamp(0.0, LARGEST_FACTOR)
+        let largest = if is_open[band] { LARGEST_FACTOR } else { 1.0 };
+        (1.0 + more).clamp(0.0, largest)
     })
 }
 

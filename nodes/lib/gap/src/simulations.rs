@@ -221,18 +221,27 @@ impl<'a> Simulations<'a> {
     /// What another recording of the device should show: every part of time is simulated with values fitted to the
     /// others, and with the response that was learnt without it, where there are any.
     pub fn held_out(&self, responses: Option<&[MotionResponse]>) -> Vec<Reading> {
-        let mut held_out = vec![Reading::default(); self.whole.stamps.len()];
+        let of_fold = |fold| self.findings.applied_excluding_fold(fold);
+        self.fold_by_fold(responses, of_fold)
+    }
+
+    /// Every part of time simulated with a set of its own, and with the response that was learnt without it.
+    pub fn fold_by_fold(
+        &self,
+        responses: Option<&[MotionResponse]>,
+        set_of_fold: impl Fn(usize) -> EffectSet,
+    ) -> Vec<Reading> {
+        let mut readings = vec![Reading::default(); self.whole.stamps.len()];
         for fold in 0..FOLDS {
             let response = responses.map(|learnt| &learnt[fold]);
-            let set = self.findings.applied_excluding_fold(fold);
-            let readings = self.simulate_with(&set, response);
+            let own = self.simulate_with(&set_of_fold(fold), response);
             for (k, &entry) in self.whole.grid_index.iter().enumerate() {
                 if self.whole.fold(entry) == fold {
-                    held_out[k] = readings[k];
+                    readings[k] = own[k];
                 }
             }
         }
-        held_out
+        readings
     }
 }
 

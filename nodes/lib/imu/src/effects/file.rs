@@ -106,6 +106,8 @@ pub struct OtherSession {
     pub epoch: Stamp,
     /// What acts in it.
     pub effects: EffectSet,
+    /// What its readings hold of the motion that its reference shows.
+    pub reference_response: Option<MotionResponse>,
 }
 
 impl PlacementEffects {
@@ -113,28 +115,33 @@ impl PlacementEffects {
     /// last that had begun by then, else the first; no other sessions are left.
     #[must_use]
     pub fn in_session_of(&self, start: Stamp) -> Self {
-        let own = (self.epoch, &self.effects);
+        let own = (self.epoch, &self.effects, &self.reference_response);
         let others = self.other_sessions.iter();
         let sessions = || {
-            let others = others.clone().map(|other| (other.epoch, &other.effects));
-            others.chain(std::iter::once(own))
+            let of = session_of;
+            others.clone().map(of).chain(std::iter::once(own))
         };
-        let (epoch, effects) = sessions()
-            .filter(|(epoch, _)| *epoch <= start)
-            .max_by_key(|(epoch, _)| *epoch)
-            .or_else(|| sessions().min_by_key(|(epoch, _)| *epoch))
+        let (epoch, effects, response) = sessions()
+            .filter(|(epoch, ..)| *epoch <= start)
+            .max_by_key(|(epoch, ..)| *epoch)
+            .or_else(|| sessions().min_by_key(|(epoch, ..)| *epoch))
             .unwrap_or(own);
         Self {
             epoch,
             declared_noise: self.declared_noise,
             effects: effects.clone(),
             unexplained: self.unexplained,
-            reference_response: self.reference_response.clone(),
+            reference_response: response.clone(),
             other_sessions: Vec::new(),
             magnetometer: self.magnetometer.clone(),
             field_in_world: self.field_in_world,
         }
     }
+}
+
+/// When it began, and what is its own.
+fn session_of(other: &OtherSession) -> (Stamp, &EffectSet, &Option<MotionResponse>) {
+    (other.epoch, &other.effects, &other.reference_response)
 }
 
 /// White noise densities, one-sided.
@@ -174,6 +181,17 @@ struct RawPlacement {
 struct RawSession {
     epoch: Seconds,
     effects: EffectSet,
+    reference_response: Option<RawResponse>,
+}
+
+impl RawSession {
+    fn parsed(self, file: &str, placement: &str) -> Result<OtherSession, ImuError> {
+        Ok(OtherSession {
+            epoch: self.epoch.0,
+            effects: self.effects,
+            reference_response: RawResponse::parsed(self.reference_response, file, placement)?,
+        })
+    }
 }
 
 /// [`UnexplainedErrors`] as files have them.
@@ -290,6 +308,9 @@ impl EffectsFile {
                 problem,
             })?;
             let response = RawResponse::parsed(placement.reference_response, file, &name)?;
+            let others = placement.other_sessions.into_iter();
+            let others = others.map(|session| session.parsed(file, &name));
+            let other_sessions = others.collect::<Result<_, _>>()?;
             placements.insert(
                 name,
                 PlacementEffects {
@@ -300,14 +321,7 @@ impl EffectsFile {
                     declared_noise: noise,
                     effects: placement.effects,
                     unexplained: rest.into(),
-                    other_sessions: placement
-                        .other_sessions
-                        .into_iter()
-                        .map(|session| OtherSession {
-                            epoch: session.epoch.0,
-                            effects: session.effects,
-                        })
-                        .collect(),
+                    other_sessions,
                 },
             );
         }
@@ -356,7 +370,7 @@ impl EffectsFile {
             );
             write_effects(&mut text, "      ", &placement.effects);
             write_unexplained(&mut text, "    ", &placement.unexplained);
-            write_response(&mut text, placement.reference_response.as_ref());
+            write_response(&mut text, "    ", placement.reference_response.as_ref());
             write_magnetic(&mut text, placement);
             write_sessions(&mut text, &placement.other_sessions);
         }
@@ -416,6 +430,7 @@ fn write_sessions(text: &mut String, sessions: &[OtherSession]) {
             decimal(session.epoch)
         );
         write_effects(text, "          ", &session.effects);
+        write_response(text, "        ", session.reference_response.as_ref());
     }
 }
 

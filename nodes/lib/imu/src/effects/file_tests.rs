@@ -95,6 +95,13 @@ fn files_come_back_to_the_last_digit() {
         [1.0]
     );
     let mut all = file.clone();
+    let response = MotionResponse {
+        hz: vec![0.5, 7.0],
+        position: vec![1.0, 0.9],
+        rotation: vec![1.0, 1.05],
+    };
+    let sessions = &mut all.placements.get_mut("wrist").unwrap().other_sessions;
+    sessions[1].reference_response = Some(response.clone());
     for kind in EffectKind::ALL {
         all.placements
             .get_mut("wrist")
@@ -113,11 +120,7 @@ fn files_come_back_to_the_last_digit() {
                 ..Magnetometer::default()
             }),
             field_in_world: Some(Vector3::new(0.0, 1.9e-5, -4.5e-5)),
-            reference_response: Some(MotionResponse {
-                hz: vec![0.5, 7.0],
-                position: vec![1.0, 0.9],
-                rotation: vec![1.0, 1.05],
-            }),
+            reference_response: Some(response),
             ..wrist.clone()
         },
     );

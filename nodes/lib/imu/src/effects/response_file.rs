@@ -70,7 +70,7 @@ impl RawResponse {
 }
 
 /// A line of the file; nothing where there is none.
-pub(crate) fn write_response(text: &mut String, response: Option<&MotionResponse>) {
+pub(crate) fn write_response(text: &mut String, indent: &str, response: Option<&MotionResponse>) {
     let Some(response) = response else {
         return;
     };
@@ -81,7 +81,7 @@ pub(crate) fn write_response(text: &mut String, response: Option<&MotionResponse
     // Writing to a string cannot fail.
     let _ = writeln!(
         text,
-        "    reference_response: {{hz: [{}], accel: [{}], gyro: [{}]}}",
+        "{indent}reference_response: {{hz: [{}], accel: [{}], gyro: [{}]}}",
         list(&response.hz),
         list(&response.position),
         list(&response.rotation)
