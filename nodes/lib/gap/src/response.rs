@@ -88,7 +88,9 @@ pub(crate) fn kept(
     simulations: &Simulations,
 ) -> (Option<LearntResponse>, Vec<Reading>) {
     let plain = simulations.held_out(None);
-    let Some(learnt) = learn(findings, simulations) else {
+    // Where nothing is wrong, nothing is to be made up for.
+    let is_wrong = findings.unknown.is_some() || !findings.applied().is_empty();
+    let Some(learnt) = is_wrong.then(|| learn(findings, simulations)).flatten() else {
         return (None, plain);
     };
     let with = simulations.held_out(Some(&learnt.excluding_fold));
