@@ -142,7 +142,8 @@ fn check_frames(rate_hz: f64, repeats: u64) -> Result<(), String> {
         return Err(format!("rate_hz {rate_hz}: expected 10 to 240"));
     }
     // Said before any study is run, which may take minutes.
-    if (TRUTH_HZ / rate_hz).fract() != 0.0 {
+    let every = (TRUTH_HZ / rate_hz).round();
+    if (every * rate_hz - TRUTH_HZ).abs() > 1e-6 {
         return Err(format!(
             "rate_hz {rate_hz}: the known motions have {TRUTH_HZ} Hz, of which it must be a whole part"
         ));
