@@ -10,8 +10,8 @@ use crate::policy::response::{
     FEWEST_BLOCKS, LARGEST_FACTOR, LEAST_PART, LEAST_USABLE, OPEN, STANDARD_ERRORS,
 };
 use crate::policy::search::MOST_RISE;
-use crate::prepared::{FOLDS, bridge};
-use crate::simulations::Simulations;
+use crate::prepared::{FOLDS, PreparedPlacement, bridge};
+use crate::simulations::{Simulations, Turn};
 use crate::trace::trace;
 
 /// Edges of the bands, Hz: thirds of an octave from 1 Hz on, one a hertz at least. Slower motion is taken as it is.
@@ -52,7 +52,14 @@ struct Block {
 /// reference shows is no motion (errors in variables), and above where it shows less than there is. Factors closer
 /// to one than their error, by what they scatter over blocks of time, are one.
 fn learn(findings: &Findings, simulations: &Simulations) -> Option<LearntResponse> {
-    let blocks = PerChannel::from_fn(|channel| blocks(findings, simulations, channel));
+    let set = findings.applied();
+    let compared = Compared {
+        prepared: findings.model.prepared,
+        measured: simulations.comparison.measured,
+        simulated: simulations.simulate_unrounded(&set),
+        turns: simulations.turns(&set),
+    };
+    let blocks = PerChannel::from_fn(|channel| blocks(&compared, channel));
     let is_open = is_open(&findings.model.basis.estimate);
     let factors = |without: Option<usize>| -> Factors {
         PerChannel::from_fn(|channel| factors(&blocks[channel], &is_open[channel], without))
@@ -177,6 +184,14 @@ fn held_out_gain<'f>(blocks: &[Block], factors: impl Fn(usize) -> &'f [f64; BAND
     gain / f64::max(all, f64::MIN_POSITIVE)
 }
 
+/// What both channels' coordinates are made of.
+struct Compared<'a> {
+    prepared: &'a PreparedPlacement,
+    measured: &'a [Reading],
+    simulated: Vec<Reading>,
+    turns: Vec<Turn>,
+}
+
 /// The coordinates of a channel, each over the sample grid: the simulation, and the residual (0 where it is not
 /// compared).
 struct Coordinates {
@@ -190,11 +205,13 @@ impl Coordinates {
     /// In the coordinates whose filters the response multiplies: of the accelerometer the specific force in the world
     /// (where gravity stands still), of the gyroscope the derivative of the quaternion, `q' = (0, w) q / 2`. In the
     /// sensor's axes a band of these would lie elsewhere as the sensor turns.
-    fn of(findings: &Findings, simulations: &Simulations, channel: Channel) -> Self {
-        let (prepared, set) = (findings.model.prepared, findings.applied());
-        let simulated = simulations.simulate_unrounded(&set);
-        let measured = simulations.comparison.measured;
-        let turns = simulations.turns(&set);
+    fn of(compared: &Compared<'_>, channel: Channel) -> Self {
+        let Compared {
+            prepared,
+            measured,
+            simulated,
+            turns,
+        } = compared;
         let count = if channel == Channel::Gyroscope { 4 } else { 3 };
         let mut own = Self {
             simulated: vec![vec![0.0; prepared.length]; count],
@@ -236,9 +253,9 @@ impl Coordinates {
 }
 
 /// One channel of a recording.
-fn blocks(findings: &Findings, simulations: &Simulations, channel: Channel) -> Vec<Block> {
-    let prepared = findings.model.prepared;
-    let coordinates = Coordinates::of(findings, simulations, channel);
+fn blocks(compared: &Compared<'_>, channel: Channel) -> Vec<Block> {
+    let prepared = compared.prepared;
+    let coordinates = Coordinates::of(compared, channel);
     let window = ((WINDOW_S * prepared.rate_hz).round() as usize).max(2);
     let transform = Windows::new(window, prepared.rate_hz);
     let place = |entry: usize| (entry as f64 / (BLOCK_S * prepared.rate_hz)) as usize;

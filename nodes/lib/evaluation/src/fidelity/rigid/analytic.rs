@@ -22,7 +22,7 @@ use super::truth::{KnownMotion, KnownSite, POSITIONS};
 use crate::seeds::mixed_seed;
 
 /// Of poses and readings, Hz; the physics' rate.
-const RATE_HZ: f64 = 240.0;
+pub(super) const RATE_HZ: f64 = 240.0;
 /// Length of a motion, s.
 const SECONDS: f64 = 15.0;
 /// Mean time from a burst to the next, s.

@@ -2,6 +2,7 @@
 
 use serde::Deserialize;
 
+use super::analytic::RATE_HZ;
 use super::pose_errors::PoseErrors;
 use super::truth::{POSITIONS, is_motion};
 use crate::fidelity::truth_source::TruthSource;
@@ -133,19 +134,16 @@ impl AnalyticSource {
     }
 }
 
-/// Rate of all known motions, Hz.
-const TRUTH_HZ: f64 = 240.0;
-
 /// Frames per second, Hz, and draws.
 fn check_frames(rate_hz: f64, repeats: u64) -> Result<(), String> {
     if !(10.0..=240.0).contains(&rate_hz) {
         return Err(format!("rate_hz {rate_hz}: expected 10 to 240"));
     }
     // Said before any study is run, which may take minutes.
-    let every = (TRUTH_HZ / rate_hz).round();
-    if (every * rate_hz - TRUTH_HZ).abs() > 1e-6 {
+    let every = (RATE_HZ / rate_hz).round();
+    if (every * rate_hz - RATE_HZ).abs() > 1e-6 {
         return Err(format!(
-            "rate_hz {rate_hz}: the known motions have {TRUTH_HZ} Hz, of which it must be a whole part"
+            "rate_hz {rate_hz}: the known motions have {RATE_HZ} Hz, of which it must be a whole part"
         ));
     }
     if repeats == 0 {
