@@ -4,7 +4,7 @@ what the answers of others say.
 
     python tests/withheld/calibrate.py --fit /tmp/building /tmp/injected --test /tmp/scoring /tmp/mechanics
 
-Each folder is one that run.py or inject.py has filled."""
+Each folder is one that run.py or inject.py has filled; of several to test there is a table of all, too."""
 import argparse
 import json
 import os
@@ -108,14 +108,19 @@ def main():
         if chosen:
             weights[is_unknown] = fitted(chosen)
             print(kind, {name: round(float(weight), 2) for name, weight in zip(NAMES, weights[is_unknown])}, f"{len(chosen)} causes, {sum(not cause[1] for cause in chosen)} wrong")
-    for folder in options.test:
-        tested = list(causes(folder))
+    tests = {folder: list(causes(folder)) for folder in options.test}
+    if len(tests) > 1:
+        tests["all of these"] = [cause for tested in tests.values() for cause in tested]
+    for name, tested in tests.items():
+        if not tested:
+            print(f"\n{name}: no causes")
+            continue
         right = np.array([cause[1] for cause in tested], float)
-        table(f"{folder}: as said", np.array([cause[2] for cause in tested]), right)
-        table(f"{folder}: by the margin alone", np.array([cause[3] for cause in tested]), right)
+        table(f"{name}: as said", np.array([cause[2] for cause in tested]), right)
+        table(f"{name}: by the margin alone", np.array([cause[3] for cause in tested]), right)
         if len(weights) == 2:
             odds = np.array([regressors(cause) @ weights[cause[0] == "unknown"] for cause in tested])
-            table(f"{folder}: by this fit", 1 / (1 + np.exp(-odds)), right)
+            table(f"{name}: by this fit", 1 / (1 + np.exp(-odds)), right)
 
 
 if __name__ == "__main__":

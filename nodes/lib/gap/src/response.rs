@@ -7,7 +7,7 @@ use nalgebra::{Quaternion, Vector3};
 use crate::axes::axes_of_channel;
 use crate::findings::Findings;
 use crate::policy::response::{
-    FEWEST_BLOCKS, LARGEST_FACTOR, LEAST_PART, LEAST_USABLE, OPEN, STANDARD_ERRORS,
+    FEWEST_BLOCKS, LARGEST_FACTOR, LEAST_PART, LEAST_USABLE, OPEN, SHUT, STANDARD_ERRORS,
 };
 use crate::policy::search::MOST_RISE;
 use crate::prepared::{FOLDS, PreparedPlacement, bridge};
@@ -60,9 +60,9 @@ fn learn(findings: &Findings, simulations: &Simulations) -> Option<LearntRespons
         turns: simulations.turns(&set),
     };
     let blocks = PerChannel::from_fn(|channel| blocks(&compared, channel));
-    let is_open = is_open(&findings.model.basis.estimate);
+    let largest = largest_factors(&findings.model.basis.estimate);
     let factors = |without: Option<usize>| -> Factors {
-        PerChannel::from_fn(|channel| factors(&blocks[channel], &is_open[channel], without))
+        PerChannel::from_fn(|channel| factors(&blocks[channel], &largest[channel], without))
     };
     let excluding: Vec<Factors> = (0..FOLDS).map(|fold| factors(Some(fold))).collect();
     let helps = PerChannel::from_fn(|channel| {
@@ -102,6 +102,7 @@ pub(crate) fn kept(
     };
     let with = simulations.held_out(Some(&learnt.excluding_fold));
     let [before, after] = [&plain, &with].map(|readings| simulations.comparison.squares(readings));
+    trace(|| eprintln!("with the response {after:?} rather than {before:?}"));
     let rises = |channel: Channel| after[channel] > MOST_RISE.powi(2) * before[channel];
     if Channel::ALL.into_iter().any(rises) {
         (None, plain)
@@ -131,18 +132,23 @@ fn held_at_ends(factors: &[f64; BANDS], helps: bool) -> Vec<f64> {
     all
 }
 
-/// Bands in which the filters let nearly all of the motion through.
-fn is_open(estimate: &PoseEstimate) -> PerChannel<[bool; BANDS]> {
+/// The largest factor of each band: [`LARGEST_FACTOR`] where the filter lets nearly all of the motion through, and in a
+/// straight line down to one where it is shut. There a larger one would undo what the filter keeps out of this
+/// motion, and it keeps out something else of the next one (impacts).
+fn largest_factors(estimate: &PoseEstimate) -> PerChannel<[f64; BANDS]> {
+    let largest = |passed: f64| {
+        let open = ((passed - SHUT) / (OPEN - SHUT)).clamp(0.0, 1.0);
+        1.0 + open * (LARGEST_FACTOR - 1.0)
+    };
     let passed = |band: usize| estimate.filter_at(0.5 * (EDGES_HZ[band] + EDGES_HZ[band + 1]));
     PerChannel {
-        accelerometer: std::array::from_fn(|band| passed(band).0 >= OPEN),
-        gyroscope: std::array::from_fn(|band| passed(band).1 >= OPEN),
+        accelerometer: std::array::from_fn(|band| largest(passed(band).0)),
+        gyroscope: std::array::from_fn(|band| largest(passed(band).1)),
     }
 }
 
-/// Factors from all blocks but those of one part of time. Above one they are only where the filter is open: elsewhere
-/// they would undo what it keeps out of this motion, and it keeps out something else of the next one (impacts).
-fn factors(blocks: &[Block], is_open: &[bool; BANDS], without: Option<usize>) -> [f64; BANDS] {
+/// Factors from all blocks but those of one part of time, none above the band's largest.
+fn factors(blocks: &[Block], largest: &[f64; BANDS], without: Option<usize>) -> [f64; BANDS] {
     let used: Vec<&Block> = blocks
         .iter()
         .filter(|block| Some(block.fold) != without)
@@ -166,8 +172,7 @@ fn factors(blocks: &[Block], is_open: &[bool; BANDS], without: Option<usize>) ->
         if more.abs() < STANDARD_ERRORS * error {
             return 1.0;
         }
-        let largest = if is_open[band] { LARGEST_FACTOR } else { 1.0 };
-        (1.0 + more).clamp(0.0, largest)
+        (1.0 + more).clamp(0.0, largest[band])
     })
 }
 
