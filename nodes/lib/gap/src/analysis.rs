@@ -142,18 +142,10 @@ impl<'a> Analysis<'a> {
             prepared,
             starts,
             digital,
-            units,
             track,
             ..
         } = self.session;
-        first_model(
-            prepared,
-            track.clone(),
-            &starts[0],
-            digital,
-            *units,
-            self.library,
-        )
+        first_model(prepared, track.clone(), &starts[0], digital, self.library)
     }
 
     /// The first search, a smoothing of the reference where one is believed, and rounds of search,

@@ -16,6 +16,11 @@ pub(crate) struct Digital {
 }
 
 impl Digital {
+    /// Step of the rounding where the device's unit is so many to the SI unit; 0 without.
+    pub fn step(&self, units: f64) -> f64 {
+        self.lsb.map_or(0.0, |lsb| lsb / units)
+    }
+
     /// Of a channel's measured readings. What the library excludes stays in the readings, to be
     /// found as something unknown.
     pub fn read_off(measured: &[Reading], channel: Channel, library: &Library) -> Self {

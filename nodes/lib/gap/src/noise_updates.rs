@@ -21,7 +21,6 @@ pub(crate) fn first_model<'a>(
     track: Arc<KinematicTrack>,
     start: &EffectSet,
     digital: &PerChannel<Digital>,
-    units: PerChannel<f64>,
     library: &Library,
 ) -> FitModel<'a> {
     let readings = prepared.predict(&track, start).readings;
@@ -48,11 +47,8 @@ pub(crate) fn first_model<'a>(
         basis.reference_share = ordinary_share(prepared.estimate.noise());
     }
     basis.line_hz = suspicious_line(prepared, &basis, &readings);
-    basis.steps = PerChannel::from_fn(|channel| {
-        digital[channel]
-            .lsb
-            .map_or(0.0, |lsb| lsb / units[channel] / sigma[channel].max(1e-12))
-    });
+    basis.steps =
+        PerChannel::from_fn(|channel| prepared.steps[channel] / sigma[channel].max(1e-12));
     let noise = NoiseModel::new(prepared, &basis, &residual);
     FitModel::new(prepared, track, basis, noise)
 }

@@ -5,8 +5,8 @@ use cromosim_spatial::{PoseLine, Spectrum};
 
 use crate::fit::{Fit, FitModel};
 use crate::policy::vibration::{
-    ABOVE_HZ, BELOW_HZ, IN_REFERENCE_HEIGHT, IN_REFERENCE_PART, LEAST_HEIGHT, LEAST_HZ,
-    LEAST_POWER, MOST_HEIGHT_LEFT, MOST_LEFT, SURROUNDINGS_HZ,
+    ABOVE_HZ, BELOW_HZ, FASTEST_STEADY_MOTION_HZ, IN_REFERENCE_HEIGHT, IN_REFERENCE_PART,
+    LEAST_HEIGHT, LEAST_HZ, LEAST_POWER, MOST_HEIGHT_LEFT, MOST_LEFT, SURROUNDINGS_HZ,
 };
 use crate::trace::trace;
 
@@ -71,9 +71,13 @@ fn is_true_vibration(model: &FitModel, fit: &Fit) -> bool {
     stands_out && !is_in_reference(model, &line)
 }
 
-/// Whether the reference has the line too, if below its noise: what goes on for minutes at one frequency (a gait,
-/// a machine) shows in all of its poses together where no filter passes it.
+/// Whether the reference has the line too, if below its noise: what goes on for minutes at one frequency shows in all
+/// of its poses together where no filter passes it. A gait is motion then, of which the reference resolves too little;
+/// faster than any, it is a machine that shakes what the reference is of as well, and a vibration to the sensor.
 fn is_in_reference(model: &FitModel, line: &SpectralLine) -> bool {
+    if line.hz > FASTEST_STEADY_MOTION_HZ {
+        return false;
+    }
     let Some(lines) = model.prepared.estimate.lines_at(line.hz) else {
         return false;
     };

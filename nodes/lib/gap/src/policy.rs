@@ -80,6 +80,9 @@ pub(crate) mod price {
 
 /// What counts as white noise of a sensor.
 pub(crate) mod sensor_noise {
+    /// Part of the step of a rounding below which no noise counts: readings that stay on a step show none, and what is so
+    /// far below it makes no difference. No source.
+    pub const LEAST_OF_STEP: f64 = 0.01;
     /// Factor on the level of a band in the lower half of a residual's spectrum, above which no level in
     /// the upper half is white noise: white noise is in all bands, and what a reference does not resolve of
     /// the motion in the upper ones alone. A few dozen values give each level to within a fifth.
@@ -177,6 +180,9 @@ pub(crate) mod vibration {
     pub const IN_REFERENCE_HEIGHT: f64 = 6.0;
     /// And the part of the vibration's power that the reference has then; no source.
     pub const IN_REFERENCE_PART: f64 = 0.3;
+    /// No body keeps moving at one frequency faster than this, Hz: physiological tremor ends at about 12 Hz, steps and
+    /// those of their harmonics that poses resolve lie below. No source for the bound itself.
+    pub const FASTEST_STEADY_MOTION_HZ: f64 = 15.0;
     /// Most of the line's power that one sinusoid may leave.
     pub const MOST_LEFT: f64 = 0.3;
 }

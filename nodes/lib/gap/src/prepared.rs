@@ -60,6 +60,8 @@ pub(crate) struct PreparedPlacement {
     pub usable: Vec<[bool; 6]>,
     /// White noise per sample that the device declares.
     pub declared: PerChannel<Option<f64>>,
+    /// Step that readings are rounded to, in their units; 0 without.
+    pub steps: PerChannel<f64>,
     /// Of the reference's motion, in metres, from its own frames.
     pub estimate: PoseEstimate,
     /// The same from poses that were interpolated between these frames; none where they were not.
@@ -176,6 +178,7 @@ impl PreparedPlacement {
             stamps,
             measured,
             declared: record.imu.declared,
+            steps: PerChannel::default(),
             estimate,
             interpolated: None,
             noise_behind_frames: None,

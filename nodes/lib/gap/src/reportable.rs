@@ -229,8 +229,6 @@ fn excess_noise(model: &FitModel, observations: &Observations, channel: Channel)
 impl Observations<'_> {
     /// Step of the rounding, in SI units; 0 without.
     fn step(&self, channel: Channel) -> f64 {
-        self.digital[channel]
-            .lsb
-            .map_or(0.0, |lsb| lsb / self.units[channel])
+        self.digital[channel].step(self.units[channel])
     }
 }

@@ -16,7 +16,10 @@ const SHARPENING_PERIODS: [f64; 3] = [8.0, 2.0, 0.5];
 /// A set to be fitted, with what one linear step predicts of it.
 #[derive(Clone, Debug)]
 pub(crate) struct Candidate {
+    /// After the step.
     pub set: EffectSet,
+    /// Before it, where an effect starts from other values than its neutral ones.
+    start: Option<EffectSet>,
     /// Held-out log-likelihood after the step, nats.
     pub predicted_gain: f64,
     /// Normal equations of an effect's columns beside the fit's, where the step is from its neutral values.
@@ -94,9 +97,21 @@ fn candidate(model: &FitModel, fit: &Fit, starts: &[Effect]) -> Candidate {
         .chain(starts.iter().flat_map(|start| layout_of(start.kind())))
         .collect();
     Candidate {
+        start: (!are_neutral).then(|| set.clone()),
         set: stepped(&set, &layout, &linear.step, 1.0),
         predicted_gain: linear.held_out,
         beside,
+    }
+}
+
+impl Candidate {
+    /// Where a fit of it begins: what is far from linear (a tissue's resonance) a whole step throws far off.
+    pub fn begin(self, model: &FitModel) -> EffectSet {
+        let cost = |set: &EffectSet| model.evaluated(set.clone()).cost;
+        match self.start {
+            Some(start) if cost(&start) < cost(&self.set) => start,
+            _ => self.set,
+        }
     }
 }
 

@@ -215,12 +215,12 @@ fn grow(
         .max(-MOST_LOSS_NATS);
     let is_promising = |predicted: f64| predicted > scored.score + needed;
     let mut screened = Vec::new();
-    for (place, (predicted, candidate)) in candidates.into_iter().enumerate() {
-        screened.extend(candidate.beside);
+    for (place, (predicted, mut candidate)) in candidates.into_iter().enumerate() {
+        screened.extend(candidate.beside.take());
         if place >= REFITS || !is_promising(predicted) {
             continue;
         }
-        let grown = score(model, candidate.set);
+        let grown = score(model, candidate.begin(model));
         if grown.score > f64::NEG_INFINITY {
             grown_sets.push(grown);
             sort(grown_sets);
@@ -334,7 +334,7 @@ fn best_rival(
         .into_iter()
         .take(RIVALS)
         .filter(|(predicted, _)| *predicted >= needed)
-        .map(|(_, candidate)| score(model, candidate.set))
+        .map(|(_, candidate)| score(model, candidate.begin(model)))
         .filter(|rival| !makes_worse(model, &scored.fit, &rival.fit))
         .max_by(|a, b| a.score.total_cmp(&b.score))
 }

@@ -9,8 +9,8 @@ use crate::axes::{axes_of_channel, value_on_axis};
 use crate::digital::Digital;
 use crate::library::Library;
 use crate::policy::sensor_noise::{
-    LEVEL, OF_LOWER_BANDS, OF_QUIET_DIFFERENCES, QUIET_PART, STEADY, STEADY_BLOCK_S, TAILS,
-    TAILS_OF_READINGS,
+    LEAST_OF_STEP, LEVEL, OF_LOWER_BANDS, OF_QUIET_DIFFERENCES, QUIET_PART, STEADY, STEADY_BLOCK_S,
+    TAILS, TAILS_OF_READINGS,
 };
 use crate::prepared::PreparedPlacement;
 
@@ -31,7 +31,8 @@ const LOWER_BANDS: [(f64, f64); 5] = [
 ];
 
 /// The declared noise in SI units. Whether a device in other units declares its covariances in them
-/// is nowhere said: what is nearer to the noise of the readings holds.
+/// is nowhere said: what is nearer to the noise of the readings holds. Readings that stay on a step of their rounding
+/// show none; they may have what such steps hide.
 pub(crate) fn declared_in_si(
     prepared: &PreparedPlacement,
     units: PerChannel<f64>,
@@ -42,6 +43,7 @@ pub(crate) fn declared_in_si(
         let found = fourth_differences(prepared, &series, channel)
             .unwrap_or(0.0)
             .sqrt()
+            .max(prepared.steps[channel] / 12f64.sqrt())
             .max(1e-12);
         let off = |sigma: f64| (sigma / found).ln().abs();
         Some(if off(declared / units[channel]) < off(declared) {
@@ -53,7 +55,7 @@ pub(crate) fn declared_in_si(
 }
 
 /// White noise per sample that residuals are divided by: what is found, unless the cause of more
-/// than the declared is excluded.
+/// than the declared is excluded; never less than a small part of the step that readings are rounded to.
 pub(crate) fn white_noise(
     prepared: &PreparedPlacement,
     found: PerChannel<f64>,
@@ -63,11 +65,12 @@ pub(crate) fn white_noise(
     PerChannel::from_fn(|channel| {
         let may_exceed = library.allows_read_off(ReadOff::ExcessNoise(channel))
             && !digital[channel].rounding_is_excluded;
-        match prepared.declared[channel] {
+        let sigma = match prepared.declared[channel] {
             None => found[channel],
             Some(declared) if may_exceed => declared.max(found[channel]),
             Some(declared) => declared,
-        }
+        };
+        sigma.max(LEAST_OF_STEP * prepared.steps[channel])
     })
 }
 

@@ -57,7 +57,7 @@ impl Session {
             mask_clipped(&mut prepared, channel, &digital[channel]);
         }
         let units = units.unwrap_or_else(|| allowed_units(&alignment, library));
-        bring_to_si(&mut prepared, units);
+        bring_to_si(&mut prepared, &digital, units);
         trace(|| {
             eprintln!(
                 "{}: {alignment:?} {digital:?} {:?} {:?}",
@@ -83,11 +83,16 @@ impl Session {
 }
 
 /// Takes the factors of the device's units out of the readings and of what is declared for them.
-fn bring_to_si(prepared: &mut PreparedPlacement, units: PerChannel<f64>) {
+fn bring_to_si(
+    prepared: &mut PreparedPlacement,
+    digital: &PerChannel<Digital>,
+    units: PerChannel<f64>,
+) {
     for reading in &mut prepared.measured {
         reading.specific_force /= units.accelerometer;
         reading.angular_velocity /= units.gyroscope;
     }
+    prepared.steps = PerChannel::from_fn(|channel| digital[channel].step(units[channel]));
     prepared.declared = declared_in_si(prepared, units);
 }
 

@@ -5,6 +5,7 @@ mod support;
 
 use cromosim_gap::PlacementAnswer;
 use cromosim_imu::{EffectKind as K, STANDARD_GRAVITY};
+use nalgebra::Vector3;
 use support::judge::{answer, cause, names, names_exactly, near, values_are};
 use support::{IMU_HZ, Scene, seed_of};
 
@@ -142,6 +143,40 @@ fn a_vibration_of_the_gyroscope_alone() {
     let diagnosis = answer(&scene.with(K::Vibration, &values).record()).diagnosis;
     assert_eq!(names(&diagnosis), ["vibration"]);
     assert!(diagnosis.gap.after.gyro_rmse < 0.5 * diagnosis.gap.before.gyro_rmse);
+}
+
+/// Names of the causes where what the sensor is on shakes as a whole, by 1 m/s2 about: the reference shows it, too, by
+/// less than its noise.
+fn causes_of_what_shakes_the_reference_too(hz: f64) -> Vec<String> {
+    let scene = Scene::new(51);
+    let (amplitude, phase) = ([0.9, 1.2, 0.7], [0.4, 2.0, 5.1]);
+    let [x, y, z] = amplitude;
+    let [px, py, pz] = phase;
+    let values = [hz, x, y, z, px, py, pz, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    let epoch = scene.epoch;
+    let mut record = scene.with(K::Vibration, &values).record();
+    let turn = std::f64::consts::TAU * hz;
+    let poses = &mut record.reference;
+    for ((stamp, position), rotation) in poses
+        .stamps
+        .iter()
+        .zip(&mut poses.positions)
+        .zip(&poses.rotations)
+    {
+        let angle = turn * (*stamp - epoch);
+        let axes: [f64; 3] = std::array::from_fn(|k| -amplitude[k] * (angle + phase[k]).sin());
+        *position += rotation * Vector3::from(axes) / turn.powi(2);
+    }
+    let causes = answer(&record).diagnosis.causes;
+    causes.into_iter().map(|cause| cause.effect).collect()
+}
+
+#[test]
+fn a_machine_that_shakes_the_reference_too_is_a_vibration() {
+    assert_eq!(causes_of_what_shakes_the_reference_too(24.8), ["vibration"]);
+    // As fast as a body moves it is motion that the reference shows too little of.
+    let slower = causes_of_what_shakes_the_reference_too(9.0);
+    assert!(!slower.contains(&"vibration".to_owned()), "{slower:?}");
 }
 
 #[test]
