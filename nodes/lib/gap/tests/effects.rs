@@ -145,6 +145,32 @@ fn a_vibration_of_the_gyroscope_alone() {
     assert!(diagnosis.gap.after.gyro_rmse < 0.5 * diagnosis.gap.before.gyro_rmse);
 }
 
+/// What is left is small, and far from a straight line in the tissue's values: a whole step from a first guess leads
+/// nowhere.
+#[test]
+fn a_tissue_under_slow_motion() {
+    for (seed, values) in [(53, [8.2, 0.38]), (54, [6.8, 0.15])] {
+        let mut scene = Scene::new(seed).with(K::SoftTissue, &values);
+        scene.motion = scene.motion.slowed(2.0);
+        let diagnosis = answer(&scene.record()).diagnosis;
+        assert_eq!(names(&diagnosis), ["soft_tissue"], "{values:?}");
+    }
+}
+
+/// Readings that stay on a step show no noise; what the device declares in SI units is not taken for its own.
+#[test]
+fn a_bias_beside_milli_degrees_that_are_rounded_coarsely() {
+    let scene = Scene::new(56)
+        .with(K::AccelBias, &[0.2, -0.15, 0.1])
+        .with(K::GyroUnits, &[180_000.0 / std::f64::consts::PI])
+        .with(K::GyroQuantization, &[1.0]);
+    let diagnosis = answer(&scene.record()).diagnosis;
+    assert_eq!(
+        names(&diagnosis),
+        ["accel_bias", "gyro_quantization", "gyro_units"]
+    );
+}
+
 /// Names of the causes where what the sensor is on shakes as a whole, by 1 m/s2 about: the reference shows it, too, by
 /// less than its noise.
 fn causes_of_what_shakes_the_reference_too(hz: f64) -> Vec<String> {

@@ -58,6 +58,15 @@ impl Motion {
         }
     }
 
+    /// The same way in more time.
+    #[must_use]
+    pub fn slowed(mut self, factor: f64) -> Self {
+        for term in self.position.iter_mut().chain(&mut self.rotation) {
+            term.hz /= factor;
+        }
+        self
+    }
+
     /// Rest at the origin, level.
     pub fn rest() -> Self {
         Self::default()
