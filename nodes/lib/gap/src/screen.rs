@@ -1,6 +1,6 @@
 //! Candidates beside a fit: one linear step for each, so that only the promising ones are fitted.
 
-use cromosim_imu::{Effect, EffectKind, EffectSet, FirstGuess, PerChannel, Search};
+use cromosim_imu::{Effect, EffectKind, EffectSet, FirstGuess, PerChannel, Search, Stage};
 use nalgebra::{Cholesky, DMatrix, Dyn, Matrix3, Vector3};
 
 use crate::axes::channel_of_axis;
@@ -18,7 +18,7 @@ const SHARPENING_PERIODS: [f64; 3] = [8.0, 2.0, 0.5];
 pub(crate) struct Candidate {
     /// After the step.
     pub set: EffectSet,
-    /// Before it, where an effect starts from other values than its neutral ones.
+    /// Before it, where a tissue starts.
     start: Option<EffectSet>,
     /// Held-out log-likelihood after the step, nats.
     pub predicted_gain: f64,
@@ -97,7 +97,10 @@ fn candidate(model: &FitModel, fit: &Fit, starts: &[Effect]) -> Candidate {
         .chain(starts.iter().flat_map(|start| layout_of(start.kind())))
         .collect();
     Candidate {
-        start: (!are_neutral).then(|| set.clone()),
+        start: starts
+            .iter()
+            .any(|start| start.kind().spec().stage == Stage::Tissue)
+            .then(|| set.clone()),
         set: stepped(&set, &layout, &linear.step, 1.0),
         predicted_gain: linear.held_out,
         beside,
@@ -105,7 +108,8 @@ fn candidate(model: &FitModel, fit: &Fit, starts: &[Effect]) -> Candidate {
 }
 
 impl Candidate {
-    /// Where a fit of it begins: what is far from linear (a tissue's resonance) a whole step throws far off.
+    /// Where a fit of it begins: a whole step throws a tissue's resonance far off. Of other effects such a step leads out
+    /// of minima that are none (a `low_pass` beside a `time_offset` that stands for it).
     pub fn begin(self, model: &FitModel) -> EffectSet {
         let cost = |set: &EffectSet| model.evaluated(set.clone()).cost;
         match self.start {
