@@ -109,7 +109,7 @@ fn candidate(model: &FitModel, fit: &Fit, starts: &[Effect]) -> Candidate {
 
 impl Candidate {
     /// Where a fit of it begins: a whole step throws a tissue's resonance far off. Of other effects such a step leads out
-    /// of minima that are none (a `low_pass` beside a `time_offset` that stands for it).
+    /// of local minima (a `low_pass` beside a `time_offset` that stands for it).
     pub fn begin(self, model: &FitModel) -> EffectSet {
         let cost = |set: &EffectSet| model.evaluated(set.clone()).cost;
         match self.start {
