@@ -32,6 +32,15 @@ const NOISE_ALONE: [f64; 3] = [1.4, 3.0, 8.0];
 const NOISE_ALONE_BEYOND_BAND: f64 = 2.2;
 /// Multiple of the noise at which a window's own band of motion ends; no source.
 const LOCAL_EDGE: f64 = 2.2;
+/// Multiple of the noise that a window's spectrum reaches beyond that band only where motion has a line: a harmonic
+/// of what is shaken or stepped, with quiet frequencies before it. By chance (17 degrees of freedom: three axes, five
+/// neighbours) one entry in 10^7 reaches half as much.
+const LOCAL_LINE: f64 = 8.0;
+/// Width of such a line at most, Hz: a window resolves 0.75, its five neighbours as much again, and people do not shake
+/// steadily. What is wider is noise of another shape than that which was learnt.
+const LINE_WIDTH_HZ: f64 = 3.0;
+/// Fastest such line, Hz: nobody shakes or steps faster, harmonics included, but frames that were resampled have lines there.
+const FASTEST_LINE_HZ: f64 = 15.0;
 /// How far around a spectral line the filter stays open, Hz: a line's amplitude changes over some
 /// seconds. No source for the number.
 const LINE_REACH_HZ: f64 = 0.1;
@@ -228,6 +237,11 @@ impl NoiseFloor {
             .find(|&k| ratio[k..k + 3].iter().all(|value| *value < LOCAL_EDGE))
             .unwrap_or(bins);
         let edge_hz = spectrum.frequency(edge);
+        let lines = if self.wandering || undone.is_some() {
+            vec![false; bins]
+        } else {
+            lines_from(&ratio, edge, spectrum.spacing_hz)
+        };
         // Above what the noise is, at the last three frequencies of the band.
         let last = (1..=3)
             .filter_map(|back| ratio.get(edge.checked_sub(back)?))
@@ -242,6 +256,8 @@ impl NoiseFloor {
             let hz = spectrum.frequency(k);
             if k < 2 {
                 1.0
+            } else if lines[k] {
+                1.0 - 1.0 / ratio[k]
             } else if k >= edge && self.wandering && undone.is_none() {
                 beyond(hz)
             } else if k >= edge || ratio[k] <= 1.0 || gain2(hz) > LARGEST_GAIN.powi(2) {
@@ -255,15 +271,7 @@ impl NoiseFloor {
                 }
             }
         };
-        let own: Vec<f64> = (0..bins).map(weight).collect();
-        if reach == 0 {
-            return own;
-        }
-        let widened = |k: usize| {
-            let around = &own[k.saturating_sub(reach)..(k + reach + 1).min(bins)];
-            around.iter().copied().fold(0.0, f64::max)
-        };
-        (0..bins).map(widened).collect()
+        widened((0..bins).map(weight).collect(), reach)
     }
 
     /// Part of the motion at a frequency that the filter keeps, mean over the windows.
@@ -353,6 +361,35 @@ fn with_ringing(local: &[Spectrum], window: usize) -> Spectrum {
         }
     }
     spectrum
+}
+
+/// Every weight as large as those up to `reach` entries away.
+fn widened(weights: Vec<f64>, reach: usize) -> Vec<f64> {
+    if reach == 0 {
+        return weights;
+    }
+    let largest_around = |k: usize| {
+        let around = &weights[k.saturating_sub(reach)..(k + reach + 1).min(weights.len())];
+        around.iter().copied().fold(0.0, f64::max)
+    };
+    (0..weights.len()).map(largest_around).collect()
+}
+
+/// Which entries from one on belong to a line: to a narrow run above [`LOCAL_EDGE`] that reaches [`LOCAL_LINE`].
+fn lines_from(ratio: &[f64], from: usize, spacing_hz: f64) -> Vec<bool> {
+    let mut lines = vec![false; ratio.len()];
+    let mut start = from;
+    for run in ratio[from..].split(|value| *value < LOCAL_EDGE) {
+        let end = start + run.len();
+        if run.iter().any(|value| *value > LOCAL_LINE)
+            && run.len() as f64 * spacing_hz <= LINE_WIDTH_HZ
+            && end as f64 * spacing_hz <= FASTEST_LINE_HZ
+        {
+            lines[start..end].fill(true);
+        }
+        start = end + 1;
+    }
+    lines
 }
 
 /// Density of the noise that was there before a smoothing: where the undone spectrum is least, beyond
