@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use cromosim_imu::{
-    Channel, Effect, EffectKind, EffectSet, PerChannel, ReadOff, Reading, SensorModel,
+    Channel, EffectKind, EffectSet, PerChannel, ReadOff, Reading, SensorModel, expected_rounding,
 };
-use cromosim_spatial::{MotionResponse, Stamp};
-use nalgebra::{Matrix3, Quaternion};
+use cromosim_spatial::{KinematicTrack, MotionResponse, Stamp};
+use nalgebra::{Matrix3, Quaternion, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha12Rng;
 
@@ -80,10 +80,39 @@ impl<'a> Simulations<'a> {
         self.findings.applied()
     }
 
-    /// The readings in the device's units under a set of effects, without noise.
+    /// The readings in the device's units under a set of effects, without noise: where they are rounded, their mean.
     pub fn simulate(&self, set: &EffectSet) -> Vec<Reading> {
-        let track = self.tracks.track(set);
-        SensorModel::new(set, self.whole.epoch).run(&track, &self.whole.stamps)
+        self.run(set, &self.tracks.track(set))
+    }
+
+    fn run(&self, set: &EffectSet, track: &KinematicTrack) -> Vec<Reading> {
+        let model = SensorModel::new(&set.unrounded(), self.whole.epoch);
+        let mut readings = model.run(track, &self.whole.stamps);
+        let steps = PerChannel::from_fn(|channel| set.lsb(channel) * set.unit_factor(channel));
+        if Channel::ALL.into_iter().any(|channel| steps[channel] > 0.0) {
+            let of_reference =
+                set.reference_variances(&self.tracks.estimate(set), 1.0, &self.whole.stamps);
+            let white = PerChannel::from_fn(|channel| self.white_variance(set, channel));
+            for (reading, of_reference) in readings.iter_mut().zip(&of_reference) {
+                let rounded = |channel: Channel, values: &Vector3<f64>, variance: f64| {
+                    let variance = (white[channel] + variance) * set.unit_factor(channel).powi(2);
+                    values.map(|value| expected_rounding(value, steps[channel], variance))
+                };
+                *reading = Reading {
+                    specific_force: rounded(
+                        Channel::Accelerometer,
+                        &reading.specific_force,
+                        of_reference.acceleration,
+                    ),
+                    angular_velocity: rounded(
+                        Channel::Gyroscope,
+                        &reading.angular_velocity,
+                        of_reference.angular_velocity,
+                    ),
+                };
+            }
+        }
+        readings
     }
 
     /// The same of a motion with a response, where there is one.
@@ -95,8 +124,7 @@ impl<'a> Simulations<'a> {
         let Some(response) = response else {
             return self.simulate(set);
         };
-        let track = self.tracks.track_with(set, response);
-        SensorModel::new(set, self.whole.epoch).run(&track, &self.whole.stamps)
+        self.run(set, &self.tracks.track_with(set, response))
     }
 
     /// How the sensor is turned at each message.
@@ -114,7 +142,7 @@ impl<'a> Simulations<'a> {
 
     /// Without rounding: rounding the simulation adds error of its own.
     pub fn simulate_unrounded(&self, set: &EffectSet) -> Vec<Reading> {
-        self.simulate(&unrounded(set))
+        self.simulate(&set.unrounded())
     }
 
     /// For the noise that is predicted under those effects of `set` that change it.
@@ -243,12 +271,4 @@ impl<'a> Simulations<'a> {
         }
         readings
     }
-}
-
-/// Without what rounds.
-fn unrounded(set: &EffectSet) -> EffectSet {
-    set.iter()
-        .map(Effect::kind)
-        .filter(|kind| kind.rounds())
-        .fold(set.clone(), |set, kind| set.without(kind))
 }

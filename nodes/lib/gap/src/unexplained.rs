@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use cromosim_imu::{
     Channel, Lateness, PerChannel, Reading, UnexplainedErrors, change_per_second,
-    rounding_difference,
+    expected_rounding_adds,
 };
 use cromosim_spatial::{MotionResponse, SampleVariance};
 use nalgebra::{Matrix2, Vector2};
@@ -143,13 +143,13 @@ impl Stated<'_> {
     }
 }
 
-/// The mean square difference of two values that, rounded to steps, differ by `found`.
+/// Mean square of an error whose values differ, rounded to steps, by `found` from what they are in the mean.
 fn before_rounding(found: f64, step: f64) -> f64 {
     let (mut least, mut most) = (0.0, found);
     // 50 halvings leave 1e-15 of it.
     for _ in 0..50 {
         let middle = 0.5 * (least + most);
-        if middle + rounding_difference(middle, step) < found {
+        if middle + expected_rounding_adds(middle, step) < found {
             least = middle;
         } else {
             most = middle;

@@ -57,6 +57,7 @@ mod placement;
 mod placement_file;
 mod pose_error;
 mod random;
+mod rounding;
 mod sample;
 mod schemes;
 mod simulate;
@@ -97,6 +98,7 @@ pub use placement::{Follow, MAX_RATE_HZ, Placement, SiteChoice};
 pub use placement_file::PlacementSet;
 pub use pose_error::PoseStd;
 pub use random::normal_pair;
+pub use rounding::{expected_rounding, expected_rounding_adds, rounding_difference};
 pub use sample::{
     GRAVITY_IN_WORLD, ImuSample, KinematicSample, STANDARD_GRAVITY, track_in_sensor_axes,
 };
@@ -104,7 +106,7 @@ pub use schemes::Scheme;
 pub use simulate::{
     Differentiation, simulate, simulate_kinematics, simulate_kinematics_on, simulate_several_on,
 };
-pub use stated_errors::{change_per_second, rounding_difference};
+pub use stated_errors::change_per_second;
 pub use stream::{StreamOptions, StreamingImu};
 pub use texture::{DrawnTexture, TextureSegment, add_texture};
 pub use trajectory::{SensorFrame, SensorTrajectory};

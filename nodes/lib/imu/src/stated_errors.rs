@@ -1,11 +1,10 @@
 //! What messages state of their errors, live and offline.
 
-use std::f64::consts::{FRAC_2_PI, PI};
-
 use cromosim_spatial::Stamp;
 use nalgebra::Vector3;
 
 use crate::effects::StatedBiases;
+use crate::rounding::{expected_rounding, expected_rounding_adds, rounding_difference};
 use crate::{
     Channel, DeclaredNoise, Device, EffectSet, PerChannel, Reading, SampleVariance, SensorModel,
     UnexplainedErrors,
@@ -72,25 +71,42 @@ impl StatedErrors {
     /// The variance of a reading's motion with what rounding adds where the simulated reading and the real one
     /// are both rounded, see [`rounding_difference`].
     pub fn with_rounding(&self, variance: SampleVariance, reading: &Reading) -> SampleVariance {
-        let own = self.own_unrounded();
-        let added = |channel: Channel, of_motion: f64, vector: &Vector3<f64>| {
-            let turned = 2.0 / 3.0 * variance.orientation * vector.norm_squared();
-            rounding_difference(own[channel] + of_motion + turned, self.steps[channel])
+        let of = self.before_rounding(&variance, reading);
+        let added =
+            PerChannel::from_fn(|channel| rounding_difference(of[channel], self.steps[channel]));
+        with_added(variance, added)
+    }
+
+    /// What a device that rounds reads in the mean, of a reading that is not rounded yet, and the variance of its motion
+    /// with what rounding adds to that, see [`expected_rounding`].
+    pub fn expected_rounding(
+        &self,
+        variance: SampleVariance,
+        reading: &Reading,
+    ) -> (SampleVariance, Reading) {
+        let of = self.before_rounding(&variance, reading);
+        let rounded = |channel: Channel| {
+            let (step, variance) = (self.steps[channel], of[channel]);
+            reading[channel].map(|value| expected_rounding(value, step, variance))
         };
-        let of_force = added(
-            Channel::Accelerometer,
-            variance.acceleration,
-            &reading.specific_force,
-        );
-        let of_rate = added(
-            Channel::Gyroscope,
-            variance.angular_velocity,
-            &reading.angular_velocity,
-        );
-        SampleVariance {
-            acceleration: variance.acceleration + of_force,
-            angular_velocity: variance.angular_velocity + of_rate,
-            ..variance
+        let expected = Reading {
+            specific_force: rounded(Channel::Accelerometer),
+            angular_velocity: rounded(Channel::Gyroscope),
+        };
+        let added =
+            PerChannel::from_fn(|channel| expected_rounding_adds(of[channel], self.steps[channel]));
+        (with_added(variance, added), expected)
+    }
+
+    /// Variance per axis of a reading before it is rounded.
+    fn before_rounding(&self, variance: &SampleVariance, reading: &Reading) -> PerChannel<f64> {
+        let own = self.own_unrounded();
+        let turned = |channel| 2.0 / 3.0 * variance.orientation * reading[channel].norm_squared();
+        PerChannel {
+            accelerometer: own.accelerometer
+                + variance.acceleration
+                + turned(Channel::Accelerometer),
+            gyroscope: own.gyroscope + variance.angular_velocity + turned(Channel::Gyroscope),
         }
     }
 
@@ -123,30 +139,6 @@ impl StatedErrors {
             ..variance
         }
     }
-}
-
-/// What rounding to whole steps l adds to the mean square difference of two values that are anywhere between two
-/// steps and differ by a normal error e of variance s2:
-/// ```text
-/// E[l^2 f (1 - f)] = l^2 (1/6 - sum over n of exp(-2 pi^2 n^2 s2 / l^2) / (pi^2 n^2)),    f the fraction of |e| / l
-/// ```
-/// nothing without an error, `l sqrt(2 s2 / pi)` where it is small, l^2 / 6 where it is large: each of the two
-/// is rounded.
-pub fn rounding_difference(variance: f64, step: f64) -> f64 {
-    if step <= 0.0 || variance <= 0.0 {
-        return 0.0;
-    }
-    let squared = variance / (step * step);
-    // Below a twentieth of a step its mean fraction is itself; the series would be long.
-    if squared < 0.0025 {
-        return step * step * ((FRAC_2_PI * squared).sqrt() - squared);
-    }
-    let term = |n: u32| {
-        let order = f64::from(n * n) * PI * PI;
-        (-2.0 * order * squared).exp() / order
-    };
-    // exp(-2 pi^2 30^2 / 400) is 5e-20.
-    step * step * (1.0 / 6.0 - (1..=30).map(term).sum::<f64>())
 }
 
 /// What readings change by per second around one of them, from its neighbours but one; none where these have
@@ -187,35 +179,10 @@ pub(crate) fn with_clock_errors(
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use rand::RngExt;
-
-    use super::*;
-    use crate::random::stream;
-
-    #[test]
-    fn two_roundings_differ_as_stated() {
-        let step = 0.3;
-        for error in [0.001, 0.01, 0.014, 0.016, 0.05, 0.2, 1.0] {
-            let mut random = stream(5, "rounding", 0);
-            let count = 200_000;
-            let mut sum = 0.0;
-            for _ in 0..count {
-                // Of twelve uniform numbers.
-                let normal: f64 = (0..12).map(|_| random.random_range(-0.5..0.5)).sum();
-                let value = random.random_range(0.0..step);
-                let rounded = |value: f64| step * (value / step).round();
-                sum += (rounded(value + error * normal) - rounded(value)).powi(2);
-            }
-            let found = sum / f64::from(count);
-            let stated = error * error + rounding_difference(error * error, step);
-            assert!(
-                (found / stated - 1.0).abs() < 0.06,
-                "{error}: {found} {stated}"
-            );
-        }
-        assert_eq!(rounding_difference(0.0, step), 0.0);
-        assert_eq!(rounding_difference(0.01, 0.0), 0.0);
+fn with_added(variance: SampleVariance, added: PerChannel<f64>) -> SampleVariance {
+    SampleVariance {
+        acceleration: variance.acceleration + added.accelerometer,
+        angular_velocity: variance.angular_velocity + added.gyroscope,
+        ..variance
     }
 }

@@ -269,7 +269,7 @@ pub struct RecordedMotion<'a> {
 
 /// The messages (`data_raw`) of a whole motion at given stamps, with effects as a diagnosis states
 /// them. Unlike [`VirtualImu`] it filters on the motion's own grid and knows what comes after a
-/// sample.
+/// sample. Without noise it is what the device reads in the mean: of rounding what is left of it then.
 ///
 /// # Errors
 /// [`ImuError::Trajectory`] for a rate that is not positive.
@@ -310,7 +310,11 @@ pub fn measure_recording(
         };
         let variance = stated.of_motion(*variance, walked);
         let variance = with_clock_errors(variance, late_squared, k, motion.stamps, &readings);
-        let variance = &stated.with_rounding(variance, reading);
+        let (variance, reading) = if noise {
+            (stated.with_rounding(variance, reading), *reading)
+        } else {
+            stated.expected_rounding(variance, reading)
+        };
         let lost = dropouts.as_mut().is_some_and(Dropouts::next_is_lost);
         let sample = ImuSample {
             stamp: *stamp,
@@ -320,7 +324,7 @@ pub fn measure_recording(
         };
         (!lost).then(|| {
             let sample = output.mapped_sample(sample);
-            output.data_raw(&sample, &output.covariances.with_motion(variance, &sample))
+            output.data_raw(&sample, &output.covariances.with_motion(&variance, &sample))
         })
     };
     let variances = motion.variances.iter().chain(std::iter::repeat(&none));
@@ -330,14 +334,19 @@ pub fn measure_recording(
         .collect())
 }
 
-/// What the device reads, and whether biases walk in it.
+/// What the device reads, without noise before it is rounded; and whether biases walk in it.
 fn noisy_readings(
     motion: RecordedMotion<'_>,
     effects: &PlacementEffects,
     options: &ImuOptions,
 ) -> Result<(Vec<Reading>, bool), ImuError> {
     let (seed, name) = (options.seed, options.name.as_str());
-    let model = SensorModel::new(&effects.effects, effects.epoch);
+    let set = if options.noise {
+        effects.effects.clone()
+    } else {
+        effects.effects.unrounded()
+    };
+    let model = SensorModel::new(&set, effects.epoch);
     let white = model.total_noise(&effects.declared_noise);
     let mut source = NoiseSource::white(&white, 0.0, options.rate_hz, seed, name)?;
     let biases = DrawnBiases::new(&effects.effects, seed, name);

@@ -89,6 +89,12 @@ impl EffectSet {
             .map(|index| self.0.remove(index))
     }
 
+    /// The set without what rounds the readings.
+    #[must_use]
+    pub fn unrounded(&self) -> Self {
+        self.filtered(|effect| !effect.kind().rounds())
+    }
+
     /// The set without a kind.
     #[must_use]
     pub fn without(&self, kind: EffectKind) -> Self {
