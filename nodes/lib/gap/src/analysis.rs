@@ -70,7 +70,7 @@ impl<'a> Analysis<'a> {
         let found_noise = found_noise(prepared, &residual, digital);
         let reportable = reportable_effects(
             &model,
-            &scored.fit.set,
+            &scored.fit,
             &Observations {
                 digital,
                 units: *units,
@@ -203,6 +203,7 @@ pub(crate) fn refit_beside_unknown(findings: &mut Findings) {
         .filter(|kind| is_calibration(*kind))
         .count();
     let found = search(&model, std::slice::from_ref(set), &calibrations, most);
+    let found = with_chosen_axes(&model, found, &findings.library);
     trace(|| {
         eprintln!(
             "beside unknown: {:?} -> {:?}",

@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use crate::fit::FitModel;
 use crate::library::Library;
-use crate::reportable::is_ordinary;
+use crate::reportable::{is_ordinary, ordinary_factor};
 use crate::search::{ScoredEffectSet, score};
 use crate::trace::{names, trace};
 
@@ -22,10 +22,16 @@ pub(crate) fn with_chosen_axes(
     if !library.allows(EffectKind::AxisConvention) || set.contains(EffectKind::AxisConvention) {
         return scored;
     }
-    let Some(chosen) = chosen_axes(set) else {
+    let Some((chosen, rest)) = chosen_axes(set, ordinary_factor(model)) else {
         return scored;
     };
-    let other = score(model, chosen);
+    // What is left of the turn is a mount's where it is seen: no cause, but kept.
+    let [alone, beside] = [chosen.clone(), chosen.with(rest)].map(|set| score(model, set));
+    let other = if alone.score >= beside.score {
+        alone
+    } else {
+        beside
+    };
     trace(|| {
         let names = names(&other.fit.set);
         eprintln!(
@@ -33,7 +39,7 @@ pub(crate) fn with_chosen_axes(
             other.score, scored.score
         );
     });
-    if other.score < scored.score {
+    if !other.score.is_finite() {
         return scored;
     }
     let margin = |kind| {
@@ -48,17 +54,17 @@ pub(crate) fn with_chosen_axes(
     ScoredEffectSet { margins, ..other }
 }
 
-/// A set with the choice of axes that its mount's rotation is; none where it is none.
-fn chosen_axes(set: &EffectSet) -> Option<EffectSet> {
+/// A set with the choice of axes that its mount's rotation is, and what is left of the rotation; none where it is none.
+fn chosen_axes(set: &EffectSet, factor: f64) -> Option<(EffectSet, Effect)> {
     let mount = set.get(EffectKind::MountRotation)?;
     let segment_from_sensor = turn(&Vector3::from_column_slice(mount.values()));
     let axes = nearest_signed_permutation(&segment_from_sensor.transpose());
     if axes == Matrix3::identity() || axes.determinant() < 0.0 {
         return None;
     }
-    let rest = UnitQuaternion::from_matrix(&(axes * segment_from_sensor));
+    let rest = UnitQuaternion::from_matrix(&(segment_from_sensor * axes));
     let rest = Effect::mount_rotation(&so3::log(&rest)).ok()?;
-    if !is_ordinary(&rest, 1.0) {
+    if !is_ordinary(&rest, factor) {
         return None;
     }
     let mut chosen = set.without(EffectKind::MountRotation);
@@ -70,7 +76,7 @@ fn chosen_axes(set: &EffectSet) -> Option<EffectSet> {
         values[1..].copy_from_slice(turned.as_slice());
         chosen.insert(slip.with_values(values).ok()?);
     }
-    Some(chosen)
+    Some((chosen, rest))
 }
 
 fn turn(rotvec: &Vector3<f64>) -> Matrix3<f64> {
@@ -107,16 +113,30 @@ mod tests {
             &Vector3::new(half, half, 0.0),
             &Vector3::new(-0.03, -0.04, 0.11),
         );
-        let chosen = chosen_axes(&turned).unwrap();
+        let (chosen, rest) = chosen_axes(&turned, 1.0).unwrap();
         assert!(!chosen.contains(EffectKind::MountRotation));
         assert!(chosen.contains(EffectKind::AxisConvention));
         assert!((read(&turned) - read(&chosen)).norm() < 1e-9);
+        assert!(rest.values().iter().all(|value| value.abs() < 1e-9));
+    }
+
+    #[test]
+    fn what_is_left_of_the_turn_is_a_mounts() {
+        let half = std::f64::consts::FRAC_1_SQRT_2 * std::f64::consts::PI;
+        let turned = set(
+            &Vector3::new(half + 0.002, half, -0.001),
+            &Vector3::new(-0.03, -0.04, 0.11),
+        );
+        assert!(chosen_axes(&turned, 0.1).is_none());
+        let (chosen, rest) = chosen_axes(&turned, 1.0).unwrap();
+        assert!((read(&turned) - read(&chosen.with(rest))).norm() < 1e-9);
     }
 
     #[test]
     fn other_turns_are_none() {
         for mount in [[0.001, 0.0, 0.0], [0.2, -0.1, 0.3], [1.56, 0.01, 0.0]] {
-            assert_eq!(chosen_axes(&set(&mount.into(), &Vector3::zeros())), None);
+            let turned = set(&mount.into(), &Vector3::zeros());
+            assert!(chosen_axes(&turned, 1.0).is_none());
         }
     }
 }

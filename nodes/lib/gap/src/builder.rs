@@ -14,6 +14,7 @@ use crate::findings::{Findings, Unknown};
 use crate::fit::Fit;
 use crate::identify::unidentifiable;
 use crate::location::locate;
+use crate::policy::probability::LEAST_OF_UNKNOWN;
 use crate::probability::{calibrate, probability_of};
 use crate::response::{LearntResponse, kept};
 use crate::screen::is_change;
@@ -198,22 +199,21 @@ impl<'a> DiagnosisBuilder<'a> {
         if let Some(last) = causes.last_mut() {
             last.after = after;
         }
-        // What is predictable of the rest belongs to `unknown`; what is not even that stays
-        // unexplained.
         let unknown = self.unknown();
+        let with_it = unknown.and_then(|unknown| {
+            // What is predictable of the rest belongs to `unknown`; what is not even that stays
+            // unexplained.
+            let share = unexplained * unknown.predictable;
+            let with_it = with_unknown(&causes, unknown_cause(unknown, share, after), before);
+            let own = with_it.iter().find(|cause| cause.effect == UNKNOWN)?;
+            (own.probability >= LEAST_OF_UNKNOWN).then_some(with_it)
+        });
+        let unknown = unknown.filter(|_| with_it.is_some());
         let predictable = unknown.map_or(0.0, |unknown| unknown.predictable);
-        if let Some(unknown) = unknown {
-            let share = unexplained * predictable;
-            causes.push(unknown_cause(unknown, share, after));
-            causes.sort_by(|a, b| b.gap_share.total_cmp(&a.gap_share));
-            // It takes nothing away: what the causes above it leave is left below it, too.
-            let place = causes.iter().position(|cause| cause.effect == UNKNOWN);
-            if let Some(place) = place.filter(|place| place + 1 < causes.len()) {
-                let above = place.checked_sub(1).map(|above| causes[above].after);
-                causes[place].after = above.unwrap_or(before);
-            }
-        }
-        calibrate(&mut causes);
+        let causes = with_it.unwrap_or_else(|| {
+            calibrate(&mut causes);
+            causes
+        });
         PlacementDiagnosis {
             verdict: verdict(&causes, &before, &after),
             gap: Gap { before, after },
@@ -411,4 +411,19 @@ impl<'a> DiagnosisBuilder<'a> {
             causes,
         }
     }
+}
+
+/// The causes with `unknown` among them, as sure as they are then.
+fn with_unknown(causes: &[Cause], unknown: Cause, before: Metrics) -> Vec<Cause> {
+    let mut causes = causes.to_vec();
+    causes.push(unknown);
+    causes.sort_by(|a, b| b.gap_share.total_cmp(&a.gap_share));
+    // It takes nothing away: what the causes above it leave is left below it, too.
+    let place = causes.iter().position(|cause| cause.effect == UNKNOWN);
+    if let Some(place) = place.filter(|place| place + 1 < causes.len()) {
+        let above = place.checked_sub(1).map(|above| causes[above].after);
+        causes[place].after = above.unwrap_or(before);
+    }
+    calibrate(&mut causes);
+    causes
 }

@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use cromosim_imu::{Effect, EffectKind, EffectSet, ParameterFit, PerChannel, Reading};
+use cromosim_imu::{
+    Effect, EffectKind, EffectSet, FirstGuess, ParameterFit, PerChannel, Reading, Search,
+};
 use cromosim_spatial::KinematicTrack;
 use nalgebra::DVector;
 
@@ -95,6 +97,31 @@ fn changed(set: &EffectSet, kind: EffectKind, value: &FreeValue, change: f64) ->
     let mut next = set.clone();
     next.insert(effect.with_values(values).ok()?);
     Some(next)
+}
+
+/// Whether one value of several may be where no such effect has it, while the others are not. A gain of an axis on which
+/// there is no motion is zero by the reference's noise there, which the readings do not have: such a value stays, and
+/// the others are fitted.
+fn may_be_implausible(kind: EffectKind, value: &FreeValue) -> bool {
+    free_values(kind).len() > 1
+        && matches!(kind.spec().search, Search::Fitted(search) if matches!(search.first_guess, FirstGuess::Neutral))
+        && [value.lower, value.upper]
+            .into_iter()
+            .any(|bound| !is_plausible_at(&EffectSet::new(), kind, value, bound))
+}
+
+/// Whether an effect of a set is what such effects are, with one value at some place and the
+/// others neutral.
+fn is_plausible_at(set: &EffectSet, kind: EffectKind, value: &FreeValue, at: f64) -> bool {
+    let Search::Fitted(search) = kind.spec().search else {
+        return true;
+    };
+    let effect = Effect::neutral(kind);
+    let mut values = effect.values().to_vec();
+    values[value.index] = at.clamp(value.lower, value.upper);
+    effect
+        .with_values(values)
+        .is_ok_and(|effect| (search.is_plausible)(&effect, set))
 }
 
 /// A set with a part of a step along several values; a change that an effect refuses is left out.
@@ -197,10 +224,31 @@ impl<'a> FitModel<'a> {
         };
         let readings = self.prepared.predict_from(&self.track, base, &moved, kind);
         let changes = changed_axes(&readings, &base.readings);
+        if may_be_implausible(kind, value) {
+            let alone = now + size * self.part_of_residual(base, &readings, changes);
+            if !is_plausible_at(set, kind, value, alone) {
+                return vec![0.0; 6 * self.prepared.length];
+            }
+        }
         let difference = self.prepared.scattered(changes, |k, axis| {
             (value_on_axis(&readings[k], axis) - value_on_axis(&base.readings[k], axis)) / size
         });
         self.whitener.apply(&difference)
+    }
+
+    /// How many times a change of the readings is in the residual, by least squares.
+    fn part_of_residual(&self, base: &Prediction, changed: &[Reading], axes: [bool; 6]) -> f64 {
+        let (mut product, mut square) = (0.0, 0.0);
+        let measured = self.prepared.measured.iter();
+        for (measured, (changed, base)) in measured.zip(changed.iter().zip(&base.readings)) {
+            for axis in (0..6).filter(|&axis| axes[axis]) {
+                let own = value_on_axis(base, axis);
+                let change = value_on_axis(changed, axis) - own;
+                product += change * (value_on_axis(measured, axis) - own);
+                square += change * change;
+            }
+        }
+        if square > 0.0 { product / square } else { 0.0 }
     }
 
     /// Normal equations of columns against a residual.

@@ -8,12 +8,12 @@ use cromosim_spatial::PoseNoise;
 
 use crate::axes::{axes_of_channel, value_on_axis};
 use crate::digital::Digital;
-use crate::fit::FitModel;
+use crate::fit::{Fit, FitModel};
 use crate::library::Library;
 use crate::policy::report::{
     COARSE_STEPS, DOUBTFUL_EXCESS_NOISE, EXCESS_NOISE, MANY_MISSING,
-    ORDINARY_BESIDE_REFERENCE_NOISE, ORDINARY_BESIDE_SMOOTHING, REFERENCE_NOISE, ROUNDING_SIGMAS,
-    ROUNDING_UNCERTAINTY, STEP,
+    ORDINARY_BESIDE_REFERENCE_NOISE, ORDINARY_BESIDE_SMOOTHING, OUTWEIGHING_NATS, REFERENCE_NOISE,
+    ROUNDING_SIGMAS, ROUNDING_UNCERTAINTY, STEP,
 };
 
 /// What readings and residual show without a fit.
@@ -34,14 +34,16 @@ pub(crate) struct Observations<'a> {
 /// The causes: fitted effects beyond what is ordinary, and those that are read off.
 pub(crate) fn reportable_effects(
     model: &FitModel,
-    fitted: &EffectSet,
+    fit: &Fit,
     observations: &Observations,
     library: &Library,
 ) -> EffectSet {
-    let mut set = fitted.filtered(|effect| {
-        !is_ordinary(effect, ordinary_factor(model)) && !is_rounding(effect, model)
+    let mut set = fit.set.filtered(|effect| {
+        let is_ordinary = is_ordinary(effect, ordinary_factor(model))
+            && (is_ordinary(effect, 1.0) || !outweighs_reference(effect, model, fit));
+        !is_ordinary && !is_rounding(effect, model)
     });
-    set.take_values_of(fitted);
+    set.take_values_of(&fit.set);
     for kind in EffectKind::ALL {
         let Search::ReadOff(search) = kind.spec().search else {
             continue;
@@ -72,8 +74,21 @@ fn is_reference_noisy(model: &FitModel) -> bool {
     is_reference_poor(model) && model.prepared.noise_behind_frames.is_none_or(is_noisy)
 }
 
+/// Whether an effect beside a noisy reference explains more than that noise could pass for.
+fn outweighs_reference(effect: &Effect, model: &FitModel, fit: &Fit) -> bool {
+    let values: f64 = effect
+        .kind()
+        .spec()
+        .channels
+        .iter()
+        .map(|channel| model.whitener.count[*channel])
+        .sum();
+    model.basis.undone_smoothing.is_none()
+        && fit.linear.held_out - fit.held_out_without(effect.kind()) > OUTWEIGHING_NATS * values
+}
+
 /// Factor on what is ordinary: what is fitted to a poor reference is that much poorer.
-fn ordinary_factor(model: &FitModel) -> f64 {
+pub(crate) fn ordinary_factor(model: &FitModel) -> f64 {
     if is_reference_poor(model) {
         ORDINARY_BESIDE_REFERENCE_NOISE
     } else if model.basis.undone_smoothing.is_some() {

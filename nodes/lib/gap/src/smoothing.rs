@@ -38,13 +38,19 @@ pub(crate) fn try_smoothing<'a>(
     // Beside what was found without it, and alone.
     let mut sets: Vec<EffectSet> = starts.to_vec();
     let found = told_from_smoothing(&scored.fit.set);
+    let plain = evidence(&model, &scored);
+    let without_smoothing = if found == scored.fit.set {
+        plain
+    } else {
+        evidence(&model, &score(&model, found.clone()))
+    };
     if !starts.contains(&found) {
         sets.push(found);
     }
-    let plain = evidence(&model, &scored);
     let needed = plain + LEAST_GAIN_NATS + LEAST_SHARE * excess(&model, &scored.fit);
     let trial = Trial {
         plain,
+        without_smoothing,
         needed,
         plain_ratio: scored.fit.held_out_ratio(),
         model: &model,
@@ -91,6 +97,8 @@ struct Trial<'t, 'a> {
     sets: &'t [EffectSet],
     /// Evidence of the reference as it is, nats.
     plain: f64,
+    /// The same without effects that cannot be told from a smoothing.
+    without_smoothing: f64,
     /// Evidence from which on a smoothing is believed.
     needed: f64,
     /// Held-out mean square of the whitened residual of the reference as it is.
@@ -124,14 +132,14 @@ impl Trial<'_, '_> {
         Some(self.refined(better, &FINE))
     }
 
-    /// The cutoff with the most evidence; none where none has more than the reference as it is: of a smoothing
-    /// that is there even a cutoff next to it explains far more.
+    /// The cutoff with the most evidence; none where none has more than the reference as it is, without what passes for a
+    /// smoothing: of one that is there even a cutoff next to it explains far more.
     fn best_of(&self, kernel: SmoothingKernel, cutoffs_hz: &[f64]) -> Option<Tried> {
         cutoffs_hz
             .iter()
             .filter_map(|&cutoff_hz| self.tried(ZeroPhaseSmoothing { cutoff_hz, kernel }))
             .max_by(|a, b| a.evidence.total_cmp(&b.evidence))
-            .filter(|best| best.evidence > self.plain)
+            .filter(|best| best.evidence > self.without_smoothing)
     }
 
     /// The best of a smoothing and those whose cutoffs lie on either side of it by some factors.

@@ -7,6 +7,7 @@ use cromosim_gap::PlacementAnswer;
 use cromosim_imu::{EffectKind as K, STANDARD_GRAVITY};
 use nalgebra::Vector3;
 use support::judge::{answer, cause, names, names_exactly, near, values_are};
+use support::motion::Motion;
 use support::{IMU_HZ, Scene, seed_of};
 
 /// Names exactly what was put in, with its values.
@@ -155,6 +156,30 @@ fn a_tissue_under_slow_motion() {
         let diagnosis = answer(&scene.record()).diagnosis;
         assert_eq!(names(&diagnosis), ["soft_tissue"], "{values:?}");
     }
+}
+
+/// An axis on which there is no motion has a gain of zero by the reference's noise there, which its readings do not have.
+#[test]
+fn gains_where_all_motion_is_in_a_plane() {
+    for (kind, seed) in [(K::AccelScale, 57), (K::GyroScale, 58)] {
+        let mut scene = Scene::new(seed).with(kind, &[1.02, 1.02, 1.02]);
+        scene.motion = Motion::pendulum();
+        let diagnosis = answer(&scene.record()).diagnosis;
+        assert_eq!(names(&diagnosis), [kind.name()], "{}", diagnosis.verdict);
+    }
+}
+
+/// A simulation that rounded as well would be off by a third more than what does not know of the rounding.
+#[test]
+fn rounding_makes_no_channel_worse() {
+    let scene = Scene::new(59)
+        .with(K::AccelQuantization, &[0.08])
+        .with(K::GyroQuantization, &[0.006]);
+    let diagnosis = answer(&scene.record()).diagnosis;
+    names_exactly(&diagnosis, &scene.effects);
+    let (before, after) = (&diagnosis.gap.before, &diagnosis.gap.after);
+    assert!(after.accel_rmse < 1.01 * before.accel_rmse, "{after:?}");
+    assert!(after.gyro_rmse < 1.01 * before.gyro_rmse, "{after:?}");
 }
 
 /// Readings that stay on a step show no noise; what the device declares in SI units is not taken for its own.

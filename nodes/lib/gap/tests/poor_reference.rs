@@ -59,3 +59,29 @@ fn degrees_are_told_where_noise_hides_all_axes_but_one() {
     let record = with_memory(record, [1e-4, 1.4e-3], 1e-3);
     assert_eq!(names(&answer(&record).diagnosis), ["gyro_units"]);
 }
+
+#[test]
+fn a_gain_that_outweighs_a_noisy_reference_is_a_cause() {
+    let scene = Scene::new(36)
+        .with(K::ReferenceNoise, &[1e-4, 0.0147])
+        .with(K::AccelScale, &[1.012, 1.014, 1.015]);
+    assert_eq!(
+        names(&answer(&scene.record()).diagnosis),
+        ["accel_scale", "reference_noise"]
+    );
+}
+
+#[test]
+fn a_smoothing_of_poses_without_noise_is_no_tissue() {
+    for (seed, cutoff_hz) in [(37, 3.7), (38, 3.0), (40, 2.2)] {
+        let scene = Scene {
+            motion: Motion::random(seed).slowed(2.0),
+            ..Scene::new(seed)
+        };
+        let scene = scene
+            .with(K::ReferenceNoise, &[1e-9, 1e-9])
+            .with(K::ReferenceSmoothing, &[cutoff_hz, 0.0]);
+        let named = names(&answer(&scene.record()).diagnosis).join(" ");
+        assert_eq!(named, "reference_smoothing", "{cutoff_hz} Hz");
+    }
+}

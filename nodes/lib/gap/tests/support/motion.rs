@@ -106,6 +106,22 @@ impl Motion {
         }
     }
 
+    /// To and fro in one plane, half a radian about the axis across it; some 3 m/s2.
+    pub fn pendulum() -> Self {
+        let term = |hz: f64, amplitude: Vector3<f64>| Term {
+            hz,
+            amplitude,
+            phase: Vector3::new(0.4, 0.4, 1.9),
+        };
+        Self {
+            position: vec![
+                term(0.6, Vector3::new(0.3, 0.0, 0.0)),
+                term(1.2, Vector3::new(0.0, 0.0, 0.04)),
+            ],
+            rotation: vec![term(0.6, Vector3::new(0.0, 0.5, 0.0))],
+        }
+    }
+
     /// Half a radian to and fro about one axis, a hundredth of it about the others; some 3 m/s2.
     pub fn turning_about_one_axis() -> Self {
         let term = |hz: f64, amplitude: Vector3<f64>, phase: Vector3<f64>| Term {
