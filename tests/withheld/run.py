@@ -12,6 +12,7 @@ import generate
 import grade
 import other_origin
 import tables
+import third_origin
 
 
 def diagnose(cromosim, recordings, out, without=None):
@@ -78,12 +79,14 @@ def write_cases(options, out, suite):
         return mechanics.generate(out, options.seed, options.count, options.jobs)
     if suite in other_origin.SUITES:
         return other_origin.generate(out, suite, options.seed, options.count, options.jobs)
+    if suite in third_origin.SUITES:
+        return third_origin.generate(out, suite, options.seed, options.count, options.jobs)
     return generate.generate(out, suite, options.seed, options.count, jobs=options.jobs, seconds=options.seconds)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--suite", action="append", choices=[*generate.SUITES, *other_origin.SUITES, "mechanics"],
+    parser.add_argument("--suite", action="append", choices=[*generate.SUITES, *other_origin.SUITES, *third_origin.SUITES, "mechanics"],
                         help="may be repeated; default all but those of another origin, and mechanics, which needs MuJoCo")
     parser.add_argument("--count", type=int, help="cases of each suite; default the suite's own")
     parser.add_argument("--seconds", type=float, help="length of the fit recordings; default the suite's own")
