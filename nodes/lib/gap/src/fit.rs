@@ -99,15 +99,34 @@ fn changed(set: &EffectSet, kind: EffectKind, value: &FreeValue, change: f64) ->
     Some(next)
 }
 
-/// Whether one value of several may be where no such effect has it, while the others are not. A gain of an axis on which
-/// there is no motion is zero by the reference's noise there, which the readings do not have: such a value stays, and
-/// the others are fitted.
+/// Whether one value of several may be where no such effect has it, while the others are not.
 fn may_be_implausible(kind: EffectKind, value: &FreeValue) -> bool {
     free_values(kind).len() > 1
         && matches!(kind.spec().search, Search::Fitted(search) if matches!(search.first_guess, FirstGuess::Neutral))
         && [value.lower, value.upper]
             .into_iter()
             .any(|bound| !is_plausible_at(&EffectSet::new(), kind, value, bound))
+}
+
+/// An effect with those of its values neutral that alone are where no such effect has them.
+pub(crate) fn with_plausible_values(set: &EffectSet, kind: EffectKind) -> EffectSet {
+    let mut next = set.clone();
+    let Some(effect) = set.get(kind) else {
+        return next;
+    };
+    let neutral = kind.spec().neutral();
+    let mut values = effect.values().to_vec();
+    for value in free_values(kind) {
+        if may_be_implausible(kind, &value)
+            && !is_plausible_at(set, kind, &value, values[value.index])
+        {
+            values[value.index] = neutral[value.index];
+        }
+    }
+    if let Ok(effect) = effect.with_values(values) {
+        next.insert(effect);
+    }
+    next
 }
 
 /// Whether an effect of a set is what such effects are, with one value at some place and the
@@ -199,7 +218,21 @@ impl<'a> FitModel<'a> {
     pub fn columns(&self, set: &EffectSet, base: &Prediction, kind: EffectKind) -> Vec<Vec<f64>> {
         free_values(kind)
             .iter()
-            .map(|value| self.column(set, base, kind, value))
+            .map(|value| self.column(set, base, kind, value, false))
+            .collect()
+    }
+
+    /// The same for a fit: nothing of values that alone would lie where no such effect has them, so that they stay. A gain
+    /// of an axis on which there is no motion is zero by the reference's noise there, which the readings do not have.
+    pub fn columns_to_fit(
+        &self,
+        set: &EffectSet,
+        base: &Prediction,
+        kind: EffectKind,
+    ) -> Vec<Vec<f64>> {
+        free_values(kind)
+            .iter()
+            .map(|value| self.column(set, base, kind, value, true))
             .collect()
     }
 
@@ -209,6 +242,7 @@ impl<'a> FitModel<'a> {
         base: &Prediction,
         kind: EffectKind,
         value: &FreeValue,
+        holds: bool,
     ) -> Vec<f64> {
         let now = set
             .get(kind)
@@ -224,7 +258,7 @@ impl<'a> FitModel<'a> {
         };
         let readings = self.prepared.predict_from(&self.track, base, &moved, kind);
         let changes = changed_axes(&readings, &base.readings);
-        if may_be_implausible(kind, value) {
+        if holds && may_be_implausible(kind, value) {
             let alone = now + size * self.part_of_residual(base, &readings, changes);
             if !is_plausible_at(set, kind, value, alone) {
                 return vec![0.0; 6 * self.prepared.length];

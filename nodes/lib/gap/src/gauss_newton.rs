@@ -94,7 +94,7 @@ fn total_cost(all: &[Evaluated]) -> f64 {
 fn columns_of(model: &FitModel, now: &Evaluated, layout: &[(EffectKind, usize)]) -> Vec<Vec<f64>> {
     layout
         .chunk_by(|a, b| a.0 == b.0)
-        .flat_map(|values| model.columns(&now.set, &now.prediction, values[0].0))
+        .flat_map(|values| model.columns_to_fit(&now.set, &now.prediction, values[0].0))
         .collect()
 }
 

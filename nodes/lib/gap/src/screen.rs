@@ -4,7 +4,7 @@ use cromosim_imu::{Effect, EffectKind, EffectSet, FirstGuess, PerChannel, Search
 use nalgebra::{Cholesky, DMatrix, Dyn, Matrix3, Vector3};
 
 use crate::axes::channel_of_axis;
-use crate::fit::{Fit, FitModel, layout_of, prior_weights, slices, stepped};
+use crate::fit::{Fit, FitModel, layout_of, prior_weights, slices, stepped, with_plausible_values};
 use crate::gram::{Gram, dot};
 use crate::prepared::Prediction;
 
@@ -101,7 +101,11 @@ fn candidate(model: &FitModel, fit: &Fit, starts: &[Effect]) -> Candidate {
             .iter()
             .any(|start| start.kind().spec().stage == Stage::Tissue)
             .then(|| set.clone()),
-        set: stepped(&set, &layout, &linear.step, 1.0),
+        set: starts
+            .iter()
+            .fold(stepped(&set, &layout, &linear.step, 1.0), |set, start| {
+                with_plausible_values(&set, start.kind())
+            }),
         predicted_gain: linear.held_out,
         beside,
     }
