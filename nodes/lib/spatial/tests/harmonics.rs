@@ -1,10 +1,13 @@
 //! Harmonics of what is shaken now and then are motion, with quiet frequencies before them.
 #![allow(clippy::unwrap_used)]
 
+mod support;
+
 use std::f64::consts::TAU;
 
 use cromosim_spatial::{PoseEstimate, Stamp};
 use nalgebra::{UnitQuaternion, Vector3};
+use support::noise;
 
 const RATE_HZ: f64 = 200.0;
 const HZ: f64 = 5.0;
@@ -17,17 +20,6 @@ const HARMONIC: f64 = 5e-4;
 fn shaken(t: f64) -> f64 {
     let eased = |x: f64| 1.0 / (1.0 + (-x / 0.08).exp());
     eased(t - 20.0) * eased(26.0 - t)
-}
-
-/// Noise of unit variance that is the same in every run: sums of twelve uniform numbers.
-fn noise(state: &mut u64) -> f64 {
-    let mut uniform = || {
-        *state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (*state >> 11) as f64 / (1u64 << 53) as f64
-    };
-    (0..12).map(|_| uniform()).sum::<f64>() - 6.0
 }
 
 #[test]

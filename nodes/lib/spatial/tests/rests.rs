@@ -1,8 +1,11 @@
 //! A rest beside a burst stays one.
 #![allow(clippy::unwrap_used)]
 
+mod support;
+
 use cromosim_spatial::{PoseEstimate, Stamp};
 use nalgebra::{UnitQuaternion, Vector3};
+use support::noise;
 
 const RATE_HZ: f64 = 240.0;
 
@@ -11,17 +14,6 @@ fn angle(t: f64) -> f64 {
     let within = t % 7.0 - 3.0;
     let eased = |x: f64| 1.0 / (1.0 + (-x / 0.05).exp());
     0.5 * eased(within) * eased(2.0 - within) * (6.0 * std::f64::consts::PI * t).sin()
-}
-
-/// Noise of unit variance that is the same in every run: sums of twelve uniform numbers.
-fn noise(state: &mut u64) -> f64 {
-    let mut uniform = || {
-        *state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (*state >> 11) as f64 / (1u64 << 53) as f64
-    };
-    (0..12).map(|_| uniform()).sum::<f64>() - 6.0
 }
 
 #[test]
