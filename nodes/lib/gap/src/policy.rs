@@ -207,8 +207,8 @@ pub(crate) mod report {
     /// is fitted to it is that much poorer.
     pub const ORDINARY_BESIDE_REFERENCE_NOISE: f64 = 15.0;
     /// Nats for each value compared from which on an effect there is a cause all the same: a fifth more power of the residual
-    /// without it. What stood in for such noise gained 0.003 at most, an `accel_scale` of 1.4 % beside turns of 0.015 rad 0.4 (two
-    /// pairs of two generators).
+    /// without it. What stood in for such noise gained less than 0.01, an `accel_scale` of 1.4 % beside turns of 0.015 rad 0.4 (one
+    /// pair each of the second and the third generator of withheld cases).
     pub const OUTWEIGHING_NATS: f64 = 0.1;
     /// The same beside a smoothing of the reference that is undone.
     pub const ORDINARY_BESIDE_SMOOTHING: f64 = 8.0;
@@ -384,9 +384,9 @@ pub(crate) mod probability {
     pub const MARGIN_NATS: f64 = 2.0;
     /// Of a fitted effect that was taken up last, beside something unknown, and so has no margin.
     pub const WITHOUT_MARGIN: f64 = 0.98;
-    /// Probability below which `unknown` is not said. Of 13 causes below one half in 480 cases of three generators (seed 10 of
-    /// the second, 74 of the first, and one that was made for this) all were wrong, ten of them `unknown`; on real recordings,
-    /// where nobody knows, it has 0.3 and more.
+    /// Probability below which `unknown` is not said. Of 14 causes below one half in some 400 cases of three generators (seed 10 of
+    /// the second, 74 of the first, 1 of the third) all were wrong, ten of them `unknown`; on real recordings, where nobody
+    /// knows, it has 0.3 and more.
     pub const LEAST_OF_UNKNOWN: f64 = 0.25;
     /// Most of `unknown`.
     pub const MOST_UNKNOWN: f64 = 0.97;

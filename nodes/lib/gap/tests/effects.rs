@@ -169,7 +169,7 @@ fn gains_where_all_motion_is_in_a_plane() {
     }
 }
 
-/// A simulation that rounded as well would be off by a third more than what does not know of the rounding.
+/// A simulation that rounded as well would be farther off than one that does not know of the rounding.
 #[test]
 fn rounding_makes_no_channel_worse() {
     let scene = Scene::new(59)

@@ -39,7 +39,8 @@ const LOCAL_LINE: f64 = 8.0;
 /// Width of such a line at most, Hz: a window resolves 0.75, its five neighbours as much again, and people do not shake
 /// steadily. What is wider is noise of another shape than that which was learnt.
 const LINE_WIDTH_HZ: f64 = 3.0;
-/// Fastest such line, Hz: nobody shakes or steps faster, harmonics included, but frames that were resampled have lines there.
+/// Fastest such line, Hz: what people shake and step at lies below, with its first harmonics; frames that were resampled
+/// have lines above. No source for the number.
 const FASTEST_LINE_HZ: f64 = 15.0;
 /// How far around a spectral line the filter stays open, Hz: a line's amplitude changes over some
 /// seconds. No source for the number.
