@@ -4,18 +4,19 @@ use std::borrow::Cow;
 
 use cromosim_imu::{
     Channel, DeclaredNoise, EffectKind, OtherSession, PerChannel, PlacementEffects,
-    UnexplainedErrors, unit_factors,
+    Search, UnexplainedErrors, unit_factors,
 };
 use cromosim_spatial::MotionResponse;
 
 use crate::builder::DiagnosisBuilder;
 use crate::clock_jumps::{Parts, parts};
-use crate::diagnosis::{ClockJump, PlacementDiagnosis};
+use crate::diagnosis::{Cause, ClockJump, PlacementDiagnosis};
 use crate::error::GapError;
 use crate::evidence::Evidence;
 use crate::findings::Findings;
 use crate::library::Library;
 use crate::magnetometer::{MagneticRecording, diagnose_magnetometer};
+use crate::policy::probability::{LEAST_NAMED, SMALL_SHARE};
 use crate::progress::{ANALYSIS, PREPARATION, Progress};
 use crate::record::{MeasuredField, PlacementRecord};
 use crate::session::Session;
@@ -112,7 +113,7 @@ pub fn diagnose_together<'r>(
     } else {
         (&sessions, findings)
     };
-    let mut answer = answer(&findings, sessions, &fields, &names, options);
+    let mut answer = answer(findings, sessions, &fields, &names, options);
     if !jumps.is_empty() {
         let verdict = &answer.diagnosis.verdict;
         answer.diagnosis.verdict = format!("{}; {verdict}", jumps_in_words(&jumps));
@@ -216,17 +217,39 @@ fn in_neighbouring_units(
     all.unwrap_or_default()
 }
 
+/// Fitted causes that are more likely not there, and of hardly any of the gap.
+fn doubtful(causes: &[Cause]) -> Vec<EffectKind> {
+    let is_doubtful =
+        |cause: &&Cause| cause.probability < LEAST_NAMED && cause.gap_share < SMALL_SHARE;
+    let kinds = causes.iter().filter(is_doubtful);
+    kinds
+        .filter_map(|cause| EffectKind::from_name(&cause.effect))
+        .filter(|kind| matches!(kind.spec().search, Search::Fitted(_)))
+        .collect()
+}
+
 fn answer(
-    findings: &[Findings],
+    mut findings: Vec<Findings>,
     sessions: &[Session],
     fields: &[&MeasuredField],
     recordings: &[&str],
     options: &DiagnoseOptions,
 ) -> PlacementAnswer {
-    for one in findings {
+    for one in &findings {
         trace(|| eprintln!("{}: {:?}", one.model.prepared.name, names(&one.reportable)));
     }
-    let builder = DiagnosisBuilder::new(findings, sessions, options.seed);
+    let builder = DiagnosisBuilder::new(&findings, sessions, options.seed);
+    let diagnosis = builder.diagnosis(recordings);
+    let doubtful = doubtful(&diagnosis.causes);
+    if !doubtful.is_empty() {
+        // Calibrations among them are taken over all the same.
+        for one in &mut findings {
+            for kind in &doubtful {
+                one.reportable.remove(*kind);
+            }
+        }
+        return answer(findings, sessions, fields, recordings, options);
+    }
     let unexplained = builder.unexplained_errors();
     let magnetic: Vec<MagneticRecording> = findings
         .iter()
@@ -234,8 +257,8 @@ fn answer(
         .map(|(findings, measured)| MagneticRecording { findings, measured })
         .collect();
     let mut answer = PlacementAnswer {
-        diagnosis: builder.diagnosis(recordings),
-        effects: simulated_effects(findings, &unexplained, builder.reference_responses()),
+        diagnosis,
+        effects: simulated_effects(&findings, &unexplained, builder.reference_responses()),
         evidence: builder.evidence(recordings),
     };
     if let Some(found) = diagnose_magnetometer(&magnetic) {

@@ -31,6 +31,7 @@ mod location;
 mod magnetometer;
 mod metrics;
 pub mod monitor;
+mod noise_filter;
 mod noise_model;
 mod noise_updates;
 mod period;

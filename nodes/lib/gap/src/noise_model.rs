@@ -13,6 +13,9 @@ const RESOLVED: f64 = 0.9;
 /// Motion beyond this is none that a reference could have lost, Hz: blows of a tool reach it, and the noise of
 /// acceleration there would cover whatever is unknown. No source.
 const FASTEST_LOST_HZ: f64 = 30.0;
+/// Power of the frequency with which displacements fall at least beyond the poses' Nyquist frequency: their acceleration
+/// falls with the square. No source for the number.
+const LEAST_FALL: f64 = 6.0;
 /// Predicted noise of a residual: white noise of the sensor and the reference's own error.
 ///
 /// One-sided densities, with N_p, N_r the error densities of the pose estimate, l the lever arm, s
@@ -159,9 +162,10 @@ impl NoiseBasis {
             gyroscope: (squared + 2.0 / 3.0 * w2) * error_r,
         };
         // Motion below the reference's noise: at most that noise itself.
+        let of_motion = gain * gain * fall_beyond(self.estimate.rate_hz() / 2.0, frequency_hz);
         let hidden_p =
-            squared * squared * position.at(frequency_hz) * (1.0 - through_p) * gain * gain;
-        let hidden_r = squared * rotation.at(frequency_hz) * (1.0 - through_r) * gain * gain;
+            squared * squared * position.at(frequency_hz) * (1.0 - through_p) * of_motion;
+        let hidden_r = squared * rotation.at(frequency_hz) * (1.0 - through_r) * of_motion;
         let hidden = PerChannel {
             accelerometer: hidden_p + 2.0 / 3.0 * lever2 * squared * hidden_r,
             gyroscope: hidden_r,
@@ -180,6 +184,11 @@ impl NoiseBasis {
             through,
         }
     }
+}
+
+/// How much less dense motion is at a frequency than where the poses' spectrum ends.
+fn fall_beyond(nyquist_hz: f64, frequency_hz: f64) -> f64 {
+    (nyquist_hz / frequency_hz.max(nyquist_hz)).powf(LEAST_FALL)
 }
 
 impl NoiseModel {

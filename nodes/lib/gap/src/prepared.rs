@@ -28,6 +28,10 @@ const FREE_ENTRIES: usize = 200_000;
 const END_S: f64 = 1.0;
 /// What is left out on either side of a gap in the reference, s.
 const GAP_S: f64 = 0.35;
+/// The same at most, as a multiple of the gap, where less than this part of the messages would be left: what is filled in
+/// for one pose or two errs beside it for as long as they last. No source for the numbers.
+const SHORT_GAP_MARGIN: f64 = 3.0;
+const LEAST_LEFT: f64 = 0.5;
 /// Poses no farther apart than this are no gap, s: two in each period of motion at 20 Hz, below which that of
 /// people and of things in their hands is, hold all of it, and what is filled in between errs no more than
 /// poses do. Cameras that lose a marker for one frame in a hundred at 300 Hz would otherwise leave nothing.
@@ -212,36 +216,20 @@ impl PreparedPlacement {
     }
 
     /// Leaves out what the reference does not cover when the IMU's stamps are late by `lag_s`, and
-    /// what is next to its gaps.
+    /// what is next to its gaps: less of it beside short ones where too little would be left.
     pub fn cover(&mut self, lag_s: f64) -> Result<(), GapError> {
-        let (start, end) = (
-            self.estimate.start().plus_seconds(lag_s),
-            self.estimate.end().plus_seconds(lag_s),
-        );
-        let gaps: Vec<(Stamp, Stamp)> = self
-            .estimate
-            .gaps()
-            .iter()
-            .filter(|(from, to)| *to - *from > SHORT_GAP_S)
-            .map(|(from, to)| {
-                let margin = GAP_S + GAP_PART * (*to - *from).min(2.0);
-                (
-                    from.plus_seconds(lag_s - margin),
-                    to.plus_seconds(lag_s + margin),
-                )
-            })
-            .collect();
-        let mut next = 0;
-        let mut covered = 0;
-        for (k, stamp) in self.stamps.iter().enumerate() {
-            while next < gaps.len() && gaps[next].1 < *stamp {
-                next += 1;
-            }
-            let in_gap = gaps.get(next).is_some_and(|gap| gap.0 <= *stamp);
-            let inside = *stamp - start >= END_S && end - *stamp >= END_S && !in_gap;
-            covered += usize::from(inside);
+        let beside_all = |_: f64| GAP_S;
+        let beside_short = |gap_s: f64| GAP_S.min(SHORT_GAP_MARGIN * gap_s);
+        let all = self.stamps.len();
+        let mut inside = self.inside(lag_s, beside_all);
+        let count = |inside: &[bool]| inside.iter().filter(|inside| **inside).count();
+        if (count(&inside) as f64) < LEAST_LEFT * all as f64 {
+            inside = self.inside(lag_s, beside_short);
+        }
+        let covered = count(&inside);
+        for (usable, inside) in self.usable.iter_mut().zip(inside) {
             if !inside {
-                self.usable[k] = [false; 6];
+                *usable = [false; 6];
             }
         }
         let overlap_s = covered as f64 / self.rate_hz;
@@ -255,6 +243,37 @@ impl PreparedPlacement {
             });
         }
         Ok(())
+    }
+
+    /// Which messages the reference covers, with some margin beside gaps of some length, s.
+    fn inside(&self, lag_s: f64, margin_s: impl Fn(f64) -> f64) -> Vec<bool> {
+        let (start, end) = (
+            self.estimate.start().plus_seconds(lag_s),
+            self.estimate.end().plus_seconds(lag_s),
+        );
+        let gaps: Vec<(Stamp, Stamp)> = self
+            .estimate
+            .gaps()
+            .iter()
+            .filter(|(from, to)| *to - *from > SHORT_GAP_S)
+            .map(|(from, to)| {
+                let gap_s = *to - *from;
+                let margin = margin_s(gap_s) + GAP_PART * gap_s.min(2.0);
+                (
+                    from.plus_seconds(lag_s - margin),
+                    to.plus_seconds(lag_s + margin),
+                )
+            })
+            .collect();
+        let mut next = 0;
+        let is_inside = |stamp: &Stamp| {
+            while next < gaps.len() && gaps[next].1 < *stamp {
+                next += 1;
+            }
+            let in_gap = gaps.get(next).is_some_and(|gap| gap.0 <= *stamp);
+            *stamp - start >= END_S && end - *stamp >= END_S && !in_gap
+        };
+        self.stamps.iter().map(is_inside).collect()
     }
 
     /// Refuses channels that never change.

@@ -61,17 +61,18 @@ fn is_noisy(noise: PoseNoise) -> bool {
     noise.position >= REFERENCE_NOISE.position || noise.rotation >= REFERENCE_NOISE.rotation
 }
 
-/// Whether the reference scatters as much, or seems to: frames too slow for the motion do, and so do the
-/// poses between them.
+/// Whether the reference scatters as much, or seems to: poses and frames that are too slow for the motion do.
 fn is_reference_poor(model: &FitModel) -> bool {
-    let prepared = model.prepared;
-    let interpolated = prepared.interpolated.as_ref();
-    is_noisy(prepared.estimate.noise()) && interpolated.is_none_or(|poses| is_noisy(poses.noise()))
+    is_noisy(model.prepared.estimate.scatter())
 }
 
-/// Whether it does: noise behind frames shows on the chords between them.
+/// Whether it does: noise of frames shows in the poses between them too, and noise behind them on the chords.
 fn is_reference_noisy(model: &FitModel) -> bool {
-    is_reference_poor(model) && model.prepared.noise_behind_frames.is_none_or(is_noisy)
+    let prepared = model.prepared;
+    let interpolated = prepared.interpolated.as_ref();
+    is_noisy(prepared.estimate.noise())
+        && interpolated.is_none_or(|poses| is_noisy(poses.noise()))
+        && prepared.noise_behind_frames.is_none_or(is_noisy)
 }
 
 /// Whether an effect beside a noisy reference explains more than that noise could pass for.

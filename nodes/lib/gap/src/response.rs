@@ -1,5 +1,7 @@
 //! How much of the reference's motion the readings hold, by frequency.
 
+use std::ops::Range;
+
 use cromosim_imu::{Channel, PerChannel, Reading};
 use cromosim_spatial::{Complex64, FourierPair, MotionResponse, PoseEstimate};
 use nalgebra::{Quaternion, Vector3};
@@ -18,7 +20,7 @@ use crate::trace::trace;
 const EDGES_HZ: [f64; 13] = [
     1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 13.0, 16.0, 20.0, 25.0, 30.0, 40.0,
 ];
-const BANDS: usize = EDGES_HZ.len() - 1;
+pub(crate) const BANDS: usize = EDGES_HZ.len() - 1;
 /// Length of a window, s.
 const WINDOW_S: f64 = 2.0;
 /// Length of the blocks of time whose windows count as one, s: neighbouring windows overlap by half.
@@ -34,13 +36,20 @@ pub(crate) struct LearntResponse {
     pub excluding_fold: Vec<MotionResponse>,
 }
 
-/// Sums over the windows of a block of time: of the simulation's power, of that times the residual, by band; of the
-/// residual's power over all frequencies.
+/// Sums over the windows of a block of time.
 #[derive(Clone, Copy, Debug, Default)]
-struct Block {
-    fold: usize,
-    simulated: [f64; BANDS],
-    both: [f64; BANDS],
+pub(crate) struct Block {
+    /// The part of time that it belongs to.
+    pub fold: usize,
+    /// The simulation's power, by band.
+    pub simulated: [f64; BANDS],
+    /// The simulation times the residual, by band.
+    pub both: [f64; BANDS],
+    /// The residual's power, by band.
+    pub rest: [f64; BANDS],
+    /// How many entries of transforms these are sums of, by band.
+    pub entries: [f64; BANDS],
+    /// The residual's power over all frequencies.
     residual: f64,
 }
 
@@ -150,7 +159,11 @@ fn largest_factors(estimate: &PoseEstimate) -> PerChannel<[f64; BANDS]> {
 }
 
 /// Factors from all blocks but those of one part of time, none above the band's largest.
-fn factors(blocks: &[Block], largest: &[f64; BANDS], without: Option<usize>) -> [f64; BANDS] {
+pub(crate) fn factors(
+    blocks: &[Block],
+    largest: &[f64; BANDS],
+    without: Option<usize>,
+) -> [f64; BANDS] {
     let used: Vec<&Block> = blocks
         .iter()
         .filter(|block| Some(block.fold) != without)
@@ -263,37 +276,28 @@ impl Coordinates {
 fn blocks(compared: &Compared<'_>, channel: Channel) -> Vec<Block> {
     let prepared = compared.prepared;
     let coordinates = Coordinates::of(compared, channel);
-    let window = ((WINDOW_S * prepared.rate_hz).round() as usize).max(2);
-    let transform = Windows::new(window, prepared.rate_hz);
-    let place = |entry: usize| (entry as f64 / (BLOCK_S * prepared.rate_hz)) as usize;
-    let mut blocks = vec![Block::default(); place(prepared.length) + 1];
-    let starts = (0..).map(|index| index * (window / 2));
-    for start in starts.take_while(|start| start + window <= prepared.length) {
-        let range = start..start + window;
+    let bands = Bands::new(prepared.rate_hz);
+    bands.blocks(prepared, |range, block| {
         let known = coordinates.known[range.end] - coordinates.known[range.start];
-        if (known as f64) < LEAST_USABLE * window as f64 {
-            continue;
+        if (known as f64) < LEAST_USABLE * range.len() as f64 {
+            return;
         }
-        let middle = start + window / 2;
-        let block = &mut blocks[place(middle)];
-        block.fold = prepared.fold(middle);
         for (motion, rest) in coordinates.simulated.iter().zip(&coordinates.residual) {
-            transform.add(&motion[range.clone()], &rest[range.clone()], block);
+            bands.add(&motion[range.clone()], &rest[range.clone()], block);
         }
-    }
-    blocks.retain(|block| block.residual > 0.0);
-    blocks
+    })
 }
 
-/// Transforms of Hann windows.
-struct Windows {
+/// Transforms of Hann windows that overlap by half, by bands.
+pub(crate) struct Bands {
     transform: FourierPair,
     hann: Vec<f64>,
     spacing_hz: f64,
 }
 
-impl Windows {
-    fn new(window: usize, rate_hz: f64) -> Self {
+impl Bands {
+    pub fn new(rate_hz: f64) -> Self {
+        let window = ((WINDOW_S * rate_hz).round() as usize).max(2);
         let turn = std::f64::consts::TAU / window as f64;
         Self {
             transform: FourierPair::new(window),
@@ -304,8 +308,44 @@ impl Windows {
         }
     }
 
+    /// The blocks of a recording: each window is added to that of its middle.
+    pub fn blocks(
+        &self,
+        prepared: &PreparedPlacement,
+        mut add: impl FnMut(Range<usize>, &mut Block),
+    ) -> Vec<Block> {
+        let window = self.hann.len();
+        let place = |entry: usize| (entry as f64 / (BLOCK_S * prepared.rate_hz)) as usize;
+        let mut blocks = vec![Block::default(); place(prepared.length) + 1];
+        let starts = (0..).map(|index| index * (window / 2));
+        for start in starts.take_while(|start| start + window <= prepared.length) {
+            let middle = start + window / 2;
+            let block = &mut blocks[place(middle)];
+            block.fold = prepared.fold(middle);
+            add(start..start + window, block);
+        }
+        blocks.retain(|block| block.residual > 0.0);
+        blocks
+    }
+
+    /// Lowest and highest frequency of a band, Hz.
+    pub fn range_hz(&self, band: usize) -> [f64; 2] {
+        [EDGES_HZ[band], EDGES_HZ[band + 1]]
+    }
+
+    /// Expected power of an entry of white noise of unit variance.
+    pub fn power_of_one(&self) -> f64 {
+        self.hann.iter().map(|weight| weight * weight).sum()
+    }
+
+    /// Sum of the squares of a series, by the sum of the entries' power: each entry stands for two (its conjugate is left
+    /// out), and each value is in two windows.
+    pub fn squares_per_power(&self) -> f64 {
+        1.0 / self.power_of_one()
+    }
+
     /// Both series in one complex transform, as its real and imaginary part.
-    fn add(&self, motion: &[f64], rest: &[f64], block: &mut Block) {
+    pub fn add(&self, motion: &[f64], rest: &[f64], block: &mut Block) {
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
         let (level, offset) = (mean(motion), mean(rest));
         let mut values: Vec<Complex64> = self
@@ -328,6 +368,8 @@ impl Windows {
             if (1..=BANDS).contains(&next) {
                 block.simulated[next - 1] += motion.norm_sqr();
                 block.both[next - 1] += (motion.conj() * rest).re;
+                block.rest[next - 1] += rest.norm_sqr();
+                block.entries[next - 1] += 1.0;
             }
         }
     }
@@ -346,6 +388,7 @@ mod tests {
                 simulated: [power; BANDS],
                 both: [(factor - 1.0) * power + 1e-4 * (1.7 * k as f64).cos(); BANDS],
                 residual: 1.0,
+                ..Block::default()
             }
         };
         (0..40).map(window).collect()

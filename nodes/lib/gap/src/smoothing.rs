@@ -48,7 +48,9 @@ pub(crate) fn try_smoothing<'a>(
         sets.push(found);
     }
     let needed = plain + LEAST_GAIN_NATS + LEAST_SHARE * excess(&model, &scored.fit);
+    let of_plain = |set: &EffectSet| residual_norms(&model, &score(&model, set.clone()));
     let trial = Trial {
+        plain_norms: sets.iter().map(of_plain).collect(),
         plain,
         without_smoothing,
         needed,
@@ -103,6 +105,8 @@ struct Trial<'t, 'a> {
     needed: f64,
     /// Held-out mean square of the whitened residual of the reference as it is.
     plain_ratio: PerChannel<f64>,
+    /// How far the reference as it is is off with each of the sets.
+    plain_norms: Vec<PerChannel<f64>>,
 }
 
 /// A smoothing that was tried.
@@ -160,7 +164,8 @@ impl Trial<'_, '_> {
     }
 
     /// A smoothing with the best of the starting sets; none where the noise that undoing it brings lets no set
-    /// have the evidence that is needed.
+    /// have the evidence that is needed. That noise covers what a cutoff that is too low leaves, so that one with which the
+    /// simulation is far farther off does not count.
     fn tried(&self, smoothing: ZeroPhaseSmoothing) -> Option<Tried> {
         let undone = with_undone_smoothing(self.model, self.start, smoothing);
         let most = -sum_over_channels(|channel| {
@@ -174,7 +179,13 @@ impl Trial<'_, '_> {
         let found = self
             .sets
             .iter()
-            .map(|set| score_after(&undone, set.clone(), TRIAL_STEPS))
+            .zip(&self.plain_norms)
+            .map(|(set, plain)| (score_after(&undone, set.clone(), TRIAL_STEPS), plain))
+            .filter(|(found, plain)| {
+                let norms = residual_norms(&undone, found);
+                larger(over(norms, **plain)) <= MUCH_FARTHER
+            })
+            .map(|(found, _)| found)
             .max_by(|a, b| a.score.total_cmp(&b.score))?;
         let evidence = evidence(&undone, &found);
         trace(|| {
@@ -227,10 +238,14 @@ fn distance(
     plain: &ScoredEffectSet,
     undone: &ScoredEffectSet,
 ) -> PerChannel<f64> {
-    let norms = |scored: &ScoredEffectSet| {
-        let readings = &scored.fit.prediction.readings;
-        model.prepared.residual_norms(readings)
-    };
-    let (undone, plain) = (norms(undone), norms(plain));
-    PerChannel::from_fn(|channel| undone[channel] / plain[channel].max(1e-30))
+    over(residual_norms(model, undone), residual_norms(model, plain))
+}
+
+fn residual_norms(model: &FitModel, scored: &ScoredEffectSet) -> PerChannel<f64> {
+    let readings = &scored.fit.prediction.readings;
+    model.prepared.residual_norms(readings)
+}
+
+fn over(one: PerChannel<f64>, other: PerChannel<f64>) -> PerChannel<f64> {
+    PerChannel::from_fn(|channel| one[channel] / other[channel].max(1e-30))
 }

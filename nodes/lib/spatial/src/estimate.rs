@@ -182,10 +182,19 @@ impl PoseEstimate {
     /// White noise of the poses. A rotation vector's variance per axis is 4/3 of the quaternion
     /// components' sum.
     pub fn noise(&self) -> PoseNoise {
+        self.of_density([self.position.shape.level, self.rotation.shape.level])
+    }
+
+    /// What looks like white noise of the poses: that, and motion that is too fast for them.
+    pub fn scatter(&self) -> PoseNoise {
+        self.of_density([self.position.shape.top, self.rotation.shape.top])
+    }
+
+    fn of_density(&self, [position, rotation]: [f64; 2]) -> PoseNoise {
         let sigma = |density: f64| (density * self.rate_hz / 2.0).sqrt();
         PoseNoise {
-            position: sigma(self.position.white),
-            rotation: sigma(self.rotation.white / QUATERNION_PER_ROTVEC),
+            position: sigma(position),
+            rotation: sigma(rotation / QUATERNION_PER_ROTVEC),
         }
     }
 

@@ -35,8 +35,8 @@ impl PoseEstimate {
     /// the n-th derivative errs by `integral N W P (2 pi f)^(2 n) df`; windows are cross-faded as the
     /// motion is. An error of the angular acceleration moves the sensor by two thirds of its square times
     /// the arm's, mean over directions. Where poses are missing, or beyond their ends, the errors of what is filled in
-    /// (its covariance under the mean spectrum) come on top. What the filter takes for noise though it is motion is
-    /// not in it.
+    /// (its covariance under the mean spectrum) come on top, and motion that is too fast for the poses, where their spectrum tells
+    /// of it. What the filter takes for noise though it is motion is not in it.
     pub fn variances(&self, stamps: &[Stamp], path: &ErrorPath<'_>) -> Vec<SampleVariance> {
         let of_windows = |floor: &NoiseFloor| -> Vec<Variances> {
             let windows = floor.windows.iter();
@@ -100,18 +100,26 @@ fn at_depth(errors: &[(f64, Variances)], depth: f64) -> Variances {
     }
 }
 
-/// What a filter and a sensor let through of the noise.
+/// What a filter and a sensor let through of the noise, and the sensor of motion that is too fast for the poses.
 fn through(floor: &NoiseFloor, filter: &Filter, passed: &dyn Fn(f64) -> [f64; 2]) -> Variances {
     let mut sums = Variances::default();
-    for (k, weight) in filter.weights.iter().enumerate() {
-        let frequency_hz = k as f64 * filter.spacing_hz;
-        let noise = floor.noise_at(frequency_hz) * filter.noise;
-        let mut power = noise * weight * filter.spacing_hz;
+    let mut add = |frequency_hz: f64, density: f64| {
+        let mut power = density * filter.noise * filter.spacing_hz;
         let [of_rate, of_acceleration] = passed(frequency_hz);
         for (sum, passed) in sums.iter_mut().zip([1.0, of_rate, of_acceleration]) {
             *sum += power * passed;
             power *= (TAU * frequency_hz).powi(2);
         }
+    };
+    let bins = filter.weights.len();
+    for (k, weight) in filter.weights.iter().enumerate() {
+        let frequency_hz = k as f64 * filter.spacing_hz;
+        add(frequency_hz, floor.noise_at(frequency_hz) * weight);
+    }
+    // An octave: by the power law it would grow on, and no motion does.
+    for k in bins..2 * bins {
+        let frequency_hz = k as f64 * filter.spacing_hz;
+        add(frequency_hz, floor.shape.motion_beyond(frequency_hz));
     }
     sums
 }

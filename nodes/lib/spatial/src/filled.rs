@@ -83,7 +83,7 @@ pub(crate) fn fill(
     let filled = |series: &mut [Vec<f64>], floor: &NoiseFloor| {
         let filling = Filling {
             spectrum: floor.spectrum(),
-            noise: floor.white,
+            noise: floor.shape.level,
             transform,
             rate_hz,
         };

@@ -7,6 +7,9 @@ use crate::golden::greatest_near;
 use crate::kinks::{Kinks, second_differences};
 use crate::{PoseNoise, PoseSeries};
 
+/// Poses over which second differences are taken, in turn until kinks show: those of slow frames drown in the noise
+/// between neighbours. Beyond half the poses of a chord they would gain nothing; frames of 8 Hz in poses of 150 Hz.
+const STRIDES: [usize; 4] = [1, 2, 4, 8];
 /// Poses per frame below which frames cannot be told from poses. No source.
 const LEAST_POSES_PER_FRAME: f64 = 1.5;
 /// Poses per frame from which on the frames are told well enough to stand for the poses: below, least
@@ -58,11 +61,17 @@ impl FrameGrid {
     /// The frames that the poses show: between two of them second differences vanish but for noise,
     /// and at each they do not. None where the poses are frames themselves, or follow a curve.
     pub fn find(poses: &PoseSeries) -> Option<Self> {
-        let kinks = Kinks::new(poses)?;
+        let strides = STRIDES.into_iter();
+        strides
+            .filter_map(|stride| Kinks::new(poses, stride))
+            .find_map(|kinks| Self::from_kinks(&kinks, poses))
+    }
+
+    fn from_kinks(kinks: &Kinks, poses: &PoseSeries) -> Option<Self> {
         let shown_hz = kinks.strongest_rate()?;
         let mut best: Option<(f64, Self)> = None;
-        for hz in candidates(&kinks, shown_hz) {
-            let (misfit, grid) = Self::through(&kinks, poses, hz);
+        for hz in candidates(kinks, shown_hz) {
+            let (misfit, grid) = Self::through(kinks, poses, hz);
             let is_better = best.as_ref().is_none_or(|(least, best)| {
                 let ratio = grid.rate_hz / best.rate_hz;
                 let is_multiple = (ratio - ratio.round()).abs() < 1e-2;
@@ -73,18 +82,18 @@ impl FrameGrid {
             }
         }
         best.map(|(_, grid)| grid.sharpened(poses))
-            .filter(|grid| grid.is_convincing(&kinks, poses))
+            .filter(|grid| grid.is_convincing(kinks, poses))
     }
 
     /// The frames of a rate that is known already; none where the poses do not show them.
     pub fn at_rate(poses: &PoseSeries, rate_hz: f64) -> Option<Self> {
-        let kinks = Kinks::new(poses)?;
-        let is_possible = rate_hz * LEAST_POSES_PER_FRAME <= kinks.poses_hz();
-        (is_possible && kinks.have_rate(rate_hz)).then(|| {
-            Self::through(&kinks, poses, kinks.sharpened(rate_hz))
-                .1
-                .sharpened(poses)
-        })
+        let of_strides = STRIDES.into_iter();
+        let kinks = of_strides
+            .filter_map(|stride| Kinks::new(poses, stride))
+            .take_while(|kinks| rate_hz * LEAST_POSES_PER_FRAME <= kinks.poses_hz())
+            .find(|kinks| kinks.have_rate(rate_hz))?;
+        let (_, grid) = Self::through(&kinks, poses, kinks.sharpened(rate_hz));
+        Some(grid.sharpened(poses))
     }
 
     /// Frames per second.
@@ -200,7 +209,7 @@ impl FrameGrid {
         let (mut within, mut all) = ([0.0; 2], [0.0; 2]);
         let (mut within_count, mut count) = (0, 0);
         for k in 1..seconds.len() - 1 {
-            let Some(differences) = second_differences(poses, &seconds, k) else {
+            let Some(differences) = second_differences(poses, &seconds, k, 1) else {
                 continue;
             };
             let is_within = frame(k - 1) == frame(k + 1);

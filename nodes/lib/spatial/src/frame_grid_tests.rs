@@ -74,6 +74,9 @@ fn frames_are_found_and_come_back() {
         (120.0, 60.0, 0.0, ORDINARY),
         (286.0, 120.0, 0.001, [1e-5, 1e-4]),
         (200.0, 40.0, 0.004, [0.0, 0.0]),
+        // Kinks that drown in the noise between neighbours.
+        (240.0, 16.02, 0.003, [1.5e-3, 1e-2]),
+        (300.0, 16.66, 0.0, [2e-3, 1e-2]),
         // Two poses alone tell of the frame before the first pose.
         (290.6, 17.807, 0.0051, [0.0, 0.0]),
     ] {

@@ -43,18 +43,19 @@ pub(crate) struct Kinks {
     spacing_hz: f64,
 }
 
-/// Second differences at a pose: of the position, m, and of the rotation vector, rad; none where the
-/// neighbours are not at equal distances.
+/// Second differences at a pose from those so many before and after it: of the position, m, and of the
+/// rotation vector, rad; none where these are not at equal distances.
 pub(crate) fn second_differences(
     poses: &PoseSeries,
     seconds: &[f64],
     k: usize,
+    stride: usize,
 ) -> Option<[Vector3<f64>; 2]> {
-    let (before, after) = (seconds[k] - seconds[k - 1], seconds[k + 1] - seconds[k]);
+    let [a, b, c] = [k - stride, k, k + stride];
+    let (before, after) = (seconds[b] - seconds[a], seconds[c] - seconds[b]);
     if (after - before).abs() > UNEVEN * before {
         return None;
     }
-    let [a, b, c] = [k - 1, k, k + 1];
     let turn =
         |from: usize, to: usize| so3::log(&(poses.rotations[from].inverse() * poses.rotations[to]));
     Some([
@@ -64,17 +65,21 @@ pub(crate) fn second_differences(
 }
 
 impl Kinks {
-    /// None for few poses, and where they stand still.
-    pub fn new(poses: &PoseSeries) -> Option<Self> {
+    /// From second differences over so many poses: at a kink they are as many times as large, and noise is not. None
+    /// for few poses, and where they stand still.
+    pub fn new(poses: &PoseSeries, stride: usize) -> Option<Self> {
         let seconds = poses.seconds();
         if seconds.len() < LEAST_POSES {
             return None;
         }
         let mut intervals: Vec<f64> = seconds.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let rate_hz = median(&mut intervals).recip();
-        let squares: Vec<Option<[f64; 2]>> = (1..seconds.len() - 1)
+        let own = stride..seconds.len() - stride;
+        let squares: Vec<Option<[f64; 2]>> = own
+            .clone()
             .map(|k| {
-                second_differences(poses, &seconds, k).map(|both| both.map(|d| d.norm_squared()))
+                second_differences(poses, &seconds, k, stride)
+                    .map(|both| both.map(|d| d.norm_squared()))
             })
             .collect();
         let scale = |of: usize| {
@@ -82,25 +87,25 @@ impl Kinks {
             median(&mut own)
         };
         let scales = [scale(0), scale(1)];
-        let own = |pair: &[f64; 2]| -> f64 {
+        let clipped = |pair: &[f64; 2]| -> f64 {
             (0..2)
                 .filter(|of| scales[*of] > 0.0)
                 .map(|of| (pair[of] / scales[of]).min(LARGEST_ENERGY))
                 .sum()
         };
         let there = squares.iter().flatten().count().max(1) as f64;
-        let mean = squares.iter().flatten().map(own).sum::<f64>() / there;
+        let mean = squares.iter().flatten().map(clipped).sum::<f64>() / there;
         let mean_squares = [0, 1]
             .map(|of| squares.iter().flatten().map(|pair| pair[of]).sum::<f64>() / (3.0 * there));
         let energy = squares
             .iter()
-            .map(|pair| pair.as_ref().map_or(0.0, |pair| own(pair) - mean))
+            .map(|pair| pair.as_ref().map_or(0.0, |pair| clipped(pair) - mean))
             .collect();
         if !(rate_hz.is_finite() && mean > 0.0) {
             return None;
         }
         let mut kinks = Self {
-            seconds: seconds[1..seconds.len() - 1].to_vec(),
+            seconds: seconds[own].to_vec(),
             energy,
             mean,
             rate_hz,

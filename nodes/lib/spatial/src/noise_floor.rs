@@ -78,11 +78,8 @@ struct LearntSpectrum {
 pub(crate) struct NoiseFloor {
     /// Mean spectra with short to long windows.
     spectra: [LearntSpectrum; 3],
-    /// One-sided density of the white floor of the poses as they are, mean over the coordinates.
-    pub white: f64,
-    /// Whether the noise wanders: then no level plateau shows where motion ends, and its fall goes
-    /// on beneath the noise.
-    wandering: bool,
+    /// Of the noise of the poses as they are, mean over the coordinates.
+    pub shape: NoiseShape,
     largest_rise: f64,
     /// Density of the noise after a smoothing is undone.
     noise: Vec<f64>,
@@ -155,9 +152,8 @@ impl NoiseFloor {
             })
             .collect();
         Self {
-            white: shape.level,
+            shape,
             spectra,
-            wandering: shape.above > 0.0,
             largest_rise,
             noise,
             filter,
@@ -201,6 +197,11 @@ impl NoiseFloor {
         self.filter = mean;
     }
 
+    /// Whether the noise wanders: then no level plateau shows where motion ends, and its fall goes on beneath the noise.
+    fn is_wandering(&self) -> bool {
+        self.shape.above > 0.0
+    }
+
     /// Multiplies the filters by a factor of the frequency.
     pub fn multiply_filters(&mut self, factor: &dyn Fn(f64) -> f64) {
         for (k, weight) in self.filter.iter_mut().enumerate() {
@@ -238,7 +239,7 @@ impl NoiseFloor {
             .find(|&k| ratio[k..k + 3].iter().all(|value| *value < LOCAL_EDGE))
             .unwrap_or(bins);
         let edge_hz = spectrum.frequency(edge);
-        let lines = if self.wandering || undone.is_some() {
+        let lines = if self.is_wandering() || undone.is_some() {
             vec![false; bins]
         } else {
             lines_from(&ratio, edge, spectrum.spacing_hz)
@@ -259,7 +260,7 @@ impl NoiseFloor {
                 1.0
             } else if lines[k] {
                 1.0 - 1.0 / ratio[k]
-            } else if k >= edge && self.wandering && undone.is_none() {
+            } else if k >= edge && self.is_wandering() && undone.is_none() {
                 beyond(hz)
             } else if k >= edge || ratio[k] <= 1.0 || gain2(hz) > LARGEST_GAIN.powi(2) {
                 0.0
@@ -275,9 +276,15 @@ impl NoiseFloor {
         widened((0..bins).map(weight).collect(), reach)
     }
 
-    /// Part of the motion at a frequency that the filter keeps, mean over the windows.
+    /// Part of the motion at a frequency that the filter keeps, mean over the windows; none of what is faster than poses
+    /// show.
     pub fn filter_at(&self, frequency_hz: f64) -> f64 {
-        interpolated(&self.filter, frequency_hz / self.spacing_hz)
+        let place = frequency_hz / self.spacing_hz;
+        if place > self.filter.len() as f64 {
+            0.0
+        } else {
+            interpolated(&self.filter, place)
+        }
     }
 
     /// One-sided density of the noise, unit^2/Hz.

@@ -35,6 +35,12 @@ const LARGEST_THIRD_RISE: f64 = 1.7;
 /// of some 10 ms at 100 Hz is 4 to 8 times as dense at 12 Hz as at the top: at a factor of 4 it was level in one recording
 /// and not in the next (tests/withheld/other_origin.py, seed 6).
 const LEAST_KNEE: f64 = 2.0;
+/// Part of the Nyquist frequency from which on motion that folds back from beyond it is told from noise; no source.
+const FOLDED_FROM: f64 = 0.5;
+/// Entries of the spectrum there below which nothing is told.
+const FEWEST_TO_FOLD: usize = 6;
+/// Powers of the frequency with which motion may fall there: those of a displacement, up to what a filter leaves.
+const FALLS: [f64; 6] = [3.0, 4.0, 6.0, 8.0, 10.0, 12.0];
 /// Below this frequency, Hz, the noise is held, since a power law grows without bound; no source.
 const HELD_BELOW_HZ: f64 = 0.1;
 
@@ -45,6 +51,10 @@ const HELD_BELOW_HZ: f64 = 0.1;
 /// the knee where the spectrum first falls slower than motion does (displacement of bodies falls
 /// with the fourth power of the frequency and more; f^-3.3 is the border here), and rises a little
 /// below the knee.
+///
+/// Poses that are too slow for a knee to be looked for may be too slow for the motion: then the top is motion, and what of
+/// it folds back from beyond the Nyquist frequency acts as noise. With S(f) = A f^-p, the spectrum shows
+/// S(f) + S(rate - f) + N.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct NoiseShape {
     /// Density at the knee, or everywhere, unit^2/Hz.
@@ -54,6 +64,12 @@ pub(crate) struct NoiseShape {
     below: f64,
     /// Negative exponent above the knee; 0 for white noise.
     pub above: f64,
+    /// Density at the top of the spectrum: of white noise and of motion that is too fast for the poses.
+    pub top: f64,
+    /// Density of the motion at the Nyquist frequency, where it folds back; 0 where it does not.
+    folded: f64,
+    /// Its negative exponent.
+    fall: f64,
 }
 
 impl NoiseShape {
@@ -65,9 +81,12 @@ impl NoiseShape {
         let part = |(from, to): (f64, f64)| level(from * nyquist_hz, to * nyquist_hz);
         let white = Self {
             level: part(TOP),
+            top: part(TOP),
             knee_hz: nyquist_hz,
             below: 0.0,
             above: 0.0,
+            folded: 0.0,
+            fall: 0.0,
         };
         let least = TOP_PARTS
             .map(part)
@@ -76,8 +95,12 @@ impl NoiseShape {
         if part(BELOW_TOP) < LEVEL_TOP * least {
             return white;
         }
+        let is_searched = |hz: f64| hz * THIRD_OCTAVE.powi(3) < LAST_PLATEAU * nyquist_hz;
         let mut from_hz = LEAST_PLATEAU_HZ;
-        while from_hz * THIRD_OCTAVE.powi(3) < LAST_PLATEAU * nyquist_hz {
+        if !is_searched(from_hz) {
+            return white.with_folded_motion(spectrum);
+        }
+        while is_searched(from_hz) {
             let thirds = [-2, -1, 0, 1, 2].map(|k| {
                 level(
                     THIRD_OCTAVE.powi(k) * from_hz,
@@ -98,17 +121,99 @@ impl NoiseShape {
         Self {
             // At the knee itself some motion is left.
             level: thirds[2].min(thirds[3] * THIRD_OCTAVE.powf(above)),
+            top: thirds[2].min(thirds[3] * THIRD_OCTAVE.powf(above)),
             knee_hz: THIRD_OCTAVE.sqrt() * from_hz,
             below: above.min(largest_rise),
             above,
+            folded: 0.0,
+            fall: 0.0,
+        }
+    }
+
+    /// White noise beside motion that folds back, by least squares in parts of the density.
+    fn with_folded_motion(self, spectrum: &Spectrum) -> Self {
+        let nyquist_hz = self.knee_hz;
+        let top = (0..spectrum.density.len())
+            .map(|k| (spectrum.frequency(k) / nyquist_hz, spectrum.density[k]))
+            .filter(|(part, density)| (FOLDED_FROM..TOP.1).contains(part) && *density > 0.0);
+        let top: Vec<(f64, f64)> = top.collect();
+        if top.len() < FEWEST_TO_FOLD {
+            return self;
+        }
+        let tried = FALLS.into_iter().map(|fall| {
+            // Of motion of one at the Nyquist frequency and of noise of one, in parts of the density.
+            let rows = top.iter().map(|(part, density)| {
+                let motion = part.powf(-fall) + (2.0 - part).powf(-fall);
+                [motion / density, density.recip()]
+            });
+            let (misfit, [folded, level]) = least_squares(rows);
+            let shape = Self {
+                level,
+                folded,
+                fall,
+                ..self
+            };
+            (misfit, shape)
+        });
+        let best = tried.min_by(|a, b| a.0.total_cmp(&b.0));
+        best.map_or(self, |(_, shape)| shape)
+    }
+
+    /// Density of the motion beyond the Nyquist frequency that the spectrum tells of, unit^2/Hz.
+    pub fn motion_beyond(&self, frequency_hz: f64) -> f64 {
+        if self.folded > 0.0 {
+            self.folded * (self.knee_hz / frequency_hz).powf(self.fall)
+        } else {
+            0.0
         }
     }
 
     /// Density at a frequency, unit^2/Hz.
     pub fn at(&self, frequency_hz: f64) -> f64 {
         let ratio = self.knee_hz / frequency_hz.max(HELD_BELOW_HZ);
-        self.level * ratio.powf(if ratio > 1.0 { self.below } else { self.above })
+        let own = self.level * ratio.powf(if ratio > 1.0 { self.below } else { self.above });
+        if self.folded > 0.0 {
+            let from_beyond = 2.0 - (frequency_hz / self.knee_hz).min(1.0);
+            own + self.folded * from_beyond.powf(-self.fall)
+        } else {
+            own
+        }
     }
+}
+
+/// Coefficients, none below zero, with which two columns come nearest to one, and the sum of the squares that they leave.
+fn least_squares(rows: impl Iterator<Item = [f64; 2]>) -> (f64, [f64; 2]) {
+    let (mut squares, mut product, mut sums, mut count) = ([0.0; 2], 0.0, [0.0; 2], 0.0);
+    for row in rows {
+        for of in 0..2 {
+            squares[of] += row[of] * row[of];
+            sums[of] += row[of];
+        }
+        product += row[0] * row[1];
+        count += 1.0;
+    }
+    let alone = |of: usize| {
+        let mut own = [0.0; 2];
+        own[of] = sums[of] / squares[of].max(f64::MIN_POSITIVE);
+        own
+    };
+    let determinant = squares[0] * squares[1] - product * product;
+    let both = [
+        (sums[0] * squares[1] - sums[1] * product) / determinant,
+        (sums[1] * squares[0] - sums[0] * product) / determinant,
+    ];
+    let left = |[a, b]: [f64; 2]| {
+        count - 2.0 * (a * sums[0] + b * sums[1])
+            + a * a * squares[0]
+            + b * b * squares[1]
+            + 2.0 * a * b * product
+    };
+    [alone(0), alone(1), both]
+        .into_iter()
+        .filter(|own| own.iter().all(|value| *value >= 0.0))
+        .map(|own| (left(own), own))
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .unwrap_or((f64::INFINITY, [0.0; 2]))
 }
 
 /// Whether the spectrum falls slower than motion from the middle one of five thirds of an octave on.
