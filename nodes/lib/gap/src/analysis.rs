@@ -3,11 +3,11 @@
 use cromosim_imu::{Effect, EffectKind, EffectSet, ReadOff};
 
 use crate::axes_choice::with_chosen_axes;
+use crate::beside_response::pruned_beside_response;
 use crate::confounding::is_calibration;
 use crate::findings::Findings;
 use crate::fit::FitModel;
 use crate::library::Library;
-use crate::noise_filter::without_noise_filter;
 use crate::noise_updates::{first_model, with_rest_as_noise, with_updated_noise};
 use crate::policy::report::MOSTLY_EXPLAINED;
 use crate::policy::search::{MOST, MOST_AT_FIRST, ROUNDS};
@@ -54,7 +54,7 @@ impl<'a> Analysis<'a> {
                 scored = exchanged(&model, grown, &fitted);
             }
         }
-        let scored = without_noise_filter(&model, scored, self.library);
+        let scored = pruned_beside_response(&model, scored, &fitted);
         let scored = with_chosen_axes(&model, scored, self.library);
         self.progress.reached(1.0);
         (model, scored)

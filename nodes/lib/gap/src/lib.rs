@@ -4,6 +4,7 @@
 mod analysis;
 mod axes;
 mod axes_choice;
+mod beside_response;
 mod builder;
 mod calibration;
 mod clock_jumps;
@@ -31,7 +32,6 @@ mod location;
 mod magnetometer;
 mod metrics;
 pub mod monitor;
-mod noise_filter;
 mod noise_model;
 mod noise_updates;
 mod period;

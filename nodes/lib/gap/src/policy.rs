@@ -125,6 +125,8 @@ pub(crate) mod smoothing {
     /// Most Gauss-Newton steps of a fit beside a cutoff: from the values beside the one before it takes few where the
     /// cutoff is nearly right.
     pub const TRIAL_STEPS: usize = 4;
+    /// Delay from which on a filter may be what makes readings late, s: that of 45 Hz, the fastest that counts.
+    pub const SHORTEST_DELAY_S: f64 = 0.005;
     /// Effects that may be added beside it when it is judged.
     pub const BESIDE: usize = 2;
     /// Ratio of the residuals' root mean squares (undone to plain) that one channel has to fall
@@ -158,12 +160,16 @@ pub(crate) mod response {
     pub const LEAST_USABLE: f64 = 0.8;
 }
 
-/// When a `low_pass` only keeps out noise of the reference.
-pub(crate) mod noise_filter {
-    /// Factor on the simulation below which nothing tells noise from a filter: hardly anything passes either.
+/// When a member of a set only makes up for what the reference's filter does.
+pub(crate) mod beside_response {
+    /// What factors on the simulation have to gain for members to be looked at, nats: as much as any one costs.
+    pub const LEAST_GAIN_NATS: f64 = 10.0;
+    /// Factor on the simulation below which nothing tells noise from a sensor's filter: hardly anything passes either.
     pub const SHUT: f64 = 0.1;
     /// Part of what noise leaves behind a factor that has to be left; no source.
     pub const LEFT_BY_NOISE: f64 = 0.5;
+    /// Part of the motion that the reference's filter lets through where it is open, as elsewhere.
+    pub const OPEN: f64 = 0.9;
 }
 
 /// When a vibration is more than motion that the reference does not resolve.

@@ -81,6 +81,7 @@ fn candidate(model: &FitModel, fit: &Fit, starts: &[Effect]) -> Candidate {
         .all(|start| *start == Effect::neutral(start.kind()));
     let mut set = fit.set.clone();
     set.extend(starts);
+    take_delay_off(&mut set, starts);
     let (linear, beside) = if are_neutral {
         let kinds = starts.iter().map(Effect::kind).collect();
         let neutral = Beside::new(model, fit, kinds);
@@ -108,6 +109,17 @@ fn candidate(model: &FitModel, fit: &Fit, starts: &[Effect]) -> Candidate {
             }),
         predicted_gain: linear.held_out,
         beside,
+    }
+}
+
+/// An offset of time that was fitted without a filter has its delay in it.
+fn take_delay_off(set: &mut EffectSet, starts: &[Effect]) {
+    let delay_s: f64 = starts.iter().filter_map(Effect::low_pass_delay).sum();
+    if delay_s > 0.0
+        && set.contains(EffectKind::TimeOffset)
+        && let Ok(offset) = Effect::time_offset(set.time_offset() - delay_s)
+    {
+        set.insert(offset);
     }
 }
 

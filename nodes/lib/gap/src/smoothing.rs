@@ -1,6 +1,6 @@
 //! Whether the reference was smoothed before it came here.
 
-use cromosim_imu::{EffectKind, EffectSet, PerChannel};
+use cromosim_imu::{Effect, EffectKind, EffectSet, PerChannel};
 use cromosim_spatial::{SmoothingKernel, ZeroPhaseSmoothing};
 
 use crate::axes::{larger, smaller, sum_over_channels};
@@ -9,7 +9,7 @@ use crate::noise_updates::with_estimate;
 use crate::plausibility::told_from_smoothing;
 use crate::policy::smoothing::{
     BESIDE, BEST_RATIO, CLOSER, LEAST_GAIN_NATS, LEAST_SHARE, MUCH_FARTHER, NOT_FARTHER,
-    SUSPICIOUS, TRIAL_STEPS,
+    SHORTEST_DELAY_S, SUSPICIOUS, TRIAL_STEPS,
 };
 use crate::search::{ScoredEffectSet, excess, score, score_after, search_down_to_noise};
 use crate::trace::{names, trace};
@@ -44,6 +44,7 @@ pub(crate) fn try_smoothing<'a>(
     } else {
         evidence(&model, &score(&model, found.clone()))
     };
+    sets.extend(with_all_delay_by_filter(&found, library));
     if !starts.contains(&found) {
         sets.push(found);
     }
@@ -71,6 +72,11 @@ pub(crate) fn try_smoothing<'a>(
         return (model, scored);
     }
     let searched = search_down_to_noise(&undone, &sets, library, BESIDE);
+    let (undone, searched) = if names(&searched.fit.set) == names(&set) {
+        (undone, searched)
+    } else {
+        trial.sharpened(undone, searched, smoothing, library)
+    };
     let gained = evidence(&undone, &searched);
     trace(|| {
         eprintln!(
@@ -117,7 +123,38 @@ struct Tried {
     set: EffectSet,
 }
 
-impl Trial<'_, '_> {
+impl<'a> Trial<'_, 'a> {
+    /// A smoothing beside what was found once it was undone: its cutoff had made up for that.
+    fn sharpened(
+        &self,
+        undone: FitModel<'a>,
+        searched: ScoredEffectSet,
+        smoothing: ZeroPhaseSmoothing,
+        library: &[EffectKind],
+    ) -> (FitModel<'a>, ScoredEffectSet) {
+        let mut sets = vec![searched.fit.set.clone()];
+        sets.extend(with_all_delay_by_filter(&sets[0], library));
+        let of_plain =
+            |set: &EffectSet| residual_norms(self.model, &score(self.model, set.clone()));
+        let beside = Trial {
+            sets: &sets,
+            plain_norms: sets.iter().map(of_plain).collect(),
+            ..*self
+        };
+        let begun = Tried {
+            evidence: evidence(&undone, &searched),
+            smoothing,
+            set: sets[0].clone(),
+        };
+        let sharp = beside.refined(beside.refined(begun, &COARSE), &FINE);
+        if sharp.smoothing == smoothing {
+            return (undone, searched);
+        }
+        let undone = with_undone_smoothing(self.model, self.start, sharp.smoothing);
+        let searched = search_down_to_noise(&undone, &[sharp.set], library, BESIDE);
+        (undone, searched)
+    }
+
     /// The smoothing with the most evidence: Butterworth's from a grid, a Gaussian from around it,
     /// the better one refined.
     fn best_smoothing(&self) -> Option<Tried> {
@@ -201,6 +238,17 @@ impl Trial<'_, '_> {
             set: found.fit.set,
         })
     }
+}
+
+/// A set in which a filter alone makes the readings late, where an offset does, or both: beside a cutoff of the smoothing
+/// that is not quite right each takes up what of the other it leaves.
+fn with_all_delay_by_filter(set: &EffectSet, library: &[EffectKind]) -> Option<EffectSet> {
+    let offset_s = set.get(EffectKind::TimeOffset).map(|_| set.time_offset())?;
+    let filter = set.get(EffectKind::LowPass);
+    let all_s = offset_s + filter.and_then(Effect::low_pass_delay).unwrap_or(0.0);
+    let filter = Effect::low_pass_with_delay(all_s).ok()?;
+    let may_be = library.contains(&EffectKind::LowPass) && SHORTEST_DELAY_S < all_s;
+    may_be.then(|| set.without(EffectKind::TimeOffset).with(filter))
 }
 
 /// Held-out log-likelihood with the predicted noise's own volume: models with other noise become

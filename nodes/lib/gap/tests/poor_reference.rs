@@ -85,3 +85,52 @@ fn a_smoothing_of_poses_without_noise_is_no_tissue() {
         assert_eq!(named, "reference_smoothing", "{cutoff_hz} Hz");
     }
 }
+
+/// Such noise is in the simulation and not in the readings; a filter of the sensor would attenuate it too.
+#[test]
+fn noise_with_a_memory_is_no_filter_of_the_sensor() {
+    for (seed, slow) in [(43, 1.25), (44, 1.5), (47, 2.25)] {
+        let scene = Scene {
+            motion: Motion::random(seed).slowed(slow),
+            ..Scene::new(seed)
+        };
+        let record = scene.with(K::TimeOffset, &[0.045]).record();
+        let record = with_memory(record, [2.5e-4, 1.2e-3], 0.012);
+        assert_eq!(names(&answer(&record).diagnosis), ["time_offset"]);
+    }
+}
+
+#[test]
+fn a_filter_is_told_beside_a_smoothing_of_the_reference() {
+    for seed in [60, 61, 63] {
+        let scene = Scene::new(seed)
+            .with(K::ReferenceSmoothing, &[3.2, 0.0])
+            .with(K::LowPass, &[6.4])
+            .with(K::AccelBias, &[-0.21, 0.41, 0.31]);
+        let record = Scene {
+            seconds: 20.0,
+            ..scene
+        };
+        assert_eq!(
+            names(&answer(&record.record()).diagnosis),
+            ["accel_bias", "low_pass", "reference_smoothing"]
+        );
+    }
+}
+
+/// Four poses in a row are missing nearly every second: a third of a second on either side of each would leave nothing.
+#[test]
+fn short_gaps_all_over_leave_enough() {
+    let scene = Scene {
+        seconds: 20.0,
+        ..Scene::new(53)
+    };
+    let mut record = scene.with(K::GyroScale, &[1.05, 0.96, 1.03]).record();
+    let series = &mut record.reference;
+    let is_seen = |k: &usize| k % 110 >= 4;
+    let kept: Vec<usize> = (0..series.stamps.len()).filter(is_seen).collect();
+    series.stamps = kept.iter().map(|&k| series.stamps[k]).collect();
+    series.positions = kept.iter().map(|&k| series.positions[k]).collect();
+    series.rotations = kept.iter().map(|&k| series.rotations[k]).collect();
+    assert_eq!(names(&answer(&record).diagnosis), ["gyro_scale"]);
+}

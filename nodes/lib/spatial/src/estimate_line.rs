@@ -21,12 +21,11 @@ pub struct PoseLine {
 
 impl PoseEstimate {
     /// The line of the positions and that of the rotations at a frequency, by a Fourier sum over all poses under
-    /// Hann's window: white noise of N poses leaves 3 / N of its variance there. None from the Nyquist
-    /// frequency on.
+    /// Hann's window: white noise of N poses leaves 3 / N of its variance there. Beyond the Nyquist frequency it is the
+    /// line that folds back, as of motion at the frequency itself. None from the poses' rate on.
     pub fn lines_at(&self, hz: f64) -> Option<[PoseLine; 2]> {
         let spacing_hz = self.rate_hz() / self.len() as f64;
-        if hz + AROUND[5] * spacing_hz >= self.rate_hz() / 2.0 || hz + AROUND[0] * spacing_hz <= 0.0
-        {
+        if hz + AROUND[5] * spacing_hz >= self.rate_hz() || hz + AROUND[0] * spacing_hz <= 0.0 {
             return None;
         }
         let squared = (TAU * hz).powi(2);
@@ -118,6 +117,8 @@ mod tests {
         let [position, rotation] = estimate.lines_at(7.3).unwrap();
         let heights = [position.height, rotation.height];
         assert!(heights.iter().all(|height| *height < 6.0), "{heights:?}");
-        assert_eq!(estimate.lines_at(59.9), None);
+        let folded = estimate.lines_at(120.0 - hz).unwrap();
+        assert!(folded.iter().all(|line| line.height > 6.0), "{folded:?}");
+        assert_eq!(estimate.lines_at(119.9), None);
     }
 }

@@ -460,3 +460,53 @@ fn noise_that_is_louder_for_some_seconds_is_kept_out() {
     println!("{loud:.3} m/s2 where the noise is loud, {quiet:.3} elsewhere");
     assert!(loud < 1.0 && quiet < 0.2, "{loud} {quiet}");
 }
+
+/// Motion that goes on beyond the Nyquist frequency, as steep as people's.
+#[test]
+fn poses_too_slow_for_a_motion_keep_what_they_show_of_it() {
+    let rate_hz = 17.0;
+    let mut random = Normal(11);
+    let terms: Vec<(f64, f64, f64)> = (2..160)
+        .map(|k| {
+            let hz = 0.17 * f64::from(k) + 0.03 * random.draw();
+            (hz, 0.02 * hz.powi(-4) * random.draw(), random.draw())
+        })
+        .collect();
+    let at = |t: f64, order: i32| -> f64 {
+        let own = terms.iter().map(|(hz, size, phase)| {
+            (TAU * hz).powi(order) * size * (TAU * hz * t + phase).sin()
+        });
+        own.sum()
+    };
+    let start = Stamp::from_nanos(1_700_000_000_000_000_000);
+    let mut draw = || Vector3::new(random.draw(), random.draw(), random.draw()) * 1e-5;
+    let (mut stamps, mut positions, mut rotations) = (Vec::new(), Vec::new(), Vec::new());
+    for k in 0..(60.0 * rate_hz) as usize {
+        let t = k as f64 / rate_hz;
+        stamps.push(start.plus_seconds(t));
+        positions.push(Vector3::new(at(t, 0), at(t + 100.0, 0), at(t + 200.0, 0)) + draw());
+        rotations.push(so3::exp(&(Vector3::x() * (0.3 * at(t, 0)) + draw())));
+    }
+    let estimate = PoseEstimate::fit(&stamps, &positions, &rotations).unwrap();
+    let (near_the_end, ..) = estimate.filter_at(7.0);
+    assert!(near_the_end > 0.6, "{near_the_end}");
+    assert_eq!(estimate.filter_at(30.0).0, 0.0);
+    assert!(estimate.noise().position < 0.7 * estimate.scatter().position);
+    let track = estimate.track(200.0);
+    let path = ErrorPath {
+        units_per_metre: 1.0,
+        lever_arm_m: 0.0,
+        passed: &|_| [1.0; 2],
+    };
+    let (mut squares, mut stated) = (0.0, 0.0);
+    for k in (400..track.len() - 400).step_by(7) {
+        let t = k as f64 / track.rate_hz;
+        let found = track.world_from_segment[k] * track.acceleration_in_segment[k];
+        let truth = -Vector3::new(at(t, 2), at(t + 100.0, 2), at(t + 200.0, 2));
+        squares += (found - truth).norm_squared() / 3.0;
+        let stamps = [start.plus_seconds(t)];
+        stated += estimate.variances(&stamps, &path)[0].acceleration;
+    }
+    let ratio = squares / stated;
+    assert!((0.5..2.0).contains(&ratio), "{ratio}");
+}

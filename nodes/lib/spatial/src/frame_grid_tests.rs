@@ -143,3 +143,23 @@ fn missing_poses_leave_missing_frames() {
         .fold(0.0, f64::max);
     assert!((2.4..2.6).contains(&largest), "{largest}");
 }
+
+/// A gait's harmonics mark a rate as kinks do, and chords pass through its swings as well as noise lets them.
+#[test]
+fn a_gait_under_much_noise_has_no_chords() {
+    for (step_hz, width, size) in [
+        (1.008, 0.03, 0.03),
+        (1.008, 0.045, 0.1),
+        (1.008, 0.06, 0.25),
+        (1.3, 0.06, 0.1),
+    ] {
+        let mut gait = poses(200.0, None, 0.0, [2.8e-3, 8.4e-3]);
+        for (k, position) in gait.positions.iter_mut().enumerate() {
+            let turns = (k as f64 / 200.0 * step_hz).fract();
+            let swing = (-((turns - 0.5) / width).powi(2)).exp();
+            position.x += size * swing;
+            gait.rotations[k] *= so3::exp(&Vector3::new(2.0 * size * swing, 0.0, 0.0));
+        }
+        assert_eq!(FrameGrid::find(&gait), None, "{step_hz} steps a second");
+    }
+}

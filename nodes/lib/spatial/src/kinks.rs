@@ -14,6 +14,12 @@ const LEAST_POSES: usize = 200;
 const UNEVEN: f64 = 0.05;
 /// Slowest kinks, Hz: below it motion has a rhythm of its own.
 const LEAST_HZ: f64 = 8.0;
+/// Slowest repetition that is looked for, Hz. No source.
+const LEAST_REPETITION_HZ: f64 = 0.25;
+/// Harmonics of a repetition of which the strongest one may be. No source.
+const MOST_OF_REPETITION: u32 = 8;
+/// How far a rate may be from a multiple of a repetition's, in parts of a line's width. No source.
+const HARMONIC_LINES: f64 = 1.5;
 /// Half the width of the surroundings that a line is compared with, Hz. No source.
 const SURROUNDINGS_HZ: f64 = 2.0;
 /// Height of a line over the median of its surroundings from which on it is one: of white noise one in
@@ -36,6 +42,7 @@ pub(crate) struct Kinks {
     mean: f64,
     /// Of the poses.
     rate_hz: f64,
+    stride: usize,
     /// Mean squares of the second differences, per axis: m2, rad2.
     pub mean_squares: [f64; 2],
     /// Up to half the poses' rate, zero-padded, and its spacing, Hz.
@@ -109,12 +116,18 @@ impl Kinks {
             energy,
             mean,
             rate_hz,
+            stride,
             mean_squares,
             power: Vec::new(),
             spacing_hz: 0.0,
         };
         (kinks.power, kinks.spacing_hz) = kinks.spectrum();
         Some(kinks)
+    }
+
+    /// Whether the second differences are those of neighbours.
+    pub fn is_of_neighbours(&self) -> bool {
+        self.stride == 1
     }
 
     /// Rate of the poses, Hz.
@@ -141,11 +154,34 @@ impl Kinks {
     /// The rate that stands out most, up to half the poses', Hz: that of the kinks, or how it shows
     /// in samples of the poses' rate. None where none stands out.
     pub fn strongest_rate(&self) -> Option<f64> {
-        let lowest = (LEAST_HZ / self.spacing_hz).ceil() as usize;
+        self.strongest_line(LEAST_HZ, f64::INFINITY)
+            .filter(|hz| self.are_marked(*hz))
+    }
+
+    /// Whether a rate is a multiple of one at which a motion repeats itself: then its harmonics mark it as kinks would.
+    pub fn is_harmonic(&self, hz: f64) -> bool {
+        let seconds = self.seconds[self.seconds.len() - 1] - self.seconds[0];
+        let Some(strongest) = self.strongest_line(LEAST_REPETITION_HZ, LEAST_HZ) else {
+            return false;
+        };
+        let slowest = (strongest / LEAST_REPETITION_HZ) as u32;
+        let repetition = (1..=slowest.min(MOST_OF_REPETITION))
+            .rev()
+            .map(|part| strongest / f64::from(part))
+            .find(|hz| self.height_at(*hz) > LEAST_HEIGHT);
+        repetition.is_some_and(|own| {
+            let off_hz = hz - (hz / own).round() * own;
+            off_hz.abs() * seconds < HARMONIC_LINES
+        })
+    }
+
+    fn strongest_line(&self, from_hz: f64, to_hz: f64) -> Option<f64> {
+        let place = |hz: f64| (hz / self.spacing_hz).ceil().min(self.power.len() as f64) as usize;
+        let (lowest, end) = (place(from_hz), place(to_hz));
         let around = self.around();
         let mut best = (LEAST_HEIGHT, None);
-        for from in (lowest..self.power.len()).step_by(around) {
-            let to = (from + around).min(self.power.len());
+        for from in (lowest..end).step_by(around) {
+            let to = (from + around).min(end);
             let level = level(&self.power, from..to, around, lowest);
             for (k, value) in self.power.iter().enumerate().take(to).skip(from) {
                 if value / level > best.0 {
@@ -153,9 +189,7 @@ impl Kinks {
                 }
             }
         }
-        best.1
-            .map(|hz| self.sharpened(hz))
-            .filter(|hz| self.are_marked(*hz))
+        best.1.map(|hz| self.sharpened(hz))
     }
 
     /// Whether kinks of a rate are more than a ripple.
@@ -184,7 +218,11 @@ impl Kinks {
         if !(LEAST_HZ..=nyquist_hz).contains(&shown_hz) {
             return 0.0;
         }
-        let k = (shown_hz / self.spacing_hz).round() as usize;
+        self.height_at(shown_hz)
+    }
+
+    fn height_at(&self, hz: f64) -> f64 {
+        let k = (hz / self.spacing_hz).round() as usize;
         let peak = self.power[k.saturating_sub(2)..(k + 3).min(self.power.len())]
             .iter()
             .copied()

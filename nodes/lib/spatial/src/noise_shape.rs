@@ -227,3 +227,44 @@ fn falls_slower_than_motion(thirds: &[f64; 5]) -> bool {
                     || ratio > MOTION_THIRD_AFTER_KNEE && before < CLEAR_KNEE * ratio)
         })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::NoiseShape;
+    use crate::Spectrum;
+
+    const RATE_HZ: f64 = 20.0;
+
+    fn learnt(density: impl Fn(f64) -> f64) -> NoiseShape {
+        let spacing_hz = 0.1;
+        let density = (0..=100).map(|k| density(f64::from(k) * spacing_hz));
+        let spectrum = Spectrum {
+            spacing_hz,
+            density: density.collect(),
+            windows: 20,
+        };
+        NoiseShape::learn(&spectrum, RATE_HZ, 1.0)
+    }
+
+    #[test]
+    fn motion_too_fast_for_poses_is_told_from_white_noise() {
+        let motion = |hz: f64| 1e-6 * (hz.max(0.1) / 10.0).powi(-6);
+        for level in [1e-12, 1e-6, 1e-5] {
+            let shape = learnt(|hz| motion(hz) + motion(RATE_HZ - hz) + level);
+            assert!((shape.level - level).abs() < 1e-9 + 0.05 * level, "{shape:?}");
+            for hz in [6.0, 9.0] {
+                let expected = level + motion(RATE_HZ - hz);
+                assert!((shape.at(hz) / expected - 1.0).abs() < 0.05, "{hz} Hz: {shape:?}");
+            }
+            assert!((shape.motion_beyond(12.0) / motion(12.0) - 1.0).abs() < 0.05);
+        }
+    }
+
+    #[test]
+    fn a_level_top_is_noise() {
+        let shape = learnt(|hz| 1e-4 * hz.max(0.1).powi(-6) + 1e-5);
+        assert!((shape.level / 1e-5 - 1.0).abs() < 0.01, "{shape:?}");
+        assert_eq!(shape.motion_beyond(12.0), 0.0);
+        assert_eq!(shape.top, shape.level);
+    }
+}

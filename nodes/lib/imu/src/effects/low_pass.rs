@@ -4,7 +4,7 @@ use super::residual_view::ResidualView;
 use super::search::{Dependence, FirstGuess, FittedSearch, Search};
 use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use super::{Effect, EffectKind, EffectSet};
-use crate::Channel;
+use crate::{Channel, EffectError};
 
 pub(super) static SPEC: EffectSpec = EffectSpec {
     kind: EffectKind::LowPass,
@@ -67,6 +67,21 @@ pub(super) fn response(cutoff_hz: f64, hz: f64) -> (f64, f64) {
 const HIGHEST_HZ: f64 = 45.0;
 /// Delay of slow motion times the cutoff: `sqrt(2) / (2 pi)`, the filter's group delay at 0 Hz.
 const DELAY_TIMES_CUTOFF: f64 = 0.225;
+impl Effect {
+    /// The `low_pass` that delays slow motion by so many seconds.
+    ///
+    /// # Errors
+    /// [`EffectError`] for a delay that none has.
+    pub fn low_pass_with_delay(seconds: f64) -> Result<Self, EffectError> {
+        SPEC.effect(vec![DELAY_TIMES_CUTOFF / seconds])
+    }
+
+    /// By how much a `low_pass` delays slow motion, s; none of another effect.
+    pub fn low_pass_delay(&self) -> Option<f64> {
+        (self.kind() == EffectKind::LowPass).then(|| DELAY_TIMES_CUTOFF / self.scalar(0))
+    }
+}
+
 /// Deviation from the filter's delay, as a part of it, up to which an offset of time undoes it.
 const UNDONE: f64 = 0.35;
 

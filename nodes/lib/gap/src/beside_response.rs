@@ -1,0 +1,196 @@
+//! Members of a set that only make up for what the reference's filter lets through of its noise, or keeps out of the motion.
+//!
+//! Noise that the reference's spectrum does not tell from motion (one with a memory) is in the simulation and not in the
+//! readings. Whatever attenuates it helps, a `low_pass` too, whose delay a `time_offset` makes up for. But a filter leaves
+//! readings that are weaker and still follow the simulation, and noise leaves some that do not follow it. Motion that the
+//! filter keeps out is in the readings and not in the simulation; what makes this stronger helps, a scale too, but a scale is
+//! the same at frequencies where the filter is open.
+
+use cromosim_imu::{Channel, Effect, EffectKind, EffectSet, PerChannel, Search};
+
+use crate::axes::{axes_of_channel, sum_over_channels, value_on_axis};
+use crate::fit::{Fit, FitModel};
+use crate::gram::channel_likelihood;
+use crate::policy::beside_response::{LEAST_GAIN_NATS, LEFT_BY_NOISE, OPEN, SHUT};
+use crate::policy::response::LARGEST_FACTOR;
+use crate::prepared::FOLDS;
+use crate::response::{BANDS, Bands, Block, factors};
+use crate::search::{ScoredEffectSet, score};
+use crate::trace::{names, trace};
+
+/// The set without the members that do not earn their place where factors on the simulation, by frequency, stand beside
+/// both; a delay stands for a `low_pass`.
+pub(crate) fn pruned_beside_response(
+    model: &FitModel,
+    scored: ScoredEffectSet,
+    library: &[EffectKind],
+) -> ScoredEffectSet {
+    let gained = gained(model, &scored.fit);
+    if gained < LEAST_GAIN_NATS {
+        return scored;
+    }
+    let mut worth = scored.score + gained;
+    let mut best = scored;
+    let members: Vec<EffectKind> = best.fit.set.iter().map(|effect| effect.kind()).collect();
+    for kind in members {
+        let Some(set) = without(&best.fit.set, kind, library) else {
+            continue;
+        };
+        let smaller = score(model, set);
+        if smaller.score == f64::NEG_INFINITY {
+            continue;
+        }
+        let beside = smaller.score + self::gained(model, &smaller.fit);
+        trace(|| {
+            eprintln!(
+                "  beside a response {:?} {beside:.1} rather than {worth:.1}; alone {:.1} {:.1}",
+                names(&smaller.fit.set),
+                smaller.score,
+                best.score
+            );
+        });
+        if beside >= worth {
+            let margins = best.margins.iter().copied();
+            let margins = margins.filter(|(member, _)| *member != kind).collect();
+            worth = beside;
+            best = ScoredEffectSet { margins, ..smaller };
+        }
+    }
+    best
+}
+
+/// A set without a member; none where it stays.
+fn without(set: &EffectSet, kind: EffectKind, library: &[EffectKind]) -> Option<EffectSet> {
+    if !matches!(kind.spec().search, Search::Fitted(_)) {
+        return None;
+    }
+    let mut smaller = set.without(kind);
+    if kind == EffectKind::LowPass {
+        if !library.contains(&EffectKind::TimeOffset) {
+            return None;
+        }
+        let delay_s = set.get(kind)?.low_pass_delay()?;
+        smaller.insert(Effect::time_offset(set.time_offset() + delay_s).ok()?);
+    }
+    Some(smaller)
+}
+
+/// By how much factors on the simulation raise the log-likelihood of the part of time that they were not learnt from,
+/// where they can be what the reference's filter does.
+fn gained(model: &FitModel, fit: &Fit) -> f64 {
+    let prepared = model.prepared;
+    let readings = &fit.prediction.readings;
+    let simulated = prepared.on_sample_grid(|k, axis| value_on_axis(&readings[k], axis));
+    let centred: Vec<Vec<f64>> = simulated
+        .into_iter()
+        .map(|series| {
+            let mean = series.iter().sum::<f64>() / series.len().max(1) as f64;
+            series.into_iter().map(|value| value - mean).collect()
+        })
+        .collect();
+    let simulated = model.whitener.apply(&centred);
+    let bands = Bands::new(prepared.rate_hz);
+    let gained = PerChannel::from_fn(|channel| {
+        let blocks = whitened_blocks(model, &bands, channel, &simulated, &fit.residual);
+        let largest = largest_factors(model, &bands, channel);
+        let may_be = of_reference(model, &bands, channel, (&blocks, &largest));
+        bands.squares_per_power() * held_out_gain(&blocks, &largest, &may_be)
+    });
+    sum_over_channels(|channel| {
+        let count = model.whitener.count[channel];
+        let squares = fit.linear.held_out_ratio[channel] * count;
+        channel_likelihood(count, squares - gained[channel]) - channel_likelihood(count, squares)
+    })
+}
+
+/// Sums over a channel's windows in units of the predicted noise, by blocks of time.
+fn whitened_blocks(
+    model: &FitModel,
+    bands: &Bands,
+    channel: Channel,
+    simulated: &[f64],
+    residual: &[f64],
+) -> Vec<Block> {
+    let prepared = model.prepared;
+    let axes = axes_of_channel(channel);
+    let of_axis = |flat: &[f64], axis: usize, range: &std::ops::Range<usize>| {
+        let first = axis * prepared.length;
+        flat[first + range.start..first + range.end].to_vec()
+    };
+    bands.blocks(prepared, |range, block| {
+        let weights = axes.clone().flat_map(|axis| &model.whitener.weight[axis][range.clone()]);
+        if weights.clone().any(|weight| *weight == 0.0) {
+            return;
+        }
+        for axis in axes.clone() {
+            let [motion, rest] = [simulated, residual].map(|flat| of_axis(flat, axis, &range));
+            bands.add(&motion, &rest, block);
+        }
+    })
+}
+
+/// The largest factor in each band: one where the reference's filter lets all motion through.
+fn largest_factors(model: &FitModel, bands: &Bands, channel: Channel) -> [f64; BANDS] {
+    std::array::from_fn(|band| {
+        let [from_hz, to_hz] = bands.range_hz(band);
+        let (position, rotation, _) = model.basis.estimate.filter_at(0.5 * (from_hz + to_hz));
+        let passed = match channel {
+            Channel::Accelerometer => position,
+            Channel::Gyroscope => rotation,
+        };
+        if passed < OPEN { LARGEST_FACTOR } else { 1.0 }
+    })
+}
+
+/// In which bands a factor can be what the reference's filter does: above one all, and below one those of noise. With X
+/// the simulation's power, and the readings a factor g of it, noise leaves g (1 - g) X that no factor takes away, and a
+/// sensor's filter nothing but the sensor's own noise. Where hardly anything passes, the one looks like the other.
+fn of_reference(
+    model: &FitModel,
+    bands: &Bands,
+    channel: Channel,
+    (blocks, largest): (&[Block], &[f64; BANDS]),
+) -> [bool; BANDS] {
+    let whole = factors(blocks, largest, None);
+    let sum = |of: fn(&Block) -> &[f64; BANDS], band: usize| -> f64 {
+        blocks.iter().map(|block| of(block)[band]).sum()
+    };
+    std::array::from_fn(|band| {
+        let (factor, more) = (whole[band], whole[band] - 1.0);
+        let power = sum(|block| &block.simulated, band);
+        let left = sum(|block| &block.rest, band) - 2.0 * more * sum(|block| &block.both, band)
+            + more * more * power;
+        let white = sum(|block| &block.entries, band)
+            * bands.power_of_one()
+            * part_of_sensor(model, channel, bands.range_hz(band));
+        factor > 1.0
+            || factor < SHUT
+            || left - white > LEFT_BY_NOISE * factor * (1.0 - factor) * power
+    })
+}
+
+/// Mean part that the sensor's white noise has of the predicted noise between two frequencies.
+fn part_of_sensor(model: &FitModel, channel: Channel, [from_hz, to_hz]: [f64; 2]) -> f64 {
+    let variance = model.basis.sigma[channel].powi(2);
+    let power = &model.noise.power[channel];
+    let place = |hz: f64| ((hz / model.noise.spacing_hz) as usize).min(power.len() - 1);
+    let own = &power[place(from_hz)..=place(to_hz)];
+    own.iter().map(|power| (variance / power).min(1.0)).sum::<f64>() / own.len() as f64
+}
+
+/// What factors, learnt without each part of time, take off the residual's power there.
+fn held_out_gain(blocks: &[Block], largest: &[f64; BANDS], may_be: &[bool; BANDS]) -> f64 {
+    let excluding: Vec<[f64; BANDS]> = (0..FOLDS)
+        .map(|fold| factors(blocks, largest, Some(fold)))
+        .collect();
+    let mut gain = 0.0;
+    for block in blocks {
+        for (band, factor) in excluding[block.fold].iter().enumerate() {
+            let more = factor - 1.0;
+            if may_be[band] {
+                gain += 2.0 * more * block.both[band] - more * more * block.simulated[band];
+            }
+        }
+    }
+    gain
+}
