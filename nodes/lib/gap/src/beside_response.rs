@@ -118,7 +118,9 @@ fn whitened_blocks(
         flat[first + range.start..first + range.end].to_vec()
     };
     bands.blocks(prepared, |range, block| {
-        let weights = axes.clone().flat_map(|axis| &model.whitener.weight[axis][range.clone()]);
+        let weights = axes
+            .clone()
+            .flat_map(|axis| &model.whitener.weight[axis][range.clone()]);
         if weights.clone().any(|weight| *weight == 0.0) {
             return;
         }
@@ -175,7 +177,10 @@ fn part_of_sensor(model: &FitModel, channel: Channel, [from_hz, to_hz]: [f64; 2]
     let power = &model.noise.power[channel];
     let place = |hz: f64| ((hz / model.noise.spacing_hz) as usize).min(power.len() - 1);
     let own = &power[place(from_hz)..=place(to_hz)];
-    own.iter().map(|power| (variance / power).min(1.0)).sum::<f64>() / own.len() as f64
+    own.iter()
+        .map(|power| (variance / power).min(1.0))
+        .sum::<f64>()
+        / own.len() as f64
 }
 
 /// What factors, learnt without each part of time, take off the residual's power there.

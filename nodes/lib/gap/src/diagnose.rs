@@ -3,8 +3,8 @@
 use std::borrow::Cow;
 
 use cromosim_imu::{
-    Channel, DeclaredNoise, EffectKind, OtherSession, PerChannel, PlacementEffects,
-    Search, UnexplainedErrors, unit_factors,
+    Channel, DeclaredNoise, EffectKind, OtherSession, PerChannel, PlacementEffects, Search,
+    UnexplainedErrors, unit_factors,
 };
 use cromosim_spatial::MotionResponse;
 

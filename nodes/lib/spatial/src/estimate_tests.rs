@@ -473,9 +473,9 @@ fn poses_too_slow_for_a_motion_keep_what_they_show_of_it() {
         })
         .collect();
     let at = |t: f64, order: i32| -> f64 {
-        let own = terms.iter().map(|(hz, size, phase)| {
-            (TAU * hz).powi(order) * size * (TAU * hz * t + phase).sin()
-        });
+        let own = terms
+            .iter()
+            .map(|(hz, size, phase)| (TAU * hz).powi(order) * size * (TAU * hz * t + phase).sin());
         own.sum()
     };
     let start = Stamp::from_nanos(1_700_000_000_000_000_000);

@@ -200,8 +200,7 @@ impl FrameGrid {
             return true;
         };
         let chords = Chords::fit(poses, self.rate_hz, self.offset_s);
-        (0..2)
-            .all(|of| chords.misfit[of] <= most * within[of] + MOST_OFF_PART * scatter.all[of])
+        (0..2).all(|of| chords.misfit[of] <= most * within[of] + MOST_OFF_PART * scatter.all[of])
     }
 
     /// White noise of poses between two frames, which their second differences within a chord tell: what

@@ -251,10 +251,16 @@ mod tests {
         let motion = |hz: f64| 1e-6 * (hz.max(0.1) / 10.0).powi(-6);
         for level in [1e-12, 1e-6, 1e-5] {
             let shape = learnt(|hz| motion(hz) + motion(RATE_HZ - hz) + level);
-            assert!((shape.level - level).abs() < 1e-9 + 0.05 * level, "{shape:?}");
+            assert!(
+                (shape.level - level).abs() < 1e-9 + 0.05 * level,
+                "{shape:?}"
+            );
             for hz in [6.0, 9.0] {
                 let expected = level + motion(RATE_HZ - hz);
-                assert!((shape.at(hz) / expected - 1.0).abs() < 0.05, "{hz} Hz: {shape:?}");
+                assert!(
+                    (shape.at(hz) / expected - 1.0).abs() < 0.05,
+                    "{hz} Hz: {shape:?}"
+                );
             }
             assert!((shape.motion_beyond(12.0) / motion(12.0) - 1.0).abs() < 0.05);
         }
