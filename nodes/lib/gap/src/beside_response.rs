@@ -165,9 +165,8 @@ fn of_reference(
         let white = sum(|block| &block.entries, band)
             * bands.power_of_one()
             * part_of_sensor(model, channel, bands.range_hz(band));
-        factor > 1.0
-            || factor < SHUT
-            || left - white > LEFT_BY_NOISE * factor * (1.0 - factor) * power
+        let is_told = (SHUT..=1.0).contains(&factor);
+        !is_told || left - white > LEFT_BY_NOISE * factor * (1.0 - factor) * power
     })
 }
 
