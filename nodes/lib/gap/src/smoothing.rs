@@ -35,8 +35,6 @@ pub(crate) fn try_smoothing<'a>(
     if larger(scored.fit.held_out_ratio()) < SUSPICIOUS {
         return (model, scored);
     }
-    // Beside what was found without it, and alone.
-    let mut sets: Vec<EffectSet> = starts.to_vec();
     let found = told_from_smoothing(&scored.fit.set);
     let plain = evidence(&model, &scored);
     let without_smoothing = if found == scored.fit.set {
@@ -44,10 +42,7 @@ pub(crate) fn try_smoothing<'a>(
     } else {
         evidence(&model, &score(&model, found.clone()))
     };
-    sets.extend(with_all_delay_by_filter(&found, library));
-    if !starts.contains(&found) {
-        sets.push(found);
-    }
+    let sets = starting_sets(starts, found, library);
     let needed = plain + LEAST_GAIN_NATS + LEAST_SHARE * excess(&model, &scored.fit);
     let of_plain = |set: &EffectSet| residual_norms(&model, &score(&model, set.clone()));
     let trial = Trial {
@@ -67,8 +62,7 @@ pub(crate) fn try_smoothing<'a>(
         return (model, scored);
     }
     let undone = with_undone_smoothing(&model, &starts[0], smoothing);
-    let [plain_fit, undone_fit] = [&model, &undone].map(|model| score(model, set.clone()));
-    if larger(distance(&model, &plain_fit, &undone_fit)) > MUCH_FARTHER {
+    if is_much_farther(&model, &undone, &set) {
         return (model, scored);
     }
     let searched = search_down_to_noise(&undone, &sets, library, BESIDE);
@@ -90,6 +84,22 @@ pub(crate) fn try_smoothing<'a>(
     } else {
         (model, scored)
     }
+}
+
+/// Beside what was found without it, that with the delay of a filter, and alone.
+fn starting_sets(starts: &[EffectSet], found: EffectSet, library: &[EffectKind]) -> Vec<EffectSet> {
+    let mut sets = starts.to_vec();
+    sets.extend(with_all_delay_by_filter(&found, library));
+    if !starts.contains(&found) {
+        sets.push(found);
+    }
+    sets
+}
+
+/// Whether the same effects are far farther off where a smoothing is undone.
+fn is_much_farther(model: &FitModel, undone: &FitModel, set: &EffectSet) -> bool {
+    let [plain, undone] = [model, undone].map(|model| score(model, set.clone()));
+    larger(distance(model, &plain, &undone)) > MUCH_FARTHER
 }
 
 /// Whether a cutoff is above all that explain something, and would be were it lower by a factor.
