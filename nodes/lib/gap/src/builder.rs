@@ -14,7 +14,7 @@ use crate::findings::{Findings, Unknown};
 use crate::fit::Fit;
 use crate::identify::unidentifiable;
 use crate::location::locate;
-use crate::policy::probability::LEAST_NAMED;
+use crate::policy::probability::LEAST_OF_UNKNOWN;
 use crate::probability::{calibrate, probability_of};
 use crate::response::{LearntResponse, kept};
 use crate::screen::is_change;
@@ -206,7 +206,7 @@ impl<'a> DiagnosisBuilder<'a> {
             let share = unexplained * unknown.predictable;
             let with_it = with_unknown(&causes, unknown_cause(unknown, share, after), before);
             let own = with_it.iter().find(|cause| cause.effect == UNKNOWN)?;
-            (own.probability >= LEAST_NAMED).then_some(with_it)
+            (own.probability >= LEAST_OF_UNKNOWN).then_some(with_it)
         });
         let unknown = unknown.filter(|_| with_it.is_some());
         let predictable = unknown.map_or(0.0, |unknown| unknown.predictable);
