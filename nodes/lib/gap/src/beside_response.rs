@@ -14,7 +14,7 @@ use crate::gram::channel_likelihood;
 use crate::policy::beside_response::{LEAST_GAIN_NATS, LEFT_BY_NOISE, OPEN, SHUT};
 use crate::policy::response::LARGEST_FACTOR;
 use crate::prepared::FOLDS;
-use crate::response::{BANDS, Bands, Block, factors};
+use crate::response::{BANDS, Bands, Block, factors, held_out_gain};
 use crate::search::{ScoredEffectSet, score};
 use crate::trace::{names, trace};
 
@@ -94,7 +94,13 @@ fn gained(model: &FitModel, fit: &Fit) -> f64 {
         let blocks = whitened_blocks(model, &bands, channel, &simulated, &fit.residual);
         let largest = largest_factors(model, &bands, channel);
         let may_be = of_reference(model, &bands, channel, (&blocks, &largest));
-        bands.squares_per_power() * held_out_gain(&blocks, &largest, &may_be)
+        let excluding: Vec<[f64; BANDS]> = (0..FOLDS)
+            .map(|fold| {
+                let own = factors(&blocks, &largest, Some(fold));
+                std::array::from_fn(|band| if may_be[band] { own[band] } else { 1.0 })
+            })
+            .collect();
+        bands.squares_per_power() * held_out_gain(&blocks, |fold| &excluding[fold])
     });
     sum_over_channels(|channel| {
         let count = model.whitener.count[channel];
@@ -180,21 +186,4 @@ fn part_of_sensor(model: &FitModel, channel: Channel, [from_hz, to_hz]: [f64; 2]
         .map(|power| (variance / power).min(1.0))
         .sum::<f64>()
         / own.len() as f64
-}
-
-/// What factors, learnt without each part of time, take off the residual's power there.
-fn held_out_gain(blocks: &[Block], largest: &[f64; BANDS], may_be: &[bool; BANDS]) -> f64 {
-    let excluding: Vec<[f64; BANDS]> = (0..FOLDS)
-        .map(|fold| factors(blocks, largest, Some(fold)))
-        .collect();
-    let mut gain = 0.0;
-    for block in blocks {
-        for (band, factor) in excluding[block.fold].iter().enumerate() {
-            let more = factor - 1.0;
-            if may_be[band] {
-                gain += 2.0 * more * block.both[band] - more * more * block.simulated[band];
-            }
-        }
-    }
-    gain
 }

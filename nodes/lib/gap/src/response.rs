@@ -75,7 +75,10 @@ fn learn(findings: &Findings, simulations: &Simulations) -> Option<LearntRespons
     };
     let excluding: Vec<Factors> = (0..FOLDS).map(|fold| factors(Some(fold))).collect();
     let helps = PerChannel::from_fn(|channel| {
-        let gain = held_out_gain(&blocks[channel], |fold| &excluding[fold][channel]);
+        let own = &blocks[channel];
+        let all: f64 = own.iter().map(|block| block.residual).sum();
+        let gain = held_out_gain(own, |fold| &excluding[fold][channel]);
+        let gain = gain / all.max(f64::MIN_POSITIVE);
         trace(|| eprintln!("response of {channel:?}: {gain:.4} of the residual"));
         gain > LEAST_PART
     });
@@ -191,17 +194,19 @@ pub(crate) fn factors(
     })
 }
 
-/// By how much factors lower the residual's power on the part of time without which they were learnt, as a part of it.
-fn held_out_gain<'f>(blocks: &[Block], factors: impl Fn(usize) -> &'f [f64; BANDS]) -> f64 {
-    let (mut gain, mut all) = (0.0, 0.0);
+/// By how much factors lower the residual's power on the part of time without which they were learnt.
+pub(crate) fn held_out_gain<'f>(
+    blocks: &[Block],
+    factors: impl Fn(usize) -> &'f [f64; BANDS],
+) -> f64 {
+    let mut gain = 0.0;
     for block in blocks {
         for (band, factor) in factors(block.fold).iter().enumerate() {
             let more = factor - 1.0;
             gain += 2.0 * more * block.both[band] - more * more * block.simulated[band];
         }
-        all += block.residual;
     }
-    gain / f64::max(all, f64::MIN_POSITIVE)
+    gain
 }
 
 /// What both channels' coordinates are made of.

@@ -62,9 +62,6 @@ pub(crate) fn try_smoothing<'a>(
         return (model, scored);
     }
     let undone = with_undone_smoothing(&model, &starts[0], smoothing);
-    if is_much_farther(&model, &undone, &set) {
-        return (model, scored);
-    }
     let searched = search_down_to_noise(&undone, &sets, library, BESIDE);
     let (undone, searched) = if names(&searched.fit.set) == names(&set) {
         (undone, searched)
@@ -94,12 +91,6 @@ fn starting_sets(starts: &[EffectSet], found: EffectSet, library: &[EffectKind])
         sets.push(found);
     }
     sets
-}
-
-/// Whether the same effects are far farther off where a smoothing is undone.
-fn is_much_farther(model: &FitModel, undone: &FitModel, set: &EffectSet) -> bool {
-    let [plain, undone] = [model, undone].map(|model| score(model, set.clone()));
-    larger(distance(model, &plain, &undone)) > MUCH_FARTHER
 }
 
 /// Whether a cutoff is above all that explain something, and would be were it lower by a factor.

@@ -8,7 +8,7 @@ use crate::kinks::{Kinks, second_differences};
 use crate::{PoseNoise, PoseSeries};
 
 /// Poses over which second differences are taken, in turn until kinks show: those of slow frames drown in the noise
-/// between neighbours. Beyond half the poses of a chord they would gain nothing; frames of 8 Hz in poses of 150 Hz.
+/// between neighbours. Eight are half of a chord of the slowest frames (8 Hz) in poses of 128 Hz. No source.
 const STRIDES: [usize; 4] = [1, 2, 4, 8];
 /// Poses per frame below which frames cannot be told from poses. No source.
 const LEAST_POSES_PER_FRAME: f64 = 1.5;
@@ -45,8 +45,8 @@ const LEAST_WITHIN: usize = 50;
 /// Most that poses are off their chords, as a multiple of the noise that they show within them; a curve
 /// between the frames is farther off. No source.
 const MOST_OFF: f64 = 2.0;
-/// The same where kinks drown between neighbours: of all steady motions, a gait under much noise comes nearest with 1.3
-/// (tests/withheld, seed 75), true chords have 1.03.
+/// The same where kinks drown between neighbours: true chords had 1.00 to 1.03 (tests/withheld/other_origin.py, seed 11), a
+/// gait under much noise 1.3 (tests/withheld, seed 75). Made pulses had less, which their repetition tells.
 const MOST_OFF_IN_NOISE: f64 = 1.15;
 /// And as a part of all second differences, where there is hardly any noise. No source.
 const MOST_OFF_PART: f64 = 0.02;

@@ -118,10 +118,11 @@ impl NoiseShape {
     /// The power law from the densities of five thirds of an octave, the middle one from `from_hz` on.
     fn from_knee(thirds: &[f64; 5], from_hz: f64, largest_rise: f64) -> Self {
         let above = ((thirds[2] / thirds[4]).ln() / THIRD_OCTAVE.powi(2).ln()).max(0.0);
+        // At the knee itself some motion is left.
+        let level = thirds[2].min(thirds[3] * THIRD_OCTAVE.powf(above));
         Self {
-            // At the knee itself some motion is left.
-            level: thirds[2].min(thirds[3] * THIRD_OCTAVE.powf(above)),
-            top: thirds[2].min(thirds[3] * THIRD_OCTAVE.powf(above)),
+            level,
+            top: level,
             knee_hz: THIRD_OCTAVE.sqrt() * from_hz,
             below: above.min(largest_rise),
             above,

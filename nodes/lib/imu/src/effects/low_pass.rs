@@ -67,6 +67,9 @@ pub(super) fn response(cutoff_hz: f64, hz: f64) -> (f64, f64) {
 const HIGHEST_HZ: f64 = 45.0;
 /// Delay of slow motion times the cutoff: `sqrt(2) / (2 pi)`, the filter's group delay at 0 Hz.
 const DELAY_TIMES_CUTOFF: f64 = 0.225;
+/// Deviation from the filter's delay, as a part of it, up to which an offset of time undoes it.
+const UNDONE: f64 = 0.35;
+
 impl Effect {
     /// The `low_pass` that delays slow motion by so many seconds.
     ///
@@ -81,9 +84,6 @@ impl Effect {
         (self.kind() == EffectKind::LowPass).then(|| DELAY_TIMES_CUTOFF / self.scalar(0))
     }
 }
-
-/// Deviation from the filter's delay, as a part of it, up to which an offset of time undoes it.
-const UNDONE: f64 = 0.35;
 
 /// Not where an offset of time beside it takes back its delay: a filter's attenuation without its
 /// delay is the reference's own smoothing error.
