@@ -8,21 +8,25 @@ use crate::fit::FitModel;
 use crate::noise_updates::with_estimate;
 use crate::plausibility::told_from_smoothing;
 use crate::policy::smoothing::{
-    BESIDE, BEST_RATIO, CLOSER, LEAST_GAIN_NATS, LEAST_SHARE, MUCH_FARTHER, NOT_FARTHER,
-    SHORTEST_DELAY_S, SUSPICIOUS, TRIAL_STEPS,
+    BESIDE, BEST_RATIO, CLOSER, FARTHER_FOR_CLOSER, LEAST_GAIN_NATS, LEAST_SHARE, MUCH_CLOSER,
+    MUCH_FARTHER, NOT_FARTHER, SHARPENINGS, SHORTEST_DELAY_S, SUSPICIOUS, SUSPICIOUS_IMITATED,
+    TRIAL_STEPS,
 };
 use crate::search::{ScoredEffectSet, excess, score, score_after, search_down_to_noise};
 use crate::trace::{names, trace};
 
 /// Cutoffs that are tried first, Hz. Beyond the last nothing is undone but noise.
 const CUTOFFS_HZ: [f64; 9] = [1.5, 2.0, 2.6, 3.4, 4.4, 5.7, 7.4, 9.6, 12.5];
-/// A Gaussian's cutoffs that are tried first, as parts of the best one of Butterworth's filter: its half
-/// power lies below that one's half amplitude.
-const GAUSSIAN_PARTS: [f64; 3] = [0.55, 0.7, 0.85];
-/// Factors between the best cutoff and those next to it that tell the kernels apart.
-const COARSE: [f64; 2] = [1.12, 1.06];
-/// And those that refine the better kernel's.
-const FINE: [f64; 2] = [1.03, 1.015];
+/// A cutoff that leaves all poses as they are.
+const UNDOES_NOTHING_HZ: f64 = 1e6;
+/// Where a Gaussian's cutoff is looked for, as a part of the best one of Butterworth's filter: its half power lies below
+/// that one's half amplitude.
+const GAUSSIAN_PART: f64 = 0.7;
+/// Factors between neighbouring cutoffs: where they tell a Gaussian from Butterworth's filter, one order of that from
+/// another, and where they refine the best, with what was found beside it.
+const BETWEEN_KERNELS: f64 = 1.2;
+const BETWEEN_ORDERS: f64 = 1.12;
+const FINE: f64 = 1.04;
 
 /// The better of `model` and models in which a smoothing of the reference is undone, each with the
 /// best set of effects.
@@ -32,10 +36,15 @@ pub(crate) fn try_smoothing<'a>(
     starts: &[EffectSet],
     library: &[EffectKind],
 ) -> (FitModel<'a>, ScoredEffectSet) {
-    if larger(scored.fit.held_out_ratio()) < SUSPICIOUS {
+    let found = told_from_smoothing(&scored.fit.set);
+    let suspicious = if found == scored.fit.set {
+        SUSPICIOUS
+    } else {
+        SUSPICIOUS_IMITATED
+    };
+    if larger(scored.fit.held_out_ratio()) < suspicious {
         return (model, scored);
     }
-    let found = told_from_smoothing(&scored.fit.set);
     let plain = evidence(&model, &scored);
     let without_smoothing = if found == scored.fit.set {
         plain
@@ -43,7 +52,7 @@ pub(crate) fn try_smoothing<'a>(
         evidence(&model, &score(&model, found.clone()))
     };
     let sets = starting_sets(starts, found, library);
-    let needed = plain + LEAST_GAIN_NATS + LEAST_SHARE * excess(&model, &scored.fit);
+    let needed = needed(&model, &scored);
     let of_plain = |set: &EffectSet| residual_norms(&model, &score(&model, set.clone()));
     let trial = Trial {
         plain_norms: sets.iter().map(of_plain).collect(),
@@ -55,19 +64,12 @@ pub(crate) fn try_smoothing<'a>(
         start: &starts[0],
         sets: &sets,
     };
-    let Some(Tried { smoothing, set, .. }) = trial.best_smoothing() else {
+    let Some(first) = trial.best_of_second_order() else {
         return (model, scored);
     };
-    if reaches_no_motion(&smoothing, 1.0) {
-        return (model, scored);
-    }
-    let undone = with_undone_smoothing(&model, &starts[0], smoothing);
+    let undone = with_undone_smoothing(&model, &starts[0], first.smoothing);
     let searched = search_down_to_noise(&undone, &sets, library, BESIDE);
-    let (undone, searched) = if names(&searched.fit.set) == names(&set) {
-        (undone, searched)
-    } else {
-        trial.sharpened(undone, searched, smoothing, library)
-    };
+    let (undone, searched, smoothing) = trial.sharpened(undone, searched, first, library);
     let gained = evidence(&undone, &searched);
     trace(|| {
         eprintln!(
@@ -75,8 +77,11 @@ pub(crate) fn try_smoothing<'a>(
             names(&searched.fit.set),
         )
     });
-    let beside = score(&model, searched.fit.set.clone());
-    if gained > needed && comes_closer(&model, &beside, &searched) {
+    let is_believed = gained > needed
+        && !reaches_no_motion(&smoothing, 1.0)
+        && trial.outdoes_rivals(gained, &searched.fit.set, &scored.fit.set)
+        && comes_closer(&model, &score(&model, searched.fit.set.clone()), &searched);
+    if is_believed {
         (undone, searched)
     } else {
         (model, scored)
@@ -125,80 +130,181 @@ struct Tried {
 }
 
 impl<'a> Trial<'_, 'a> {
-    /// A smoothing beside what was found once it was undone: its cutoff had made up for that.
+    /// A smoothing beside what was found once it was undone: its cutoff had made up for that, and kernels that rise more steeply
+    /// bring more noise, which covers it. Once more where more than noise is left then.
     fn sharpened(
         &self,
-        undone: FitModel<'a>,
-        searched: ScoredEffectSet,
-        smoothing: ZeroPhaseSmoothing,
+        mut undone: FitModel<'a>,
+        mut searched: ScoredEffectSet,
+        first: Tried,
         library: &[EffectKind],
-    ) -> (FitModel<'a>, ScoredEffectSet) {
-        let mut sets = vec![searched.fit.set.clone()];
-        sets.extend(with_all_delay_by_filter(&sets[0], library));
-        let of_plain =
-            |set: &EffectSet| residual_norms(self.model, &score(self.model, set.clone()));
-        let beside = Trial {
-            sets: &sets,
-            plain_norms: sets.iter().map(of_plain).collect(),
-            ..*self
-        };
-        let begun = Tried {
-            evidence: evidence(&undone, &searched),
-            smoothing,
-            set: sets[0].clone(),
-        };
-        let sharp = beside.refined(beside.refined(begun, &COARSE), &FINE);
-        if sharp.smoothing == smoothing {
-            return (undone, searched);
-        }
-        let undone = with_undone_smoothing(self.model, self.start, sharp.smoothing);
-        let searched = search_down_to_noise(&undone, &[sharp.set], library, BESIDE);
-        (undone, searched)
-    }
-
-    /// The smoothing with the most evidence: Butterworth's from a grid, a Gaussian from around it,
-    /// the better one refined.
-    fn best_smoothing(&self) -> Option<Tried> {
-        let butterworth = self.best_of(SmoothingKernel::Butterworth, &CUTOFFS_HZ)?;
-        let butterworth = self.refined(butterworth, &COARSE);
-        let parts = GAUSSIAN_PARTS.map(|part| part * butterworth.smoothing.cutoff_hz);
-        let gaussian = self
-            .best_of(SmoothingKernel::Gaussian, &parts)
-            .map(|gaussian| self.refined(gaussian, &COARSE))
-            .filter(|gaussian| gaussian.evidence > butterworth.evidence);
-        let better = gaussian.unwrap_or(butterworth);
-        // Then nothing finer does, either.
-        if reaches_no_motion(&better.smoothing, FINE.iter().product()) {
-            return None;
-        }
-        Some(self.refined(better, &FINE))
-    }
-
-    /// The cutoff with the most evidence; none where none has more than the reference as it is, without what passes for a
-    /// smoothing: of one that is there even a cutoff next to it explains far more.
-    fn best_of(&self, kernel: SmoothingKernel, cutoffs_hz: &[f64]) -> Option<Tried> {
-        cutoffs_hz
-            .iter()
-            .filter_map(|&cutoff_hz| self.tried(ZeroPhaseSmoothing { cutoff_hz, kernel }))
-            .max_by(|a, b| a.evidence.total_cmp(&b.evidence))
-            .filter(|best| best.evidence > self.without_smoothing)
-    }
-
-    /// The best of a smoothing and those whose cutoffs lie on either side of it by some factors.
-    fn refined(&self, mut best: Tried, factors: &[f64]) -> Tried {
-        for factor in factors {
-            let middle = best.smoothing;
-            for cutoff_hz in [middle.cutoff_hz / factor, middle.cutoff_hz * factor] {
-                let other = self.tried(ZeroPhaseSmoothing {
-                    cutoff_hz,
-                    ..middle
-                });
-                best = other
-                    .filter(|other| other.evidence > best.evidence)
-                    .unwrap_or(best);
+    ) -> (FitModel<'a>, ScoredEffectSet, ZeroPhaseSmoothing) {
+        let mut smoothing = first.smoothing;
+        let mut set_of_first = Some(first.set);
+        for pass in 0..SHARPENINGS {
+            let beside = self.beside(&searched.fit.set, set_of_first.take(), library);
+            let begun = Tried {
+                evidence: evidence(&undone, &searched),
+                smoothing,
+                set: searched.fit.set.clone(),
+            };
+            let beside = Trial {
+                sets: &beside.0,
+                plain_norms: beside.1,
+                ..*self
+            };
+            let sharp = if pass == 0 {
+                beside.best_kernel(begun)
+            } else {
+                beside.refined(begun, FINE)
+            };
+            let leaves_more = larger(searched.fit.held_out_ratio()) > SUSPICIOUS;
+            if sharp.smoothing == smoothing && !leaves_more {
+                break;
+            }
+            smoothing = sharp.smoothing;
+            undone = with_undone_smoothing(self.model, self.start, smoothing);
+            let before = names(&sharp.set);
+            searched = search_down_to_noise(&undone, &[sharp.set], library, BESIDE);
+            if names(&searched.fit.set) == before {
+                break;
             }
         }
-        best
+        (undone, searched, smoothing)
+    }
+
+    /// Whether undoing it has more evidence than what was found without it has together with what was found since, and than
+    /// the same filters have where nothing is undone.
+    fn outdoes_rivals(&self, gained: f64, since: &EffectSet, without: &EffectSet) -> bool {
+        let mut both = without.clone();
+        both.extend(since.iter());
+        let nothing = ZeroPhaseSmoothing {
+            cutoff_hz: UNDOES_NOTHING_HZ,
+            kernel: SmoothingKernel::SECOND_ORDER,
+        };
+        let same_filters = with_undone_smoothing(self.model, self.start, nothing);
+        [(self.model, &both), (&same_filters, since)]
+            .into_iter()
+            .all(|(model, set)| gained > needed(model, &score(model, set.clone())))
+    }
+
+    /// Sets to try beside a smoothing where one was found, with how far the reference as it is is off with each.
+    fn beside(
+        &self,
+        found: &EffectSet,
+        other: Option<EffectSet>,
+        library: &[EffectKind],
+    ) -> (Vec<EffectSet>, Vec<PerChannel<f64>>) {
+        let mut sets = vec![found.clone()];
+        sets.extend(with_all_delay_by_filter(found, library));
+        sets.extend(other.filter(|other| names(other) != names(found)));
+        let of_plain =
+            |set: &EffectSet| residual_norms(self.model, &score(self.model, set.clone()));
+        let plain_norms = sets.iter().map(of_plain).collect();
+        (sets, plain_norms)
+    }
+
+    /// The kernel with the most evidence: Butterworth's of the second order, or the fourth; where that is better the third, else
+    /// what sets in more softly, a Gaussian and then the first. The best is refined.
+    fn best_kernel(&self, second: Tried) -> Tried {
+        let middle_hz = second.smoothing.cutoff_hz;
+        let around = |kernel, part, factor| {
+            let cutoff_hz = part * middle_hz;
+            let first = self.tried(ZeroPhaseSmoothing { cutoff_hz, kernel })?;
+            Some(self.refined(first, factor))
+        };
+        // Half of the amplitude is left at the cutoff whatever the order.
+        let of_order = |order| around(SmoothingKernel::Butterworth { order }, 1.0, BETWEEN_ORDERS);
+        let better = |one: Tried, other: Option<Tried>| match other {
+            Some(other) if other.evidence > one.evidence => (other, true),
+            _ => (one, false),
+        };
+        let (best, is_steeper) = better(second, of_order(4));
+        let (best, _) = if is_steeper {
+            better(best, of_order(3))
+        } else {
+            let gaussian = around(SmoothingKernel::Gaussian, GAUSSIAN_PART, BETWEEN_KERNELS);
+            match better(best, gaussian) {
+                (best, true) => better(best, of_order(1)),
+                second => second,
+            }
+        };
+        self.refined(best, FINE)
+    }
+
+    /// Butterworth's of the second order with the most evidence.
+    fn best_of_second_order(&self) -> Option<Tried> {
+        let best = self.best_of_grid()?;
+        let which = self
+            .sets
+            .iter()
+            .position(|set| names(set) == names(&best.set))?;
+        let beside_best = Trial {
+            sets: &self.sets[which..=which],
+            plain_norms: vec![self.plain_norms[which]],
+            ..*self
+        };
+        let best = beside_best.refined(best, BETWEEN_ORDERS);
+        // Then nothing finer does, either.
+        let reaches_motion = !reaches_no_motion(&best.smoothing, FINE);
+        reaches_motion.then_some(best)
+    }
+
+    /// The cutoff of the second order with the most evidence; none where none has more than the reference as it is, without what
+    /// passes for a smoothing: of one that is there even a cutoff next to it explains far more. From the lowest on, until two in
+    /// turn have lost most of what the best one gained.
+    fn best_of_grid(&self) -> Option<Tried> {
+        let kernel = SmoothingKernel::SECOND_ORDER;
+        let mut best: Option<Tried> = None;
+        let mut far_behind = 0;
+        for cutoff_hz in CUTOFFS_HZ {
+            let Some(other) = self.tried(ZeroPhaseSmoothing { cutoff_hz, kernel }) else {
+                continue;
+            };
+            let most = best
+                .as_ref()
+                .map_or(f64::NEG_INFINITY, |best| best.evidence);
+            let is_far = other.evidence < 0.5 * (most + self.without_smoothing);
+            far_behind = if is_far { far_behind + 1 } else { 0 };
+            if other.evidence > most {
+                best = Some(other);
+            }
+            if far_behind == 2 {
+                break;
+            }
+        }
+        best.filter(|best| best.evidence > self.without_smoothing)
+    }
+
+    /// The best of a smoothing and those of other cutoffs: by a factor lower and higher as long as that is better, and then at
+    /// the vertex of the parabola through the best and its neighbours, over the cutoff's logarithm.
+    fn refined(&self, begun: Tried, factor: f64) -> Tried {
+        let kernel = begun.smoothing.kernel;
+        let at = |cutoff_hz: f64| self.tried(ZeroPhaseSmoothing { cutoff_hz, kernel });
+        let height =
+            |one: &Option<Tried>| one.as_ref().map_or(f64::NEG_INFINITY, |one| one.evidence);
+        let mut best = begun;
+        let mut beside = [factor.recip(), factor].map(|step| at(best.smoothing.cutoff_hz * step));
+        for (side, step) in [factor.recip(), factor].into_iter().enumerate() {
+            while height(&beside[side]) > best.evidence
+                && let Some(next) = beside[side].take()
+            {
+                beside[side] = at(next.smoothing.cutoff_hz * step);
+                beside[1 - side] = Some(std::mem::replace(&mut best, next));
+            }
+        }
+        let [lower, upper] = [height(&beside[0]), height(&beside[1])];
+        let bend = 2.0 * best.evidence - lower - upper;
+        let steps = if bend.is_finite() && bend > 0.0 {
+            0.5 * (upper - lower) / bend
+        } else {
+            // One side alone can be judged.
+            0.5 * f64::from(i8::from(upper > lower) - i8::from(lower > upper))
+        };
+        let vertex = at(best.smoothing.cutoff_hz * factor.powf(steps));
+        vertex
+            .filter(|vertex| vertex.evidence > best.evidence)
+            .unwrap_or(best)
     }
 
     /// A smoothing with the best of the starting sets; none where the noise that undoing it brings lets no set
@@ -261,6 +367,11 @@ fn evidence(model: &FitModel, scored: &ScoredEffectSet) -> f64 {
         })
 }
 
+/// Evidence from which on a smoothing is believed rather than a fit without one.
+fn needed(model: &FitModel, scored: &ScoredEffectSet) -> f64 {
+    evidence(model, scored) + LEAST_GAIN_NATS + LEAST_SHARE * excess(model, &scored.fit)
+}
+
 /// The model in which a smoothing is undone.
 pub(crate) fn with_undone_smoothing<'a>(
     model: &FitModel<'a>,
@@ -274,11 +385,14 @@ pub(crate) fn with_undone_smoothing<'a>(
 }
 
 /// Whether the simulation itself comes closer in one channel than with the same effects alone, and in
-/// none moves away: what is undone must not cost more than it gives.
+/// none moves away: what is undone must not cost more than it gives. The noise that it lets in may take one farther where the
+/// other comes much closer: factors by frequency keep that out in the end ([`crate::response`]).
 fn comes_closer(model: &FitModel, plain: &ScoredEffectSet, undone: &ScoredEffectSet) -> bool {
     let ratio = distance(model, plain, undone);
     trace(|| eprintln!("  smoothing comes closer by {ratio:.3?}"));
-    smaller(ratio) < CLOSER && larger(ratio) < NOT_FARTHER
+    let (closer, farther) = (smaller(ratio), larger(ratio));
+    let farther_for_closer = farther < FARTHER_FOR_CLOSER && closer * farther < MUCH_CLOSER;
+    closer < CLOSER && (farther < NOT_FARTHER || farther_for_closer)
 }
 
 /// Root mean squares of the residuals of what is undone, over those of what is not.

@@ -4,7 +4,8 @@
 mod support;
 
 use cromosim_gap::PlacementAnswer;
-use cromosim_imu::{EffectKind as K, STANDARD_GRAVITY};
+use cromosim_imu::{Effect, EffectKind as K, STANDARD_GRAVITY};
+use cromosim_spatial::{SmoothingKernel, ZeroPhaseSmoothing};
 use nalgebra::Vector3;
 use support::judge::{answer, cause, names, names_exactly, near, values_are};
 use support::motion::Motion;
@@ -114,6 +115,28 @@ fn a_reference_that_was_smoothed_by_a_gaussian() {
         &Scene::new(50).with(K::ReferenceSmoothing, &[4.5, 1.0]),
         [0.5, 0.5],
     );
+}
+
+#[test]
+fn a_reference_that_was_smoothed_by_a_steep_filter() {
+    let of_fourth_order = ZeroPhaseSmoothing {
+        cutoff_hz: 3.0,
+        kernel: SmoothingKernel::Butterworth { order: 4 },
+    };
+    let smoothing = Effect::reference_smoothing(&of_fourth_order).unwrap();
+    let scene = Scene::new(51).with(K::ReferenceSmoothing, smoothing.values());
+    let diagnosis = answer(&scene.record()).diagnosis;
+    names_exactly(&diagnosis, &scene.effects);
+    // The third order's is as near where motion has few frequencies.
+    let found = &cause(&diagnosis, K::ReferenceSmoothing).parameters;
+    let kernel = found["kernel"].as_str().unwrap();
+    assert!(
+        ["butterworth_3", "butterworth_4"].contains(&kernel),
+        "{kernel}"
+    );
+    near(found["cutoff_hz"].as_f64().unwrap(), 3.0, 0.15, "cutoff");
+    let (before, after) = (&diagnosis.gap.before, &diagnosis.gap.after);
+    assert!(after.accel_rmse < 0.3 * before.accel_rmse, "{after:?}");
 }
 
 #[test]

@@ -5,7 +5,7 @@
 pub mod judge;
 pub mod motion;
 
-use std::f64::consts::{LN_2, PI, SQRT_2};
+use std::f64::consts::{LN_2, PI};
 use std::ops::Range;
 
 use cromosim_gap::{MeasuredField, MeasuredImu, PlacementRecord, PoseSeries};
@@ -252,10 +252,10 @@ fn normal_vector(random: &mut ChaCha12Rng) -> Vector3<f64> {
 /// Without phase, settled on the first value or continued by it.
 fn smoothed(series: &[f64], smoothing: &ZeroPhaseSmoothing) -> Vec<f64> {
     match smoothing.kernel {
-        SmoothingKernel::Butterworth => {
-            let mut once = butterworth(series, smoothing.cutoff_hz);
+        SmoothingKernel::Butterworth { order } => {
+            let mut once = butterworth(series, smoothing.cutoff_hz, order);
             once.reverse();
-            let mut twice = butterworth(&once, smoothing.cutoff_hz);
+            let mut twice = butterworth(&once, smoothing.cutoff_hz, order);
             twice.reverse();
             twice
         }
@@ -281,14 +281,22 @@ fn gaussian(series: &[f64], cutoff_hz: f64) -> Vec<f64> {
     (0..=last).map(mean).collect()
 }
 
+/// Of an even order.
+fn butterworth(series: &[f64], cutoff_hz: f64, order: u8) -> Vec<f64> {
+    let damping = |k: u8| 2.0 * (f64::from(2 * k + 1) * PI / (2.0 * f64::from(order))).sin();
+    (0..order / 2).fold(series.to_vec(), |series, k| {
+        of_second_order(&series, cutoff_hz, damping(k))
+    })
+}
+
 /// By the bilinear transform, settled on the first value.
-fn butterworth(series: &[f64], cutoff_hz: f64) -> Vec<f64> {
+fn of_second_order(series: &[f64], cutoff_hz: f64, damping: f64) -> Vec<f64> {
     let k = (PI * cutoff_hz / REFERENCE_HZ).tan();
-    let norm = 1.0 + SQRT_2 * k + k * k;
+    let norm = 1.0 + damping * k + k * k;
     let (b, a1, a2) = (
         k * k / norm,
         2.0 * (k * k - 1.0) / norm,
-        (1.0 - SQRT_2 * k + k * k) / norm,
+        (1.0 - damping * k + k * k) / norm,
     );
     let (mut x, mut y) = ([series[0]; 2], [series[0]; 2]);
     let step = |&now: &f64| {

@@ -21,11 +21,17 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         ParameterSpec {
             name: "kernel",
             unit: "",
-            shape: Shape::Choice(&["butterworth", "gaussian"]),
+            shape: Shape::Choice(&[
+                "butterworth",
+                "gaussian",
+                "butterworth_1",
+                "butterworth_3",
+                "butterworth_4",
+            ]),
             neutral: &[0.0],
             is_optional: true,
             lower: 0.0,
-            upper: 1.0,
+            upper: 4.0,
             fit: None,
         },
     ],
@@ -37,7 +43,13 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
 };
 
 /// The kernels in the order of the parameter's words.
-const KERNELS: [SmoothingKernel; 2] = [SmoothingKernel::Butterworth, SmoothingKernel::Gaussian];
+const KERNELS: [SmoothingKernel; 5] = [
+    SmoothingKernel::SECOND_ORDER,
+    SmoothingKernel::Gaussian,
+    SmoothingKernel::Butterworth { order: 1 },
+    SmoothingKernel::Butterworth { order: 3 },
+    SmoothingKernel::Butterworth { order: 4 },
+];
 
 impl Effect {
     /// A reference that was smoothed in this way.
