@@ -22,7 +22,8 @@ pub(crate) fn with_chosen_axes(
     if !library.allows(EffectKind::AxisConvention) || set.contains(EffectKind::AxisConvention) {
         return scored;
     }
-    let Some((chosen, rest)) = chosen_axes(set, ordinary_factor(model)) else {
+    let factor = ordinary_factor(model, EffectKind::MountRotation);
+    let Some((chosen, rest)) = chosen_axes(set, factor) else {
         return scored;
     };
     // What is left of the turn is a mount's where it is seen: no cause, but kept.

@@ -14,8 +14,8 @@ use crate::findings::{Findings, Unknown};
 use crate::fit::Fit;
 use crate::identify::unidentifiable;
 use crate::location::locate;
-use crate::policy::probability::LEAST_OF_UNKNOWN;
-use crate::probability::{calibrate, probability_of};
+use crate::policy::probability::{LEAST_NAMED, LEAST_OF_UNKNOWN, SMALL_SHARE};
+use crate::probability::{calibrate, is_calibration_of, probability_of};
 use crate::response::{LearntResponse, kept};
 use crate::screen::is_change;
 use crate::session::Session;
@@ -206,7 +206,13 @@ impl<'a> DiagnosisBuilder<'a> {
             let share = unexplained * unknown.predictable;
             let with_it = with_unknown(&causes, unknown_cause(unknown, share, after), before);
             let own = with_it.iter().find(|cause| cause.effect == UNKNOWN)?;
-            (own.probability >= LEAST_OF_UNKNOWN).then_some(with_it)
+            let is_taken_up = with_it.iter().any(|cause| is_calibration_of(&cause.effect));
+            let least = if own.gap_share < SMALL_SHARE && !is_taken_up {
+                LEAST_NAMED
+            } else {
+                LEAST_OF_UNKNOWN
+            };
+            (own.probability >= least).then_some(with_it)
         });
         let unknown = unknown.filter(|_| with_it.is_some());
         let predictable = unknown.map_or(0.0, |unknown| unknown.predictable);

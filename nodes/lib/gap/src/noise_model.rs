@@ -142,6 +142,26 @@ impl NoiseBasis {
         sum
     }
 
+    /// Variance per sample that the reference's error leaves in a channel at least, in the bands (parts of half of the IMU's
+    /// rate) that show a sensor's white noise: nothing where the estimate's filter ends below them.
+    pub fn least_reference_error(
+        &self,
+        prepared: &PreparedPlacement,
+        channel: Channel,
+        bands: &[(f64, f64)],
+    ) -> f64 {
+        let nyquist_hz = prepared.rate_hz / 2.0;
+        let reported = self.estimate.spectra();
+        let white = self.sigma[channel] * self.sigma[channel];
+        let of_band = |(from, to): &(f64, f64)| {
+            let middle_hz = 0.5 * (from + to) * nyquist_hz;
+            let expected = self.expected_folded(middle_hz, prepared.rate_hz, &reported);
+            expected.known[channel] * nyquist_hz - white
+        };
+        let least = bands.iter().map(of_band).fold(f64::INFINITY, f64::min);
+        least.max(0.0)
+    }
+
     /// The densities of the reference's error, before what is lost is added.
     fn expected(&self, frequency_hz: f64, (position, rotation): &(Spectrum, Spectrum)) -> Expected {
         let squared = (TAU * frequency_hz).powi(2);

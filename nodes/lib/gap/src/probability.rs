@@ -66,7 +66,7 @@ pub(crate) fn calibrate(causes: &mut [Cause]) {
     }
 }
 
-fn is_calibration_of(name: &str) -> bool {
+pub(crate) fn is_calibration_of(name: &str) -> bool {
     EffectKind::from_name(name).is_some_and(is_calibration)
 }
 

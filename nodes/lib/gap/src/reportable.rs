@@ -2,7 +2,8 @@
 //! read off the readings, the stamps and the reference.
 
 use cromosim_imu::{
-    Channel, Effect, EffectKind, EffectSet, Ordinary, PerChannel, ReadOff, Rounding, Search,
+    Channel, Dependence, Effect, EffectKind, EffectSet, Ordinary, PerChannel, ReadOff, Rounding,
+    Search,
 };
 use cromosim_spatial::PoseNoise;
 
@@ -13,8 +14,9 @@ use crate::library::Library;
 use crate::policy::report::{
     COARSE_STEPS, DOUBTFUL_EXCESS_NOISE, EXCESS_NOISE, MANY_MISSING,
     ORDINARY_BESIDE_REFERENCE_NOISE, ORDINARY_BESIDE_SMOOTHING, OUTWEIGHING_NATS, REFERENCE_NOISE,
-    ROUNDING_SIGMAS, ROUNDING_UNCERTAINTY, STEP,
+    REFERENCE_UNCERTAINTY, ROUNDING_SIGMAS, ROUNDING_UNCERTAINTY, STEP,
 };
+use crate::sensor_noise::UPPER_BANDS;
 
 /// What readings and residual show without a fit.
 pub(crate) struct Observations<'a> {
@@ -39,7 +41,7 @@ pub(crate) fn reportable_effects(
     library: &Library,
 ) -> EffectSet {
     let mut set = fit.set.filtered(|effect| {
-        let is_ordinary = is_ordinary(effect, ordinary_factor(model))
+        let is_ordinary = is_ordinary(effect, ordinary_factor(model, effect.kind()))
             && (is_ordinary(effect, 1.0) || !outweighs_reference(effect, model, fit));
         !is_ordinary && !is_rounding(effect, model)
     });
@@ -88,15 +90,26 @@ fn outweighs_reference(effect: &Effect, model: &FitModel, fit: &Fit) -> bool {
         && fit.linear.held_out - fit.held_out_without(effect.kind()) > OUTWEIGHING_NATS * values
 }
 
-/// Factor on what is ordinary: what is fitted to a poor reference is that much poorer.
-pub(crate) fn ordinary_factor(model: &FitModel) -> f64 {
+/// Factor on what is ordinary of an effect: what is fitted to a poor reference is that much poorer.
+pub(crate) fn ordinary_factor(model: &FitModel, kind: EffectKind) -> f64 {
     if is_reference_poor(model) {
         ORDINARY_BESIDE_REFERENCE_NOISE
-    } else if model.basis.undone_smoothing.is_some() {
+    } else if model.basis.undone_smoothing.is_some() && !is_late_or_grows(kind) {
         ORDINARY_BESIDE_SMOOTHING
     } else {
         1.0
     }
+}
+
+/// Whether an effect shows as nothing but what depends on time alone, or as a delay: a smoothing without phase leaves neither,
+/// however wrong its kernel is. (A bias shows where turns that it made too small leave one.)
+fn is_late_or_grows(kind: EffectKind) -> bool {
+    let Search::Fitted(search) = kind.spec().search else {
+        return false;
+    };
+    let shown = search.special_case_of;
+    let is_of_time = |one: &Dependence| matches!(one, Dependence::Time | Dependence::DelayOverTime);
+    !shown.is_empty() && shown.iter().all(is_of_time)
 }
 
 /// Whether an effect is no larger than what every recording has, times a factor.
@@ -226,8 +239,14 @@ fn excess_noise(model: &FitModel, observations: &Observations, channel: Channel)
     let prepared = model.prepared;
     let declared = prepared.declared[channel]?;
     let step = observations.step(channel);
+    // At 25 Hz the reference's error folds over into all bands.
+    let of_reference = model
+        .basis
+        .least_reference_error(prepared, channel, &UPPER_BANDS);
     // Rounding adds step^2 / 12 of noise of its own.
-    let beyond = observations.found_noise[channel].powi(2) - step * step / 12.0 - declared.powi(2);
+    let of_rounding = step * step / 12.0;
+    let found = observations.found_noise[channel].powi(2);
+    let beyond = found - of_rounding - declared.powi(2) - of_reference;
     // What a smoothed reference lacks is broad enough to pass for noise, and so are blows.
     let is_doubtful = model.basis.undone_smoothing.is_some()
         || prepared.missing.fraction > MANY_MISSING
@@ -237,7 +256,9 @@ fn excess_noise(model: &FitModel, observations: &Observations, channel: Channel)
     } else {
         EXCESS_NOISE
     };
-    let needed = factor * declared.powi(2) + ROUNDING_UNCERTAINTY * step * step / 12.0;
+    let needed = factor * declared.powi(2)
+        + ROUNDING_UNCERTAINTY * of_rounding
+        + REFERENCE_UNCERTAINTY * of_reference;
     let is_noise = observations.is_white[channel] && observations.is_steady[channel];
     (is_noise && beyond > needed).then(|| (beyond / prepared.rate_hz).sqrt())
 }

@@ -69,7 +69,11 @@ pub(crate) fn residual_regression(
     if dependence != Dependence::Time && !moving() {
         return None;
     }
-    let columns = all_whitened(model, &regressors(model, fit, dependence, channel));
+    let predicted = &fit.prediction.readings;
+    let columns = all_whitened(
+        model,
+        &regressors(model, fit, predicted, dependence, channel),
+    );
     let gain = gain(model, fit, &columns);
     Some(ResidualRegression {
         dependence,
@@ -83,12 +87,17 @@ pub(crate) fn residual_regression(
     })
 }
 
-/// What a residual gains by the rate of change of the readings themselves, nats. That of their prediction holds the
-/// reference's errors, and so does the residual: it goes with their second differences whatever the device does.
-/// The readings hold none of them. Their own noise, which the residual holds as well, is kept out as far as the
+/// What a residual gains by a family of the readings themselves, nats. Their prediction holds the reference's errors, and so
+/// does the residual: it goes with their second differences, and with the other channel, whatever the device does. The
+/// readings hold none of them. Their own noise, which the residual holds as well, is kept out as far as the
 /// reference's filters keep out all beyond the motion's band.
-pub(crate) fn gain_by_measured_changes(model: &FitModel, fit: &Fit, channel: Channel) -> f64 {
-    let columns = changes(&model.prepared.measured, axes_of_channel(channel));
+pub(crate) fn gain_by_measured(
+    model: &FitModel,
+    fit: &Fit,
+    dependence: Dependence,
+    channel: Channel,
+) -> f64 {
+    let columns = regressors(model, fit, &model.prepared.measured, dependence, channel);
     let spacing_hz = model.noise.spacing_hz;
     let passed = PerChannel::from_fn(|channel| {
         let hz = (0..model.noise.power[channel].len()).map(|k| k as f64 * spacing_hz);
@@ -185,14 +194,14 @@ fn whitened(model: &FitModel, whitener: &Whitener, (axis, values): &Column) -> V
     whitener.apply(&model.prepared.scattered(axes, |k, _| values[k] * factor))
 }
 
-/// The regressors of one family, before they are whitened.
+/// The regressors of one family of predicted or measured readings, before they are whitened.
 fn regressors(
     model: &FitModel,
     fit: &Fit,
+    readings: &[Reading],
     dependence: Dependence,
     channel: Channel,
 ) -> Vec<Column> {
-    let readings = &fit.prediction.readings;
     let axes = axes_of_channel(channel);
     match dependence {
         Dependence::OwnReading => curves(readings, axes),

@@ -20,7 +20,8 @@ const LEAST_RUNS: usize = 300;
 const QUIET_QUANTILE: f64 = 0.2;
 const QUIET_SIGMAS: f64 = 0.253_347_1;
 /// Bands in the upper half of a spectrum, in units of the Nyquist frequency.
-const UPPER_BANDS: [(f64, f64); 4] = [(0.5, 0.62), (0.62, 0.74), (0.74, 0.86), (0.86, 0.97)];
+pub(crate) const UPPER_BANDS: [(f64, f64); 4] =
+    [(0.5, 0.62), (0.62, 0.74), (0.74, 0.86), (0.86, 0.97)];
 /// And below it, where a reference resolves more of the motion.
 const LOWER_BANDS: [(f64, f64); 5] = [
     (0.03, 0.06),

@@ -17,7 +17,7 @@ use crate::policy::unknown::{
 };
 use crate::prepared::PreparedPlacement;
 use crate::residual_regressions::{
-    ResidualRegression, dependence_name, gain_by_measured_changes, residual_regression,
+    ResidualRegression, dependence_name, gain_by_measured, residual_regression,
     residual_regressions,
 };
 use crate::search::excess;
@@ -76,8 +76,8 @@ struct Seen {
     diagnostics: ResidualDiagnostics,
     /// The strongest first.
     regressions: Vec<ResidualRegression>,
-    /// Channels whose readings' own rate of change tells what that of the prediction does.
-    changes_tell: PerChannel<bool>,
+    /// Regressions on the prediction whose gain the readings themselves do not keep.
+    of_prediction_alone: Vec<(Dependence, Channel)>,
 }
 
 impl Rest {
@@ -87,12 +87,12 @@ impl Rest {
         let mut regressions = residual_regressions(findings);
         regressions.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         trace_regressions(&diagnostics, &regressions);
-        let changes_tell = changes_tell(findings, &regressions);
+        let of_prediction_alone = of_prediction_alone(findings, &regressions);
         Self {
             seen: Seen {
                 diagnostics,
                 regressions,
-                changes_tell,
+                of_prediction_alone,
             },
             standings: Standings::new(),
         }
@@ -314,27 +314,41 @@ fn bar_factor(model: &FitModel) -> f64 {
 
 /// Whether a regression may be on errors of the reference: what its filters keep out of the motion goes with
 /// the motion's rate of change as what a delay leaves does, and is no louder than is expected of it; what they
-/// let through is in the prediction's rate of change, and not in the readings'.
+/// let through is in the prediction, and not in the readings.
 fn may_be_references(seen: &Seen, regression: &ResidualRegression) -> bool {
-    let channel = regression.channel;
-    regression.dependence == Dependence::RateOfChange
-        && (seen.diagnostics.band[channel] < ORDINARY_BAND || !seen.changes_tell[channel])
+    let (dependence, channel) = (regression.dependence, regression.channel);
+    let is_ordinary =
+        dependence == Dependence::RateOfChange && seen.diagnostics.band[channel] < ORDINARY_BAND;
+    is_ordinary || seen.of_prediction_alone.contains(&(dependence, channel))
 }
 
-/// Channels in which a strong regression on the prediction's rate of change keeps its gain on the readings' own.
-fn changes_tell(findings: &Findings, regressions: &[ResidualRegression]) -> PerChannel<bool> {
+/// Strong regressions on the prediction's rate of change and on the other channel that keep less of their gain on the
+/// readings' own: an error of the rotation turns gravity in one channel and is a rate in the other.
+fn of_prediction_alone(
+    findings: &Findings,
+    regressions: &[ResidualRegression],
+) -> Vec<(Dependence, Channel)> {
     let (model, fit) = (&findings.model, &findings.scored.fit);
-    PerChannel::from_fn(|channel| {
-        let found = regressions.iter().find(|regression| {
-            regression.dependence == Dependence::RateOfChange && regression.channel == channel
+    let asked = [
+        Dependence::RateOfChange,
+        Dependence::OtherChannel,
+        Dependence::OtherChannelSquared,
+    ];
+    let strong = regressions.iter().filter(|regression| {
+        asked.contains(&regression.dependence) && regression.gain > REGRESSION_NATS
+    });
+    let alone = strong.filter(|regression| {
+        let (dependence, channel) = (regression.dependence, regression.channel);
+        let gain = gain_by_measured(model, fit, dependence, channel);
+        trace(|| {
+            let of_prediction = regression.gain;
+            eprintln!("{dependence:?} by the readings {gain:.0} of {of_prediction:.0}");
         });
-        let Some(of_prediction) = found.filter(|found| found.gain > REGRESSION_NATS) else {
-            return false;
-        };
-        let gain = gain_by_measured_changes(model, fit, channel);
-        trace(|| eprintln!("by measured changes {gain:.0} of {:.0}", of_prediction.gain));
-        gain > STAYS * of_prediction.gain
-    })
+        gain <= STAYS * regression.gain
+    });
+    alone
+        .map(|regression| (regression.dependence, regression.channel))
+        .collect()
 }
 
 /// Rounding errors of slow motion are no noise at all.
