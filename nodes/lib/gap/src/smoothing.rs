@@ -53,16 +53,14 @@ pub(crate) fn try_smoothing<'a>(
     };
     let sets = starting_sets(starts, found, library);
     let needed = needed(&model, &scored);
-    let of_plain = |set: &EffectSet| residual_norms(&model, &score(&model, set.clone()));
     let trial = Trial {
-        plain_norms: sets.iter().map(of_plain).collect(),
         plain,
         without_smoothing,
         needed,
         plain_ratio: scored.fit.held_out_ratio(),
         model: &model,
         start: &starts[0],
-        sets: &sets,
+        beside: with_plain_norms(&model, sets.clone()),
     };
     let Some(first) = trial.best_of_second_order() else {
         return (model, scored);
@@ -108,7 +106,8 @@ struct Trial<'t, 'a> {
     model: &'t FitModel<'a>,
     /// What is certain from the start.
     start: &'t EffectSet,
-    sets: &'t [EffectSet],
+    /// The sets that are tried, with how far the reference as it is is off with each.
+    beside: Vec<(EffectSet, PerChannel<f64>)>,
     /// Evidence of the reference as it is, nats.
     plain: f64,
     /// The same without effects that cannot be told from a smoothing.
@@ -117,8 +116,6 @@ struct Trial<'t, 'a> {
     needed: f64,
     /// Held-out mean square of the whitened residual of the reference as it is.
     plain_ratio: PerChannel<f64>,
-    /// How far the reference as it is is off with each of the sets.
-    plain_norms: Vec<PerChannel<f64>>,
 }
 
 /// A smoothing that was tried.
@@ -142,16 +139,19 @@ impl<'a> Trial<'_, 'a> {
         let mut smoothing = first.smoothing;
         let mut set_of_first = Some(first.set);
         for pass in 0..SHARPENINGS {
-            let beside = self.beside(&searched.fit.set, set_of_first.take(), library);
+            let found = &searched.fit.set;
+            let mut sets = vec![found.clone()];
+            sets.extend(with_all_delay_by_filter(found, library));
+            let other = set_of_first.take();
+            sets.extend(other.filter(|other| names(other) != names(found)));
+            let beside = Trial {
+                beside: with_plain_norms(self.model, sets),
+                ..*self
+            };
             let begun = Tried {
                 evidence: evidence(&undone, &searched),
                 smoothing,
-                set: searched.fit.set.clone(),
-            };
-            let beside = Trial {
-                sets: &beside.0,
-                plain_norms: beside.1,
-                ..*self
+                set: found.clone(),
             };
             let sharp = if pass == 0 {
                 beside.best_kernel(begun)
@@ -162,8 +162,10 @@ impl<'a> Trial<'_, 'a> {
             if sharp.smoothing == smoothing && !leaves_more {
                 break;
             }
-            smoothing = sharp.smoothing;
-            undone = with_undone_smoothing(self.model, self.start, smoothing);
+            if sharp.smoothing != smoothing {
+                smoothing = sharp.smoothing;
+                undone = with_undone_smoothing(self.model, self.start, smoothing);
+            }
             let before = names(&sharp.set);
             searched = search_down_to_noise(&undone, &[sharp.set], library, BESIDE);
             if names(&searched.fit.set) == before {
@@ -186,22 +188,6 @@ impl<'a> Trial<'_, 'a> {
         [(self.model, &both), (&same_filters, since)]
             .into_iter()
             .all(|(model, set)| gained > needed(model, &score(model, set.clone())))
-    }
-
-    /// Sets to try beside a smoothing where one was found, with how far the reference as it is is off with each.
-    fn beside(
-        &self,
-        found: &EffectSet,
-        other: Option<EffectSet>,
-        library: &[EffectKind],
-    ) -> (Vec<EffectSet>, Vec<PerChannel<f64>>) {
-        let mut sets = vec![found.clone()];
-        sets.extend(with_all_delay_by_filter(found, library));
-        sets.extend(other.filter(|other| names(other) != names(found)));
-        let of_plain =
-            |set: &EffectSet| residual_norms(self.model, &score(self.model, set.clone()));
-        let plain_norms = sets.iter().map(of_plain).collect();
-        (sets, plain_norms)
     }
 
     /// The kernel with the most evidence: Butterworth's of the second order, or the fourth; where that is better the third, else
@@ -235,13 +221,15 @@ impl<'a> Trial<'_, 'a> {
     /// Butterworth's of the second order with the most evidence.
     fn best_of_second_order(&self) -> Option<Tried> {
         let best = self.best_of_grid()?;
-        let which = self
-            .sets
-            .iter()
-            .position(|set| names(set) == names(&best.set))?;
+        let is_best = |(set, _): &&(EffectSet, _)| names(set) == names(&best.set);
         let beside_best = Trial {
-            sets: &self.sets[which..=which],
-            plain_norms: vec![self.plain_norms[which]],
+            beside: self
+                .beside
+                .iter()
+                .find(is_best)
+                .cloned()
+                .into_iter()
+                .collect(),
             ..*self
         };
         let best = beside_best.refined(best, BETWEEN_ORDERS);
@@ -321,9 +309,8 @@ impl<'a> Trial<'_, 'a> {
             return None;
         }
         let found = self
-            .sets
+            .beside
             .iter()
-            .zip(&self.plain_norms)
             .map(|(set, plain)| (score_after(&undone, set.clone(), TRIAL_STEPS), plain))
             .filter(|(found, plain)| {
                 let norms = residual_norms(&undone, found);
@@ -345,6 +332,15 @@ impl<'a> Trial<'_, 'a> {
             set: found.fit.set,
         })
     }
+}
+
+/// Sets with how far the reference as it is is off with each.
+fn with_plain_norms(model: &FitModel, sets: Vec<EffectSet>) -> Vec<(EffectSet, PerChannel<f64>)> {
+    let with_norms = |set: EffectSet| {
+        let norms = residual_norms(model, &score(model, set.clone()));
+        (set, norms)
+    };
+    sets.into_iter().map(with_norms).collect()
 }
 
 /// A set in which a filter alone makes the readings late, where an offset does, or both: beside a cutoff of the smoothing
