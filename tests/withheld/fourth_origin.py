@@ -2,12 +2,9 @@
 """Cases of a fourth generator, written from the contract alone by somebody who had seen none of the others: its own motions (`fourth_motions.py`, splines through poses at 2 kHz), sizes,
 rates and nuisances, its own reading of the measurement model and of what can be seen; it shares only the files' form with the rest. Times are seconds from the session's base (whole
 nanoseconds since 1970 are kept apart)."""
-import argparse
 import hashlib
 import json
-import os
 import zlib
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path as File
 
 import numpy as np
@@ -540,21 +537,8 @@ def build(job):
 
 
 def generate(out, suite, seed, count, jobs=1):
-    labels = first_hand.labels_folder(out)
-    os.makedirs(out, exist_ok=True)
-    os.makedirs(labels, exist_ok=True)
-    with ProcessPoolExecutor(jobs) as pool:
-        found = pool.map(build, [(out, suite, seed, index) for index in range(count or len(EFFECTS))])
-        return [first_hand.write_label(labels, label) for label in found if label is not None]
+    return first_hand.write_all(out, build, [(out, suite, seed, index) for index in range(count or len(EFFECTS))], jobs)
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("out", help="folder of the cases; their labels come into OUT-labels")
-    parser.add_argument("--suite", choices=SUITES, required=True)
-    parser.add_argument("--count", type=int)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--jobs", type=int, default=1)
-    options = parser.parse_args()
-    for case in generate(options.out, options.suite, options.seed, options.count, options.jobs):
-        print(case)
+    first_hand.command_line(__doc__, SUITES, generate)

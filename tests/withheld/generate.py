@@ -279,19 +279,34 @@ def write_label(labels, label):
 def generate(out, suite, seed=1, count=None, only=None, jobs=1, seconds=None):
     if seconds and suite == "outside":
         sys.exit("--seconds: the effects of the outside suite are made for its own length")
-    labels = labels_folder(out)
-    os.makedirs(out, exist_ok=True)
-    os.makedirs(labels, exist_ok=True)
     if motions.data_folder() is None:
         print("motion data absent (CROMOSIM_DATA): synthetic motions only", file=sys.stderr)
     seconds = seconds or usual_seconds(suite)
     work = [(out, suite, seed, index, planned, seconds) for index, planned in enumerate(plan(suite, count))]
     work = [job for job in work if only is None or case_name(suite, seed, job[3], seconds) == only]
-    names = []
+    return write_all(out, build, work, jobs)
+
+
+def write_all(out, build, work, jobs):
+    """Builds the cases of some work in so many processes; their names. `build` writes a case and returns its label, none where there is no case."""
+    labels = labels_folder(out)
+    os.makedirs(out, exist_ok=True)
+    os.makedirs(labels, exist_ok=True)
     with ProcessPoolExecutor(jobs) as pool:
-        for label in pool.map(build, work):
-            names.append(write_label(labels, label))
-    return names
+        return [write_label(labels, label) for label in pool.map(build, work) if label is not None]
+
+
+def command_line(doc, suites, generate):
+    """What the other generators do on their own."""
+    parser = argparse.ArgumentParser(description=doc)
+    parser.add_argument("out", help="folder of the cases; their labels come into OUT-labels")
+    parser.add_argument("--suite", choices=list(suites), required=True)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--count", type=int)
+    parser.add_argument("--jobs", type=int, default=1)
+    options = parser.parse_args()
+    for case in generate(options.out, options.suite, options.seed, options.count, options.jobs):
+        print(case)
 
 
 if __name__ == "__main__":

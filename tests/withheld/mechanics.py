@@ -7,10 +7,8 @@
 The engine's own accelerometer and gyroscope at a site are what the IMU reads. One continuous run of 0.5 ms steps (RK4) a case; fit and check
 are two stretches of it. --verify also says how far model.py's formulas, at the true parameters, are from the engine without any noise."""
 import argparse
-import json
 import os
 import sys
-from concurrent.futures import ProcessPoolExecutor
 
 for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(threads, "1")
@@ -287,12 +285,7 @@ def build(job):
 
 
 def generate(out, seed=1, count=None, jobs=1, verify=False):
-    labels = suites.labels_folder(out)
-    for folder in (out, labels):
-        os.makedirs(folder, exist_ok=True)
-    work = [(out, seed, index, planned, verify) for index, planned in enumerate(plan(count))]
-    with ProcessPoolExecutor(jobs) as pool:
-        return [suites.write_label(labels, label) for label in pool.map(build, work)]
+    return suites.write_all(out, build, [(out, seed, index, planned, verify) for index, planned in enumerate(plan(count))], jobs)
 
 
 if __name__ == "__main__":

@@ -3,10 +3,8 @@
 
 Nothing of model.py, effects.py and motions.py is used; only the files' form (recording.py) and the labels' (generate.py).
 The mass on a spring is integrated by the implicit midpoint rule, with the contract's equation as it stands there."""
-import argparse
 import hashlib
 import os
-from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -305,20 +303,8 @@ def build(job):
 
 
 def generate(out, suite, seed, count, jobs=1):
-    labels = first_hand.labels_folder(out)
-    os.makedirs(out, exist_ok=True)
-    os.makedirs(labels, exist_ok=True)
-    with ProcessPoolExecutor(jobs) as pool:
-        return [first_hand.write_label(labels, label) for label in pool.map(build, [(out, suite, seed, index, None) for index in range(count or 20)])]
+    return first_hand.write_all(out, build, [(out, suite, seed, index, None) for index in range(count or 20)], jobs)
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("out")
-    parser.add_argument("--suite", choices=list(SUITES), required=True)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--count", type=int)
-    parser.add_argument("--jobs", type=int, default=1)
-    options = parser.parse_args()
-    for case in generate(options.out, options.suite, options.seed, options.count, options.jobs):
-        print(case)
+    first_hand.command_line(__doc__, SUITES, generate)

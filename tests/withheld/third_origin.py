@@ -1,9 +1,7 @@
 #!/usr/bin/env python3
 """Cases of a third generator, written from the contract alone by somebody who had seen neither of the others: its own motions (`third_motions.py`), strengths, rates and nuisances,
 its own reading of the measurement model; it shares only the files' form with the rest. Times are seconds from t0 throughout."""
-import argparse
 import os
-from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 from scipy import signal
@@ -15,7 +13,7 @@ import generate as first_hand
 import recording
 import third_motions
 
-SUITES = ("third-single", "third-pair", "third-triple", "third-none", "third-placement")
+SUITES = ("third-single", "third-pair", "third-triple", "third-none", "third-placement", "third-smoothing")
 G = np.array([0, 0, -9.80665])
 RAD = np.pi / 180
 
@@ -484,6 +482,8 @@ def names_of(suite, index, rng):
         return []
     while True:
         names = [str(name) for name in rng.choice(EFFECTS, 2 if suite == "third-pair" else 3, replace=False)]
+        if suite == "third-smoothing":  # beside one other, or two
+            names = ["reference_smoothing", *(name for name in names if name != "reference_smoothing")][:2 + index % 2]
         if not any(a in names and b in names for a, b in APART):
             return names
 
@@ -535,21 +535,8 @@ def build(job):
 
 
 def generate(out, suite, seed, count, jobs=1):
-    labels = first_hand.labels_folder(out)
-    os.makedirs(out, exist_ok=True)
-    os.makedirs(labels, exist_ok=True)
-    with ProcessPoolExecutor(jobs) as pool:
-        found = pool.map(build, [(out, suite, seed, index) for index in range(count or 20)])
-        return [first_hand.write_label(labels, label) for label in found if label is not None]
+    return first_hand.write_all(out, build, [(out, suite, seed, index) for index in range(count or 20)], jobs)
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("out", help="folder of the cases; their labels come into OUT-labels")
-    parser.add_argument("--suite", choices=SUITES, required=True)
-    parser.add_argument("--count", type=int)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--jobs", type=int, default=1)
-    options = parser.parse_args()
-    for case in generate(options.out, options.suite, options.seed, options.count, options.jobs):
-        print(case)
+    first_hand.command_line(__doc__, SUITES, generate)
