@@ -142,7 +142,7 @@ def digital(x, channel, t, fx, t0, sigma=0.0, rate=1.0, rng=None, units=True, ro
 
 def lost_samples(rng, count, fraction, mean_burst):
     """True for what is kept; bursts have geometric lengths and the first sample stays."""
-    keep, here, lost = np.ones(count, bool), 1, 0
+    keep, lost = np.ones(count, bool), 0
     while lost < fraction * count:
         start, length = rng.integers(1, count - 1), rng.geometric(1 / max(mean_burst, 1.0))
         lost += int(keep[start:start + length].sum())
