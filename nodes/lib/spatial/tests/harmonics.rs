@@ -1,4 +1,4 @@
-//! Harmonics of what is shaken now and then are motion, with quiet frequencies before them.
+//! Harmonics of what is shaken now and then, and motors, are motion, with quiet frequencies before them.
 #![allow(clippy::unwrap_used)]
 
 mod support;
@@ -55,6 +55,42 @@ fn the_second_harmonic_of_a_shake_is_kept() {
     assert!(
         errors < 0.05 * squares,
         "{} of the harmonic's power is lost",
+        errors / squares
+    );
+}
+
+/// A motor of a tool, amid noise of half its size.
+#[test]
+fn a_motor_is_kept_whose_speed_changes() {
+    const RATE_HZ: f64 = 300.0;
+    const NOISE: f64 = 2.4e-5;
+    const MOTOR: f64 = 5e-5;
+    let mut state = 6;
+    let mut draw = || Vector3::from_fn(|_, _| NOISE * noise(&mut state));
+    // From 36 to 44 Hz within two seconds.
+    let phase = |t: f64| TAU * 40.0 * t + 16.0 * (TAU * 0.25 * t).sin();
+    let tool = |t: f64| {
+        let way = 0.2 * (TAU * 0.4 * t).sin();
+        Vector3::new(way, MOTOR * phase(t).sin(), MOTOR * phase(t).cos())
+    };
+    let stamp = |k: i64| Stamp::from_nanos(0).plus_seconds(k as f64 / RATE_HZ);
+    let poses = 0..(30.0 * RATE_HZ) as i64;
+    let stamps: Vec<Stamp> = poses.clone().map(stamp).collect();
+    let positions: Vec<_> = poses.map(|k| tool(k as f64 / RATE_HZ) + draw()).collect();
+    let rotations = vec![UnitQuaternion::identity(); stamps.len()];
+    let track = PoseEstimate::fit(&stamps, &positions, &rotations)
+        .unwrap()
+        .track(RATE_HZ);
+    let (mut errors, mut squares) = (0.0, 0.0);
+    for k in RATE_HZ as usize..track.len() - RATE_HZ as usize {
+        let (t, step) = (k as f64 / track.rate_hz, 1e-5);
+        let true_one = (tool(t + step) - 2.0 * tool(t) + tool(t - step)) / (step * step);
+        errors += (track.acceleration_in_segment[k].y - true_one.y).powi(2);
+        squares += true_one.y.powi(2);
+    }
+    assert!(
+        errors < 0.25 * squares,
+        "{} of the motor's power is lost",
         errors / squares
     );
 }
