@@ -37,6 +37,13 @@ const LOCAL_EDGE: f64 = 2.2;
 /// neighbours) one entry in 10^7 reaches half as much. Chosen among 3.5, 5 and 8 on 448 readings' errors of the withheld
 /// second generator (seed 11) and the fourth (seed 2): with 5 two of them rose by more than 2 %, with 8 none.
 const LOCAL_LINE: f64 = 8.0;
+/// Width below which a run of such entries is one steady frequency, Hz: a window resolves 0.75, its five neighbours as much
+/// again.
+const STEADY_HZ: f64 = 3.0;
+/// Fastest steady frequency that is motion, Hz: what people shake and step at lies below, with its first harmonics. Faster ones
+/// are machines that shake the reference too, whose phase and size a `vibration` describes better than poses show them. No
+/// source for the number.
+const FASTEST_STEADY_HZ: f64 = 15.0;
 /// How far around a spectral line the filter stays open, Hz: a line's amplitude changes over some
 /// seconds. No source for the number.
 const LINE_REACH_HZ: f64 = 0.1;
@@ -237,7 +244,7 @@ impl NoiseFloor {
         let lines = if self.is_wandering() || undone.is_some() {
             vec![false; bins]
         } else {
-            lines_from(&ratio, edge)
+            lines_from(&ratio, edge, spectrum.spacing_hz)
         };
         // Above what the noise is, at the last three frequencies of the band.
         let last = (1..=3)
@@ -378,14 +385,16 @@ fn widened(weights: Vec<f64>, reach: usize) -> Vec<f64> {
     (0..weights.len()).map(largest_around).collect()
 }
 
-/// Which entries from one on belong to motion: to a run above [`LOCAL_EDGE`] that reaches [`LOCAL_LINE`], however wide and
-/// fast, since a motor's speed changes within a window.
-fn lines_from(ratio: &[f64], from: usize) -> Vec<bool> {
+/// Which entries from one on belong to motion: to a run above [`LOCAL_EDGE`] that reaches [`LOCAL_LINE`] and is wide, as of
+/// a tool whose speed changes within a window, or slow.
+fn lines_from(ratio: &[f64], from: usize, spacing_hz: f64) -> Vec<bool> {
     let mut lines = vec![false; ratio.len()];
     let mut start = from;
     for run in ratio[from..].split(|value| *value < LOCAL_EDGE) {
         let end = start + run.len();
-        if run.iter().any(|value| *value > LOCAL_LINE) {
+        let is_machine = run.len() as f64 * spacing_hz <= STEADY_HZ
+            && end as f64 * spacing_hz > FASTEST_STEADY_HZ;
+        if run.iter().any(|value| *value > LOCAL_LINE) && !is_machine {
             lines[start..end].fill(true);
         }
         start = end + 1;
