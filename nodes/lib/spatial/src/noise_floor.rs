@@ -34,8 +34,8 @@ const NOISE_ALONE_BEYOND_BAND: f64 = 2.2;
 const LOCAL_EDGE: f64 = 2.2;
 /// Multiple of the noise that a window's spectrum reaches beyond that band only where there is motion: a harmonic of what is
 /// shaken or stepped, a motor, with quiet frequencies before it. By chance (17 degrees of freedom: three axes, five
-/// neighbours) one entry in 10^7 reaches half as much. Chosen among 3.5, 5 and 8 on 448 readings' errors of the withheld
-/// second generator (seed 11) and the fourth (seed 2): with 5 two of them rose by more than 2 %, with 8 none.
+/// neighbours) one entry in 10^7 reaches half as much. No source for the
+/// number.
 const LOCAL_LINE: f64 = 8.0;
 /// Width below which a run of such entries is one steady frequency, Hz: a window resolves 0.75, its five neighbours as much
 /// again.
