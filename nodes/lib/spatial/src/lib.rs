@@ -34,6 +34,7 @@ mod adaptive_fit;
 mod banded;
 mod basis;
 mod beyond;
+mod beyond_band;
 mod chords;
 mod confidence;
 mod derivative;

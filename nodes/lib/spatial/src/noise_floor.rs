@@ -1,5 +1,6 @@
 //! What is noise and what is motion in a spectrum of poses.
 
+use crate::beyond_band::{motion_beyond, steady_machines};
 use crate::local_noise::local_noise;
 use crate::noise_shape::NoiseShape;
 use crate::pose_spectra::mean_spectrum;
@@ -32,18 +33,6 @@ const NOISE_ALONE: [f64; 3] = [1.4, 3.0, 8.0];
 const NOISE_ALONE_BEYOND_BAND: f64 = 2.2;
 /// Multiple of the noise at which a window's own band of motion ends; no source.
 const LOCAL_EDGE: f64 = 2.2;
-/// Multiple of the noise that a window's spectrum reaches beyond that band only where there is motion: a harmonic of what is
-/// shaken or stepped, a motor, with quiet frequencies before it. By chance (17 degrees of freedom: three axes, five
-/// neighbours) one entry in 10^7 reaches half as much. No source for the
-/// number.
-const LOCAL_LINE: f64 = 8.0;
-/// Width below which a run of such entries is one steady frequency, Hz: a window resolves 0.75, its five neighbours as much
-/// again.
-const STEADY_HZ: f64 = 3.0;
-/// Fastest steady frequency that is motion, Hz: what people shake and step at lies below, with its first harmonics. Faster ones
-/// are machines that shake the reference too, whose phase and size a `vibration` describes better than poses show them. No
-/// source for the number.
-const FASTEST_STEADY_HZ: f64 = 15.0;
 /// How far around a spectral line the filter stays open, Hz: a line's amplitude changes over some
 /// seconds. No source for the number.
 const LINE_REACH_HZ: f64 = 0.1;
@@ -177,6 +166,7 @@ impl NoiseFloor {
         reach: usize,
     ) {
         let mut mean = vec![0.0; self.filter.len()];
+        let machines = steady_machines(local, &self.spectra[2].spectrum);
         self.windows = (0..local.len())
             .map(|window| {
                 let spectrum = &local[window];
@@ -185,9 +175,10 @@ impl NoiseFloor {
                     None => local_noise(spectrum, rate_hz, self.spectrum()),
                 };
                 let spectrum = with_ringing(local, window);
+                let (own, machines) = ((&spectrum, noise), machines.as_slice());
                 let filter = Filter {
                     spacing_hz: spectrum.spacing_hz,
-                    weights: self.local_weights(&spectrum, rate_hz, (undone, reach), noise),
+                    weights: self.local_weights(own, machines, rate_hz, (undone, reach)),
                     noise,
                 };
                 for (k, sum) in mean.iter_mut().enumerate() {
@@ -217,13 +208,13 @@ impl NoiseFloor {
     }
 
     /// The filter's weights at the frequencies of one window's spectrum, whose noise is so many times as
-    /// dense as that of the whole series.
+    /// dense as that of the whole series, and at some of which machines are.
     fn local_weights(
         &self,
-        spectrum: &Spectrum,
+        (spectrum, noise): (&Spectrum, f64),
+        machines: &[bool],
         rate_hz: f64,
         (undone, reach): (Option<ZeroPhaseSmoothing>, usize),
-        noise: f64,
     ) -> Vec<f64> {
         let noise_at = |hz: f64| noise * self.noise_at(hz);
         let gain2 = |hz: f64| undoing_gain(hz, undone, rate_hz).powi(2);
@@ -244,7 +235,7 @@ impl NoiseFloor {
         let lines = if self.is_wandering() || undone.is_some() {
             vec![false; bins]
         } else {
-            lines_from(&ratio, edge, spectrum.spacing_hz)
+            motion_beyond(&ratio, (LOCAL_EDGE, edge), spectrum.spacing_hz, machines)
         };
         // Above what the noise is, at the last three frequencies of the band.
         let last = (1..=3)
@@ -383,23 +374,6 @@ fn widened(weights: Vec<f64>, reach: usize) -> Vec<f64> {
         around.iter().copied().fold(0.0, f64::max)
     };
     (0..weights.len()).map(largest_around).collect()
-}
-
-/// Which entries from one on belong to motion: to a run above [`LOCAL_EDGE`] that reaches [`LOCAL_LINE`] and is wide, as of
-/// a tool whose speed changes within a window, or slow.
-fn lines_from(ratio: &[f64], from: usize, spacing_hz: f64) -> Vec<bool> {
-    let mut lines = vec![false; ratio.len()];
-    let mut start = from;
-    for run in ratio[from..].split(|value| *value < LOCAL_EDGE) {
-        let end = start + run.len();
-        let is_machine = run.len() as f64 * spacing_hz <= STEADY_HZ
-            && end as f64 * spacing_hz > FASTEST_STEADY_HZ;
-        if run.iter().any(|value| *value > LOCAL_LINE) && !is_machine {
-            lines[start..end].fill(true);
-        }
-        start = end + 1;
-    }
-    lines
 }
 
 /// Density of the noise that was there before a smoothing: where the undone spectrum is least, beyond

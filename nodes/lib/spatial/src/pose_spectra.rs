@@ -9,6 +9,10 @@ use crate::{Spectrum, welch};
 /// much of the entry, at most: the slope of a steep spectrum would spill into the noise. No source.
 const LARGEST_SPILL: f64 = 4.0;
 
+/// Height of a line in [`local_spectra`] over that in an unsmoothed spectrum: Hann's window gives its neighbours a quarter
+/// each.
+pub(crate) const LINE_SMOOTHED: f64 = 4.0 / 9.0;
+
 /// Mean Welch spectrum of several coordinates, with windows of `window` samples.
 pub(crate) fn mean_spectrum(coordinates: &[Vec<f64>], rate_hz: f64, window: usize) -> Spectrum {
     let mut mean = Spectrum::default();
