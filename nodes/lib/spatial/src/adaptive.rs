@@ -3,10 +3,11 @@
 use crate::SpatialError;
 use crate::equations::{IntervalWeights, SplineEquations};
 use crate::fourth_differences::{MEDIAN_OF_SQUARE, fourth_difference, white_noise_variance};
+use crate::kernel::{Evidence, Kernel};
 use crate::local_spline::{LocalSolution, Series, Statements};
-use crate::low_passed::{LowPassed, LowPassedSamples};
+use crate::low_passed::{LowPassed, LowPassedLanes, LowPassedSamples};
 use crate::weight_search::LOWEST_LOG_WEIGHT;
-use crate::wide::{Four, add, scale, widest};
+use crate::wide::{Four, add_product, add_scaled, divided, formula, multiply, scaled, widest};
 
 /// Time over which neighbours share one drive, standard deviation, s: shorter, a burst's own noise
 /// decides; longer, a burst's start is smoothed away. Chosen among 0.05, 0.1, 0.15 and 0.25 s on
@@ -134,11 +135,8 @@ impl<const L: usize> Adaptation<L> {
         series: &Series<C, L>,
         expected: [ExpectedNoise; L],
     ) -> Self {
-        let least_noise: [f64; L] = std::array::from_fn(|lane| {
-            (LEAST_NOISE * range(series, lane))
-                .max(LEAST_NOISE_AT_ALL)
-                .powi(2)
-        });
+        let least_noise =
+            ranges(series).map(|range| (LEAST_NOISE * range).max(LEAST_NOISE_AT_ALL).powi(2));
         let noise: [f64; L] = std::array::from_fn(|lane| {
             fourth_difference_variance(series, lane).max(least_noise[lane])
         });
@@ -217,7 +215,7 @@ impl<const L: usize> Adaptation<L> {
         stride: Stride,
     ) {
         widest!(s => {
-            self.take_evidence(equations, weights, statements);
+            self.take_evidence(s, equations, weights, statements);
             self.update(s, equations, statements, stride);
         });
     }
@@ -230,45 +228,90 @@ impl<const L: usize> Adaptation<L> {
     /// The penalty's weight over each knot interval: the noise changes so little over a spline's
     /// width that its quotient with the drive may stand for both.
     pub(crate) fn weights(&self) -> Vec<IntervalWeights<L>> {
-        let lowest = 10f64.powf(LOWEST_LOG_WEIGHT);
         let mut weights = vec![[[0.0; L]; 2]; self.drive.len()];
-        widest!(_s => {
-            for (k, [fifth, second]) in weights.iter_mut().enumerate() {
-                for lane in 0..L {
-                    let noise = self.noise_over(k, lane);
-                    fifth[lane] = (noise / self.drive[k][lane]).clamp(lowest, LARGEST_WEIGHT);
-                    second[lane] = noise / (self.vigour[k][lane] + noise * self.least_vigour);
-                }
+        widest!(s => {
+            self.weigh_white(s, &mut weights);
+            if self.low_passed.iter().any(Option::is_some) {
+                self.weigh_low_passed(s, &mut weights);
             }
         });
-        for (lane, low_passed) in self.low_passed.iter().enumerate() {
-            if let Some(low_passed) = low_passed {
-                self.weigh_low_passed(low_passed, lane, &mut weights);
-            }
-        }
         weights
     }
 
-    /// Makes weights for white noise those for noise behind a low-pass.
-    fn weigh_low_passed(
-        &self,
-        low_passed: &LowPassedSamples,
-        lane: usize,
-        weights: &mut [IntervalWeights<L>],
-    ) {
-        let lowest = 10f64.powf(LOWEST_LOG_WEIGHT);
+    #[inline(always)]
+    fn weigh_white(&self, s: impl Four, weights: &mut [IntervalWeights<L>]) {
+        let lowest = s.splat(10f64.powf(LOWEST_LOG_WEIGHT));
+        let largest = s.splat(LARGEST_WEIGHT);
         for (k, [fifth, second]) in weights.iter_mut().enumerate() {
-            let at_cutoff = low_passed.at_cutoff(fifth[lane]);
-            let noise = self.noise_over(k, lane) * at_cutoff;
-            fifth[lane] = (fifth[lane] * at_cutoff).max(lowest);
-            second[lane] = noise / (self.vigour[k][lane] + noise * self.least_vigour);
+            let noise = self.noise_over(s, k);
+            *fifth = formula(
+                s,
+                [&noise, &self.drive[k]],
+                #[inline(always)]
+                |[noise, drive]| {
+                    let weight = s.divide(noise, drive);
+                    s.less(largest, s.greater(lowest, weight))
+                },
+            );
+            *second = self.second_weight(s, k, &noise);
+        }
+    }
+
+    /// Makes weights for white noise those for noise behind a low-pass.
+    #[inline(always)]
+    fn weigh_low_passed(&self, s: impl Four, weights: &mut [IntervalWeights<L>]) {
+        let lowest = s.splat(10f64.powf(LOWEST_LOG_WEIGHT));
+        let low_passed = LowPassedLanes::new(self.low_passed);
+        for (k, [fifth, second]) in weights.iter_mut().enumerate() {
+            let at_cutoff = low_passed.at_cutoff(s, fifth);
+            let mut noise = self.noise_over(s, k);
+            multiply(s, &mut noise, &at_cutoff);
+            let own = formula(
+                s,
+                [fifth, &at_cutoff],
+                #[inline(always)]
+                |[weight, at_cutoff]| s.greater(s.multiply(weight, at_cutoff), lowest),
+            );
+            self.take_low_passed(fifth, &own);
+            self.take_low_passed(second, &self.second_weight(s, k, &noise));
+        }
+    }
+
+    /// That of the second derivative, for noise of this variance over a knot interval.
+    #[inline(always)]
+    fn second_weight(&self, s: impl Four, interval: usize, noise: &[f64; L]) -> [f64; L] {
+        let least = s.splat(self.least_vigour);
+        formula(
+            s,
+            [noise, &self.vigour[interval]],
+            #[inline(always)]
+            |[noise, vigour]| s.divide(noise, s.add(vigour, s.multiply(noise, least))),
+        )
+    }
+
+    /// Of lanes whose noise was low-passed before, these values.
+    #[inline(always)]
+    fn take_low_passed(&self, values: &mut [f64; L], of_low_passed: &[f64; L]) {
+        if self.low_passed.iter().all(Option::is_some) {
+            *values = *of_low_passed;
+            return;
+        }
+        for lane in 0..L {
+            if self.low_passed[lane].is_some() {
+                values[lane] = of_low_passed[lane];
+            }
         }
     }
 
     /// Variance of the noise over a knot interval.
     #[inline(always)]
-    fn noise_over(&self, interval: usize, lane: usize) -> f64 {
-        (self.noise[interval][lane] * self.noise[interval + 1][lane]).sqrt()
+    fn noise_over(&self, s: impl Four, interval: usize) -> [f64; L] {
+        formula(
+            s,
+            [&self.noise[interval], &self.noise[interval + 1]],
+            #[inline(always)]
+            |[a, b]| s.square_root(s.multiply(a, b)),
+        )
     }
 
     /// A step towards the greatest likelihood.
@@ -284,53 +327,36 @@ impl<const L: usize> Adaptation<L> {
         }: &mut Statements<L>,
         stride: Stride,
     ) {
+        let mut room = residuals.clone();
         let mut near = drives.clone();
-        Kernel::new(NEAR_DRIVE_INTERVALS).smooth(s, &mut near);
-        let around = local_means(s, drives, SHARED_DRIVE_S / equations.interval);
-        for ((drive, near), around) in self.drive.iter_mut().zip(near).zip(around) {
-            let found = with_expected(near, around, NEAR_DRIVE_COUNT);
+        Kernel::new(NEAR_DRIVE_INTERVALS).smooth(s, &mut near, &mut room);
+        smooth_shared(s, drives, SHARED_DRIVE_S / equations.interval, &mut room);
+        for ((drive, near), around) in self.drive.iter_mut().zip(&near).zip(&*drives) {
+            let found = with_expected(s, near, &mean(s, around), NEAR_DRIVE_COUNT);
             *drive = match stride {
                 Stride::Whole => found,
                 Stride::Half => std::array::from_fn(|lane| (drive[lane] * found[lane]).sqrt()),
             };
         }
-        self.learn_vigour(s, equations, accelerations);
-        take_fourth_roots(s, residuals);
-        let found = local_means(s, residuals, SHARED_NOISE_S / equations.interval)
-            .map(|roots| roots.map(|root| root.powi(4)));
-        for (noise, found) in self.noise.iter_mut().zip(found) {
-            *noise = std::array::from_fn(|lane| found[lane].max(self.least_noise[lane]));
-        }
-    }
-
-    #[inline(always)]
-    fn learn_vigour(
-        &mut self,
-        s: impl Four,
-        equations: &SplineEquations,
-        accelerations: &mut [Evidence<L>],
-    ) {
         // White up to half the samples' rate, the same square would be less dense.
         let denser = 0.5 / (equations.interval * VIGOUR_BAND_HZ);
-        let found = local_means(s, accelerations, SHARED_VIGOUR_S / equations.interval);
-        for (vigour, found) in self.vigour.iter_mut().zip(found) {
-            *vigour = found.map(|square| denser * square);
+        let shared = SHARED_VIGOUR_S / equations.interval;
+        smooth_shared(s, accelerations, shared, &mut room);
+        for (vigour, found) in self.vigour.iter_mut().zip(&*accelerations) {
+            *vigour = scaled(s, &mean(s, found), denser);
         }
-    }
-
-    /// The share of the residuals that is not free, of noise behind a low-pass.
-    #[inline(always)]
-    fn take_low_passed(
-        &self,
-        low_passed: &LowPassedSamples,
-        lane: usize,
-        residuals: &mut [Evidence<L>],
-    ) {
-        let last = self.drive.len() - 1;
-        for (k, [_, share]) in residuals.iter_mut().enumerate() {
-            let interval = k.min(last);
-            let for_white = self.noise_over(interval, lane) / self.drive[interval][lane];
-            share[lane] = 1.0 - low_passed.left_over(for_white, 1.0 - share[lane]);
+        take_fourth_roots(s, residuals, &mut room);
+        smooth_shared(s, residuals, SHARED_NOISE_S / equations.interval, &mut room);
+        for (noise, found) in self.noise.iter_mut().zip(&*residuals) {
+            *noise = formula(
+                s,
+                [&mean(s, found), &self.least_noise],
+                #[inline(always)]
+                |[root, least]| {
+                    let square = s.multiply(root, root);
+                    s.greater(s.multiply(square, square), least)
+                },
+            );
         }
     }
 
@@ -339,31 +365,40 @@ impl<const L: usize> Adaptation<L> {
     #[inline(always)]
     fn take_evidence(
         &self,
+        s: impl Four,
         equations: &SplineEquations,
         weights: &[IntervalWeights<L>],
         Statements {
             drives, residuals, ..
         }: &mut Statements<L>,
     ) {
-        let free = |share: f64| (1.0 - share).max(LEAST_FREE);
         let expected = EXPECTED_COUNT / equations.weight_of_cutoff(EXPECTED_CUTOFF_HZ);
         for (k, [square, variance]) in drives.iter_mut().enumerate() {
-            for lane in 0..L {
-                square[lane] += expected * self.noise_over(k, lane);
-                variance[lane] = free(weights[k][0][lane] * variance[lane]) + EXPECTED_COUNT;
-            }
+            add_scaled(s, square, expected, &self.noise_over(s, k));
+            multiply(s, variance, &weights[k][0]);
+            *variance = free_with(s, variance, &[EXPECTED_COUNT; L]);
         }
-        for (lane, low_passed) in self.low_passed.iter().enumerate() {
-            if let Some(low_passed) = low_passed {
-                self.take_low_passed(low_passed, lane, residuals);
-            }
+        if self.low_passed.iter().any(Option::is_some) {
+            self.leave_low_passed(s, residuals);
         }
+        let expected: [f64; L] = self.expected_noise.map(|[expected, _]| expected);
+        let count: [f64; L] = self.expected_noise.map(|[_, count]| count);
         for [square, variance] in residuals {
-            for lane in 0..L {
-                let [expected, count] = self.expected_noise[lane];
-                square[lane] += count * expected;
-                variance[lane] = free(variance[lane]) + count;
-            }
+            add_product(s, square, &count, &expected);
+            *variance = free_with(s, variance, &count);
+        }
+    }
+
+    /// The share of the residuals that is not free, of noise behind a low-pass.
+    #[inline(always)]
+    fn leave_low_passed(&self, s: impl Four, residuals: &mut [Evidence<L>]) {
+        let last = self.drive.len() - 1;
+        let low_passed = LowPassedLanes::new(self.low_passed);
+        for (k, [_, share]) in residuals.iter_mut().enumerate() {
+            let interval = k.min(last);
+            let for_white = divided(s, &self.noise_over(s, interval), &self.drive[interval]);
+            let left = low_passed.left_over(s, &for_white, &one_less(s, share));
+            self.take_low_passed(share, &one_less(s, &left));
         }
     }
 }
@@ -375,56 +410,104 @@ enum Stride {
     Half,
 }
 
-/// A sum of squares, and what it counts, of each lane.
-type Evidence<const L: usize> = [[f64; L]; 2];
-
-/// Means around each entry, by a kernel of this standard deviation.
+/// Sums around each entry, by a kernel of this standard deviation; `room` as in [`Kernel::smooth`].
 #[inline(always)]
-fn local_means<const L: usize>(
+fn smooth_shared<const L: usize>(
     s: impl Four,
     evidence: &mut [Evidence<L>],
     intervals: f64,
-) -> impl Iterator<Item = [f64; L]> {
-    Kernel::new(intervals.max(LEAST_SHARED_INTERVALS)).smooth(s, evidence);
-    evidence.iter().map(|[square, count]| {
-        std::array::from_fn(|lane| (square[lane] / count[lane]).max(f64::MIN_POSITIVE))
-    })
+    room: &mut [Evidence<L>],
+) {
+    Kernel::new(intervals.max(LEAST_SHARED_INTERVALS)).smooth(s, evidence, room);
+}
+
+/// `1 - share`.
+#[inline(always)]
+fn one_less<const L: usize>(s: impl Four, share: &[f64; L]) -> [f64; L] {
+    formula(
+        s,
+        [share],
+        #[inline(always)]
+        |[share]| s.subtract(s.splat(1.0), share),
+    )
+}
+
+/// What of an observation is free, given the share that is not, and what is expected beside it.
+#[inline(always)]
+fn free_with<const L: usize>(s: impl Four, share: &[f64; L], count: &[f64; L]) -> [f64; L] {
+    formula(
+        s,
+        [share, count],
+        #[inline(always)]
+        |[share, count]| {
+            let free = s.subtract(s.splat(1.0), share);
+            s.add(s.greater(free, s.splat(LEAST_FREE)), count)
+        },
+    )
+}
+
+/// The mean that evidence gives.
+#[inline(always)]
+fn mean<const L: usize>(s: impl Four, [square, count]: &Evidence<L>) -> [f64; L] {
+    formula(
+        s,
+        [square, count],
+        #[inline(always)]
+        |[square, count]| s.greater(s.divide(square, count), s.splat(f64::MIN_POSITIVE)),
+    )
 }
 
 /// The mean that evidence gives together with what is expected, which counts so much.
 #[inline(always)]
 fn with_expected<const L: usize>(
-    [square, count]: Evidence<L>,
-    expected: [f64; L],
+    s: impl Four,
+    [square, count]: &Evidence<L>,
+    expected: &[f64; L],
     expected_count: f64,
 ) -> [f64; L] {
-    std::array::from_fn(|lane| {
-        let mean =
-            (square[lane] + expected_count * expected[lane]) / (count[lane] + expected_count);
-        mean.max(f64::MIN_POSITIVE)
-    })
+    let counts = s.splat(expected_count);
+    formula(
+        s,
+        [square, count, expected],
+        #[inline(always)]
+        |[square, count, expected]| {
+            let sum = s.add(square, s.multiply(counts, expected));
+            let mean = s.divide(sum, s.add(count, counts));
+            s.greater(mean, s.splat(f64::MIN_POSITIVE))
+        },
+    )
 }
 
 /// In place of each sum of squares the fourth root of the mean over the nearest entries, times what
 /// the entry counts.
 #[inline(always)]
-fn take_fourth_roots<const L: usize>(s: impl Four, evidence: &mut [Evidence<L>]) {
+fn take_fourth_roots<const L: usize>(
+    s: impl Four,
+    evidence: &mut [Evidence<L>],
+    room: &mut [Evidence<L>],
+) {
     let mut near = evidence.to_vec();
-    Kernel::new(NEAR_NOISE_INTERVALS).smooth(s, &mut near);
-    for ([square, count], [near_square, near_count]) in evidence.iter_mut().zip(near) {
-        for lane in 0..L {
-            let mean = near_square[lane] / near_count[lane];
-            square[lane] = count[lane] * mean.max(f64::MIN_POSITIVE).sqrt().sqrt();
-        }
+    Kernel::new(NEAR_NOISE_INTERVALS).smooth(s, &mut near, room);
+    for ([square, count], near) in evidence.iter_mut().zip(&near) {
+        *square = formula(
+            s,
+            [count, &mean(s, near)],
+            #[inline(always)]
+            |[count, mean]| s.multiply(count, s.square_root(s.square_root(mean))),
+        );
     }
 }
 
-/// Largest distance of a sample from the first, over all channels.
-fn range<const C: usize, const L: usize>(series: &Series<C, L>, lane: usize) -> f64 {
-    let values = series.values.iter();
-    values
-        .flat_map(|value| series.channels_of(lane).map(|c| value[c]))
-        .fold(0.0, |most, v| v.abs().max(most))
+/// Largest distance of a sample from the first, over all channels of each lane.
+fn ranges<const C: usize, const L: usize>(series: &Series<C, L>) -> [f64; L] {
+    let mut most = [0.0_f64; C];
+    for value in &series.values {
+        for (most, own) in most.iter_mut().zip(value) {
+            *most = most.max(own.abs());
+        }
+    }
+    let of_lane = |lane| series.channels_of(lane).map(|c| most[c]);
+    std::array::from_fn(|lane| of_lane(lane).fold(0.0, f64::max))
 }
 
 /// Variance of white noise from the fourth differences of all channels.
@@ -440,46 +523,4 @@ fn fourth_difference_variance<const C: usize, const L: usize>(
         .flat_map(|run| series.channels_of(lane).map(move |c| of_channel(run, c)))
         .collect();
     white_noise_variance(&mut differences, MEDIAN_OF_SQUARE).unwrap_or(0.0)
-}
-
-/// `a^|k|` convolved with itself, a so chosen that the standard deviation is as wanted: two
-/// recursions each way.
-struct Kernel {
-    decay: f64,
-}
-
-impl Kernel {
-    /// Of this standard deviation, in entries. One pass has the variance `2 a / (1 - a)^2`.
-    fn new(std: f64) -> Self {
-        let variance = 0.5 * std * std;
-        let decay = (1.0 + variance - (1.0 + 2.0 * variance).sqrt()) / variance;
-        Self { decay }
-    }
-
-    /// Weighted sums in place; a quotient of two of them is a weighted mean.
-    #[inline(always)]
-    fn smooth<const L: usize>(&self, s: impl Four, values: &mut [Evidence<L>]) {
-        let mut before = vec![[[0.0; L]; 2]; values.len()];
-        for _ in 0..2 {
-            let mut sum = [[0.0; L]; 2];
-            for (before, own) in before.iter_mut().zip(&*values) {
-                for (sum, own) in sum.iter_mut().zip(own) {
-                    scale(s, sum, self.decay);
-                    add(s, sum, own);
-                }
-                *before = sum;
-            }
-            let mut after = [[0.0; L]; 2];
-            for (value, before) in values.iter_mut().zip(&before).rev() {
-                for ((value, before), after) in value.iter_mut().zip(before).zip(&mut after) {
-                    let mut next = *after;
-                    add(s, &mut next, value);
-                    scale(s, &mut next, self.decay);
-                    *value = *before;
-                    add(s, value, after);
-                    *after = next;
-                }
-            }
-        }
-    }
 }

@@ -2,7 +2,8 @@
 
 use crate::SpatialError;
 use crate::wide::{
-    Four, Plain, add_scaled, divided, multiply, subtract_product, subtract_product_rows,
+    Four, Plain, add_scaled, are_positive, divided, multiply, subtract_product,
+    subtract_product_rows,
 };
 
 /// Bands stored beside the diagonal: a quintic B-spline overlaps five neighbours on each side.
@@ -88,11 +89,11 @@ impl<const L: usize> Factor<L> {
                 Some(above) => eliminate(s, above, &given),
                 None => eliminate(s, &after_zeros(&self.rows), &given),
             };
-            let is_positive = |fine: bool, d: &f64| fine & (*d > 0.0) & (*d < f64::INFINITY);
-            if !diagonal.iter().fold(true, is_positive) {
+            row[0] = divided(s, &[1.0; L], &diagonal);
+            // The inverse of infinity is zero.
+            if !(are_positive(s, &diagonal) & are_positive(s, &row[0])) {
                 return Err(SpatialError::Singular { index: i });
             }
-            row[0] = divided(s, &[1.0; L], &diagonal);
             self.rows.push(row);
             // Nobody asks for those of several.
             if L == 1 {

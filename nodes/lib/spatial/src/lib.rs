@@ -54,6 +54,7 @@ mod gaps;
 mod golden;
 mod grid;
 mod influence;
+mod kernel;
 mod kinks;
 mod local_noise;
 mod local_spline;
@@ -107,7 +108,7 @@ pub use pose_series::PoseSeries;
 pub use pose_source::PoseSource;
 pub use pose_spline::{
     Located, Motion, MotionEstimate, POSES_AT_ONCE, PoseAdaptation, PoseSmoothing, PoseSpline,
-    PoseTimes, position_channels, rotation_channels,
+    PoseTimes, PosesInTime, position_channels, rotation_channels,
 };
 pub use rustfft::num_complex::Complex64;
 pub use sample_variance::{Bandwidth, SampleVariance};

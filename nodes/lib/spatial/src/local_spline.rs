@@ -3,6 +3,7 @@
 
 use crate::SpatialError;
 use crate::banded::{Factor, InverseBands, InverseBlock, Solved, quadratic_form};
+use crate::basis::AT_KNOT;
 use crate::equations::{IntervalWeights, LocalWeights, SplineEquations, add_residual, refinements};
 use crate::wide::{Four, add_product, add_scaled, add_scaled_rows, widest};
 
@@ -13,8 +14,6 @@ pub(crate) struct Series<const C: usize, const L: usize> {
     pub(crate) values: Vec<[f64; C]>,
     /// Number of each lane's channels.
     pub(crate) channels: [usize; L],
-    /// `B^T y` of the samples alone.
-    projected: Vec<[f64; C]>,
     /// The derivatives at the ends.
     targets: [[f64; C]; 4],
 }
@@ -25,18 +24,31 @@ impl<const C: usize, const L: usize> Series<C, L> {
         values: Vec<[f64; C]>,
         channels: [usize; L],
     ) -> Self {
-        let mut projected = vec![[0.0; C]; equations.basis.count()];
-        widest!(s => {
-            for (k, (value, row)) in values.iter().zip(&equations.collocation).enumerate() {
-                add_multiples(s, row, value, &mut projected[k..]);
-            }
-        });
         Self {
             targets: equations.ends.map(|end| end.target(&values)),
             values,
             channels,
-            projected,
         }
+    }
+
+    /// Row i of `B^T y` of the samples alone.
+    #[inline(always)]
+    fn projected_row(&self, s: impl Four, equations: &SplineEquations, i: usize) -> [f64; C] {
+        let mut sum = [0.0; C];
+        let first = i.saturating_sub(AT_KNOT - 1);
+        let (rows, values) = (&equations.collocation[first..], &self.values[first..]);
+        match (rows.first_chunk(), values.first_chunk()) {
+            (Some([a, b, c, d, e]), Some(values)) if i >= AT_KNOT - 1 => {
+                add_scaled_rows(s, &mut sum, &[a[4], b[3], c[2], d[1], e[0]], values);
+            }
+            _ => {
+                let reaching = rows.iter().zip(values).enumerate();
+                for (k, (row, value)) in reaching.take(i - first + 1) {
+                    add_scaled(s, &mut sum, row[i - first - k], value);
+                }
+            }
+        }
+        sum
     }
 
     /// The numbers of a lane's channels.
@@ -133,7 +145,11 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
         series: &Series<C, L>,
         weights: &LocalWeights<L>,
     ) -> Result<(), SpatialError> {
-        self.coefficients.clone_from(&series.projected);
+        // Made anew each time: kept, they would be read from as far away as the values are.
+        self.coefficients.resize(equations.basis.count(), [0.0; C]);
+        for (i, row) in self.coefficients.iter_mut().enumerate() {
+            *row = series.projected_row(s, equations, i);
+        }
         for ((end, weight), target) in equations
             .ends
             .iter()

@@ -19,6 +19,7 @@
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
 use crate::equations::SplineEquations;
+use crate::wide::{Four, formula};
 
 /// White noise that is left beside, as a part of r: 0.03 mm and 0.01 degrees of fitted poses at 100 Hz. No marker
 /// fit with an IMU was at hand to measure it on. Chosen among 0 and 3e-5 to 1e-3 on the motions of `tests/physics`
@@ -73,7 +74,7 @@ impl LowPassed {
 }
 
 /// The same among samples of a rate, for weights of their spline.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct LowPassedSamples {
     /// Weight that cuts at the corner.
     pub weight_of_corner: f64,
@@ -81,46 +82,93 @@ pub(crate) struct LowPassedSamples {
     pub corner: f64,
 }
 
-impl LowPassedSamples {
+/// Several of them in the lanes of a [`Four`].
+#[derive(Clone, Copy)]
+pub(crate) struct LowPassedLanes<const L: usize> {
+    weight_of_corner: [f64; L],
+    corner: [f64; L],
+}
+
+impl<const L: usize> LowPassedLanes<L> {
+    /// Where a lane has none, what comes out for it means nothing.
+    pub(crate) fn new(lanes: [Option<LowPassedSamples>; L]) -> Self {
+        let lanes = lanes.map(Option::unwrap_or_default);
+        Self {
+            weight_of_corner: lanes.map(|own| own.weight_of_corner),
+            corner: lanes.map(|own| own.corner),
+        }
+    }
+
     /// The noise's density at the cutoff where motion is as dense, over that at low frequencies; `weight` is
     /// that for white noise.
     #[inline(always)]
-    pub(crate) fn at_cutoff(self, weight: f64) -> f64 {
-        self.behind_filter(weight) + FLOOR
-    }
-
-    /// Without the floor.
-    #[inline(always)]
-    fn behind_filter(self, weight: f64) -> f64 {
-        let v = self.weight_of_corner / weight;
-        let square = v * v;
-        1.0 / (1.0 + 3.80 * v.sqrt() + 1.90 * v + 9.10 * square + square * square)
+    pub(crate) fn at_cutoff(&self, s: impl Four, weight: &[f64; L]) -> [f64; L] {
+        formula(
+            s,
+            [weight, &self.weight_of_corner],
+            #[inline(always)]
+            |[weight, of_corner]| s.add(behind_filter(s, of_corner, weight), s.splat(FLOOR)),
+        )
     }
 
     /// What of the noise a spline leaves in a sample's distance from it, over what white noise of all
     /// frequencies has: that beyond the cutoff. `weight` is that for white noise, `free` what of white noise
     /// is left.
     #[inline(always)]
-    pub(crate) fn left_over(self, weight: f64, free: f64) -> f64 {
-        let x = (1.0 / self.behind_filter(weight).sqrt() - 1.0)
-            .sqrt()
-            .sqrt();
-        let (square, cube) = (x * x, x * x * x);
-        // The integral from x on, within 2 %.
-        let beyond = ALL
-            / (1.0 + x / ALL + 0.117 * square + 6.13 * cube + 7.0 * ALL * (square * square * cube));
-        self.corner * beyond + FLOOR * free
+    pub(crate) fn left_over(&self, s: impl Four, weight: &[f64; L], free: &[f64; L]) -> [f64; L] {
+        formula(
+            s,
+            [weight, free, &self.weight_of_corner, &self.corner],
+            #[inline(always)]
+            |[weight, free, of_corner, corner]| {
+                let one = s.splat(1.0);
+                let density = behind_filter(s, of_corner, weight);
+                let square = s.subtract(s.divide(one, s.square_root(density)), one);
+                let x = s.square_root(s.square_root(square));
+                // The integral from x on, within 2 %.
+                let beyond = s.divide(s.splat(ALL), falls_by(s, x));
+                let of_floor = s.multiply(s.splat(FLOOR), free);
+                s.add(s.multiply(corner, beyond), of_floor)
+            },
+        )
     }
+}
+
+/// Density behind the filter at the cutoff, without the floor.
+#[inline(always)]
+fn behind_filter<S: Four>(s: S, of_corner: S::Numbers, weight: S::Numbers) -> S::Numbers {
+    let v = s.divide(of_corner, weight);
+    let square = s.multiply(v, v);
+    let mut sum = s.splat(1.0);
+    sum = s.add(sum, s.multiply(s.splat(3.80), s.square_root(v)));
+    sum = s.add(sum, s.multiply(s.splat(1.90), v));
+    sum = s.add(sum, s.multiply(s.splat(9.10), square));
+    sum = s.add(sum, s.multiply(square, square));
+    s.divide(s.splat(1.0), sum)
+}
+
+/// `1 + x / ALL + 0.117 x^2 + 6.13 x^3 + 7 ALL x^7`.
+#[inline(always)]
+fn falls_by<S: Four>(s: S, x: S::Numbers) -> S::Numbers {
+    let square = s.multiply(x, x);
+    let cube = s.multiply(square, x);
+    let seventh = s.multiply(s.multiply(square, square), cube);
+    let mut sum = s.add(s.splat(1.0), s.divide(x, s.splat(ALL)));
+    sum = s.add(sum, s.multiply(s.splat(0.117), square));
+    sum = s.add(sum, s.multiply(s.splat(6.13), cube));
+    s.add(sum, s.multiply(s.splat(7.0 * ALL), seventh))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::wide::Plain;
 
     const FITTED: LowPassed = LowPassed { corner_hz: 8.0 };
-    const AT_CORNER_1: LowPassedSamples = LowPassedSamples {
-        weight_of_corner: 1.0,
-        corner: 0.1,
+    const CORNER: f64 = 0.1;
+    const AT_CORNER_1: LowPassedLanes<1> = LowPassedLanes {
+        weight_of_corner: [1.0],
+        corner: [CORNER],
     };
 
     fn density(x: f64) -> f64 {
@@ -138,13 +186,13 @@ mod tests {
     fn at_its_cutoff_motion_is_as_dense_as_the_noise() {
         for x in [0.2_f64, 0.5, 0.8, 1.0, 1.5, 2.5, 4.0] {
             let for_white = 1.0 / (x.powi(10) * density(x));
-            let found = AT_CORNER_1.behind_filter(for_white);
+            let found = AT_CORNER_1.at_cutoff(Plain, &[for_white])[0] - FLOOR;
             assert!(
                 (found / density(x) - 1.0).abs() < 0.016,
                 "{x}: {found} {}",
                 density(x)
             );
-            let left = AT_CORNER_1.left_over(for_white, 0.0) / AT_CORNER_1.corner;
+            let left = AT_CORNER_1.left_over(Plain, &[for_white], &[0.0])[0] / CORNER;
             let beyond = sum(x, density);
             assert!((left / beyond - 1.0).abs() < 0.1, "{x}: {left} {beyond}");
         }

@@ -97,6 +97,35 @@ pub struct MotionEstimate {
 #[derive(Clone, Debug, Default)]
 pub struct PoseAdaptation(Option<Adaptation<2>>);
 
+/// Poses that a spline is fitted to, wherever they lie.
+pub trait PosesInTime {
+    /// How many.
+    fn count(&self) -> usize;
+
+    /// world_from_body, m, of a number below [`PosesInTime::count`].
+    fn pose(&self, number: usize) -> &Isometry3<f64>;
+}
+
+impl PosesInTime for [Isometry3<f64>] {
+    fn count(&self) -> usize {
+        self.len()
+    }
+
+    fn pose(&self, number: usize) -> &Isometry3<f64> {
+        &self[number]
+    }
+}
+
+impl PosesInTime for Vec<Isometry3<f64>> {
+    fn count(&self) -> usize {
+        self.len()
+    }
+
+    fn pose(&self, number: usize) -> &Isometry3<f64> {
+        &self[number]
+    }
+}
+
 /// Most series of poses that are fitted at once: position and rotation of two are four lanes, which fill a
 /// register of AVX2. Of a clip of 870 poses each then takes 690 ns a pose rather than 920; four at once
 /// take no less, and twice the memory, with AVX-512 too.
@@ -193,7 +222,7 @@ impl PoseSpline {
         if let Some(expected) = smoothing.expected()
             && world_from_body.len() >= FEWEST_ADAPTIVE
         {
-            let [fitted] = Self::learn::<1, 2, 8>(times, [world_from_body], expected)?;
+            let [fitted] = Self::learn::<1, 2, 8, _>(times, [world_from_body], expected)?;
             return Ok(fitted);
         }
         let positions = position_channels(world_from_body);
@@ -212,25 +241,27 @@ impl PoseSpline {
     ///
     /// # Errors
     /// As [`SmoothingSpline::fit`], of any of them.
-    pub fn fit_all_on(
+    pub fn fit_all_on<S: PosesInTime>(
         times: &PoseTimes,
-        series: &[Vec<Isometry3<f64>>],
+        series: &[S],
         smoothing: PoseSmoothing,
     ) -> Result<Vec<Self>, SpatialError> {
-        let long = series.iter().all(|poses| poses.len() >= FEWEST_ADAPTIVE);
+        let long = series.iter().all(|poses| poses.count() >= FEWEST_ADAPTIVE);
         let Some(expected) = smoothing.expected().filter(|_| long) else {
-            let alone = |poses: &Vec<_>| Self::fit_on(times, poses, smoothing);
+            let poses =
+                |series: &S| -> Vec<_> { (0..series.count()).map(|k| *series.pose(k)).collect() };
+            let alone = |series: &S| Self::fit_on(times, &poses(series), smoothing);
             return series.iter().map(alone).collect();
         };
         let mut fitted = Vec::with_capacity(series.len());
         for series in series.chunks(POSES_AT_ONCE) {
             match series {
                 [one, other] => {
-                    fitted.extend(Self::learn::<2, 4, 16>(times, [one, other], expected)?)
+                    fitted.extend(Self::learn::<2, 4, 16, _>(times, [one, other], expected)?)
                 }
                 alone => {
                     for poses in alone {
-                        fitted.extend(Self::learn::<1, 2, 8>(times, [poses], expected)?);
+                        fitted.extend(Self::learn::<1, 2, 8, _>(times, [poses], expected)?);
                     }
                 }
             }
@@ -239,9 +270,9 @@ impl PoseSpline {
     }
 
     /// Adaptive fits of P series in L lanes, C channels in all.
-    fn learn<const P: usize, const L: usize, const C: usize>(
+    fn learn<const P: usize, const L: usize, const C: usize, S: PosesInTime + ?Sized>(
         times: &PoseTimes,
-        series: [&[Isometry3<f64>]; P],
+        series: [&S; P],
         expected: [ExpectedNoise; 2],
     ) -> Result<[Self; P], SpatialError> {
         let fit = AdaptiveFit::<C, L>::learn(
@@ -272,7 +303,7 @@ impl PoseSpline {
         }
         let fit = AdaptiveFit::follow(
             &times.system.equations,
-            pose_channels::<8, 1>([world_from_body]),
+            pose_channels::<8, 1, _>([world_from_body]),
             channel_counts::<2>(),
             source.expected(),
             (learnt, dropped),
@@ -297,7 +328,7 @@ impl PoseSpline {
         }
         let noise = AdaptiveFit::learn_noise(
             &times.system.equations,
-            pose_channels::<8, 1>([world_from_body]),
+            pose_channels::<8, 1, _>([world_from_body]),
             channel_counts::<2>(),
             source.expected(),
         )?;
@@ -343,14 +374,18 @@ impl PoseSpline {
     /// As [`PoseSpline::estimate`], at a stamp that the spline's times have located.
     pub fn estimate_at(&self, &Located { first, values }: &Located) -> MotionEstimate {
         let highest_hz = 0.5 / self.times.system.equations.interval;
-        let bandwidth = Bandwidth {
-            acceleration_hz: self.position.cutoff_over(first).min(highest_hz),
-            angular_velocity_hz: self.rotation.cutoff_over(first).min(highest_hz),
-        };
+        let cutoffs_hz = [
+            self.position.cutoff_over(first),
+            self.rotation.cutoff_over(first),
+        ];
+        let [acceleration_hz, angular_velocity_hz] = cutoffs_hz.map(|hz| hz.min(highest_hz));
         MotionEstimate {
             motion: self.motion(first, &values),
-            variance: self.variance(first, &values, &bandwidth),
-            bandwidth,
+            variance: self.variance(first, &values, cutoffs_hz),
+            bandwidth: Bandwidth {
+                acceleration_hz,
+                angular_velocity_hz,
+            },
         }
     }
 
@@ -372,7 +407,7 @@ impl PoseSpline {
         &self,
         first: usize,
         values: &BasisValues,
-        bandwidth: &Bandwidth,
+        [position_hz, rotation_hz]: [f64; 2],
     ) -> Option<SampleVariance> {
         let [value, slope, second] = values;
         let interval = self.times.system.equations.interval;
@@ -393,8 +428,8 @@ impl PoseSpline {
             ..rotation
         };
         let (bends_hz, turns_hz) = (
-            asked_hz(&self.position, first, bandwidth.acceleration_hz),
-            asked_hz(&self.rotation, first, bandwidth.angular_velocity_hz),
+            asked_hz(&position, position_hz),
+            asked_hz(&rotation, rotation_hz),
         );
         let acceleration = Beyond::ACCELERATION.stated(position, bends_hz);
         let angular_velocity =
@@ -421,12 +456,12 @@ impl PoseSpline {
     }
 }
 
-/// The cutoff that says how much motion is beyond it, Hz. Where noise was low-passed before, weights soon ask
-/// for more than half the rate, and how much more says what of the motion no sample shows.
-fn asked_hz<const C: usize>(spline: &SmoothingSpline<C>, interval: usize, resolved_hz: f64) -> f64 {
-    match spline.low_passed() {
-        Some(_) => spline.cutoff_over(interval),
-        None => resolved_hz,
+/// The cutoff that says how much motion is beyond it, Hz, given that of the weight. Where noise was low-passed
+/// before, weights soon ask for more than half the rate, and how much more says what of the motion no sample shows.
+fn asked_hz(posterior: &Posterior, cutoff_hz: f64) -> f64 {
+    match posterior.low_passed {
+        Some(_) => cutoff_hz,
+        None => cutoff_hz.min(0.5 / posterior.interval),
     }
 }
 
@@ -440,28 +475,28 @@ pub fn position_channels(world_from_body: &[Isometry3<f64>]) -> Vec<[f64; 3]> {
 
 /// The four channels (i, j, k, w) of a pose series' sign-continuous quaternion.
 pub fn rotation_channels(world_from_body: &[Isometry3<f64>]) -> Vec<[f64; 4]> {
-    let rotations: Vec<_> = world_from_body
-        .iter()
-        .map(|isometry| isometry.rotation)
-        .collect();
-    so3::sign_continuous(&rotations)
-        .into_iter()
+    let rotations = world_from_body.iter().map(|isometry| isometry.rotation);
+    so3::with_continuous_signs(rotations)
         .map(|q| q.coords.into())
         .collect()
 }
 
 /// Both of each series in turn: its position and its rotation are a lane each. Of one series: x, i, y,
 /// j, z, k, 0, w.
-fn pose_channels<const C: usize, const P: usize>(series: [&[Isometry3<f64>]; P]) -> Vec<[f64; C]> {
-    let count = series.iter().map(|poses| poses.len()).max().unwrap_or(0);
+fn pose_channels<const C: usize, const P: usize, S: PosesInTime + ?Sized>(
+    series: [&S; P],
+) -> Vec<[f64; C]> {
+    let count = series.iter().map(|poses| poses.count()).max().unwrap_or(0);
     let mut channels = vec![[0.0; C]; count];
     for (k, poses) in series.into_iter().enumerate() {
-        let rotations = rotation_channels(poses);
+        let poses = (0..poses.count()).map(|number| poses.pose(number));
+        let rotations = so3::with_continuous_signs(poses.clone().map(|pose| pose.rotation));
         for ((row, pose), rotation) in channels.iter_mut().zip(poses).zip(rotations) {
             let position: [f64; 3] = pose.translation.vector.into();
             for (axis, own) in position.into_iter().enumerate() {
                 row[2 * P * axis + 2 * k] = own;
             }
+            let rotation: [f64; 4] = rotation.coords.into();
             for (component, own) in rotation.into_iter().enumerate() {
                 row[2 * P * component + 2 * k + 1] = own;
             }

@@ -99,19 +99,23 @@ pub fn minimal_rotation(from: &Vector3<f64>, to: &Vector3<f64>) -> UnitQuaternio
 /// (on the 3-sphere) of the one before; the first has `w >= 0`. Components are then smooth wherever
 /// the rotation is, as long as it turns by under 180 degrees per sample.
 pub fn sign_continuous(rotations: &[UnitQuaternion<f64>]) -> Vec<Quaternion<f64>> {
+    with_continuous_signs(rotations.iter().copied()).collect()
+}
+
+/// As [`sign_continuous`], one after the other.
+pub(crate) fn with_continuous_signs(
+    rotations: impl Iterator<Item = UnitQuaternion<f64>>,
+) -> impl Iterator<Item = Quaternion<f64>> {
     let mut previous = Quaternion::identity();
-    rotations
-        .iter()
-        .map(|rotation| {
-            let q = rotation.into_inner();
-            previous = if q.coords.dot(&previous.coords) < 0.0 {
-                -q
-            } else {
-                q
-            };
-            previous
-        })
-        .collect()
+    rotations.map(move |rotation| {
+        let q = rotation.into_inner();
+        previous = if q.coords.dot(&previous.coords) < 0.0 {
+            -q
+        } else {
+            q
+        };
+        previous
+    })
 }
 
 /// Parses a matrix as a rotation: `|R^T R - I|` (Frobenius) and `|det R - 1|` at most `tolerance`,

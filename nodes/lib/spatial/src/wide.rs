@@ -14,6 +14,13 @@ pub(crate) trait Four: Copy {
     fn subtract(self, a: Self::Numbers, b: Self::Numbers) -> Self::Numbers;
     fn multiply(self, a: Self::Numbers, b: Self::Numbers) -> Self::Numbers;
     fn divide(self, a: Self::Numbers, b: Self::Numbers) -> Self::Numbers;
+    fn square_root(self, a: Self::Numbers) -> Self::Numbers;
+    /// `a` where it is greater than `b`, else `b`: also where one is no number.
+    fn greater(self, a: Self::Numbers, b: Self::Numbers) -> Self::Numbers;
+    /// `a` where it is less than `b`, else `b`.
+    fn less(self, a: Self::Numbers, b: Self::Numbers) -> Self::Numbers;
+    /// Whether all are greater than zero.
+    fn are_positive(self, a: Self::Numbers) -> bool;
 }
 
 /// As the compiler has it for any processor.
@@ -57,11 +64,31 @@ impl Four for Plain {
     fn divide(self, a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
         [a[0] / b[0], a[1] / b[1], a[2] / b[2], a[3] / b[3]]
     }
+
+    #[inline(always)]
+    fn square_root(self, a: [f64; 4]) -> [f64; 4] {
+        [a[0].sqrt(), a[1].sqrt(), a[2].sqrt(), a[3].sqrt()]
+    }
+
+    #[inline(always)]
+    fn greater(self, a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
+        std::array::from_fn(|k| if a[k] > b[k] { a[k] } else { b[k] })
+    }
+
+    #[inline(always)]
+    fn less(self, a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
+        std::array::from_fn(|k| if a[k] < b[k] { a[k] } else { b[k] })
+    }
+
+    #[inline(always)]
+    fn are_positive(self, a: [f64; 4]) -> bool {
+        (a[0] > 0.0) & (a[1] > 0.0) & (a[2] > 0.0) & (a[3] > 0.0)
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
 mod avx2 {
-    use std::arch::x86_64::__m256d;
+    use std::arch::x86_64::{__m256d, _CMP_GT_OQ};
 
     use pulp::bytemuck::cast;
     use pulp::x86::V3;
@@ -104,6 +131,28 @@ mod avx2 {
         #[inline(always)]
         fn divide(self, a: __m256d, b: __m256d) -> __m256d {
             self.avx._mm256_div_pd(a, b)
+        }
+
+        #[inline(always)]
+        fn square_root(self, a: __m256d) -> __m256d {
+            self.avx._mm256_sqrt_pd(a)
+        }
+
+        #[inline(always)]
+        fn greater(self, a: __m256d, b: __m256d) -> __m256d {
+            self.avx._mm256_max_pd(a, b)
+        }
+
+        #[inline(always)]
+        fn less(self, a: __m256d, b: __m256d) -> __m256d {
+            self.avx._mm256_min_pd(a, b)
+        }
+
+        #[inline(always)]
+        fn are_positive(self, a: __m256d) -> bool {
+            let zero = self.avx._mm256_setzero_pd();
+            let positive = self.avx._mm256_cmp_pd::<_CMP_GT_OQ>(a, zero);
+            self.avx._mm256_movemask_pd(positive) == 0b1111
         }
     }
 }
@@ -314,4 +363,51 @@ pub(crate) fn subtract_product_rows<const L: usize, const C: usize, const W: usi
             }
         }
     }
+}
+
+/// A formula of lanes, of four at once; what is left of them is filled up with ones. It has to be inlined.
+#[inline(always)]
+pub(crate) fn formula<S: Four, const L: usize, const N: usize>(
+    s: S,
+    inputs: [&[f64; L]; N],
+    of_four: impl Fn([S::Numbers; N]) -> S::Numbers,
+) -> [f64; L] {
+    let mut made = [0.0; L];
+    let (whole, rest) = made.as_chunks_mut::<4>();
+    for (k, own) in whole.iter_mut().enumerate() {
+        let mut fours = [s.splat(1.0); N];
+        for (four, input) in fours.iter_mut().zip(inputs) {
+            *four = s.load(&input.as_chunks::<4>().0[k]);
+        }
+        *own = s.store(of_four(fours));
+    }
+    if !rest.is_empty() {
+        let mut fours = [s.splat(1.0); N];
+        for (four, input) in fours.iter_mut().zip(inputs) {
+            let mut filled = [1.0; 4];
+            for (filled, own) in filled.iter_mut().zip(input.as_chunks::<4>().1) {
+                *filled = *own;
+            }
+            *four = s.load(&filled);
+        }
+        let made = s.store(of_four(fours));
+        for (own, made) in rest.iter_mut().zip(made) {
+            *own = made;
+        }
+    }
+    made
+}
+
+/// Whether all lanes are greater than zero.
+#[inline(always)]
+pub(crate) fn are_positive<const L: usize>(s: impl Four, a: &[f64; L]) -> bool {
+    let (whole, rest) = a.as_chunks::<4>();
+    let mut all = true;
+    for four in whole {
+        all &= s.are_positive(s.load(four));
+    }
+    for one in rest {
+        all &= *one > 0.0;
+    }
+    all
 }

@@ -1,7 +1,8 @@
 //! Smoothing quintic splines of position and quaternion, see [`cromosim_spatial::PoseSpline`].
 
 use cromosim_spatial::{
-    Influence, Located, MotionEstimate, PoseSmoothing, PoseSource, PoseSpline, PoseTimes, Stamp,
+    Influence, Located, MotionEstimate, PoseSmoothing, PoseSource, PoseSpline, PoseTimes,
+    PosesInTime, Stamp,
 };
 use nalgebra::Isometry3;
 
@@ -23,9 +24,17 @@ pub(crate) fn fit_all(
     trajectories: &[SensorTrajectory],
     smoothing: PoseSmoothing,
 ) -> Result<Vec<PoseSpline>, ImuError> {
-    let frames = trajectories.iter().map(SensorTrajectory::frames);
-    let series: Vec<Vec<Isometry3<f64>>> = frames.map(poses).collect();
-    Ok(PoseSpline::fit_all_on(times, &series, smoothing)?)
+    Ok(PoseSpline::fit_all_on(times, trajectories, smoothing)?)
+}
+
+impl PosesInTime for SensorTrajectory {
+    fn count(&self) -> usize {
+        self.frames().len()
+    }
+
+    fn pose(&self, number: usize) -> &Isometry3<f64> {
+        &self.frames()[number].world_from_sensor
+    }
 }
 
 fn poses(frames: &[SensorFrame]) -> Vec<Isometry3<f64>> {
