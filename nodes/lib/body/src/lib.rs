@@ -33,6 +33,7 @@ mod error;
 mod file;
 mod gender;
 mod joint;
+mod lanes;
 mod model;
 mod pose;
 mod pose_blocks;

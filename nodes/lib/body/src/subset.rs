@@ -1,9 +1,13 @@
 //! A few vertices in f64: all that a virtual sensor needs of the mesh.
 
 use nalgebra::{Isometry3, Vector3};
+use pulp::{Scalar, Simd, WithSimd};
 
+use crate::lanes::{
+    IsometryLanes, RotationLanes, VectorLanes, difference, gathered, isometry_of, matrix_less_one,
+    product, rotated, scaled, splat, sum, vector_of,
+};
 use crate::pose_blocks::PoseBlock;
-use crate::shape::forward_kinematics;
 use crate::{BodyError, BodyPose, JOINT_COUNT, Joint, ShapedBody};
 
 /// Some vertices of a shaped body; holds only what these need.
@@ -13,8 +17,12 @@ pub struct VertexSubset {
     vertices: Vec<SubsetVertex>,
     /// Whose segments are evaluated, each after its parent.
     joints: Vec<Joint>,
+    /// Of these, whose segments are asked for.
+    asked: Vec<Joint>,
     /// Whose rotation the vertices' corrections depend on.
     correcting: Vec<Joint>,
+    /// Whose rotation anything depends on.
+    turning: Vec<Joint>,
 }
 
 #[derive(Clone, Debug)]
@@ -25,17 +33,17 @@ struct SubsetVertex {
     skin_weights: Vec<(u8, f64)>,
 }
 
-/// A [`PoseBlock`] in the order in which it is summed: x, y, z and nothing of each element of R - I.
+/// A [`PoseBlock`] in the order in which it is summed: x, y, z of each element of R - I.
 #[derive(Clone, Debug)]
 struct Correction {
     joint: u8,
-    coefficients: [[f64; 4]; 9],
+    coefficients: [Vector3<f64>; 9],
 }
 
 impl From<&PoseBlock> for Correction {
     fn from(block: &PoseBlock) -> Self {
         let [x, y, z] = [0, 1, 2].map(|axis| &block.coefficients[9 * axis..9 * (axis + 1)]);
-        let of_element = |i: usize| [x[i], y[i], z[i], 0.0].map(f64::from);
+        let of_element = |i: usize| Vector3::new(x[i], y[i], z[i]).map(f64::from);
         Self {
             joint: block.joint,
             coefficients: std::array::from_fn(of_element),
@@ -75,6 +83,8 @@ impl ShapedBody {
         Ok(VertexSubset {
             joints_in_model: *self.joints_in_model(),
             joints: Joint::ALL.to_vec(),
+            asked: Joint::ALL.to_vec(),
+            turning: Joint::ALL.to_vec(),
             correcting: Joint::ALL.into_iter().filter(corrects).collect(),
             vertices,
         })
@@ -90,6 +100,8 @@ impl VertexSubset {
         joints
             .into_iter()
             .for_each(|joint| wanted[joint.index()] = true);
+        let all = Joint::ALL.into_iter();
+        self.asked = all.filter(|joint| wanted[joint.index()]).collect();
         let weights = self.vertices.iter().flat_map(|vertex| &vertex.skin_weights);
         weights.for_each(|(joint, _)| wanted[*joint as usize] = true);
         // Parents stand before their children.
@@ -102,6 +114,9 @@ impl VertexSubset {
             .into_iter()
             .filter(|joint| wanted[joint.index()])
             .collect();
+        let (joints, correcting) = (&self.joints, &self.correcting);
+        let turns = |joint: &Joint| joints.contains(joint) || correcting.contains(joint);
+        self.turning = Joint::ALL.into_iter().filter(turns).collect();
         self
     }
 
@@ -130,49 +145,164 @@ impl VertexSubset {
         pose: &BodyPose,
         positions: &mut Vec<Vector3<f64>>,
     ) -> [Isometry3<f64>; JOINT_COUNT] {
-        let world_from_segments = forward_kinematics(&self.joints_in_model, &self.joints, pose);
-        let root_position = pose.root_position;
-        let mut features = [[0.0; 9]; JOINT_COUNT];
-        for joint in &self.correcting {
-            let matrix = pose.local_rotations[joint.index()].to_rotation_matrix();
-            features[joint.index()] = std::array::from_fn(|i| {
-                matrix[(i / 3, i % 3)] - if i / 3 == i % 3 { 1.0 } else { 0.0 }
+        let evaluated = self.evaluate(Scalar::new(), std::slice::from_ref(pose));
+        positions.clear();
+        positions.extend(
+            evaluated
+                .positions
+                .iter()
+                .map(|it| vector_of::<Scalar>(it, 0)),
+        );
+        let mut segments = [Isometry3::identity(); JOINT_COUNT];
+        for joint in &self.joints {
+            let segment = &evaluated.world_from_segments[joint.index()];
+            segments[joint.index()] = isometry_of::<Scalar>(segment, 0);
+        }
+        segments
+    }
+
+    /// As [`Self::positions_and_segments_into`] of each pose, as many at once as the processor has lanes:
+    /// `visit` is given the pose's number, the positions, and the segments that
+    /// [`Self::with_segments_of`] was asked for (the others are said to be the identity).
+    pub fn visit_poses(
+        &self,
+        poses: &[BodyPose],
+        visit: impl FnMut(usize, &[Vector3<f64>], &[Isometry3<f64>; JOINT_COUNT]),
+    ) {
+        pulp::Arch::new().dispatch(Walk {
+            subset: self,
+            poses,
+            visit,
+        });
+    }
+
+    /// As many poses as there are lanes, or fewer: the last stands in the lanes that are left.
+    #[inline(always)]
+    fn evaluate<S: Simd>(&self, s: S, poses: &[BodyPose]) -> Evaluated<S> {
+        let pose = |lane: usize| &poses[lane.min(poses.len() - 1)];
+        let zero = [s.splat_f64s(0.0); 3];
+        let mut rotations = [[s.splat_f64s(0.0); 4]; JOINT_COUNT];
+        for joint in &self.turning {
+            rotations[joint.index()] = std::array::from_fn(|component| {
+                gathered(s, |lane| {
+                    pose(lane).local_rotations[joint.index()].coords[component]
+                })
             });
         }
-        positions.clear();
-        positions.extend(self.vertices.iter().map(|vertex| {
-            let corrected = vertex.rest + correction(&vertex.corrections, &features);
-            let moved = |&(joint, weight): &(u8, f64)| {
-                let in_segment = corrected - self.joints_in_model[joint as usize];
-                let world_from_segment = &world_from_segments[joint as usize];
+        let root = std::array::from_fn(|axis| gathered(s, |lane| pose(lane).root_position[axis]));
+        let world_from_segments = self.segments(s, &rotations, &root);
+        let mut features = [[s.splat_f64s(0.0); 9]; JOINT_COUNT];
+        for joint in &self.correcting {
+            features[joint.index()] = matrix_less_one(s, &rotations[joint.index()]);
+        }
+        let mut positions = Vec::with_capacity(self.vertices.len());
+        for vertex in &self.vertices {
+            let correction = correction(s, &vertex.corrections, &features);
+            let corrected = sum(s, &splat(s, &vertex.rest), &correction);
+            let mut about_root = zero;
+            for &(joint, weight) in &vertex.skin_weights {
+                let in_model = splat(s, &self.joints_in_model[joint as usize]);
+                let (rotation, translation) = &world_from_segments[joint as usize];
+                let turned = rotated(s, rotation, &difference(s, &corrected, &in_model));
                 // About the root: weights sum to 1 within 1e-7 only, which must not grow with the
                 // distance walked.
-                (world_from_segment.rotation * in_segment
-                    + (world_from_segment.translation.vector - root_position))
-                    * weight
-            };
-            root_position + vertex.skin_weights.iter().map(moved).sum::<Vector3<f64>>()
-        }));
-        world_from_segments
+                let moved = sum(s, &turned, &difference(s, translation, &root));
+                let weighted = scaled(s, &moved, s.splat_f64s(weight));
+                about_root = sum(s, &about_root, &weighted);
+            }
+            positions.push(sum(s, &root, &about_root));
+        }
+        Evaluated {
+            world_from_segments,
+            positions,
+        }
+    }
+
+    /// As `ShapedBody::world_from_segments`, of the joints that are evaluated.
+    #[inline(always)]
+    fn segments<S: Simd>(
+        &self,
+        s: S,
+        rotations: &[RotationLanes<S>; JOINT_COUNT],
+        root: &VectorLanes<S>,
+    ) -> [IsometryLanes<S>; JOINT_COUNT] {
+        let mut world_from = [(rotations[0], *root); JOINT_COUNT];
+        for joint in &self.joints {
+            if let Some(parent) = joint.parent() {
+                let joints = &self.joints_in_model;
+                let in_parent = joints[joint.index()] - joints[parent.index()];
+                let (rotation, translation) = &world_from[parent.index()];
+                let shift = rotated(s, rotation, &splat(s, &in_parent));
+                world_from[joint.index()] = (
+                    product(s, rotation, &rotations[joint.index()]),
+                    sum(s, translation, &shift),
+                );
+            }
+        }
+        world_from
+    }
+}
+
+/// Poses of all lanes.
+struct Evaluated<S: Simd> {
+    /// Of the joints that are evaluated.
+    world_from_segments: [IsometryLanes<S>; JOINT_COUNT],
+    positions: Vec<VectorLanes<S>>,
+}
+
+/// [`VertexSubset::visit_poses`], to be compiled for each kind of processor.
+struct Walk<'a, V> {
+    subset: &'a VertexSubset,
+    poses: &'a [BodyPose],
+    visit: V,
+}
+
+impl<V: FnMut(usize, &[Vector3<f64>], &[Isometry3<f64>; JOINT_COUNT])> WithSimd for Walk<'_, V> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, s: S) {
+        let mut positions = Vec::with_capacity(self.subset.vertices.len());
+        let mut segments = [Isometry3::identity(); JOINT_COUNT];
+        for (number, poses) in self.poses.chunks(S::F64_LANES).enumerate() {
+            let evaluated = self.subset.evaluate(s, poses);
+            for lane in 0..poses.len() {
+                positions.clear();
+                positions.extend(
+                    evaluated
+                        .positions
+                        .iter()
+                        .map(|it| vector_of::<S>(it, lane)),
+                );
+                for joint in &self.subset.asked {
+                    let segment = &evaluated.world_from_segments[joint.index()];
+                    segments[joint.index()] = isometry_of::<S>(segment, lane);
+                }
+                (self.visit)(number * S::F64_LANES + lane, &positions, &segments);
+            }
+        }
     }
 }
 
 /// P vec(R - I) of one vertex, m.
-fn correction(corrections: &[Correction], features: &[[f64; 9]; JOINT_COUNT]) -> Vector3<f64> {
-    let mut all = Vector3::zeros();
+#[inline(always)]
+fn correction<S: Simd>(
+    s: S,
+    corrections: &[Correction],
+    features: &[[S::f64s; 9]; JOINT_COUNT],
+) -> VectorLanes<S> {
+    let mut all = [s.splat_f64s(0.0); 3];
     for Correction {
         joint,
         coefficients,
     } in corrections
     {
-        let mut of_joint = [0.0; 4];
+        let mut of_joint = [s.splat_f64s(0.0); 3];
         for (coefficients, feature) in coefficients.iter().zip(&features[*joint as usize]) {
-            for (sum, coefficient) in of_joint.iter_mut().zip(coefficients) {
-                *sum += coefficient * feature;
-            }
+            let of_feature = scaled(s, &splat(s, coefficients), *feature);
+            of_joint = sum(s, &of_joint, &of_feature);
         }
-        let [x, y, z, _] = of_joint;
-        all += Vector3::new(x, y, z);
+        all = sum(s, &all, &of_joint);
     }
     all
 }

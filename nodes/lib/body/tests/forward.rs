@@ -194,6 +194,29 @@ fn segments_that_are_not_asked_for_change_no_vertex() {
 }
 
 #[test]
+fn poses_beside_each_other_are_what_each_is_alone() {
+    let body = ShapedBody::new(BodyModel::embedded(), &[0.5]).unwrap();
+    let vertices: Vec<u32> = (0..40).map(|k| 170 * k).collect();
+    let asked = [Joint::LeftFoot, Joint::Head];
+    let subset = body.subset(&vertices).unwrap().with_segments_of(asked);
+    for count in [0, 1, 3, 8, 19] {
+        let poses: Vec<_> = (0..count).map(|seed| some_pose(seed, 0.8)).collect();
+        let mut expected = Vec::new();
+        let mut visited = 0;
+        subset.visit_poses(&poses, |number, found, found_segments| {
+            assert_eq!(number, visited);
+            visited += 1;
+            let segments = subset.positions_and_segments_into(&poses[number], &mut expected);
+            assert_eq!(found, expected);
+            for joint in asked {
+                assert_eq!(found_segments[joint.index()], segments[joint.index()]);
+            }
+        });
+        assert_eq!(visited, poses.len());
+    }
+}
+
+#[test]
 fn far_from_the_origin_only_the_last_rounding_grows() {
     let body = ShapedBody::new(BodyModel::embedded(), &[]).unwrap();
     let mut pose = some_pose(5, 0.8);

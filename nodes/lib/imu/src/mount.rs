@@ -280,12 +280,16 @@ impl MountedSensors {
             .iter()
             .map(|_| Vec::with_capacity(stamps.len()))
             .collect();
-        let (mut positions, mut sensor_poses) = (Vec::new(), Vec::new());
-        for (stamp, pose) in stamps.iter().zip(poses) {
-            self.poses_into(pose, &mut positions, &mut sensor_poses);
-            for (series, sensor_pose) in by_sensor.iter_mut().zip(&sensor_poses) {
-                series.push(sensor_pose.at(*stamp));
-            }
+        if let Some(subset) = &self.subset {
+            let poses = &poses[..poses.len().min(stamps.len())];
+            subset.visit_poses(poses, |number, positions, segments| {
+                let corners = positions.as_chunks::<3>().0;
+                let sensors = by_sensor.iter_mut().zip(&self.sensors);
+                for ((series, sensor), corners) in sensors.zip(corners) {
+                    let segment = &segments[sensor.site.joint.index()];
+                    series.push(sensor.pose_from(segment, *corners).at(stamps[number]));
+                }
+            });
         }
         by_sensor.into_iter().map(SensorTrajectory::new).collect()
     }
