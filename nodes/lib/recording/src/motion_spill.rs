@@ -4,7 +4,6 @@
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use std::vec;
 
 use cromosim_imu::{Bandwidth, KinematicSample, SampleVariance};
 use cromosim_spatial::Stamp;
@@ -20,6 +19,15 @@ const SAMPLE: usize = 8 * (VALUES + 1) + 1;
 /// Bytes that are read or written at once.
 const BUFFER: usize = 64 * 1024;
 
+/// Samples in a file.
+struct SpilledFile {
+    file: BufReader<File>,
+    left: usize,
+    folder: PathBuf,
+    /// The sample that was read last.
+    sample: Option<KinematicSample>,
+}
+
 /// Samples of one placement, in the order of time.
 pub struct MotionSpill {
     kept: Kept,
@@ -27,9 +35,9 @@ pub struct MotionSpill {
 }
 
 enum Kept {
-    /// All of them.
-    InMemory(vec::IntoIter<KinematicSample>),
-    InFile(BufReader<File>, usize, PathBuf),
+    /// All of them, and how many were taken.
+    InMemory(Vec<KinematicSample>, usize),
+    InFile(Box<SpilledFile>),
 }
 
 impl MotionSpill {
@@ -44,11 +52,16 @@ impl MotionSpill {
     ) -> Result<Self, RecordingError> {
         let count = samples.len();
         let kept = if size_of_val(samples.as_slice()) <= in_memory {
-            Kept::InMemory(samples.into_iter())
+            Kept::InMemory(samples, 0)
         } else {
             let folder = folder.to_owned();
             match written(&samples, &folder) {
-                Ok(file) => Kept::InFile(file, count, folder),
+                Ok(file) => Kept::InFile(Box::new(SpilledFile {
+                    file,
+                    left: count,
+                    folder,
+                    sample: None,
+                })),
                 Err(source) => return Err(RecordingError::PutAside { folder, source }),
             }
         };
@@ -63,30 +76,41 @@ impl MotionSpill {
     /// Whether all were taken.
     pub fn is_empty(&self) -> bool {
         match &self.kept {
-            Kept::InMemory(samples) => samples.as_slice().is_empty(),
-            Kept::InFile(_, left, _) => *left == 0,
+            Kept::InMemory(samples, taken) => *taken == samples.len(),
+            Kept::InFile(spilled) => spilled.left == 0,
         }
     }
 
-    /// The next sample; none after the last.
+    /// The next sample, where it lies: copies of what has left the caches would cost more than all that is
+    /// made of it. None after the last.
     ///
     /// # Errors
     /// [`RecordingError::PutAside`].
-    pub fn next_sample(&mut self) -> Result<Option<KinematicSample>, RecordingError> {
+    pub fn next_sample(&mut self) -> Result<Option<&KinematicSample>, RecordingError> {
         match &mut self.kept {
-            Kept::InMemory(samples) => Ok(samples.next()),
-            Kept::InFile(_, 0, _) => Ok(None),
-            Kept::InFile(file, left, folder) => {
-                let mut bytes = [0; SAMPLE];
-                let read = file.read_exact(&mut bytes);
-                read.map_err(|source| RecordingError::PutAside {
-                    folder: folder.clone(),
-                    source,
-                })?;
-                *left -= 1;
-                Ok(Some(sample_of(&bytes)))
+            Kept::InMemory(samples, taken) => {
+                let sample = samples.get(*taken);
+                *taken += usize::from(sample.is_some());
+                Ok(sample)
             }
+            Kept::InFile(spilled) => spilled.next_sample(),
         }
+    }
+}
+
+impl SpilledFile {
+    fn next_sample(&mut self) -> Result<Option<&KinematicSample>, RecordingError> {
+        if self.left == 0 {
+            return Ok(None);
+        }
+        let mut bytes = [0; SAMPLE];
+        let read = self.file.read_exact(&mut bytes);
+        read.map_err(|source| RecordingError::PutAside {
+            folder: self.folder.clone(),
+            source,
+        })?;
+        self.left -= 1;
+        Ok(Some(self.sample.insert(sample_of(&bytes))))
     }
 }
 
@@ -222,7 +246,7 @@ mod tests {
             let mut spill = MotionSpill::new(samples.clone(), in_memory, folder.path()).unwrap();
             assert_eq!(spill.count(), samples.len());
             for sample in &samples {
-                assert_eq!(spill.next_sample().unwrap().as_ref(), Some(sample));
+                assert_eq!(spill.next_sample().unwrap(), Some(sample));
             }
             assert_eq!(spill.next_sample().unwrap(), None);
         }

@@ -66,7 +66,7 @@ impl SimulatedPlacement {
         read: impl Fn(&mut VirtualImu, &KinematicSample) -> Option<T>,
     ) -> Result<Option<T>, RecordingError> {
         while let Some(sample) = self.motion.next_sample()? {
-            if let Some(read) = read(&mut self.imu, &sample) {
+            if let Some(read) = read(&mut self.imu, sample) {
                 return Ok(Some(read));
             }
         }
