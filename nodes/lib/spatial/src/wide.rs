@@ -411,3 +411,50 @@ pub(crate) fn are_positive<const L: usize>(s: impl Four, a: &[f64; L]) -> bool {
     }
     all
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[inline(always)]
+    fn some_formula<S: Four>(s: S, a: &[f64; 5], b: &[f64; 5]) -> [f64; 5] {
+        formula(
+            s,
+            [a, b],
+            #[inline(always)]
+            |[a, b]| {
+                let root = s.square_root(s.divide(a, b));
+                s.less(s.splat(1.4), s.greater(root, s.splat(0.9)))
+            },
+        )
+    }
+
+    #[test]
+    fn a_formula_is_the_same_in_all_lanes_and_on_all_processors() {
+        let (a, b) = ([1.0, 2.0, 3.0, -1.0, 0.81], [1.1, 0.5, 2.0, 1.0, 0.9]);
+        let root = |k: usize| f64::sqrt(a[k] / b[k]);
+        // What is no number gives way to the other in `greater`.
+        let expected = [root(0), 1.4, root(2), 0.9, root(4)];
+        assert_eq!(some_formula(Plain, &a, &b), expected);
+        let found = widest!(s => some_formula(s, &a, &b));
+        assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn all_lanes_have_to_be_positive() {
+        for (lane, other) in [
+            (0, 0.0),
+            (2, f64::NAN),
+            (3, -1.0),
+            (4, -0.0),
+            (1, f64::INFINITY),
+        ] {
+            let mut numbers = [1.0, 5e-324, 1e300, 2.0, 3.0];
+            assert!(are_positive(Plain, &numbers) && widest!(s => are_positive(s, &numbers)));
+            numbers[lane] = other;
+            let positive = other > 0.0;
+            assert_eq!(are_positive(Plain, &numbers), positive);
+            assert_eq!(widest!(s => are_positive(s, &numbers)), positive);
+        }
+    }
+}
