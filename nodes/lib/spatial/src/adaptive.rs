@@ -324,14 +324,17 @@ impl<const L: usize> Adaptation<L> {
             drives,
             accelerations,
             residuals,
+            room: [near, room],
         }: &mut Statements<L>,
         stride: Stride,
     ) {
-        let mut room = residuals.clone();
-        let mut near = drives.clone();
-        Kernel::new(NEAR_DRIVE_INTERVALS).smooth(s, &mut near, &mut room);
-        smooth_shared(s, drives, SHARED_DRIVE_S / equations.interval, &mut room);
-        for ((drive, near), around) in self.drive.iter_mut().zip(&near).zip(&*drives) {
+        room.resize(residuals.len(), [[0.0; L]; 2]);
+        near.clear();
+        near.reserve(residuals.len());
+        near.extend_from_slice(drives);
+        Kernel::new(NEAR_DRIVE_INTERVALS).smooth(s, near, room);
+        smooth_shared(s, drives, SHARED_DRIVE_S / equations.interval, room);
+        for ((drive, near), around) in self.drive.iter_mut().zip(&*near).zip(&*drives) {
             let found = with_expected(s, near, &mean(s, around), NEAR_DRIVE_COUNT);
             *drive = match stride {
                 Stride::Whole => found,
@@ -341,12 +344,12 @@ impl<const L: usize> Adaptation<L> {
         // White up to half the samples' rate, the same square would be less dense.
         let denser = 0.5 / (equations.interval * VIGOUR_BAND_HZ);
         let shared = SHARED_VIGOUR_S / equations.interval;
-        smooth_shared(s, accelerations, shared, &mut room);
+        smooth_shared(s, accelerations, shared, room);
         for (vigour, found) in self.vigour.iter_mut().zip(&*accelerations) {
             *vigour = scaled(s, &mean(s, found), denser);
         }
-        take_fourth_roots(s, residuals, &mut room);
-        smooth_shared(s, residuals, SHARED_NOISE_S / equations.interval, &mut room);
+        take_fourth_roots(s, residuals, near, room);
+        smooth_shared(s, residuals, SHARED_NOISE_S / equations.interval, room);
         for (noise, found) in self.noise.iter_mut().zip(&*residuals) {
             *noise = formula(
                 s,
@@ -479,16 +482,18 @@ fn with_expected<const L: usize>(
 }
 
 /// In place of each sum of squares the fourth root of the mean over the nearest entries, times what
-/// the entry counts.
+/// the entry counts; `near` is memory for as many.
 #[inline(always)]
 fn take_fourth_roots<const L: usize>(
     s: impl Four,
     evidence: &mut [Evidence<L>],
+    near: &mut Vec<Evidence<L>>,
     room: &mut [Evidence<L>],
 ) {
-    let mut near = evidence.to_vec();
-    Kernel::new(NEAR_NOISE_INTERVALS).smooth(s, &mut near, room);
-    for ([square, count], near) in evidence.iter_mut().zip(&near) {
+    near.clear();
+    near.extend_from_slice(evidence);
+    Kernel::new(NEAR_NOISE_INTERVALS).smooth(s, near, room);
+    for ([square, count], near) in evidence.iter_mut().zip(&*near) {
         *square = formula(
             s,
             [count, &mean(s, near)],

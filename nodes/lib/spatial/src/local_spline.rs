@@ -70,6 +70,8 @@ pub(crate) struct Statements<const L: usize> {
     pub(crate) accelerations: Vec<Stated<L>>,
     /// Of each sample: its distance from the spline.
     pub(crate) residuals: Vec<Stated<L>>,
+    /// Memory that learning from them reuses: made anew in each step, its pages would be too.
+    pub(crate) room: [Vec<Stated<L>>; 2],
 }
 
 /// A solution of the equations in each lane, and memory that solving reuses.
@@ -192,6 +194,7 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
             drives,
             accelerations,
             residuals,
+            ..
         } = statements;
         accelerations.resize(equations.interval_count(), [[1.0; L]; 2]);
         drives.resize(equations.interval_count(), [[0.0; L]; 2]);
