@@ -5,12 +5,12 @@ use std::ops::RangeInclusive;
 
 use cromosim_imu::{
     Channel, Effect, EffectError, EffectKind, EffectSet, GravityMode, PerChannel, Reading,
-    nearest_signed_permutation,
+    length_factors, nearest_signed_permutation, unit_factors,
 };
 use cromosim_spatial::{KinematicTrack, PoseNoise, so3};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use crate::force_slopes::{ForceSlopes, known_factor};
+use crate::force_slopes::{ForceSlopes, Scales, known_factor};
 use crate::lag::{Drift, drift_of_angular_speeds, lag_of_angular_speeds};
 use crate::policy::report::REFERENCE_NOISE;
 use crate::prepared::PreparedPlacement;
@@ -29,6 +29,8 @@ const ON_TIME_LEAVES: f64 = 1.2;
 const NEAR_AXES: f64 = 0.25;
 /// Scales of the gyroscope that are no other units: noise and a lag take away half.
 const NEARLY_ONE: RangeInclusive<f64> = 0.5..=2.0;
+/// Part of a unit's factor that saturation or a filter may leave of a gyroscope's scale; no source.
+const WEAKENED: f64 = 0.5;
 /// Part of the measured angular velocity's square that the reference's most turned axis has to explain, for their
 /// ratio to be a unit's; no source. Noise that has nothing to do with it explains one part in as many as there
 /// are readings.
@@ -40,6 +42,8 @@ const LEAST_SPREAD: f64 = 0.0025;
 /// reference to have axes.
 const LEAST_LIKENESS: f64 = 0.3;
 
+/// Time over which forces are averaged for what is slow, s: below some 2 Hz. No source.
+const SLOW_S: f64 = 0.25;
 /// White noise of positions, "m", that is taken for millimetres where the rotation scatters as ordinarily, and
 /// nothing moves: 50 m away, a cluster of markers of 50 mm would have it. No source.
 const MILLIMETRES_NOISE: f64 = 0.05;
@@ -99,16 +103,13 @@ impl CoarseAlignment {
         let slopes = |turn: &Matrix3<f64>| ForceSlopes::new(&rows, track, turn);
         let as_it_is = slopes(&Matrix3::identity());
         // Angular velocities about one axis tell axes badly: what leaves less of the force unexplained holds.
-        let slopes = axes
-            .map(|axes| slopes(&axes))
-            .filter(|turned| turned.explains_as_much_as(&as_it_is))
-            .unwrap_or(as_it_is);
-        let scales = slopes.scales();
-        let length_units = if slopes.tells_length() {
-            scales.length
-        } else {
-            length_units_at_rest(prepared.estimate.noise())
-        };
+        let (turn, slopes) = axes
+            .map(|axes| (axes, slopes(&axes)))
+            .filter(|(_, turned)| turned.explains_as_much_as(&as_it_is))
+            .unwrap_or((Matrix3::identity(), as_it_is));
+        let count = (SLOW_S * prepared.rate_hz).round() as usize;
+        let slow = ForceSlopes::of_means(&rows, track, &turn, count);
+        let scales = scales(&slopes, &slow, prepared.estimate.noise());
         Self {
             lag_s,
             drift,
@@ -117,7 +118,7 @@ impl CoarseAlignment {
                 gyroscope: gyro,
             },
             gravity: scales.gravity,
-            length_units,
+            length_units: scales.length,
             axes,
         }
     }
@@ -168,6 +169,17 @@ impl CoarseAlignment {
         }
         starts
     }
+}
+
+/// Units of the accelerometer, gravity, and units per metre of the reference: by what of its motion is slow (a filter
+/// of the device weakens what is fast, by as much as feet do), by all of it, or at rest by its noise.
+fn scales(slopes: &ForceSlopes, slow: &ForceSlopes, noise: PoseNoise) -> Scales {
+    let telling = [slow, slopes].into_iter().find(|it| it.tells_length());
+    let length = telling.map_or_else(
+        || length_units_at_rest(noise),
+        |it| it.scales(length_factors()).length,
+    );
+    slopes.scales(&[length])
 }
 
 /// Units per metre of a reference at rest, by its noise alone.
@@ -253,7 +265,7 @@ impl Turns {
         if (0.05..=5.0).contains(&ratio) || !self.are_followed() {
             1.0
         } else {
-            known_factor(ratio, Channel::Gyroscope)
+            gyro_factor(ratio)
         }
     }
 
@@ -264,6 +276,17 @@ impl Turns {
             (self.yw * inverse * self.yw.transpose()).trace()
         });
         1.0 - explained / self.yy.max(f64::MIN_POSITIVE)
+    }
+}
+
+/// The unit's factor that a gyroscope's scale has: up to half of a fine unit's is lost where readings saturate or are
+/// filtered; coarse ones may be what noise of the reference leaves of none, and have to be near. Else 1.
+fn gyro_factor(scale: f64) -> f64 {
+    let factors = unit_factors(Channel::Gyroscope).iter().copied();
+    let is_weakened = |factor: &f64| *factor > 1.0 && (WEAKENED..1.0).contains(&(scale / factor));
+    match known_factor(scale, Channel::Gyroscope) {
+        1.0 => factors.into_iter().find(is_weakened).unwrap_or(1.0),
+        known => known,
     }
 }
 
@@ -279,8 +302,7 @@ fn gyro_axes(turns: &Turns) -> (Option<Matrix3<f64>>, f64) {
     match of_all_axes {
         // Noise of the reference makes the axes that it turns least about count for less.
         Some((axes, scale)) if !NEARLY_ONE.contains(&scale) => {
-            let factors = [scale, turns.about_most_turned_axis().0]
-                .map(|scale| known_factor(scale, Channel::Gyroscope));
+            let factors = [scale, turns.about_most_turned_axis().0].map(gyro_factor);
             let known = factors.into_iter().find(|factor| *factor != 1.0);
             (Some(axes), known.unwrap_or(1.0))
         }
@@ -322,5 +344,68 @@ mod tests {
         let (axes, factor) = gyro_axes(&turns);
         assert!(axes.is_some());
         assert_eq!(factor, 1.0_f64.to_degrees());
+    }
+
+    /// A tool's acceleration along x, m/s2: slow, and of 30 Hz.
+    fn acceleration(t: f64) -> [f64; 2] {
+        [2.0 * (1.7 * t).sin(), 20.0 * (190.0 * t).sin()]
+    }
+
+    /// At 200 Hz, of a reference in such units, readings that hold so much of what is fast, with gravity along an axis.
+    fn forces(units: f64, of_fast: f64, up: Vector3<f64>) -> (KinematicTrack, Vec<Reading>) {
+        let mut track = KinematicTrack::default();
+        let mut readings = Vec::new();
+        for k in 0..4000 {
+            let [slow, fast] = acceleration(0.005 * f64::from(k));
+            track
+                .acceleration_in_segment
+                .push(Vector3::x() * (units * (slow + fast)));
+            track.world_from_segment.push(UnitQuaternion::identity());
+            readings.push(Reading {
+                specific_force: Vector3::x() * (slow + of_fast * fast) + up * 9.80665,
+                ..Reading::default()
+            });
+        }
+        (track, readings)
+    }
+
+    fn scales_of((track, readings): &(KinematicTrack, Vec<Reading>), noise: f64) -> [f64; 2] {
+        let rows: Vec<(&Reading, usize)> = readings.iter().zip(0..).collect();
+        let as_it_is = Matrix3::identity();
+        let slow = ForceSlopes::of_means(&rows, track, &as_it_is, 50);
+        let noise = PoseNoise {
+            position: noise,
+            rotation: 1e-3,
+        };
+        let scales = scales(&ForceSlopes::new(&rows, track, &as_it_is), &slow, noise);
+        [scales.accel, scales.length]
+    }
+
+    #[test]
+    fn a_filter_neither_hides_feet_nor_passes_for_them() {
+        let feet = 1.0 / 0.3048;
+        let found = scales_of(&forces(feet, 0.02, Vector3::z()), 1e-4);
+        assert_eq!(found, [1.0, feet]);
+        let found = scales_of(&forces(1.0, 0.3, Vector3::z()), 1e-4);
+        assert_eq!(found, [1.0, 1.0]);
+    }
+
+    #[test]
+    fn millimetres_of_who_rests_are_no_units_of_the_accelerometer() {
+        // Other axes hide the acceleration, the positions' noise tells their units.
+        let found = scales_of(&forces(1000.0, 1.0, Vector3::y()), 0.2);
+        assert_eq!(found, [1.0, 1000.0]);
+    }
+
+    #[test]
+    fn saturation_hides_no_units_of_the_gyroscope() {
+        for (scale, factor) in [
+            (40.0, 1.0_f64.to_degrees()),
+            (57.0, 1.0_f64.to_degrees()),
+            (0.3, 1.0),
+            (3.0, 1.0),
+        ] {
+            assert_eq!(gyro_factor(scale), factor, "{scale}");
+        }
     }
 }

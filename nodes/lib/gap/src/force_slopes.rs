@@ -1,9 +1,9 @@
 //! Units of an accelerometer and of a reference, and gravity, by how the measured specific force follows the
 //! reference's acceleration and its gravity.
 
-use cromosim_imu::{Channel, GRAVITY_IN_WORLD, GravityMode, Reading, length_factors, unit_factors};
+use cromosim_imu::{Channel, GRAVITY_IN_WORLD, GravityMode, Reading, unit_factors};
 use cromosim_spatial::KinematicTrack;
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Squared correlation of the accelerations below which nothing is told of the reference's units of
 /// length: a turned mount or a poor reference halves a slope too, but not along with a good
@@ -63,6 +63,18 @@ pub(crate) struct Scales {
     pub length: f64,
 }
 
+/// The measured specific force y, the reference's acceleration `R^T a` and its gravity `-R^T g`, in a sensor's
+/// axes.
+fn forces(
+    (reading, entry): &(&Reading, usize),
+    track: &KinematicTrack,
+    turn: &Matrix3<f64>,
+) -> [Vector3<f64>; 3] {
+    let gravity = track.world_from_segment[*entry].inverse() * -GRAVITY_IN_WORLD;
+    let acceleration = track.acceleration_in_segment[*entry];
+    [reading.specific_force, turn * acceleration, turn * gravity]
+}
+
 /// Inner products of the measured specific force y, the reference's acceleration `R^T a` and its
 /// gravity `-R^T g`, for the slopes of `y = s_a R^T a + s_g (-R^T g)`.
 #[derive(Default)]
@@ -77,11 +89,30 @@ pub(crate) struct ForceSlopes {
 
 impl ForceSlopes {
     pub fn new(rows: &[(&Reading, usize)], track: &KinematicTrack, turn: &Matrix3<f64>) -> Self {
+        let of_rows = rows.iter().map(|row| forces(row, track, turn));
+        Self::of_products(of_rows)
+    }
+
+    /// Of the means over so many rows each: what is slow alone.
+    pub fn of_means(
+        rows: &[(&Reading, usize)],
+        track: &KinematicTrack,
+        turn: &Matrix3<f64>,
+        count: usize,
+    ) -> Self {
+        let means = rows.chunks_exact(count.max(1)).map(|several| {
+            let sum = several.iter().fold([Vector3::zeros(); 3], |sum, row| {
+                let own = forces(row, track, turn);
+                std::array::from_fn(|k| sum[k] + own[k])
+            });
+            sum.map(|sum| sum / several.len() as f64)
+        });
+        Self::of_products(means)
+    }
+
+    fn of_products(forces: impl Iterator<Item = [Vector3<f64>; 3]>) -> Self {
         let mut sums = Self::default();
-        for (reading, entry) in rows {
-            let a = turn * track.acceleration_in_segment[*entry];
-            let g = turn * (track.world_from_segment[*entry].inverse() * -GRAVITY_IN_WORLD);
-            let y = reading.specific_force;
+        for [y, a, g] in forces {
             sums.aa += a.dot(&a);
             sums.ag += a.dot(&g);
             sums.gg += g.dot(&g);
@@ -118,17 +149,12 @@ impl ForceSlopes {
         (self.yy - self.slopes().map_or(0.0, explained)).max(0.0)
     }
 
-    /// The known factors that the slopes are nearest to.
-    pub fn scales(&self) -> Scales {
+    /// The known factors that the slopes are nearest to, where the reference has one of these units of length.
+    pub fn scales(&self, lengths: &[f64]) -> Scales {
         let Some((of_a, of_g)) = self.slopes() else {
             return self.at_rest();
         };
         let likeness = self.likeness();
-        let lengths = if self.tells_length() {
-            length_factors()
-        } else {
-            &length_factors()[..1]
-        };
         let mut best = f64::INFINITY;
         let mut scales = self.at_rest();
         for &length in lengths {
