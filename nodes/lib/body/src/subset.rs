@@ -17,8 +17,6 @@ pub struct VertexSubset {
     vertices: Vec<SubsetVertex>,
     /// Whose segments are evaluated, each after its parent.
     joints: Vec<Joint>,
-    /// Of these, whose segments are asked for.
-    asked: Vec<Joint>,
     /// Whose rotation the vertices' corrections depend on.
     correcting: Vec<Joint>,
     /// Whose rotation anything depends on.
@@ -83,7 +81,6 @@ impl ShapedBody {
         Ok(VertexSubset {
             joints_in_model: *self.joints_in_model(),
             joints: Joint::ALL.to_vec(),
-            asked: Joint::ALL.to_vec(),
             turning: Joint::ALL.to_vec(),
             correcting: Joint::ALL.into_iter().filter(corrects).collect(),
             vertices,
@@ -100,8 +97,6 @@ impl VertexSubset {
         joints
             .into_iter()
             .for_each(|joint| wanted[joint.index()] = true);
-        let all = Joint::ALL.into_iter();
-        self.asked = all.filter(|joint| wanted[joint.index()]).collect();
         let weights = self.vertices.iter().flat_map(|vertex| &vertex.skin_weights);
         weights.for_each(|(joint, _)| wanted[*joint as usize] = true);
         // Parents stand before their children.
@@ -145,14 +140,11 @@ impl VertexSubset {
         pose: &BodyPose,
         positions: &mut Vec<Vector3<f64>>,
     ) -> [Isometry3<f64>; JOINT_COUNT] {
-        let evaluated = self.evaluate(Scalar::new(), std::slice::from_ref(pose));
+        let mut evaluated = PosesInLanes::new(Scalar::new(), self.vertices.len());
+        self.evaluate(Scalar::new(), std::slice::from_ref(pose), &mut evaluated);
         positions.clear();
-        positions.extend(
-            evaluated
-                .positions
-                .iter()
-                .map(|it| vector_of::<Scalar>(it, 0)),
-        );
+        let vectors = evaluated.positions.iter();
+        positions.extend(vectors.map(|it| vector_of::<Scalar>(it, 0)));
         let mut segments = [Isometry3::identity(); JOINT_COUNT];
         for joint in &self.joints {
             let segment = &evaluated.world_from_segments[joint.index()];
@@ -161,45 +153,44 @@ impl VertexSubset {
         segments
     }
 
-    /// As [`Self::positions_and_segments_into`] of each pose, as many at once as the processor has lanes:
-    /// `visit` is given the pose's number, the positions, and the segments that
-    /// [`Self::with_segments_of`] was asked for (the others are said to be the identity).
-    pub fn visit_poses(
-        &self,
-        poses: &[BodyPose],
-        visit: impl FnMut(usize, &[Vector3<f64>], &[Isometry3<f64>; JOINT_COUNT]),
-    ) {
+    /// As [`Self::positions_and_segments_into`] of each pose, as many at once as the processor has
+    /// lanes.
+    pub fn visit_poses(&self, poses: &[BodyPose], visitor: impl VisitPoses) {
         pulp::Arch::new().dispatch(Walk {
             subset: self,
             poses,
-            visit,
+            visitor,
         });
     }
 
     /// As many poses as there are lanes, or fewer: the last stands in the lanes that are left.
     #[inline(always)]
-    fn evaluate<S: Simd>(&self, s: S, poses: &[BodyPose]) -> Evaluated<S> {
+    fn evaluate<S: Simd>(&self, s: S, poses: &[BodyPose], evaluated: &mut PosesInLanes<S>) {
         let pose = |lane: usize| &poses[lane.min(poses.len() - 1)];
-        let zero = [s.splat_f64s(0.0); 3];
-        let mut rotations = [[s.splat_f64s(0.0); 4]; JOINT_COUNT];
+        let PosesInLanes {
+            local_rotations,
+            features,
+            world_from_segments,
+            positions,
+            count,
+        } = evaluated;
+        *count = poses.len();
         for joint in &self.turning {
-            rotations[joint.index()] = std::array::from_fn(|component| {
+            local_rotations[joint.index()] = std::array::from_fn(|component| {
                 gathered(s, |lane| {
                     pose(lane).local_rotations[joint.index()].coords[component]
                 })
             });
         }
         let root = std::array::from_fn(|axis| gathered(s, |lane| pose(lane).root_position[axis]));
-        let world_from_segments = self.segments(s, &rotations, &root);
-        let mut features = [[s.splat_f64s(0.0); 9]; JOINT_COUNT];
+        self.segments(s, local_rotations, &root, world_from_segments);
         for joint in &self.correcting {
-            features[joint.index()] = matrix_less_one(s, &rotations[joint.index()]);
+            features[joint.index()] = matrix_less_one(s, &local_rotations[joint.index()]);
         }
-        let mut positions = Vec::with_capacity(self.vertices.len());
-        for vertex in &self.vertices {
-            let correction = correction(s, &vertex.corrections, &features);
+        for (vertex, position) in self.vertices.iter().zip(positions) {
+            let correction = correction(s, &vertex.corrections, features);
             let corrected = sum(s, &splat(s, &vertex.rest), &correction);
-            let mut about_root = zero;
+            let mut about_root = [s.splat_f64s(0.0); 3];
             for &(joint, weight) in &vertex.skin_weights {
                 let in_model = splat(s, &self.joints_in_model[joint as usize]);
                 let (rotation, translation) = &world_from_segments[joint as usize];
@@ -210,11 +201,7 @@ impl VertexSubset {
                 let weighted = scaled(s, &moved, s.splat_f64s(weight));
                 about_root = sum(s, &about_root, &weighted);
             }
-            positions.push(sum(s, &root, &about_root));
-        }
-        Evaluated {
-            world_from_segments,
-            positions,
+            *position = sum(s, &root, &about_root);
         }
     }
 
@@ -225,8 +212,9 @@ impl VertexSubset {
         s: S,
         rotations: &[RotationLanes<S>; JOINT_COUNT],
         root: &VectorLanes<S>,
-    ) -> [IsometryLanes<S>; JOINT_COUNT] {
-        let mut world_from = [(rotations[0], *root); JOINT_COUNT];
+        world_from: &mut [IsometryLanes<S>; JOINT_COUNT],
+    ) {
+        world_from[0] = (rotations[0], *root);
         for joint in &self.joints {
             if let Some(parent) = joint.parent() {
                 let joints = &self.joints_in_model;
@@ -239,47 +227,73 @@ impl VertexSubset {
                 );
             }
         }
-        world_from
     }
 }
 
-/// Poses of all lanes.
-struct Evaluated<S: Simd> {
+/// Poses beside each other, one in each lane.
+#[derive(Clone, Debug)]
+pub struct PosesInLanes<S: Simd> {
+    local_rotations: [RotationLanes<S>; JOINT_COUNT],
+    /// R - I of the joints that correct.
+    features: [[S::f64s; 9]; JOINT_COUNT],
     /// Of the joints that are evaluated.
     world_from_segments: [IsometryLanes<S>; JOINT_COUNT],
     positions: Vec<VectorLanes<S>>,
+    count: usize,
+}
+
+impl<S: Simd> PosesInLanes<S> {
+    #[inline(always)]
+    fn new(s: S, vertex_count: usize) -> Self {
+        let zero = s.splat_f64s(0.0);
+        Self {
+            local_rotations: [[zero; 4]; JOINT_COUNT],
+            features: [[zero; 9]; JOINT_COUNT],
+            world_from_segments: [([zero; 4], [zero; 3]); JOINT_COUNT],
+            positions: vec![[zero; 3]; vertex_count],
+            count: 0,
+        }
+    }
+
+    /// How many lanes hold a pose of their own; what the others hold means nothing.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// The subset's vertices in the world, m, in its order.
+    pub fn positions(&self) -> &[VectorLanes<S>] {
+        &self.positions
+    }
+
+    /// A joint's segment (m), which [`VertexSubset::with_segments_of`] was asked for.
+    pub fn world_from_segment(&self, joint: Joint) -> &IsometryLanes<S> {
+        &self.world_from_segments[joint.index()]
+    }
+}
+
+/// What is done with poses that stand beside each other; written `#[inline(always)]`, so that it is
+/// compiled for the processor whose lanes it is given.
+pub trait VisitPoses {
+    /// `first` is the number of the pose in lane 0, the others follow it.
+    fn visit<S: Simd>(&mut self, s: S, first: usize, poses: &PosesInLanes<S>);
 }
 
 /// [`VertexSubset::visit_poses`], to be compiled for each kind of processor.
 struct Walk<'a, V> {
     subset: &'a VertexSubset,
     poses: &'a [BodyPose],
-    visit: V,
+    visitor: V,
 }
 
-impl<V: FnMut(usize, &[Vector3<f64>], &[Isometry3<f64>; JOINT_COUNT])> WithSimd for Walk<'_, V> {
+impl<V: VisitPoses> WithSimd for Walk<'_, V> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, s: S) {
-        let mut positions = Vec::with_capacity(self.subset.vertices.len());
-        let mut segments = [Isometry3::identity(); JOINT_COUNT];
+        let mut evaluated = PosesInLanes::new(s, self.subset.vertices.len());
         for (number, poses) in self.poses.chunks(S::F64_LANES).enumerate() {
-            let evaluated = self.subset.evaluate(s, poses);
-            for lane in 0..poses.len() {
-                positions.clear();
-                positions.extend(
-                    evaluated
-                        .positions
-                        .iter()
-                        .map(|it| vector_of::<S>(it, lane)),
-                );
-                for joint in &self.subset.asked {
-                    let segment = &evaluated.world_from_segments[joint.index()];
-                    segments[joint.index()] = isometry_of::<S>(segment, lane);
-                }
-                (self.visit)(number * S::F64_LANES + lane, &positions, &segments);
-            }
+            self.subset.evaluate(s, poses, &mut evaluated);
+            self.visitor.visit(s, number * S::F64_LANES, &evaluated);
         }
     }
 }

@@ -4,7 +4,9 @@
 use std::path::{Path, PathBuf};
 
 use cromosim_arrays::NpzReader;
-use cromosim_body::{BodyModel, BodyPose, Joint, ShapedBody};
+use cromosim_body::{
+    BodyModel, BodyPose, Joint, PosesInLanes, ShapedBody, VertexSubset, VisitPoses, lanes,
+};
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
 fn data(name: &str) -> PathBuf {
@@ -201,18 +203,43 @@ fn poses_beside_each_other_are_what_each_is_alone() {
     let subset = body.subset(&vertices).unwrap().with_segments_of(asked);
     for count in [0, 1, 3, 8, 19] {
         let poses: Vec<_> = (0..count).map(|seed| some_pose(seed, 0.8)).collect();
-        let mut expected = Vec::new();
         let mut visited = 0;
-        subset.visit_poses(&poses, |number, found, found_segments| {
-            assert_eq!(number, visited);
-            visited += 1;
-            let segments = subset.positions_and_segments_into(&poses[number], &mut expected);
-            assert_eq!(found, expected);
-            for joint in asked {
-                assert_eq!(found_segments[joint.index()], segments[joint.index()]);
-            }
-        });
+        subset.visit_poses(
+            &poses,
+            AsEachAlone {
+                subset: &subset,
+                poses: &poses,
+                asked,
+                visited: &mut visited,
+            },
+        );
         assert_eq!(visited, poses.len());
+    }
+}
+
+struct AsEachAlone<'a> {
+    subset: &'a VertexSubset,
+    poses: &'a [BodyPose],
+    asked: [Joint; 2],
+    visited: &'a mut usize,
+}
+
+impl VisitPoses for AsEachAlone<'_> {
+    fn visit<S: pulp::Simd>(&mut self, _: S, first: usize, found: &PosesInLanes<S>) {
+        assert_eq!(first, *self.visited);
+        let mut expected = Vec::new();
+        for lane in 0..found.count() {
+            let pose = &self.poses[first + lane];
+            let segments = self.subset.positions_and_segments_into(pose, &mut expected);
+            let positions = found.positions().iter();
+            let positions = positions.map(|it| lanes::vector_of::<S>(it, lane));
+            assert_eq!(positions.collect::<Vec<_>>(), expected);
+            for joint in self.asked {
+                let segment = lanes::isometry_of::<S>(found.world_from_segment(joint), lane);
+                assert_eq!(segment, segments[joint.index()]);
+            }
+        }
+        *self.visited += found.count();
     }
 }
 

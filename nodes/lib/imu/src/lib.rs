@@ -57,6 +57,7 @@ mod placement;
 mod placement_file;
 mod pose_error;
 mod random;
+mod rest_triangle;
 mod rounding;
 mod sample;
 mod schemes;

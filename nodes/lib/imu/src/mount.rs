@@ -1,10 +1,18 @@
 //! Sensors on a body of one shape.
 
-use cromosim_body::{BodyModel, BodyPose, Joint, ShapedBody, Site, VertexSubset};
+use cromosim_body::lanes::{
+    IsometryLanes, VectorLanes, isometry_of, isometry_product, product, rotated, scaled, splat,
+    splat_isometry, splat_rotation, sum, vector_of,
+};
+use cromosim_body::{
+    BodyModel, BodyPose, Joint, PosesInLanes, ShapedBody, Site, VertexSubset, VisitPoses,
+};
 use cromosim_spatial::Stamp;
 use cromosim_spatial::plausible::{Oddity, POINT_FROM_SKIN};
-use nalgebra::{Isometry3, Matrix2, Matrix3, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
+use pulp::Simd;
 
+use crate::rest_triangle::{RestTriangle, point_of, points_of};
 use crate::{Follow, ImuError, Placement, PoseStd, SensorFrame, SensorTrajectory, SiteChoice};
 
 /// Where a sensor is for one pose of the body.
@@ -194,6 +202,40 @@ impl MountedSensor {
             triangle_in_world: corners,
         }
     }
+
+    /// [`Self::pose_from`] of each lane, operation by operation: world_from_sensor, and the normal.
+    #[inline(always)]
+    fn poses_from<S: Simd>(
+        &self,
+        s: S,
+        world_from_segment: &IsometryLanes<S>,
+        corners: &[VectorLanes<S>; 3],
+    ) -> (IsometryLanes<S>, VectorLanes<S>) {
+        match self.follow {
+            Follow::Segment => (
+                isometry_product(
+                    s,
+                    world_from_segment,
+                    &splat_isometry(s, &self.segment_from_sensor),
+                ),
+                rotated(s, &world_from_segment.0, &splat(s, &self.normal_in_segment)),
+            ),
+            Follow::Skin => {
+                let world_from_triangle = self.triangle.frames(s, corners, &world_from_segment.0);
+                let normal = rotated(s, &world_from_triangle, &splat(s, &Vector3::z()));
+                let off_skin = scaled(s, &normal, s.splat_f64s(self.skin_distance));
+                let point = points_of(s, corners, &self.site.barycentrics);
+                let triangle_from_sensor = splat_rotation(s, &self.triangle_from_sensor);
+                (
+                    (
+                        product(s, &world_from_triangle, &triangle_from_sensor),
+                        sum(s, &point, &off_skin),
+                    ),
+                    normal,
+                )
+            }
+        }
+    }
 }
 
 /// What is odd about the point that a placement gives for its site; `None` also for other sites.
@@ -282,14 +324,14 @@ impl MountedSensors {
             .collect();
         if let Some(subset) = &self.subset {
             let poses = &poses[..poses.len().min(stamps.len())];
-            subset.visit_poses(poses, |number, positions, segments| {
-                let corners = positions.as_chunks::<3>().0;
-                let sensors = by_sensor.iter_mut().zip(&self.sensors);
-                for ((series, sensor), corners) in sensors.zip(corners) {
-                    let segment = &segments[sensor.site.joint.index()];
-                    series.push(sensor.pose_from(segment, *corners).at(stamps[number]));
-                }
-            });
+            subset.visit_poses(
+                poses,
+                FramesOf {
+                    sensors: &self.sensors,
+                    stamps,
+                    by_sensor: &mut by_sensor,
+                },
+            );
         }
         by_sensor.into_iter().map(SensorTrajectory::new).collect()
     }
@@ -310,57 +352,30 @@ impl MountedSensors {
     }
 }
 
-/// A triangle's shape at rest, in its own plane.
-#[derive(Clone, Copy, Debug)]
-struct RestTriangle {
-    /// Inverse of the matrix whose columns are the two edges from the first corner.
-    edges_inverse: Matrix2<f64>,
+/// Appends the frames of all sensors to their series.
+struct FramesOf<'a> {
+    sensors: &'a [MountedSensor],
+    stamps: &'a [Stamp],
+    by_sensor: &'a mut [Vec<SensorFrame>],
 }
 
-impl RestTriangle {
-    /// The shape, and model_from_triangle; `None` for a triangle without area.
-    fn new(corners: &[Vector3<f64>; 3]) -> Option<(Self, UnitQuaternion<f64>)> {
-        let [x, y, z] = edge_axes(corners)?;
-        let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, y, z]));
-        let edges_inverse = edges_in_plane(corners, &x, &y).try_inverse()?;
-        Some((
-            Self { edges_inverse },
-            UnitQuaternion::from_rotation_matrix(&rotation),
-        ))
+impl VisitPoses for FramesOf<'_> {
+    #[inline(always)]
+    fn visit<S: Simd>(&mut self, s: S, first: usize, poses: &PosesInLanes<S>) {
+        let stamps = &self.stamps[first..first + poses.count()];
+        let corners = poses.positions().as_chunks::<3>().0;
+        let sensors = self.by_sensor.iter_mut().zip(self.sensors);
+        for ((series, sensor), corners) in sensors.zip(corners) {
+            let segment = poses.world_from_segment(sensor.site.joint);
+            let (world_from_sensor, normal) = sensor.poses_from(s, segment, corners);
+            series.extend(stamps.iter().enumerate().map(|(lane, stamp)| SensorFrame {
+                stamp: *stamp,
+                world_from_sensor: isometry_of::<S>(&world_from_sensor, lane),
+                normal_in_world: vector_of::<S>(&normal, lane),
+                pose_std: PoseStd::NONE,
+            }));
+        }
     }
-
-    /// world_from_triangle of moved corners: z is their normal; about it, the rotation part (polar
-    /// decomposition) of what turned the rest triangle into the moved one, so that a stretched
-    /// triangle turns as a whole and not as its first edge does.
-    fn frame(&self, corners: &[Vector3<f64>; 3]) -> Option<UnitQuaternion<f64>> {
-        let [edge, across, normal] = edge_axes(corners)?;
-        let gradient = edges_in_plane(corners, &edge, &across) * self.edges_inverse;
-        let (sine, cosine) = (gradient.m21 - gradient.m12, gradient.m11 + gradient.m22);
-        let x = (edge * cosine + across * sine) / sine.hypot(cosine);
-        let rotation =
-            Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, normal.cross(&x), normal]));
-        Some(UnitQuaternion::from_rotation_matrix(&rotation))
-    }
-}
-
-/// First edge, normal cross edge, normal.
-fn edge_axes(corners: &[Vector3<f64>; 3]) -> Option<[Vector3<f64>; 3]> {
-    let edge = (corners[1] - corners[0]).try_normalize(1e-9)?;
-    let normal = edge.cross(&(corners[2] - corners[0])).try_normalize(1e-9)?;
-    Some([edge, normal.cross(&edge), normal])
-}
-
-fn edges_in_plane(corners: &[Vector3<f64>; 3], x: &Vector3<f64>, y: &Vector3<f64>) -> Matrix2<f64> {
-    let (first, second) = (corners[1] - corners[0], corners[2] - corners[0]);
-    Matrix2::new(first.dot(x), second.dot(x), first.dot(y), second.dot(y))
-}
-
-fn point_of(corners: &[Vector3<f64>; 3], barycentrics: &[f64; 3]) -> Vector3<f64> {
-    corners
-        .iter()
-        .zip(barycentrics)
-        .map(|(corner, weight)| corner * *weight)
-        .sum()
 }
 
 /// From a joint to the next one towards the far end; of a last joint the way from its parent. Model

@@ -28,9 +28,14 @@ fn mounted(fields: &str) -> MountedSensor {
 
 /// Turned joints everywhere, the pelvis too.
 fn bent() -> BodyPose {
+    bent_by(0.0)
+}
+
+/// As [`bent`], each time another way.
+fn bent_by(phase: f64) -> BodyPose {
     let mut pose = BodyPose::rest(Vector3::new(1.0, 2.0, 0.9));
     for k in 0..JOINT_COUNT {
-        let k_f = k as f64;
+        let k_f = k as f64 + phase;
         pose.local_rotations[k] = so3::exp(
             &(Vector3::new((k_f * 1.7).sin(), (k_f * 2.3).cos(), (k_f * 0.9).sin()) * 0.4),
         );
@@ -154,33 +159,6 @@ fn mount_and_distance_act_in_the_sites_frame() {
 }
 
 #[test]
-fn the_frame_of_a_stretched_triangle_turns_as_a_whole() {
-    let rest = [
-        Vector3::new(0.0, 0.0, 0.0),
-        Vector3::new(1.0, 0.0, 0.0),
-        Vector3::new(0.2, 0.8, 0.0),
-    ];
-    let (triangle, _) = RestTriangle::new(&rest).unwrap();
-    // A symmetric stretch has no rotation, though it turns every edge.
-    let stretch = Matrix3::new(1.3, 0.2, 0.0, 0.2, 0.9, 0.0, 0.0, 0.0, 1.0);
-    assert!(
-        triangle
-            .frame(&rest.map(|corner| stretch * corner))
-            .unwrap()
-            .angle()
-            < 1e-7
-    );
-    let turn = so3::exp(&Vector3::new(0.3, 0.9, -2.0));
-    assert!(
-        triangle
-            .frame(&rest.map(|corner| turn * corner))
-            .unwrap()
-            .angle_to(&turn)
-            < 1e-7
-    );
-}
-
-#[test]
 fn sites_are_chosen_by_triangle_and_by_point_too() {
     let named = mounted("site: left_shank_front");
     let Site {
@@ -241,4 +219,36 @@ fn evaluated_together_or_alone_frames_are_the_same() {
         (trajectories.len(), trajectories[0].frames().len()),
         (17, 3)
     );
+}
+
+#[test]
+fn beside_other_poses_frames_have_the_bytes_that_they_have_alone() {
+    let mut placements = PlacementSet::full17().placements().to_vec();
+    placements.push(placement("site: sternum, follow: segment"));
+    placements.push(placement("site: left_watch, skin_distance: 0.02"));
+    let together = MountedSensors::new(&BODY, &placements).unwrap();
+    let bytes = |frame: &SensorFrame| {
+        let SensorFrame {
+            world_from_sensor: it,
+            normal_in_world: normal,
+            ..
+        } = frame;
+        let (turn, place) = (it.rotation.coords, it.translation.vector);
+        let numbers = turn.iter().chain(&place).chain(normal);
+        numbers.map(|number| number.to_bits()).collect::<Vec<_>>()
+    };
+    for count in [2, 7, 8, 9, 37] {
+        let poses: Vec<_> = (0..count).map(|k| bent_by(0.7 * f64::from(k))).collect();
+        let stamps = (0..count).map(|k| Stamp::from_seconds(0.1 * f64::from(k)));
+        let stamps: Vec<_> = stamps.collect();
+        let trajectories = together.trajectories(&stamps, &poses).unwrap();
+        for (sensor, trajectory) in together.sensors().iter().zip(trajectories) {
+            assert_eq!(trajectory.frames().len(), poses.len());
+            for ((frame, pose), stamp) in trajectory.frames().iter().zip(&poses).zip(&stamps) {
+                assert_eq!(frame.stamp, *stamp);
+                let alone = sensor.pose(pose).at(*stamp);
+                assert_eq!(bytes(frame), bytes(&alone), "{}", sensor.name());
+            }
+        }
+    }
 }
