@@ -224,14 +224,10 @@ impl<'a> Sampler<'a> {
     }
 
     /// What is read at a stamp; it is held within the frames, and lies there.
+    #[inline]
     fn sample(&self, stamp: Stamp, (held, located): (Stamp, &Located)) -> KinematicSample {
         let known = self.errors.as_ref().map(|errors| errors.at(held));
-        let sample = spline::sample(self.fitted, self.source, (held, located));
-        KinematicSample {
-            stamp,
-            variance: sample.variance.larger(known.unwrap_or_default()),
-            ..sample
-        }
+        spline::sample(self.fitted, self.source, (stamp, located), known)
     }
 }
 

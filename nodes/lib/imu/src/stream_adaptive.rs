@@ -44,12 +44,8 @@ impl AdaptiveLag {
         self.times = Some(times.clone());
         let errors = SplineVariance::new(&times, &spline, frames)?;
         samples.extend(due.iter().map(|&stamp| {
-            let sample = sample(&spline, source, (stamp, &times.locate(stamp)));
             let known = errors.as_ref().map(|errors| errors.at(stamp));
-            KinematicSample {
-                variance: sample.variance.larger(known.unwrap_or_default()),
-                ..sample
-            }
+            sample(&spline, source, (stamp, &times.locate(stamp)), known)
         }));
         Ok(())
     }

@@ -110,6 +110,7 @@ impl FixedLag {
                 &spline,
                 PoseSource::default(),
                 (stamp, &times.locate(stamp)),
+                None,
             )
         }));
         Ok(())

@@ -37,8 +37,8 @@ impl Trim {
         let (from, to) = match self {
             Self::Seconds(seconds) => (start.plus_seconds(seconds), end.plus_seconds(-seconds)),
             Self::Uncertain => {
-                let of_all = [acceleration, angular_velocity]
-                    .map(|variance| median(motion.iter().map(variance)));
+                let both = |sample| (acceleration(sample), angular_velocity(sample));
+                let of_all = medians(motion.iter().map(both));
                 let first = first_certain(motion.iter(), of_all).unwrap_or(start);
                 let last = first_certain(motion.iter().rev(), of_all).unwrap_or(end);
                 let most_s = LONGEST_TRIM_S.min(LARGEST_PART * (end - start));
@@ -54,13 +54,18 @@ impl Trim {
 
 /// Median over the motion; none where a sample has none.
 pub fn median_bandwidth(motion: &[KinematicSample]) -> Option<Bandwidth> {
-    let all: Vec<Bandwidth> = motion
-        .iter()
-        .map(|sample| sample.bandwidth)
-        .collect::<Option<_>>()?;
-    (!all.is_empty()).then(|| Bandwidth {
-        acceleration_hz: median(all.iter().map(|bandwidth| bandwidth.acceleration_hz)),
-        angular_velocity_hz: median(all.iter().map(|bandwidth| bandwidth.angular_velocity_hz)),
+    let mut known = true;
+    let both = motion.iter().map(|sample| match sample.bandwidth {
+        Some(bandwidth) => (bandwidth.acceleration_hz, bandwidth.angular_velocity_hz),
+        None => {
+            known = false;
+            (0.0, 0.0)
+        }
+    });
+    let [acceleration_hz, angular_velocity_hz] = medians(both);
+    (known && !motion.is_empty()).then_some(Bandwidth {
+        acceleration_hz,
+        angular_velocity_hz,
     })
 }
 
@@ -89,12 +94,29 @@ fn first_certain<'a>(
 
 /// 0 of nothing.
 fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    let middle = values.len() / 2;
-    if values.is_empty() {
+    middle(values.map(in_order).collect())
+}
+
+/// Those of each, from one walk: samples fill more than the caches.
+fn medians(values: impl Iterator<Item = (f64, f64)>) -> [f64; 2] {
+    let (one, other) = values.map(|(a, b)| (in_order(a), in_order(b))).unzip();
+    [one, other].map(middle)
+}
+
+fn middle(mut ordered: Vec<i64>) -> f64 {
+    let middle = ordered.len() / 2;
+    if ordered.is_empty() {
         return 0.0;
     }
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+    let key = *ordered.select_nth_unstable(middle).1;
+    f64::from_bits(in_order(f64::from_bits(key as u64)) as u64)
+}
+
+/// The bits as a number that is in the order of [`f64::total_cmp`], and back: such numbers are compared in one
+/// step.
+fn in_order(value: f64) -> i64 {
+    let bits = value.to_bits() as i64;
+    bits ^ (((bits >> 63) as u64) >> 1) as i64
 }
 
 fn acceleration(sample: &KinematicSample) -> f64 {

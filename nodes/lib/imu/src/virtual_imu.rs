@@ -158,19 +158,23 @@ impl VirtualImu {
     pub fn read(&mut self, motion: &KinematicSample) -> Option<Measured> {
         let sample = self.effects.step(motion);
         let magnetic_field = self.read_field(motion);
-        let mut sample = self.output.mapped_sample(sample?);
+        let sample = self.output.mapped_sample(sample?);
         let variance = self
             .stated
             .of_motion(motion.variance, self.effects.walked_seconds());
-        let mut covariances = self.output.covariances.with_motion(&variance, &sample);
-        self.orient(&mut sample, magnetic_field.as_ref(), &mut covariances);
+        let covariances = self.output.covariances.with_motion(&variance, &sample);
         let thermometer = self.thermometer.as_mut();
-        Some(Measured {
+        let mut measured = Some(Measured {
             sample,
             covariances,
             magnetic_field,
             temperature: thermometer.and_then(|it| it.read(sample.stamp)),
-        })
+        });
+        // Where it lies: a copy of all costs more than this.
+        if let Some(it) = &mut measured {
+            self.orient(&mut it.sample, magnetic_field.as_ref(), &mut it.covariances);
+        }
+        measured
     }
 
     /// Of every sample: a magnetometer that is late needs those that are lost.

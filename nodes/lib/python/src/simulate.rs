@@ -6,16 +6,16 @@ use std::str::FromStr;
 use std::sync::Arc;
 
 use cromosim_imu::{
-    AmbientField, Device, Differentiation, OrientationSource, PlacementSet, Scheme, TextureSegment,
-    Trim,
+    AmbientField, Device, Differentiation, OrientationSource, PlacementSet, Scheme, SensorFrame,
+    TextureSegment, Trim,
 };
 use cromosim_learned::{LearnedSimulator, MappingFile};
 use cromosim_recording::{
-    Aside, PlayedPerson, RecordingError, Simulation, SimulationOptions, TextureOn,
+    Aside, PlayedPerson, Quality, RecordingError, SimulatedPlacement, Simulation,
+    SimulationOptions, TextureOn,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rayon::prelude::*;
 use serde::Deserialize;
 
 use crate::arrays::{Columns, poses, set_quality};
@@ -118,6 +118,25 @@ fn texture(name: &str) -> PyResult<TextureOn> {
     }
 }
 
+/// What stays of a placement when its samples are measured.
+struct MeasuredPlacement {
+    name: String,
+    columns: Columns,
+    frames: Vec<SensorFrame>,
+    quality: Quality,
+}
+
+fn measured(mut placement: SimulatedPlacement) -> Result<MeasuredPlacement, RecordingError> {
+    let mut columns = Columns::with_capacity(placement.motion.count());
+    placement.each_measured(|measured| columns.push(measured))?;
+    Ok(MeasuredPlacement {
+        name: placement.name,
+        columns,
+        frames: placement.frames,
+        quality: placement.quality,
+    })
+}
+
 /// The IMUs at `placements` (the text of a placements file) of a moving person: a dictionary of
 /// arrays for each. `device` is a device's text, with the placements that have it.
 #[pyfunction]
@@ -144,26 +163,18 @@ pub fn simulate<'py>(
         }
         let (start_s, duration_s) = (motion.start_s, motion.duration_s);
         let person = PlayedPerson::part(&motion.motion, start_s, duration_s).map_err(raise)?;
-        let simulated = simulation
-            .simulate::<RecordingError>(&person, &Aside::in_memory(), || Ok(()), || ())
-            .map_err(raise)?;
-        let measured = simulated.placements.into_par_iter().map(|mut placement| {
-            let mut columns = Columns::with_capacity(placement.motion.count());
-            while let Some(measured) = placement.next_measured()? {
-                columns.push(&measured);
-            }
-            Ok((columns, placement))
-        });
-        let measured = measured.collect::<Result<Vec<_>, RecordingError>>();
-        measured.map_err(raise)
+        let aside = Aside::in_memory();
+        let simulated = simulation.simulate_each(&person, &aside, || Ok(()), || (), measured);
+        simulated.map_err(raise)
     })?;
     let imus = PyDict::new(py);
-    for (columns, placement) in simulated {
-        let oriented = columns.are_oriented();
-        let arrays = columns.into_arrays(py, oriented)?;
-        arrays.set_item("reference", poses(py, &placement.frames)?)?;
-        set_quality(&arrays, &placement.quality)?;
-        imus.set_item(&placement.name, arrays)?;
+    let (simulated, _) = simulated;
+    for measured in simulated {
+        let oriented = measured.columns.are_oriented();
+        let arrays = measured.columns.into_arrays(py, oriented)?;
+        arrays.set_item("reference", poses(py, &measured.frames)?)?;
+        set_quality(&arrays, &measured.quality)?;
+        imus.set_item(&measured.name, arrays)?;
     }
     Ok(imus)
 }

@@ -35,7 +35,7 @@ pub struct MotionSpill {
 }
 
 enum Kept {
-    /// All of them, and how many were taken.
+    /// All of them, and which is next.
     InMemory(Vec<KinematicSample>, usize),
     InFile(Box<SpilledFile>),
 }
@@ -50,12 +50,22 @@ impl MotionSpill {
         in_memory: usize,
         folder: &Path,
     ) -> Result<Self, RecordingError> {
-        let count = samples.len();
-        let kept = if size_of_val(samples.as_slice()) <= in_memory {
-            Kept::InMemory(samples, 0)
+        Self::of_part(samples, 0, (in_memory, folder))
+    }
+
+    /// Those from `first` on.
+    pub(crate) fn of_part(
+        samples: Vec<KinematicSample>,
+        first: usize,
+        (in_memory, folder): (usize, &Path),
+    ) -> Result<Self, RecordingError> {
+        let part = &samples[first..];
+        let count = part.len();
+        let kept = if size_of_val(part) <= in_memory {
+            Kept::InMemory(samples, first)
         } else {
             let folder = folder.to_owned();
-            match written(&samples, &folder) {
+            match written(part, &folder) {
                 Ok(file) => Kept::InFile(Box::new(SpilledFile {
                     file,
                     left: count,
@@ -76,7 +86,7 @@ impl MotionSpill {
     /// Whether all were taken.
     pub fn is_empty(&self) -> bool {
         match &self.kept {
-            Kept::InMemory(samples, taken) => *taken == samples.len(),
+            Kept::InMemory(samples, next) => *next == samples.len(),
             Kept::InFile(spilled) => spilled.left == 0,
         }
     }
@@ -88,9 +98,9 @@ impl MotionSpill {
     /// [`RecordingError::PutAside`].
     pub fn next_sample(&mut self) -> Result<Option<&KinematicSample>, RecordingError> {
         match &mut self.kept {
-            Kept::InMemory(samples, taken) => {
-                let sample = samples.get(*taken);
-                *taken += usize::from(sample.is_some());
+            Kept::InMemory(samples, next) => {
+                let sample = samples.get(*next);
+                *next += usize::from(sample.is_some());
                 Ok(sample)
             }
             Kept::InFile(spilled) => spilled.next_sample(),

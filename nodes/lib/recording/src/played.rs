@@ -56,6 +56,20 @@ impl SimulatedPlacement {
         self.next_read(VirtualImu::read)
     }
 
+    /// Shows `take` what [`SimulatedPlacement::next_measured`] would give, one after the other: copies of it
+    /// would cost as much as making it.
+    ///
+    /// # Errors
+    /// As [`SimulatedPlacement::next_measured`].
+    pub fn each_measured(&mut self, mut take: impl FnMut(&Measured)) -> Result<(), RecordingError> {
+        while let Some(sample) = self.motion.next_sample()? {
+            if let Some(measured) = self.imu.read(sample) {
+                take(&measured);
+            }
+        }
+        Ok(())
+    }
+
     /// Stamp and channels of the same; whoever takes these takes nothing else of this placement.
     pub(crate) fn next_channels(&mut self) -> Result<Option<(Stamp, Reading)>, RecordingError> {
         self.next_read(VirtualImu::read_channels)

@@ -13,7 +13,7 @@ use cromosim_imu::{
     simulate_kinematics_on, simulate_several_on,
 };
 use cromosim_learned::{LearnedSimulator, MappingFile, Patch, SiteMotion, scheme_for_networks};
-use cromosim_spatial::{PoseTimes, uniform_stamps};
+use cromosim_spatial::{PoseTimes, Stamp, uniform_stamps};
 use rayon::prelude::*;
 
 use crate::motion_spill::MotionSpill;
@@ -210,6 +210,23 @@ impl Simulation {
         check: impl Fn() -> Result<(), E> + Sync,
         advance: impl Fn() + Sync,
     ) -> Result<SimulatedPerson, E> {
+        let (placements, sites) = self.simulate_each(person, aside, check, advance, Ok)?;
+        Ok(SimulatedPerson { placements, sites })
+    }
+
+    /// As [`Simulation::simulate`], with what `finish` makes of each placement on the same core, as soon as it
+    /// is simulated: its samples are in the caches then, and their memory serves the next.
+    ///
+    /// # Errors
+    /// As [`Simulation::simulate`], and those of `finish`.
+    pub fn simulate_each<T: Send, E: From<RecordingError> + Send>(
+        &self,
+        person: &PlayedPerson,
+        aside: &Aside,
+        check: impl Fn() -> Result<(), E> + Sync,
+        advance: impl Fn() + Sync,
+        finish: impl Fn(SimulatedPlacement) -> Result<T, E> + Sync,
+    ) -> Result<(Vec<T>, MountedSensors), E> {
         let PlayedPerson { motion, stamps, .. } = person;
         let shaped =
             ShapedBody::new(self.model.clone(), &motion.betas).map_err(RecordingError::from)?;
@@ -238,25 +255,23 @@ impl Simulation {
             (indices, own)
         };
         let groups: Vec<_> = groups.into_iter().map(own).collect();
-        let together = |(indices, own): (Range<usize>, _)| -> Result<Vec<SimulatedPlacement>, E> {
+        let together = |(indices, own): (Range<usize>, _)| -> Result<Vec<T>, E> {
             check()?;
             let motions = self.motions(person, &shaped, (indices.clone(), own), &times);
             let one = |(index, motion): (usize, _)| {
                 check()?;
                 let mounted = (&shaped, &sites.sensors()[index]);
                 let simulated = self.simulate_placement(person, mounted, index, motion, aside);
+                let finished = simulated.map_err(E::from).and_then(&finish);
                 advance();
-                Ok(simulated?)
+                finished
             };
             indices.zip(motions?).map(one).collect()
         };
         // Of several errors the first placement's is said, whichever comes first.
         let placements: Vec<Result<_, E>> = groups.into_par_iter().map(together).collect();
         let placements = placements.into_iter().collect::<Result<Vec<_>, E>>()?;
-        Ok(SimulatedPerson {
-            placements: placements.into_iter().flatten().collect(),
-            sites,
-        })
+        Ok((placements.into_iter().flatten().collect(), sites))
     }
 
     /// Trajectories and ideal motions of some placements; the trajectories are found where none are given.
@@ -273,8 +288,14 @@ impl Simulation {
         }
         let [start, end] =
             [person.played.start(), person.played.end()].map(|frame| person.stamps[*frame]);
-        let output = |placement: &Placement| uniform_stamps(start, end, placement.rate_hz());
-        let outputs: Vec<_> = placements.iter().map(output).collect::<Result<_, _>>()?;
+        let mut outputs: Vec<Vec<Stamp>> = Vec::with_capacity(placements.len());
+        for (k, placement) in placements.iter().enumerate() {
+            let same = (0..k).find(|&j| placements[j].rate_hz() == placement.rate_hz());
+            outputs.push(match same {
+                Some(j) => outputs[j].clone(),
+                None => uniform_stamps(start, end, placement.rate_hz())?,
+            });
+        }
         let schemes: BTreeSet<_> = placements.iter().map(|one| one.scheme().name()).collect();
         let by = |placement: &Placement| match self.options.differentiation {
             Some(by @ Differentiation::Bandwidth(_)) => by,
@@ -342,18 +363,21 @@ impl Simulation {
         let imu = VirtualImu::new(device, options)?;
         let (mut quality, span) =
             Quality::of(&motion, self.options.trim).ok_or(RecordingError::AllTrimmed)?;
-        motion.retain(|sample| span.contains(&sample.stamp));
+        motion.truncate(motion.partition_point(|sample| sample.stamp <= *span.end()));
+        // What is left out in front stays where it lies: all behind it would have to move.
+        let mut first = motion.partition_point(|sample| sample.stamp < *span.start());
         let whose = person.frame(name);
-        quality.texture = self.draw_texture(&mut motion, mounted, &whose)?;
-        let mut motion = [motion];
+        quality.texture = self.draw_texture(&mut motion[first..], mounted, &whose)?;
         if let Some(networks) = &self.options.learned {
+            motion.drain(..std::mem::take(&mut first));
             let patch = Patch::new(shaped, mounted.site())?;
             let poses = person.motion.frames.iter();
             let points: Vec<_> = poses.map(|pose| patch.points(pose)).collect();
             let seen = SiteMotion::new(&trajectory, placement.scheme(), &points)?;
-            networks.correction(seen).correct(&mut motion)?;
+            networks
+                .correction(seen)
+                .correct(std::slice::from_mut(&mut motion))?;
         }
-        let [motion] = motion;
         let mut frames = Vec::new();
         if aside.frames {
             frames = trajectory.into_frames();
@@ -363,7 +387,7 @@ impl Simulation {
         Ok(SimulatedPlacement {
             frames,
             name: name.to_owned(),
-            motion: MotionSpill::new(motion, aside.in_memory, &aside.folder)?,
+            motion: MotionSpill::of_part(motion, first, (aside.in_memory, &aside.folder))?,
             imu,
             quality,
         })

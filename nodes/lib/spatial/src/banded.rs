@@ -292,13 +292,29 @@ pub(crate) struct InverseBands {
 
 impl InverseBands {
     /// `row^T Z row` of one lane, the row's entries standing at `first` and after it.
+    #[inline]
     pub(crate) fn quadratic_form(
         &self,
         lane: usize,
         first: usize,
         row: &[f64; BANDWIDTH + 1],
     ) -> f64 {
-        let lanes = self.lanes;
+        // Those of one and of two series of poses: their places are then known when this is compiled.
+        match self.lanes {
+            2 => self.form_amid(2, lane, first, row),
+            4 => self.form_amid(4, lane, first, row),
+            lanes => self.form_amid(lanes, lane, first, row),
+        }
+    }
+
+    #[inline(always)]
+    fn form_amid(
+        &self,
+        lanes: usize,
+        lane: usize,
+        first: usize,
+        row: &[f64; BANDWIDTH + 1],
+    ) -> f64 {
         let own = (first + BANDWIDTH) * (BANDWIDTH + 1) * lanes + lane;
         let block = &self.entries[own..=own + (BANDWIDTH + 1) * BANDWIDTH * lanes];
         let entry = |i: usize, j: usize| block[(j * (BANDWIDTH + 1) + i - j) * lanes];

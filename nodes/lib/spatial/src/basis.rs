@@ -49,6 +49,12 @@ impl Basis {
     /// over `t`.
     pub(crate) fn interval_of(&self, t: f64) -> usize {
         let inner = &self.knots[ORDER..self.count()];
+        // Samples at a steady rate are one unit apart in most callers' time: looking there is soon done.
+        let near = (t as usize).min(inner.len());
+        let begins = near.checked_sub(1).is_none_or(|before| inner[before] <= t);
+        if begins && inner.get(near).is_none_or(|&after| t < after) {
+            return near;
+        }
         inner.partition_point(|&k| k <= t)
     }
 
@@ -74,14 +80,15 @@ impl Basis {
         std::array::from_fn(|j| values[k - first + j])
     }
 
-    /// Value, first and second derivatives at `t` of the functions from `first` on.
+    /// Value, first and second derivatives at `t` of the functions from `first` on. All degrees are written
+    /// out, so that they are known when this is compiled.
     pub(crate) fn values(&self, first: usize, t: f64) -> BasisValues {
         let window = self.window(first);
         let mut value = [0.0; ORDER];
         value[0] = 1.0;
-        for q in 1..=DEGREE - 2 {
-            raise_value(&mut value, window, q, t);
-        }
+        raise_value(&mut value, window, 1, t);
+        raise_value(&mut value, window, 2, t);
+        raise_value(&mut value, window, 3, t);
         let mut second = value;
         raise_derivative(&mut second, window, DEGREE - 1);
         raise_derivative(&mut second, window, DEGREE);
@@ -100,6 +107,7 @@ impl Basis {
 }
 
 /// Turns the values of the degree `q - 1` functions into those of degree `q` (Cox and de Boor).
+#[inline(always)]
 fn raise_value(values: &mut [f64; ORDER], window: &[f64], q: usize, t: f64) {
     let mut carried = 0.0;
     for j in 0..q {
@@ -113,6 +121,7 @@ fn raise_value(values: &mut [f64; ORDER], window: &[f64], q: usize, t: f64) {
 
 /// Turns any derivative of the degree `q - 1` functions into the next derivative of those of degree
 /// `q`: `B'_i,q = q (B_i,q-1 / (k_i+q - k_i) - B_i+1,q-1 / (k_i+q+1 - k_i+1))`.
+#[inline(always)]
 fn raise_derivative(values: &mut [f64; ORDER], window: &[f64], q: usize) {
     let mut carried = 0.0;
     for j in 0..q {

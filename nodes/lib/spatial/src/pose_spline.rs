@@ -371,8 +371,11 @@ impl PoseSpline {
         self.estimate_at(&self.times.locate(stamp))
     }
 
-    /// As [`PoseSpline::estimate`], at a stamp that the spline's times have located.
-    pub fn estimate_at(&self, &Located { first, values }: &Located) -> MotionEstimate {
+    /// As [`PoseSpline::estimate`], at a stamp that the spline's times have located. It is compiled with what
+    /// takes the estimate: its numbers would go through memory otherwise, which costs as much as they do.
+    #[inline]
+    pub fn estimate_at(&self, located: &Located) -> MotionEstimate {
+        let (first, values) = (located.first, &located.values);
         let highest_hz = 0.5 / self.times.system.equations.interval;
         let cutoffs_hz = [
             self.position.cutoff_over(first),
@@ -380,8 +383,8 @@ impl PoseSpline {
         ];
         let [acceleration_hz, angular_velocity_hz] = cutoffs_hz.map(|hz| hz.min(highest_hz));
         MotionEstimate {
-            motion: self.motion(first, &values),
-            variance: self.variance(first, &values, cutoffs_hz),
+            motion: self.motion(first, values),
+            variance: self.variance(first, values, cutoffs_hz),
             bandwidth: Bandwidth {
                 acceleration_hz,
                 angular_velocity_hz,
@@ -389,6 +392,7 @@ impl PoseSpline {
         }
     }
 
+    #[inline]
     fn motion(&self, first: usize, values: &BasisValues) -> Motion {
         let [position, velocity, acceleration] =
             self.position.combine(first, values).map(Vector3::from);
@@ -403,6 +407,7 @@ impl PoseSpline {
         }
     }
 
+    #[inline]
     fn variance(
         &self,
         first: usize,

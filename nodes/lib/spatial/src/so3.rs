@@ -59,6 +59,7 @@ pub fn vee(m: &Matrix3<f64>) -> Vector3<f64> {
 /// Angular velocity in world axes, rad/s, of a quaternion `s` (world_from_body, of any length but
 /// zero) with time derivative `s'`: with `q = s/|s|`, `w = 2 vec(q' q*) = 2 vec(s' s*) / |s|^2`
 /// (the change of length only enters the real part).
+#[inline]
 pub fn angular_velocity_in_world(s: &Quaternion<f64>, s_dot: &Quaternion<f64>) -> Vector3<f64> {
     (s_dot * s.conjugate()).imag() * (2.0 / s.norm_squared())
 }
@@ -71,6 +72,7 @@ pub fn angular_velocity_in_body(s: &Quaternion<f64>, s_dot: &Quaternion<f64>) ->
 /// Angular acceleration in world axes, rad/s2: the time derivative of
 /// [`angular_velocity_in_world`], `alpha = 2 vec(s'' s*) / |s|^2 - w (|s|^2)' / |s|^2` (`s' s'*` is
 /// real).
+#[inline]
 pub fn angular_acceleration_in_world(
     s: &Quaternion<f64>,
     s_dot: &Quaternion<f64>,

@@ -199,12 +199,12 @@ impl<const C: usize> SmoothingSpline<C> {
     }
 
     /// As [`SmoothingSpline::evaluate`], from what [`crate::equations::SplineEquations::basis_at`] gave.
+    #[inline]
     pub(crate) fn combine(&self, first: usize, values: &BasisValues) -> [[f64; C]; 3] {
         let mut result = [[0.0; C]; 3];
-        for (j, coefficient) in self.coefficients[first..first + values[0].len()]
-            .iter()
-            .enumerate()
-        {
+        let coefficients = &self.coefficients[first..first + ORDER];
+        for j in 0..ORDER {
+            let coefficient = &coefficients[j];
             for (derivative, row) in result.iter_mut().zip(values) {
                 for c in 0..C {
                     derivative[c] += row[j] * coefficient[c];
@@ -224,6 +224,7 @@ impl<const C: usize> SmoothingSpline<C> {
     }
 
     /// The variance of one of what [`crate::equations::SplineEquations::basis_at`] gave.
+    #[inline]
     pub(crate) fn variance_of(&self, first: usize, row: &[f64; ORDER]) -> Option<f64> {
         let (uncertainty, lane) = self.uncertainty.as_ref()?;
         Some(uncertainty.variance(*lane, first, row))
@@ -231,12 +232,14 @@ impl<const C: usize> SmoothingSpline<C> {
 
     /// Variance of the samples' noise over a knot interval, unit^2; none but for
     /// [`Smoothing::Adaptive`].
+    #[inline]
     pub(crate) fn noise_over(&self, interval: usize) -> Option<f64> {
         let (uncertainty, lane) = self.uncertainty.as_ref()?;
         Some(uncertainty.noise_over(*lane, interval))
     }
 
     /// What a low-pass has made of the samples' noise before.
+    #[inline]
     pub(crate) fn low_passed(&self) -> Option<LowPassed> {
         let (uncertainty, lane) = self.uncertainty.as_ref()?;
         uncertainty.low_passed(*lane)
@@ -253,6 +256,7 @@ impl<const C: usize> SmoothingSpline<C> {
     }
 
     /// The same over a knot interval.
+    #[inline]
     pub(crate) fn cutoff_over(&self, interval: usize) -> f64 {
         let weight = match &self.weight {
             SplineWeight::Uniform(weight) => *weight,

@@ -361,8 +361,16 @@ impl SensorModel {
     /// [`super::Stage::Digital`]: saturation, quantisation and units, after the noise.
     pub(super) fn digital(&self, readings: &mut [Reading]) {
         for reading in readings {
-            reading.specific_force = self.accelerometer.digital(&reading.specific_force);
-            reading.angular_velocity = self.gyroscope.digital(&reading.angular_velocity);
+            *reading = self.digital_reading(reading);
+        }
+    }
+
+    /// The same of one reading.
+    #[inline]
+    pub(super) fn digital_reading(&self, reading: &Reading) -> Reading {
+        Reading {
+            specific_force: self.accelerometer.digital(&reading.specific_force),
+            angular_velocity: self.gyroscope.digital(&reading.angular_velocity),
         }
     }
 }

@@ -107,6 +107,7 @@ impl StreamingEffects {
 
     /// The device's reading of a sample, by the device's own clock; none where it is lost. One call
     /// a sample, in order of time; after a pause of more than ten intervals the filters begin anew.
+    #[inline]
     pub fn step(&mut self, sample: &KinematicSample) -> Option<ImuSample> {
         let read = self.step_reading(sample);
         let mut world_from_sensor = self.world_from_sensor(sample);
@@ -122,6 +123,7 @@ impl StreamingEffects {
     }
 
     /// As [`StreamingEffects::step`], without an orientation: for a device that says none of any sample.
+    #[inline]
     pub fn step_reading(&mut self, sample: &KinematicSample) -> Option<(Stamp, Reading)> {
         let model = match self.model.take() {
             Some(model) => model,
@@ -139,9 +141,12 @@ impl StreamingEffects {
             .model
             .as_ref()
             .and_then(|model| sensor_from_segment(model, sample.stamp - model.epoch));
-        sample.world_from_sensor.rotation * orientation(turn.as_ref())
+        sample.world_from_sensor.rotation * orientation(turn)
     }
 
+    // What goes by reference to a stage that most devices lack goes as a copy, or all of it would go through memory in
+    // pieces and come back whole, which waits for each.
+    #[inline]
     fn reading(&mut self, model: &SensorModel, sample: &KinematicSample) -> (Stamp, Reading) {
         let seconds = sample.stamp - model.epoch;
         let interval = self.previous.map_or(0.0, |(stamp, _)| sample.stamp - stamp);
@@ -153,46 +158,59 @@ impl StreamingEffects {
         let turning = self.turning(sample);
         let mut reading = self.segment(model, sample, &turning);
         if let Some(tissue) = &mut self.tissue {
+            let turning = turning;
             reading.specific_force = tissue.push(reading.specific_force, &turning, interval);
         }
-        let sensor_from_segment = sensor_from_segment(model, seconds);
-        reading = model.turned(sensor_from_segment.as_ref(), &reading);
-        self.shake_and_filter(model, &mut reading, seconds, interval);
+        reading = model.turned(sensor_from_segment(model, seconds), &reading);
+        reading = self.shaken_and_filtered(model, reading, seconds, interval);
         if let Some(delay) = &mut self.delay {
             reading.angular_velocity = delay.push(seconds, reading.angular_velocity);
         }
         let stamp = model.epoch.plus_seconds(model.clock.stamp_seconds(seconds));
         reading = model.linear_reading(&reading, seconds);
         if let Some(biases) = &mut self.biases {
-            biases.add_to(&mut reading, stamp);
+            let mut biased = reading;
+            biases.add_to(&mut biased, stamp);
+            reading = biased;
         }
         if let Some(noise) = &mut self.noise {
-            noise.add_to(std::slice::from_mut(&mut reading));
+            let mut noisy = reading;
+            noise.add_to(std::slice::from_mut(&mut noisy));
+            reading = noisy;
         }
-        model.digital(std::slice::from_mut(&mut reading));
-        (stamp, reading)
+        (stamp, model.digital_reading(&reading))
     }
 
-    /// The vibration, with what the gyroscope feels of it, and the low-pass.
-    fn shake_and_filter(
+    /// With the vibration, and what the gyroscope feels of it, and behind the low-pass.
+    #[inline]
+    fn shaken_and_filtered(
         &mut self,
         model: &SensorModel,
-        reading: &mut Reading,
+        mut reading: Reading,
         seconds: f64,
         interval: f64,
-    ) {
+    ) -> Reading {
         if let Some(line) = &model.vibration {
-            model.shake(line, reading, seconds);
+            let mut shaken = reading;
+            model.shake(line, &mut shaken, seconds);
+            reading = shaken;
         }
-        for channel in Channel::ALL {
-            if let Some(filter) = &mut self.low_pass[channel] {
-                reading[channel] = filter.push(reading[channel], interval);
-            }
+        let PerChannel {
+            accelerometer,
+            gyroscope,
+        } = &mut self.low_pass;
+        if let Some(filter) = accelerometer {
+            reading.specific_force = filter.push(reading.specific_force, interval);
         }
+        if let Some(filter) = gyroscope {
+            reading.angular_velocity = filter.push(reading.angular_velocity, interval);
+        }
+        reading
     }
 
     /// How the segment turns; where the sample does not tell the angular acceleration, the difference
     /// from the sample before does.
+    #[inline]
     fn turning(&mut self, sample: &KinematicSample) -> Turning {
         let segment_from_world = sample.world_from_sensor.rotation.inverse();
         let velocity = segment_from_world * sample.angular_velocity_in_world;
@@ -211,6 +229,7 @@ impl StreamingEffects {
     }
 
     /// [`super::Stage::Segment`]; in segment axes.
+    #[inline]
     fn segment(&self, model: &SensorModel, sample: &KinematicSample, turning: &Turning) -> Reading {
         let acceleration = sample.acceleration_in_world * model.inverse_scale;
         let mut specific_force =
@@ -227,12 +246,12 @@ impl StreamingEffects {
 }
 
 /// So many seconds after the epoch.
-fn sensor_from_segment(model: &SensorModel, seconds: f64) -> Option<Matrix3<f64>> {
-    model
-        .slip
-        .filter(|(at, _)| seconds >= *at)
+#[inline]
+fn sensor_from_segment(model: &SensorModel, seconds: f64) -> Option<&Matrix3<f64>> {
+    let slip = model.slip.as_ref();
+    slip.filter(|(at, _)| seconds >= *at)
         .map(|(_, after)| after)
-        .or(model.sensor_from_segment)
+        .or(model.sensor_from_segment.as_ref())
 }
 
 /// segment_from_sensor as a rotation; a mirrored axis convention, which is none, leaves the

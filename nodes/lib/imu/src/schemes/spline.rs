@@ -42,11 +42,13 @@ fn poses(frames: &[SensorFrame]) -> Vec<Isometry3<f64>> {
 }
 
 /// The motion at a stamp that lies there, and how far it may be off where the spline has learnt that: by the noise that it
-/// has learnt, by the motion beyond it and by what poses of this source hide.
+/// has learnt, by the motion beyond it and by what poses of this source hide; or by what is known otherwise, where that is more.
+#[inline]
 pub(crate) fn sample(
     spline: &PoseSpline,
     source: PoseSource,
     (stamp, located): (Stamp, &Located),
+    known: Option<SampleVariance>,
 ) -> KinematicSample {
     let MotionEstimate {
         motion,
@@ -61,7 +63,8 @@ pub(crate) fn sample(
         angular_acceleration_in_world: Some(motion.angular_acceleration),
         variance: variance
             .map(|learnt| learnt.plus(source.unseen_errors(&bandwidth)))
-            .unwrap_or_default(),
+            .unwrap_or_default()
+            .larger(known.unwrap_or_default()),
         bandwidth: Some(bandwidth),
     }
 }
