@@ -170,7 +170,7 @@ impl Covariances {
     /// the covariance starts with -1: "no estimate" (sensor_msgs/Imu), and whoever reads it leaves
     /// the values out. Without errors everything stays as it is.
     #[must_use]
-    #[inline]
+    #[inline(always)]
     pub fn with_motion(self, variance: &SampleVariance, reading: &ImuSample) -> Self {
         if *variance == SampleVariance::default() {
             return self;

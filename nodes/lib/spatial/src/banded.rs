@@ -292,7 +292,6 @@ pub(crate) struct InverseBands {
 
 impl InverseBands {
     /// `row^T Z row` of one lane, the row's entries standing at `first` and after it.
-    #[inline]
     pub(crate) fn quadratic_form(
         &self,
         lane: usize,
@@ -317,14 +316,27 @@ impl InverseBands {
     ) -> f64 {
         let own = (first + BANDWIDTH) * (BANDWIDTH + 1) * lanes + lane;
         let block = &self.entries[own..=own + (BANDWIDTH + 1) * BANDWIDTH * lanes];
-        let entry = |i: usize, j: usize| block[(j * (BANDWIDTH + 1) + i - j) * lanes];
         let mut sum = 0.0;
-        for i in 0..=BANDWIDTH {
-            let beside: f64 = (0..i).map(|j| row[j] * entry(i, j)).sum();
-            sum += row[i] * (row[i] * entry(i, i) + 2.0 * beside);
-        }
+        sum += part_of_form::<0>(block, lanes, row);
+        sum += part_of_form::<1>(block, lanes, row);
+        sum += part_of_form::<2>(block, lanes, row);
+        sum += part_of_form::<3>(block, lanes, row);
+        sum += part_of_form::<4>(block, lanes, row);
+        sum += part_of_form::<5>(block, lanes, row);
         sum
     }
+}
+
+/// What row I of Z, up to its diagonal, adds to `row^T Z row`; entries are so many `lanes` apart.
+#[inline(always)]
+fn part_of_form<const I: usize>(block: &[f64], lanes: usize, row: &[f64; BANDWIDTH + 1]) -> f64 {
+    let entry = |j: usize| block[(j * (BANDWIDTH + 1) + I - j) * lanes];
+    // As sums of no number begin.
+    let mut beside = -0.0;
+    for j in 0..I {
+        beside += row[j] * entry(j);
+    }
+    row[I] * (row[I] * entry(I) + 2.0 * beside)
 }
 
 /// `row^T Z row` in each lane, Z the block or, for rows of five, its upper left part.

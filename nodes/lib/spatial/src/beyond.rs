@@ -30,6 +30,7 @@ pub(crate) struct Posterior {
 
 impl Posterior {
     /// The variance that noise of its own spectrum leaves in the derivative of an order.
+    #[inline(always)]
     pub(crate) fn learnt(self, order: i32, cutoff_hz: f64) -> f64 {
         self.low_passed.map_or(self.variance, |noise| {
             self.variance * noise.passed(order, cutoff_hz)
@@ -68,7 +69,9 @@ impl Beyond {
         from_hz: 6.4,
     };
 
-    /// The variance with that of the motion beyond the cutoff, unit^2.
+    /// The variance with that of the motion beyond the cutoff, unit^2. Written out where it is asked for, as the order
+    /// is known there.
+    #[inline(always)]
     pub(crate) fn stated(self, posterior: Posterior, cutoff_hz: f64) -> f64 {
         let part = 0.1 * f64::from(2 * self.order + 1);
         let z = (cutoff_hz / self.from_hz).powi(8);
@@ -78,6 +81,7 @@ impl Beyond {
     }
 
     /// V above, for white noise as dense as that at the cutoff.
+    #[inline(always)]
     fn amid(
         self,
         Posterior {

@@ -115,6 +115,7 @@ impl PoseSource {
 
     /// What errors that look like motion leave in samples of this bandwidth, beside those that are
     /// learnt from the poses.
+    #[inline]
     pub fn unseen_errors(self, bandwidth: &Bandwidth) -> SampleVariance {
         let [position, rotation] = self.slow_errors();
         unseen(

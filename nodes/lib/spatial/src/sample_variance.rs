@@ -28,6 +28,7 @@ pub struct Bandwidth {
 impl SampleVariance {
     /// The larger of each: two statements about the same errors.
     #[must_use]
+    #[inline]
     pub fn larger(self, other: Self) -> Self {
         let of_larger = |own: f64, others: f64, k: usize| {
             let larger = if own < others { other } else { self };
@@ -46,6 +47,7 @@ impl SampleVariance {
 
     /// The sum of each: of errors that know nothing of each other.
     #[must_use]
+    #[inline]
     pub fn plus(self, other: Self) -> Self {
         Self {
             unseen: [0, 1].map(|k| self.unseen[k] + other.unseen[k]),

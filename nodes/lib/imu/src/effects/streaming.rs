@@ -162,10 +162,28 @@ impl StreamingEffects {
             reading.specific_force = tissue.push(reading.specific_force, &turning, interval);
         }
         reading = model.turned(sensor_from_segment(model, seconds), &reading);
-        reading = self.shaken_and_filtered(model, reading, seconds, interval);
-        if let Some(delay) = &mut self.delay {
-            reading.angular_velocity = delay.push(seconds, reading.angular_velocity);
+        if let Some(line) = &model.vibration {
+            let mut shaken = reading;
+            model.shake(line, &mut shaken, seconds);
+            reading = shaken;
         }
+        let Reading {
+            mut specific_force,
+            mut angular_velocity,
+        } = reading;
+        if let Some(filter) = &mut self.low_pass.accelerometer {
+            specific_force = filter.push(specific_force, interval);
+        }
+        if let Some(filter) = &mut self.low_pass.gyroscope {
+            angular_velocity = filter.push(angular_velocity, interval);
+        }
+        if let Some(delay) = &mut self.delay {
+            angular_velocity = delay.push(seconds, angular_velocity);
+        }
+        reading = Reading {
+            specific_force,
+            angular_velocity,
+        };
         let stamp = model.epoch.plus_seconds(model.clock.stamp_seconds(seconds));
         reading = model.linear_reading(&reading, seconds);
         if let Some(biases) = &mut self.biases {
@@ -179,33 +197,6 @@ impl StreamingEffects {
             reading = noisy;
         }
         (stamp, model.digital_reading(&reading))
-    }
-
-    /// With the vibration, and what the gyroscope feels of it, and behind the low-pass.
-    #[inline]
-    fn shaken_and_filtered(
-        &mut self,
-        model: &SensorModel,
-        mut reading: Reading,
-        seconds: f64,
-        interval: f64,
-    ) -> Reading {
-        if let Some(line) = &model.vibration {
-            let mut shaken = reading;
-            model.shake(line, &mut shaken, seconds);
-            reading = shaken;
-        }
-        let PerChannel {
-            accelerometer,
-            gyroscope,
-        } = &mut self.low_pass;
-        if let Some(filter) = accelerometer {
-            reading.specific_force = filter.push(reading.specific_force, interval);
-        }
-        if let Some(filter) = gyroscope {
-            reading.angular_velocity = filter.push(reading.angular_velocity, interval);
-        }
-        reading
     }
 
     /// How the segment turns; where the sample does not tell the angular acceleration, the difference
