@@ -333,8 +333,8 @@ fn part_of_form<const I: usize>(block: &[f64], lanes: usize, row: &[f64; BANDWID
     let entry = |j: usize| block[(j * (BANDWIDTH + 1) + I - j) * lanes];
     // As sums of no number begin.
     let mut beside = -0.0;
-    for j in 0..I {
-        beside += row[j] * entry(j);
+    for (j, value) in row[..I].iter().enumerate() {
+        beside += value * entry(j);
     }
     row[I] * (row[I] * entry(I) + 2.0 * beside)
 }

@@ -158,8 +158,8 @@ impl StreamingEffects {
         let turning = self.turning(sample);
         let mut reading = self.segment(model, sample, &turning);
         if let Some(tissue) = &mut self.tissue {
-            let turning = turning;
-            reading.specific_force = tissue.push(reading.specific_force, &turning, interval);
+            let copy = turning;
+            reading.specific_force = tissue.push(reading.specific_force, &copy, interval);
         }
         reading = model.turned(sensor_from_segment(model, seconds), &reading);
         if let Some(line) = &model.vibration {
