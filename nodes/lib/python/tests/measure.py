@@ -3,8 +3,9 @@
     CROMOSIM_BINARY=... python measure.py        (five turns, alternating; medians)
 
 The command line's time holds its start, reading, and writing of a bag as well; Python's its start, the
-import and reading. `alone` is `simulate` by itself in a process that is already running, its first
-call, fits of splines included; `ideal` the same with sensors as IMUSim's: no device, no noise.
+import and reading. `alone` is `simulate` by itself in a process that is already running, fits of splines
+included: its first call, which finds neither code nor memory in place, and the median of five later ones;
+`ideal` the same with sensors as IMUSim's: no device, no noise.
 IMUSIM_PYTHON names a Python that has IMUSim (see peer_imusim.py), WIMUSIM_PYTHON one that has WIMUSim
 (see peer_wimusim.py): then these, too, of the same motion.
 """
@@ -37,14 +38,16 @@ PROGRAM = """
 import resource, sys
 import cromosim
 motion = cromosim.read_motion(sys.argv[1])
-placements = {f"p{k}": cromosim.Placement(site=site) for k, site in enumerate(sys.argv[3:])}
+placements = {f"p{k}": cromosim.Placement(site=site) for k, site in enumerate(sys.argv[4:])}
 device = dict(device="ideal", noise=False) if sys.argv[2] == "ideal" else dict(device=sys.argv[2])
-before = resource.getrusage(resource.RUSAGE_SELF)
-imus = cromosim.simulate(motion, placements, rate_hz=100, **device)
-after = resource.getrusage(resource.RUSAGE_SELF)
-assert sum(map(len, imus.values())) > 29000
-print(after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime)
+for call in range(int(sys.argv[3])):
+    before = resource.getrusage(resource.RUSAGE_SELF)
+    imus = cromosim.simulate(motion, placements, rate_hz=100, **device)
+    after = resource.getrusage(resource.RUSAGE_SELF)
+    assert sum(map(len, imus.values())) > 29000
+    print(after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime)
 """
+LATER_CALLS = 5
 
 
 def main() -> None:
@@ -75,14 +78,19 @@ def main() -> None:
         )
         line = [binary, "simulate", str(minute), "--placements", str(sensors), "--force"]
         line += ["--out", str(Path(folder) / "out.mcap")]
-        of = {name: [sys.executable, "-c", PROGRAM, str(minute), name, *sites] for name in ("consumer_mems", "ideal")}
-        of_line, of_python, alone, ideal = [], [], [], []
+
+        def python(device: str, calls: int) -> list[str]:
+            return [sys.executable, "-c", PROGRAM, str(minute), device, str(calls), *sites]
+
+        of_line, of_python = [], []
+        calls: dict[str, list[list[float]]] = {"consumer_mems": [], "ideal": []}
         for _ in range(TURNS):
             of_line.append(cpu(line))
-            of_python.append(cpu(of["consumer_mems"]))
-            for seconds, python in ((alone, of["consumer_mems"]), (ideal, of["ideal"])):
-                done = subprocess.run(python, check=True, capture_output=True, text=True)
-                seconds.append(float(done.stdout))
+            of_python.append(cpu(python("consumer_mems", 1)))
+            for device, seconds in calls.items():
+                command = python(device, 1 + LATER_CALLS)
+                done = subprocess.run(command, check=True, capture_output=True, text=True)
+                seconds.append([float(told) for told in done.stdout.split()])
         imusim = os.environ.get("IMUSIM_PYTHON")
         if imusim is not None:
             bvh = str(Path(folder) / "minute.bvh")
@@ -94,15 +102,20 @@ def main() -> None:
         if wimusim is not None:
             peer = [wimusim, str(Path(__file__).parent / "peer_wimusim.py"), str(minute)]
             torch_told = subprocess.run(peer, check=True, capture_output=True, text=True).stdout
-    line_s, python_s, alone_s, ideal_s = map(statistics.median, (of_line, of_python, alone, ideal))
+    line_s, python_s = map(statistics.median, (of_line, of_python))
+    alone_s, ideal_s = (statistics.median(told[0] for told in turns) for turns in calls.values())
+    alone_later_s, ideal_later_s = (
+        statistics.median(statistics.median(told[1:]) for told in turns) for turns in calls.values()
+    )
     print(f"command line {line_s:.3f} s, Python {python_s:.3f} s: {python_s / line_s:.2f} times")
-    print(f"simulate alone {alone_s:.3f} s, ideal {ideal_s:.3f} s")
+    print(f"simulate alone {alone_s:.3f} s, ideal {ideal_s:.3f} s; later calls {alone_later_s:.3f}, {ideal_later_s:.3f} s")
     if imusim is not None:
         splines_s, after_s, peer_s = map(float, told.split())
         peer_alone_s = splines_s + after_s
         print(
             f"IMUSim alone {peer_alone_s:.2f} s ({splines_s:.2f} s of it its splines), {peer_alone_s / ideal_s:.0f} times "
-            f"ideal, {peer_alone_s / alone_s:.0f} times alone; in all {peer_s:.2f} s, {peer_s / python_s:.0f} times"
+            f"ideal, {peer_alone_s / alone_s:.0f} times alone; {peer_alone_s / ideal_later_s:.0f} and "
+            f"{peer_alone_s / alone_later_s:.0f} times later calls; in all {peer_s:.2f} s, {peer_s / python_s:.0f} times"
         )
     if wimusim is not None:
         forward_s, first_s, whole_s = map(float, torch_told.split())
