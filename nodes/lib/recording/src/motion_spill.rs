@@ -41,20 +41,12 @@ enum Kept {
 }
 
 impl MotionSpill {
-    /// Puts samples aside: where they are more than `in_memory` bytes, in a file in `folder`.
+    /// Puts samples aside, those from `first` on: where they are more than `in_memory` bytes, in a file in
+    /// `folder`.
     ///
     /// # Errors
     /// [`RecordingError::PutAside`].
-    pub fn new(
-        samples: Vec<KinematicSample>,
-        in_memory: usize,
-        folder: &Path,
-    ) -> Result<Self, RecordingError> {
-        Self::of_part(samples, 0, (in_memory, folder))
-    }
-
-    /// Those from `first` on.
-    pub(crate) fn of_part(
+    pub(crate) fn new(
         samples: Vec<KinematicSample>,
         first: usize,
         (in_memory, folder): (usize, &Path),
@@ -253,7 +245,8 @@ mod tests {
         let samples: Vec<KinematicSample> = (0..1000).map(sample).collect();
         let folder = tempfile::tempdir().unwrap();
         for in_memory in [0, 1000, 1 << 20] {
-            let mut spill = MotionSpill::new(samples.clone(), in_memory, folder.path()).unwrap();
+            let mut spill =
+                MotionSpill::new(samples.clone(), 0, (in_memory, folder.path())).unwrap();
             assert_eq!(spill.count(), samples.len());
             for sample in &samples {
                 assert_eq!(spill.next_sample().unwrap(), Some(sample));

@@ -387,7 +387,7 @@ impl Simulation {
         Ok(SimulatedPlacement {
             frames,
             name: name.to_owned(),
-            motion: MotionSpill::of_part(motion, first, (aside.in_memory, &aside.folder))?,
+            motion: MotionSpill::new(motion, first, (aside.in_memory, &aside.folder))?,
             imu,
             quality,
         })
