@@ -101,6 +101,7 @@ fn who_is_told_to_end_again_and_again_still_closes_its_bag() {
                     publisher.publish(&Imu::default()).unwrap();
                 }
                 // The terminal's and launch's, and a user who does not wait; as long as it ends.
+                // And here one child ends while another starts: this process, too, is signalled.
                 for signal in ["-INT", "-INT", "-TERM", "-INT"] {
                     recorder.signal(signal);
                     std::thread::sleep(Duration::from_millis(3 * round));
@@ -108,6 +109,31 @@ fn who_is_told_to_end_again_and_again_still_closes_its_bag() {
                 recorder.interrupt();
                 BagReader::open(&folder.path().join(&name)).unwrap();
             }
+        },
+    );
+}
+
+#[test]
+fn a_node_that_was_stopped_and_continued_goes_on() {
+    in_private_network(
+        "faults::a_node_that_was_stopped_and_continued_goes_on",
+        || {
+            let folder = tempfile::tempdir().unwrap();
+            let node = observer();
+            let (recorder, publisher) = recorded(&node, folder.path(), "bag");
+            // Ctrl-Z and `fg`, more than once.
+            for _ in 0..3 {
+                for signal in ["-STOP", "-CONT"] {
+                    std::thread::sleep(Duration::from_millis(50));
+                    recorder.signal(signal);
+                }
+                publisher.publish(&Imu::default()).unwrap();
+                assert!(publisher.wait_for_acknowledgments(PATIENCE));
+            }
+            recorder.interrupt();
+            let bag = BagReader::open(&folder.path().join("bag")).unwrap();
+            let counts = bag.summary().topics.iter().map(|topic| topic.message_count);
+            assert_eq!(counts.sum::<u64>(), 3);
         },
     );
 }

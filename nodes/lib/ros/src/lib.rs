@@ -18,6 +18,7 @@
 //! | subscriptions, services, their clients | only `Node` makes them, and its announcement would contradict ours, in which publishers are |
 //! | received `ros_discovery_info` | ros2-client's type hides the endpoints |
 //! | graph and matching | ros2-client's `Spinner` always reads `/clock` with a wrong type, and needs the `Node` |
+//! | `epoll_wait` | RustDDS's threads end for good at the first wait that a signal interrupts (`uninterrupted.rs`) |
 //! | stamps of received messages | ros2-client rounds down and loses a nanosecond |
 //!
 //! ```no_run
@@ -67,6 +68,9 @@ mod subscription;
 #[cfg(feature = "testing")]
 pub mod testing;
 mod turns;
+#[cfg(target_os = "linux")]
+#[allow(unsafe_code)]
+mod uninterrupted;
 mod wake;
 
 pub use args::RosArgs;
