@@ -1,12 +1,12 @@
 //! Waits that signals do not end.
 //!
-//! RustDDS 0.15.1 takes an interrupted `epoll_wait` for an error and ends its threads, silently and
-//! for good: the node hears and says nothing more, and to make or drop an endpoint locks up. Any
-//! signal may do it, a process that is stopped and continued (Ctrl-Z and `fg`, a machine that
-//! sleeps, a debugger), one that is told to end twice, one whose child ends while it starts
-//! another; and no mask keeps the first kind from a thread. So this crate stands in for the C
-//! library's `epoll_wait`, as it does for `bind`: an interrupted wait goes on until its time is
-//! over. Whoever polls has to take up a wait that ends early anyway, so others miss nothing by it.
+//! RustDDS 0.15.1 takes an interrupted `epoll_wait` for an error (EINTR) and ends the thread, for
+//! good and with no more than a line in the log: the node hears and says nothing more, and to make
+//! a publisher locks up. A process that is stopped and continued (Ctrl-Z and `fg`) comes to that, one
+//! that is told to end twice, and one whose child ends while it starts another (SIGCHLD is not
+//! ignored while `posix_spawn` blocks it). Signals can be kept from a thread, a stop cannot. So this
+//! crate stands in for the C library's `epoll_wait`, as it does for `bind`: an interrupted wait goes
+//! on until its time is over.
 
 use std::io;
 use std::time::{Duration, Instant};
