@@ -5,7 +5,8 @@
 The command line's time holds its start, reading, and writing of a bag as well; Python's its start, the
 import and reading. `alone` is `simulate` by itself in a process that is already running, fits of splines
 included: its first call, which finds neither code nor memory in place, and the median of five later ones;
-`ideal` the same with sensors as IMUSim's: no device, no noise.
+`ideal` the same with sensors as IMUSim's: no device, no noise. NumPy's OpenBLAS makes a thread that spins
+for some time after the import and is no part of a call: calls begin when the process has come to rest.
 IMUSIM_PYTHON names a Python that has IMUSim (see peer_imusim.py), WIMUSIM_PYTHON one that has WIMUSim
 (see peer_wimusim.py): then these, too, of the same motion.
 """
@@ -35,11 +36,12 @@ def cpu(command: list[str]) -> float:
 
 
 PROGRAM = """
-import resource, sys
+import resource, sys, time
 import cromosim
 motion = cromosim.read_motion(sys.argv[1])
 placements = {f"p{k}": cromosim.Placement(site=site) for k, site in enumerate(sys.argv[4:])}
 device = dict(device="ideal", noise=False) if sys.argv[2] == "ideal" else dict(device=sys.argv[2])
+time.sleep(0.5)
 for call in range(int(sys.argv[3])):
     before = resource.getrusage(resource.RUSAGE_SELF)
     imus = cromosim.simulate(motion, placements, rate_hz=100, **device)
