@@ -1,15 +1,20 @@
 //! What the readings' digits show: clipping and rounding.
 
-use cromosim_imu::{Channel, ReadOff, Reading, clipping_limit, lattice_spacing};
+use cromosim_imu::{
+    Channel, ReadOff, Reading, clipping_limit, doubtful_clipping_limit, lattice_spacing,
+};
 
 use crate::axes::{axes_of_channel, value_on_axis};
 use crate::library::Library;
+use crate::policy::clipping::{LEAST_STEPS, STANDARD_ERRORS, STEPS_BELOW};
 use crate::prepared::PreparedPlacement;
 
 /// A value at which a channel clips, and the common distance of its values, in the device's units.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Digital {
     pub limit: Option<f64>,
+    /// A value that a simulation may show to be one ([`Digital::settle`]).
+    pub doubtful_limit: Option<f64>,
     pub lsb: Option<f64>,
     /// Whether there is rounding that may not be named.
     pub rounding_is_excluded: bool,
@@ -29,13 +34,86 @@ impl Digital {
             .flat_map(|reading| reading[channel].iter().copied())
             .collect();
         let lsb = lattice_spacing(&mut values.clone());
-        let limit = clipping_limit(&values, lsb);
+        let clipping_is_allowed = library.allows_read_off(ReadOff::ClippedReadings(channel));
         let rounding_is_allowed = library.allows_read_off(ReadOff::Lattice(channel));
+        let doubtful = lsb.and_then(|lsb| doubtful_clipping_limit(&values, lsb));
         Self {
-            limit: limit.filter(|_| library.allows_read_off(ReadOff::ClippedReadings(channel))),
+            limit: clipping_limit(&values, lsb).filter(|_| clipping_is_allowed),
+            doubtful_limit: doubtful.filter(|_| clipping_is_allowed),
             lsb: lsb.filter(|_| rounding_is_allowed),
             rounding_is_excluded: lsb.is_some() && !rounding_is_allowed,
         }
+    }
+
+    /// Whether readings at a doubtful limit clip: where they stand at it, the simulation (of `units`
+    /// to the SI unit) is farther beyond them than where they are a few steps below. What scales, a
+    /// bias and peaks of the motion itself do to it is the same there.
+    pub fn settle(
+        &mut self,
+        prepared: &PreparedPlacement,
+        simulated: &[Reading],
+        channel: Channel,
+        units: f64,
+    ) {
+        let (Some(limit), Some(lsb)) = (self.doubtful_limit, self.lsb) else {
+            return;
+        };
+        let values = prepared.measured.iter().zip(simulated).enumerate();
+        let compared = values.flat_map(|(k, (measured, simulated))| {
+            let axes = axes_of_channel(channel).filter(move |axis| prepared.usable[k][*axis]);
+            axes.map(move |axis| {
+                let expected = value_on_axis(simulated, axis) * units;
+                (value_on_axis(measured, axis), expected)
+            })
+        });
+        if goes_beyond(compared, limit, lsb) {
+            self.limit = Some(limit);
+        }
+    }
+}
+
+/// Whether what is expected of readings at a limit lies farther beyond them than of those a few steps of
+/// the lattice below.
+fn goes_beyond(compared: impl Iterator<Item = (f64, f64)>, limit: f64, lsb: f64) -> bool {
+    let (mut at, mut below) = (Moments::default(), Moments::default());
+    for (read, expected) in compared {
+        let beyond = (read.signum() * expected - read.abs()) / lsb;
+        let steps = ((limit - read.abs()) / lsb).round();
+        if steps < 0.5 {
+            at.add(beyond);
+        } else if steps <= STEPS_BELOW {
+            below.add(beyond);
+        }
+    }
+    let farther = at.mean() - below.mean();
+    at.count > 1.0
+        && below.count > 1.0
+        && farther > LEAST_STEPS
+        && farther > STANDARD_ERRORS * (at.squared_error() + below.squared_error()).sqrt()
+}
+
+/// Of numbers in steps of the lattice.
+#[derive(Default)]
+struct Moments {
+    count: f64,
+    sum: f64,
+    squares: f64,
+}
+
+impl Moments {
+    fn add(&mut self, value: f64) {
+        self.count += 1.0;
+        self.sum += value;
+        self.squares += value * value;
+    }
+
+    fn mean(&self) -> f64 {
+        self.sum / self.count
+    }
+
+    /// Of the mean, as of independent numbers.
+    fn squared_error(&self) -> f64 {
+        (self.squares / self.count - self.mean().powi(2)) / (self.count - 1.0)
     }
 }
 
@@ -48,5 +126,46 @@ pub(crate) fn mask_clipped(prepared: &mut PreparedPlacement, channel: Channel, d
                 prepared.usable[k][axis] = false;
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LSB: f64 = 0.4;
+
+    /// Peaks of 18.3 and 6 of a slow motion, as read beyond a limit and as expected with a gain and errors.
+    fn compared(limit: f64, gain: f64) -> Vec<(f64, f64)> {
+        let motion = (0..6000).map(|k| {
+            let phase = f64::from(k) * 0.02;
+            18.3 * phase.sin() + 6.0 * (7.3 * phase).sin()
+        });
+        let read = |value: f64| (value.clamp(-limit, limit) / LSB).round() * LSB;
+        let error = |value: f64| 0.5 * (137.0 * value).sin();
+        motion
+            .map(|value| (read(value), gain * value + error(value)))
+            .collect()
+    }
+
+    fn clips(limit: f64, gain: f64) -> bool {
+        let compared = compared(limit, gain);
+        let largest = compared
+            .iter()
+            .fold(0.0, |most: f64, (read, _)| most.max(read.abs()));
+        goes_beyond(compared.into_iter(), largest, LSB)
+    }
+
+    #[test]
+    fn a_limit_is_where_the_simulation_goes_on() {
+        for gain in [0.9, 1.0, 1.1] {
+            assert!(clips(20.0, gain), "{gain}");
+            assert!(!clips(100.0, gain), "{gain}");
+        }
+        // What is expected of other axes tells nothing.
+        let turned = compared(20.0, 1.0);
+        let others = turned.iter().map(|(read, _)| *read);
+        let expected = turned.iter().skip(700).map(|(_, expected)| *expected);
+        assert!(!goes_beyond(others.zip(expected), 20.0, LSB));
     }
 }

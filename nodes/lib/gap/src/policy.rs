@@ -110,6 +110,17 @@ pub(crate) mod sensor_noise {
     pub const STEADY: f64 = 0.4;
 }
 
+/// When readings on a lattice clip whose own digits leave it open. Of the two recordings of seed 1024 of the
+/// second generator that had passed for peaks of the motion one has 2.1 steps and 7 standard errors.
+pub(crate) mod clipping {
+    /// Steps below the limit that readings at it are compared with.
+    pub const STEPS_BELOW: f64 = 5.0;
+    /// Steps by which what is expected has to be farther beyond the limit than below; no source.
+    pub const LEAST_STEPS: f64 = 1.0;
+    /// And standard errors, as of independent readings; no source.
+    pub const STANDARD_ERRORS: f64 = 5.0;
+}
+
 /// When a smoothing of the reference is looked for, and when it is believed.
 pub(crate) mod smoothing {
     /// Held-out mean square of a whitened residual from which on it is looked for.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use cromosim_imu::{Channel, EffectSet, PerChannel, ReadOff, Reading};
 use cromosim_spatial::{FrameGrid, KinematicTrack};
 
+use crate::axes::any;
 use crate::coarse_alignment::CoarseAlignment;
 use crate::digital::{Digital, mask_clipped};
 use crate::error::GapError;
@@ -45,7 +46,7 @@ impl Session {
             prepared.restore_reference(&record.reference, report)?;
             track = prepared.track(&prepared.estimate);
         }
-        let digital =
+        let mut digital =
             PerChannel::from_fn(|channel| Digital::read_off(&prepared.measured, channel, library));
         prepared.cover(alignment.lag_s)?;
         if let Some(drift) = alignment.drift {
@@ -53,10 +54,19 @@ impl Session {
             prepared.cover(alignment.lag_s + drift.per_second * seconds)?;
         }
         let covered = prepared.usable.clone();
+        let units = units.unwrap_or_else(|| allowed_units(&alignment, library));
+        let starts = alignment.starts();
+        let starts: Vec<EffectSet> = starts.iter().map(|set| library.restrict(set)).collect();
+        let is_doubtful = |channel| digital[channel].doubtful_limit.is_some();
+        if any(PerChannel::from_fn(is_doubtful)) {
+            let simulated = prepared.predict(&track, &starts[0]).readings;
+            for channel in Channel::ALL {
+                digital[channel].settle(&prepared, &simulated, channel, units[channel]);
+            }
+        }
         for channel in Channel::ALL {
             mask_clipped(&mut prepared, channel, &digital[channel]);
         }
-        let units = units.unwrap_or_else(|| allowed_units(&alignment, library));
         bring_to_si(&mut prepared, &digital, units);
         trace(|| {
             eprintln!(
@@ -69,12 +79,11 @@ impl Session {
                     .map(|estimate| estimate.noise())
             )
         });
-        let starts = alignment.starts();
         Ok(Self {
             prepared,
             raw,
             covered,
-            starts: starts.iter().map(|set| library.restrict(set)).collect(),
+            starts,
             digital,
             units,
             track: Arc::new(track),

@@ -86,8 +86,8 @@ pub use effects::{
     Lateness, MeasurementInput, Ordinary, OtherSession, Owner, ParameterFit, ParameterSpec,
     PlacementEffects, ReadOff, ReadOffSearch, ResidualView, Rounding, Search, SensorModel, Shape,
     SpectralLine, Stage, StagedReadings, StreamingEffects, UnexplainedErrors, Wave, clipping_limit,
-    lattice_spacing, length_factors, nearest_signed_permutation, strongest_line, unit_factors,
-    white_noise_density,
+    doubtful_clipping_limit, lattice_spacing, length_factors, nearest_signed_permutation,
+    strongest_line, unit_factors, white_noise_density,
 };
 pub use error::{EffectError, ImuError, PlacementProblem};
 pub use kalibr::KalibrNoise;

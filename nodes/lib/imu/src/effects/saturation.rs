@@ -67,34 +67,62 @@ const EPISODE_GAP: usize = 60;
 /// The value at which the readings of a channel clip; none where they do not. `values` are those of
 /// all axes, reading after reading; `lsb` is the lattice that they lie on, where there is one.
 pub fn clipping_limit(values: &[f64], lsb: Option<f64>) -> Option<f64> {
-    let largest = values
-        .iter()
-        .fold(0.0_f64, |most, value| most.max(value.abs()));
-    let below = lsb.map_or(0, |lsb| {
-        values
-            .iter()
-            .filter(|value| (value.abs() - largest + lsb).abs() < 0.5 * lsb)
-            .count()
-    });
-    let clipped: Vec<usize> = values
-        .iter()
-        .enumerate()
-        .filter(|(_, value)| value.abs() >= largest * (1.0 - 1e-9))
-        .map(|(at, _)| at)
-        .collect();
-    let repeats = clipped.len();
-    let episodes = 1 + clipped
-        .windows(2)
-        .filter(|pair| pair[1] > pair[0] + EPISODE_GAP)
-        .count();
+    let pile = Pile::new(values, lsb);
     let piles_up = if lsb.is_some() {
-        repeats >= LEAST_REPEATS_ON_LATTICE
-            && repeats > MORE_THAN_BELOW * below
-            && episodes >= LEAST_EPISODES
+        pile.may_clip_on_lattice() && pile.repeats > MORE_THAN_BELOW * pile.below
     } else {
-        repeats >= LEAST_REPEATS
+        pile.repeats >= LEAST_REPEATS
     };
-    (piles_up && largest > 0.0).then_some(largest)
+    (piles_up && pile.largest > 0.0).then_some(pile.largest)
+}
+
+/// A value on a lattice at which readings may clip, or may only have their peaks: more stand at it
+/// than one step below, but not as many more as [`clipping_limit`] asks for. A simulation tells.
+pub fn doubtful_clipping_limit(values: &[f64], lsb: f64) -> Option<f64> {
+    let pile = Pile::new(values, Some(lsb));
+    let doubtful = pile.may_clip_on_lattice()
+        && (pile.below + 1..=MORE_THAN_BELOW * pile.below).contains(&pile.repeats);
+    (doubtful && pile.largest > 0.0).then_some(pile.largest)
+}
+
+/// The values of largest magnitude.
+struct Pile {
+    largest: f64,
+    /// Values of that magnitude.
+    repeats: usize,
+    /// Values one step of the lattice below, where there is one.
+    below: usize,
+    /// Separate times.
+    episodes: usize,
+}
+
+impl Pile {
+    fn new(values: &[f64], lsb: Option<f64>) -> Self {
+        let largest = values
+            .iter()
+            .fold(0.0_f64, |most, value| most.max(value.abs()));
+        let is_below =
+            |value: &&f64| lsb.is_some_and(|lsb| (value.abs() - largest + lsb).abs() < 0.5 * lsb);
+        let clipped: Vec<usize> = values
+            .iter()
+            .enumerate()
+            .filter(|(_, value)| value.abs() >= largest * (1.0 - 1e-9))
+            .map(|(at, _)| at)
+            .collect();
+        let gaps = clipped
+            .windows(2)
+            .filter(|pair| pair[1] > pair[0] + EPISODE_GAP);
+        Self {
+            largest,
+            repeats: clipped.len(),
+            below: values.iter().filter(is_below).count(),
+            episodes: 1 + gaps.count(),
+        }
+    }
+
+    fn may_clip_on_lattice(&self) -> bool {
+        self.repeats >= LEAST_REPEATS_ON_LATTICE && self.episodes >= LEAST_EPISODES
+    }
 }
 
 /// Clips one value at +-limit.

@@ -7,8 +7,8 @@ use nalgebra::{Matrix3, Vector3};
 use super::model_tests::{START, set, track};
 use super::{
     DeclaredNoise, Effect, EffectKind as Kind, EffectSet, FirstGuess, MeasurementInput, Reading,
-    ResidualView, Search, SensorModel, clipping_limit, lattice_spacing, nearest_signed_permutation,
-    white_noise_density,
+    ResidualView, Search, SensorModel, clipping_limit, doubtful_clipping_limit, lattice_spacing,
+    nearest_signed_permutation, white_noise_density,
 };
 use crate::{Channel, NoiseSource};
 
@@ -145,6 +145,25 @@ fn what_digits_show_is_read_off() {
     let rounded = case(&[(Kind::GyroQuantization, &[0.00106])]);
     let lsb = lattice_spacing(&mut rounded.values(Channel::Gyroscope)).unwrap();
     assert!((lsb - 0.00106).abs() < 1e-9);
+}
+
+/// Three times a few readings at 9 steps, and some one step below.
+#[test]
+fn a_pile_that_peaks_may_make_as_well_is_doubtful() {
+    let found = |at: usize, below: usize| {
+        let mut once = vec![9.0; at];
+        once.extend(vec![8.0; below]);
+        once.extend([1.0; 100]);
+        let values = once.repeat(3);
+        (
+            clipping_limit(&values, Some(1.0)),
+            doubtful_clipping_limit(&values, 1.0),
+        )
+    };
+    assert_eq!(found(20, 6), (Some(9.0), None));
+    assert_eq!(found(20, 7), (None, Some(9.0)));
+    assert_eq!(found(20, 20), (None, None));
+    assert_eq!(found(3, 1), (None, None));
 }
 
 #[test]
