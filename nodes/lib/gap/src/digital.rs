@@ -1,8 +1,9 @@
 //! What the readings' digits show: clipping and rounding.
 
 use cromosim_imu::{
-    Channel, ReadOff, Reading, clipping_limit, doubtful_clipping_limit, lattice_spacing,
+    Channel, EffectSet, PerChannel, ReadOff, Reading, clipping_limit, lattice_spacing,
 };
+use cromosim_spatial::KinematicTrack;
 
 use crate::axes::{axes_of_channel, value_on_axis};
 use crate::library::Library;
@@ -13,11 +14,18 @@ use crate::prepared::PreparedPlacement;
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Digital {
     pub limit: Option<f64>,
-    /// A value that a simulation may show to be one ([`Digital::settle`]).
-    pub doubtful_limit: Option<f64>,
+    /// One that a simulation may show to be a limit ([`settle_limits`]).
+    doubtful: Option<DoubtfulLimit>,
     pub lsb: Option<f64>,
     /// Whether there is rounding that may not be named.
     pub rounding_is_excluded: bool,
+}
+
+/// A value on a lattice at which readings clip or the motion has its peaks, in the device's units.
+#[derive(Clone, Copy, Debug)]
+struct DoubtfulLimit {
+    value: f64,
+    lsb: f64,
 }
 
 impl Digital {
@@ -34,40 +42,55 @@ impl Digital {
             .flat_map(|reading| reading[channel].iter().copied())
             .collect();
         let lsb = lattice_spacing(&mut values.clone());
-        let clipping_is_allowed = library.allows_read_off(ReadOff::ClippedReadings(channel));
+        let limit = clipping_limit(&values, lsb)
+            .filter(|_| library.allows_read_off(ReadOff::ClippedReadings(channel)));
         let rounding_is_allowed = library.allows_read_off(ReadOff::Lattice(channel));
-        let doubtful = lsb.and_then(|lsb| doubtful_clipping_limit(&values, lsb));
+        let doubtful = limit.zip(lsb).filter(|(limit, _)| !limit.is_certain);
         Self {
-            limit: clipping_limit(&values, lsb).filter(|_| clipping_is_allowed),
-            doubtful_limit: doubtful.filter(|_| clipping_is_allowed),
+            limit: limit
+                .filter(|limit| limit.is_certain)
+                .map(|limit| limit.value),
+            doubtful: doubtful.map(|(limit, lsb)| DoubtfulLimit {
+                value: limit.value,
+                lsb,
+            }),
             lsb: lsb.filter(|_| rounding_is_allowed),
             rounding_is_excluded: lsb.is_some() && !rounding_is_allowed,
         }
     }
+}
 
-    /// Whether readings at a doubtful limit clip: where they stand at it, the simulation (of `units`
-    /// to the SI unit) is farther beyond them than where they are a few steps below. What scales, a
-    /// bias and peaks of the motion itself do to it is the same there.
-    pub fn settle(
-        &mut self,
-        prepared: &PreparedPlacement,
-        simulated: &[Reading],
-        channel: Channel,
-        units: f64,
-    ) {
-        let (Some(limit), Some(lsb)) = (self.doubtful_limit, self.lsb) else {
-            return;
+/// Finds out by a simulation under `start` whether readings clip where their digits leave it open: where
+/// they stand at the limit, it is farther beyond them than where they are a few steps below. A bias and
+/// peaks of the motion are the same there, and a gain nearly so. `units` are the device's for one SI unit.
+pub(crate) fn settle_limits(
+    digital: &mut PerChannel<Digital>,
+    prepared: &PreparedPlacement,
+    track: &KinematicTrack,
+    start: &EffectSet,
+    units: PerChannel<f64>,
+) {
+    if Channel::ALL
+        .into_iter()
+        .all(|channel| digital[channel].doubtful.is_none())
+    {
+        return;
+    }
+    let simulated = prepared.predict(track, start).readings;
+    for channel in Channel::ALL {
+        let Some(doubtful) = digital[channel].doubtful else {
+            continue;
         };
-        let values = prepared.measured.iter().zip(simulated).enumerate();
-        let compared = values.flat_map(|(k, (measured, simulated))| {
+        let readings = prepared.measured.iter().zip(&simulated).enumerate();
+        let compared = readings.flat_map(|(k, (measured, simulated))| {
             let axes = axes_of_channel(channel).filter(move |axis| prepared.usable[k][*axis]);
             axes.map(move |axis| {
-                let expected = value_on_axis(simulated, axis) * units;
+                let expected = value_on_axis(simulated, axis) * units[channel];
                 (value_on_axis(measured, axis), expected)
             })
         });
-        if goes_beyond(compared, limit, lsb) {
-            self.limit = Some(limit);
+        if goes_beyond(compared, doubtful.value, doubtful.lsb) {
+            digital[channel].limit = Some(doubtful.value);
         }
     }
 }

@@ -110,8 +110,8 @@ pub(crate) mod sensor_noise {
     pub const STEADY: f64 = 0.4;
 }
 
-/// When readings on a lattice clip whose own digits leave it open. Of the two recordings of seed 1024 of the
-/// second generator that had passed for peaks of the motion one has 2.1 steps and 7 standard errors.
+/// When readings on a lattice clip whose own digits leave it open. Made on one recording (44f4bb04be of seed 1024
+/// of the second generator: 2.1 steps and 7 standard errors); no other with such a limit has been met.
 pub(crate) mod clipping {
     /// Steps below the limit that readings at it are compared with.
     pub const STEPS_BELOW: f64 = 5.0;

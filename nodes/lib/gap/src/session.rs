@@ -5,9 +5,8 @@ use std::sync::Arc;
 use cromosim_imu::{Channel, EffectSet, PerChannel, ReadOff, Reading};
 use cromosim_spatial::{FrameGrid, KinematicTrack};
 
-use crate::axes::any;
 use crate::coarse_alignment::CoarseAlignment;
-use crate::digital::{Digital, mask_clipped};
+use crate::digital::{Digital, mask_clipped, settle_limits};
 use crate::error::GapError;
 use crate::library::Library;
 use crate::prepared::{PreparedPlacement, ReferenceReport, estimated};
@@ -57,13 +56,7 @@ impl Session {
         let units = units.unwrap_or_else(|| allowed_units(&alignment, library));
         let starts = alignment.starts();
         let starts: Vec<EffectSet> = starts.iter().map(|set| library.restrict(set)).collect();
-        let is_doubtful = |channel| digital[channel].doubtful_limit.is_some();
-        if any(PerChannel::from_fn(is_doubtful)) {
-            let simulated = prepared.predict(&track, &starts[0]).readings;
-            for channel in Channel::ALL {
-                digital[channel].settle(&prepared, &simulated, channel, units[channel]);
-            }
-        }
+        settle_limits(&mut digital, &prepared, &track, &starts[0], units);
         for channel in Channel::ALL {
             mask_clipped(&mut prepared, channel, &digital[channel]);
         }

@@ -81,13 +81,13 @@ pub use channel::{AXES, Channel, PerChannel, Reading};
 pub use cromosim_spatial::{Bandwidth, SampleVariance};
 pub use device::{Device, EMBEDDED_DEVICES};
 pub use effects::{
-    AXIS_ORDERS, DeclaredNoise, Dependence, DrawnBiases, Dropouts, Effect, EffectKind, EffectSet,
-    EffectSpec, EffectsFile, FirstGuess, FittedSearch, GravityMode, GridTrace, Identifiability,
-    Lateness, MeasurementInput, Ordinary, OtherSession, Owner, ParameterFit, ParameterSpec,
-    PlacementEffects, ReadOff, ReadOffSearch, ResidualView, Rounding, Search, SensorModel, Shape,
-    SpectralLine, Stage, StagedReadings, StreamingEffects, UnexplainedErrors, Wave, clipping_limit,
-    doubtful_clipping_limit, lattice_spacing, length_factors, nearest_signed_permutation,
-    strongest_line, unit_factors, white_noise_density,
+    AXIS_ORDERS, ClippingLimit, DeclaredNoise, Dependence, DrawnBiases, Dropouts, Effect,
+    EffectKind, EffectSet, EffectSpec, EffectsFile, FirstGuess, FittedSearch, GravityMode,
+    GridTrace, Identifiability, Lateness, MeasurementInput, Ordinary, OtherSession, Owner,
+    ParameterFit, ParameterSpec, PlacementEffects, ReadOff, ReadOffSearch, ResidualView, Rounding,
+    Search, SensorModel, Shape, SpectralLine, Stage, StagedReadings, StreamingEffects,
+    UnexplainedErrors, Wave, clipping_limit, lattice_spacing, length_factors,
+    nearest_signed_permutation, strongest_line, unit_factors, white_noise_density,
 };
 pub use error::{EffectError, ImuError, PlacementProblem};
 pub use kalibr::KalibrNoise;

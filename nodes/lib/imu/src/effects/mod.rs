@@ -104,7 +104,7 @@ pub(crate) use number::number;
 pub use quantization::lattice_spacing;
 pub use reference_units::length_factors;
 pub use residual_view::ResidualView;
-pub use saturation::{clipping_limit, doubtful_clipping_limit};
+pub use saturation::{ClippingLimit, clipping_limit};
 pub use search::{
     Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, ReadOff, ReadOffSearch,
     Rounding, Search,

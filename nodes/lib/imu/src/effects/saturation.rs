@@ -64,65 +64,51 @@ const LEAST_EPISODES: usize = 3;
 /// Values without the limit that separate two times at it: twenty readings.
 const EPISODE_GAP: usize = 60;
 
+/// A value at which readings clip or may clip, in the unit of the readings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ClippingLimit {
+    /// Of largest magnitude, positive.
+    pub value: f64,
+    /// Whether the readings alone show it; else peaks of the motion may have made it, and a simulation tells.
+    pub is_certain: bool,
+}
+
 /// The value at which the readings of a channel clip; none where they do not. `values` are those of
-/// all axes, reading after reading; `lsb` is the lattice that they lie on, where there is one.
-pub fn clipping_limit(values: &[f64], lsb: Option<f64>) -> Option<f64> {
-    let pile = Pile::new(values, lsb);
-    let piles_up = if lsb.is_some() {
-        pile.may_clip_on_lattice() && pile.repeats > MORE_THAN_BELOW * pile.below
-    } else {
-        pile.repeats >= LEAST_REPEATS
-    };
-    (piles_up && pile.largest > 0.0).then_some(pile.largest)
-}
-
-/// A value on a lattice at which readings may clip, or may only have their peaks: more stand at it
-/// than one step below, but not as many more as [`clipping_limit`] asks for. A simulation tells.
-pub fn doubtful_clipping_limit(values: &[f64], lsb: f64) -> Option<f64> {
-    let pile = Pile::new(values, Some(lsb));
-    let doubtful = pile.may_clip_on_lattice()
-        && (pile.below + 1..=MORE_THAN_BELOW * pile.below).contains(&pile.repeats);
-    (doubtful && pile.largest > 0.0).then_some(pile.largest)
-}
-
-/// The values of largest magnitude.
-struct Pile {
-    largest: f64,
-    /// Values of that magnitude.
-    repeats: usize,
-    /// Values one step of the lattice below, where there is one.
-    below: usize,
-    /// Separate times.
-    episodes: usize,
-}
-
-impl Pile {
-    fn new(values: &[f64], lsb: Option<f64>) -> Self {
-        let largest = values
+/// all axes, reading after reading; `lsb` is the lattice that they lie on, where there is one: then
+/// more than three times as many readings at the largest value as one step below make a limit certain,
+/// and fewer, but more than one step below, leave it open.
+pub fn clipping_limit(values: &[f64], lsb: Option<f64>) -> Option<ClippingLimit> {
+    let largest = values
+        .iter()
+        .fold(0.0_f64, |most, value| most.max(value.abs()));
+    let clipped: Vec<usize> = values
+        .iter()
+        .enumerate()
+        .filter(|(_, value)| value.abs() >= largest * (1.0 - 1e-9))
+        .map(|(at, _)| at)
+        .collect();
+    let repeats = clipped.len();
+    let (may_clip, is_certain) = if let Some(lsb) = lsb {
+        let below = values
             .iter()
-            .fold(0.0_f64, |most, value| most.max(value.abs()));
-        let is_below =
-            |value: &&f64| lsb.is_some_and(|lsb| (value.abs() - largest + lsb).abs() < 0.5 * lsb);
-        let clipped: Vec<usize> = values
-            .iter()
-            .enumerate()
-            .filter(|(_, value)| value.abs() >= largest * (1.0 - 1e-9))
-            .map(|(at, _)| at)
-            .collect();
-        let gaps = clipped
+            .filter(|value| (value.abs() - largest + lsb).abs() < 0.5 * lsb)
+            .count();
+        let episodes = 1 + clipped
             .windows(2)
-            .filter(|pair| pair[1] > pair[0] + EPISODE_GAP);
-        Self {
-            largest,
-            repeats: clipped.len(),
-            below: values.iter().filter(is_below).count(),
-            episodes: 1 + gaps.count(),
-        }
-    }
-
-    fn may_clip_on_lattice(&self) -> bool {
-        self.repeats >= LEAST_REPEATS_ON_LATTICE && self.episodes >= LEAST_EPISODES
-    }
+            .filter(|pair| pair[1] > pair[0] + EPISODE_GAP)
+            .count();
+        let piles_up = repeats >= LEAST_REPEATS_ON_LATTICE && episodes >= LEAST_EPISODES;
+        (
+            piles_up && repeats > below,
+            repeats > MORE_THAN_BELOW * below,
+        )
+    } else {
+        (repeats >= LEAST_REPEATS, true)
+    };
+    (may_clip && largest > 0.0).then_some(ClippingLimit {
+        value: largest,
+        is_certain,
+    })
 }
 
 /// Clips one value at +-limit.

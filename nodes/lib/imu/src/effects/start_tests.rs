@@ -7,8 +7,8 @@ use nalgebra::{Matrix3, Vector3};
 use super::model_tests::{START, set, track};
 use super::{
     DeclaredNoise, Effect, EffectKind as Kind, EffectSet, FirstGuess, MeasurementInput, Reading,
-    ResidualView, Search, SensorModel, clipping_limit, doubtful_clipping_limit, lattice_spacing,
-    nearest_signed_permutation, white_noise_density,
+    ResidualView, Search, SensorModel, clipping_limit, lattice_spacing, nearest_signed_permutation,
+    white_noise_density,
 };
 use crate::{Channel, NoiseSource};
 
@@ -129,10 +129,13 @@ fn what_digits_show_is_read_off() {
         assert!((lsb - 0.0383 * units).abs() < 1e-9 * units);
         // The limit itself is rounded to the lattice.
         let limit = clipping_limit(&values, Some(lsb)).unwrap();
+        assert!(limit.is_certain);
+        let limit = limit.value;
         assert!((limit / units - 9.5).abs() < 0.02, "{limit}");
     }
     let limit_of = |kind: Kind, limit: f64, channel: Channel| {
-        clipping_limit(&case(&[(kind, &[limit])]).values(channel), None)
+        let found = clipping_limit(&case(&[(kind, &[limit])]).values(channel), None);
+        found.map(|limit| limit.value)
     };
     assert_eq!(
         limit_of(Kind::AccelSaturation, 9.5, Channel::Accelerometer),
@@ -155,15 +158,12 @@ fn a_pile_that_peaks_may_make_as_well_is_doubtful() {
         once.extend(vec![8.0; below]);
         once.extend([1.0; 100]);
         let values = once.repeat(3);
-        (
-            clipping_limit(&values, Some(1.0)),
-            doubtful_clipping_limit(&values, 1.0),
-        )
+        clipping_limit(&values, Some(1.0)).map(|limit| (limit.value, limit.is_certain))
     };
-    assert_eq!(found(20, 6), (Some(9.0), None));
-    assert_eq!(found(20, 7), (None, Some(9.0)));
-    assert_eq!(found(20, 20), (None, None));
-    assert_eq!(found(3, 1), (None, None));
+    assert_eq!(found(20, 6), Some((9.0, true)));
+    assert_eq!(found(20, 7), Some((9.0, false)));
+    assert_eq!(found(20, 20), None);
+    assert_eq!(found(3, 1), None);
 }
 
 #[test]
