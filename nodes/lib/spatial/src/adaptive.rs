@@ -137,9 +137,8 @@ impl<const L: usize> Adaptation<L> {
     ) -> Self {
         let least_noise =
             ranges(series).map(|range| (LEAST_NOISE * range).max(LEAST_NOISE_AT_ALL).powi(2));
-        let noise: [f64; L] = std::array::from_fn(|lane| {
-            fourth_difference_variance(series, lane).max(least_noise[lane])
-        });
+        let shown = fourth_difference_variances(series);
+        let noise: [f64; L] = std::array::from_fn(|lane| shown[lane].max(least_noise[lane]));
         let drive = noise.map(|noise| noise / equations.weight_of_cutoff(FIRST_CUTOFF_HZ));
         Self {
             drive: vec![drive; equations.interval_count()],
@@ -157,26 +156,28 @@ impl<const L: usize> Adaptation<L> {
         }
     }
 
-    /// Learns from whole series; `expected` is that of each lane. What `solution` holds afterwards is of no use.
+    /// Learns from whole series; `expected` is that of each lane. With the weights of what was learnt; what
+    /// `solution` holds afterwards is of no use.
     pub(crate) fn learn<const C: usize>(
         equations: &SplineEquations,
         series: &Series<C, L>,
         expected: [ExpectedNoise; L],
         solution: &mut LocalSolution<C, L>,
-    ) -> Result<Self, SpatialError> {
+    ) -> Result<(Self, Vec<IntervalWeights<L>>), SpatialError> {
         let mut adaptation = Self::start(equations, series, expected);
-        let mut statements = Statements::default();
+        let (mut weighing, mut statements) = (Weighing::default(), Statements::default());
         for step in 0..STEPS {
             if step == STEPS_AS_WHITE {
                 adaptation.low_passed =
                     expected.map(|it| it.low_passed.map(|own| own.among(equations)));
             }
-            let weights = adaptation.weights();
+            adaptation.weigh(&mut weighing);
             // Not refined: squares are all that is wanted of it.
-            solution.solve_and_state(equations, series, &weights, &mut statements)?;
-            adaptation.step(equations, &weights, &mut statements, Stride::Whole);
+            solution.solve_and_state(equations, series, &weighing.weights, &mut statements)?;
+            adaptation.step(equations, &weighing, &mut statements, Stride::Whole);
         }
-        Ok(adaptation)
+        adaptation.weigh(&mut weighing);
+        Ok((adaptation, weighing.weights))
     }
 
     /// Moves on with a window: `dropped` samples have left it at its front, others have come at its
@@ -196,26 +197,26 @@ impl<const L: usize> Adaptation<L> {
         true
     }
 
-    /// Learns from what splines of [`Adaptation::weights`] say. Half a step, so that it does not
+    /// Learns from what splines of [`Adaptation::weigh`]'s weights say. Half a step, so that it does not
     /// swing from window to window.
     pub(crate) fn learn_from(
         &mut self,
         equations: &SplineEquations,
-        weights: &[IntervalWeights<L>],
+        weighing: &Weighing<L>,
         statements: &mut Statements<L>,
     ) {
-        self.step(equations, weights, statements, Stride::Half);
+        self.step(equations, weighing, statements, Stride::Half);
     }
 
     fn step(
         &mut self,
         equations: &SplineEquations,
-        weights: &[IntervalWeights<L>],
+        weighing: &Weighing<L>,
         statements: &mut Statements<L>,
         stride: Stride,
     ) {
         widest!(s => {
-            self.take_evidence(s, equations, weights, statements);
+            self.take_evidence(s, equations, weighing, statements);
             self.update(s, equations, statements, stride);
         });
     }
@@ -227,53 +228,61 @@ impl<const L: usize> Adaptation<L> {
 
     /// The penalty's weight over each knot interval: the noise changes so little over a spline's
     /// width that its quotient with the drive may stand for both.
-    pub(crate) fn weights(&self) -> Vec<IntervalWeights<L>> {
-        let mut weights = vec![[[0.0; L]; 2]; self.drive.len()];
-        widest!(s => {
-            self.weigh_white(s, &mut weights);
-            if self.low_passed.iter().any(Option::is_some) {
-                self.weigh_low_passed(s, &mut weights);
+    pub(crate) fn weigh(&self, weighing: &mut Weighing<L>) {
+        let count = self.drive.len();
+        weighing.weights.resize(count, [[0.0; L]; 2]);
+        weighing.noise.resize(count, [0.0; L]);
+        match self.low_passed.iter().any(Option::is_some) {
+            false => widest!(s => self.weigh_white(s, weighing)),
+            true => {
+                weighing.density.resize(count, [0.0; L]);
+                widest!(s => self.weigh_low_passed(s, weighing));
             }
-        });
-        weights
-    }
-
-    #[inline(always)]
-    fn weigh_white(&self, s: impl Four, weights: &mut [IntervalWeights<L>]) {
-        let lowest = s.splat(10f64.powf(LOWEST_LOG_WEIGHT));
-        let largest = s.splat(LARGEST_WEIGHT);
-        for (k, [fifth, second]) in weights.iter_mut().enumerate() {
-            let noise = self.noise_over(s, k);
-            *fifth = formula(
-                s,
-                [&noise, &self.drive[k]],
-                #[inline(always)]
-                |[noise, drive]| {
-                    let weight = s.divide(noise, drive);
-                    s.less(largest, s.greater(lowest, weight))
-                },
-            );
-            *second = self.second_weight(s, k, &noise);
         }
     }
 
-    /// Makes weights for white noise those for noise behind a low-pass.
     #[inline(always)]
-    fn weigh_low_passed(&self, s: impl Four, weights: &mut [IntervalWeights<L>]) {
+    fn weigh_white(&self, s: impl Four, weighing: &mut Weighing<L>) {
+        let weights = weighing.weights.iter_mut().zip(&mut weighing.noise);
+        for (k, ([fifth, second], noise)) in weights.enumerate() {
+            *noise = self.noise_over(s, k);
+            *fifth = within_bounds(s, &divided(s, noise, &self.drive[k]));
+            *second = self.second_weight(s, k, noise);
+        }
+    }
+
+    /// The same where the noise of some lanes, or of all, is behind a low-pass.
+    #[inline(always)]
+    fn weigh_low_passed(&self, s: impl Four, weighing: &mut Weighing<L>) {
         let lowest = s.splat(10f64.powf(LOWEST_LOG_WEIGHT));
         let low_passed = LowPassedLanes::new(self.low_passed);
-        for (k, [fifth, second]) in weights.iter_mut().enumerate() {
-            let at_cutoff = low_passed.at_cutoff(s, fifth);
-            let mut noise = self.noise_over(s, k);
-            multiply(s, &mut noise, &at_cutoff);
-            let own = formula(
+        let all = self.low_passed.iter().all(Option::is_some);
+        let weights = weighing.weights.iter_mut().zip(&mut weighing.noise);
+        let weights = weights.zip(&mut weighing.density).enumerate();
+        for (k, (([fifth, second], noise), density)) in weights {
+            *noise = self.noise_over(s, k);
+            let for_white = divided(s, noise, &self.drive[k]);
+            let white = within_bounds(s, &for_white);
+            *density = low_passed.density(s, &for_white);
+            let mut at_cutoff = *density;
+            if white != for_white {
+                at_cutoff = low_passed.density(s, &white);
+            }
+            at_cutoff = low_passed.with_floor(s, &at_cutoff);
+            *fifth = formula(
                 s,
-                [fifth, &at_cutoff],
+                [&white, &at_cutoff],
                 #[inline(always)]
                 |[weight, at_cutoff]| s.greater(s.multiply(weight, at_cutoff), lowest),
             );
-            self.take_low_passed(fifth, &own);
-            self.take_low_passed(second, &self.second_weight(s, k, &noise));
+            let mut own = *noise;
+            multiply(s, &mut own, &at_cutoff);
+            *second = self.second_weight(s, k, &own);
+            if !all {
+                let white = [white, self.second_weight(s, k, noise)];
+                self.take_white(fifth, &white[0]);
+                self.take_white(second, &white[1]);
+            }
         }
     }
 
@@ -289,16 +298,12 @@ impl<const L: usize> Adaptation<L> {
         )
     }
 
-    /// Of lanes whose noise was low-passed before, these values.
+    /// Of lanes whose noise is white, these values.
     #[inline(always)]
-    fn take_low_passed(&self, values: &mut [f64; L], of_low_passed: &[f64; L]) {
-        if self.low_passed.iter().all(Option::is_some) {
-            *values = *of_low_passed;
-            return;
-        }
+    fn take_white(&self, values: &mut [f64; L], of_white: &[f64; L]) {
         for lane in 0..L {
-            if self.low_passed[lane].is_some() {
-                values[lane] = of_low_passed[lane];
+            if self.low_passed[lane].is_none() {
+                values[lane] = of_white[lane];
             }
         }
     }
@@ -370,19 +375,20 @@ impl<const L: usize> Adaptation<L> {
         &self,
         s: impl Four,
         equations: &SplineEquations,
-        weights: &[IntervalWeights<L>],
+        weighing: &Weighing<L>,
         Statements {
             drives, residuals, ..
         }: &mut Statements<L>,
     ) {
         let expected = EXPECTED_COUNT / equations.weight_of_cutoff(EXPECTED_CUTOFF_HZ);
-        for (k, [square, variance]) in drives.iter_mut().enumerate() {
-            add_scaled(s, square, expected, &self.noise_over(s, k));
-            multiply(s, variance, &weights[k][0]);
+        let weights = weighing.weights.iter().zip(&weighing.noise);
+        for ([square, variance], ([fifth, _], noise)) in drives.iter_mut().zip(weights) {
+            add_scaled(s, square, expected, noise);
+            multiply(s, variance, fifth);
             *variance = free_with(s, variance, &[EXPECTED_COUNT; L]);
         }
         if self.low_passed.iter().any(Option::is_some) {
-            self.leave_low_passed(s, residuals);
+            self.leave_low_passed(s, &weighing.density, residuals);
         }
         let expected: [f64; L] = self.expected_noise.map(|[expected, _]| expected);
         let count: [f64; L] = self.expected_noise.map(|[_, count]| count);
@@ -394,16 +400,30 @@ impl<const L: usize> Adaptation<L> {
 
     /// The share of the residuals that is not free, of noise behind a low-pass.
     #[inline(always)]
-    fn leave_low_passed(&self, s: impl Four, residuals: &mut [Evidence<L>]) {
-        let last = self.drive.len() - 1;
+    fn leave_low_passed(&self, s: impl Four, density: &[[f64; L]], residuals: &mut [Evidence<L>]) {
+        let last = density.len() - 1;
         let low_passed = LowPassedLanes::new(self.low_passed);
+        let all = self.low_passed.iter().all(Option::is_some);
         for (k, [_, share]) in residuals.iter_mut().enumerate() {
-            let interval = k.min(last);
-            let for_white = divided(s, &self.noise_over(s, interval), &self.drive[interval]);
-            let left = low_passed.left_over(s, &for_white, &one_less(s, share));
-            self.take_low_passed(share, &one_less(s, &left));
+            let white = *share;
+            let left = low_passed.left_over(s, &density[k.min(last)], &one_less(s, share));
+            *share = one_less(s, &left);
+            if !all {
+                self.take_white(share, &white);
+            }
         }
     }
+}
+
+/// Weights, and what was needed for them on the way.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Weighing<const L: usize> {
+    /// Of the penalty over each knot interval.
+    pub(crate) weights: Vec<IntervalWeights<L>>,
+    /// Variance of the noise over it, unit^2.
+    noise: Vec<[f64; L]>,
+    /// Where noise was low-passed before, its density at the cutoff for white noise, over that at low frequencies.
+    density: Vec<[f64; L]>,
 }
 
 /// How far a step goes, in the logarithm of the drive.
@@ -422,6 +442,19 @@ fn smooth_shared<const L: usize>(
     room: &mut [Evidence<L>],
 ) {
     Kernel::new(intervals.max(LEAST_SHARED_INTERVALS)).smooth(s, evidence, room);
+}
+
+/// A weight that leaves enough of the sixteen digits.
+#[inline(always)]
+fn within_bounds<const L: usize>(s: impl Four, weight: &[f64; L]) -> [f64; L] {
+    let lowest = s.splat(10f64.powf(LOWEST_LOG_WEIGHT));
+    let largest = s.splat(LARGEST_WEIGHT);
+    formula(
+        s,
+        [weight],
+        #[inline(always)]
+        |[weight]| s.less(largest, s.greater(lowest, weight)),
+    )
 }
 
 /// `1 - share`.
@@ -515,17 +548,24 @@ fn ranges<const C: usize, const L: usize>(series: &Series<C, L>) -> [f64; L] {
     std::array::from_fn(|lane| of_lane(lane).fold(0.0, f64::max))
 }
 
-/// Variance of white noise from the fourth differences of all channels.
-fn fourth_difference_variance<const C: usize, const L: usize>(
-    series: &Series<C, L>,
-    lane: usize,
-) -> f64 {
-    let of_channel =
-        |run: &[[f64; C]], c: usize| fourth_difference(std::array::from_fn(|k| run[k][c]));
-    let mut differences: Vec<f64> = series
-        .values
-        .windows(5)
-        .flat_map(|run| series.channels_of(lane).map(move |c| of_channel(run, c)))
-        .collect();
-    white_noise_variance(&mut differences, MEDIAN_OF_SQUARE).unwrap_or(0.0)
+/// Variance of white noise from the fourth differences of all channels, of each lane.
+fn fourth_difference_variances<const C: usize, const L: usize>(series: &Series<C, L>) -> [f64; L] {
+    let count = series.values.len().saturating_sub(4);
+    let mut lanes: [Vec<f64>; L] = series
+        .channels
+        .map(|channels| Vec::with_capacity(count * channels));
+    for [v, w, x, y, z] in series.values.array_windows() {
+        let mut differences = [0.0; C];
+        for (c, difference) in differences.iter_mut().enumerate() {
+            *difference = fourth_difference([v[c], w[c], x[c], y[c], z[c]]);
+        }
+        for (channel, differences) in differences.as_chunks::<L>().0.iter().enumerate() {
+            for lane in 0..L {
+                if channel < series.channels[lane] {
+                    lanes[lane].push(differences[lane]);
+                }
+            }
+        }
+    }
+    lanes.map(|mut own| white_noise_variance(&mut own, MEDIAN_OF_SQUARE).unwrap_or(0.0))
 }

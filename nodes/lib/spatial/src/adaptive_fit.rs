@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::SpatialError;
-use crate::adaptive::{Adaptation, ExpectedNoise};
+use crate::adaptive::{Adaptation, ExpectedNoise, Weighing};
 use crate::banded::InverseBands;
 use crate::basis::ORDER;
 use crate::equations::{IntervalWeights, SplineEquations};
@@ -62,8 +62,7 @@ impl<const C: usize, const L: usize> AdaptiveFit<C, L> {
         let constant = centre(&mut values);
         let series = Series::new(equations, values, channels);
         let mut solution = LocalSolution::default();
-        let learnt = Adaptation::learn(equations, &series, expected, &mut solution)?;
-        let weights = learnt.weights();
+        let (learnt, weights) = Adaptation::learn(equations, &series, expected, &mut solution)?;
         solution.solve(equations, &series, &weights)?;
         solution.invert();
         let noise = learnt.into_noise();
@@ -82,7 +81,7 @@ impl<const C: usize, const L: usize> AdaptiveFit<C, L> {
         centre(&mut values);
         let series = Series::new(equations, values, channels);
         let mut solution = LocalSolution::default();
-        let learnt = Adaptation::learn(equations, &series, expected, &mut solution)?;
+        let (learnt, _) = Adaptation::learn(equations, &series, expected, &mut solution)?;
         let noise = learnt.into_noise().into_iter();
         Ok(noise.map(|variances| variances.map(f64::sqrt)).collect())
     }
@@ -106,16 +105,23 @@ impl<const C: usize, const L: usize> AdaptiveFit<C, L> {
         });
         let mut learnt = match moved {
             Some(learnt) => learnt,
-            None => Adaptation::learn(equations, &series, expected, &mut solution)?,
+            None => Adaptation::learn(equations, &series, expected, &mut solution)?.0,
         };
-        let (weights, noise) = (learnt.weights(), learnt.clone().into_noise());
-        solution.solve(equations, &series, &weights)?;
+        let mut weighing = Weighing::default();
+        learnt.weigh(&mut weighing);
+        let noise = learnt.clone().into_noise();
+        solution.solve(equations, &series, &weighing.weights)?;
         let mut statements = Statements::default();
         solution.state(equations, &series, &mut statements);
-        learnt.learn_from(equations, &weights, &mut statements);
+        learnt.learn_from(equations, &weighing, &mut statements);
         *adaptation = Some(learnt);
         let finished = solution.finish();
-        Ok(Self::of(constant, weights, (noise, expected), finished))
+        Ok(Self::of(
+            constant,
+            weighing.weights,
+            (noise, expected),
+            finished,
+        ))
     }
 
     fn of(

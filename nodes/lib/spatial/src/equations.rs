@@ -5,7 +5,7 @@ use crate::banded::{Banded, Factor, Row};
 use crate::basis::{AT_KNOT, Basis, BasisValues, DEGREE, ORDER};
 use crate::difference::MAX_STENCIL;
 use crate::end_derivatives::{EndDerivative, end_derivatives};
-use crate::wide::{Four, Plain, add_scaled, multiply, scaled, subtract_scaled};
+use crate::wide::{Four, Plain, add_scaled, divided, multiply, scaled, subtract_scaled};
 
 /// Derivative that smoothing penalises. Five is the highest that a quintic has; the response to
 /// noise, `1 / (1 + weight w^10)`, then falls the most sharply, and motion below the cutoff passes
@@ -73,14 +73,9 @@ pub(crate) enum PenaltyWeights<'a> {
 pub(crate) type IntervalWeights<const L: usize> = [[f64; L]; 2];
 
 /// The weights of all knot intervals, for as many series at once as there are lanes.
-#[derive(Clone, Debug)]
-pub(crate) struct LocalWeights<const L: usize> {
-    /// Of each lane.
-    pub(crate) largest: [f64; L],
-    /// What each penalty row counts.
-    pub(crate) penalty: Vec<[f64; L]>,
-    /// What each second derivative counts.
-    pub(crate) second: Vec<[f64; L]>,
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LocalWeights<'a, const L: usize> {
+    pub(crate) intervals: &'a [IntervalWeights<L>],
     /// What each derivative at the ends counts.
     pub(crate) ends: [[f64; L]; 4],
 }
@@ -163,26 +158,33 @@ impl SplineEquations {
         }
     }
 
-    /// What these weights of the knot intervals make of each row.
+    /// With what these weights of the knot intervals make of the ends.
     #[inline(always)]
-    pub(crate) fn local_weights<const L: usize>(
+    pub(crate) fn local_weights<'a, const L: usize>(
         &self,
-        weights: &[IntervalWeights<L>],
-    ) -> LocalWeights<L> {
-        let mut largest = [0.0_f64; L];
-        for [weight, _] in weights {
-            (0..L).for_each(|lane| largest[lane] = largest[lane].max(weight[lane]));
-        }
-        let penalty = weights.iter().zip(&self.eased);
+        intervals: &'a [IntervalWeights<L>],
+    ) -> LocalWeights<'a, L> {
+        let ends = self.ends.each_ref();
         LocalWeights {
-            largest,
-            penalty: penalty
-                .map(|([weight, _], ease)| weight.map(|weight| weight / ease))
-                .collect(),
-            second: weights.iter().map(|[_, second]| *second).collect(),
-            ends: self
-                .ends
-                .map(|end| weights[end.first][0].map(|weight| local_end_weight(&end, weight))),
+            intervals,
+            ends: ends
+                .map(|end| intervals[end.first][0].map(|weight| local_end_weight(end, weight))),
+        }
+    }
+
+    /// What the penalty row of an interval counts.
+    #[inline(always)]
+    pub(crate) fn eased_weight<const L: usize>(
+        &self,
+        s: impl Four,
+        interval: usize,
+        [fifth, _]: &IntervalWeights<L>,
+    ) -> [f64; L] {
+        let ease = self.eased[interval];
+        if ease == 1.0 {
+            *fifth
+        } else {
+            divided(s, fifth, &[ease; L])
         }
     }
 
@@ -207,19 +209,20 @@ impl SplineEquations {
         }
         let first = i.saturating_sub(DEGREE);
         let intervals = first..self.interval_count().min(i + 1);
-        for (rows, weights) in [
-            (&self.penalty_rows, &weights.penalty),
-            (&self.second_rows, &weights.second),
-        ] {
-            let place = i - first;
-            add_all_products(
-                s,
-                &mut entries,
-                place,
-                &rows[intervals.clone()],
-                &weights[intervals.clone()],
-            );
+        let place = i - first;
+        let own = &weights.intervals[intervals.clone()];
+        // Eased are those near the ends: from either on, fewer and fewer.
+        if self.eased[intervals.start] == 1.0 && self.eased[intervals.end - 1] == 1.0 {
+            let rows = &self.penalty_rows[intervals.clone()];
+            add_all_products::<L, 0>(s, &mut entries, place, rows, own);
+        } else {
+            for (k, interval) in intervals.clone().enumerate() {
+                let weight = self.eased_weight(s, interval, &own[k]);
+                let row = &self.penalty_rows[interval];
+                add_products(s, &mut entries, place - k, row, &weight);
+            }
         }
+        add_all_products::<L, 1>(s, &mut entries, place, &self.second_rows[intervals], own);
         entries
     }
 
@@ -464,25 +467,25 @@ fn local_end_weight(end: &EndDerivative, weight: f64) -> f64 {
 /// Adds the products of all rows that reach a row of a band matrix, which is entry `place` of the first
 /// of them, one less of the next, and so on.
 #[inline(always)]
-fn add_all_products<const L: usize>(
+fn add_all_products<const L: usize, const KIND: usize>(
     s: impl Four,
     entries: &mut Row<L>,
     place: usize,
     rows: &[[f64; ORDER]],
-    weights: &[[f64; L]],
+    weights: &[IntervalWeights<L>],
 ) {
     match (rows.first_chunk::<ORDER>(), weights.first_chunk::<ORDER>()) {
         (Some(rows), Some(weights)) => {
-            add_products(s, entries, 5, &rows[0], &weights[0]);
-            add_products(s, entries, 4, &rows[1], &weights[1]);
-            add_products(s, entries, 3, &rows[2], &weights[2]);
-            add_products(s, entries, 2, &rows[3], &weights[3]);
-            add_products(s, entries, 1, &rows[4], &weights[4]);
-            add_products(s, entries, 0, &rows[5], &weights[5]);
+            add_products(s, entries, 5, &rows[0], &weights[0][KIND]);
+            add_products(s, entries, 4, &rows[1], &weights[1][KIND]);
+            add_products(s, entries, 3, &rows[2], &weights[2][KIND]);
+            add_products(s, entries, 2, &rows[3], &weights[3][KIND]);
+            add_products(s, entries, 1, &rows[4], &weights[4][KIND]);
+            add_products(s, entries, 0, &rows[5], &weights[5][KIND]);
         }
         _ => {
             for (k, (row, weight)) in rows.iter().zip(weights).enumerate() {
-                add_products(s, entries, place - k, row, weight);
+                add_products(s, entries, place - k, row, &weight[KIND]);
             }
         }
     }

@@ -5,7 +5,7 @@ use crate::SpatialError;
 use crate::banded::{Factor, InverseBands, InverseBlock, Solved, quadratic_form};
 use crate::basis::AT_KNOT;
 use crate::equations::{IntervalWeights, LocalWeights, SplineEquations, add_residual, refinements};
-use crate::wide::{Four, add_product, add_scaled, add_scaled_rows, widest};
+use crate::wide::{Four, add_product, add_scaled, add_scaled_rows, divided, widest};
 
 /// Series on the same times, a lane each: channel c belongs to lane c modulo L, and where a lane has
 /// fewer channels than others, those that it lacks are zero.
@@ -14,6 +14,8 @@ pub(crate) struct Series<const C: usize, const L: usize> {
     pub(crate) values: Vec<[f64; C]>,
     /// Number of each lane's channels.
     pub(crate) channels: [usize; L],
+    /// The same as floating-point numbers.
+    counts: [f64; L],
     /// The derivatives at the ends.
     targets: [[f64; C]; 4],
 }
@@ -28,6 +30,7 @@ impl<const C: usize, const L: usize> Series<C, L> {
             targets: equations.ends.map(|end| end.target(&values)),
             values,
             channels,
+            counts: channels.map(|count| count as f64),
         }
     }
 
@@ -120,7 +123,11 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
         let weights = equations.local_weights(weights);
         self.solve_down(s, equations, series, &weights)?;
         self.factor.solve_up(s, &mut self.coefficients);
-        let refined = weights.largest.map(refinements);
+        let mut largest = [0.0_f64; L];
+        for [weight, _] in weights.intervals {
+            (0..L).for_each(|lane| largest[lane] = largest[lane].max(weight[lane]));
+        }
+        let refined = largest.map(refinements);
         for round in 1..=refined.into_iter().max().unwrap_or(0) {
             self.residual(s, equations, series, &weights);
             self.factor.solve(s, &mut self.correction);
@@ -208,7 +215,7 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
                 if i < drives.len() {
                     drives[i] = drive_over(s, i, equations, series, coefficients, block);
                     let second = combined(s, &coefficients[i..], &equations.second_rows[i]);
-                    accelerations[i] = [mean_squares(s, &second, &series.channels), [1.0; L]];
+                    accelerations[i] = [mean_squares(s, &second, &series.counts), [1.0; L]];
                 }
                 if i < residuals.len() {
                     residuals[i] = residual_at(s, i, equations, series, coefficients, block);
@@ -252,12 +259,13 @@ impl<const C: usize, const L: usize> LocalSolution<C, L> {
             let near = &mut correction[end.first..];
             add_residual(s, &x[end.first..], &end.row, target, weight, near);
         }
-        let rows = equations.penalty_rows.iter().zip(&weights.penalty);
-        for (k, (row, weight)) in rows.enumerate() {
+        let rows = equations.penalty_rows.iter().zip(weights.intervals);
+        for (k, (row, weights)) in rows.enumerate() {
+            let weight = &equations.eased_weight(s, k, weights);
             add_residual(s, &x[k..], row, &[0.0; C], weight, &mut correction[k..]);
         }
-        let rows = equations.second_rows.iter().zip(&weights.second);
-        for (k, (row, weight)) in rows.enumerate() {
+        let rows = equations.second_rows.iter().zip(weights.intervals);
+        for (k, (row, [_, weight])) in rows.enumerate() {
             add_residual(s, &x[k..], row, &[0.0; C], weight, &mut correction[k..]);
         }
     }
@@ -274,11 +282,17 @@ fn drive_over<const C: usize, const L: usize>(
 ) -> Stated<L> {
     let (row, ease) = (&equations.penalty_rows[interval], equations.eased[interval]);
     let fifth = combined(s, &coefficients[interval..], row);
-    [
-        mean_squares(s, &fifth, &series.channels),
+    let mut stated = [
+        mean_squares(s, &fifth, &series.counts),
         quadratic_form(s, block, row),
-    ]
-    .map(|stated| stated.map(|lane| lane / ease))
+    ];
+    // But for the ends there is nothing to divide by.
+    if ease != 1.0 {
+        for stated in &mut stated {
+            *stated = divided(s, stated, &[ease; L]);
+        }
+    }
+    stated
 }
 
 #[inline(always)]
@@ -294,7 +308,7 @@ fn residual_at<const C: usize, const L: usize>(
     let mut residual = combined(s, &coefficients[sample..], row);
     (0..C).for_each(|c| residual[c] = value[c] - residual[c]);
     [
-        mean_squares(s, &residual, &series.channels),
+        mean_squares(s, &residual, &series.counts),
         quadratic_form(s, block, row),
     ]
 }
@@ -328,11 +342,11 @@ fn combined<const C: usize, const W: usize>(
 fn mean_squares<const C: usize, const L: usize>(
     s: impl Four,
     values: &[f64; C],
-    channels: &[usize; L],
+    counts: &[f64; L],
 ) -> [f64; L] {
     let mut sum = [0.0; L];
     for values in values.as_chunks::<L>().0 {
         add_product(s, &mut sum, values, values);
     }
-    std::array::from_fn(|lane| sum[lane] / channels[lane] as f64)
+    divided(s, &sum, counts)
 }

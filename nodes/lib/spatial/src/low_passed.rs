@@ -99,30 +99,40 @@ impl<const L: usize> LowPassedLanes<L> {
         }
     }
 
-    /// The noise's density at the cutoff where motion is as dense, over that at low frequencies; `weight` is
-    /// that for white noise.
+    /// The noise's density at the cutoff where motion is as dense, over that at low frequencies, without the
+    /// floor; `weight` is that for white noise.
     #[inline(always)]
-    pub(crate) fn at_cutoff(&self, s: impl Four, weight: &[f64; L]) -> [f64; L] {
+    pub(crate) fn density(&self, s: impl Four, weight: &[f64; L]) -> [f64; L] {
         formula(
             s,
             [weight, &self.weight_of_corner],
             #[inline(always)]
-            |[weight, of_corner]| s.add(behind_filter(s, of_corner, weight), s.splat(FLOOR)),
+            |[weight, of_corner]| behind_filter(s, of_corner, weight),
+        )
+    }
+
+    /// The same with the floor.
+    #[inline(always)]
+    pub(crate) fn with_floor(&self, s: impl Four, density: &[f64; L]) -> [f64; L] {
+        formula(
+            s,
+            [density],
+            #[inline(always)]
+            |[density]| s.add(density, s.splat(FLOOR)),
         )
     }
 
     /// What of the noise a spline leaves in a sample's distance from it, over what white noise of all
-    /// frequencies has: that beyond the cutoff. `weight` is that for white noise, `free` what of white noise
-    /// is left.
+    /// frequencies has: that beyond the cutoff. `density` is that at the cutoff, without the floor, `free` what
+    /// of white noise is left.
     #[inline(always)]
-    pub(crate) fn left_over(&self, s: impl Four, weight: &[f64; L], free: &[f64; L]) -> [f64; L] {
+    pub(crate) fn left_over(&self, s: impl Four, density: &[f64; L], free: &[f64; L]) -> [f64; L] {
         formula(
             s,
-            [weight, free, &self.weight_of_corner, &self.corner],
+            [density, free, &self.corner],
             #[inline(always)]
-            |[weight, free, of_corner, corner]| {
+            |[density, free, corner]| {
                 let one = s.splat(1.0);
-                let density = behind_filter(s, of_corner, weight);
                 let square = s.subtract(s.divide(one, s.square_root(density)), one);
                 let x = s.square_root(s.square_root(square));
                 // The integral from x on, within 2 %.
@@ -186,13 +196,13 @@ mod tests {
     fn at_its_cutoff_motion_is_as_dense_as_the_noise() {
         for x in [0.2_f64, 0.5, 0.8, 1.0, 1.5, 2.5, 4.0] {
             let for_white = 1.0 / (x.powi(10) * density(x));
-            let found = AT_CORNER_1.at_cutoff(Plain, &[for_white])[0] - FLOOR;
+            let found = AT_CORNER_1.density(Plain, &[for_white])[0];
             assert!(
                 (found / density(x) - 1.0).abs() < 0.016,
                 "{x}: {found} {}",
                 density(x)
             );
-            let left = AT_CORNER_1.left_over(Plain, &[for_white], &[0.0])[0] / CORNER;
+            let left = AT_CORNER_1.left_over(Plain, &[found], &[0.0])[0] / CORNER;
             let beyond = sum(x, density);
             assert!((left / beyond - 1.0).abs() < 0.1, "{x}: {left} {beyond}");
         }
