@@ -42,7 +42,7 @@ const LEAST_SPREAD: f64 = 0.0025;
 /// reference to have axes.
 const LEAST_LIKENESS: f64 = 0.3;
 
-/// Time over which forces are averaged for what is slow, s: below some 2 Hz. No source.
+/// Time over which forces and turns are averaged for what is slow, s: below some 2 Hz. No source.
 const SLOW_S: f64 = 0.25;
 /// White noise of positions, "m", that is taken for millimetres where the rotation scatters as ordinarily, and
 /// nothing moves: 50 m away, a cluster of markers of 50 mm would have it. No source.
@@ -99,7 +99,8 @@ impl CoarseAlignment {
         if drift.is_none() && is_on_time {
             (lag_s, rows, turns) = (0.0, on_time, turns_on_time);
         }
-        let (axes, gyro) = gyro_axes(&turns);
+        let count = (SLOW_S * prepared.rate_hz).round() as usize;
+        let (axes, gyro) = gyro_axes(&turns, &Turns::of_means(&rows, track, count));
         let slopes = |turn: &Matrix3<f64>| ForceSlopes::new(&rows, track, turn);
         let as_it_is = slopes(&Matrix3::identity());
         // Angular velocities about one axis tell axes badly: what leaves less of the force unexplained holds.
@@ -107,7 +108,6 @@ impl CoarseAlignment {
             .map(|axes| (axes, slopes(&axes)))
             .filter(|(_, turned)| turned.explains_as_much_as(&as_it_is))
             .unwrap_or((Matrix3::identity(), as_it_is));
-        let count = (SLOW_S * prepared.rate_hz).round() as usize;
         let slow = ForceSlopes::of_means(&rows, track, &turn, count);
         let scales = scales(&slopes, &slow, prepared.estimate.noise());
         Self {
@@ -196,6 +196,14 @@ fn insert_valid(set: &mut EffectSet, effect: Result<Effect, EffectError>) {
     }
 }
 
+/// The measured angular velocity, and the reference's.
+fn turns(row: &(&Reading, usize), track: &KinematicTrack) -> [Vector3<f64>; 2] {
+    [
+        row.0.angular_velocity,
+        track.angular_velocity_in_segment[row.1],
+    ]
+}
+
 /// Sums over rows of products of the measured angular velocity y and the reference's w, means taken out, for the
 /// matrix of `y = A w + b` by least squares.
 struct Turns {
@@ -209,13 +217,24 @@ struct Turns {
 
 impl Turns {
     fn new(rows: &[(&Reading, usize)], track: &KinematicTrack) -> Self {
-        let count = rows.len().max(1) as f64;
-        let measured = |row: &(&Reading, usize)| row.0.angular_velocity;
-        let predicted = |row: &(&Reading, usize)| track.angular_velocity_in_segment[row.1];
-        let mean_of = |of: &dyn Fn(&(&Reading, usize)) -> Vector3<f64>| {
-            rows.iter().map(of).sum::<Vector3<f64>>() / count
-        };
-        let (mean_y, mean_w) = (mean_of(&measured), mean_of(&predicted));
+        Self::of_pairs(rows.iter().map(|row| turns(row, track)))
+    }
+
+    /// Of the means over so many rows each: what is slow alone.
+    fn of_means(rows: &[(&Reading, usize)], track: &KinematicTrack, count: usize) -> Self {
+        Self::of_pairs(rows.chunks_exact(count.max(1)).map(|several| {
+            let sum = several.iter().fold([Vector3::zeros(); 2], |sum, row| {
+                let own = turns(row, track);
+                [sum[0] + own[0], sum[1] + own[1]]
+            });
+            sum.map(|sum| sum / several.len() as f64)
+        }))
+    }
+
+    fn of_pairs(pairs: impl Iterator<Item = [Vector3<f64>; 2]> + Clone) -> Self {
+        let count = pairs.clone().count().max(1) as f64;
+        let mean = |k: usize| pairs.clone().map(|pair| pair[k]).sum::<Vector3<f64>>() / count;
+        let (mean_y, mean_w) = (mean(0), mean(1));
         let mut sums = Self {
             count,
             yw: Matrix3::zeros(),
@@ -223,8 +242,7 @@ impl Turns {
             yy: 0.0,
             squares: [0.0; 2],
         };
-        for row in rows {
-            let (y, w) = (measured(row), predicted(row));
+        for [y, w] in pairs {
             sums.squares[0] += y.norm_squared();
             sums.squares[1] += w.norm_squared();
             let (y, w) = (y - mean_y, w - mean_w);
@@ -249,6 +267,15 @@ impl Turns {
     /// both, whose ratio is anything.
     fn are_followed(&self) -> bool {
         self.about_most_turned_axis().1 > FOLLOWED
+    }
+
+    /// The factor of the gyroscope's units about it; 1 where the readings do not turn with the reference.
+    fn factor_about_most_turned_axis(&self) -> f64 {
+        if self.are_followed() {
+            gyro_factor(self.about_most_turned_axis().0)
+        } else {
+            1.0
+        }
     }
 
     /// The matrix; none where the reference does not turn about all axes.
@@ -291,8 +318,8 @@ fn gyro_factor(scale: f64) -> f64 {
 }
 
 /// Axes and units of the gyroscope from the matrix of [`Turns`]: its polar factor and the
-/// cube root of its determinant.
-fn gyro_axes(turns: &Turns) -> (Option<Matrix3<f64>>, f64) {
+/// cube root of its determinant; units also from what is slow of them.
+fn gyro_axes(turns: &Turns, slow: &Turns) -> (Option<Matrix3<f64>>, f64) {
     let of_all_axes = turns.matrix().and_then(|matrix| {
         let svd = matrix.svd(true, true);
         let is_alike = svd.singular_values.min() >= LEAST_LIKENESS * svd.singular_values.max();
@@ -300,9 +327,20 @@ fn gyro_axes(turns: &Turns) -> (Option<Matrix3<f64>>, f64) {
         is_alike.then(|| (axes, matrix.determinant().abs().cbrt()))
     });
     match of_all_axes {
-        // Noise of the reference makes the axes that it turns least about count for less.
+        // Noise of the reference makes the axes that it turns least about count for less; smoothed, it turns less
+        // than the readings, but for what is slow of them.
         Some((axes, scale)) if !NEARLY_ONE.contains(&scale) => {
-            let factors = [scale, turns.about_most_turned_axis().0].map(gyro_factor);
+            let of_slow = slow.factor_about_most_turned_axis();
+            let are_followed = turns.unexplained() < 1.0 - FOLLOWED;
+            let factors = [
+                if are_followed {
+                    gyro_factor(scale)
+                } else {
+                    1.0
+                },
+                turns.factor_about_most_turned_axis(),
+                if of_slow < scale { of_slow } else { 1.0 },
+            ];
             let known = factors.into_iter().find(|factor| *factor != 1.0);
             (Some(axes), known.unwrap_or(1.0))
         }
@@ -341,9 +379,63 @@ mod tests {
             .matrix()
             .map_or(0.0, |matrix| matrix.determinant().cbrt());
         assert!((30.0..50.0).contains(&attenuated), "{attenuated}");
-        let (axes, factor) = gyro_axes(&turns);
+        let (axes, factor) = gyro_axes(&turns, &turns);
         assert!(axes.is_some());
         assert_eq!(factor, 1.0_f64.to_degrees());
+    }
+
+    #[test]
+    fn readings_that_do_not_follow_are_in_no_other_units() {
+        // Those of a drifting clock: by chance something is left of their slope, here 0.159 about one axis.
+        let mut track = KinematicTrack::default();
+        let mut readings = Vec::new();
+        for k in 0..2000 {
+            let t = 0.02 * f64::from(k);
+            let seen = Vector3::new(2.0 * (7.0 * t).sin(), (8.0 * t).sin(), (9.0 * t).sin());
+            let left = seen.component_mul(&Vector3::new(0.159, 0.45, 0.45));
+            track.angular_velocity_in_segment.push(seen);
+            readings.push(Reading {
+                angular_velocity: left + Vector3::repeat(3.0 * (11.0 * t).sin()),
+                ..Reading::default()
+            });
+        }
+        let rows: Vec<(&Reading, usize)> = readings.iter().zip(0..).collect();
+        let turns = Turns::new(&rows, &track);
+        let (slope, explained) = turns.about_most_turned_axis();
+        assert_eq!(gyro_factor(slope), 0.159_154_943_091_895_35);
+        assert!(explained < 0.05, "{explained}");
+        let (axes, factor) = gyro_axes(&turns, &turns);
+        assert!(axes.is_some());
+        assert_eq!(factor, 1.0);
+    }
+
+    #[test]
+    fn a_smoothed_reference_hides_no_units_of_the_gyroscope() {
+        // Of turns at 4 Hz and more the reference holds a tenth: the slope of all is four times the unit's.
+        let slow = |t: f64| Vector3::new((1.9 * t).sin(), (2.3 * t).sin(), (2.9 * t).sin());
+        let fast =
+            |t: f64| Vector3::new((26.0 * t).sin(), (52.0 * t).sin(), (78.0 * t).sin()) * 8.0;
+        for factor in [1.0, 1.0_f64.to_degrees()] {
+            let mut track = KinematicTrack::default();
+            let mut readings = Vec::new();
+            for k in 0..2000 {
+                let t = 0.02 * f64::from(k);
+                let seen = slow(t) + fast(t) * 0.1;
+                track.angular_velocity_in_segment.push(seen);
+                readings.push(Reading {
+                    angular_velocity: (slow(t) + fast(t)) * factor,
+                    ..Reading::default()
+                });
+            }
+            let rows: Vec<(&Reading, usize)> = readings.iter().zip(0..).collect();
+            let turns = Turns::new(&rows, &track);
+            let slope = turns.about_most_turned_axis().0;
+            assert!((3.0..6.0).contains(&(slope / factor)), "{slope}");
+            assert_eq!(gyro_axes(&turns, &turns).1, 1.0);
+            let (axes, found) = gyro_axes(&turns, &Turns::of_means(&rows, &track, 12));
+            assert!(axes.is_some());
+            assert_eq!(found, factor);
+        }
     }
 
     /// A tool's acceleration along x, m/s2: slow, and of 30 Hz.

@@ -16,7 +16,7 @@ use crate::evidence::Evidence;
 use crate::findings::Findings;
 use crate::library::Library;
 use crate::magnetometer::{MagneticRecording, diagnose_magnetometer};
-use crate::policy::probability::{LEAST_NAMED, SMALL_SHARE};
+use crate::policy::probability::{LEAST_MOUNT, LEAST_NAMED, SMALL_SHARE};
 use crate::progress::{ANALYSIS, PREPARATION, Progress};
 use crate::record::{MeasuredField, PlacementRecord};
 use crate::session::Session;
@@ -217,13 +217,24 @@ fn in_neighbouring_units(
     all.unwrap_or_default()
 }
 
-/// Fitted causes that are more likely not there, and of hardly any of the gap.
+/// Where the sensor sits: small ones take up what other effects leave.
+const MOUNT: [EffectKind; 2] = [EffectKind::LeverArm, EffectKind::MountRotation];
+
+/// Fitted causes that are not likely enough to be there, and of hardly any of the gap.
 fn doubtful(causes: &[Cause]) -> Vec<EffectKind> {
-    let is_doubtful =
-        |cause: &&Cause| cause.probability < LEAST_NAMED && cause.gap_share < SMALL_SHARE;
-    let kinds = causes.iter().filter(is_doubtful);
-    kinds
-        .filter_map(|cause| EffectKind::from_name(&cause.effect))
+    let is_doubtful = |cause: &Cause, kind: EffectKind| {
+        let least = if MOUNT.contains(&kind) {
+            LEAST_MOUNT
+        } else {
+            LEAST_NAMED
+        };
+        cause.probability < least && cause.gap_share < SMALL_SHARE
+    };
+    causes
+        .iter()
+        .filter_map(|cause| EffectKind::from_name(&cause.effect).map(|kind| (cause, kind)))
+        .filter(|(cause, kind)| is_doubtful(cause, *kind))
+        .map(|(_, kind)| kind)
         .filter(|kind| matches!(kind.spec().search, Search::Fitted(_)))
         .collect()
 }

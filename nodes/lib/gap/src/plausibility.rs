@@ -20,7 +20,12 @@ pub(crate) fn is_sound(model: &FitModel, fit: &Fit) -> bool {
 /// Whether the fitted values are what such effects have: a filter that passes all motion, or a
 /// tissue stiffer than any, are no causes but the reference's own smoothing error in their disguise.
 fn is_plausible(set: &EffectSet) -> bool {
-    set.iter().all(|effect| match effect.kind().spec().search {
+    plausible_members(set) == *set
+}
+
+/// The effects of a set whose values are.
+pub(crate) fn plausible_members(set: &EffectSet) -> EffectSet {
+    set.filtered(|effect| match effect.kind().spec().search {
         Search::Fitted(search) => (search.is_plausible)(effect, set),
         Search::Choice | Search::ReadOff(_) | Search::Given => true,
     })
@@ -115,5 +120,30 @@ impl LineInSpectrum {
             height: band.iter().copied().fold(0.0, f64::max) / around,
             power: band.iter().sum::<f64>() - around * band.len() as f64,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use cromosim_imu::{Effect, EffectKind};
+
+    #[test]
+    fn a_filter_that_passes_all_leaves_what_stands_beside_it() {
+        let set = |cutoff_hz: f64| {
+            let mut set = EffectSet::new();
+            for (kind, value) in [
+                (EffectKind::LowPass, cutoff_hz),
+                (EffectKind::ClockDrift, -1300.0),
+            ] {
+                set.insert(Effect::new(kind, vec![value]).unwrap());
+            }
+            set
+        };
+        assert_eq!(plausible_members(&set(8.0)), set(8.0));
+        let rest = plausible_members(&set(60.0));
+        assert_eq!(rest, set(60.0).without(EffectKind::LowPass));
+        assert!(!is_plausible(&set(60.0)) && is_plausible(&rest));
     }
 }

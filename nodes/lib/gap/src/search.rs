@@ -4,7 +4,7 @@ use cromosim_imu::{Channel, EffectKind, EffectSet, PerChannel, Search};
 
 use crate::axes::{larger, sum_over_channels};
 use crate::fit::{Fit, FitModel, free_values};
-use crate::plausibility::is_sound;
+use crate::plausibility::{is_sound, plausible_members};
 use crate::policy::price;
 use crate::policy::search::{
     BEAM, EXCHANGES, FAR_BEHIND, FAR_LOWER, MOST_LOSS_NATS, MOST_MEMBERS, MOST_RISE,
@@ -220,7 +220,7 @@ fn grow(
         if place >= REFITS || !is_promising(predicted) {
             continue;
         }
-        let grown = score(model, candidate.begin(model));
+        let grown = grown_to(model, candidate.begin(model), &scored.fit.set);
         if grown.score > f64::NEG_INFINITY {
             grown_sets.push(grown);
             sort(grown_sets);
@@ -229,6 +229,17 @@ fn grow(
         }
     }
     screened
+}
+
+/// A set that has grown from another, without what lost its sense beside the new effect: a member may have stood
+/// for that one, as a filter does for a drift that blurs.
+fn grown_to(model: &FitModel, set: EffectSet, from: &EffectSet) -> ScoredEffectSet {
+    let grown = score(model, set);
+    let rest = plausible_members(&grown.fit.set);
+    if rest == grown.fit.set || names(&rest) == names(from) {
+        return grown;
+    }
+    score(model, rest)
 }
 
 /// Whether an effect earns its place by so much that no fit without it is needed to see it: one
