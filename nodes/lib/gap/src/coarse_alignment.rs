@@ -269,15 +269,6 @@ impl Turns {
         self.about_most_turned_axis().1 > FOLLOWED
     }
 
-    /// The factor of the gyroscope's units about it; 1 where the readings do not turn with the reference.
-    fn factor_about_most_turned_axis(&self) -> f64 {
-        if self.are_followed() {
-            gyro_factor(self.about_most_turned_axis().0)
-        } else {
-            1.0
-        }
-    }
-
     /// The matrix; none where the reference does not turn about all axes.
     fn matrix(&self) -> Option<Matrix3<f64>> {
         let spread = self.ww.symmetric_eigenvalues() / self.count;
@@ -330,18 +321,15 @@ fn gyro_axes(turns: &Turns, slow: &Turns) -> (Option<Matrix3<f64>>, f64) {
         // Noise of the reference makes the axes that it turns least about count for less; smoothed, it turns less
         // than the readings, but for what is slow of them.
         Some((axes, scale)) if !NEARLY_ONE.contains(&scale) => {
-            let of_slow = slow.factor_about_most_turned_axis();
-            let are_followed = turns.unexplained() < 1.0 - FOLLOWED;
-            let factors = [
-                if are_followed {
-                    gyro_factor(scale)
-                } else {
-                    1.0
-                },
-                turns.factor_about_most_turned_axis(),
-                if of_slow < scale { of_slow } else { 1.0 },
-            ];
-            let known = factors.into_iter().find(|factor| *factor != 1.0);
+            let all = (scale, 1.0 - turns.unexplained());
+            let slow = Some(slow.about_most_turned_axis()).filter(|(slope, _)| *slope < scale);
+            let slopes = [all, turns.about_most_turned_axis()]
+                .into_iter()
+                .chain(slow);
+            let known = slopes
+                .filter(|(_, explained)| *explained > FOLLOWED)
+                .map(|(slope, _)| gyro_factor(slope))
+                .find(|factor| *factor != 1.0);
             (Some(axes), known.unwrap_or(1.0))
         }
         Some((axes, _)) => (Some(axes), 1.0),
@@ -353,26 +341,35 @@ fn gyro_axes(turns: &Turns, slow: &Turns) -> (Option<Matrix3<f64>>, f64) {
 mod tests {
     use super::*;
 
+    /// At 50 Hz, what a reference and a gyroscope turn.
+    fn turned(
+        seen: impl Fn(f64) -> Vector3<f64>,
+        read: impl Fn(f64) -> Vector3<f64>,
+    ) -> (KinematicTrack, Vec<Reading>) {
+        let times = || (0..2000).map(|k| 0.02 * f64::from(k));
+        let track = KinematicTrack {
+            angular_velocity_in_segment: times().map(seen).collect(),
+            ..KinematicTrack::default()
+        };
+        let reading = |t: f64| Reading {
+            angular_velocity: read(t),
+            ..Reading::default()
+        };
+        (track, times().map(reading).collect())
+    }
+
+    fn sines(t: f64, of: [f64; 3]) -> Vector3<f64> {
+        Vector3::from(of.map(|radians| (radians * t).sin()))
+    }
+
     #[test]
     fn noise_about_axes_that_hardly_turn_hides_no_units() {
         // Turns of 1 rad/s about one axis and 0.08 rad/s about the others, where the reference's own errors are nearly
         // as large: slopes of one and of 0.57.
-        let mut track = KinematicTrack::default();
-        let mut readings = Vec::new();
-        for k in 0..2000 {
-            let t = 0.02 * f64::from(k);
-            let turns = Vector3::new(
-                (3.0 * t).sin(),
-                0.08 * (4.1 * t).sin(),
-                0.08 * (5.3 * t).sin(),
-            );
-            let errors = Vector3::new((17.0 * t).sin(), (19.3 * t).sin(), (23.7 * t).sin()) * 0.07;
-            track.angular_velocity_in_segment.push(turns + errors);
-            readings.push(Reading {
-                angular_velocity: turns.map(f64::to_degrees),
-                ..Reading::default()
-            });
-        }
+        let turns =
+            |t: f64| sines(t, [3.0, 4.1, 5.3]).component_mul(&Vector3::new(1.0, 0.08, 0.08));
+        let errors = |t: f64| sines(t, [17.0, 19.3, 23.7]) * 0.07;
+        let (track, readings) = turned(|t| turns(t) + errors(t), |t| turns(t).map(f64::to_degrees));
         let rows: Vec<(&Reading, usize)> = readings.iter().zip(0..).collect();
         let turns = Turns::new(&rows, &track);
         let attenuated = turns
@@ -387,18 +384,11 @@ mod tests {
     #[test]
     fn readings_that_do_not_follow_are_in_no_other_units() {
         // Those of a drifting clock: by chance something is left of their slope, here 0.159 about one axis.
-        let mut track = KinematicTrack::default();
-        let mut readings = Vec::new();
-        for k in 0..2000 {
-            let t = 0.02 * f64::from(k);
-            let seen = Vector3::new(2.0 * (7.0 * t).sin(), (8.0 * t).sin(), (9.0 * t).sin());
-            let left = seen.component_mul(&Vector3::new(0.159, 0.45, 0.45));
-            track.angular_velocity_in_segment.push(seen);
-            readings.push(Reading {
-                angular_velocity: left + Vector3::repeat(3.0 * (11.0 * t).sin()),
-                ..Reading::default()
-            });
-        }
+        let seen = |t: f64| sines(t, [7.0, 8.0, 9.0]).component_mul(&Vector3::new(2.0, 1.0, 1.0));
+        let left = Vector3::new(0.159, 0.45, 0.45);
+        let (track, readings) = turned(seen, |t| {
+            seen(t).component_mul(&left) + sines(t, [11.0; 3]) * 3.0
+        });
         let rows: Vec<(&Reading, usize)> = readings.iter().zip(0..).collect();
         let turns = Turns::new(&rows, &track);
         let (slope, explained) = turns.about_most_turned_axis();
@@ -412,21 +402,13 @@ mod tests {
     #[test]
     fn a_smoothed_reference_hides_no_units_of_the_gyroscope() {
         // Of turns at 4 Hz and more the reference holds a tenth: the slope of all is four times the unit's.
-        let slow = |t: f64| Vector3::new((1.9 * t).sin(), (2.3 * t).sin(), (2.9 * t).sin());
-        let fast =
-            |t: f64| Vector3::new((26.0 * t).sin(), (52.0 * t).sin(), (78.0 * t).sin()) * 8.0;
+        let slow = |t: f64| sines(t, [1.9, 2.3, 2.9]);
+        let fast = |t: f64| sines(t, [26.0, 52.0, 78.0]) * 8.0;
         for factor in [1.0, 1.0_f64.to_degrees()] {
-            let mut track = KinematicTrack::default();
-            let mut readings = Vec::new();
-            for k in 0..2000 {
-                let t = 0.02 * f64::from(k);
-                let seen = slow(t) + fast(t) * 0.1;
-                track.angular_velocity_in_segment.push(seen);
-                readings.push(Reading {
-                    angular_velocity: (slow(t) + fast(t)) * factor,
-                    ..Reading::default()
-                });
-            }
+            let (track, readings) = turned(
+                |t| slow(t) + fast(t) * 0.1,
+                |t| (slow(t) + fast(t)) * factor,
+            );
             let rows: Vec<(&Reading, usize)> = readings.iter().zip(0..).collect();
             let turns = Turns::new(&rows, &track);
             let slope = turns.about_most_turned_axis().0;

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use cromosim_imu::{
-    Channel, DeclaredNoise, EffectKind, OtherSession, PerChannel, PlacementEffects, Search,
+    Channel, DeclaredNoise, EffectKind, OtherSession, Owner, PerChannel, PlacementEffects, Search,
     UnexplainedErrors, unit_factors,
 };
 use cromosim_spatial::MotionResponse;
@@ -16,7 +16,7 @@ use crate::evidence::Evidence;
 use crate::findings::Findings;
 use crate::library::Library;
 use crate::magnetometer::{MagneticRecording, diagnose_magnetometer};
-use crate::policy::probability::{LEAST_MOUNT, LEAST_NAMED, SMALL_SHARE};
+use crate::policy::probability::{LEAST_NAMED, LEAST_SIGNIFICANCE, SMALL_SHARE};
 use crate::progress::{ANALYSIS, PREPARATION, Progress};
 use crate::record::{MeasuredField, PlacementRecord};
 use crate::session::Session;
@@ -217,26 +217,24 @@ fn in_neighbouring_units(
     all.unwrap_or_default()
 }
 
-/// Where the sensor sits: small ones take up what other effects leave.
-const MOUNT: [EffectKind; 2] = [EffectKind::LeverArm, EffectKind::MountRotation];
-
-/// Fitted causes that are not likely enough to be there, and of hardly any of the gap.
-fn doubtful(causes: &[Cause]) -> Vec<EffectKind> {
-    let is_doubtful = |cause: &Cause, kind: EffectKind| {
-        let least = if MOUNT.contains(&kind) {
-            LEAST_MOUNT
-        } else {
-            LEAST_NAMED
-        };
-        cause.probability < least && cause.gap_share < SMALL_SHARE
+/// Fitted causes of hardly any of the gap that are not likely enough to be there, or of the device and little beyond
+/// their own standard errors: what other effects leave is taken up by small ones.
+fn doubtful(causes: &[Cause], findings: &[Findings]) -> Vec<EffectKind> {
+    let is_significant = |kind: EffectKind| {
+        findings.iter().any(|one| {
+            let effect = one.reportable.get(kind);
+            effect.is_some_and(|effect| one.scored.fit.significance(effect) >= LEAST_SIGNIFICANCE)
+        })
     };
-    causes
-        .iter()
-        .filter_map(|cause| EffectKind::from_name(&cause.effect).map(|kind| (cause, kind)))
-        .filter(|(cause, kind)| is_doubtful(cause, *kind))
-        .map(|(_, kind)| kind)
-        .filter(|kind| matches!(kind.spec().search, Search::Fitted(_)))
-        .collect()
+    let doubtful = |cause: &Cause| {
+        let kind = EffectKind::from_name(&cause.effect)?;
+        let spec = kind.spec();
+        let is_fitted = matches!(spec.search, Search::Fitted(_));
+        let is_likely = cause.probability >= LEAST_NAMED
+            && (spec.owner == Owner::Session || is_significant(kind));
+        (is_fitted && cause.gap_share < SMALL_SHARE && !is_likely).then_some(kind)
+    };
+    causes.iter().filter_map(doubtful).collect()
 }
 
 fn answer(
@@ -251,7 +249,7 @@ fn answer(
     }
     let builder = DiagnosisBuilder::new(&findings, sessions, options.seed);
     let diagnosis = builder.diagnosis(recordings);
-    let doubtful = doubtful(&diagnosis.causes);
+    let doubtful = doubtful(&diagnosis.causes, &findings);
     if !doubtful.is_empty() {
         // Calibrations among them are taken over all the same.
         for one in &mut findings {

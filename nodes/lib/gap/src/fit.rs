@@ -402,4 +402,17 @@ impl Fit {
         }
         errors
     }
+
+    /// How many standard errors an effect's values are from the neutral ones, of the value that is the farthest;
+    /// infinite where none is fitted.
+    pub fn significance(&self, effect: &Effect) -> f64 {
+        let errors = self.standard_errors(effect).into_iter();
+        let neutral = effect.kind().spec().neutral();
+        let distances = effect.values().iter().zip(&neutral);
+        let fitted = distances.zip(errors).filter(|(_, error)| *error > 0.0);
+        fitted
+            .map(|((value, neutral), error)| (value - neutral).abs() / error)
+            .reduce(f64::max)
+            .unwrap_or(f64::INFINITY)
+    }
 }

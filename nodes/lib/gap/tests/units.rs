@@ -44,3 +44,20 @@ fn three_reversed_axes_are_no_negated_gravity() {
         names_exactly(&answer(&scene.record()).diagnosis, &scene.effects);
     }
 }
+
+#[test]
+fn a_lever_arm_of_hardly_any_of_the_gap_is_named_where_it_is_significant() {
+    // Beside other units next to nothing of the gap is its own: 14 and 36 standard errors, by slow motion.
+    for (metres, others) in [(0.002, vec![]), (0.005, vec!["lever_arm"])] {
+        let scene = Scene {
+            motion: Motion::random(61).slowed(3.0),
+            ..Scene::new(61)
+        };
+        let scene = scene
+            .with(K::GyroUnits, &[1.0_f64.to_degrees()])
+            .with(K::LeverArm, &[metres, metres, -metres]);
+        let mut expected = others;
+        expected.insert(0, "gyro_units");
+        assert_eq!(names(&answer(&scene.record()).diagnosis), expected);
+    }
+}

@@ -232,12 +232,11 @@ impl<const L: usize> Adaptation<L> {
         let count = self.drive.len();
         weighing.weights.resize(count, [[0.0; L]; 2]);
         weighing.noise.resize(count, [0.0; L]);
-        match self.low_passed.iter().any(Option::is_some) {
-            false => widest!(s => self.weigh_white(s, weighing)),
-            true => {
-                weighing.density.resize(count, [0.0; L]);
-                widest!(s => self.weigh_low_passed(s, weighing));
-            }
+        if self.low_passed.iter().any(Option::is_some) {
+            weighing.density.resize(count, [0.0; L]);
+            widest!(s => self.weigh_low_passed(s, weighing));
+        } else {
+            widest!(s => self.weigh_white(s, weighing));
         }
     }
 
