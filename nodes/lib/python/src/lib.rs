@@ -41,3 +41,9 @@ mod _native {
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }
+
+// Fits work in some megabytes that are made anew in each thread. This allocator asks for them as huge pages, which
+// the C library's does only where a variable of the environment says so, and begins them at a cache line: a first
+// call waits for less memory, and all read it faster.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
