@@ -19,6 +19,7 @@ use crate::arrays::{stamps, vectors};
 use crate::error::raise;
 use crate::motion::model;
 use crate::rigid::frames;
+use crate::workers::on_all_cores;
 
 /// One placement's poses and readings, ready to be diagnosed.
 #[pyclass(frozen, module = "cromosim._native")]
@@ -133,7 +134,7 @@ pub fn diagnose(
         ..DiagnoseOptions::default()
     };
     let records: Vec<PlacementRecord> = records.iter().map(|one| one.record.clone()).collect();
-    py.detach(|| {
+    on_all_cores(py, || {
         let mut diagnosis = Diagnosis {
             schema: SCHEMA.to_owned(),
             placements: BTreeMap::new(),

@@ -13,6 +13,7 @@ mod error;
 mod motion;
 mod rigid;
 mod simulate;
+mod workers;
 
 use pyo3::prelude::*;
 

@@ -12,6 +12,7 @@ use pyo3::prelude::*;
 
 use crate::arrays::{rows, vectors};
 use crate::error::raise;
+use crate::workers::on_all_cores;
 
 /// A person's motion.
 #[pyclass(frozen, module = "cromosim._native")]
@@ -42,7 +43,7 @@ pub fn read_motion(
 ) -> PyResult<Motion> {
     let options: MotionOptions = serde_json::from_str(options)
         .map_err(|error| raise(format!("read_motion: {}", in_plain_words(error))))?;
-    py.detach(|| {
+    on_all_cores(py, || {
         let model = model(body.as_deref())?;
         let whole = MotionOptions {
             start_s: 0.0,

@@ -16,6 +16,7 @@ use crate::arrays::{Columns, rotations, set_quality, stamps, vectors};
 use crate::device::device;
 use crate::error::raise;
 use crate::simulate::Options;
+use crate::workers::on_all_cores;
 
 /// The IMU of a rigid body that moves along these poses.
 #[pyfunction]
@@ -35,7 +36,7 @@ pub fn simulate_rigid<'py>(
     let device = device(device_name, device_text)?;
     let frames = frames(&stamps_s, &positions, &orientations)?;
     let options = Options::parse(options)?;
-    let resimulated = py.detach(|| {
+    let resimulated = on_all_cores(py, || {
         let recorded = RecordedPlacement {
             name: name.clone(),
             frames,

@@ -21,6 +21,7 @@ use serde::Deserialize;
 use crate::arrays::{Columns, poses, set_quality};
 use crate::error::raise;
 use crate::motion::Motion;
+use crate::workers::on_all_cores;
 
 /// The options of a simulation as `python/cromosim` writes them.
 #[derive(Deserialize)]
@@ -149,7 +150,7 @@ pub fn simulate<'py>(
     device: Option<(Vec<String>, String)>,
     options: &str,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let simulated = py.detach(|| {
+    let simulated = on_all_cores(py, || {
         let placements = PlacementSet::parse(placements, "placements").map_err(raise)?;
         let options = Options::parse(options)?;
         let model = motion.model.clone();

@@ -1,6 +1,7 @@
 """What the package simulates is what the command line simulates, bit for bit."""
 
 import json
+import multiprocessing
 import subprocess
 import sys
 import threading
@@ -216,3 +217,17 @@ def test_a_magnetometer_and_a_fused_orientation():
         cromosim.simulate(walk_motion, placements, orientation="magdwick")
     with pytest.raises(cromosim.CromosimError, match="1 uT is 1e-6 T"):
         cromosim.simulate(walk_motion, placements, magnetic_field=[20, 0, -43])
+
+
+def simulated_force(seed):
+    walk = cromosim.walk()
+    return cromosim.simulate(walk, PLACEMENTS, device="consumer_mems", seed=seed)["pocket"].specific_force
+
+
+def test_forked_processes_have_threads_of_their_own():
+    """As data loaders make them, after the parent's own threads have worked."""
+    expected = simulated_force(3)
+    with multiprocessing.get_context("fork").Pool(2) as workers:
+        found = workers.map_async(simulated_force, [3, 3, 4]).get(timeout=60)
+    assert [force.tobytes() == expected.tobytes() for force in found] == [True, True, False]
+    assert simulated_force(3).tobytes() == expected.tobytes()
