@@ -4,6 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use cromosim_spatial::meant;
+use serde::{Deserialize, Serialize};
 
 use crate::BodyError;
 
@@ -14,7 +15,7 @@ pub const JOINT_COUNT: usize = 24;
 pub(crate) const SHARED_JOINTS: usize = 22;
 
 /// A joint of SMPL, and the segment whose frame stands there. The discriminant is SMPL's index.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[repr(u8)]
 #[allow(missing_docs)] // the names are the anatomical ones of SMPL
 pub enum Joint {

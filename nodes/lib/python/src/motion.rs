@@ -1,14 +1,18 @@
 //! Motions, on the body that they were read for.
 
 use cromosim_spatial::in_plain_words;
-use std::path::{Path, PathBuf};
+use std::path::{self, Path, PathBuf};
 use std::sync::Arc;
 
-use cromosim_body::{BodyModel, BodyPose, Gender, JOINT_COUNT};
-use cromosim_motion::{MotionOptions, SmplMotion, embedded_walk, read_motion_for};
-use nalgebra::Vector3;
+use cromosim_body::{BodyModel, BodyPose, Gender, JOINT_COUNT, ShapeSpace};
+use cromosim_motion::{
+    MarkerReport, MotionOptions, PoseReport, RetargetReport, SmplMotion, embedded_walk,
+    read_motion_for,
+};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::arrays::{rows, vectors};
 use crate::error::raise;
@@ -19,6 +23,8 @@ use crate::workers::on_all_cores;
 pub struct Motion {
     pub motion: Arc<SmplMotion>,
     pub model: Arc<BodyModel>,
+    /// The file of `model`; none: it is the embedded one.
+    body: Option<PathBuf>,
     /// The part that is simulated, s; the rest is there for its derivatives.
     pub start_s: f64,
     pub duration_s: Option<f64>,
@@ -57,6 +63,7 @@ pub fn read_motion(
         Ok(Motion {
             motion: Arc::new(motion),
             model,
+            body,
             start_s: options.start_s,
             duration_s: options.duration_s,
         })
@@ -69,10 +76,36 @@ pub fn walk(py: Python<'_>) -> Motion {
     py.detach(|| Motion {
         motion: Arc::new(embedded_walk()),
         model: BodyModel::embedded(),
+        body: None,
         start_s: 0.0,
         duration_s: None,
     })
 }
+
+/// What a motion is beside its arrays, for the processes that it is sent to.
+#[derive(Serialize, Deserialize)]
+struct Description {
+    name: String,
+    rate_hz: f64,
+    gender: Gender,
+    shape_space: ShapeSpace,
+    report: Option<RetargetReport>,
+    markers: Option<MarkerReport>,
+    poses: Option<PoseReport>,
+    body: Option<PathBuf>,
+    start_s: f64,
+    duration_s: Option<f64>,
+}
+
+/// A [`Description`] as YAML, which holds numbers to the last bit; betas (B,), root positions (N, 3), quaternions
+/// x, y, z, w of the joints (N, 24, 4) and confidence (N,).
+type State<'py> = (
+    String,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray3<f64>>,
+    Option<Bound<'py, PyArray1<f64>>>,
+);
 
 /// (N, 24, 3) of rotation vectors and (N, 3) of positions as poses.
 pub fn body_poses(
@@ -144,8 +177,78 @@ impl Motion {
         Ok(Self {
             motion: Arc::new(motion),
             model,
+            body,
             start_s: 0.0,
             duration_s: None,
+        })
+    }
+
+    /// All that [`Motion::of_state`] makes the same motion of.
+    fn state<'py>(&self, py: Python<'py>) -> PyResult<State<'py>> {
+        let motion = &*self.motion;
+        let body = self.body.as_ref().map(path::absolute).transpose();
+        let description = Description {
+            name: motion.name.clone(),
+            rate_hz: motion.rate_hz,
+            gender: motion.gender,
+            shape_space: motion.shape_space,
+            report: motion.report.clone(),
+            markers: motion.markers.clone(),
+            poses: motion.poses.clone(),
+            body: body.map_err(raise)?,
+            start_s: self.start_s,
+            duration_s: self.duration_s,
+        };
+        let text = serde_norway::to_string(&description).map_err(raise)?;
+        let joints = motion.frames.iter().flat_map(|pose| &pose.local_rotations);
+        let quaternions = joints.flat_map(|joint| <[f64; 4]>::from(joint.coords));
+        let quaternions = PyArray1::from_vec(py, quaternions.collect());
+        let quaternions = quaternions.reshape([motion.frames.len(), JOINT_COUNT, 4])?;
+        let (betas, positions) = (self.betas(py), self.root_positions(py)?);
+        Ok((text, betas, positions, quaternions, self.confidence(py)))
+    }
+
+    /// The motion that had this [`Motion::state`].
+    #[staticmethod]
+    fn of_state(
+        description: &str,
+        betas: Vec<f64>,
+        root_positions: PyReadonlyArray2<'_, f64>,
+        quaternions: PyReadonlyArray3<'_, f64>,
+        confidence: Option<Vec<f64>>,
+    ) -> PyResult<Self> {
+        let told: Description = serde_norway::from_str(description)
+            .map_err(|error| raise(format!("motion: {}", in_plain_words(error))))?;
+        let positions = vectors(&root_positions, "root_positions")?;
+        let quaternions = quaternions.as_array();
+        if quaternions.shape() != [positions.len(), JOINT_COUNT, 4] {
+            return Err(raise("motion: not as many rotations as positions"));
+        }
+        let pose = |(number, root_position): (usize, Vector3<f64>)| BodyPose {
+            root_position,
+            local_rotations: std::array::from_fn(|joint| {
+                let [x, y, z, w] = std::array::from_fn(|part| quaternions[[number, joint, part]]);
+                UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z))
+            }),
+        };
+        let motion = SmplMotion {
+            name: told.name,
+            rate_hz: told.rate_hz,
+            gender: told.gender,
+            betas,
+            shape_space: told.shape_space,
+            frames: positions.into_iter().enumerate().map(pose).collect(),
+            confidence,
+            report: told.report,
+            markers: told.markers,
+            poses: told.poses,
+        };
+        Ok(Self {
+            motion: Arc::new(motion),
+            model: model(told.body.as_deref())?,
+            body: told.body,
+            start_s: told.start_s,
+            duration_s: told.duration_s,
         })
     }
 

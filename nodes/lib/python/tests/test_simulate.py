@@ -2,6 +2,7 @@
 
 import json
 import multiprocessing
+import pickle
 import subprocess
 import sys
 import threading
@@ -231,3 +232,26 @@ def test_forked_processes_have_threads_of_their_own():
         found = workers.map_async(simulated_force, [3, 3, 4]).get(timeout=60)
     assert [force.tobytes() == expected.tobytes() for force in found] == [True, True, False]
     assert simulated_force(3).tobytes() == expected.tobytes()
+
+
+@pytest.mark.parametrize("kind", ["bvh", "npz", "trc"])
+def test_motions_go_to_other_processes(tmp_path, command_line, kind):
+    """Of skeletons, SMPL parameters and markers: what it is of decides about the noise that is expected."""
+    path = tmp_path / f"walk.{kind}"
+    command_line("convert", ROOT / "bags/walk", path)
+    motion = cromosim.read_motion(path, start_s=1, duration_s=2)
+    sent = pickle.loads(pickle.dumps(motion))
+    same = ("name", "rate_hz", "duration_s", "how_read", "oddities")
+    assert [getattr(sent, name) for name in same] == [getattr(motion, name) for name in same]
+    here, there = (cromosim.simulate(one, PLACEMENTS, seed=1) for one in (motion, sent))
+    for name in PLACEMENTS:
+        assert there[name].stamps_ns.tobytes() == here[name].stamps_ns.tobytes()
+        assert there[name].specific_force.tobytes() == here[name].specific_force.tobytes()
+        covariances = (readings[name].specific_force_covariance.tobytes() for readings in (here, there))
+        assert len(set(covariances)) == 1
+
+
+def test_bodies_go_to_other_processes():
+    body = cromosim.Body([1.0, -0.5])
+    sent = pickle.loads(pickle.dumps(body))
+    assert sent.id == body.id and sent.rest_vertices.tobytes() == body.rest_vertices.tobytes()

@@ -3,9 +3,10 @@
 use std::fmt;
 
 use cromosim_body::Joint;
+use serde::{Deserialize, Serialize};
 
 /// One marker of the set.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MarkerFit {
     /// The set's label.
     pub label: String,
@@ -18,7 +19,7 @@ pub struct MarkerFit {
 }
 
 /// What the fit took, left out and achieved.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MarkerReport {
     /// The marker set.
     pub marker_set: String,

@@ -2,13 +2,15 @@
 
 use std::fmt;
 
+use serde::{Deserialize, Serialize};
+
 /// Frames of all people of a file together: nine hours at 30 Hz.
 pub const MAX_POSES: usize = 1 << 20;
 /// Video estimates do not say their frame rate; Hz.
 pub const VIDEO_RATE_HZ: f64 = 30.0;
 
 /// Who wrote a file of SMPL parameters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum PoseFormat {
     /// AMASS (Mahmood et al. 2019), the releases for SMPL, SMPL-H and SMPL-X, and MoSh++'s stage
     /// II.

@@ -3,11 +3,12 @@
 use std::fmt;
 
 use cromosim_body::{Gender, ShapeSpace};
+use serde::{Deserialize, Serialize};
 
 use super::format::PoseFormat;
 
 /// Who says how many frames a second has.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum RateOrigin {
     /// The file.
     File,
@@ -18,7 +19,7 @@ pub enum RateOrigin {
 }
 
 /// Where the shape of the body comes from.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum ShapeOrigin {
     /// The file's betas.
     File,
@@ -32,7 +33,7 @@ pub enum ShapeOrigin {
 }
 
 /// What was taken of a file of SMPL parameters, and how.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PoseReport {
     /// Who wrote it.
     pub format: PoseFormat,

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from os import PathLike
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,6 +29,11 @@ class Body:
         self, betas: Sequence[float] = (), path: str | PathLike[str] | None = None
     ) -> None:
         self._native = _native.Body([float(beta) for beta in betas], path)
+        self._path = None if path is None else Path(path).absolute()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For other processes; they read a file anew."""
+        return Body, (self.betas.tolist(), self._path)
 
     @property
     def id(self) -> str:

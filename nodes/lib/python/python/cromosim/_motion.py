@@ -61,6 +61,14 @@ class Motion:
         motion._native = native
         return motion
 
+    @classmethod
+    def _of_state(cls, *state: Any) -> Motion:
+        return cls._of(_native.Motion.of_state(*state))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For other processes, with the values to the last bit; they read a file of `body` anew."""
+        return Motion._of_state, self._native.state()
+
     @property
     def name(self) -> str:
         """The file's name, or what was given."""
