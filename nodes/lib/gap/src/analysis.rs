@@ -92,6 +92,7 @@ impl<'a> Analysis<'a> {
             found_noise,
             most_noise: most_noise(prepared, &residual),
             reportable,
+            struck: Vec::new(),
             kept: None,
             library: self.library.clone(),
             unknown: None,

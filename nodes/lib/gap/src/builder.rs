@@ -315,7 +315,8 @@ impl<'a> DiagnosisBuilder<'a> {
             above.push(kind);
             let after = self.pooled(|part| part.under(&part.only(&above)));
             causes.extend(self.last(kind).map(|(part, effect)| {
-                let [parameters, standard_errors] = part.values(effect, &part.findings.scored.fit);
+                let fit = part.findings.fit_of(kind);
+                let [parameters, standard_errors] = part.values(effect, fit);
                 let by_margin = self.probability_by_margin(kind);
                 Cause {
                     effect: kind.name().to_owned(),
@@ -396,7 +397,8 @@ impl<'a> DiagnosisBuilder<'a> {
             .reportable
             .iter()
             .map(|effect| {
-                let [parameters, standard_errors] = part.values(effect, &part.findings.scored.fit);
+                let fit = part.findings.fit_of(effect.kind());
+                let [parameters, standard_errors] = part.values(effect, fit);
                 RecordingCause {
                     effect: effect.kind().name().to_owned(),
                     parameters,

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use cromosim_imu::{Channel, Dependence, EffectKind, EffectSet, Search};
+use cromosim_imu::{Channel, Dependence, EffectKind, EffectSet, Kept, Search};
 
 use crate::findings::Findings;
 use crate::policy::confounded::{
@@ -54,7 +54,7 @@ pub(crate) fn confounded_effects(
 
 /// Whether an effect is one that every sensor has to be calibrated for.
 pub(crate) fn is_calibration(kind: EffectKind) -> bool {
-    matches!(kind.spec().search, Search::Fitted(search) if search.is_calibration)
+    matches!(kind.spec().search, Search::Fitted(search) if search.kept == Kept::AsCalibration)
 }
 
 /// Whether a family over time says more than the same without time.

@@ -19,8 +19,10 @@ pub(crate) struct Findings<'a> {
     pub most_noise: PerChannel<f64>,
     /// All named causes but `unknown`.
     pub reportable: EffectSet,
-    /// A fit of the named causes' values as they are, and of the calibrations that a simulation takes
-    /// over beside them; none where there are none.
+    /// Fitted effects that were taken out, as they might only pass for what is unknown.
+    pub struck: Vec<EffectKind>,
+    /// A fit of the named causes, most with their values as they are, and of what a simulation takes
+    /// over beside them; none where that is nothing.
     pub kept: Option<Fit>,
     pub library: Library,
     /// What none of them explains.
@@ -59,7 +61,7 @@ pub(crate) struct ResidualDependence {
 }
 
 impl Findings<'_> {
-    /// The calibrations that are no causes, but are taken over all the same.
+    /// What is no cause, but taken over all the same.
     pub fn kept_calibrations(&self) -> EffectSet {
         self.kept.as_ref().map_or_else(EffectSet::new, |fit| {
             fit.set
@@ -76,14 +78,20 @@ impl Findings<'_> {
 
     /// The same with the values that a fit to all parts of time but one has.
     pub fn applied_excluding_fold(&self, fold: usize) -> EffectSet {
-        let mut kept = self.kept_calibrations();
-        if let Some(fit) = &self.kept {
-            kept.take_values_of(&fit.excluding_fold(fold));
-        }
         let mut set = self.reportable.clone();
         set.take_values_of(&self.scored.fit.excluding_fold(fold));
-        set.extend(&kept);
+        if let Some(kept) = &self.kept {
+            let is_its = |kind: EffectKind| !self.reportable.contains(kind) || kept.moves(kind);
+            let values = kept.excluding_fold(fold);
+            set.extend(&values.filtered(|effect| is_its(effect.kind())));
+        }
         set
+    }
+
+    /// The fit that the values of a named cause are of.
+    pub fn fit_of(&self, kind: EffectKind) -> &Fit {
+        let kept = self.kept.as_ref().filter(|kept| kept.moves(kind));
+        kept.unwrap_or(&self.scored.fit)
     }
 
     /// Brings the reported effects to the values of the fit.

@@ -377,6 +377,11 @@ impl Fit {
         extended.held_out_without(&columns, &moves)
     }
 
+    /// Whether the values of an effect were fitted, not given.
+    pub fn moves(&self, kind: EffectKind) -> bool {
+        self.layout.iter().any(|(own, _)| *own == kind)
+    }
+
     /// The set as it would be fitted without one part of time.
     pub fn excluding_fold(&self, fold: usize) -> EffectSet {
         stepped(&self.set, &self.layout, &self.linear.fold_steps[fold], 1.0)

@@ -34,6 +34,7 @@ mod metrics;
 pub mod monitor;
 mod noise_model;
 mod noise_updates;
+mod parts_of_time;
 mod period;
 mod plausibility;
 mod policy;

@@ -9,9 +9,8 @@ use nalgebra::{Quaternion, Vector3};
 use crate::axes::axes_of_channel;
 use crate::findings::Findings;
 use crate::policy::response::{
-    FEWEST_BLOCKS, LARGEST_FACTOR, LEAST_PART, LEAST_USABLE, OPEN, SHUT, STANDARD_ERRORS,
+    FEWEST_BLOCKS, LARGEST_FACTOR, LEAST_PART, LEAST_USABLE, MOST_RISE, OPEN, SHUT, STANDARD_ERRORS,
 };
-use crate::policy::search::MOST_RISE;
 use crate::prepared::{FOLDS, PreparedPlacement, bridge};
 use crate::simulations::{Simulations, Turn};
 use crate::trace::trace;

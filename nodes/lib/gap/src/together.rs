@@ -151,6 +151,8 @@ fn without_confounded_effects(findings: &mut [Findings]) -> Option<Vec<EffectSet
             .filter(|kind| is_out(session, *kind))
             .collect();
         one.reportable = without_all(&one.reportable, &out);
+        let members = one.scored.fit.set.iter().map(|effect| effect.kind());
+        one.struck.extend(members.filter(|kind| out.contains(kind)));
         sets.push(without_all(&one.scored.fit.set, &out));
     }
     let mut pairs = findings.iter().zip(&sets);

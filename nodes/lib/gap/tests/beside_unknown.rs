@@ -3,6 +3,7 @@
 
 mod support;
 
+use cromosim_gap::Gap;
 use cromosim_imu::EffectKind as K;
 use support::Scene;
 use support::judge::{answer, names, values_are};
@@ -42,6 +43,43 @@ fn what_is_unknown_takes_nothing_away() {
     assert_eq!(first.effect, "unknown", "{}", diagnosis.verdict);
     assert_eq!(first.after, diagnosis.gap.before);
     assert_eq!(last.after, diagnosis.gap.after);
+}
+
+#[test]
+fn a_gain_that_may_only_pass_for_the_unknown_is_simulated_all_the_same() {
+    let answer = answer(&with_squares(&Scene::new(71), 0.02));
+    let (diagnosis, simulated) = (answer.diagnosis, answer.effects.effects);
+    assert_eq!(names(&diagnosis), ["unknown"], "{}", diagnosis.verdict);
+    assert!(simulated.contains(K::GyroScale), "{simulated:?}");
+    let kept = diagnosis.calibration.iter().map(|kept| &kept.effect[..]);
+    assert_eq!(kept.collect::<Vec<_>>(), ["gyro_scale"]);
+    // The best line through x |x| leaves a third or so of it.
+    let Gap { before, after } = diagnosis.gap;
+    assert!(after.gyro_rmse < 0.5 * before.gyro_rmse, "{after:?}");
+}
+
+#[test]
+fn the_mean_of_a_curve_over_time_is_no_bias() {
+    let bias_simulated = |curve: fn(f64) -> f64| {
+        let mut record = Scene::new(71).record();
+        let count = record.imu.readings.len() as f64;
+        for (k, reading) in record.imu.readings.iter_mut().enumerate() {
+            reading.angular_velocity.z += curve(k as f64 / count);
+        }
+        let answer = answer(&record);
+        let said = names(&answer.diagnosis);
+        assert_eq!(said, ["unknown"], "{}", answer.diagnosis.verdict);
+        let bias = answer.effects.effects.get(K::GyroBias)?;
+        Some(bias.values()[2])
+    };
+    // One that has turned round at the end is worse than none there.
+    let turns = bias_simulated(|time| 0.08 * (0.7 - time * time));
+    assert_eq!(turns, None);
+    let stays = bias_simulated(|time| 0.1 * (time - time * time));
+    assert!(
+        stays.is_some_and(|bias| (bias - 0.017).abs() < 0.002),
+        "{stays:?}"
+    );
 }
 
 #[test]

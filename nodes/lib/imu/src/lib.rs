@@ -83,7 +83,7 @@ pub use device::{Device, EMBEDDED_DEVICES};
 pub use effects::{
     AXIS_ORDERS, ClippingLimit, DeclaredNoise, Dependence, DrawnBiases, Dropouts, Effect,
     EffectKind, EffectSet, EffectSpec, EffectsFile, FirstGuess, FittedSearch, GravityMode,
-    GridTrace, Identifiability, Lateness, MeasurementInput, Ordinary, OtherSession, Owner,
+    GridTrace, Identifiability, Kept, Lateness, MeasurementInput, Ordinary, OtherSession, Owner,
     ParameterFit, ParameterSpec, PlacementEffects, ReadOff, ReadOffSearch, ResidualView, Rounding,
     Search, SensorModel, Shape, SpectralLine, Stage, StagedReadings, StreamingEffects,
     UnexplainedErrors, Wave, clipping_limit, lattice_spacing, length_factors,

@@ -2,7 +2,7 @@
 
 use super::EffectKind;
 use super::search::{
-    Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, Rounding, Search, always,
+    Dependence, FirstGuess, FittedSearch, Identifiability, Kept, Ordinary, Rounding, Search, always,
 };
 use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use crate::Channel;
@@ -34,7 +34,7 @@ pub(super) static ACCEL: EffectSpec = EffectSpec {
         is_plausible: always,
         ordinary: Some(Ordinary::EachValue(5e-3)),
         rounding: Some(Rounding::Offset),
-        is_calibration: true,
+        kept: Kept::AsCalibration,
         special_case_of: &[
             Dependence::Time,
             Dependence::Orientation,
@@ -75,7 +75,7 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
         is_plausible: always,
         ordinary: Some(Ordinary::EachValue(4e-4)),
         rounding: Some(Rounding::Offset),
-        is_calibration: true,
+        kept: Kept::AsCalibration,
         special_case_of: &[
             Dependence::Time,
             Dependence::Orientation,

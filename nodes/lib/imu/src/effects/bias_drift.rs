@@ -1,7 +1,9 @@
 //! `accel_bias_drift`, `gyro_bias_drift`: biases that grow with time.
 
 use super::EffectKind;
-use super::search::{Dependence, FirstGuess, FittedSearch, Ordinary, Rounding, Search, always};
+use super::search::{
+    Dependence, FirstGuess, FittedSearch, Kept, Ordinary, Rounding, Search, always,
+};
 use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use crate::Channel;
 
@@ -32,7 +34,7 @@ pub(super) static ACCEL: EffectSpec = EffectSpec {
         is_plausible: always,
         ordinary: Some(Ordinary::EachValue(2e-4)),
         rounding: Some(Rounding::Ramp),
-        is_calibration: false,
+        kept: Kept::Never,
         special_case_of: &[Dependence::Time],
         identifiability: None,
     }),
@@ -65,7 +67,7 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
         is_plausible: always,
         ordinary: Some(Ordinary::EachValue(1.5e-5)),
         rounding: Some(Rounding::Ramp),
-        is_calibration: false,
+        kept: Kept::Never,
         special_case_of: &[Dependence::Time],
         identifiability: None,
     }),

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use super::EffectKind;
 use super::search::{
-    Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, Search, always,
+    Dependence, FirstGuess, FittedSearch, Identifiability, Kept, Ordinary, Search, always,
 };
 use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use crate::Channel;
@@ -38,7 +38,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         is_plausible: always,
         ordinary: Some(Ordinary::EachValue(ORDINARY_S)),
         rounding: None,
-        is_calibration: false,
+        kept: Kept::BesideUnknown,
         special_case_of: &[Dependence::DelayOverTime],
         identifiability: Some(Identifiability {
             relevant_size: 0.005,

@@ -2,7 +2,7 @@
 //! times.
 
 use super::search::{
-    Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, Search, always,
+    Dependence, FirstGuess, FittedSearch, Identifiability, Kept, Ordinary, Search, always,
 };
 use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use super::{EffectKind, EffectSet};
@@ -35,7 +35,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         is_plausible: always,
         ordinary: Some(Ordinary::EachValue(ORDINARY_PPM)),
         rounding: None,
-        is_calibration: false,
+        kept: Kept::Never,
         special_case_of: &[Dependence::DelayOverTime],
         identifiability: Some(Identifiability {
             relevant_size: 200.0,

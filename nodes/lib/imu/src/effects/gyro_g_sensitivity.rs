@@ -2,7 +2,7 @@
 
 use super::EffectKind;
 use super::search::{
-    Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, Search, always,
+    Dependence, FirstGuess, FittedSearch, Identifiability, Kept, Ordinary, Search, always,
 };
 use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use crate::Channel;
@@ -34,7 +34,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         is_plausible: always,
         ordinary: Some(Ordinary::EachValue(5e-5)),
         rounding: None,
-        is_calibration: false,
+        kept: Kept::Never,
         special_case_of: &[Dependence::Orientation],
         identifiability: Some(Identifiability {
             relevant_size: 0.002,

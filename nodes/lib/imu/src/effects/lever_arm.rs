@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::search::{FirstGuess, FittedSearch, Identifiability, Ordinary, Search, always};
+use super::search::{FirstGuess, FittedSearch, Identifiability, Kept, Ordinary, Search, always};
 use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use super::{EffectKind, EffectSet};
 use crate::Channel;
@@ -34,7 +34,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         is_plausible: always,
         ordinary: Some(Ordinary::EachValue(1e-3)),
         rounding: None,
-        is_calibration: true,
+        kept: Kept::AsCalibration,
         special_case_of: &[],
         identifiability: Some(Identifiability {
             relevant_size: 0.02,

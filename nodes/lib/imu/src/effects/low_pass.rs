@@ -1,7 +1,7 @@
 //! `low_pass`: the device's own second-order Butterworth filter, on both channels.
 
 use super::residual_view::ResidualView;
-use super::search::{Dependence, FirstGuess, FittedSearch, Search};
+use super::search::{Dependence, FirstGuess, FittedSearch, Kept, Search};
 use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use super::{Effect, EffectKind, EffectSet};
 use crate::{Channel, EffectError};
@@ -27,7 +27,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         is_plausible,
         ordinary: None,
         rounding: None,
-        is_calibration: false,
+        kept: Kept::Never,
         special_case_of: &[Dependence::DelayOverTime],
         identifiability: None,
     }),

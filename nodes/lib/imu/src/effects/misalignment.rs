@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::EffectKind;
 use super::search::{
-    Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, Search, always,
+    Dependence, FirstGuess, FittedSearch, Identifiability, Kept, Ordinary, Search, always,
 };
 use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use crate::Channel;
@@ -36,7 +36,7 @@ pub(super) static ACCEL: EffectSpec = EffectSpec {
         is_plausible: always,
         ordinary: Some(Ordinary::EachValue(3e-3)),
         rounding: None,
-        is_calibration: false,
+        kept: Kept::BesideUnknown,
         special_case_of: &[Dependence::MountOverTime, Dependence::OtherAxes],
         identifiability: Some(Identifiability {
             relevant_size: 0.03,
@@ -73,7 +73,7 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
         is_plausible: always,
         ordinary: Some(Ordinary::EachValue(3e-3)),
         rounding: None,
-        is_calibration: false,
+        kept: Kept::BesideUnknown,
         special_case_of: &[Dependence::MountOverTime, Dependence::OtherAxes],
         identifiability: Some(Identifiability {
             relevant_size: 0.03,

@@ -106,7 +106,7 @@ pub use reference_units::length_factors;
 pub use residual_view::ResidualView;
 pub use saturation::{ClippingLimit, clipping_limit};
 pub use search::{
-    Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, ReadOff, ReadOffSearch,
+    Dependence, FirstGuess, FittedSearch, Identifiability, Kept, Ordinary, ReadOff, ReadOffSearch,
     Rounding, Search,
 };
 pub use spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};

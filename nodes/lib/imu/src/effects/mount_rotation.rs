@@ -6,7 +6,7 @@ use cromosim_spatial::so3;
 use nalgebra::{Matrix3, Vector3};
 
 use super::search::{
-    Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, Search, always,
+    Dependence, FirstGuess, FittedSearch, Identifiability, Kept, Ordinary, Search, always,
 };
 use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use super::{Effect, EffectKind};
@@ -39,7 +39,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         is_plausible: always,
         ordinary: Some(Ordinary::EachValue(3e-3)),
         rounding: None,
-        is_calibration: true,
+        kept: Kept::AsCalibration,
         special_case_of: &[Dependence::MountOverTime],
         identifiability: Some(Identifiability {
             relevant_size: 0.035,

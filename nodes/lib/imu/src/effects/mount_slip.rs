@@ -6,7 +6,7 @@ use cromosim_spatial::Stamp;
 
 use super::EffectKind;
 use super::search::{
-    Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, Search, always,
+    Dependence, FirstGuess, FittedSearch, Identifiability, Kept, Ordinary, Search, always,
 };
 use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use crate::Channel;
@@ -50,7 +50,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         is_plausible: always,
         ordinary: Some(Ordinary::Change(5e-3)),
         rounding: None,
-        is_calibration: false,
+        kept: Kept::Never,
         special_case_of: &[Dependence::MountOverTime],
         identifiability: Some(Identifiability {
             relevant_size: 0.05,

@@ -1,6 +1,6 @@
 //! `reference_scale`: positions of the reference that are a little too large or too small.
 
-use super::search::{FirstGuess, FittedSearch, Identifiability, Ordinary, Search};
+use super::search::{FirstGuess, FittedSearch, Identifiability, Kept, Ordinary, Search};
 use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use super::{Effect, EffectKind, EffectSet};
 use crate::Channel;
@@ -37,7 +37,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         is_plausible,
         ordinary: Some(Ordinary::EachValue(ORDINARY)),
         rounding: None,
-        is_calibration: false,
+        kept: Kept::Never,
         special_case_of: &[],
         identifiability: Some(Identifiability {
             relevant_size: 0.03,

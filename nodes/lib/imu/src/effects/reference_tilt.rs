@@ -6,7 +6,7 @@ use cromosim_spatial::so3;
 use nalgebra::Vector3;
 
 use super::EffectKind;
-use super::search::{FirstGuess, FittedSearch, Identifiability, Ordinary, Search, always};
+use super::search::{FirstGuess, FittedSearch, Identifiability, Kept, Ordinary, Search, always};
 use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use crate::{Channel, GRAVITY_IN_WORLD};
 
@@ -37,7 +37,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         is_plausible: always,
         ordinary: Some(Ordinary::EachValue(2e-3)),
         rounding: None,
-        is_calibration: false,
+        kept: Kept::Never,
         special_case_of: &[],
         identifiability: Some(Identifiability {
             relevant_size: 0.035,

@@ -1,6 +1,8 @@
 //! `accel_scale`, `gyro_scale`: gain of each axis.
 
-use super::search::{Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, Search};
+use super::search::{
+    Dependence, FirstGuess, FittedSearch, Identifiability, Kept, Ordinary, Search,
+};
 use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use super::{Effect, EffectKind, EffectSet};
 use crate::Channel;
@@ -35,7 +37,7 @@ pub(super) static ACCEL: EffectSpec = EffectSpec {
         is_plausible,
         ordinary: Some(Ordinary::EachValue(2e-3)),
         rounding: None,
-        is_calibration: false,
+        kept: Kept::BesideUnknown,
         special_case_of: &[Dependence::GainOverTime, Dependence::OwnReading],
         identifiability: Some(Identifiability {
             relevant_size: 0.03,
@@ -72,7 +74,7 @@ pub(super) static GYRO: EffectSpec = EffectSpec {
         is_plausible,
         ordinary: Some(Ordinary::EachValue(2e-3)),
         rounding: None,
-        is_calibration: false,
+        kept: Kept::BesideUnknown,
         special_case_of: &[Dependence::GainOverTime, Dependence::OwnReading],
         identifiability: Some(Identifiability {
             relevant_size: 0.03,

@@ -35,8 +35,8 @@ pub struct FittedSearch {
     pub ordinary: Option<Ordinary>,
     /// How coarse rounding shows as this effect; none where it does not.
     pub rounding: Option<Rounding>,
-    /// Whether every sensor has to be calibrated for it.
-    pub is_calibration: bool,
+    /// Where a simulation takes it over although it is no cause.
+    pub kept: Kept,
     /// What a residual may depend on (in the effect's channels) of which this effect is a special
     /// case: it says no more than such a dependence.
     pub special_case_of: &'static [Dependence],
@@ -54,6 +54,18 @@ pub enum FirstGuess {
     /// At the time at which changing the three values of another effect helps most; its values are
     /// that time and the change.
     ChangeOf(EffectKind),
+}
+
+/// Where a simulation takes an effect over that is no cause, if it lowers the gap on time that it was not fitted to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kept {
+    /// Everywhere: each sensor has to be calibrated for it.
+    AsCalibration,
+    /// Beside something unknown that it might pass for: it is the same at all times and for every motion, so that it does
+    /// in another recording what it does in this one, whatever is behind it.
+    BesideUnknown,
+    /// Nowhere.
+    Never,
 }
 
 /// What every recording has of an effect.

@@ -1,7 +1,7 @@
 //! `soft_tissue`: the sensor rides on a mass, spring and damper.
 
 use super::residual_view::ResidualView;
-use super::search::{FirstGuess, FittedSearch, Search};
+use super::search::{FirstGuess, FittedSearch, Kept, Search};
 use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use super::{Effect, EffectKind, EffectSet};
 use crate::Channel;
@@ -48,7 +48,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         is_plausible,
         ordinary: None,
         rounding: None,
-        is_calibration: false,
+        kept: Kept::Never,
         special_case_of: &[],
         identifiability: None,
     }),

@@ -1,7 +1,7 @@
 //! `time_offset`: the IMU's stamps are late by a constant.
 
 use super::search::{
-    Dependence, FirstGuess, FittedSearch, Identifiability, Ordinary, Search, always,
+    Dependence, FirstGuess, FittedSearch, Identifiability, Kept, Ordinary, Search, always,
 };
 use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use super::{Effect, EffectKind, EffectSet};
@@ -34,7 +34,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         is_plausible: always,
         ordinary: Some(Ordinary::EachValue(2e-3)),
         rounding: None,
-        is_calibration: true,
+        kept: Kept::AsCalibration,
         special_case_of: &[Dependence::DelayOverTime],
         identifiability: Some(Identifiability {
             relevant_size: 0.01,

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use super::clock_drift::Clock;
 use super::residual_view::ResidualView;
-use super::search::{FirstGuess, FittedSearch, Search, always};
+use super::search::{FirstGuess, FittedSearch, Kept, Search, always};
 use super::spec::{EffectSpec, Owner, ParameterFit, ParameterSpec, Shape, Stage};
 use super::spectral_line::strongest_line;
 use super::wave::SpectralLine;
@@ -45,7 +45,7 @@ pub(super) static SPEC: EffectSpec = EffectSpec {
         is_plausible: always,
         ordinary: None,
         rounding: None,
-        is_calibration: false,
+        kept: Kept::Never,
         special_case_of: &[],
         identifiability: None,
     }),
