@@ -33,8 +33,8 @@ pub struct PlacementDiagnosis {
     pub location: GapLocation,
     /// By share of the gap, the largest first.
     pub causes: Vec<Cause>,
-    /// Calibrations that are no causes, but lower the gap on held-out time: effects.yaml holds them
-    /// beside the causes, and `gap.after` counts on them.
+    /// Calibrations that are no causes, but lower the gap on held-out time, and gains, misalignments and a delay that
+    /// may only pass for something unknown: effects.yaml holds them beside the causes, and `gap.after` counts on them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub calibration: Vec<KeptCalibration>,
     /// What the readings hold of the motion that the reference shows, by frequency; no cause, but in effects.yaml and
@@ -259,7 +259,7 @@ pub struct Cause {
     pub after: Metrics,
 }
 
-/// A calibration that is taken over without being a cause.
+/// An effect that is taken over without being a cause.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KeptCalibration {
     /// The effect's name.
