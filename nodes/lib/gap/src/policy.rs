@@ -369,9 +369,9 @@ pub(crate) mod confounded {
 pub(crate) mod calibration {
     /// Most by which it may raise the norm of a channel's residual. No source.
     pub const MOST_RISE: f64 = 1.002;
-    /// Share of a recording that its end and its calm are.
+    /// Share of a recording that its end and its calm are. No source.
     pub const PART: f64 = 0.25;
-    /// Length of the blocks of time that are calm or not, s.
+    /// Length of the blocks of time that are calm or not, s. No source.
     pub const BLOCK_S: f64 = 2.0;
     /// Most by which a bias beside something unknown may raise the norm in each of these parts. Of recordings of
     /// effects outside the library (seeds 74 and 75 of tests/withheld) one that did left the next recording with 5.4
