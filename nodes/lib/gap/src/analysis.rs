@@ -9,6 +9,7 @@ use crate::findings::Findings;
 use crate::fit::FitModel;
 use crate::library::Library;
 use crate::noise_updates::{first_model, with_rest_as_noise, with_updated_noise};
+use crate::policy::confounded::HARDLY_EXPLAINED;
 use crate::policy::report::MOSTLY_EXPLAINED;
 use crate::policy::search::{MOST, MOST_AT_FIRST, ROUNDS};
 use crate::progress::{self, Progress, THINNED};
@@ -84,7 +85,8 @@ impl<'a> Analysis<'a> {
             self.library,
         );
         let nominal = excess(&model, &score(&model, EffectSet::new()).fit);
-        let is_mostly_explained = excess(&model, &scored.fit) < MOSTLY_EXPLAINED * nominal;
+        let left = excess(&model, &scored.fit) / nominal;
+        trace(|| eprintln!("left {left:.3} of what is to be gained"));
         Findings {
             model,
             scored,
@@ -96,7 +98,8 @@ impl<'a> Analysis<'a> {
             kept: None,
             library: self.library.clone(),
             unknown: None,
-            is_mostly_explained,
+            is_mostly_explained: left < MOSTLY_EXPLAINED,
+            is_hardly_explained: left > HARDLY_EXPLAINED,
         }
     }
 

@@ -9,8 +9,8 @@ use crate::findings::Findings;
 use crate::fit::{Fit, FitModel};
 use crate::gauss_newton::fit_together;
 use crate::noise_updates::with_rest_as_noise;
-use crate::parts_of_time::{PartsOfTime, rises_in_part};
-use crate::policy::calibration::MOST_RISE;
+use crate::parts_of_time::{Part, PartsOfTime, Rises};
+use crate::policy::calibration::{MANY_POSTURES, MOST_RISE};
 use crate::policy::search::FIT_STEPS;
 use crate::search::{price_of_effect, rises};
 use crate::trace::{names, trace};
@@ -100,12 +100,17 @@ impl Recordings<'_, '_> {
         }
     }
 
-    /// Whether a channel's residual rises with a member. What is unknown may have a mean, which passes for a bias where
-    /// the error grows over time or with the motion: a bias is there at the end and in the calm too.
+    /// Whether a channel's residual rises with a member. What is unknown may pass for a calibration on the whole: such
+    /// a one is there at the end and in most postures, a bias in the calm too.
     fn does_harm(&self, kind: EffectKind, without: &[Fit], with: &[Fit]) -> bool {
-        let parts = self.parts.as_ref().filter(|_| is_offset(kind));
+        let parts = self.parts.as_ref().filter(|_| is_calibration(kind));
         rises(self.models, without, with, MOST_RISE)
-            || parts.is_some_and(|parts| rises_in_part(self.models, parts, without, with))
+            || parts.is_some_and(|parts| {
+                let rises = Rises::between(self.models, parts, without, with);
+                rises.share(Part::End) > 0.0
+                    || rises.share(Part::Posture) >= MANY_POSTURES
+                    || (is_offset(kind) && rises.share(Part::Calm) > 0.0)
+            })
     }
 }
 
@@ -148,7 +153,7 @@ fn drifts_ordinarily(findings: &Findings) -> bool {
 }
 
 /// Something unknown counts as noise: else it pulls at the values, and its size passes for evidence.
-fn model_of<'a>(findings: &Findings<'a>) -> FitModel<'a> {
+pub(crate) fn model_of<'a>(findings: &Findings<'a>) -> FitModel<'a> {
     match &findings.unknown {
         Some(_) => with_rest_as_noise(&findings.model, &findings.scored),
         None => findings.model.clone(),

@@ -28,7 +28,8 @@ pub(crate) type Standings = BTreeMap<EffectKind, Standing>;
 
 /// The suspects among the fitted effects that are confounded with what the strongest regressions
 /// describe, and the special cases of these. `strong` are those of `all` that tell, the strongest
-/// first. What is known of members is not judged anew, and what is judged becomes known.
+/// first. What is known of members is not judged anew, and what is judged becomes known. Where little is explained, what
+/// explains it is rather the little of the unknown that the library can follow.
 pub(crate) fn confounded_effects(
     findings: &Findings,
     strong: &[&ResidualRegression],
@@ -38,6 +39,10 @@ pub(crate) fn confounded_effects(
 ) -> Vec<EffectKind> {
     let members = findings.scored.fit.set.iter().map(|effect| effect.kind());
     let suspects: Vec<EffectKind> = members.filter(|kind| is_suspect(*kind)).collect();
+    if findings.is_hardly_explained {
+        let is_named = |kind: &EffectKind| findings.reportable.contains(*kind);
+        return suspects.into_iter().filter(is_named).collect();
+    }
     judge_members(findings, strong, &suspects, known);
     let is = |kind: &EffectKind, standing| known.get(kind) == Some(&standing);
     let mut confounded = suspects;

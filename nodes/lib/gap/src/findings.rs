@@ -30,6 +30,8 @@ pub(crate) struct Findings<'a> {
     /// Whether little is unknown against what the found effects explain: then calibrations among
     /// these are not confounded with it.
     pub is_mostly_explained: bool,
+    /// Whether the found effects explain little of the gap: then these may be a part of what is unknown.
+    pub is_hardly_explained: bool,
 }
 
 /// Structure that no named effect explains.

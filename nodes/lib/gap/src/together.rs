@@ -3,9 +3,9 @@
 use cromosim_imu::{Effect, EffectKind, EffectSet, Owner};
 
 use crate::analysis::{Analysis, refit_beside_unknown};
-use crate::calibration::keep_calibrations;
+use crate::calibration::{keep_calibrations, model_of};
 use crate::findings::Findings;
-use crate::fit::FitModel;
+use crate::fit::{Fit, FitModel};
 use crate::gauss_newton::fit_together;
 use crate::joint_search::{owned_by, search_together};
 use crate::library::{Library, without_all};
@@ -177,22 +177,59 @@ fn refit(findings: &mut [Findings], sets: Vec<EffectSet>) {
 /// its session's values are fitted to it.
 pub(crate) fn reported_by_the_others(findings: &[Findings], index: usize) -> EffectSet {
     let own = &findings[index];
-    let others = || findings.iter().enumerate().filter(|(k, _)| *k != index);
-    let models: Vec<&FitModel> = others().map(|(_, one)| &one.model).collect();
-    let sets = others()
-        .map(|(_, one)| one.scored.fit.set.clone())
+    let others: Vec<&Findings> = [&findings[..index], &findings[index + 1..]]
+        .into_iter()
+        .flatten()
         .collect();
-    let of_others = fit_together(&models, sets, FIT_STEPS, |_| true);
-    let mut set = own.scored.fit.set.clone();
-    for other in &of_others {
-        set.extend(&owned_by(Owner::Device, &other.set));
-    }
-    let is_of_session = |kind: EffectKind| kind.spec().owner == Owner::Session;
+    let models: Vec<&FitModel> = others.iter().map(|one| &one.model).collect();
+    let sets = others.iter().map(|one| one.scored.fit.set.clone());
+    let of_others = fit_together(&models, sets.collect(), FIT_STEPS, |_| true);
+    let set = with_device_of(&of_others, own.scored.fit.set.clone());
     let fits = fit_together(&[&own.model], vec![set], FIT_STEPS, is_of_session);
     let mut reported = own.reportable.clone();
-    reported.extend(&owned_by(Owner::Session, &own.kept_calibrations()));
     for fit in &fits {
         reported.take_values_of(&fit.set);
     }
+    if let Some(kept) = kept_by_the_others(own, &others, &of_others, &reported) {
+        reported.extend(&kept);
+    }
     reported
+}
+
+/// What a simulation of one recording takes over beside what is reported of it, in the same way.
+fn kept_by_the_others(
+    own: &Findings,
+    others: &[&Findings],
+    of_others: &[Fit],
+    reported: &EffectSet,
+) -> Option<EffectSet> {
+    let kept = own.kept.as_ref()?;
+    let is_free = |kind: EffectKind| kept.moves(kind);
+    let models: Vec<FitModel> = others.iter().map(|one| model_of(one)).collect();
+    let models: Vec<&FitModel> = models.iter().collect();
+    let set_of_other = |(one, fit): (&&Findings, &Fit)| {
+        let mut set = one.kept.as_ref()?.set.clone();
+        set.take_values_of(&fit.set);
+        Some(set)
+    };
+    let sets: Option<Vec<EffectSet>> = others.iter().zip(of_others).map(set_of_other).collect();
+    let kept_of_others = fit_together(&models, sets?, FIT_STEPS, is_free);
+    let mut set = kept.set.clone();
+    set.take_values_of(reported);
+    let set = with_device_of(&kept_of_others, set);
+    let is_free = |kind: EffectKind| is_free(kind) && is_of_session(kind);
+    let fits = fit_together(&[&model_of(own)], vec![set], FIT_STEPS, is_free);
+    fits.into_iter().next().map(|fit| fit.set)
+}
+
+/// A set with the device's effects of fits to other recordings.
+fn with_device_of(fits: &[Fit], mut set: EffectSet) -> EffectSet {
+    for fit in fits {
+        set.extend(&owned_by(Owner::Device, &fit.set));
+    }
+    set
+}
+
+fn is_of_session(kind: EffectKind) -> bool {
+    kind.spec().owner == Owner::Session
 }

@@ -3,18 +3,33 @@
 
 mod support;
 
-use cromosim_gap::Gap;
-use cromosim_imu::EffectKind as K;
+use cromosim_gap::{DiagnoseOptions, Gap, PlacementRecord, diagnose_together};
+use cromosim_imu::{EffectKind as K, Reading};
+use nalgebra::{Rotation3, Vector3};
 use support::Scene;
 use support::judge::{answer, names, values_are};
 
 /// A gyroscope whose error grows with the square of its own rate (rad/s per (rad/s)^2), on top of
 /// what the library has.
-fn with_squares(scene: &Scene, factor: f64) -> cromosim_gap::PlacementRecord {
+fn with_squares(scene: &Scene, factor: f64) -> PlacementRecord {
     let mut record = scene.record();
     for reading in &mut record.imu.readings {
         let rate = reading.angular_velocity;
         reading.angular_velocity += factor * rate.map(|axis| axis * axis.abs());
+    }
+    record
+}
+
+/// A mount that is turned by a twentieth of a radian while readings, and the seconds since the first, say so.
+fn with_loose_mount(scene: &Scene, is_turned: impl Fn(&Reading, f64) -> bool) -> PlacementRecord {
+    let mut record = scene.record();
+    let turn = Rotation3::new(Vector3::new(0.02, 0.04, -0.02));
+    let start = record.imu.stamps[0];
+    for (reading, stamp) in record.imu.readings.iter_mut().zip(&record.imu.stamps) {
+        if is_turned(reading, *stamp - start) {
+            reading.specific_force = turn.inverse() * reading.specific_force;
+            reading.angular_velocity = turn.inverse() * reading.angular_velocity;
+        }
     }
     record
 }
@@ -59,6 +74,26 @@ fn a_gain_that_may_only_pass_for_the_unknown_is_simulated_all_the_same() {
 }
 
 #[test]
+fn such_a_gain_is_shown_by_the_other_recordings_too() {
+    let scene = |seed| Scene {
+        seconds: 30.0,
+        ..Scene::new(seed)
+    };
+    let mut second = scene(71);
+    second.start = second.start.plus_seconds(5000.0);
+    second.epoch = second.start;
+    let [first, second] = [scene(72), second].map(|scene| with_squares(&scene, 0.02));
+    let recordings = [("first", &first), ("second", &second)];
+    let (answer, _) = diagnose_together(&recordings, &DiagnoseOptions::default()).unwrap();
+    assert_eq!(names(&answer.diagnosis), ["unknown"]);
+    assert!(answer.effects.effects.contains(K::GyroScale));
+    for one in &answer.diagnosis.recordings {
+        let (before, left_out) = (one.gap.before.gyro_rmse, one.left_out.gyro_rmse);
+        assert!(left_out < 0.5 * before, "{before} to {left_out}");
+    }
+}
+
+#[test]
 fn the_mean_of_a_curve_over_time_is_no_bias() {
     let bias_simulated = |curve: fn(f64) -> f64| {
         let mut record = Scene::new(71).record();
@@ -80,6 +115,36 @@ fn the_mean_of_a_curve_over_time_is_no_bias() {
         stays.is_some_and(|bias| (bias - 0.017).abs() < 0.002),
         "{stays:?}"
     );
+}
+
+/// Half of the time a mount is turned: it is neither turned by the half of it, nor was it turned once.
+#[test]
+fn the_little_of_the_unknown_that_effects_follow_is_no_cause_of_its_own() {
+    let knocks = |_: &Reading, t: f64| (0.37 * t + 2.0 * (0.11 * t).sin()).sin() > 0.3;
+    for seed in [70, 73, 74] {
+        let diagnosis = answer(&with_loose_mount(&Scene::new(seed), knocks)).diagnosis;
+        assert_eq!(names(&diagnosis), ["unknown"], "{}", diagnosis.verdict);
+        let kept = diagnosis.calibration.iter().map(|kept| &kept.effect[..]);
+        assert_eq!(kept.collect::<Vec<_>>(), ["mount_rotation"], "seed {seed}");
+        let Gap { before, after } = diagnosis.gap;
+        assert!(after.accel_rmse < 0.9 * before.accel_rmse, "{after:?}");
+    }
+}
+
+#[test]
+fn a_mount_that_is_turned_in_one_posture_is_not_simulated_in_all() {
+    let mount_simulated = |slower: f64, force: f64| {
+        let mut scene = Scene::new(73);
+        scene.motion = scene.motion.slowed(slower);
+        let is_turned = |reading: &Reading, _: f64| reading.specific_force.x > force;
+        let answer = answer(&with_loose_mount(&scene, is_turned));
+        let said = names(&answer.diagnosis);
+        assert_eq!(said, ["unknown"], "{}", answer.diagnosis.verdict);
+        answer.effects.effects.contains(K::MountRotation)
+    };
+    assert!(!mount_simulated(4.0, 4.0), "a tenth of the time");
+    let is_simulated = mount_simulated(1.0, 2.0);
+    assert!(is_simulated, "a third of it, in most postures");
 }
 
 #[test]
