@@ -327,19 +327,20 @@ mod linux {
 
         #[test]
         fn within_a_circle_of_hosts_no_multicast_leaves_and_some_ports_are_refused() {
-            let free = UdpSocket::bind("127.0.0.1:0").unwrap();
-            let port = free.local_addr().unwrap().port();
-            drop(free);
+            // The port of a socket that lives is given to no other test's at all addresses; those at one have another.
+            let held = UdpSocket::bind("127.0.0.2:0").unwrap();
+            let here = ("127.0.0.3", held.local_addr().unwrap().port());
+            let port = here.1;
             let circle = Sockets::within(Circle::Hosts {
                 admitted: vec![[10, 9, 8, 2].into()],
                 refused_ports: [port, port],
             });
-            let refused = UdpSocket::bind(("127.0.0.1", port)).unwrap_err();
+            let refused = UdpSocket::bind(here).unwrap_err();
             assert_eq!(refused.kind(), io::ErrorKind::AddrNotAvailable);
             let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
             assert_eq!(socket.multicast_ttl_v4().unwrap(), 0);
             drop(circle);
-            let socket = UdpSocket::bind(("127.0.0.1", port)).unwrap();
+            let socket = UdpSocket::bind(here).unwrap();
             assert_eq!(socket.multicast_ttl_v4().unwrap(), 1);
         }
     }
