@@ -100,8 +100,8 @@ impl Recordings<'_, '_> {
         }
     }
 
-    /// Whether a channel's residual rises with a member. What is unknown may pass for a calibration on the whole: such
-    /// a one is there at the end and in most postures, a bias in the calm too.
+    /// Whether a channel's residual rises with a member. What is unknown may pass for a calibration on the
+    /// whole: a true one does no harm at the end and in most postures, a bias in the calm neither.
     fn does_harm(&self, kind: EffectKind, without: &[Fit], with: &[Fit]) -> bool {
         let parts = self.parts.as_ref().filter(|_| is_calibration(kind));
         rises(self.models, without, with, MOST_RISE)

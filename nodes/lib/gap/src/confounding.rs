@@ -28,8 +28,8 @@ pub(crate) type Standings = BTreeMap<EffectKind, Standing>;
 
 /// The suspects among the fitted effects that are confounded with what the strongest regressions
 /// describe, and the special cases of these. `strong` are those of `all` that tell, the strongest
-/// first. What is known of members is not judged anew, and what is judged becomes known. Where little is explained, what
-/// explains it is rather the little of the unknown that the library can follow.
+/// first. What is known of members is not judged anew, and what is judged becomes known. Where little is explained, all
+/// that are named: what explains it is rather the part of the unknown that the library can follow.
 pub(crate) fn confounded_effects(
     findings: &Findings,
     strong: &[&ResidualRegression],

@@ -20,7 +20,7 @@ fn with_squares(scene: &Scene, factor: f64) -> PlacementRecord {
     record
 }
 
-/// A mount that is turned by a twentieth of a radian while readings, and the seconds since the first, say so.
+/// A mount that is turned by a twentieth of a radian where a reading, and its seconds since the first, say so.
 fn with_loose_mount(scene: &Scene, is_turned: impl Fn(&Reading, f64) -> bool) -> PlacementRecord {
     let mut record = scene.record();
     let turn = Rotation3::new(Vector3::new(0.02, 0.04, -0.02));
@@ -117,7 +117,7 @@ fn the_mean_of_a_curve_over_time_is_no_bias() {
     );
 }
 
-/// Half of the time a mount is turned: it is neither turned by the half of it, nor was it turned once.
+/// A mount that knocks to and fro is neither turned by its mean angle, nor was it turned once.
 #[test]
 fn the_little_of_the_unknown_that_effects_follow_is_no_cause_of_its_own() {
     let knocks = |_: &Reading, t: f64| (0.37 * t + 2.0 * (0.11 * t).sin()).sin() > 0.3;

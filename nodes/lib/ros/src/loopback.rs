@@ -327,10 +327,11 @@ mod linux {
 
         #[test]
         fn within_a_circle_of_hosts_no_multicast_leaves_and_some_ports_are_refused() {
-            // The port of a socket that lives is given to no other test's at all addresses; those at one have another.
+            // While it is held, no socket that listens on every address is given this port; on 127.0.0.3 no other
+            // test listens.
             let held = UdpSocket::bind("127.0.0.2:0").unwrap();
-            let here = ("127.0.0.3", held.local_addr().unwrap().port());
-            let port = here.1;
+            let port = held.local_addr().unwrap().port();
+            let here = ("127.0.0.3", port);
             let circle = Sockets::within(Circle::Hosts {
                 admitted: vec![[10, 9, 8, 2].into()],
                 refused_ports: [port, port],
