@@ -1,6 +1,6 @@
 //! The analysis of one recording of a placement, from its start to what was found.
 
-use cromosim_imu::{Effect, EffectKind, EffectSet, ReadOff};
+use cromosim_imu::{Effect, EffectKind, EffectSet, ReadOff, Search};
 
 use crate::axes_choice::with_chosen_axes;
 use crate::beside_response::pruned_beside_response;
@@ -93,13 +93,13 @@ impl<'a> Analysis<'a> {
             digital: *digital,
             found_noise,
             most_noise: most_noise(prepared, &residual),
-            reportable,
             struck: Vec::new(),
             kept: None,
             library: self.library.clone(),
             unknown: None,
             is_mostly_explained: left < MOSTLY_EXPLAINED,
-            is_hardly_explained: left > HARDLY_EXPLAINED,
+            is_hardly_explained: left > HARDLY_EXPLAINED && !is_read_off_undone(&reportable),
+            reportable,
         }
     }
 
@@ -226,6 +226,24 @@ pub(crate) fn refit_beside_unknown(findings: &mut Findings) {
         ..score_as_it_is(&findings.model, found.fit.set)
     };
     findings.scored.fit.linear.covariance = covariance;
+}
+
+/// Whether the nominal simulation that fits are compared with has more of the gap explained than a set without
+/// effects: units, frames, a smoothing and steps that are read off are taken into account before anything is fitted.
+fn is_read_off_undone(reportable: &EffectSet) -> bool {
+    reportable.iter().any(|effect| {
+        let Search::ReadOff(search) = effect.kind().spec().search else {
+            return false;
+        };
+        matches!(
+            search.from,
+            ReadOff::Lattice(_)
+                | ReadOff::UnitFactor(_)
+                | ReadOff::ReferenceLength
+                | ReadOff::ReferenceSpectrum
+                | ReadOff::ReferenceFrames
+        )
+    })
 }
 
 /// Brings the reported effects from one fitted set to the next.

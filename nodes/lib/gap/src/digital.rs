@@ -34,6 +34,11 @@ impl Digital {
         self.lsb.map_or(0.0, |lsb| lsb / units)
     }
 
+    /// Whether the readings lie on a lattice, named or not.
+    pub fn has_lattice(&self) -> bool {
+        self.lsb.is_some() || self.rounding_is_excluded
+    }
+
     /// Of a channel's measured readings. What the library excludes stays in the readings, to be
     /// found as something unknown.
     pub fn read_off(measured: &[Reading], channel: Channel, library: &Library) -> Self {
@@ -115,16 +120,16 @@ fn goes_beyond(compared: impl Iterator<Item = (f64, f64)>, limit: f64, lsb: f64)
         && farther > STANDARD_ERRORS * (at.squared_error() + below.squared_error()).sqrt()
 }
 
-/// Of numbers in steps of the lattice.
+/// Of numbers.
 #[derive(Default)]
-struct Moments {
+pub(crate) struct Moments {
     count: f64,
     sum: f64,
     squares: f64,
 }
 
 impl Moments {
-    fn add(&mut self, value: f64) {
+    pub fn add(&mut self, value: f64) {
         self.count += 1.0;
         self.sum += value;
         self.squares += value * value;
@@ -134,9 +139,13 @@ impl Moments {
         self.sum / self.count
     }
 
+    pub fn variance(&self) -> f64 {
+        self.squares / self.count - self.mean().powi(2)
+    }
+
     /// Of the mean, as of independent numbers.
     fn squared_error(&self) -> f64 {
-        (self.squares / self.count - self.mean().powi(2)) / (self.count - 1.0)
+        self.variance() / (self.count - 1.0)
     }
 }
 

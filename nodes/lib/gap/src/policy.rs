@@ -119,6 +119,9 @@ pub(crate) mod clipping {
     pub const LEAST_STEPS: f64 = 1.0;
     /// And standard errors, as of independent readings; no source.
     pub const STANDARD_ERRORS: f64 = 5.0;
+    /// Part of the movement of its channel's liveliest axis (standard deviation) from which on an axis that never changes is stuck; no
+    /// source.
+    pub const STILL_PART: f64 = 0.1;
 }
 
 /// When a smoothing of the reference is looked for, and when it is believed.

@@ -8,7 +8,7 @@ use cromosim_spatial::{
     FrameGrid, KinematicTrack, PoseEstimate, PoseNoise, Spectrum, Stamp, welch,
 };
 
-use crate::axes::{axes_of_channel, value_on_axis};
+use crate::axes::{axes_of_channel, channel_of_axis, value_on_axis};
 use crate::error::GapError;
 use crate::period::median_period;
 use crate::record::{PlacementRecord, PoseSeries};
@@ -188,7 +188,8 @@ impl PreparedPlacement {
             noise_behind_frames: None,
             report: ReferenceReport::default(),
         };
-        prepared.refuse_stuck_axes()?;
+        let is_dead = |channel| axes_of_channel(channel).all(|axis| prepared.is_constant(axis));
+        prepared.refuse_stuck(|axis| is_dead(channel_of_axis(axis)))?;
         Ok(prepared)
     }
 
@@ -276,17 +277,17 @@ impl PreparedPlacement {
         self.stamps.iter().map(is_inside).collect()
     }
 
-    /// Refuses channels that never change.
-    fn refuse_stuck_axes(&self) -> Result<(), GapError> {
-        let constant = |axis: usize| {
-            self.measured.iter().all(|reading| {
-                value_on_axis(reading, axis) == value_on_axis(&self.measured[0], axis)
-            })
-        };
-        let stuck: Vec<&str> = (0..6)
-            .filter(|&axis| constant(axis))
-            .map(|axis| AXES[axis])
-            .collect();
+    /// Whether an axis never changes.
+    pub fn is_constant(&self, axis: usize) -> bool {
+        let of = |reading| value_on_axis(reading, axis);
+        let first = of(&self.measured[0]);
+        self.measured.iter().all(|reading| of(reading) == first)
+    }
+
+    /// Refuses those of the axes, if any.
+    pub fn refuse_stuck(&self, is_stuck: impl Fn(usize) -> bool) -> Result<(), GapError> {
+        let axes = (0..6).filter(|&axis| is_stuck(axis));
+        let stuck: Vec<&str> = axes.map(|axis| AXES[axis]).collect();
         if stuck.is_empty() {
             Ok(())
         } else {

@@ -5,10 +5,12 @@ use std::sync::Arc;
 use cromosim_imu::{Channel, EffectSet, PerChannel, ReadOff, Reading};
 use cromosim_spatial::{FrameGrid, KinematicTrack};
 
+use crate::axes::{axes_of_channel, channel_of_axis, value_on_axis};
 use crate::coarse_alignment::CoarseAlignment;
-use crate::digital::{Digital, mask_clipped, settle_limits};
+use crate::digital::{Digital, Moments, mask_clipped, settle_limits};
 use crate::error::GapError;
 use crate::library::Library;
+use crate::policy::clipping::STILL_PART;
 use crate::prepared::{PreparedPlacement, ReferenceReport, estimated};
 use crate::record::PlacementRecord;
 use crate::sensor_noise::declared_in_si;
@@ -56,6 +58,7 @@ impl Session {
         let units = units.unwrap_or_else(|| allowed_units(&alignment, library));
         let starts = alignment.starts();
         let starts: Vec<EffectSet> = starts.iter().map(|set| library.restrict(set)).collect();
+        refuse_stuck_axes(&prepared, &track, &starts[0], &digital)?;
         settle_limits(&mut digital, &prepared, &track, &starts[0], units);
         for channel in Channel::ALL {
             mask_clipped(&mut prepared, channel, &digital[channel]);
@@ -82,6 +85,33 @@ impl Session {
             track: Arc::new(track),
         })
     }
+}
+
+/// Refuses axes that never change, but for those that round all of their motion away: the other axes lie on a lattice,
+/// and move much more under `start`.
+fn refuse_stuck_axes(
+    prepared: &PreparedPlacement,
+    track: &KinematicTrack,
+    start: &EffectSet,
+    digital: &PerChannel<Digital>,
+) -> Result<(), GapError> {
+    if !(0..6).any(|axis| prepared.is_constant(axis)) {
+        return Ok(());
+    }
+    let simulated = prepared.predict(track, start).readings;
+    let movement = |axis: usize| {
+        let mut moments = Moments::default();
+        let readings = simulated.iter().zip(&prepared.usable);
+        let covered = readings.filter(|(_, usable)| usable[axis]);
+        covered.for_each(|(reading, _)| moments.add(value_on_axis(reading, axis)));
+        moments.variance()
+    };
+    let is_rounded_away = |axis: usize| {
+        let channel = channel_of_axis(axis);
+        let most = axes_of_channel(channel).map(movement).fold(0.0, f64::max);
+        digital[channel].has_lattice() && movement(axis) < STILL_PART.powi(2) * most
+    };
+    prepared.refuse_stuck(|axis| prepared.is_constant(axis) && !is_rounded_away(axis))
 }
 
 /// Takes the factors of the device's units out of the readings and of what is declared for them.

@@ -358,6 +358,33 @@ fn a_stuck_sensor_is_refused() {
 }
 
 #[test]
+fn an_axis_whose_motion_is_rounded_away_is_no_stuck_one() {
+    // Steps of 4 degrees a second, about the one axis that turns.
+    let scene = Scene {
+        motion: Motion::pendulum(),
+        ..Scene::new(15).with(K::GyroQuantization, &[0.07])
+    };
+    let record = scene.record();
+    let turns_about_y_alone = |rate: &Vector3<f64>| rate.x == 0.0 && rate.z == 0.0;
+    let mut readings = record.imu.readings.iter();
+    assert!(readings.all(|reading| turns_about_y_alone(&reading.angular_velocity)));
+    let diagnosis = answer(&record).diagnosis;
+    assert_eq!(
+        names(&diagnosis),
+        ["gyro_quantization"],
+        "{}",
+        diagnosis.verdict
+    );
+    // One that stands still while the motion turns about it is.
+    let mut record = Scene::new(15).with(K::GyroQuantization, &[0.07]).record();
+    for reading in &mut record.imu.readings {
+        reading.angular_velocity.z = 0.0;
+    }
+    let error = refusal(&record).to_string();
+    assert!(error.contains("wrist: gyro_z never change"), "{error}");
+}
+
+#[test]
 fn the_order_of_messages_does_not_matter() {
     let record = lever_and_bias(18).record();
     let mut shuffled = record.clone();
