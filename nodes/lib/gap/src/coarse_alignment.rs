@@ -8,12 +8,14 @@ use cromosim_imu::{
     length_factors, nearest_signed_permutation, unit_factors,
 };
 use cromosim_spatial::{KinematicTrack, PoseNoise, so3};
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion};
 
+use crate::exchanged_axes::exchanged_axes;
 use crate::force_slopes::{ForceSlopes, Scales, known_factor};
 use crate::lag::{Drift, drift_of_angular_speeds, lag_of_angular_speeds};
 use crate::policy::report::REFERENCE_NOISE;
 use crate::prepared::PreparedPlacement;
+use crate::turns::{FOLLOWED, Turns};
 
 /// Lags above this are certain, s.
 const CERTAIN_LAG_S: f64 = 0.1;
@@ -31,13 +33,6 @@ const NEAR_AXES: f64 = 0.25;
 const NEARLY_ONE: RangeInclusive<f64> = 0.5..=2.0;
 /// Part of a unit's factor that saturation or a filter may leave of a gyroscope's scale; no source.
 const WEAKENED: f64 = 0.5;
-/// Part of the measured angular velocity's square that the reference's most turned axis has to explain, for their
-/// ratio to be a unit's; no source. Noise that has nothing to do with it explains one part in as many as there
-/// are readings.
-const FOLLOWED: f64 = 0.2;
-/// Mean square of the angular velocity about the least moved axis below which nothing is told of
-/// the axes, rad2/s2: 0.05 rad/s.
-const LEAST_SPREAD: f64 = 0.0025;
 /// Smallest over largest singular value below which readings have too little to do with the
 /// reference to have axes.
 const LEAST_LIKENESS: f64 = 0.3;
@@ -102,6 +97,7 @@ impl CoarseAlignment {
         let count = (SLOW_S * prepared.rate_hz).round() as usize;
         let (axes, gyro) = gyro_axes(&turns, &Turns::of_means(&rows, track, count));
         let slopes = |turn: &Matrix3<f64>| ForceSlopes::new(&rows, track, turn);
+        let axes = axes.or_else(|| exchanged_axes(&turns, slopes));
         let as_it_is = slopes(&Matrix3::identity());
         // Angular velocities about one axis tell axes badly: what leaves less of the force unexplained holds.
         let (turn, slopes) = axes
@@ -196,104 +192,13 @@ fn insert_valid(set: &mut EffectSet, effect: Result<Effect, EffectError>) {
     }
 }
 
-/// The measured angular velocity, and the reference's.
-fn turns(row: &(&Reading, usize), track: &KinematicTrack) -> [Vector3<f64>; 2] {
-    [
-        row.0.angular_velocity,
-        track.angular_velocity_in_segment[row.1],
-    ]
-}
-
-/// Sums over rows of products of the measured angular velocity y and the reference's w, means taken out, for the
-/// matrix of `y = A w + b` by least squares.
-struct Turns {
-    count: f64,
-    yw: Matrix3<f64>,
-    ww: Matrix3<f64>,
-    yy: f64,
-    /// With the means.
-    squares: [f64; 2],
-}
-
-impl Turns {
-    fn new(rows: &[(&Reading, usize)], track: &KinematicTrack) -> Self {
-        Self::of_pairs(rows.iter().map(|row| turns(row, track)))
-    }
-
-    /// Of the means over so many rows each: what is slow alone.
-    fn of_means(rows: &[(&Reading, usize)], track: &KinematicTrack, count: usize) -> Self {
-        Self::of_pairs(rows.chunks_exact(count.max(1)).map(|several| {
-            let sum = several.iter().fold([Vector3::zeros(); 2], |sum, row| {
-                let own = turns(row, track);
-                [sum[0] + own[0], sum[1] + own[1]]
-            });
-            sum.map(|sum| sum / several.len() as f64)
-        }))
-    }
-
-    fn of_pairs(pairs: impl Iterator<Item = [Vector3<f64>; 2]> + Clone) -> Self {
-        let count = pairs.clone().count().max(1) as f64;
-        let mean = |k: usize| pairs.clone().map(|pair| pair[k]).sum::<Vector3<f64>>() / count;
-        let (mean_y, mean_w) = (mean(0), mean(1));
-        let mut sums = Self {
-            count,
-            yw: Matrix3::zeros(),
-            ww: Matrix3::zeros(),
-            yy: 0.0,
-            squares: [0.0; 2],
-        };
-        for [y, w] in pairs {
-            sums.squares[0] += y.norm_squared();
-            sums.squares[1] += w.norm_squared();
-            let (y, w) = (y - mean_y, w - mean_w);
-            sums.yw += y * w.transpose();
-            sums.ww += w * w.transpose();
-            sums.yy += y.norm_squared();
-        }
-        sums
-    }
-
-    /// The reference's most turned axis: the readings per unit of its angular velocity about it, and the part of
-    /// their square that these explain.
-    fn about_most_turned_axis(&self) -> (f64, f64) {
-        let turned = self.ww.symmetric_eigen();
-        let (most, square) = turned.eigenvalues.argmax();
-        let along = (self.yw * turned.eigenvectors.column(most)).norm();
-        let square = square.max(f64::MIN_POSITIVE);
-        (along / square, along.powi(2) / (square * self.yy))
-    }
-
-    /// Whether the readings turn when the reference does about its most turned axis: what rests has the noise of
-    /// both, whose ratio is anything.
-    fn are_followed(&self) -> bool {
-        self.about_most_turned_axis().1 > FOLLOWED
-    }
-
-    /// The matrix; none where the reference does not turn about all axes.
-    fn matrix(&self) -> Option<Matrix3<f64>> {
-        let spread = self.ww.symmetric_eigenvalues() / self.count;
-        let inverse = self.ww.try_inverse()?;
-        (spread.min() >= LEAST_SPREAD).then(|| self.yw * inverse)
-    }
-
-    /// The factor of the gyroscope's units where noise hides how the reference turns about other axes.
-    fn factor_about_one_axis(&self) -> f64 {
-        let [measured, predicted] = self.squares;
-        let ratio = (measured / predicted.max(1e-12)).sqrt();
-        if (0.05..=5.0).contains(&ratio) || !self.are_followed() {
-            1.0
-        } else {
-            gyro_factor(ratio)
-        }
-    }
-
-    /// Part of the measured angular velocity's square that no matrix explains; all of it where the reference
-    /// does not turn about all axes.
-    fn unexplained(&self) -> f64 {
-        let explained = self.ww.try_inverse().map_or(0.0, |inverse| {
-            (self.yw * inverse * self.yw.transpose()).trace()
-        });
-        1.0 - explained / self.yy.max(f64::MIN_POSITIVE)
+/// The factor of the gyroscope's units where noise hides how the reference turns about other axes.
+fn factor_about_one_axis(turns: &Turns) -> f64 {
+    let ratio = turns.ratio();
+    if (0.05..=5.0).contains(&ratio) || !turns.are_followed() {
+        1.0
+    } else {
+        gyro_factor(ratio)
     }
 }
 
@@ -333,7 +238,7 @@ fn gyro_axes(turns: &Turns, slow: &Turns) -> (Option<Matrix3<f64>>, f64) {
             (Some(axes), known.unwrap_or(1.0))
         }
         Some((axes, _)) => (Some(axes), 1.0),
-        None => (None, turns.factor_about_one_axis()),
+        None => (None, factor_about_one_axis(turns)),
     }
 }
 

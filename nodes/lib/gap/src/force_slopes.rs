@@ -85,6 +85,8 @@ pub(crate) struct ForceSlopes {
     ya: f64,
     yg: f64,
     yy: f64,
+    sum: Vector3<f64>,
+    count: f64,
 }
 
 impl ForceSlopes {
@@ -119,6 +121,8 @@ impl ForceSlopes {
             sums.ya += y.dot(&a);
             sums.yg += y.dot(&g);
             sums.yy += y.dot(&y);
+            sums.sum += y;
+            sums.count += 1.0;
         }
         sums
     }
@@ -141,6 +145,19 @@ impl ForceSlopes {
     /// axes: all three as they are leave nothing of what has them reversed, by slopes below zero.
     pub fn explains_as_much_as(&self, others: &Self) -> bool {
         self.unexplained() <= others.unexplained() + OF_AXES * self.yy
+    }
+
+    /// Sum of squares that no slopes explain over that about the mean, of which all stays where the readings go against the reference's
+    /// acceleration.
+    pub fn unexplained_part(&self) -> f64 {
+        let about_mean = self.yy - self.sum.norm_squared() / self.count.max(1.0);
+        let goes_along = self.slopes().is_some_and(|(of_a, _)| of_a > 0.0);
+        let unexplained = self.unexplained() / about_mean.max(f64::MIN_POSITIVE);
+        if goes_along {
+            unexplained
+        } else {
+            unexplained.max(1.0)
+        }
     }
 
     /// Sum of squares of the measured specific force that no slopes explain.

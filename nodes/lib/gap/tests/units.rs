@@ -46,6 +46,26 @@ fn three_reversed_axes_are_no_negated_gravity() {
 }
 
 #[test]
+fn axes_are_told_where_the_body_turns_about_one_of_them_alone() {
+    // Two reflections, of which the first takes what is up to where down is, and a rotation.
+    let conventions = [
+        [-1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0],
+        [0.0, 0.0, -1.0, 0.0, -1.0, 0.0, 1.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0],
+    ];
+    for axes in conventions {
+        let scene = Scene {
+            motion: Motion::turning_about_one_axis(),
+            ..Scene::new(63)
+        };
+        let scene = scene
+            .with(K::AxisConvention, &axes)
+            .with(K::AccelMisalignment, &[-0.03, 0.02, 0.03]);
+        names_exactly(&answer(&scene.record()).diagnosis, &scene.effects);
+    }
+}
+
+#[test]
 fn a_lever_arm_of_hardly_any_of_the_gap_is_named_where_it_is_significant() {
     // Beside other units next to nothing of the gap is its own: 14 and 36 standard errors, by slow motion.
     for (metres, others) in [(0.002, vec![]), (0.005, vec!["lever_arm"])] {
