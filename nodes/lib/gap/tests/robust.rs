@@ -142,6 +142,15 @@ fn a_quarter_turn_is_axes_named_otherwise() {
         cause(&diagnosis, K::AxisConvention).parameters["matrix"],
         matrix
     );
+    // A third of a degree beside it is a mount's, beside the axes.
+    let scene = Scene::new(9).with(K::MountRotation, &[0.0, 0.0, quarter - 0.006]);
+    let diagnosis = answer(&scene.record()).diagnosis;
+    assert_eq!(
+        names(&diagnosis),
+        ["axis_convention", "mount_rotation"],
+        "{}",
+        diagnosis.verdict
+    );
     // Ten degrees beside it is a mount.
     let scene = Scene::new(9).with(K::MountRotation, &[0.0, 0.0, quarter - 0.18]);
     names_exactly(&answer(&scene.record()).diagnosis, &scene.effects);
