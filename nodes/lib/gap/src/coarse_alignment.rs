@@ -99,10 +99,14 @@ impl CoarseAlignment {
         let slopes = |turn: &Matrix3<f64>| ForceSlopes::new(&rows, track, turn);
         let axes = axes.or_else(|| exchanged_axes(&turns, slopes));
         let as_it_is = slopes(&Matrix3::identity());
-        // Angular velocities about one axis tell axes badly: what leaves less of the force unexplained holds.
+        // Angular velocities about one axis, or a gyroscope's misalignment, tell axes badly: what leaves less of the force
+        // unexplained holds, of exchanged axes these themselves.
         let (turn, slopes) = axes
+            .into_iter()
+            .flat_map(|axes| [Some(axes), near_permutation(&axes)])
+            .flatten()
             .map(|axes| (axes, slopes(&axes)))
-            .filter(|(_, turned)| turned.explains_as_much_as(&as_it_is))
+            .find(|(_, turned)| turned.explains_as_much_as(&as_it_is))
             .unwrap_or((Matrix3::identity(), as_it_is));
         let slow = ForceSlopes::of_means(&rows, track, &turn, count);
         let scales = scales(&slopes, &slow, prepared.estimate.noise());
@@ -147,14 +151,13 @@ impl CoarseAlignment {
         let Some(axes) = self.axes else {
             return vec![certain];
         };
-        let permutation = nearest_signed_permutation(&axes);
-        let near = |other: &Matrix3<f64>| (axes - other).norm() / 2.0_f64.sqrt() < NEAR_AXES;
-        if near(&Matrix3::identity()) {
+        if is_near(&axes, &Matrix3::identity()) {
             return vec![certain];
         }
         let mut starts = Vec::new();
-        if near(&permutation) || axes.determinant() < 0.0 {
+        if near_permutation(&axes).is_some() || axes.determinant() < 0.0 {
             let mut set = certain.clone();
+            let permutation = nearest_signed_permutation(&axes);
             insert_valid(&mut set, Effect::axis_convention(&permutation));
             starts.push(set);
         }
@@ -183,6 +186,16 @@ fn length_units_at_rest(noise: PoseNoise) -> f64 {
     let is_in_millimetres =
         noise.position > MILLIMETRES_NOISE && noise.rotation < REFERENCE_NOISE.rotation;
     if is_in_millimetres { 1000.0 } else { 1.0 }
+}
+
+/// Whether axes are others but for what is left to the search.
+fn is_near(axes: &Matrix3<f64>, others: &Matrix3<f64>) -> bool {
+    (axes - others).norm() / 2.0_f64.sqrt() < NEAR_AXES
+}
+
+/// The signed permutation that axes are near to.
+fn near_permutation(axes: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+    Some(nearest_signed_permutation(axes)).filter(|permutation| is_near(axes, permutation))
 }
 
 /// Inserts an effect where its values are within its bounds.

@@ -42,6 +42,9 @@ fn three_reversed_axes_are_no_negated_gravity() {
         let reversed = [-1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0];
         let scene = Scene::new(seed).with(K::AxisConvention, &reversed);
         names_exactly(&answer(&scene.record()).diagnosis, &scene.effects);
+        // A gyroscope that tells the axes wrongly.
+        let scene = scene.with(K::GyroMisalignment, &[0.07, -0.07, 0.07]);
+        names_exactly(&answer(&scene.record()).diagnosis, &scene.effects);
     }
 }
 
