@@ -98,16 +98,7 @@ impl CoarseAlignment {
         let (axes, gyro) = gyro_axes(&turns, &Turns::of_means(&rows, track, count));
         let slopes = |turn: &Matrix3<f64>| ForceSlopes::new(&rows, track, turn);
         let axes = axes.or_else(|| exchanged_axes(&turns, slopes));
-        let as_it_is = slopes(&Matrix3::identity());
-        // Angular velocities about one axis, or a gyroscope's misalignment, tell axes badly: what leaves less of the force
-        // unexplained holds, of exchanged axes these themselves.
-        let (turn, slopes) = axes
-            .into_iter()
-            .flat_map(|axes| [Some(axes), near_permutation(&axes)])
-            .flatten()
-            .map(|axes| (axes, slopes(&axes)))
-            .find(|(_, turned)| turned.explains_as_much_as(&as_it_is))
-            .unwrap_or((Matrix3::identity(), as_it_is));
+        let (turn, slopes) = axes_of_forces(axes, slopes);
         let slow = ForceSlopes::of_means(&rows, track, &turn, count);
         let scales = scales(&slopes, &slow, prepared.estimate.noise());
         Self {
@@ -168,6 +159,21 @@ impl CoarseAlignment {
         }
         starts
     }
+}
+
+/// The axes by which forces are compared, with the forces' slopes in them. Angular velocities about one axis, or a gyroscope's
+/// misalignment, tell axes badly: what leaves less of the force unexplained holds, of exchanged axes these themselves.
+fn axes_of_forces(
+    axes: Option<Matrix3<f64>>,
+    slopes: impl Fn(&Matrix3<f64>) -> ForceSlopes,
+) -> (Matrix3<f64>, ForceSlopes) {
+    let as_it_is = slopes(&Matrix3::identity());
+    axes.into_iter()
+        .flat_map(|axes| [Some(axes), near_permutation(&axes)])
+        .flatten()
+        .map(|axes| (axes, slopes(&axes)))
+        .find(|(_, turned)| turned.explains_as_much_as(&as_it_is))
+        .unwrap_or((Matrix3::identity(), as_it_is))
 }
 
 /// Units of the accelerometer, gravity, and units per metre of the reference: by what of its motion is slow (a filter
