@@ -42,7 +42,7 @@ fn scenes() -> [(&'static str, Scene); 4] {
         ),
         (
             "reference_smoothing",
-            Scene::new(1).with(K::ReferenceSmoothing, &[6.0]),
+            Scene::new(1).with(K::ReferenceSmoothing, &[6.0, 0.0]),
         ),
     ]
 }
