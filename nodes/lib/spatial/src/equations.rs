@@ -424,6 +424,12 @@ impl SplineEquations {
         (std::f64::consts::TAU * cutoff_hz * self.interval).powi(-4)
     }
 
+    /// The inverse of [`SplineEquations::second_weight_of_cutoff`], Hz.
+    #[inline]
+    pub(crate) fn cutoff_of_second_weight(&self, weight: f64) -> f64 {
+        (weight.sqrt().sqrt() * std::f64::consts::TAU * self.interval).recip()
+    }
+
     /// Frequency at which a weight's response is one half, Hz.
     pub(crate) fn cutoff_of_weight(&self, weight: f64) -> f64 {
         weight.powf(-0.5 / PENALTY_ORDER as f64) / (std::f64::consts::TAU * self.interval)

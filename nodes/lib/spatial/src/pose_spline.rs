@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 use crate::adaptive::{Adaptation, ExpectedNoise, FEWEST_ADAPTIVE};
 use crate::adaptive_fit::AdaptiveFit;
 use crate::basis::BasisValues;
-use crate::beyond::{Beyond, Posterior};
+use crate::beyond::{Beyond, Cutoffs, Posterior};
 use crate::grid::relative_seconds;
 use crate::so3::{QUATERNION_PER_ROTVEC, ROTVEC_PER_QUATERNION};
 use crate::{
@@ -432,13 +432,20 @@ impl PoseSpline {
             variance: self.rotation.variance_of(first, value)?,
             ..rotation
         };
-        let (bends_hz, turns_hz) = (
-            asked_hz(&position, position_hz),
-            asked_hz(&rotation, rotation_hz),
+        let (bends, turns) = (
+            Cutoffs {
+                smooth_hz: asked_hz(&position, position_hz),
+                vigour_hz: self.position.vigour_cutoff_over(first),
+            },
+            Cutoffs {
+                smooth_hz: asked_hz(&rotation, rotation_hz),
+                vigour_hz: self.rotation.vigour_cutoff_over(first),
+            },
         );
-        let acceleration = Beyond::ACCELERATION.stated(position, bends_hz);
+        let (bends_hz, turns_hz) = (bends.smooth_hz, turns.smooth_hz);
+        let acceleration = Beyond::ACCELERATION.stated(position, bends);
         let angular_velocity =
-            ROTVEC_PER_QUATERNION * Beyond::ANGULAR_VELOCITY.stated(rotation, turns_hz);
+            ROTVEC_PER_QUATERNION * Beyond::ANGULAR_VELOCITY.stated(rotation, turns);
         Some(SampleVariance {
             acceleration,
             angular_velocity,

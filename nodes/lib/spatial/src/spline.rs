@@ -264,6 +264,19 @@ impl<const C: usize> SmoothingSpline<C> {
         };
         self.system.equations.cutoff_of_weight(weight)
     }
+
+    /// Frequency at which the response of the second derivative's weight alone is one half over a knot
+    /// interval, Hz; infinite where it has none.
+    #[inline]
+    pub(crate) fn vigour_cutoff_over(&self, interval: usize) -> f64 {
+        match &self.weight {
+            SplineWeight::Uniform(_) => f64::INFINITY,
+            SplineWeight::Local(weights) => {
+                let weight = weights[interval.min(weights.len() - 1)].second;
+                self.system.equations.cutoff_of_second_weight(weight)
+            }
+        }
+    }
 }
 
 #[cfg(test)]
