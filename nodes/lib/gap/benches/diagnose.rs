@@ -1,9 +1,10 @@
 //! Diagnosis of 60 s of one placement at 100 Hz with a reference at 120 Hz, on one core: `cargo
 //! bench -p cromosim_gap`. Goal: 5 s.
 //!
-//! Measured on one core of a small shared machine: 0.44 s without effect, 0.56 s lever arm, 0.72 s
-//! two effects, 0.97 s smoothing (5 to 11 times within the goal). What such an analysis cannot do
-//! without are Fourier transforms (18 us each of 6000 values) and forward simulations (0.28 ms):
+//! Measured on one core of a small shared machine: 0.42 s without effect, 0.48 s lever arm, 0.73 s
+//! two effects, 1.38 s smoothing, which is looked for in more shapes since the counts below (3.6 to 12
+//! times within the goal). What such an analysis cannot do without are Fourier transforms (18 us each of
+//! 6000 values) and forward simulations (0.33 ms); counted when the four took 0.44 to 0.97 s:
 //!
 //! | case | transforms (million values) | Welch windows beside them | forward simulations | transforms and simulations take |
 //! |---|---|---|---|---|
