@@ -64,29 +64,31 @@ impl Posterior {
 
 /// What motion has beyond the cutoff over what the prior has there.
 ///
-/// `z / (1 + z) (most / (1 + (fv / (swing fc))^16) + swung)`, z = (fc / from)^12: of an impact, and of any fast motion. The constants were fitted by gamma likelihood (the variance's, given squared errors) and to means of one on the motions of
-/// `tests/physics` with other paces and sways (1.12 and 0.9 times as fast), and on motions of closed form of another seed,
-/// all with white errors at 30, 60 and 120 Hz; neither those of `bags/truth` nor the seed of `evaluate
-/// fidelity` was among them. `swung` was chosen among 1, 3 and 6 (velocity: 1, 2 and 4) on
-/// the real pairs of that command: motions of the physics have 1 to 6 at fv of 4 fc and more, closed forms 0.3.
+/// `z / (1 + z) (impact / (1 + (fv / (ratio fc))^16) + swing)`, z = (fc / from)^12. The constants were
+/// fitted by gamma likelihood (the variance's, given squared errors) and to means of one on the
+/// motions of `tests/physics` with other paces and sways (1.12 and 0.9 times as fast), and on motions
+/// of closed form of another seed, all with white errors at 30, 60 and 120 Hz; neither those of
+/// `bags/truth` nor the seed of `evaluate fidelity` was among them. `swing` was chosen among about 1, 3
+/// and 6 (velocity: 1, 2 and 4) on the real pairs of that command: motions of the physics have 1 to 6
+/// at fv of 4 fc and more, closed forms 0.3.
 #[derive(Clone, Copy, Debug)]
 struct Excess {
-    /// No unit.
-    most: f64,
+    /// Of an impact, no unit.
+    impact: f64,
     /// Hz.
     from_hz: f64,
-    /// fv over fc.
+    /// fv over fc from which on motion is a swing.
+    ratio: f64,
+    /// Of any fast motion, no unit.
     swing: f64,
-    /// No unit.
-    swung: f64,
 }
 
 impl Excess {
     #[inline(always)]
     fn over_prior(self, cutoff_hz: f64, vigour_hz: f64) -> f64 {
         let z = (cutoff_hz / self.from_hz).powi(12);
-        let swing = (vigour_hz / (self.swing * cutoff_hz)).powi(16);
-        z / (1.0 + z) * (self.most / (1.0 + swing) + self.swung)
+        let swings = (vigour_hz / (self.ratio * cutoff_hz)).powi(16);
+        z / (1.0 + z) * (self.impact / (1.0 + swings) + self.swing)
     }
 }
 
@@ -130,10 +132,10 @@ impl Beyond {
         order: 2,
         integral: 0.1 * PI,
         white: Excess {
-            most: 260.0,
+            impact: 260.0,
             from_hz: 8.3,
-            swing: 3.2,
-            swung: 6.0,
+            ratio: 3.2,
+            swing: 6.0,
         },
         filtered: FilteredExcess {
             most: 36.0,
@@ -144,10 +146,10 @@ impl Beyond {
         order: 1,
         integral: 0.388_322_207_745_093_3,
         white: Excess {
-            most: 31.0,
+            impact: 31.0,
             from_hz: 7.0,
-            swing: 2.6,
-            swung: 4.0,
+            ratio: 2.6,
+            swing: 4.0,
         },
         filtered: FilteredExcess {
             most: 7.0,
