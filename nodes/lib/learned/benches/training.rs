@@ -21,8 +21,20 @@ use cromosim_learned::{Direction, LearnedError, Network, NetworkShape};
 
 const BATCH: usize = 64;
 const STEPS: usize = 128;
-const ROUNDS: usize = 3;
-const REPETITIONS: usize = 5;
+
+/// Rounds and repetitions; once where `cargo test` only wants it to run.
+fn times(measured: usize) -> usize {
+    let measures = std::env::args().any(|argument| argument == "--bench");
+    if measures { measured } else { 1 }
+}
+
+fn rounds() -> usize {
+    times(3)
+}
+
+fn repetitions() -> usize {
+    times(5)
+}
 
 struct Noise(NetworkShape);
 
@@ -56,7 +68,7 @@ fn training(shape: &NetworkShape, engine: &mut dyn Engine) -> Vec<f64> {
         learning_rate: 1e-3,
         schedule: Schedule::Constant,
         clip: Some(1.0),
-        steps: REPETITIONS as u64 + 1,
+        steps: repetitions() as u64 + 1,
         validate_every: u64::MAX,
         patience: None,
         checkpoint_every: u64::MAX,
@@ -93,7 +105,7 @@ fn inference(shape: &NetworkShape, batch: usize) -> Vec<f64> {
             .expect("an input that fits");
         1e3 * start.elapsed().as_secs_f64()
     };
-    (0..=REPETITIONS).map(once).skip(1).collect()
+    (0..=repetitions()).map(once).skip(1).collect()
 }
 
 /// Least milliseconds by name.
@@ -130,7 +142,7 @@ fn pytorch(direction: &str, threads: usize) -> Option<serde_json::Value> {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts/bench_torch.py");
     let arguments = [
         threads.to_string(),
-        REPETITIONS.to_string(),
+        repetitions().to_string(),
         direction.to_owned(),
     ];
     let output = Command::new(python)
@@ -160,7 +172,7 @@ fn main() {
         };
         for threads in [1, 2] {
             let mut least: Vec<(String, f64, f64)> = Vec::new();
-            for _ in 0..ROUNDS {
+            for _ in 0..rounds() {
                 let found = ours(&shape, threads);
                 let theirs = pytorch(name, threads);
                 for (index, (what, milliseconds)) in found.into_iter().enumerate() {
