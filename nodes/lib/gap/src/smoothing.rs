@@ -205,6 +205,8 @@ impl<'a> Trial<'_, 'a> {
             Some(other) if other.evidence > one.evidence => (other, true),
             _ => (one, false),
         };
+        // The grid's cutoff was chosen beside less: left there it loses against kernels whose cutoffs are not.
+        let second = self.refined(second, BETWEEN_ORDERS);
         let (best, is_steeper) = better(second, of_order(4));
         let (best, _) = if is_steeper {
             better(best, of_order(3))

@@ -134,3 +134,21 @@ fn short_gaps_all_over_leave_enough() {
     series.rotations = kept.iter().map(|&k| series.rotations[k]).collect();
     assert_eq!(names(&answer(&record).diagnosis), ["gyro_scale"]);
 }
+
+/// Beside a scale the first cutoffs are tried without it, and the best of them makes up for some of it: left there, the
+/// filter that it belongs to loses against others.
+#[test]
+fn the_shape_of_a_smoothing_is_told_beside_a_scale() {
+    let scene = Scene {
+        motion: Motion::random(70).slowed(1.7),
+        ..Scene::new(70)
+    };
+    let scene = scene
+        .with(K::ReferenceSmoothing, &[2.0, 1.0])
+        .with(K::AccelScale, &[1.03, 1.026, 1.033]);
+    let diagnosis = answer(&scene.record()).diagnosis;
+    assert_eq!(names(&diagnosis), ["accel_scale", "reference_smoothing"]);
+    let (before, after) = (&diagnosis.gap.before, &diagnosis.gap.after);
+    assert!(after.accel_rmse < 0.15 * before.accel_rmse, "{after:?}");
+    assert!(after.gyro_rmse < 0.15 * before.gyro_rmse, "{after:?}");
+}
