@@ -391,6 +391,22 @@ mod tests {
     }
 
     #[test]
+    fn feet_are_told_where_little_moves_and_readings_hold_nearly_all_of_it() {
+        let (little, gravity) = (0.03, Vector3::z() * 9.80665);
+        for (units, told) in [(1.0 / 0.3048, 1.0 / 0.3048), (1.0, 1.0), (2.9, 1.0)] {
+            let (mut track, mut readings) = forces(units, 1.0, Vector3::z());
+            for acceleration in &mut track.acceleration_in_segment {
+                *acceleration *= little;
+            }
+            for reading in &mut readings {
+                let moved = reading.specific_force - gravity;
+                reading.specific_force = gravity + moved * little;
+            }
+            assert_eq!(scales_of(&(track, readings), 1e-4), [1.0, told]);
+        }
+    }
+
+    #[test]
     fn millimetres_of_who_rests_are_no_units_of_the_accelerometer() {
         // Other axes hide the acceleration, the positions' noise tells their units.
         let found = scales_of(&forces(1000.0, 1.0, Vector3::y()), 0.2);

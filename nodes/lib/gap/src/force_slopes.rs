@@ -13,6 +13,11 @@ const LEAST_LIKENESS_FOR_LENGTH: f64 = 0.5;
 const LEAST_LIKENESS_WHERE_LOUD: f64 = 0.1;
 /// Natural logarithm of how much louder: a hundred times; no source.
 const MUCH_TOO_LOUD: f64 = 4.6;
+/// From this squared correlation on, a slope that is a unit's as near as [`SAME_UNITS`] tells units of length however small
+/// accelerations are beside gravity: readings hold nearly all of them. No source.
+const LIKENESS_THAT_TELLS: f64 = 0.95;
+/// See [`LIKENESS_THAT_TELLS`]; natural logarithm, no source.
+const SAME_UNITS: f64 = 0.03;
 /// Scatter of the acceleration's slope, see [`slope_off`].
 const SLOPE_SCATTER: f64 = 0.4;
 /// Cost of a device with other units, and of one with other gravity, in units of a slope's squared
@@ -172,6 +177,9 @@ impl ForceSlopes {
             return self.at_rest();
         };
         let likeness = self.likeness();
+        let is_of_length =
+            |length: &f64| *length != 1.0 && (of_a / of_g.abs() * length).ln().abs() < SAME_UNITS;
+        let is_told = likeness > LIKENESS_THAT_TELLS && lengths.iter().any(is_of_length);
         let mut best = f64::INFINITY;
         let mut scales = self.at_rest();
         for &length in lengths {
@@ -182,7 +190,7 @@ impl ForceSlopes {
                         gravity,
                         length,
                     };
-                    let cost = self.cost((of_a, of_g), likeness, &of);
+                    let cost = self.cost((of_a, of_g), likeness, is_told, &of);
                     if cost < best {
                         (best, scales) = (cost, of);
                     }
@@ -204,7 +212,7 @@ impl ForceSlopes {
     }
 
     /// How unlikely such units are, in squared scatters.
-    fn cost(&self, (of_a, of_g): (f64, f64), likeness: f64, of: &Scales) -> f64 {
+    fn cost(&self, (of_a, of_g): (f64, f64), likeness: f64, is_told: bool, of: &Scales) -> f64 {
         let Scales {
             accel,
             gravity,
@@ -219,7 +227,11 @@ impl ForceSlopes {
         } else {
             aa * (of_a / accel).powi(2)
         };
-        let weight = likeness * (in_metres.max(in_readings) / gg * 50.0).min(1.0);
+        let weight = if is_told {
+            likeness
+        } else {
+            likeness * (in_metres.max(in_readings) / gg * 50.0).min(1.0)
+        };
         // Of what is measured, in units of gravity's power.
         let unexplained = self.unexplained() / gg;
         let scatter = GRAVITY_SCATTER.powi(2) + CHANCE_LIKENESS * unexplained / accel.powi(2);
