@@ -158,6 +158,10 @@ impl<'a> Trial<'_, 'a> {
             } else {
                 beside.refined(begun, FINE)
             };
+            if reaches_no_motion(&sharp.smoothing, 1.0) {
+                // It will not be believed.
+                return (undone, searched, sharp.smoothing);
+            }
             let leaves_more = larger(searched.fit.held_out_ratio()) > SUSPICIOUS;
             if sharp.smoothing == smoothing && !leaves_more {
                 break;
@@ -208,6 +212,9 @@ impl<'a> Trial<'_, 'a> {
         // The grid's cutoff was chosen beside less: left there it loses against kernels whose cutoffs are not.
         let second = self.refined(second, BETWEEN_ORDERS);
         let (best, is_steeper) = better(second, of_order(4));
+        if reaches_no_motion(&best.smoothing, 1.0) {
+            return best;
+        }
         let (best, _) = if is_steeper {
             better(best, of_order(3))
         } else {
@@ -276,7 +283,9 @@ impl<'a> Trial<'_, 'a> {
         let mut best = begun;
         let mut beside = [factor.recip(), factor].map(|step| at(best.smoothing.cutoff_hz * step));
         for (side, step) in [factor.recip(), factor].into_iter().enumerate() {
+            // Beyond what explains something evidence rises on towards that of undoing nothing.
             while height(&beside[side]) > best.evidence
+                && !reaches_no_motion(&best.smoothing, 1.0)
                 && let Some(next) = beside[side].take()
             {
                 beside[side] = at(next.smoothing.cutoff_hz * step);
