@@ -69,7 +69,7 @@ impl Posterior {
 /// motions of `tests/physics` with other paces and sways (1.12 and 0.9 times as fast), and on motions
 /// of closed form of another seed, all with white errors at 30, 60 and 120 Hz; neither those of
 /// `bags/truth` nor the seed of `evaluate fidelity` was among them. `rest` lies where these have means of one
-/// for fv below 5 Hz and from there to 6 Hz (0.5 to 0.9 without it). `swing` was chosen among about 1, 3
+/// for fv below 5 Hz and from there to 6 Hz (accelerations 0.5 to 1.0 without it). `swing` was chosen among about 1, 3
 /// and 6 (velocity: 1, 2 and 4) on the real pairs of that command: motions of the physics have 1 to 6
 /// at fv of 4 fc and more, closed forms 0.3.
 #[derive(Clone, Copy, Debug)]
