@@ -6,13 +6,15 @@
 //! `CROMOSIM_DATA` or at `../shared/data`. `cargo test` runs its first line once, so that it keeps running.
 #![allow(clippy::unwrap_used)]
 
+#[path = "../common/mod.rs"]
+mod common;
 mod run;
 #[path = "../../nodes/lib/gap/tests/support/mod.rs"]
 mod support;
 
 use std::env;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use cromosim_bag::{BagOptions, BagWriter};
 use cromosim_gap::PlacementRecord;
@@ -111,15 +113,6 @@ fn write_placement(bag: &mut BagWriter, name: &str, record: &PlacementRecord) {
     }
 }
 
-/// Where third-party data lie, if they do.
-fn data() -> Option<PathBuf> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let folder = env::var_os("CROMOSIM_DATA")
-        .map_or_else(|| root.join("../shared/data"), PathBuf::from)
-        .join("paired_broad");
-    folder.is_dir().then_some(folder)
-}
-
 /// Measures a recording and prints its line: medians of `runs` turns, the two in turn.
 fn measure(folder: &Path, name: &str, recording: &Path, runs: usize) {
     let found = folder.join("found");
@@ -183,12 +176,12 @@ fn main() {
     if !measures {
         return;
     }
-    let Some(data) = data() else {
-        return println!("skipped: BROAD's trials, as there is no CROMOSIM_DATA");
+    let Some(data) = common::shared_data() else {
+        return;
     };
     for trial in BROAD {
         let recording = folder.path().join(format!("{trial}.mcap"));
-        let file = data.join(format!("{trial}.npz"));
+        let file = data.join(format!("paired_broad/{trial}.npz"));
         run::cromosim(&[
             "convert",
             file.to_str().unwrap(),

@@ -5,6 +5,8 @@ use std::fs;
 use std::mem::zeroed;
 use std::process::{Command, Stdio};
 
+use crate::common::CROMOSIM;
+
 /// What a process used until its end.
 pub struct Used {
     /// Processor time, user and system.
@@ -15,7 +17,7 @@ pub struct Used {
 
 /// Runs `cromosim`, which must succeed.
 pub fn cromosim(arguments: &[&str]) -> Used {
-    wait(Command::new(env!("CARGO_BIN_EXE_cromosim")).args(arguments))
+    wait(Command::new(CROMOSIM).args(arguments))
 }
 
 /// Runs this very program, which must succeed.
