@@ -17,7 +17,9 @@ use crate::reportable::{Observations, is_ordinary, reportable_effects};
 use crate::search::{
     ScoredEffectSet, excess, exchanged, score, score_as_it_is, search, search_down_to_noise,
 };
-use crate::sensor_noise::{found_noise, has_tails, is_steady, is_white, most_noise};
+use crate::sensor_noise::{
+    found_noise, has_tails, is_steady, is_white, most_noise, readings_are_level,
+};
 use crate::session::Session;
 use crate::smoothing::{try_smoothing, with_undone_smoothing};
 use crate::thinned::{is_folded, thinned};
@@ -81,6 +83,7 @@ impl<'a> Analysis<'a> {
                 is_white: is_white(prepared, &residual),
                 is_steady: is_steady(prepared, &residual),
                 has_tails: has_tails(prepared, &residual),
+                readings_are_level: readings_are_level(prepared),
             },
             self.library,
         );

@@ -17,6 +17,7 @@ use crate::policy::report::{
     REFERENCE_UNCERTAINTY, ROUNDING_SIGMAS, ROUNDING_UNCERTAINTY, STEP,
 };
 use crate::sensor_noise::UPPER_BANDS;
+use crate::trace::trace;
 
 /// What readings and residual show without a fit.
 pub(crate) struct Observations<'a> {
@@ -31,6 +32,8 @@ pub(crate) struct Observations<'a> {
     pub is_steady: PerChannel<bool>,
     /// Whether it scatters farther than noise does now and then.
     pub has_tails: PerChannel<bool>,
+    /// Whether the top of the readings' own spectrum is level.
+    pub readings_are_level: PerChannel<bool>,
 }
 
 /// The causes: fitted effects beyond what is ordinary, and those that are read off.
@@ -247,8 +250,10 @@ fn excess_noise(model: &FitModel, observations: &Observations, channel: Channel)
     let of_rounding = step * step / 12.0;
     let found = observations.found_noise[channel].powi(2);
     let beyond = found - of_rounding - declared.powi(2) - of_reference;
-    // What a smoothed reference lacks is broad enough to pass for noise, and so are blows.
-    let is_doubtful = model.basis.undone_smoothing.is_some()
+    // What a smoothed reference lacks is broad enough to pass for noise where the readings hold it, and so are blows.
+    let may_lack_motion =
+        model.basis.undone_smoothing.is_some() && !observations.readings_are_level[channel];
+    let is_doubtful = may_lack_motion
         || prepared.missing.fraction > MANY_MISSING
         || observations.has_tails[channel];
     let factor = if is_doubtful {
@@ -260,6 +265,15 @@ fn excess_noise(model: &FitModel, observations: &Observations, channel: Channel)
         + ROUNDING_UNCERTAINTY * of_rounding
         + REFERENCE_UNCERTAINTY * of_reference;
     let is_noise = observations.is_white[channel] && observations.is_steady[channel];
+    trace(|| {
+        eprintln!(
+            "noise of {channel:?}: found {found:.3e}, declared {:.3e}, reference {of_reference:.3e}, beyond {beyond:.3e} of {needed:.3e}, white {} steady {} tails {}",
+            declared.powi(2),
+            observations.is_white[channel],
+            observations.is_steady[channel],
+            observations.has_tails[channel]
+        )
+    });
     (is_noise && beyond > needed).then(|| (beyond / prepared.rate_hz).sqrt())
 }
 

@@ -9,8 +9,8 @@ use crate::axes::{axes_of_channel, value_on_axis};
 use crate::digital::Digital;
 use crate::library::Library;
 use crate::policy::sensor_noise::{
-    LEAST_OF_STEP, LEVEL, OF_LOWER_BANDS, OF_QUIET_DIFFERENCES, QUIET_PART, STEADY, STEADY_BLOCK_S,
-    TAILS, TAILS_OF_READINGS,
+    LEAST_OF_STEP, LEVEL, LEVEL_READINGS, OF_LOWER_BANDS, OF_QUIET_DIFFERENCES, QUIET_PART, STEADY,
+    STEADY_BLOCK_S, TAILS, TAILS_OF_READINGS,
 };
 use crate::prepared::PreparedPlacement;
 
@@ -189,6 +189,17 @@ pub(crate) fn is_white(prepared: &PreparedPlacement, residual: &[Vec<f64>]) -> P
                 .unwrap_or(0.0)
         };
         is_everywhere && level(0.70, 0.83) < 1.5 * level(0.84, 0.97)
+    })
+}
+
+/// Whether the upper half of the readings' own spectrum is level: what a reference lacks of the motion is not in them,
+/// nor is motion.
+pub(crate) fn readings_are_level(prepared: &PreparedPlacement) -> PerChannel<bool> {
+    let measured = prepared.on_sample_grid(|k, axis| value_on_axis(&prepared.measured[k], axis));
+    PerChannel::from_fn(|channel| {
+        let levels = || band_variances(prepared, &measured, channel, &UPPER_BANDS);
+        let least = levels().fold(f64::INFINITY, f64::min);
+        levels().fold(0.0, f64::max) < LEVEL_READINGS * least
     })
 }
 

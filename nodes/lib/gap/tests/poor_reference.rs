@@ -11,7 +11,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha12Rng;
 use support::judge::{answer, names};
 use support::motion::Motion;
-use support::{REFERENCE_HZ, Scene};
+use support::{REFERENCE_HZ, SIGMA, Scene};
 
 /// Noise of first order beside that of the record: m, rad, and its memory, s.
 fn with_memory(mut record: PlacementRecord, sizes: [f64; 2], memory_s: f64) -> PlacementRecord {
@@ -151,4 +151,26 @@ fn the_shape_of_a_smoothing_is_told_beside_a_scale() {
     let (before, after) = (&diagnosis.gap.before, &diagnosis.gap.after);
     assert!(after.accel_rmse < 0.15 * before.accel_rmse, "{after:?}");
     assert!(after.gyro_rmse < 0.15 * before.gyro_rmse, "{after:?}");
+}
+
+/// What a smoothed reference lacks of the motion would be in the readings, and their spectrum not level.
+#[test]
+fn noise_of_a_sensor_is_told_beside_a_smoothing() {
+    for seed in [71, 73] {
+        let scene = Scene {
+            motion: Motion::random(seed).slowed(1.7),
+            ..Scene::new(seed)
+        };
+        let declared = SIGMA[1];
+        let density = 3.0 * declared / scene.imu_hz.sqrt();
+        let scene = scene
+            .with(K::ReferenceSmoothing, &[2.5, 0.0])
+            .with(K::GyroNoise, &[density]);
+        let diagnosis = answer(&scene.record()).diagnosis;
+        assert_eq!(
+            names(&diagnosis),
+            ["gyro_noise", "reference_smoothing"],
+            "{seed}"
+        );
+    }
 }

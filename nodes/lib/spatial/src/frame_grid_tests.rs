@@ -77,6 +77,9 @@ fn frames_are_found_and_come_back() {
         // Kinks that drown in the noise between neighbours.
         (240.0, 16.02, 0.003, [1.5e-3, 1e-2]),
         (300.0, 16.66, 0.0, [2e-3, 1e-2]),
+        // And nearly so over several.
+        (263.6, 46.35, 0.004, [9e-4, 4.5e-3]),
+        (240.0, 34.55, 0.004, [1.2e-3, 6e-3]),
         // Two poses alone tell of the frame before the first pose.
         (290.6, 17.807, 0.0051, [0.0, 0.0]),
     ] {
@@ -111,7 +114,7 @@ fn frames_are_found_and_come_back() {
 
 #[test]
 fn where_there_are_no_chords_none_are_found() {
-    for noise in [[0.0, 0.0], ORDINARY, [4e-3, 0.014]] {
+    for noise in [[0.0, 0.0], ORDINARY, [1e-3, 5e-3], [4e-3, 0.014]] {
         for poses_hz in [60.0, 120.0, 200.0] {
             let plain = poses(poses_hz, None, 0.0, noise);
             assert_eq!(FrameGrid::find(&plain), None, "{poses_hz} {noise:?}");
