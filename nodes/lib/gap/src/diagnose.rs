@@ -232,7 +232,17 @@ fn doubtful(causes: &[Cause], findings: &[Findings]) -> Vec<EffectKind> {
         let is_fitted = matches!(spec.search, Search::Fitted(_));
         let is_likely = cause.probability >= LEAST_NAMED
             && (spec.owner == Owner::Session || is_significant(kind));
-        (is_fitted && cause.gap_share < SMALL_SHARE && !is_likely).then_some(kind)
+        let is_doubtful = is_fitted && cause.gap_share < SMALL_SHARE && !is_likely;
+        trace(|| {
+            let Cause {
+                effect,
+                probability,
+                gap_share,
+                ..
+            } = cause;
+            eprintln!("  {effect} {probability:.2} of {gap_share:.4}, doubtful {is_doubtful}");
+        });
+        is_doubtful.then_some(kind)
     };
     causes.iter().filter_map(doubtful).collect()
 }

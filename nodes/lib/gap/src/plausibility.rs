@@ -6,7 +6,8 @@ use cromosim_spatial::{PoseLine, Spectrum};
 use crate::fit::{Fit, FitModel};
 use crate::policy::vibration::{
     ABOVE_HZ, BELOW_HZ, FASTEST_STEADY_MOTION_HZ, IN_REFERENCE_HEIGHT, IN_REFERENCE_PART,
-    LEAST_HEIGHT, LEAST_HZ, LEAST_POWER, MOST_HEIGHT_LEFT, MOST_LEFT, SURROUNDINGS_HZ,
+    LEAST_HEIGHT, LEAST_HEIGHT_IN_PHASE, LEAST_HZ, LEAST_POWER, MOST_HEIGHT_IN_PHASE,
+    MOST_HEIGHT_LEFT, MOST_LEFT, SURROUNDINGS_HZ,
 };
 use crate::trace::trace;
 
@@ -67,11 +68,20 @@ fn is_true_vibration(model: &FitModel, fit: &Fit) -> bool {
     for channel in Channel::ALL {
         let (before, left) = (line_of(&before, channel), line_of(&after, channel));
         let is_high = before.height > LEAST_HEIGHT;
+        trace(|| {
+            eprintln!(
+                "  line of {:.3} Hz in {channel:?}: height {:.1} -> {:.1}, power {:.2e} -> {:.2e}",
+                line.hz, before.height, left.height, before.power, left.power
+            )
+        });
         let is_taken_away = left.power < MOST_LEFT * before.power;
         if !is_taken_away && (is_high || left.height > MOST_HEIGHT_LEFT) {
             return false;
         }
-        stands_out |= is_high;
+        let is_in_phase = before.height > LEAST_HEIGHT_IN_PHASE
+            && is_taken_away
+            && left.height < MOST_HEIGHT_IN_PHASE;
+        stands_out |= is_high || is_in_phase;
     }
     stands_out && !is_in_reference(model, &line)
 }

@@ -59,6 +59,7 @@ pub(crate) fn screen(
         FirstGuess::FromResidual(guess) => guess(&model.prepared.view(&fit.prediction.readings))
             .into_iter()
             .filter_map(|values| Effect::new(kind, values).ok())
+            .map(|start| start.by_clock_of(&fit.set))
             .collect(),
         FirstGuess::ChangeOf(base) => change_point(model, fit, kind, base).into_iter().collect(),
     };

@@ -44,3 +44,20 @@ fn motion_that_is_played_again_and_again_is_no_lag_of_a_loop() {
         names_exactly(&answer(&scene.record()).diagnosis, &scene.effects);
     }
 }
+
+/// A line of 16 Hz is three and a half turns off by the stamps in 146 s of 1500 ppm.
+#[test]
+fn a_vibration_is_told_beside_a_drift() {
+    let mut values = vec![15.92, 0.27, 0.56, 0.68, 5.9, 3.2, 4.3];
+    values.extend([0.031, 0.063, 0.036, 5.9, 3.9, 4.3]);
+    for (ppm, seed) in [(-1470.0, 38), (540.0, 39)] {
+        let scene = Scene {
+            seconds: 146.0,
+            ..Scene::new(seed)
+        };
+        let scene = scene
+            .with(K::ClockDrift, &[ppm])
+            .with(K::Vibration, &values);
+        names_exactly(&answer(&scene.record()).diagnosis, &scene.effects);
+    }
+}
