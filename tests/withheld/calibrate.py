@@ -82,6 +82,22 @@ def fitted(chosen):
     return minimize(cost, np.zeros(x.shape[1])).x
 
 
+def log_odds(cause):
+    said = min(max(cause[2], 1e-6), 1 - 1e-9)
+    return np.log(said / (1 - said))
+
+
+def rescaled(chosen):
+    """(a, b) of the log-odds `a said + b`, with a weak prior on a of 1: two numbers where few answers are wrong. What is said stays in its order,
+    so what is named can stay as it is."""
+    x, y = np.array([log_odds(cause) for cause in chosen]), np.array([cause[1] for cause in chosen], float)
+
+    def cost(line):
+        odds = line[0] * x + line[1]
+        return np.sum(np.logaddexp(0, -odds) * y + np.logaddexp(0, odds) * (1 - y)) + 2 * (line[0] - 1) ** 2
+    return minimize(cost, np.array([1.0, 0.0])).x
+
+
 def table(title, said, right):
     print(f"\n{title}\n\n| said probability | mean said | right | n |\n|---|---|---|---|")
     error = 0.0
@@ -102,11 +118,13 @@ def main():
     parser.add_argument("--test", nargs="*", default=[], metavar="FOLDER")
     options = parser.parse_args()
     building = [cause for folder in options.fit for cause in causes(folder)]
-    weights = {}
+    weights, lines = {}, {}
     for kind, is_unknown in (("NAMED", False), ("OF_UNKNOWN", True)):
         chosen = [cause for cause in building if (cause[0] == "unknown") == is_unknown]
         if chosen:
             weights[is_unknown] = fitted(chosen)
+            lines[is_unknown] = rescaled(chosen)
+            print(kind, "rescaled: {:.3f} times the log-odds as said, plus {:.3f}".format(*lines[is_unknown]))
             print(kind, {name: round(float(weight), 2) for name, weight in zip(NAMES, weights[is_unknown])}, f"{len(chosen)} causes, {sum(not cause[1] for cause in chosen)} wrong")
     tests = {folder: list(causes(folder)) for folder in options.test}
     if len(tests) > 1:
@@ -119,6 +137,8 @@ def main():
         table(f"{name}: as said", np.array([cause[2] for cause in tested]), right)
         table(f"{name}: by the margin alone", np.array([cause[3] for cause in tested]), right)
         if len(weights) == 2:
+            odds = np.array([lines[cause[0] == "unknown"] @ [log_odds(cause), 1.0] for cause in tested])
+            table(f"{name}: rescaled", 1 / (1 + np.exp(-odds)), right)
             odds = np.array([regressors(cause) @ weights[cause[0] == "unknown"] for cause in tested])
             table(f"{name}: by this fit", 1 / (1 + np.exp(-odds)), right)
 

@@ -14,7 +14,7 @@ use crate::findings::{Findings, Unknown};
 use crate::fit::Fit;
 use crate::identify::unidentifiable;
 use crate::location::locate;
-use crate::policy::probability::{LEAST_NAMED, LEAST_OF_UNKNOWN, SMALL_SHARE};
+use crate::policy::probability::{LEAST_OF_SMALL_UNKNOWN, LEAST_OF_UNKNOWN, SMALL_SHARE};
 use crate::probability::{calibrate, is_calibration_of, probability_of};
 use crate::response::{LearntResponse, kept};
 use crate::screen::is_change;
@@ -208,7 +208,7 @@ impl<'a> DiagnosisBuilder<'a> {
             let own = with_it.iter().find(|cause| cause.effect == UNKNOWN)?;
             let is_taken_up = with_it.iter().any(|cause| is_calibration_of(&cause.effect));
             let least = if own.gap_share < SMALL_SHARE && !is_taken_up {
-                LEAST_NAMED
+                LEAST_OF_SMALL_UNKNOWN
             } else {
                 LEAST_OF_UNKNOWN
             };

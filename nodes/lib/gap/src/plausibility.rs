@@ -1,6 +1,6 @@
 //! Whether fitted effects look like what they are named after.
 
-use cromosim_imu::{Channel, EffectSet, PerChannel, Search, SpectralLine, Stage};
+use cromosim_imu::{Channel, EffectKind, EffectSet, PerChannel, Search, SpectralLine, Stage};
 use cromosim_spatial::{PoseLine, Spectrum};
 
 use crate::fit::{Fit, FitModel};
@@ -35,6 +35,11 @@ pub(crate) fn plausible_members(set: &EffectSet) -> EffectSet {
 /// Whether the set can be told from the shape of a smoothing of the reference, where one is undone.
 fn is_told_from_smoothing(model: &FitModel, set: &EffectSet) -> bool {
     model.basis.undone_smoothing.is_none() || told_from_smoothing(set) == *set
+}
+
+/// Whether an effect can be told from the shape of a smoothing that is undone, if one is.
+pub(crate) fn may_be_told(model: &FitModel, kind: EffectKind) -> bool {
+    model.basis.undone_smoothing.is_none() || kind.spec().stage != Stage::Tissue
 }
 
 /// The effects that can be told from the shape of a smoothing that is undone: that is only guessed, and

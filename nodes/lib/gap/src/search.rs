@@ -4,7 +4,7 @@ use cromosim_imu::{Channel, EffectKind, EffectSet, PerChannel, Search};
 
 use crate::axes::{larger, sum_over_channels};
 use crate::fit::{Fit, FitModel, free_values};
-use crate::plausibility::{is_sound, plausible_members};
+use crate::plausibility::{is_sound, may_be_told, plausible_members};
 use crate::policy::price;
 use crate::policy::search::{
     BEAM, EXCHANGES, FAR_BEHIND, FAR_LOWER, MOST_LOSS_NATS, MOST_MEMBERS, MOST_RISE,
@@ -171,7 +171,7 @@ fn searched(
 fn candidates(model: &FitModel, fit: &Fit, library: &[EffectKind]) -> Vec<(f64, Candidate)> {
     let mut candidates: Vec<_> = library
         .iter()
-        .filter(|kind| fit.set.get(**kind).is_none())
+        .filter(|kind| fit.set.get(**kind).is_none() && may_be_told(model, **kind))
         .flat_map(|kind| screen(model, fit, *kind, library))
         .map(|candidate| {
             (
