@@ -6,8 +6,7 @@ use cromosim_spatial::{PoseLine, Spectrum};
 use crate::fit::{Fit, FitModel};
 use crate::policy::vibration::{
     ABOVE_HZ, BELOW_HZ, FASTEST_STEADY_MOTION_HZ, IN_REFERENCE_HEIGHT, IN_REFERENCE_PART,
-    LEAST_HEIGHT, LEAST_HEIGHT_IN_PHASE, LEAST_HZ, LEAST_POWER, MOST_HEIGHT_IN_PHASE,
-    MOST_HEIGHT_LEFT, MOST_LEFT, SURROUNDINGS_HZ,
+    LEAST_HEIGHT, LEAST_HZ, LEAST_POWER, MOST_HEIGHT_LEFT, MOST_LEFT, SURROUNDINGS_HZ,
 };
 use crate::trace::trace;
 
@@ -83,10 +82,7 @@ fn is_true_vibration(model: &FitModel, fit: &Fit) -> bool {
         if !is_taken_away && (is_high || left.height > MOST_HEIGHT_LEFT) {
             return false;
         }
-        let is_in_phase = before.height > LEAST_HEIGHT_IN_PHASE
-            && is_taken_away
-            && left.height < MOST_HEIGHT_IN_PHASE;
-        stands_out |= is_high || is_in_phase;
+        stands_out |= is_high;
     }
     stands_out && !is_in_reference(model, &line)
 }
