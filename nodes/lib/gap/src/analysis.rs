@@ -83,7 +83,7 @@ impl<'a> Analysis<'a> {
                 is_white: is_white(prepared, &residual),
                 is_steady: is_steady(prepared, &residual),
                 has_tails: has_tails(prepared, &residual),
-                readings_are_level: readings_are_level(prepared),
+                readings_are_level: readings_are_level(prepared, found_noise),
             },
             self.library,
         );

@@ -94,8 +94,8 @@ pub(crate) mod sensor_noise {
     /// channel to be as loud as it is by noise: a third of it was reached where blows at 25 Hz passed for noise
     /// (tests/withheld/other_origin.py, seed 4), and white noise reaches all of it.
     pub const LEVEL: f64 = 0.5;
-    /// Most of the loudest band over the quietest one in the upper half of the readings' own spectrum where they hold
-    /// noise alone: a few dozen values give each level to within a fifth. Made on one recording (8bde33c650 of seed 1032 of the
+    /// Most of the loudest band over the quietest one in the upper half of the readings' own spectrum, and over the noise that
+    /// was found, where they hold noise alone: a few dozen values give each level to within a fifth. Made on one recording (8bde33c650 of seed 1032 of the
     /// third generator: 1.1; with motion there it is tens).
     pub const LEVEL_READINGS: f64 = 1.5;
     /// Mean square of fourth differences over what their median says, from which on they are no normal noise, whose
@@ -264,7 +264,7 @@ pub(crate) mod report {
     /// is a cause.
     pub const EXCESS_NOISE: f64 = 1.0;
     /// The same where something else is broad enough to pass for noise: beside a smoothed
-    /// reference where the readings are not level themselves, or [`MANY_MISSING`] messages.
+    /// reference or [`MANY_MISSING`] messages where the readings are not level themselves, or blows.
     pub const DOUBTFUL_EXCESS_NOISE: f64 = 20.0;
     /// The same beside something unknown in the channel: what is unknown may be broad, but hardly level and steady with
     /// five times the declared variance. No source for the number.

@@ -250,11 +250,11 @@ fn excess_noise(model: &FitModel, observations: &Observations, channel: Channel)
     let of_rounding = step * step / 12.0;
     let found = observations.found_noise[channel].powi(2);
     let beyond = found - of_rounding - declared.powi(2) - of_reference;
-    // What a smoothed reference lacks is broad enough to pass for noise where the readings hold it, and so are blows.
+    // What a smoothed reference lacks, or missing messages, is broad enough to pass for noise where the readings hold it,
+    // and so are blows.
     let may_lack_motion =
-        model.basis.undone_smoothing.is_some() && !observations.readings_are_level[channel];
-    let is_doubtful = may_lack_motion
-        || prepared.missing.fraction > MANY_MISSING
+        model.basis.undone_smoothing.is_some() || prepared.missing.fraction > MANY_MISSING;
+    let is_doubtful = (may_lack_motion && !observations.readings_are_level[channel])
         || observations.has_tails[channel];
     let factor = if is_doubtful {
         DOUBTFUL_EXCESS_NOISE

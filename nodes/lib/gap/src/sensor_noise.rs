@@ -192,14 +192,17 @@ pub(crate) fn is_white(prepared: &PreparedPlacement, residual: &[Vec<f64>]) -> P
     })
 }
 
-/// Whether the upper half of the readings' own spectrum is level: what a reference lacks of the motion is not in them,
-/// nor is motion.
-pub(crate) fn readings_are_level(prepared: &PreparedPlacement) -> PerChannel<bool> {
+/// Whether the upper half of the readings' own spectrum is level, at no more than was found (standard deviations): what a
+/// reference lacks of the motion is not in them, nor is motion.
+pub(crate) fn readings_are_level(
+    prepared: &PreparedPlacement,
+    found: PerChannel<f64>,
+) -> PerChannel<bool> {
     let measured = prepared.on_sample_grid(|k, axis| value_on_axis(&prepared.measured[k], axis));
     PerChannel::from_fn(|channel| {
         let levels = || band_variances(prepared, &measured, channel, &UPPER_BANDS);
         let least = levels().fold(f64::INFINITY, f64::min);
-        levels().fold(0.0, f64::max) < LEVEL_READINGS * least
+        levels().fold(0.0, f64::max) < LEVEL_READINGS * least.min(found[channel].powi(2))
     })
 }
 

@@ -91,3 +91,19 @@ fn rounding_is_no_noise_beside_the_rounding() {
     let noise = answer.effects.declared_noise.accel_density * IMU_HZ.sqrt();
     assert!(noise < 0.05, "{noise}");
 }
+
+#[test]
+fn noise_is_told_where_messages_are_missing() {
+    let scene = Scene {
+        motion: Motion::random(16).slowed(4.0),
+        imu_hz: 200.0,
+        ..Scene::new(16)
+    };
+    let scene = scene
+        .with(K::DroppedSamples, &[0.15, 3.0])
+        .with(K::GyroNoise, &[3.5 * SIGMA[1] / 200_f64.sqrt()]);
+    assert_eq!(
+        names(&answer(&scene.record()).diagnosis),
+        ["dropped_samples", "gyro_noise"]
+    );
+}
