@@ -94,9 +94,10 @@ pub(crate) mod sensor_noise {
     /// channel to be as loud as it is by noise: a third of it was reached where blows at 25 Hz passed for noise
     /// (tests/withheld/other_origin.py, seed 4), and white noise reaches all of it.
     pub const LEVEL: f64 = 0.5;
-    /// Most of the loudest band over the quietest one in the upper half of the readings' own spectrum, and over the noise that
-    /// was found, where they hold noise alone: a few dozen values give each level to within a fifth. Made on one recording (8bde33c650 of seed 1032 of the
-    /// third generator: 1.1; with motion there it is tens).
+    /// Most of the loudest band in the upper half of the readings' own spectrum over the quietest one, and over the noise that
+    /// was found, where they hold noise alone: a few dozen values give each level to within a fifth. Made on two recordings
+    /// (8bde33c650 of seed 1032 of the third generator, 4dfa49fc61 of seed 1033 of the fourth: 1.1 and 1.2; with motion
+    /// there it is tens).
     pub const LEVEL_READINGS: f64 = 1.5;
     /// Mean square of fourth differences over what their median says, from which on they are no normal noise, whose
     /// ratio is 1 to within a fifth for a few hundred of them. No source for the number.
