@@ -13,7 +13,10 @@ use crate::trace::trace;
 /// Whether fitted effects are what they are named after.
 pub(crate) fn is_sound(model: &FitModel, fit: &Fit) -> bool {
     is_plausible(&fit.set)
-        && is_told_from_smoothing(model, &fit.set)
+        && fit
+            .set
+            .iter()
+            .all(|effect| may_be_told(model, effect.kind()))
         && is_true_vibration(model, fit)
 }
 
@@ -31,20 +34,19 @@ pub(crate) fn plausible_members(set: &EffectSet) -> EffectSet {
     })
 }
 
-/// Whether the set can be told from the shape of a smoothing of the reference, where one is undone.
-fn is_told_from_smoothing(model: &FitModel, set: &EffectSet) -> bool {
-    model.basis.undone_smoothing.is_none() || told_from_smoothing(set) == *set
-}
-
-/// Whether an effect can be told from the shape of a smoothing that is undone, if one is.
+/// Whether an effect can be told from the shape of a smoothing of the reference, where one is undone.
 pub(crate) fn may_be_told(model: &FitModel, kind: EffectKind) -> bool {
-    model.basis.undone_smoothing.is_none() || kind.spec().stage != Stage::Tissue
+    model.basis.undone_smoothing.is_none() || is_told_from_smoothing(kind)
 }
 
-/// The effects that can be told from the shape of a smoothing that is undone: that is only guessed, and
-/// what is left of it looks like a tissue under the sensor.
+/// The effects that can be told from the shape of a smoothing that is undone.
 pub(crate) fn told_from_smoothing(set: &EffectSet) -> EffectSet {
-    set.filtered(|effect| effect.kind().spec().stage != Stage::Tissue)
+    set.filtered(|effect| is_told_from_smoothing(effect.kind()))
+}
+
+/// The shape of a smoothing is only guessed, and what is left of it looks like a tissue under the sensor.
+fn is_told_from_smoothing(kind: EffectKind) -> bool {
+    kind.spec().stage != Stage::Tissue
 }
 
 /// Whether a vibration in the set is more than motion that the reference does not resolve: strong

@@ -185,8 +185,11 @@ impl FrameGrid {
             offset_s: (self.offset_s + 0.5 / self.rate_hz) % (1.0 / self.rate_hz),
             ..*self
         };
+        let scatter = self.scatter(poses);
+        let chords = Chords::fit(poses, self.rate_hz, self.offset_s);
+        let off = chords.misfit;
         let of_nats = |nats: f64| nats / (1.5 * poses.stamps.len() as f64);
-        let needed = if kinks.is_of_neighbours() || !self.is_within_noise(poses) {
+        let needed = if kinks.is_of_neighbours() || !scatter.covers(off) {
             BETTER_THAN_SHIFTED.max(of_nats(BETTER_THAN_SHIFTED_NATS))
         } else {
             of_nats(BETTER_IN_NOISE_NATS).min(BETTER_THAN_SHIFTED)
@@ -194,29 +197,7 @@ impl FrameGrid {
         shifted.misfit(kinks, poses) - self.misfit(kinks, poses) > needed
             && kinks.are_marked(self.rate_hz)
             && (kinks.is_of_neighbours() || !kinks.is_harmonic(self.rate_hz))
-            && self.is_straight(poses, kinks.is_of_neighbours())
-    }
-
-    /// Whether the poses lie on the chords as well as their noise lets them.
-    fn is_straight(&self, poses: &PoseSeries, shows_between_neighbours: bool) -> bool {
-        let most = if shows_between_neighbours {
-            MOST_OFF
-        } else {
-            MOST_OFF_IN_NOISE
-        };
-        let scatter = self.scatter(poses);
-        let Some(within) = scatter.within else {
-            return true;
-        };
-        let chords = Chords::fit(poses, self.rate_hz, self.offset_s);
-        (0..2).all(|of| chords.misfit[of] <= most * within[of] + MOST_OFF_PART * scatter.all[of])
-    }
-
-    /// Whether the poses are off the chords by no more than the noise within these.
-    fn is_within_noise(&self, poses: &PoseSeries) -> bool {
-        let chords = Chords::fit(poses, self.rate_hz, self.offset_s);
-        let within = self.scatter(poses).within;
-        within.is_some_and(|within| (0..2).all(|of| chords.misfit[of] <= OFF_IN_NOISE * within[of]))
+            && scatter.lets_be_straight(off, kinks.is_of_neighbours())
     }
 
     /// White noise of poses between two frames, which their second differences within a chord tell: what
@@ -258,6 +239,26 @@ struct Scatter {
     /// Of those within a chord; none where these are few.
     within: Option<[f64; 2]>,
     all: [f64; 2],
+}
+
+impl Scatter {
+    /// Whether poses that are so far off their chords lie on them as well as their noise lets them.
+    fn lets_be_straight(&self, off: [f64; 2], shows_between_neighbours: bool) -> bool {
+        let most = if shows_between_neighbours {
+            MOST_OFF
+        } else {
+            MOST_OFF_IN_NOISE
+        };
+        self.within.is_none_or(|within| {
+            (0..2).all(|of| off[of] <= most * within[of] + MOST_OFF_PART * self.all[of])
+        })
+    }
+
+    /// Whether they are off by no more than that noise.
+    fn covers(&self, off: [f64; 2]) -> bool {
+        self.within
+            .is_some_and(|within| (0..2).all(|of| off[of] <= OFF_IN_NOISE * within[of]))
+    }
 }
 
 /// Rates of kinks that show as a line, the lowest first: as itself or, above half the poses' rate, as
