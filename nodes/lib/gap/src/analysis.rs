@@ -14,6 +14,7 @@ use crate::policy::report::MOSTLY_EXPLAINED;
 use crate::policy::search::{MOST, MOST_AT_FIRST, ROUNDS};
 use crate::progress::{self, Progress, THINNED};
 use crate::reportable::{Observations, is_ordinary, reportable_effects};
+use crate::resolved_noise::{may_fold_over, resolved_noise};
 use crate::search::{
     ScoredEffectSet, excess, exchanged, score, score_as_it_is, search, search_down_to_noise,
 };
@@ -84,6 +85,8 @@ impl<'a> Analysis<'a> {
                 is_steady: is_steady(prepared, &residual),
                 has_tails: has_tails(prepared, &residual),
                 readings_are_level: readings_are_level(prepared, found_noise),
+                resolved_noise: resolved_noise(prepared, &model.basis, &residual),
+                may_fold_over: may_fold_over(prepared, &model.basis, found_noise),
             },
             self.library,
         );

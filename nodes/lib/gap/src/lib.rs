@@ -48,6 +48,7 @@ mod reference_tracks;
 pub mod report;
 mod reportable;
 mod residual_regressions;
+mod resolved_noise;
 mod response;
 mod same_motion;
 mod screen;

@@ -86,6 +86,16 @@ impl NoiseBasis {
     }
 }
 
+/// The reference's error in a band of a channel.
+pub(crate) struct ReferenceError {
+    /// Per sample, were it as dense in all bands.
+    pub variance: f64,
+    /// Most that motion can leave which the estimate does not keep, with what folds over.
+    pub of_lost_motion: f64,
+    /// Whether the estimate keeps the motion there.
+    pub is_resolved: bool,
+}
+
 /// One-sided densities at a frequency, by channel.
 struct Expected {
     /// The error of the estimate, and the sensor's noise once it is added.
@@ -150,16 +160,32 @@ impl NoiseBasis {
         channel: Channel,
         bands: &[(f64, f64)],
     ) -> f64 {
+        let errors = self.reference_errors(prepared, channel, bands);
+        let least = errors
+            .map(|error| error.variance)
+            .fold(f64::INFINITY, f64::min);
+        least.max(0.0)
+    }
+
+    /// What the reference's error leaves in the middles of bands (parts of half of the IMU's rate).
+    pub fn reference_errors(
+        &self,
+        prepared: &PreparedPlacement,
+        channel: Channel,
+        bands: &[(f64, f64)],
+    ) -> impl Iterator<Item = ReferenceError> {
         let nyquist_hz = prepared.rate_hz / 2.0;
         let reported = self.estimate.spectra();
         let white = self.sigma[channel] * self.sigma[channel];
-        let of_band = |(from, to): &(f64, f64)| {
+        bands.iter().map(move |(from, to)| {
             let middle_hz = 0.5 * (from + to) * nyquist_hz;
             let expected = self.expected_folded(middle_hz, prepared.rate_hz, &reported);
-            expected.known[channel] * nyquist_hz - white
-        };
-        let least = bands.iter().map(of_band).fold(f64::INFINITY, f64::min);
-        least.max(0.0)
+            ReferenceError {
+                variance: expected.known[channel] * nyquist_hz - white,
+                of_lost_motion: expected.hidden[channel] * nyquist_hz,
+                is_resolved: expected.through[channel] >= RESOLVED,
+            }
+        })
     }
 
     /// The densities of the reference's error, before what is lost is added.

@@ -115,6 +115,25 @@ pub(crate) mod sensor_noise {
     pub const STEADY: f64 = 0.4;
 }
 
+/// When a sensor's white noise is read below the frequencies that its reference does not resolve. Made on four recordings
+/// (9e63735251, fb7c8affef, 043f6ba316 and 614135f754 of seed 1033 of the fourth generator and the second).
+pub(crate) mod resolved_noise {
+    /// Most of a band's level that the reference's error is. It was 0.3 of it where bands of noise were level.
+    pub const MOST_OF_REFERENCE: f64 = 0.5;
+    /// Most of a level band over the least: with the reference's error known to a half, and a few dozen values that
+    /// give each level to within a fifth, 1.4 was met. Motion rises by tens from band to band.
+    pub const LEVEL: f64 = 1.6;
+    /// Bands that have to be level.
+    pub const LEAST_BANDS: usize = 2;
+    /// Factor on the level of the least band in the upper half, which white noise is in too; as in the lower half
+    /// ([`super::sensor_noise::OF_LOWER_BANDS`]).
+    pub const OF_UPPER_BANDS: f64 = 1.4;
+    /// Level of the quietest band in the upper half of the readings' own spectrum, in units of the noise, from which on motion
+    /// that the reference may lack goes on beyond half of the IMU's rate and folds over. Noise told truly beside as much lost
+    /// motion had at most 3.7 (43e346b477 of seed 1032 of the fourth generator), motion that folded over 4.9 (35f07255b6 of 1033).
+    pub const READINGS: f64 = 4.2;
+}
+
 /// When readings on a lattice clip whose own digits leave it open. Made on one recording (44f4bb04be of seed 1024
 /// of the second generator: 2.1 steps and 7 standard errors); no other with such a limit has been met.
 pub(crate) mod clipping {

@@ -16,6 +16,7 @@ use crate::policy::report::{
     ORDINARY_BESIDE_REFERENCE_NOISE, ORDINARY_BESIDE_SMOOTHING, OUTWEIGHING_NATS, REFERENCE_NOISE,
     REFERENCE_UNCERTAINTY, ROUNDING_SIGMAS, ROUNDING_UNCERTAINTY, STEP,
 };
+use crate::resolved_noise::ResolvedNoise;
 use crate::sensor_noise::UPPER_BANDS;
 use crate::trace::trace;
 
@@ -34,6 +35,10 @@ pub(crate) struct Observations<'a> {
     pub has_tails: PerChannel<bool>,
     /// Whether the top of the readings' own spectrum is level.
     pub readings_are_level: PerChannel<bool>,
+    /// White noise where the reference resolves the motion.
+    pub resolved_noise: PerChannel<Option<ResolvedNoise>>,
+    /// Whether the noise found may be motion that folds over.
+    pub may_fold_over: PerChannel<bool>,
 }
 
 /// The causes: fitted effects beyond what is ordinary, and those that are read off.
@@ -240,41 +245,55 @@ fn read_off(model: &FitModel, observations: &Observations, from: ReadOff) -> Opt
 /// Density of the white noise beyond the declared, where it is a cause.
 fn excess_noise(model: &FitModel, observations: &Observations, channel: Channel) -> Option<f64> {
     let prepared = model.prepared;
-    let declared = prepared.declared[channel]?;
-    let step = observations.step(channel);
+    let declared = prepared.declared[channel]?.powi(2);
+    // Rounding adds step^2 / 12 of noise of its own.
+    let of_rounding = observations.step(channel).powi(2) / 12.0;
+    let factor = excess_factor(model, observations, channel);
+    let rate_hz = prepared.rate_hz;
+    let density = |variance: f64, of_reference: f64| {
+        let beyond = variance - of_rounding - declared;
+        let needed = factor * declared
+            + ROUNDING_UNCERTAINTY * of_rounding
+            + REFERENCE_UNCERTAINTY * of_reference;
+        (beyond > needed).then(|| (beyond / rate_hz).sqrt())
+    };
     // At 25 Hz the reference's error folds over into all bands.
     let of_reference = model
         .basis
         .least_reference_error(prepared, channel, &UPPER_BANDS);
-    // Rounding adds step^2 / 12 of noise of its own.
-    let of_rounding = step * step / 12.0;
     let found = observations.found_noise[channel].powi(2);
-    let beyond = found - of_rounding - declared.powi(2) - of_reference;
+    let resolved = observations.resolved_noise[channel]
+        .filter(|_| !observations.has_tails[channel] && of_rounding == 0.0);
+    let is_white = observations.is_white[channel];
+    let is_steady = observations.is_steady[channel];
+    let may_fold_over = observations.may_fold_over[channel];
+    trace(|| {
+        eprintln!(
+            "noise of {channel:?}: found {found:.3e}, declared {declared:.3e} times {factor}, reference {of_reference:.3e}, white {is_white} steady {is_steady} tails {} folds {may_fold_over}, {resolved:?}",
+            observations.has_tails[channel]
+        );
+    });
+    let of_all = || density(found - of_reference, of_reference);
+    let of_resolved = || resolved.and_then(|noise| density(noise.variance, noise.of_reference));
+    let white = is_white.then(of_all).flatten();
+    white
+        .or_else(of_resolved)
+        .filter(|_| is_steady && !may_fold_over)
+}
+
+/// Variance of white noise beyond the declared, in units of the declared, from which on it is a cause.
+fn excess_factor(model: &FitModel, observations: &Observations, channel: Channel) -> f64 {
     // What a smoothed reference lacks, or missing messages, is broad enough to pass for noise where the readings hold it,
     // and so are blows.
     let may_lack_motion =
-        model.basis.undone_smoothing.is_some() || prepared.missing.fraction > MANY_MISSING;
+        model.basis.undone_smoothing.is_some() || model.prepared.missing.fraction > MANY_MISSING;
     let is_doubtful = (may_lack_motion && !observations.readings_are_level[channel])
         || observations.has_tails[channel];
-    let factor = if is_doubtful {
+    if is_doubtful {
         DOUBTFUL_EXCESS_NOISE
     } else {
         EXCESS_NOISE
-    };
-    let needed = factor * declared.powi(2)
-        + ROUNDING_UNCERTAINTY * of_rounding
-        + REFERENCE_UNCERTAINTY * of_reference;
-    let is_noise = observations.is_white[channel] && observations.is_steady[channel];
-    trace(|| {
-        eprintln!(
-            "noise of {channel:?}: found {found:.3e}, declared {:.3e}, reference {of_reference:.3e}, beyond {beyond:.3e} of {needed:.3e}, white {} steady {} tails {}",
-            declared.powi(2),
-            observations.is_white[channel],
-            observations.is_steady[channel],
-            observations.has_tails[channel]
-        )
-    });
-    (is_noise && beyond > needed).then(|| (beyond / prepared.rate_hz).sqrt())
+    }
 }
 
 impl Observations<'_> {

@@ -23,7 +23,7 @@ const QUIET_SIGMAS: f64 = 0.253_347_1;
 pub(crate) const UPPER_BANDS: [(f64, f64); 4] =
     [(0.5, 0.62), (0.62, 0.74), (0.74, 0.86), (0.86, 0.97)];
 /// And below it, where a reference resolves more of the motion.
-const LOWER_BANDS: [(f64, f64); 5] = [
+pub(crate) const LOWER_BANDS: [(f64, f64); 5] = [
     (0.03, 0.06),
     (0.06, 0.12),
     (0.12, 0.2),
@@ -119,12 +119,12 @@ fn noise_variances(
         .chain(fourth_differences(prepared, residual, channel))
 }
 
-fn band_variances(
+pub(crate) fn band_variances<'a>(
     prepared: &PreparedPlacement,
     residual: &[Vec<f64>],
     channel: Channel,
-    bands: &'static [(f64, f64)],
-) -> impl Iterator<Item = f64> {
+    bands: &'a [(f64, f64)],
+) -> impl Iterator<Item = f64> + use<'a> {
     let spectrum = prepared.channel_spectrum(residual, channel);
     let nyquist_hz = prepared.rate_hz / 2.0;
     bands.iter().filter_map(move |(a, b)| {

@@ -63,6 +63,35 @@ fn motion_that_no_reference_resolves_is_no_noise() {
 }
 
 #[test]
+fn noise_is_told_below_motion_that_no_reference_resolves() {
+    for seed in [20, 21] {
+        let scene = Scene {
+            motion: Motion::random(seed).shivering(1.5, seed),
+            imu_hz: 50.0,
+            ..Scene::new(seed)
+        };
+        let answer = answer(&scene.with(K::AccelNoise, &[0.02]).record());
+        assert_eq!(names(&answer.diagnosis), ["accel_noise"]);
+        let density = &answer.diagnosis.causes[0].parameters["density"];
+        near(density.as_f64().unwrap(), 0.02, 0.001, "density");
+    }
+}
+
+#[test]
+fn motion_that_folds_over_is_no_noise() {
+    // The reference resolves the motion up to half of the IMU's rate, and not beyond.
+    for seed in [22, 23] {
+        let motion = Motion::random(seed).humming(1.0, 4.0..12.0, seed);
+        let scene = Scene {
+            motion: motion.humming(0.3, 13.0..25.0, seed + 10),
+            imu_hz: 25.0,
+            ..Scene::new(seed)
+        };
+        assert_eq!(names(&answer(&scene.record()).diagnosis), [""; 0]);
+    }
+}
+
+#[test]
 fn an_error_of_the_reference_that_folds_over_is_no_noise() {
     // The reference resolves motion beyond half of the IMU's rate, so that nothing of its error is kept out.
     for seed in [18, 19] {
