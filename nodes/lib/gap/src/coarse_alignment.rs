@@ -99,7 +99,9 @@ impl CoarseAlignment {
         let slopes = |turn: &Matrix3<f64>| ForceSlopes::new(&rows, track, turn);
         let axes = axes.or_else(|| exchanged_axes(&turns, slopes));
         let (turn, slopes) = axes_of_forces(axes, slopes);
-        let slow = ForceSlopes::of_means(&rows, track, &turn, count);
+        let variance = prepared.declared[Channel::Accelerometer].map_or(0.0, |sigma| sigma.powi(2));
+        let slow = ForceSlopes::of_means(&rows, track, &turn, count)
+            .with_noise(variance / count.max(1) as f64);
         let scales = scales(&slopes, &slow, prepared.estimate.noise());
         Self {
             lag_s,
@@ -263,7 +265,10 @@ fn gyro_axes(turns: &Turns, slow: &Turns) -> (Option<Matrix3<f64>>, f64) {
 
 #[cfg(test)]
 mod tests {
+    use cromosim_imu::normal_pair;
     use nalgebra::Vector3;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha12Rng;
 
     use super::*;
 
@@ -369,10 +374,19 @@ mod tests {
         (track, readings)
     }
 
-    fn scales_of((track, readings): &(KinematicTrack, Vec<Reading>), noise: f64) -> [f64; 2] {
+    fn scales_of(seen: &(KinematicTrack, Vec<Reading>), noise: f64) -> [f64; 2] {
+        scales_beside(seen, noise, 0.0)
+    }
+
+    /// The same beside a sensor's noise that has such a variance.
+    fn scales_beside(
+        (track, readings): &(KinematicTrack, Vec<Reading>),
+        noise: f64,
+        variance: f64,
+    ) -> [f64; 2] {
         let rows: Vec<(&Reading, usize)> = readings.iter().zip(0..).collect();
         let as_it_is = Matrix3::identity();
-        let slow = ForceSlopes::of_means(&rows, track, &as_it_is, 50);
+        let slow = ForceSlopes::of_means(&rows, track, &as_it_is, 50).with_noise(variance / 50.0);
         let noise = PoseNoise {
             position: noise,
             rotation: 1e-3,
@@ -403,6 +417,26 @@ mod tests {
                 reading.specific_force = gravity + moved * little;
             }
             assert_eq!(scales_of(&(track, readings), 1e-4), [1.0, told]);
+        }
+    }
+
+    #[test]
+    fn feet_are_told_where_readings_hold_nearly_all_but_for_their_noise() {
+        let (little, gravity, sigma) = (0.03, Vector3::z() * 9.80665, 0.08);
+        let mut random = ChaCha12Rng::seed_from_u64(5);
+        let mut noise = || normal_pair(&mut random)[0] * sigma;
+        for (units, told) in [(1.0 / 0.3048, 1.0 / 0.3048), (1.0, 1.0), (2.8, 1.0)] {
+            let (mut track, mut readings) = forces(units, 1.0, Vector3::z());
+            for acceleration in &mut track.acceleration_in_segment {
+                *acceleration *= little;
+            }
+            for reading in &mut readings {
+                let moved = reading.specific_force - gravity;
+                let noise = Vector3::new(noise(), noise(), noise());
+                reading.specific_force = gravity + moved * little + noise;
+            }
+            let seen = (track, readings);
+            assert_eq!(scales_beside(&seen, 1e-4, sigma * sigma), [1.0, told]);
         }
     }
 
