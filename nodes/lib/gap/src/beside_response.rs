@@ -11,12 +11,19 @@ use cromosim_imu::{Channel, Effect, EffectKind, EffectSet, PerChannel, Search};
 use crate::axes::{axes_of_channel, sum_over_channels, value_on_axis};
 use crate::fit::{Fit, FitModel};
 use crate::gram::channel_likelihood;
-use crate::policy::beside_response::{LEAST_GAIN_NATS, LEFT_BY_NOISE, OPEN, SHUT};
+use crate::policy::beside_response::{LEAST_GAIN_NATS, LEFT_BY_DELAY, LEFT_BY_NOISE, OPEN, SHUT};
 use crate::policy::response::LARGEST_FACTOR;
 use crate::prepared::FOLDS;
-use crate::response::{BANDS, Bands, Block, factors, held_out_gain};
+use crate::response::{BANDS, Bands, Block, EDGES_HZ, Edges, WINDOW_S, factors, held_out_gain};
 use crate::search::{ScoredEffectSet, score};
 use crate::trace::{names, trace};
+
+/// Bands of motion that is slow beside its reference's noise, Hz.
+const SLOW_EDGES_HZ: Edges = [
+    0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 13.0, 20.0, 30.0, 40.0,
+];
+/// Length of their windows, s.
+const SLOW_WINDOW_S: f64 = 4.0;
 
 /// The set without the members that do not earn their place where factors on the simulation, by frequency, stand beside
 /// both; a delay stands for a `low_pass`.
@@ -49,7 +56,12 @@ pub(crate) fn pruned_beside_response(
                 best.score
             );
         });
-        if beside >= worth {
+        let of_delay = if kind == EffectKind::LowPass {
+            LEFT_BY_DELAY * (worth - smaller.score)
+        } else {
+            0.0
+        };
+        if beside >= worth - of_delay {
             let margins = best.margins.iter().copied();
             let margins = margins.filter(|(member, _)| *member != kind).collect();
             worth = beside;
@@ -76,7 +88,7 @@ fn without(set: &EffectSet, kind: EffectKind, library: &[EffectKind]) -> Option<
 }
 
 /// By how much factors on the simulation raise the log-likelihood of the part of time that they were not learnt from,
-/// where they can be what the reference's filter does.
+/// where they can be what the reference's filter does; in the bands that gain more.
 fn gained(model: &FitModel, fit: &Fit) -> f64 {
     let prepared = model.prepared;
     let readings = &fit.prediction.readings;
@@ -89,11 +101,22 @@ fn gained(model: &FitModel, fit: &Fit) -> f64 {
         })
         .collect();
     let simulated = model.whitener.apply(&centred);
-    let bands = Bands::new(prepared.rate_hz);
+    let rate_hz = prepared.rate_hz;
+    [
+        Bands::new(rate_hz, WINDOW_S, &EDGES_HZ),
+        Bands::new(rate_hz, SLOW_WINDOW_S, &SLOW_EDGES_HZ),
+    ]
+    .iter()
+    .map(|bands| gained_in(model, fit, bands, &simulated))
+    .fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// The same of factors in some bands, with the whitened simulation.
+fn gained_in(model: &FitModel, fit: &Fit, bands: &Bands, simulated: &[f64]) -> f64 {
     let gained = PerChannel::from_fn(|channel| {
-        let blocks = whitened_blocks(model, &bands, channel, &simulated, &fit.residual);
-        let largest = largest_factors(model, &bands, channel);
-        let may_be = of_reference(model, &bands, channel, (&blocks, &largest));
+        let blocks = whitened_blocks(model, bands, channel, simulated, &fit.residual);
+        let largest = largest_factors(model, bands, channel);
+        let may_be = of_reference(model, bands, channel, (&blocks, &largest));
         let excluding: Vec<[f64; BANDS]> = (0..FOLDS)
             .map(|fold| {
                 let own = factors(&blocks, &largest, Some(fold));

@@ -16,14 +16,14 @@ use crate::simulations::{Simulations, Turn};
 use crate::trace::trace;
 
 /// Edges of the bands, Hz: thirds of an octave from 1 Hz on, one a hertz at least. Slower motion is taken as it is.
-const EDGES_HZ: [f64; 13] = [
+pub(crate) const EDGES_HZ: Edges = [
     1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 13.0, 16.0, 20.0, 25.0, 30.0, 40.0,
 ];
-pub(crate) const BANDS: usize = EDGES_HZ.len() - 1;
-/// Length of a window, s.
-const WINDOW_S: f64 = 2.0;
-/// Length of the blocks of time whose windows count as one, s: neighbouring windows overlap by half.
-const BLOCK_S: f64 = 2.0;
+pub(crate) const BANDS: usize = 12;
+/// Edges of bands, Hz.
+pub(crate) type Edges = [f64; BANDS + 1];
+/// Length of a window, and of the blocks of time whose windows count as one, s: neighbouring windows overlap by half.
+pub(crate) const WINDOW_S: f64 = 2.0;
 
 /// Factors of the bands.
 type Factors = PerChannel<[f64; BANDS]>;
@@ -280,7 +280,7 @@ impl Coordinates {
 fn blocks(compared: &Compared<'_>, channel: Channel) -> Vec<Block> {
     let prepared = compared.prepared;
     let coordinates = Coordinates::of(compared, channel);
-    let bands = Bands::new(prepared.rate_hz);
+    let bands = Bands::new(prepared.rate_hz, WINDOW_S, &EDGES_HZ);
     bands.blocks(prepared, |range, block| {
         let known = coordinates.known[range.end] - coordinates.known[range.start];
         if (known as f64) < LEAST_USABLE * range.len() as f64 {
@@ -294,16 +294,20 @@ fn blocks(compared: &Compared<'_>, channel: Channel) -> Vec<Block> {
 
 /// Transforms of Hann windows that overlap by half, by bands.
 pub(crate) struct Bands {
+    edges_hz: &'static Edges,
+    window_s: f64,
     transform: FourierPair,
     hann: Vec<f64>,
     spacing_hz: f64,
 }
 
 impl Bands {
-    pub fn new(rate_hz: f64) -> Self {
-        let window = ((WINDOW_S * rate_hz).round() as usize).max(2);
+    pub fn new(rate_hz: f64, window_s: f64, edges_hz: &'static Edges) -> Self {
+        let window = ((window_s * rate_hz).round() as usize).max(2);
         let turn = std::f64::consts::TAU / window as f64;
         Self {
+            edges_hz,
+            window_s,
             transform: FourierPair::new(window),
             hann: (0..window)
                 .map(|k| 0.5 - 0.5 * (turn * (k as f64 + 0.5)).cos())
@@ -319,7 +323,7 @@ impl Bands {
         mut add: impl FnMut(Range<usize>, &mut Block),
     ) -> Vec<Block> {
         let window = self.hann.len();
-        let place = |entry: usize| (entry as f64 / (BLOCK_S * prepared.rate_hz)) as usize;
+        let place = |entry: usize| (entry as f64 / (self.window_s * prepared.rate_hz)) as usize;
         let mut blocks = vec![Block::default(); place(prepared.length) + 1];
         let starts = (0..).map(|index| index * (window / 2));
         for start in starts.take_while(|start| start + window <= prepared.length) {
@@ -334,7 +338,7 @@ impl Bands {
 
     /// Lowest and highest frequency of a band, Hz.
     pub fn range_hz(&self, band: usize) -> [f64; 2] {
-        [EDGES_HZ[band], EDGES_HZ[band + 1]]
+        [self.edges_hz[band], self.edges_hz[band + 1]]
     }
 
     /// Expected power of an entry of white noise of unit variance.
@@ -368,7 +372,7 @@ impl Bands {
             let rest = (here - there) * Complex64::new(0.0, -0.5);
             block.residual += rest.norm_sqr();
             let hz = k as f64 * self.spacing_hz;
-            let next = EDGES_HZ.partition_point(|edge| *edge <= hz);
+            let next = self.edges_hz.partition_point(|edge| *edge <= hz);
             if (1..=BANDS).contains(&next) {
                 block.simulated[next - 1] += motion.norm_sqr();
                 block.both[next - 1] += (motion.conj() * rest).re;

@@ -100,6 +100,25 @@ fn noise_with_a_memory_is_no_filter_of_the_sensor() {
     }
 }
 
+/// Nor is it where motion is slow, and most of the noise with it.
+#[test]
+fn slow_noise_with_a_memory_is_no_filter_of_the_sensor() {
+    for (seed, slow) in [(49, 6.0), (51, 5.0), (53, 4.0)] {
+        let scene = Scene {
+            motion: Motion::random(seed).slowed(slow),
+            ..Scene::new(seed)
+        };
+        for (kind, value, named) in [
+            (K::TimeOffset, 0.11, "time_offset"),
+            (K::LowPass, 1.3, "low_pass"),
+        ] {
+            let record = scene.clone().with(kind, &[value]).record();
+            let record = with_memory(record, [2.5e-4, 1.2e-3], 0.012);
+            assert_eq!(names(&answer(&record).diagnosis), [named], "{seed}");
+        }
+    }
+}
+
 #[test]
 fn a_filter_is_told_beside_a_smoothing_of_the_reference() {
     for seed in [60, 61, 63] {
