@@ -9,8 +9,8 @@ use crate::noise_updates::with_estimate;
 use crate::plausibility::told_from_smoothing;
 use crate::policy::smoothing::{
     BESIDE, BEST_RATIO, CLOSER, FARTHER_FOR_CLOSER, LEAST_GAIN_NATS, LEAST_SHARE, MUCH_CLOSER,
-    MUCH_FARTHER, NOT_FARTHER, SHARPENINGS, SHORTEST_DELAY_S, SUSPICIOUS, SUSPICIOUS_IMITATED,
-    TRIAL_STEPS,
+    MUCH_FARTHER, NOT_FARTHER, SHARP, SHARPENINGS, SHORTEST_DELAY_S, SUSPICIOUS,
+    SUSPICIOUS_IMITATED, TRIAL_STEPS,
 };
 use crate::search::{ScoredEffectSet, excess, score, score_after, search_down_to_noise};
 use crate::trace::{names, trace};
@@ -78,7 +78,7 @@ pub(crate) fn try_smoothing<'a>(
     let is_believed = gained > needed
         && !reaches_no_motion(&smoothing, 1.0)
         && trial.outdoes_rivals(gained, &searched.fit.set, &scored.fit.set)
-        && comes_closer(&model, &score(&model, searched.fit.set.clone()), &searched);
+        && trial.is_of_motion(&smoothing, &searched);
     if is_believed {
         (undone, searched)
     } else {
@@ -177,6 +177,43 @@ impl<'a> Trial<'_, 'a> {
             }
         }
         (undone, searched, smoothing)
+    }
+
+    /// Whether the simulation comes closer, or no farther where the cutoff is a sharp one: most of a fast motion is lost in the
+    /// reference's noise, and undoing the rest brings the simulation hardly closer.
+    fn is_of_motion(&self, smoothing: &ZeroPhaseSmoothing, undone: &ScoredEffectSet) -> bool {
+        let plain = score(self.model, undone.fit.set.clone());
+        let ratio = distance(self.model, &plain, undone);
+        trace(|| eprintln!("  smoothing comes closer by {ratio:.3?}"));
+        let goes_no_farther = smaller(ratio) < 1.0 && larger(ratio) < NOT_FARTHER;
+        comes_closer(ratio) || (goes_no_farther && self.is_sharp(smoothing, &undone.fit.set))
+    }
+
+    /// Whether the cutoffs next to one, on both sides, lose much of what undoing it gains; of a reference that was interpolated each
+    /// cutoff near half of its frames' rate does.
+    fn is_sharp(&self, smoothing: &ZeroPhaseSmoothing, set: &EffectSet) -> bool {
+        if self.model.prepared.report.frames.is_some() {
+            return false;
+        }
+        let beside = Trial {
+            beside: with_plain_norms(self.model, vec![set.clone()]),
+            ..*self
+        };
+        let evidence = |factor: f64| {
+            let cutoff_hz = factor * smoothing.cutoff_hz;
+            let tried = beside.tried(ZeroPhaseSmoothing {
+                cutoff_hz,
+                ..*smoothing
+            });
+            tried.map(|tried| tried.evidence)
+        };
+        let around = [1.0, BETWEEN_ORDERS, BETWEEN_ORDERS.recip()].map(evidence);
+        let [Some(best), Some(higher), Some(lower)] = around else {
+            return false;
+        };
+        let lost = (best - higher.max(lower)) / (best - self.plain);
+        trace(|| eprintln!("  cutoffs next to it lose {lost:.3}"));
+        best > self.plain && lost > SHARP
     }
 
     /// Whether undoing it has more evidence than what was found without it has together with what was found since, and than
@@ -391,12 +428,10 @@ pub(crate) fn with_undone_smoothing<'a>(
     undone
 }
 
-/// Whether the simulation itself comes closer in one channel than with the same effects alone, and in
+/// Whether the simulation itself, by the ratio of its distances, comes closer in one channel than with the same effects alone, and in
 /// none moves away: what is undone must not cost more than it gives. The noise that it lets in may take one farther where the
 /// other comes much closer: factors by frequency keep that out in the end ([`crate::response`]).
-fn comes_closer(model: &FitModel, plain: &ScoredEffectSet, undone: &ScoredEffectSet) -> bool {
-    let ratio = distance(model, plain, undone);
-    trace(|| eprintln!("  smoothing comes closer by {ratio:.3?}"));
+fn comes_closer(ratio: PerChannel<f64>) -> bool {
     let (closer, farther) = (smaller(ratio), larger(ratio));
     let farther_for_closer = farther < FARTHER_FOR_CLOSER && closer * farther < MUCH_CLOSER;
     closer < CLOSER && (farther < NOT_FARTHER || farther_for_closer)

@@ -119,6 +119,21 @@ fn slow_noise_with_a_memory_is_no_filter_of_the_sensor() {
     }
 }
 
+/// Most of the motion is above the cutoff and lost in noise: the simulation comes hardly closer.
+#[test]
+fn a_smoothing_that_took_most_of_the_motion_is_told_by_its_cutoff() {
+    for (seed, cutoff_hz) in [(43, 3.8), (44, 3.0)] {
+        let motion = Motion::random(seed).humming(8.0, 8.0..20.0, seed);
+        let scene = Scene {
+            motion: motion.trembling(0.96, 8.0..20.0, seed + 5),
+            ..Scene::new(seed)
+        };
+        let record = scene.with(K::ReferenceSmoothing, &[cutoff_hz, 0.0]);
+        let diagnosis = answer(&record.record()).diagnosis;
+        assert_eq!(names(&diagnosis), ["reference_smoothing"], "{seed}");
+    }
+}
+
 #[test]
 fn a_filter_is_told_beside_a_smoothing_of_the_reference() {
     for seed in [60, 61, 63] {

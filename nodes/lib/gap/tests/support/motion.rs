@@ -34,6 +34,22 @@ pub struct Instant {
     pub angular_acceleration: Vector3<f64>,
 }
 
+/// A line each quarter of a hertz, whose derivatives of an order have the same size and are so large in all (root mean
+/// square by axis).
+fn lines(size: f64, order: i32, band_hz: Range<f64>, seed: u64) -> impl Iterator<Item = Term> {
+    let mut random = ChaCha12Rng::seed_from_u64(seed);
+    let count = (4.0 * (band_hz.end - band_hz.start)) as usize;
+    (0..count).map(move |k| {
+        let hz = band_hz.start + 0.25 * (k as f64 + random.random_range(0.2..0.8));
+        let size = size * (2.0 / count as f64).sqrt() / (TAU * hz).powi(order);
+        Term {
+            hz,
+            amplitude: Vector3::repeat(size),
+            phase: Vector3::from_fn(|_, _| random.random_range(0.0..TAU)),
+        }
+    })
+}
+
 impl Motion {
     /// Ten terms from 0.2 to 4 Hz each: some 4 m/s2 and 2 rad/s (root mean square of the vectors),
     /// and 80 degrees of turn.
@@ -161,17 +177,15 @@ impl Motion {
     /// The same with lines a quarter of a hertz apart, each of as much acceleration (m/s2 in all, by axis).
     #[must_use]
     pub fn humming(mut self, acceleration: f64, band_hz: Range<f64>, seed: u64) -> Self {
-        let mut random = ChaCha12Rng::seed_from_u64(seed);
-        let lines = (4.0 * (band_hz.end - band_hz.start)) as usize;
-        self.position.extend((0..lines).map(|k| {
-            let hz = band_hz.start + 0.25 * (k as f64 + random.random_range(0.2..0.8));
-            let size = acceleration * (2.0 / lines as f64).sqrt() / (TAU * hz).powi(2);
-            Term {
-                hz,
-                amplitude: Vector3::repeat(size),
-                phase: Vector3::from_fn(|_, _| random.random_range(0.0..TAU)),
-            }
-        }));
+        self.position.extend(lines(acceleration, 2, band_hz, seed));
+        self
+    }
+
+    /// The same with such lines of the rotation vector, each of as much angular velocity (rad/s).
+    #[must_use]
+    pub fn trembling(mut self, angular_velocity: f64, band_hz: Range<f64>, seed: u64) -> Self {
+        self.rotation
+            .extend(lines(angular_velocity, 1, band_hz, seed));
         self
     }
 
