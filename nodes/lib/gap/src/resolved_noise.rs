@@ -74,7 +74,7 @@ fn clear_bands(
     let bands = levels.zip(errors).filter_map(|((width, level), error)| {
         let level = level?;
         let is_clear = error.is_resolved && error.variance < MOST_OF_REFERENCE * level;
-        is_clear.then(|| Band {
+        is_clear.then_some(Band {
             width,
             variance: level - error.variance,
             of_reference: error.variance,
