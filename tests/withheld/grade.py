@@ -245,7 +245,7 @@ def grade_case(case, out, labels, results, cromosim):
 
 def title(label):
     """The suite, with the length where it is another than the suite's own."""
-    usual = label["suite"].startswith(("mechanics", "other-", "third-", "fourth-")) or label["seconds"] == generate.usual_seconds(label["suite"])
+    usual = label["suite"].startswith(("mechanics", "other-", "third-", "fourth-", "fifth-")) or label["seconds"] == generate.usual_seconds(label["suite"])
     return label["suite"] if usual else f"{label['suite']} {label['seconds']:.0f} s"
 
 

@@ -8,6 +8,7 @@ import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 
+import fifth_origin
 import fourth_origin
 import generate
 import grade
@@ -84,12 +85,14 @@ def write_cases(options, out, suite):
         return third_origin.generate(out, suite, options.seed, options.count, options.jobs)
     if suite in fourth_origin.SUITES:
         return fourth_origin.generate(out, suite, options.seed, options.count, options.jobs)
+    if suite in fifth_origin.SUITES:
+        return fifth_origin.generate(out, suite, options.seed, options.count, options.jobs)
     return generate.generate(out, suite, options.seed, options.count, jobs=options.jobs, seconds=options.seconds)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--suite", action="append", choices=[*generate.SUITES, *other_origin.SUITES, *third_origin.SUITES, *fourth_origin.SUITES, "mechanics"],
+    parser.add_argument("--suite", action="append", choices=[*generate.SUITES, *other_origin.SUITES, *third_origin.SUITES, *fourth_origin.SUITES, *fifth_origin.SUITES, "mechanics"],
                         help="may be repeated; default all but those of another origin, and mechanics, which needs MuJoCo")
     parser.add_argument("--count", type=int, help="cases of each suite; default the suite's own")
     parser.add_argument("--seconds", type=float, help="length of the fit recordings; default the suite's own")
