@@ -182,12 +182,14 @@ impl<'a> DiagnosisBuilder<'a> {
         }
     }
 
-    /// What the readings of each recording hold of the motion that its reference shows, by frequency.
+    /// What the readings of each recording hold of the motion that its reference shows, by frequency; in the units in
+    /// which it was reported.
     pub fn reference_responses(&self) -> Vec<Option<MotionResponse>> {
-        let parts = self.parts.iter();
-        parts
-            .map(|part| part.reference_response().cloned())
-            .collect()
+        let response = |part: &Part| {
+            let units = part.findings.model.prepared.report.length_units;
+            Some(part.reference_response()?.in_units_of_length(units))
+        };
+        self.parts.iter().map(response).collect()
     }
 
     /// The diagnosis; `recordings` are the names of the recordings.

@@ -48,7 +48,7 @@ impl<'a> ReferenceTracks<'a> {
 
     /// The same motion with a response.
     pub fn track_with(&self, set: &EffectSet, response: &MotionResponse) -> Arc<KinematicTrack> {
-        let estimate = self.estimate(set).with_response(response.clone());
+        let estimate = self.estimate(set).with_response(response);
         self.in_reported_units(Arc::new(self.model.prepared.track(&estimate)))
     }
 

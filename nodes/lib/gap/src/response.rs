@@ -72,6 +72,8 @@ fn learn(findings: &Findings, simulations: &Simulations) -> Option<LearntRespons
     let factors = |without: Option<usize>| -> Factors {
         PerChannel::from_fn(|channel| factors(&blocks[channel], &largest[channel], without))
     };
+    let estimate = simulations.reference_estimate(&set);
+    let learnt_from = estimate.densities_at(&centres());
     let excluding: Vec<Factors> = (0..FOLDS).map(|fold| factors(Some(fold))).collect();
     let helps = PerChannel::from_fn(|channel| {
         let own = &blocks[channel];
@@ -87,6 +89,7 @@ fn learn(findings: &Findings, simulations: &Simulations) -> Option<LearntRespons
             hz: centres(),
             position: of(Channel::Accelerometer),
             rotation: of(Channel::Gyroscope),
+            learnt_from: Some(learnt_from.clone()),
         }
     };
     Channel::ALL

@@ -3,11 +3,12 @@
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
+use std::sync::Arc;
 
 use cromosim_imu::{
     Channel, EffectKind, EffectSet, PerChannel, ReadOff, Reading, SensorModel, expected_rounding,
 };
-use cromosim_spatial::{KinematicTrack, MotionResponse, Stamp};
+use cromosim_spatial::{KinematicTrack, MotionResponse, PoseEstimate, Stamp};
 use nalgebra::{Matrix3, Quaternion, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha12Rng;
@@ -113,6 +114,11 @@ impl<'a> Simulations<'a> {
             }
         }
         readings
+    }
+
+    /// What the reference's motion under a set is estimated from.
+    pub fn reference_estimate(&self, set: &EffectSet) -> Arc<PoseEstimate> {
+        self.tracks.estimate(set)
     }
 
     /// The same of a motion with a response, where there is one.

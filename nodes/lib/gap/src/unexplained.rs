@@ -202,7 +202,7 @@ impl<'a> ReferenceVariances<'a> {
         let (whole, set) = (&simulations.whole, findings.applied());
         let estimate = findings.model.basis.estimate.as_ref();
         let estimate = match response {
-            Some(response) => Cow::Owned(estimate.with_response(response.clone())),
+            Some(response) => Cow::Owned(estimate.with_response(response)),
             None => Cow::Borrowed(estimate),
         };
         Self {

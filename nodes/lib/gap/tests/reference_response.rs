@@ -10,6 +10,7 @@ use cromosim_imu::{EffectKind as K, PlacementEffects, SensorModel};
 use cromosim_spatial::{PoseEstimate, so3};
 use nalgebra::{Quaternion, UnitQuaternion};
 use support::judge::answer;
+use support::motion::Motion;
 use support::{REFERENCE_HZ, Scene};
 
 /// How often the rotations of [`smoothed`] go through the mean with their neighbours, weights 1, 2, 1: what is left at f
@@ -38,7 +39,7 @@ fn gyro_gap(record: &PlacementRecord, effects: &PlacementEffects) -> f64 {
     let mut estimate =
         PoseEstimate::fit(&poses.stamps, &poses.positions, &poses.rotations).unwrap();
     if let Some(response) = &effects.reference_response {
-        estimate = estimate.with_response(response.clone());
+        estimate = estimate.with_response(response);
     }
     let model = SensorModel::new(&effects.effects, effects.epoch);
     let simulated = model.run(&estimate.track(200.0), &record.imu.stamps);
@@ -89,6 +90,43 @@ fn rotations_that_were_smoothed_alone_are_made_up_for() {
         (with / promised - 1.0).abs() < 0.15,
         "{with} rad/s, {promised} promised"
     );
+}
+
+/// What cameras see of a scene whose rotations they have trembling, 0.07 rad/s from 2 to 6 Hz.
+fn trembling(scene: &Scene) -> PlacementRecord {
+    let seen = Scene {
+        motion: scene.motion.clone().trembling(0.04, 2.0..6.0, 5),
+        ..scene.clone()
+    };
+    PlacementRecord {
+        reference: seen.record().reference,
+        ..scene.record()
+    }
+}
+
+#[test]
+fn errors_beside_a_slow_motion_are_no_part_of_a_livelier_one() {
+    let slow = Scene {
+        motion: Motion::random(45).slowed(3.0),
+        ..Scene::new(45)
+    };
+    let slow = slow.with(K::TimeOffset, &[0.03]);
+    let effects = answer(&trembling(&slow)).effects;
+    let response = effects.reference_response.clone().unwrap();
+    assert!(response.of_rotation(3.5) < 0.5, "{response:?}");
+    let plain = PlacementEffects {
+        reference_response: None,
+        ..effects.clone()
+    };
+    let livelier = Scene {
+        motion: Motion::random(46),
+        ..slow.clone()
+    };
+    for (scene, part) in [(&slow, 0.8), (&livelier, 1.02)] {
+        let later = trembling(&scene.again(90.0));
+        let (with, without) = (gyro_gap(&later, &effects), gyro_gap(&later, &plain));
+        assert!(with < part * without, "{with} rad/s, {without} without");
+    }
 }
 
 #[test]

@@ -273,7 +273,7 @@ impl Resimulation {
             let estimate = undone
                 .map(|smoothing| estimate.undoing(smoothing))
                 .unwrap_or(estimate);
-            let response = known.reference_response.clone();
+            let response = known.reference_response.as_ref();
             let estimate = response
                 .map(|response| estimate.with_response(response))
                 .unwrap_or(estimate);

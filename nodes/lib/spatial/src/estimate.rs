@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::filled::{Filled, all_filled, fill, lengthen};
-use crate::motion_response::MotionResponse;
+use crate::motion_response::{MotionResponse, PoseDensities};
 use crate::noise_floor::{LARGEST_GAIN, LARGEST_REPORTED_GAIN, LARGEST_RISE, NoiseFloor};
 use crate::pose_spectra::local_spectra;
 use crate::sample_grid::SampleGrid;
@@ -223,9 +223,32 @@ impl PoseEstimate {
         self.filtered_anew(self.undone, reach)
     }
 
-    /// The estimate with factors on what its filters pass, in place of those that it has.
+    /// How dense the poses are at some frequencies, noise included: means over the frequencies that lie nearest to each,
+    /// as the acceleration and the angular velocity have them (weights f^4 and f^2).
+    pub fn densities_at(&self, hz: &[f64]) -> PoseDensities {
+        let (position, rotation) = self.spectra();
+        let of = |spectrum: &Spectrum, power: i32| -> Vec<f64> {
+            (0..hz.len())
+                .map(|k| {
+                    let from = k.checked_sub(1).map_or(hz[k], |before| hz[before]);
+                    let to = hz.get(k + 1).unwrap_or(&hz[k]);
+                    spectrum.weighted_mean(0.5 * (from + hz[k]), 0.5 * (hz[k] + to), power)
+                })
+                .collect()
+        };
+        PoseDensities {
+            position: of(&position, 4),
+            rotation: of(&rotation, 2),
+        }
+    }
+
+    /// The estimate with factors on what its filters pass, in place of those that it has. Where the response says from
+    /// what poses it was learnt, the factors are those of the errors that it found there, beside this motion.
     #[must_use]
-    pub fn with_response(&self, response: MotionResponse) -> Self {
+    pub fn with_response(&self, response: &MotionResponse) -> Self {
+        let own = self.densities_at(&response.hz);
+        let gain = |hz: f64| undoing_gain(hz, self.undone, self.rate_hz).min(LARGEST_GAIN);
+        let response = response.of_poses(&own, &gain);
         let plain = Self {
             response: Some(Arc::new(response)),
             ..self.clone()

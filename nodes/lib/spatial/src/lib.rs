@@ -102,7 +102,7 @@ pub use golden::greatest_near;
 pub use grid::{check_times, relative_seconds, uniform_stamps};
 pub use influence::{Influence, SampleWeights};
 pub use low_passed::LowPassed;
-pub use motion_response::MotionResponse;
+pub use motion_response::{MotionResponse, PoseDensities};
 pub use nearest_name::{in_plain_words, meant, nearest_name};
 pub use pose_series::PoseSeries;
 pub use pose_source::PoseSource;

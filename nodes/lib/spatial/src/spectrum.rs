@@ -36,6 +36,24 @@ impl Spectrum {
         &self.density[from.min(to)..to]
     }
 
+    /// Mean density between two frequencies, Hz, with weights of a power of the frequency; the density in their middle
+    /// where no entry lies between.
+    pub fn weighted_mean(&self, from_hz: f64, to_hz: f64, power: i32) -> f64 {
+        let first = (from_hz / self.spacing_hz).ceil().max(1.0) as usize;
+        let last = ((to_hz / self.spacing_hz) as usize).min(self.density.len().saturating_sub(1));
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for k in first..=last {
+            let weight = self.frequency(k).powi(power);
+            sum += weight * self.density[k];
+            weights += weight;
+        }
+        if weights > 0.0 {
+            sum / weights
+        } else {
+            self.at(0.5 * (from_hz + to_hz))
+        }
+    }
+
     /// Median of the density between two frequencies, Hz.
     pub fn median(&self, from_hz: f64, to_hz: f64) -> Option<f64> {
         let mut values = self.band(from_hz, to_hz).to_vec();

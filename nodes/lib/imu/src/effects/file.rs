@@ -31,7 +31,8 @@ const SCHEMA: &str = "cromosim/effects/1";
 ///       - {effect: time_offset, seconds: 0.021}
 ///     unexplained: {accel_variance: 0.0021, gyro_variance: 1.2e-5}   # where something is, and
 ///     # {accel,gyro}_{reference_excess,late,late_per_second}, see [`UnexplainedErrors`]
-///     reference_response: {hz: [0.5, 7.0], accel: [1.0, 0.9], gyro: [1.0, 1.05]}   # where it is not 1
+///     reference_response: {hz: [0.5, 7.0], accel: [1.0, 0.9], gyro: [1.0, 1.05]}   # where it is not 1;
+///     # {position,rotation}_density of the poses that it was learnt from, see [`MotionResponse`]
 ///     magnetometer: {hard_iron: [5.0e-6, -2.0e-6, 1.0e-6]}   # where one was diagnosed, as in a device file
 ///     field_in_world: [0.0, 1.9e-5, -4.5e-5]   # T, as that magnetometer measures it
 ///     other_sessions:   # where several recordings were diagnosed together

@@ -1,4 +1,6 @@
 #![allow(clippy::unwrap_used)]
+use cromosim_spatial::PoseDensities;
+
 use super::*;
 use crate::EffectKind;
 
@@ -99,6 +101,7 @@ fn files_come_back_to_the_last_digit() {
         hz: vec![0.5, 7.0],
         position: vec![1.0, 0.9],
         rotation: vec![1.0, 1.05],
+        learnt_from: None,
     };
     let sessions = &mut all.placements.get_mut("wrist").unwrap().other_sessions;
     sessions[1].reference_response = Some(response.clone());
@@ -120,7 +123,13 @@ fn files_come_back_to_the_last_digit() {
                 ..Magnetometer::default()
             }),
             field_in_world: Some(Vector3::new(0.0, 1.9e-5, -4.5e-5)),
-            reference_response: Some(response),
+            reference_response: Some(MotionResponse {
+                learnt_from: Some(PoseDensities {
+                    position: vec![2e-4, 3.5e-11],
+                    rotation: vec![0.1, 0.0],
+                }),
+                ..response
+            }),
             ..wrist.clone()
         },
     );
@@ -242,6 +251,22 @@ fn a_response_that_makes_no_sense_is_refused() {
         (
             "{hz: [1, 2], accel: [1, 1], gyro: [1, -0.5]}",
             "gyro: expected factors from 0 to 10, found -0.5",
+        ),
+        (
+            "{hz: [1], accel: [1], gyro: [1], position_density: [1e-9]}",
+            "rotation_density: expected beside position_density",
+        ),
+        (
+            "{hz: [1], accel: [1], gyro: [1], rotation_density: [1e-9]}",
+            "position_density: expected beside rotation_density",
+        ),
+        (
+            "{hz: [1], accel: [1], gyro: [1], position_density: [], rotation_density: [1]}",
+            "position_density: expected 1 densities, one for each of hz, found 0",
+        ),
+        (
+            "{hz: [1], accel: [1], gyro: [1], position_density: [1], rotation_density: [-1]}",
+            "rotation_density: expected densities from 0 on, found -1",
         ),
     ] {
         let text = YAML.replacen(

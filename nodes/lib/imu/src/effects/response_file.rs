@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use cromosim_spatial::MotionResponse;
+use cromosim_spatial::{MotionResponse, PoseDensities};
 use serde::Deserialize;
 
 use super::number::number;
@@ -12,12 +12,15 @@ use crate::ImuError;
 const LARGEST_FACTOR: f64 = 10.0;
 
 /// As it stands in the file: the position's factors by what the accelerometer shows of them, the rotation's by the gyroscope.
+/// Files of earlier versions lack the densities of the poses from which these were learnt.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RawResponse {
     hz: Vec<f64>,
     accel: Vec<f64>,
     gyro: Vec<f64>,
+    position_density: Option<Vec<f64>>,
+    rotation_density: Option<Vec<f64>>,
 }
 
 impl RawResponse {
@@ -40,7 +43,13 @@ impl RawResponse {
 
     /// Checked; in words what is wrong with it.
     fn parse(self) -> Result<MotionResponse, String> {
-        let Self { hz, accel, gyro } = self;
+        let Self {
+            hz,
+            accel,
+            gyro,
+            position_density,
+            rotation_density,
+        } = self;
         let is_increasing = hz.windows(2).all(|pair| pair[0] < pair[1]);
         let are_frequencies = hz.iter().all(|value| value.is_finite() && *value >= 0.0);
         if hz.is_empty() || !is_increasing || !are_frequencies {
@@ -62,11 +71,44 @@ impl RawResponse {
             }
         }
         Ok(MotionResponse {
+            learnt_from: learnt_from(hz.len(), position_density, rotation_density)?,
             hz,
             position: accel,
             rotation: gyro,
         })
     }
+}
+
+/// The densities of the poses at `count` frequencies; in words what is wrong with them.
+fn learnt_from(
+    count: usize,
+    position: Option<Vec<f64>>,
+    rotation: Option<Vec<f64>>,
+) -> Result<Option<PoseDensities>, String> {
+    let (position, rotation) = match (position, rotation) {
+        (None, None) => return Ok(None),
+        (Some(position), Some(rotation)) => (position, rotation),
+        (None, _) => return Err("position_density: expected beside rotation_density".to_owned()),
+        (_, None) => return Err("rotation_density: expected beside position_density".to_owned()),
+    };
+    for (field, densities) in [
+        ("position_density", &position),
+        ("rotation_density", &rotation),
+    ] {
+        if densities.len() != count {
+            return Err(format!(
+                "{field}: expected {count} densities, one for each of hz, found {}",
+                densities.len()
+            ));
+        }
+        let is_density = |value: &f64| value.is_finite() && *value >= 0.0;
+        if let Some(odd) = densities.iter().find(|value| !is_density(value)) {
+            return Err(format!(
+                "{field}: expected densities from 0 on, found {odd}"
+            ));
+        }
+    }
+    Ok(Some(PoseDensities { position, rotation }))
 }
 
 /// A line of the file; nothing where there is none.
@@ -79,11 +121,20 @@ pub(crate) fn write_response(text: &mut String, indent: &str, response: Option<&
         values.join(", ")
     };
     // Writing to a string cannot fail.
-    let _ = writeln!(
+    let _ = write!(
         text,
-        "{indent}reference_response: {{hz: [{}], accel: [{}], gyro: [{}]}}",
+        "{indent}reference_response: {{hz: [{}], accel: [{}], gyro: [{}]",
         list(&response.hz),
         list(&response.position),
         list(&response.rotation)
     );
+    if let Some(learnt) = &response.learnt_from {
+        let _ = write!(
+            text,
+            ", position_density: [{}], rotation_density: [{}]",
+            list(&learnt.position),
+            list(&learnt.rotation)
+        );
+    }
+    text.push_str("}\n");
 }
