@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use cromosim_imu::{EffectSet, PerChannel, ReadOff, Reading, strongest_line};
+use cromosim_imu::{EffectKind, EffectSet, PerChannel, ReadOff, Reading, strongest_line};
 use cromosim_spatial::{KinematicTrack, PoseEstimate, PoseNoise};
 
 use crate::digital::Digital;
@@ -101,13 +101,40 @@ pub(crate) fn with_estimate<'a>(
     estimate: PoseEstimate,
     set: &EffectSet,
 ) -> FitModel<'a> {
-    let prepared = model.prepared;
-    let track = Arc::new(prepared.track(&estimate));
-    let residual = prepared.residual(&prepared.predict(&track, set).readings);
     let basis = NoiseBasis {
         estimate: Arc::new(estimate),
         ..model.basis.clone()
     };
+    with_basis(model, basis, set)
+}
+
+/// The same with filters of the reference that are so much wider; a line that could have been a vibration and is none may be
+/// motion that drowns in the reference's noise, as all else.
+pub(crate) fn behind_wider_filters<'a>(
+    model: &FitModel<'a>,
+    wider_hz: f64,
+    set: &EffectSet,
+    library: &Library,
+) -> FitModel<'a> {
+    let line = set.iter().find_map(|effect| effect.spectral_line());
+    let of_set = line.map(|line| line.hz);
+    let line_hz = if library.allows(EffectKind::Vibration) {
+        of_set
+    } else {
+        of_set.or(model.basis.line_hz)
+    };
+    let basis = NoiseBasis {
+        estimate: Arc::new(model.basis.estimate.with_wider_filters(wider_hz)),
+        line_hz,
+        ..model.basis.clone()
+    };
+    with_basis(model, basis, set)
+}
+
+fn with_basis<'a>(model: &FitModel<'a>, basis: NoiseBasis, set: &EffectSet) -> FitModel<'a> {
+    let prepared = model.prepared;
+    let track = Arc::new(prepared.track(&basis.estimate));
+    let residual = prepared.residual(&prepared.predict(&track, set).readings);
     let noise = NoiseModel::new(prepared, &basis, &residual);
     FitModel::new(prepared, track, basis, noise)
 }

@@ -181,6 +181,11 @@ pub(crate) mod smoothing {
     /// simulation comes hardly closer: true ones of the fourth generator (seeds 1031 to 1033) lost 0.06 to 0.18, those that other effects
     /// imitate 0.001 and 0.003.
     pub const SHARP: f64 = 0.04;
+    /// Part of the power that undoing it takes off the residual, in both channels, from which on it is noise when factors of at
+    /// most one on the simulation take that off as well: 0.63 to 0.97 of noise with a memory (fifth_origin.py, seed 1), 0 of eight true
+    /// smoothings (the same, and fourth_origin.py, seed 1034). And the part of what these factors leave that undoing it has to leave then:
+    /// 0.72 to 0.96 there, 0.03 of a reference that was interpolated.
+    pub const PART_OF_ATTENUATION: f64 = 0.5;
     /// Or that neither may exceed where the product of both channels' is below the second. Two of 36 recordings made of the third
     /// generator's effects (seed 3) had 1.13 and 1.23 beside 0.51 and 0.41 with the true smoothing.
     pub const FARTHER_FOR_CLOSER: f64 = 1.3;

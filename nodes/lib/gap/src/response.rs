@@ -8,6 +8,7 @@ use nalgebra::{Quaternion, Vector3};
 
 use crate::axes::axes_of_channel;
 use crate::findings::Findings;
+use crate::fit::{Fit, FitModel};
 use crate::policy::response::{
     FEWEST_BLOCKS, LARGEST_FACTOR, LEAST_PART, LEAST_USABLE, MOST_RISE, OPEN, SHUT, STANDARD_ERRORS,
 };
@@ -123,6 +124,25 @@ pub(crate) fn kept(
     } else {
         (Some(learnt), with)
     }
+}
+
+/// Root mean square of a fit's residual beside factors of at most one on its simulation, by frequency, over that without: what
+/// is gained where a part of the reference's motion is none.
+pub(crate) fn left_beside_attenuation(model: &FitModel, fit: &Fit) -> PerChannel<f64> {
+    let prepared = model.prepared;
+    let compared = Compared {
+        prepared,
+        measured: &prepared.measured,
+        simulated: fit.prediction.readings.clone(),
+        turns: Turn::of_sensor(&model.track, &fit.set, prepared),
+    };
+    PerChannel::from_fn(|channel| {
+        let blocks = blocks(&compared, channel);
+        let own = factors(&blocks, &[1.0; BANDS], None);
+        let all: f64 = blocks.iter().map(|block| block.residual).sum();
+        let gain = held_out_gain(&blocks, |_| &own);
+        (1.0 - gain / all.max(f64::MIN_POSITIVE)).max(0.0).sqrt()
+    })
 }
 
 /// The lowest frequency at which a factor stands, the bands' middles, and where the highest factor ends.

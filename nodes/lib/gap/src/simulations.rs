@@ -47,6 +47,24 @@ pub(crate) struct Turn {
     pub world_from_segment: Quaternion<f64>,
 }
 
+impl Turn {
+    /// At each message of a recording.
+    pub fn of_sensor(
+        track: &KinematicTrack,
+        set: &EffectSet,
+        prepared: &PreparedPlacement,
+    ) -> Vec<Self> {
+        let model = SensorModel::new(set, prepared.epoch);
+        let turned = model.sensor_from_world(track, &prepared.stamps, 0.0);
+        let stamps = prepared.stamps.iter().zip(turned);
+        let of = |(stamp, sensor_from_world): (&Stamp, Matrix3<f64>)| Self {
+            sensor_from_world,
+            world_from_segment: track.quaternion_at(model.true_time(*stamp)),
+        };
+        stamps.map(of).collect()
+    }
+}
+
 impl<'a> Simulations<'a> {
     /// `raw` are the readings in the device's units, `covered` the axes of each to be compared.
     pub fn new(
@@ -135,15 +153,7 @@ impl<'a> Simulations<'a> {
 
     /// How the sensor is turned at each message.
     pub fn turns(&self, set: &EffectSet) -> Vec<Turn> {
-        let track = self.tracks.track(set);
-        let model = SensorModel::new(set, self.whole.epoch);
-        let turned = model.sensor_from_world(&track, &self.whole.stamps, 0.0);
-        let stamps = self.whole.stamps.iter().zip(turned);
-        let of = |(stamp, sensor_from_world): (&Stamp, Matrix3<f64>)| Turn {
-            sensor_from_world,
-            world_from_segment: track.quaternion_at(model.true_time(*stamp)),
-        };
-        stamps.map(of).collect()
+        Turn::of_sensor(&self.tracks.track(set), set, &self.whole)
     }
 
     /// Without rounding: rounding the simulation adds error of its own.

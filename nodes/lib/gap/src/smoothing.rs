@@ -1,6 +1,6 @@
 //! Whether the reference was smoothed before it came here.
 
-use cromosim_imu::{Effect, EffectKind, EffectSet, PerChannel};
+use cromosim_imu::{Channel, Effect, EffectKind, EffectSet, PerChannel};
 use cromosim_spatial::{SmoothingKernel, ZeroPhaseSmoothing};
 
 use crate::axes::{larger, smaller, sum_over_channels};
@@ -9,9 +9,10 @@ use crate::noise_updates::with_estimate;
 use crate::plausibility::told_from_smoothing;
 use crate::policy::smoothing::{
     BESIDE, BEST_RATIO, CLOSER, FARTHER_FOR_CLOSER, LEAST_GAIN_NATS, LEAST_SHARE, MUCH_CLOSER,
-    MUCH_FARTHER, NOT_FARTHER, SHARP, SHARPENINGS, SHORTEST_DELAY_S, SUSPICIOUS,
-    SUSPICIOUS_IMITATED, TRIAL_STEPS,
+    MUCH_FARTHER, NOT_FARTHER, PART_OF_ATTENUATION, SHARP, SHARPENINGS, SHORTEST_DELAY_S,
+    SUSPICIOUS, SUSPICIOUS_IMITATED, TRIAL_STEPS,
 };
+use crate::response::left_beside_attenuation;
 use crate::search::{ScoredEffectSet, excess, score, score_after, search_down_to_noise};
 use crate::trace::{names, trace};
 
@@ -179,12 +180,18 @@ impl<'a> Trial<'_, 'a> {
         (undone, searched, smoothing)
     }
 
-    /// Whether the simulation comes closer, or no farther where the cutoff is a sharp one: most of a fast motion is lost in the
+    /// Whether the simulation comes closer, and not as factors below one would bring it, or no farther where the cutoff is a sharp one: most of a fast motion is lost in the
     /// reference's noise, and undoing the rest brings the simulation hardly closer.
     fn is_of_motion(&self, smoothing: &ZeroPhaseSmoothing, undone: &ScoredEffectSet) -> bool {
         let plain = score(self.model, undone.fit.set.clone());
         let ratio = distance(self.model, &plain, undone);
-        trace(|| eprintln!("  smoothing comes closer by {ratio:.3?}"));
+        let attenuated = left_beside_attenuation(self.model, &plain.fit);
+        trace(|| {
+            eprintln!("  smoothing comes closer by {ratio:.3?}, attenuation by {attenuated:.3?}");
+        });
+        if is_attenuation(ratio, attenuated) {
+            return false;
+        }
         let goes_no_farther = smaller(ratio) < 1.0 && larger(ratio) < NOT_FARTHER;
         comes_closer(ratio) || (goes_no_farther && self.is_sharp(smoothing, &undone.fit.set))
     }
@@ -435,6 +442,17 @@ fn comes_closer(ratio: PerChannel<f64>) -> bool {
     let (closer, farther) = (smaller(ratio), larger(ratio));
     let farther_for_closer = farther < FARTHER_FOR_CLOSER && closer * farther < MUCH_CLOSER;
     closer < CLOSER && (farther < NOT_FARTHER || farther_for_closer)
+}
+
+/// Whether most of the power that undoing a smoothing takes off the residual goes where the simulation is attenuated, too, and
+/// undoing it leaves not much less: a smoothing leaves less of the motion than there was. Noise that its spectrum does not tell
+/// from motion is more than there was, and the filters that undo a smoothing keep it out. Of ratios of root mean squares.
+fn is_attenuation(undone: PerChannel<f64>, attenuated: PerChannel<f64>) -> bool {
+    Channel::ALL.into_iter().all(|channel| {
+        let [left, left_beside] = [undone, attenuated].map(|ratio| ratio[channel].powi(2));
+        let takes_off_as_much = 1.0 - left_beside >= PART_OF_ATTENUATION * (1.0 - left);
+        takes_off_as_much && left >= PART_OF_ATTENUATION * left_beside
+    })
 }
 
 /// Root mean squares of the residuals of what is undone, over those of what is not.

@@ -8,7 +8,7 @@ use crate::findings::{Findings, ResidualDependence, Unknown};
 use crate::fit::{Fit, FitModel};
 use crate::gram::dot;
 use crate::location::{bands, locate, summed_spectrum};
-use crate::noise_updates::with_estimate;
+use crate::noise_updates::behind_wider_filters;
 use crate::policy::probability::{MOST_UNKNOWN, NATS_PER_BAND, UNKNOWN_GAIN_NATS};
 use crate::policy::report::{COARSE_STEPS, EXCESS_NOISE_BESIDE_UNKNOWN};
 use crate::policy::unknown::{
@@ -107,11 +107,11 @@ pub(crate) fn detect_unmodelled_structure(
 ) -> Option<Unknown> {
     let structure = Structure::new(findings, &rest.seen);
     let (diagnostics, regressions) = (&rest.seen.diagnostics, &rest.seen.regressions);
-    if !structure.is_there()
-        || (structure.is_loud_alone() && !is_loud_behind_wider_filters(findings, diagnostics))
-        || (structure.is_regression_alone(&findings.model)
-            && !structure.stays_behind_wider_filters(findings))
-    {
+    let stands = structure.tells_by_messages()
+        || (structure.is_loud(&findings.model)
+            && is_loud_behind_wider_filters(findings, diagnostics))
+        || (!structure.strong.is_empty() && structure.stays_behind_wider_filters(findings));
+    if !stands {
         return None;
     }
     let location = locate(
@@ -197,19 +197,15 @@ impl<'a> Structure<'a> {
         }
     }
 
-    fn is_there(&self) -> bool {
-        self.in_stamps || any(self.in_channel)
+    /// Whether stamps or repeated readings tell.
+    fn tells_by_messages(&self) -> bool {
+        self.in_stamps || any(self.stuck)
     }
 
-    /// Whether nothing but the size of the residual tells.
-    fn is_loud_alone(&self) -> bool {
-        !self.in_stamps && !any(self.stuck) && self.strong.is_empty()
-    }
-
-    /// Whether nothing but regressions tells.
-    fn is_regression_alone(&self, model: &FitModel) -> bool {
+    /// Whether the size of the residual does.
+    fn is_loud(&self, model: &FitModel) -> bool {
         let is_loud = |channel| self.diagnostics.is_loud(model, channel);
-        !self.in_stamps && !any(self.stuck) && !Channel::ALL.into_iter().any(is_loud)
+        Channel::ALL.into_iter().any(is_loud)
     }
 
     /// Whether any of the regressions keeps its gain where the reference is filtered much less: what its filters
@@ -217,12 +213,7 @@ impl<'a> Structure<'a> {
     /// depend on itself.
     fn stays_behind_wider_filters(&self, findings: &Findings) -> bool {
         let set = &findings.scored.fit.set;
-        let estimate = findings
-            .model
-            .basis
-            .estimate
-            .with_wider_filters(MUCH_WIDER_HZ);
-        let model = with_estimate(&findings.model, estimate, set);
+        let model = behind_wider_filters(&findings.model, MUCH_WIDER_HZ, set, &findings.library);
         let fit = model.fit_steps(set.clone(), 0);
         self.strong.iter().any(|before| {
             let after = residual_regression(&model, &fit, before.dependence, before.channel);
@@ -360,8 +351,7 @@ fn is_coarse(model: &FitModel, channel: Channel) -> bool {
 /// own, which cut bursts off and ring where motion ends.
 fn is_loud_behind_wider_filters(findings: &Findings, before: &ResidualDiagnostics) -> bool {
     let set = &findings.scored.fit.set;
-    let estimate = findings.model.basis.estimate.with_wider_filters(WIDER_HZ);
-    let model = with_estimate(&findings.model, estimate, set);
+    let model = behind_wider_filters(&findings.model, WIDER_HZ, set, &findings.library);
     let fit = model.fit_steps(set.clone(), 0);
     let after = ResidualDiagnostics::new(&model, &fit);
     trace(|| eprintln!("behind wider filters {after:.3?}"));

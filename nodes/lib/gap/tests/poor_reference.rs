@@ -3,7 +3,7 @@
 
 mod support;
 
-use cromosim_gap::PlacementRecord;
+use cromosim_gap::{PlacementRecord, PoseSeries};
 use cromosim_imu::{EffectKind as K, normal_pair};
 use cromosim_spatial::so3;
 use nalgebra::Vector3;
@@ -28,6 +28,15 @@ fn with_memory(mut record: PlacementRecord, sizes: [f64; 2], memory_s: f64) -> P
         *rotation *= so3::exp(&noise[1]);
     }
     record
+}
+
+/// At 30 Hz.
+fn every_fourth(poses: &PoseSeries) -> PoseSeries {
+    PoseSeries {
+        stamps: poses.stamps.iter().step_by(4).copied().collect(),
+        positions: poses.positions.iter().step_by(4).copied().collect(),
+        rotations: poses.rotations.iter().step_by(4).copied().collect(),
+    }
 }
 
 #[test]
@@ -116,6 +125,39 @@ fn slow_noise_with_a_memory_is_no_filter_of_the_sensor() {
             let record = with_memory(record, [2.5e-4, 1.2e-3], 0.012);
             assert_eq!(names(&answer(&record).diagnosis), [named], "{seed}");
         }
+    }
+}
+
+/// Nor is it a smoothing of slow frames, whose filters would keep it out.
+#[test]
+fn noise_with_a_memory_is_no_smoothing_of_slow_frames() {
+    for seed in [54, 55, 56] {
+        let scene = Scene {
+            motion: Motion::random(seed).slowed(3.0),
+            ..Scene::new(seed)
+        };
+        let turned = [0.045, -0.016, -0.056];
+        let mut record = scene.with(K::AccelMisalignment, &turned).record();
+        record.reference = every_fourth(&record.reference);
+        let record = with_memory(record, [3e-4, 1.5e-3], 0.025);
+        assert_eq!(
+            names(&answer(&record).diagnosis),
+            ["accel_misalignment"],
+            "{seed}"
+        );
+    }
+}
+
+/// Lines that no vibration describes, below what the reference's noise is as a rate.
+#[test]
+fn motion_that_drowns_in_noise_is_nothing_unknown() {
+    for seed in [57, 58] {
+        let scene = Scene {
+            motion: Motion::random(seed).trembling(0.01, 12.5..14.5, seed),
+            ..Scene::new(seed)
+        };
+        let diagnosis = answer(&scene.record()).diagnosis;
+        assert_eq!(names(&diagnosis), [""; 0], "{}", diagnosis.verdict);
     }
 }
 

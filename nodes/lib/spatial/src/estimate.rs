@@ -28,7 +28,7 @@ const LEAST_TRACK_RATE_HZ: f64 = 200.0;
 /// vector: `q = (1, v / 2)` for a small v, so that their sum is 3 / 4.
 pub(crate) const QUATERNION_PER_ROTVEC: f64 = 3.0 / 16.0;
 
-/// White noise of poses: standard deviation per sample and axis.
+/// Noise of poses: standard deviation per sample and axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PoseNoise {
     /// Of the position, m.
@@ -179,22 +179,23 @@ impl PoseEstimate {
         &self.gaps
     }
 
-    /// White noise of the poses. A rotation vector's variance per axis is 4/3 of the quaternion
+    /// Noise of the poses, over all frequencies. A rotation vector's variance per axis is 4/3 of the quaternion
     /// components' sum.
     pub fn noise(&self) -> PoseNoise {
-        self.of_density([self.position.shape.level, self.rotation.shape.level])
+        let nyquist_hz = self.rate_hz / 2.0;
+        let variance = |floor: &NoiseFloor| floor.shape.variance(nyquist_hz);
+        PoseNoise {
+            position: variance(&self.position).sqrt(),
+            rotation: (variance(&self.rotation) / QUATERNION_PER_ROTVEC).sqrt(),
+        }
     }
 
-    /// What looks like white noise of the poses: that, and motion that is too fast for them.
+    /// What looks like noise of the poses: that, and motion that is too fast for them, as if it were white.
     pub fn scatter(&self) -> PoseNoise {
-        self.of_density([self.position.shape.top, self.rotation.shape.top])
-    }
-
-    fn of_density(&self, [position, rotation]: [f64; 2]) -> PoseNoise {
         let sigma = |density: f64| (density * self.rate_hz / 2.0).sqrt();
         PoseNoise {
-            position: sigma(position),
-            rotation: sigma(rotation / QUATERNION_PER_ROTVEC),
+            position: sigma(self.position.shape.top),
+            rotation: sigma(self.rotation.shape.top / QUATERNION_PER_ROTVEC),
         }
     }
 

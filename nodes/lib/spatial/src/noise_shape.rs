@@ -169,6 +169,21 @@ impl NoiseShape {
         }
     }
 
+    /// Variance of the noise per sample, unit^2: the density's integral up to the Nyquist frequency, where it falls from the knee on.
+    /// Below the knee motion hides it, and it counts as dense as there.
+    pub fn variance(&self, nyquist_hz: f64) -> f64 {
+        if self.above == 0.0 || self.knee_hz >= nyquist_hz {
+            return self.level * nyquist_hz;
+        }
+        let (ratio, power) = (nyquist_hz / self.knee_hz, 1.0 - self.above);
+        let falling = if power.abs() < 1e-6 {
+            ratio.ln()
+        } else {
+            (ratio.powf(power) - 1.0) / power
+        };
+        self.level * self.knee_hz * (1.0 + falling)
+    }
+
     /// Density at a frequency, unit^2/Hz.
     pub fn at(&self, frequency_hz: f64) -> f64 {
         let ratio = self.knee_hz / frequency_hz.max(HELD_BELOW_HZ);
@@ -264,6 +279,31 @@ mod tests {
                 );
             }
             assert!((shape.motion_beyond(12.0) / motion(12.0) - 1.0).abs() < 0.05);
+        }
+    }
+
+    /// First order: its variance is the sum of its densities, and a third or less of the plateau's were that white.
+    #[test]
+    fn noise_with_a_memory_has_the_variance_of_its_sum() {
+        for (rate_hz, pole) in [(300.0, 0.67_f64), (360.0, 0.7), (200.0, 0.58)] {
+            let spacing_hz = 0.1;
+            let count = (rate_hz / 2.0 / spacing_hz) as usize;
+            let noise = |hz: f64| {
+                let turn = std::f64::consts::TAU * hz / rate_hz;
+                (1.0 - pole * pole) / (1.0 - 2.0 * pole * turn.cos() + pole * pole) * 2.0 / rate_hz
+            };
+            let density = (0..=count).map(|k| {
+                let hz = f64::from(k as u32) * spacing_hz;
+                noise(hz) + 10.0 * hz.max(0.1).powi(-6)
+            });
+            let spectrum = Spectrum {
+                spacing_hz,
+                density: density.collect(),
+                windows: 20,
+            };
+            let shape = NoiseShape::learn(&spectrum, rate_hz, 1.0);
+            let found = shape.variance(rate_hz / 2.0);
+            assert!((0.6..1.4).contains(&found), "{rate_hz}: {found} {shape:?}");
         }
     }
 
