@@ -180,8 +180,8 @@ impl<'a> Trial<'_, 'a> {
         (undone, searched, smoothing)
     }
 
-    /// Whether the simulation comes closer, and not as factors below one would bring it, or no farther where the cutoff is a sharp one: most of a fast motion is lost in the
-    /// reference's noise, and undoing the rest brings the simulation hardly closer.
+    /// Whether the simulation comes closer, and not as factors below one would bring it, or no farther where the cutoff is a sharp
+    /// one: most of a fast motion is lost in the reference's noise, and undoing the rest brings the simulation hardly closer.
     fn is_of_motion(&self, smoothing: &ZeroPhaseSmoothing, undone: &ScoredEffectSet) -> bool {
         let plain = score(self.model, undone.fit.set.clone());
         let ratio = distance(self.model, &plain, undone);
