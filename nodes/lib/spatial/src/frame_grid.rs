@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use crate::chord_images;
 use crate::chords::Chords;
 use crate::golden::greatest_near;
 use crate::kinks::{Kinks, second_differences};
@@ -198,6 +199,7 @@ impl FrameGrid {
             && kinks.are_marked(self.rate_hz)
             && (kinks.is_of_neighbours() || !kinks.is_harmonic(self.rate_hz))
             && scatter.lets_be_straight(off, kinks.is_of_neighbours())
+            && !chord_images::are_missing(poses, self.rate_hz, self.offset_s)
     }
 
     /// White noise of poses between two frames, which their second differences within a chord tell: what

@@ -166,3 +166,23 @@ fn a_gait_under_much_noise_has_no_chords() {
         assert_eq!(FrameGrid::find(&gait), None, "{step_hz} steps a second");
     }
 }
+
+/// Kinks come back at the sum of two frequencies of a steady motion, but the rest of the motion has no images.
+#[test]
+fn a_motion_of_two_steady_frequencies_has_no_chords() {
+    for (poses_hz, lines_hz, size, noise) in [
+        (90.0, [14.14, 14.14], 1e-3, [1e-4, 1.3e-3]),
+        (30.0, [7.64, 5.69], 3e-3, [7e-5, 1e-3]),
+        (30.0, [7.38, 7.17], 3e-3, [3e-4, 2.5e-3]),
+        (50.0, [8.19, 6.02], 3e-3, [7e-5, 8e-4]),
+    ] {
+        let mut steady = poses(poses_hz, None, 0.0, noise);
+        for k in 0..steady.stamps.len() {
+            let t = k as f64 / poses_hz;
+            let [first, second] = lines_hz.map(|hz| (TAU * hz * t).sin());
+            steady.positions[k] += Vector3::new(0.0, size * first, size * second);
+            steady.rotations[k] *= so3::exp(&Vector3::new(0.0, size * second, 3.0 * size * first));
+        }
+        assert_eq!(FrameGrid::find(&steady), None, "{lines_hz:?} Hz");
+    }
+}

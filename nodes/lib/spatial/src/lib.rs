@@ -35,6 +35,7 @@ mod banded;
 mod basis;
 mod beyond;
 mod beyond_band;
+mod chord_images;
 mod chords;
 mod confidence;
 mod derivative;
