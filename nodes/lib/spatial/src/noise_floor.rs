@@ -190,11 +190,6 @@ impl NoiseFloor {
         self.filter = mean;
     }
 
-    /// Whether the noise wanders: then no level plateau shows where motion ends, and its fall goes on beneath the noise.
-    fn is_wandering(&self) -> bool {
-        self.shape.above > 0.0
-    }
-
     /// Multiplies the filters by a factor of the frequency.
     pub fn multiply_filters(&mut self, factor: &dyn Fn(f64) -> f64) {
         for (k, weight) in self.filter.iter_mut().enumerate() {
@@ -232,7 +227,7 @@ impl NoiseFloor {
             .find(|&k| ratio[k..k + 3].iter().all(|value| *value < LOCAL_EDGE))
             .unwrap_or(bins);
         let edge_hz = spectrum.frequency(edge);
-        let lines = if self.is_wandering() || undone.is_some() {
+        let lines = if self.shape.is_wandering() || undone.is_some() {
             vec![false; bins]
         } else {
             motion_beyond(&ratio, (LOCAL_EDGE, edge), spectrum.spacing_hz, machines)
@@ -253,7 +248,7 @@ impl NoiseFloor {
                 1.0
             } else if lines[k] {
                 1.0 - 1.0 / ratio[k]
-            } else if k >= edge && self.is_wandering() && undone.is_none() {
+            } else if k >= edge && self.shape.falls() && undone.is_none() {
                 beyond(hz)
             } else if k >= edge || ratio[k] <= 1.0 || gain2(hz) > LARGEST_GAIN.powi(2) {
                 0.0
