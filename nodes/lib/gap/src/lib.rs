@@ -28,6 +28,7 @@ mod gram;
 mod identify;
 mod joint_search;
 mod lag;
+mod lever_arm_by_readings;
 mod library;
 mod location;
 mod magnetometer;

@@ -4,6 +4,7 @@ use cromosim_imu::{Channel, EffectKind, EffectSet, PerChannel, Search, SpectralL
 use cromosim_spatial::{PoseLine, Spectrum};
 
 use crate::fit::{Fit, FitModel};
+use crate::lever_arm_by_readings;
 use crate::policy::vibration::{
     ABOVE_HZ, BELOW_HZ, FASTEST_STEADY_MOTION_HZ, IN_REFERENCE_HEIGHT, IN_REFERENCE_PART,
     LEAST_HEIGHT, LEAST_HZ, LEAST_POWER, MOST_HEIGHT_LEFT, MOST_LEFT, SURROUNDINGS_HZ,
@@ -18,6 +19,7 @@ pub(crate) fn is_sound(model: &FitModel, fit: &Fit) -> bool {
             .iter()
             .all(|effect| may_be_told(model, effect.kind()))
         && is_true_vibration(model, fit)
+        && lever_arm_by_readings::is_in_readings(model, fit)
 }
 
 /// Whether the fitted values are what such effects have: a filter that passes all motion, or a

@@ -237,6 +237,15 @@ pub(crate) mod beside_response {
     pub const OPEN: f64 = 0.9;
 }
 
+/// When a lever arm is in the gyroscope's readings too, not in the reference's errors alone.
+pub(crate) mod lever_arm {
+    /// Part of what it does with the reference's rotation that it does with the readings at least, both as far as the
+    /// readings tell: a true one does all, an error none. No source for the number between.
+    pub const LEAST_OF_READINGS: f64 = 0.5;
+    /// Standard errors that it does less, below which nothing is told. No source.
+    pub const STANDARD_ERRORS: f64 = 4.0;
+}
+
 /// When a vibration is more than motion that the reference does not resolve.
 pub(crate) mod vibration {
     /// Its power over the three axes, in units of the white noise's variance per axis.

@@ -98,6 +98,14 @@ pub(crate) fn gain_by_measured(
     channel: Channel,
 ) -> f64 {
     let columns = regressors(model, fit, &model.prepared.measured, dependence, channel);
+    let whitener = behind_reference(model);
+    let columns = columns.iter();
+    let columns = columns.map(|column| whitened(model, &whitener, column));
+    gain(model, fit, &columns.collect())
+}
+
+/// The whitener behind the reference's filters, which keep out what lies beyond the motion's band.
+pub(crate) fn behind_reference(model: &FitModel) -> Whitener {
     let spacing_hz = model.noise.spacing_hz;
     let passed = PerChannel::from_fn(|channel| {
         let hz = (0..model.noise.power[channel].len()).map(|k| k as f64 * spacing_hz);
@@ -109,10 +117,7 @@ pub(crate) fn gain_by_measured(
                 .collect::<Vec<f64>>(),
         }
     });
-    let whitener = model.whitener.behind(&passed);
-    let columns = columns.iter();
-    let columns = columns.map(|column| whitened(model, &whitener, column));
-    gain(model, fit, &columns.collect())
+    model.whitener.behind(&passed)
 }
 
 /// Held-out gain of columns beside a fit, nats, less their price.

@@ -250,3 +250,17 @@ fn noise_of_a_sensor_is_told_beside_a_smoothing() {
         );
     }
 }
+
+/// Errors of the rotation tilt gravity, and a lever arm of g / (2 pi f)^2 along it would take those around f away.
+#[test]
+fn what_a_rotation_is_off_makes_no_lever_arm() {
+    for seed in [57, 58] {
+        let scene = Scene {
+            motion: Motion::sway(1.0),
+            ..Scene::new(seed)
+        };
+        let record = with_memory(scene.record(), [3e-4, 4e-3], 0.0166);
+        let named = names(&answer(&record).diagnosis).join(" ");
+        assert!(!named.contains("lever_arm"), "{seed}: {named}");
+    }
+}
