@@ -7,7 +7,7 @@ import numpy as np
 import fifth_motions as motions
 import generate as first_hand
 import recording
-from fifth_physics import G, Lens, Stage, back, digital, log_uniform, readings
+from fifth_physics import G, Lens, Stage, analog, back, digital, log_uniform, readings
 
 SUITES = ("fifth-single", "fifth-pair", "fifth-triple", "fifth-none", "fifth-placement")
 EFFECTS = ("reference_noise", "reference_smoothing", "reference_interpolation", "reference_tilt", "reference_scale", "reference_units", "mount_rotation", "lever_arm",
@@ -264,14 +264,15 @@ def _ns(epoch_ns, seconds):
 
 
 def _sessions(rng, placements, lens, family, seconds):
-    """A later recording: half of them another family's motion. None where this reference cannot carry it."""
+    """A later recording: half of them another family's motion. None where this reference cannot carry it, nor the tissue."""
     fit_seconds = next(iter(placements.values()))["stage"].seconds
     start = fit_seconds + rng.uniform(8, 60)
     for _ in range(5):
         other = str(rng.choice(list(motions.FAMILIES))) if rng.random() < 0.5 else family
         bodies = _bodies(rng, other, seconds, len(placements))
         stages = [Stage(joints, start, seconds, c["rate"], c["stage"].epoch) for joints, c in zip(bodies, placements.values())]
-        if all(_carried(lens, stage, joints, c["sigmas"]) for stage, joints, c in zip(stages, bodies, placements.values())):
+        if all(_carried(lens, stage, joints, c["sigmas"]) for stage, joints, c in zip(stages, bodies, placements.values())) and all(
+                analog(stage, _sensor(c["effects"])) is not None for stage, c in zip(stages, placements.values()) if "soft_tissue" in c["effects"]):
             return other, bodies, stages
     return None
 

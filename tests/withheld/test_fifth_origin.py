@@ -99,3 +99,10 @@ def test_reference_effects_leave_the_device_alone(effect, values):
     c = {"effects": {effect: values}, "sigmas": [0.0, 0.0], "rate": 100.0}
     _, gyro, accel = origin._imu(np.random.default_rng(1), c, stage, STAMPS)
     assert np.allclose(accel, readings(stage, {}, STAMPS)[0]) and np.allclose(gyro, readings(stage, {}, STAMPS)[1])
+
+
+def test_a_later_motion_is_one_that_the_tissue_stands(tmp_path):
+    """The first motion drawn for this case's second recording moves the sensor farther on its tissue than tissue goes."""
+    index = origin.EFFECTS.index("soft_tissue")
+    assert origin.build((str(tmp_path), "fifth-single", 1037, index)) is not None
+    assert len(list(tmp_path.glob("*/check.mcap"))) == 1
