@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use cromosim_imu::{
-    Effect, EffectKind, EffectSet, FirstGuess, ParameterFit, PerChannel, Reading, Search,
+    Channel, Effect, EffectKind, EffectSet, FirstGuess, ParameterFit, PerChannel, Reading, Search,
 };
 use cromosim_spatial::KinematicTrack;
 use nalgebra::DVector;
@@ -206,6 +206,21 @@ impl<'a> FitModel<'a> {
             folds,
             counts,
         }
+    }
+
+    /// The whitener behind the reference's filters, which keep out what lies beyond the motion's band.
+    pub fn whitener_behind_reference(&self) -> Whitener {
+        let spacing_hz = self.noise.spacing_hz;
+        let passed = PerChannel::from_fn(|channel| {
+            let count = self.noise.power[channel].len();
+            let through = (0..count).map(|k| self.basis.estimate.filter_at(k as f64 * spacing_hz));
+            let own = |(position, rotation, _): (f64, f64, f64)| match channel {
+                Channel::Accelerometer => position,
+                Channel::Gyroscope => rotation,
+            };
+            through.map(own).collect::<Vec<f64>>()
+        });
+        self.whitener.behind(&passed)
     }
 
     /// Whitened measured less predicted.

@@ -10,7 +10,6 @@ use nalgebra::{Matrix3, Vector3};
 use crate::axes::axes_of_channel;
 use crate::fit::{Fit, FitModel};
 use crate::policy::lever_arm::{LEAST_OF_READINGS, STANDARD_ERRORS};
-use crate::residual_regressions::behind_reference;
 use crate::trace::trace;
 
 /// Whether a lever arm of the set, if there is one, does in the residual what it does with the gyroscope's readings in place of
@@ -35,7 +34,7 @@ pub(crate) fn is_in_readings(model: &FitModel, fit: &Fit) -> bool {
         return true;
     };
     let read = rotations(&prepared.measured, &seconds);
-    let whitener = behind_reference(model);
+    let whitener = model.whitener_behind_reference();
     let whitened = |value: &dyn Fn(usize) -> Vector3<f64>| {
         let mut axes = [false; 6];
         axes[axes_of_channel(Channel::Accelerometer)].fill(true);

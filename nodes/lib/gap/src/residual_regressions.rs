@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use cromosim_imu::{Channel, Dependence, PerChannel, Reading};
+use cromosim_imu::{Channel, Dependence, Reading};
 use cromosim_spatial::Stamp;
 use nalgebra::Vector3;
 
@@ -98,26 +98,10 @@ pub(crate) fn gain_by_measured(
     channel: Channel,
 ) -> f64 {
     let columns = regressors(model, fit, &model.prepared.measured, dependence, channel);
-    let whitener = behind_reference(model);
+    let whitener = model.whitener_behind_reference();
     let columns = columns.iter();
     let columns = columns.map(|column| whitened(model, &whitener, column));
     gain(model, fit, &columns.collect())
-}
-
-/// The whitener behind the reference's filters, which keep out what lies beyond the motion's band.
-pub(crate) fn behind_reference(model: &FitModel) -> Whitener {
-    let spacing_hz = model.noise.spacing_hz;
-    let passed = PerChannel::from_fn(|channel| {
-        let hz = (0..model.noise.power[channel].len()).map(|k| k as f64 * spacing_hz);
-        let through = hz.map(|hz| model.basis.estimate.filter_at(hz));
-        match channel {
-            Channel::Accelerometer => through.map(|(position, ..)| position).collect(),
-            Channel::Gyroscope => through
-                .map(|(_, rotation, _)| rotation)
-                .collect::<Vec<f64>>(),
-        }
-    });
-    model.whitener.behind(&passed)
 }
 
 /// Held-out gain of columns beside a fit, nats, less their price.
