@@ -155,6 +155,9 @@ pub(crate) mod smoothing {
     /// The same where an effect was found that cannot be told from one: a `soft_tissue` in the place of a smoothing left 1.28
     /// (third_origin.py, seed 3). No source for the number.
     pub const SUSPICIOUS_IMITATED: f64 = 1.1;
+    /// The same from which on Gaussians are tried where Butterworth's filter of the second order explains nothing: a knee's at 50 Hz
+    /// and a rate table's left 5.4 and 203. No source for the number.
+    pub const SUSPICIOUS_OF_GAUSSIAN: f64 = 3.0;
     /// What undoing it has to gain, nats.
     pub const LEAST_GAIN_NATS: f64 = 30.0;
     /// And as a share of what is still to be explained.

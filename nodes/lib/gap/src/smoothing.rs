@@ -10,7 +10,7 @@ use crate::plausibility::told_from_smoothing;
 use crate::policy::smoothing::{
     BESIDE, BEST_RATIO, CLOSER, FARTHER_FOR_CLOSER, LEAST_GAIN_NATS, LEAST_SHARE, MUCH_CLOSER,
     MUCH_FARTHER, NOT_FARTHER, PART_OF_ATTENUATION, SHARP, SHARPENINGS, SHORTEST_DELAY_S,
-    SUSPICIOUS, SUSPICIOUS_IMITATED, TRIAL_STEPS,
+    SUSPICIOUS, SUSPICIOUS_IMITATED, SUSPICIOUS_OF_GAUSSIAN, TRIAL_STEPS,
 };
 use crate::response::left_beside_attenuation;
 use crate::search::{ScoredEffectSet, excess, score, score_after, search_down_to_noise};
@@ -20,9 +20,10 @@ use crate::trace::{names, trace};
 const CUTOFFS_HZ: [f64; 9] = [1.5, 2.0, 2.6, 3.4, 4.4, 5.7, 7.4, 9.6, 12.5];
 /// A cutoff that leaves all poses as they are.
 const UNDOES_NOTHING_HZ: f64 = 1e6;
-/// Where a Gaussian's cutoff is looked for, as a part of the best one of Butterworth's filter: its half power lies below
-/// that one's half amplitude.
-const GAUSSIAN_PART: f64 = 0.7;
+/// Where a Gaussian's cutoff is looked for, as parts of the best one of Butterworth's filter, in turn until one comes in question:
+/// its half power lies below that one's half amplitude, but not where all of the motion is far beyond the cutoff, and Butterworth's
+/// best one is too low.
+const GAUSSIAN_PARTS: [f64; 3] = [0.7, 0.85, 1.0];
 /// Factors between neighbouring cutoffs: where they tell a Gaussian from Butterworth's filter, one order of that from
 /// another, and where they refine the best, with what was found beside it.
 const BETWEEN_KERNELS: f64 = 1.2;
@@ -63,7 +64,12 @@ pub(crate) fn try_smoothing<'a>(
         start: &starts[0],
         beside: with_plain_norms(&model, sets.clone()),
     };
-    let Some(first) = trial.best_of_second_order() else {
+    let Some(first) = trial.best_of(SmoothingKernel::SECOND_ORDER).or_else(|| {
+        let is_far = larger(trial.plain_ratio) > SUSPICIOUS_OF_GAUSSIAN;
+        is_far
+            .then(|| trial.best_of(SmoothingKernel::Gaussian))
+            .flatten()
+    }) else {
         return (model, scored);
     };
     let undone = with_undone_smoothing(&model, &starts[0], first.smoothing);
@@ -239,8 +245,12 @@ impl<'a> Trial<'_, 'a> {
     }
 
     /// The kernel with the most evidence: Butterworth's of the second order, or the fourth; where that is better the third, else
-    /// what sets in more softly, a Gaussian and then the first. The best is refined.
+    /// what sets in more softly, a Gaussian and then the first. The best is refined. A Gaussian stays one: the second order explained
+    /// nothing.
     fn best_kernel(&self, second: Tried) -> Tried {
+        if second.smoothing.kernel == SmoothingKernel::Gaussian {
+            return self.refined(self.refined(second, BETWEEN_KERNELS), FINE);
+        }
         let middle_hz = second.smoothing.cutoff_hz;
         let around = |kernel, part, factor| {
             let cutoff_hz = part * middle_hz;
@@ -262,7 +272,9 @@ impl<'a> Trial<'_, 'a> {
         let (best, _) = if is_steeper {
             better(best, of_order(3))
         } else {
-            let gaussian = around(SmoothingKernel::Gaussian, GAUSSIAN_PART, BETWEEN_KERNELS);
+            let gaussian = GAUSSIAN_PARTS
+                .into_iter()
+                .find_map(|part| around(SmoothingKernel::Gaussian, part, BETWEEN_KERNELS));
             match better(best, gaussian) {
                 (best, true) => better(best, of_order(1)),
                 second => second,
@@ -271,9 +283,9 @@ impl<'a> Trial<'_, 'a> {
         self.refined(best, FINE)
     }
 
-    /// Butterworth's of the second order with the most evidence.
-    fn best_of_second_order(&self) -> Option<Tried> {
-        let best = self.best_of_grid()?;
+    /// The one of a kernel with the most evidence.
+    fn best_of(&self, kernel: SmoothingKernel) -> Option<Tried> {
+        let best = self.best_of_grid(kernel)?;
         let is_best = |(set, _): &&(EffectSet, _)| names(set) == names(&best.set);
         let beside_best = Trial {
             beside: self
@@ -291,14 +303,18 @@ impl<'a> Trial<'_, 'a> {
         reaches_motion.then_some(best)
     }
 
-    /// The cutoff of the second order with the most evidence; none where none has more than the reference as it is, without what
+    /// The cutoff of a kernel with the most evidence; none where none has more than the reference as it is, without what
     /// passes for a smoothing: of one that is there even a cutoff next to it explains far more. From the lowest on, until two in
     /// turn have lost most of what the best one gained.
-    fn best_of_grid(&self) -> Option<Tried> {
-        let kernel = SmoothingKernel::SECOND_ORDER;
+    fn best_of_grid(&self, kernel: SmoothingKernel) -> Option<Tried> {
+        let part = match kernel {
+            SmoothingKernel::Gaussian => GAUSSIAN_PARTS[0],
+            SmoothingKernel::Butterworth { .. } => 1.0,
+        };
         let mut best: Option<Tried> = None;
         let mut far_behind = 0;
         for cutoff_hz in CUTOFFS_HZ {
+            let cutoff_hz = part * cutoff_hz;
             let Some(other) = self.tried(ZeroPhaseSmoothing { cutoff_hz, kernel }) else {
                 continue;
             };
