@@ -8,6 +8,7 @@ use crate::filled::{Filled, all_filled, fill, lengthen};
 use crate::motion_response::{MotionResponse, PoseDensities};
 use crate::noise_floor::{LARGEST_GAIN, LARGEST_REPORTED_GAIN, LARGEST_RISE, NoiseFloor};
 use crate::pose_spectra::local_spectra;
+use crate::quaternion_length::with_lengths;
 use crate::sample_grid::SampleGrid;
 use crate::segments::Segments;
 use crate::zero_phase_smoothing::undoing_gain;
@@ -210,10 +211,29 @@ impl PoseEstimate {
         (self.position.spectrum().clone(), rotation)
     }
 
-    /// The estimate with a smoothing of the poses undone, up to a factor of 32.
+    /// The estimate with a smoothing of the poses undone, up to a factor of 32: of position and of a quaternion's
+    /// components, which were normalised afterwards.
     #[must_use]
     pub fn undoing(&self, smoothing: ZeroPhaseSmoothing) -> Self {
-        self.filtered_anew(Some(smoothing), 0)
+        let first = self.filtered_anew(Some(smoothing), 0);
+        let rate_hz = self.rate_hz;
+        let gain = |hz: f64| smoothing.undoing_gain(hz, rate_hz);
+        let passed = |hz: f64| gain(hz).recip();
+        let undone = |hz: f64| gain(hz).min(LARGEST_GAIN) * first.rotation.filter_at(hz);
+        let mut coordinates = self.coordinates.to_vec();
+        let quaternions = with_lengths(&coordinates[3..], rate_hz, &passed, &undone);
+        let inside = quaternions
+            .iter()
+            .map(|values| values[self.lead..self.lead + self.count].to_vec())
+            .collect::<Vec<_>>();
+        coordinates.splice(3.., quaternions);
+        let lengthened = Self {
+            coordinates: Arc::new(coordinates),
+            rotation: NoiseFloor::learn(&inside, rate_hz, LARGEST_RISE[1]),
+            local: Arc::new([self.local[0].clone(), local_spectra(&inside, rate_hz)]),
+            ..self.clone()
+        };
+        lengthened.filtered_anew(Some(smoothing), 0)
     }
 
     /// The estimate with filters that are so many hertz wider around each frequency that they pass: they let

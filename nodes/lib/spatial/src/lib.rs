@@ -69,6 +69,7 @@ mod pose_series;
 mod pose_source;
 mod pose_spectra;
 mod pose_spline;
+mod quaternion_length;
 mod sample_grid;
 mod sample_variance;
 mod segments;
