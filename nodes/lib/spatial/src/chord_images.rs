@@ -9,7 +9,8 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::Vector3;
 use rustfft::num_complex::Complex64;
 
-use crate::kinks::second_differences;
+use crate::kinks::{median, second_differences};
+use crate::system::median_interval;
 use crate::{FourierPair, PoseSeries};
 
 /// Width of the bands that are asked one by one, Hz, and their least one in lines of the spectrum: steady motions are
@@ -42,18 +43,13 @@ struct Differences {
     rate_hz: f64,
     /// Place, time since the first pose, and value.
     values: Vec<(usize, f64, [Vector3<f64>; 2])>,
-    size: usize,
+    transform: FourierPair,
 }
 
 impl Differences {
     fn of(poses: &PoseSeries, seconds: &[f64]) -> Option<Self> {
         let last = seconds.len().checked_sub(2)?;
-        let mut intervals: Vec<f64> = seconds.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        let middle = intervals.len() / 2;
-        let rate_hz = intervals
-            .select_nth_unstable_by(middle, f64::total_cmp)
-            .1
-            .recip();
+        let rate_hz = median_interval(seconds).recip();
         let span = seconds[last + 1];
         let values = (1..=last).filter_map(|k| {
             let window = 0.5 - 0.5 * (TAU * seconds[k] / span).cos();
@@ -65,17 +61,17 @@ impl Differences {
         Some(Self {
             rate_hz,
             values: values.collect(),
-            size,
+            transform: FourierPair::new(size),
         })
     }
 
     /// One axis, moved by so many hertz.
     fn spectrum(&self, of: usize, axis: usize, moved_hz: f64) -> Vec<Complex64> {
-        let mut signal = vec![Complex64::default(); self.size];
+        let mut signal = vec![Complex64::default(); self.transform.length()];
         for (place, seconds, values) in &self.values {
             signal[*place] = Complex64::from_polar(values[of][axis], TAU * moved_hz * seconds);
         }
-        FourierPair::new(self.size).forward(&mut signal);
+        self.transform.forward(&mut signal);
         signal
     }
 
@@ -84,8 +80,9 @@ impl Differences {
     fn votes(&self, of: usize, frames_hz: f64, offset_s: f64) -> f64 {
         let own = [0, 1, 2].map(|axis| self.spectrum(of, axis, 0.0));
         let at_images = [0, 1, 2].map(|axis| self.spectrum(of, axis, frames_hz));
-        let hz = |k: usize| k as f64 * self.rate_hz / self.size as f64;
-        let entry = |hz: f64| (hz * self.size as f64 / self.rate_hz).ceil() as usize;
+        let size = self.transform.length() as f64;
+        let hz = |k: usize| k as f64 * self.rate_hz / size;
+        let entry = |hz: f64| (hz * size / self.rate_hz).ceil() as usize;
         // What second differences let pass of a position's power.
         let passed = |hz: f64| (PI * hz / self.rate_hz).sin().powi(4);
         let power = |k: usize| own.iter().map(|axis| axis[k].norm_sqr()).sum::<f64>();
@@ -95,8 +92,7 @@ impl Differences {
         if top.is_empty() {
             return 0.0;
         }
-        let middle = top.len() / 2;
-        let noise = *top.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let noise = median(&mut top);
         let phase = Complex64::from_polar(1.0, TAU * frames_hz * offset_s);
         let width = entry(BAND_HZ).max(FEWEST_LINES as usize);
         let (first, end) = (entry(SLOWEST_HZ), entry(0.5 * frames_hz));

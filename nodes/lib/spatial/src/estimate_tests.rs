@@ -258,6 +258,26 @@ fn a_smoothing_is_undone_up_to_the_ends() {
 }
 
 #[test]
+fn motion_up_to_the_largest_gain_is_no_noise_before_a_smoothing() {
+    let (stamps, _, rotations) = poses(PoseNoise::default(), 100.0, |t| t < 30.0);
+    let smoothing = ZeroPhaseSmoothing {
+        cutoff_hz: 2.5,
+        kernel: SmoothingKernel::Butterworth { order: 4 },
+    };
+    let left = |hz: f64| 1.0 / smoothing.undoing_gain(hz, 100.0);
+    let mut random = Normal(11);
+    let positions: Vec<Vector3<f64>> = (0..stamps.len())
+        .map(|k| {
+            let noise = Vector3::new(random.draw(), random.draw(), random.draw()) * 1e-7;
+            many_frequencies(k as f64 / 100.0, &left).0 + noise
+        })
+        .collect();
+    let estimate = PoseEstimate::fit(&stamps, &positions, &rotations).unwrap();
+    let (position, ..) = estimate.undoing(smoothing).filter_at(3.0);
+    assert!(position > 0.9, "{position}");
+}
+
+#[test]
 fn bad_input_is_refused() {
     let (stamps, positions, rotations) = poses(PoseNoise::default(), 100.0, |t| t < 1.0);
     assert!(matches!(

@@ -267,7 +267,7 @@ fn level(power: &[f64], entries: std::ops::Range<usize>, around: usize, lowest: 
     median(&mut power[from..to].to_vec()).max(f64::MIN_POSITIVE)
 }
 
-fn median(values: &mut [f64]) -> f64 {
+pub(crate) fn median(values: &mut [f64]) -> f64 {
     if values.is_empty() {
         return 0.0;
     }

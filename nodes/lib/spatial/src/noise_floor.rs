@@ -123,7 +123,7 @@ impl NoiseFloor {
         let gain2 = |frequency_hz: f64| undoing_gain(frequency_hz, undone, rate_hz).powi(2);
         let shape = NoiseShape::learn(spectrum, rate_hz, largest_rise);
         let before = match undone {
-            Some(_) => noise_before_smoothing(spectrum, &gain2),
+            Some(_) => noise_before_smoothing(spectrum, &gain2, &shape),
             None => 0.0,
         };
         let noise_at =
@@ -372,11 +372,15 @@ fn widened(weights: Vec<f64>, reach: usize) -> Vec<f64> {
 }
 
 /// Density of the noise that was there before a smoothing: where the undone spectrum is least, beyond
-/// the slowest motion.
-fn noise_before_smoothing(spectrum: &Spectrum, gain2: &dyn Fn(f64) -> f64) -> f64 {
+/// the slowest motion, as far as it stands above the noise since. What is least short of that is motion.
+fn noise_before_smoothing(
+    spectrum: &Spectrum,
+    gain2: &dyn Fn(f64) -> f64,
+    since: &NoiseShape,
+) -> f64 {
     let least = (SLOWEST_ENTRIES..spectrum.density.len())
         .map(|k| (spectrum.frequency(k), spectrum.density[k]))
-        .filter(|(hz, _)| gain2(*hz) <= LARGEST_GAIN.powi(2))
+        .filter(|(hz, density)| *density > LOCAL_EDGE * since.at(*hz))
         .map(|(hz, density)| density * gain2(hz))
         .fold(f64::INFINITY, f64::min);
     if least.is_finite() { least } else { 0.0 }

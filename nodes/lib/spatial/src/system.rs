@@ -232,7 +232,7 @@ impl SplineSystem {
     }
 }
 
-fn median_interval(seconds: &[f64]) -> f64 {
+pub(crate) fn median_interval(seconds: &[f64]) -> f64 {
     let mut intervals: Vec<f64> = seconds.windows(2).map(|w| w[1] - w[0]).collect();
     let middle = intervals.len() / 2;
     *intervals.select_nth_unstable_by(middle, f64::total_cmp).1
