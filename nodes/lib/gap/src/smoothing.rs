@@ -244,9 +244,9 @@ impl<'a> Trial<'_, 'a> {
             .all(|(model, set)| gained > needed(model, &score(model, set.clone())))
     }
 
-    /// The kernel with the most evidence: Butterworth's of the second order, or the fourth; where that is better the third, else
-    /// what sets in more softly, a Gaussian and then the first. The best is refined. A Gaussian stays one: the second order explained
-    /// nothing.
+    /// The kernel with the most evidence: Butterworth's of the second order, or the fourth, and where that is better the third; or a
+    /// Gaussian, and where it is better than the second the first, which sets in more softly still. The best is refined. A
+    /// Gaussian stays one: the second order explained nothing.
     fn best_kernel(&self, second: Tried) -> Tried {
         if second.smoothing.kernel == SmoothingKernel::Gaussian {
             return self.refined(self.refined(second, BETWEEN_KERNELS), FINE);
@@ -265,21 +265,23 @@ impl<'a> Trial<'_, 'a> {
         };
         // The grid's cutoff was chosen beside less: left there it loses against kernels whose cutoffs are not.
         let second = self.refined(second, BETWEEN_ORDERS);
+        if reaches_no_motion(&second.smoothing, 1.0) {
+            // What was found beside it explains what it did.
+            return second;
+        }
         let (best, is_steeper) = better(second, of_order(4));
         if reaches_no_motion(&best.smoothing, 1.0) {
             return best;
         }
-        let (best, _) = if is_steeper {
-            better(best, of_order(3))
-        } else {
-            let gaussian = GAUSSIAN_PARTS
-                .into_iter()
-                .find_map(|part| around(SmoothingKernel::Gaussian, part, BETWEEN_KERNELS));
-            match better(best, gaussian) {
-                (best, true) => better(best, of_order(1)),
-                second => second,
-            }
-        };
+        let (best, _) = better(best, is_steeper.then(|| of_order(3)).flatten());
+        let gaussian = GAUSSIAN_PARTS
+            .into_iter()
+            .find_map(|part| around(SmoothingKernel::Gaussian, part, BETWEEN_KERNELS));
+        let (best, is_gaussian) = better(best, gaussian);
+        let sets_in_softly = is_gaussian && !is_steeper;
+        let first = sets_in_softly.then(|| of_order(1)).flatten();
+        let first = first.filter(|first| !reaches_no_motion(&first.smoothing, 1.0));
+        let (best, _) = better(best, first);
         self.refined(best, FINE)
     }
 
