@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use crate::chord_images;
 use crate::chords::Chords;
 use crate::golden::greatest_near;
-use crate::kinks::{Kinks, second_differences};
+use crate::kinks::{Kinks, LEAST_HZ, second_differences};
 use crate::{PoseNoise, PoseSeries};
 
 /// Poses over which second differences are taken, in turn until kinks show: those of slow frames drown in the noise
@@ -90,8 +90,24 @@ impl FrameGrid {
                 best = Some((misfit, grid));
             }
         }
-        best.map(|(_, grid)| grid.sharpened(poses))
-            .filter(|grid| grid.is_convincing(kinks, poses))
+        let found = best
+            .map(|(_, grid)| grid.sharpened(poses))
+            .filter(|grid| grid.is_convincing(kinks, poses))?;
+        Some(found.with_fewer_frames(kinks, poses).unwrap_or(found))
+    }
+
+    /// The slowest part of the rate that stands out too and has chords that poses are off by hardly more: narrow kinks
+    /// have many multiples, and a high one of them may stand out most.
+    fn with_fewer_frames(&self, kinks: &Kinks, poses: &PoseSeries) -> Option<Self> {
+        let parts = (2..=(self.rate_hz / LEAST_HZ) as u32).rev();
+        parts
+            .map(|part| self.rate_hz / f64::from(part))
+            .filter(|hz| kinks.height(*hz) > LEAST_FUNDAMENTAL)
+            .map(|hz| Self::through(kinks, poses, hz).1.sharpened(poses))
+            .find(|grid| {
+                grid.misfit(kinks, poses) < self.misfit(kinks, poses) + BETTER
+                    && grid.is_convincing(kinks, poses)
+            })
     }
 
     /// The frames of a rate that is known already; none where the poses do not show them.

@@ -80,6 +80,11 @@ fn frames_are_found_and_come_back() {
         // And nearly so over several.
         (263.6, 46.35, 0.004, [9e-4, 4.5e-3]),
         (240.0, 34.55, 0.004, [1.2e-3, 6e-3]),
+        // The rate itself stands out less than its tenth multiple and more.
+        (200.0, 10.0, 0.0013, [3e-4, 1.2e-3]),
+        (200.0, 10.0, 0.0013, [5e-4, 2e-3]),
+        (360.0, 9.0, 0.0013, [3e-4, 1.2e-3]),
+        (240.0, 12.0, 0.0013, [3e-4, 1.2e-3]),
         // Two poses alone tell of the frame before the first pose.
         (290.6, 17.807, 0.0051, [0.0, 0.0]),
     ] {

@@ -13,7 +13,7 @@ const LEAST_POSES: usize = 200;
 /// Intervals of neighbours may differ by this part for a second difference to mean anything. No source.
 const UNEVEN: f64 = 0.05;
 /// Slowest kinks, Hz: below it motion has a rhythm of its own.
-const LEAST_HZ: f64 = 8.0;
+pub(crate) const LEAST_HZ: f64 = 8.0;
 /// Slowest repetition that is looked for, Hz. No source.
 const LEAST_REPETITION_HZ: f64 = 0.25;
 /// Harmonics of a repetition of which the strongest one may be. No source.

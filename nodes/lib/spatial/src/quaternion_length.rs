@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use rustfft::num_complex::Complex64;
 
 use crate::FourierPair;
+use crate::segments::continued;
 
 /// Passes in which a length is looked for at most, and the largest change at which it is found. No source.
 const PASSES: usize = 6;
@@ -101,8 +102,9 @@ impl Filtering {
             let mut values = vec![Complex64::default(); self.transform.length()];
             let lines = [first, second].map(|values| Line::of(values));
             for at in 0..self.count + 2 * self.padding {
-                let [re, im] = [first, second].map(|values| self.continued(values, at));
-                let [line_re, line_im] = lines.each_ref().map(|line| line.at(self.place(at)));
+                let [re, im] = [first, second].map(|values| continued(values, self.place(at)));
+                let [line_re, line_im] =
+                    lines.each_ref().map(|line| line.at(self.place(at) as f64));
                 let faded = self.fade(at);
                 values[at] = Complex64::new((re - line_re) * faded, (im - line_im) * faded);
             }
@@ -127,28 +129,17 @@ impl Filtering {
     }
 
     /// Place in the series of an entry of the padded one.
-    fn place(&self, at: usize) -> f64 {
-        at as f64 - self.padding as f64
-    }
-
-    fn continued(&self, series: &[f64], at: usize) -> f64 {
-        let last = self.count - 1;
-        if at < self.padding {
-            2.0 * series[0] - series[self.padding - at]
-        } else if at > self.padding + last {
-            2.0 * series[last] - series[2 * last + self.padding - at]
-        } else {
-            series[at - self.padding]
-        }
+    fn place(&self, at: usize) -> i64 {
+        at as i64 - self.padding as i64
     }
 
     /// 1 on the series, and down to 0 over the padding.
     fn fade(&self, at: usize) -> f64 {
-        let beyond = (-self.place(at)).max(self.place(at) - (self.count - 1) as f64);
-        if beyond <= 0.0 {
+        let beyond = (-self.place(at)).max(self.place(at) - (self.count - 1) as i64);
+        if beyond <= 0 {
             1.0
         } else {
-            0.5 + 0.5 * (PI * beyond / self.padding as f64).cos()
+            0.5 + 0.5 * (PI * beyond as f64 / self.padding as f64).cos()
         }
     }
 }

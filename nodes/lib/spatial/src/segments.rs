@@ -186,7 +186,7 @@ impl Segments {
 }
 
 /// A series continued oddly beyond its ends, and level beyond that.
-fn continued(series: &[f64], entry: i64) -> f64 {
+pub(crate) fn continued(series: &[f64], entry: i64) -> f64 {
     let last = series.len() as i64 - 1;
     if entry < 0 {
         2.0 * series[0] - series[(-entry).min(last) as usize]
