@@ -103,6 +103,7 @@ impl<'a> Analysis<'a> {
             kept: None,
             library: self.library.clone(),
             unknown: None,
+            is_loud: false,
             is_mostly_explained: left < MOSTLY_EXPLAINED,
             is_hardly_explained: left > HARDLY_EXPLAINED && !is_read_off_undone(&reportable),
             reportable,

@@ -90,18 +90,8 @@ fn without(set: &EffectSet, kind: EffectKind, library: &[EffectKind]) -> Option<
 /// By how much factors on the simulation raise the log-likelihood of the part of time that they were not learnt from,
 /// where they can be what the reference's filter does; in the bands that gain more.
 fn gained(model: &FitModel, fit: &Fit) -> f64 {
-    let prepared = model.prepared;
-    let readings = &fit.prediction.readings;
-    let simulated = prepared.on_sample_grid(|k, axis| value_on_axis(&readings[k], axis));
-    let centred: Vec<Vec<f64>> = simulated
-        .into_iter()
-        .map(|series| {
-            let mean = series.iter().sum::<f64>() / series.len().max(1) as f64;
-            series.into_iter().map(|value| value - mean).collect()
-        })
-        .collect();
-    let simulated = model.whitener.apply(&centred);
-    let rate_hz = prepared.rate_hz;
+    let simulated = whitened_simulation(model, fit);
+    let rate_hz = model.prepared.rate_hz;
     [
         Bands::new(rate_hz, WINDOW_S, &EDGES_HZ),
         Bands::new(rate_hz, SLOW_WINDOW_S, &SLOW_EDGES_HZ),
@@ -109,6 +99,21 @@ fn gained(model: &FitModel, fit: &Fit) -> f64 {
     .iter()
     .map(|bands| gained_in(model, fit, bands, &simulated))
     .fold(f64::NEG_INFINITY, f64::max)
+}
+
+pub(crate) fn whitened_simulation(model: &FitModel, fit: &Fit) -> Vec<f64> {
+    let readings = &fit.prediction.readings;
+    let simulated = model
+        .prepared
+        .on_sample_grid(|k, axis| value_on_axis(&readings[k], axis));
+    let centred: Vec<Vec<f64>> = simulated
+        .into_iter()
+        .map(|series| {
+            let mean = series.iter().sum::<f64>() / series.len().max(1) as f64;
+            series.into_iter().map(|value| value - mean).collect()
+        })
+        .collect();
+    model.whitener.apply(&centred)
 }
 
 /// The same of factors in some bands, with the whitened simulation.
@@ -133,7 +138,7 @@ fn gained_in(model: &FitModel, fit: &Fit, bands: &Bands, simulated: &[f64]) -> f
 }
 
 /// Sums over a channel's windows in units of the predicted noise, by blocks of time.
-fn whitened_blocks(
+pub(crate) fn whitened_blocks(
     model: &FitModel,
     bands: &Bands,
     channel: Channel,
@@ -176,7 +181,7 @@ fn largest_factors(model: &FitModel, bands: &Bands, channel: Channel) -> [f64; B
 /// In which bands a factor can be what the reference's filter does: above one all, and below one those of noise. With X
 /// the simulation's power, and the readings a factor g of it, noise leaves g (1 - g) X that no factor takes away, and a
 /// sensor's filter nothing but the sensor's own noise. Where hardly anything passes, the one looks like the other.
-fn of_reference(
+pub(crate) fn of_reference(
     model: &FitModel,
     bands: &Bands,
     channel: Channel,
@@ -187,16 +192,24 @@ fn of_reference(
         blocks.iter().map(|block| of(block)[band]).sum()
     };
     std::array::from_fn(|band| {
-        let (factor, more) = (whole[band], whole[band] - 1.0);
+        let factor = whole[band];
         let power = sum(|block| &block.simulated, band);
-        let left = sum(|block| &block.rest, band) - 2.0 * more * sum(|block| &block.both, band)
-            + more * more * power;
+        let left = left_behind(blocks, band, factor);
         let white = sum(|block| &block.entries, band)
             * bands.power_of_one()
             * part_of_sensor(model, channel, bands.range_hz(band));
         let is_told = (SHUT..=1.0).contains(&factor);
         !is_told || left - white > LEFT_BY_NOISE * factor * (1.0 - factor) * power
     })
+}
+
+/// The residual's power in a band behind a factor on the simulation.
+pub(crate) fn left_behind(blocks: &[Block], band: usize, factor: f64) -> f64 {
+    let more = factor - 1.0;
+    let of = |block: &Block| {
+        block.rest[band] - 2.0 * more * block.both[band] + more * more * block.simulated[band]
+    };
+    blocks.iter().map(of).sum()
 }
 
 /// Mean part that the sensor's white noise has of the predicted noise between two frequencies.

@@ -27,6 +27,8 @@ pub(crate) struct Findings<'a> {
     pub library: Library,
     /// What none of them explains.
     pub unknown: Option<Unknown>,
+    /// Whether more is left than the noise that is expected, whatever it is.
+    pub is_loud: bool,
     /// Whether little is unknown against what the found effects explain: then calibrations among
     /// these are not confounded with it.
     pub is_mostly_explained: bool,

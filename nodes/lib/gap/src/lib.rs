@@ -33,6 +33,7 @@ mod library;
 mod location;
 mod magnetometer;
 mod metrics;
+mod mistaken_noise;
 pub mod monitor;
 mod noise_model;
 mod noise_updates;

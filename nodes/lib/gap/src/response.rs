@@ -111,7 +111,7 @@ pub(crate) fn kept(
 ) -> (Option<LearntResponse>, Vec<Reading>) {
     let plain = simulations.held_out(None);
     // Where nothing is wrong, nothing is to be made up for.
-    let is_wrong = findings.unknown.is_some() || !findings.applied().is_empty();
+    let is_wrong = findings.is_loud || findings.unknown.is_some() || !findings.applied().is_empty();
     let Some(learnt) = is_wrong.then(|| learn(findings, simulations)).flatten() else {
         return (None, plain);
     };

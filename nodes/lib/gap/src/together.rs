@@ -110,6 +110,7 @@ fn judge_rest(findings: &mut [Findings], progress: &Progress) {
     for (index, suspects) in passes.into_iter().enumerate() {
         for one in findings.iter_mut() {
             let mut rest = known.take().unwrap_or_else(|| Rest::of(one));
+            one.is_loud = rest.is_loud(&one.model);
             one.unknown = detect_unmodelled_structure(one, &mut rest, suspects);
             // Those of several recordings would fill much memory.
             known = is_alone.then_some(rest);

@@ -8,6 +8,7 @@ use crate::findings::{Findings, ResidualDependence, Unknown};
 use crate::fit::{Fit, FitModel};
 use crate::gram::dot;
 use crate::location::{bands, locate, summed_spectrum};
+use crate::mistaken_noise::loudest_beside_noise;
 use crate::noise_updates::behind_wider_filters;
 use crate::policy::probability::{MOST_UNKNOWN, NATS_PER_BAND, UNKNOWN_GAIN_NATS};
 use crate::policy::report::{COARSE_STEPS, EXCESS_NOISE_BESIDE_UNKNOWN};
@@ -97,6 +98,11 @@ impl Rest {
             standings: Standings::new(),
         }
     }
+
+    /// Whether a band or a burst stands out of the noise.
+    pub fn is_loud(&self, model: &FitModel) -> bool {
+        self.seen.diagnostics.are_loud(model)
+    }
 }
 
 /// Looks for structure in the whitened residual that no named effect explains.
@@ -106,12 +112,8 @@ pub(crate) fn detect_unmodelled_structure(
     suspects: Suspects,
 ) -> Option<Unknown> {
     let structure = Structure::new(findings, &rest.seen);
-    let (diagnostics, regressions) = (&rest.seen.diagnostics, &rest.seen.regressions);
-    let stands = structure.tells_by_messages()
-        || (structure.is_loud(&findings.model)
-            && is_loud_behind_wider_filters(findings, diagnostics))
-        || (!structure.strong.is_empty() && structure.stays_behind_wider_filters(findings));
-    if !stands {
+    let regressions = &rest.seen.regressions;
+    if !structure.stands_out(findings) {
         return None;
     }
     let location = locate(
@@ -197,15 +199,18 @@ impl<'a> Structure<'a> {
         }
     }
 
+    /// Whether it is more than the reference's errors and its filters leave.
+    fn stands_out(&self, findings: &Findings) -> bool {
+        self.tells_by_messages()
+            || (self.diagnostics.are_loud(&findings.model)
+                && is_loud_behind_wider_filters(findings, self.diagnostics)
+                && is_loud_beside_noise(findings, self.diagnostics))
+            || (!self.strong.is_empty() && self.stays_behind_wider_filters(findings))
+    }
+
     /// Whether stamps or repeated readings tell.
     fn tells_by_messages(&self) -> bool {
         self.in_stamps || any(self.stuck)
-    }
-
-    /// Whether the size of the residual does.
-    fn is_loud(&self, model: &FitModel) -> bool {
-        let is_loud = |channel| self.diagnostics.is_loud(model, channel);
-        Channel::ALL.into_iter().any(is_loud)
     }
 
     /// Whether any of the regressions keeps its gain where the reference is filtered much less: what its filters
@@ -363,6 +368,19 @@ fn is_loud_behind_wider_filters(findings: &Findings, before: &ResidualDiagnostic
     })
 }
 
+/// Whether the residual is louder than noise that the reference's filters take for motion makes it.
+fn is_loud_beside_noise(findings: &Findings, before: &ResidualDiagnostics) -> bool {
+    let (model, fit) = (&findings.model, &findings.scored.fit);
+    let factor = bar_factor(model);
+    Channel::ALL.into_iter().any(|channel| {
+        let stays = || {
+            let loudest = loudest_beside_noise(model, fit, channel);
+            loudest.is_none_or(|loudest| loudest > BAND * factor)
+        };
+        before.is_loud(model, channel) && (before.bursts_out(model, channel) || stays())
+    })
+}
+
 impl ResidualDiagnostics {
     fn new(model: &FitModel, fit: &Fit) -> Self {
         let prepared = model.prepared;
@@ -378,12 +396,19 @@ impl ResidualDiagnostics {
         }
     }
 
+    fn are_loud(&self, model: &FitModel) -> bool {
+        let is_loud = |channel| self.is_loud(model, channel);
+        Channel::ALL.into_iter().any(is_loud)
+    }
+
     /// Whether a band or a burst of a channel stands out of the noise.
     fn is_loud(&self, model: &FitModel, channel: Channel) -> bool {
-        let factor = bar_factor(model);
-        !is_coarse(model, channel)
-            && (self.band[channel] > BAND * factor
-                || (self.burst[channel] > BURST * factor && self.outliers[channel] > OUTLIERS))
+        let by_band = self.band[channel] > BAND * bar_factor(model);
+        !is_coarse(model, channel) && (by_band || self.bursts_out(model, channel))
+    }
+
+    fn bursts_out(&self, model: &FitModel, channel: Channel) -> bool {
+        self.burst[channel] > BURST * bar_factor(model) && self.outliers[channel] > OUTLIERS
     }
 }
 
