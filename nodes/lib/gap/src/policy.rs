@@ -286,6 +286,8 @@ pub(crate) mod vibration {
 pub(crate) mod report {
     use cromosim_spatial::PoseNoise;
 
+    /// Part of a channel's residual below which the verdict tells of what is kept without a cause. No source.
+    pub const MUCH_LESS: f64 = 0.9;
     /// Noise per sample and axis from which on the reference's noise is a cause: m, rad. From the
     /// contract: 1 mm or 0.25 degrees.
     pub const REFERENCE_NOISE: PoseNoise = PoseNoise {

@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use crate::diagnosis::{Cause, ClockJump, Interval, Metrics, UNKNOWN};
 use crate::findings::Unknown;
+use crate::policy::report::MUCH_LESS;
 use crate::policy::unknown::{BAND_SHARE, INTERVAL_SHARE};
 
 /// Values by the names of their parameters, in the form of diagnosis.json.
@@ -111,10 +112,7 @@ fn intervals(all: &[Interval]) -> Vec<[f64; 2]> {
 /// One sentence for people.
 pub(crate) fn verdict(causes: &[Cause], before: &Metrics, after: &Metrics) -> String {
     let Some(first) = causes.first() else {
-        return format!(
-            "No cause: the residual ({:.3} m/s2, {:.4} rad/s) is what the sensor's noise and the reference's own error leave.",
-            before.accel_rmse, before.gyro_rmse
-        );
+        return without_cause(before, after);
     };
     let percent = |share: f64| (100.0 * share).round();
     let share = |cause: &Cause| {
@@ -149,6 +147,22 @@ pub(crate) fn verdict(causes: &[Cause], before: &Metrics, after: &Metrics) -> St
     format!(
         "{text}; the accelerometer's {} {} m/s2, the gyroscope's{gyro_word} {} rad/s.",
         accel.0, accel.1, gyro.1
+    )
+}
+
+/// What is kept without being a cause is told of where it changes much.
+fn without_cause(before: &Metrics, after: &Metrics) -> String {
+    let size = |of: &Metrics| format!("{:.3} m/s2, {:.4} rad/s", of.accel_rmse, of.gyro_rmse);
+    let falls = |before: f64, after: f64| after < MUCH_LESS * before;
+    let kept =
+        if falls(before.accel_rmse, after.accel_rmse) || falls(before.gyro_rmse, after.gyro_rmse) {
+            format!("; with what is kept all the same it is {}", size(after))
+        } else {
+            String::new()
+        };
+    format!(
+        "No cause: the residual ({}) is what the sensor's noise and the reference's own error leave{kept}.",
+        size(before)
     )
 }
 
@@ -213,6 +227,17 @@ mod tests {
         };
         let text = verdict(&[lever_arm], &before, &after);
         text.split_once("; ").unwrap().1.to_owned()
+    }
+
+    #[test]
+    fn without_a_cause_the_verdict_tells_of_what_is_kept() {
+        let before = metrics(1.036, 0.0423);
+        let of = |after: Metrics| verdict(&[], &before, &after);
+        assert!(of(metrics(1.02, 0.0420)).ends_with("the reference's own error leave."));
+        assert!(
+            of(metrics(0.278, 0.0423))
+                .ends_with("leave; with what is kept all the same it is 0.278 m/s2, 0.0423 rad/s.")
+        );
     }
 
     #[test]
