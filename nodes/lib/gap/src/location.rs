@@ -94,6 +94,34 @@ pub(crate) fn bands(nyquist_hz: f64) -> Vec<(f64, f64)> {
     edges.windows(2).map(|pair| (pair[0], pair[1])).collect()
 }
 
+/// How loud a channel's whitened residual is by frequency.
+pub(crate) struct Loudness {
+    spectrum: Spectrum,
+    /// Of a mean density, to a mean square of what is compared.
+    scale: f64,
+}
+
+impl Loudness {
+    pub fn new(
+        white: &[f64],
+        prepared: &PreparedPlacement,
+        whitener: &Whitener,
+        channel: Channel,
+    ) -> Self {
+        let kept = whitener.count[channel] / (3.0 * prepared.length as f64);
+        Self {
+            spectrum: summed_spectrum(white, prepared, axes_of_channel(channel)),
+            scale: prepared.rate_hz / 6.0 / kept.max(1e-9),
+        }
+    }
+
+    /// Mean square between two frequencies, Hz; 1 for the predicted noise.
+    pub fn between(&self, from_hz: f64, to_hz: f64) -> f64 {
+        let band = self.spectrum.band(from_hz, to_hz);
+        band.iter().sum::<f64>() / band.len().max(1) as f64 * self.scale
+    }
+}
+
 /// Sum over axes of the spectra of a flat whitened residual: 2 / rate each where it is white.
 pub(crate) fn summed_spectrum(
     white: &[f64],

@@ -9,9 +9,13 @@ use cromosim_imu::Channel;
 
 use crate::beside_response::{left_behind, of_reference, whitened_blocks, whitened_simulation};
 use crate::fit::{Fit, FitModel};
+use crate::location::Loudness;
 use crate::policy::beside_response::MOST_LEFT_BY_NOISE;
 use crate::response::{BANDS, Bands, Block, EDGES_HZ, WINDOW_S, factors};
 use crate::trace::trace;
+
+/// What is slower is motion, Hz.
+const SLOWEST_HZ: f64 = 0.5;
 
 /// One band, in units of the predicted noise.
 #[derive(Clone, Copy, Debug)]
@@ -49,7 +53,25 @@ pub(crate) fn loudest_beside_noise(model: &FitModel, fit: &Fit, channel: Channel
             growth: of_memory(channel, range_hz) / mean_predicted(model, channel, range_hz),
         })
     };
-    let rests: Vec<BandRest> = (0..BANDS).filter_map(of_band).collect();
+    let mut rests: Vec<BandRest> = (0..BANDS).filter_map(of_band).collect();
+    if rests.is_empty() {
+        return None;
+    }
+    // Slower and faster the simulation is not looked at.
+    let prepared = model.prepared;
+    let loudness = Loudness::new(&fit.residual, prepared, &model.whitener, channel);
+    let bare = |[from_hz, to_hz]: [f64; 2]| BandRest {
+        factor: 1.0,
+        simulated: 0.0,
+        left: loudness.between(from_hz, to_hz),
+        growth: of_memory(channel, [from_hz, to_hz])
+            / mean_predicted(model, channel, [from_hz, to_hz]),
+    };
+    rests.insert(0, bare([SLOWEST_HZ, EDGES_HZ[0]]));
+    let fastest_hz = prepared.rate_hz / 2.0;
+    if fastest_hz > EDGES_HZ[BANDS] {
+        rests.push(bare([EDGES_HZ[BANDS], fastest_hz]));
+    }
     trace(|| eprintln!("beside mistaken noise {channel:?} {rests:.3?}"));
     loudest(&rests)
 }

@@ -7,7 +7,7 @@ use crate::confounding::{Standing, Standings, confounded_effects, is_calibration
 use crate::findings::{Findings, ResidualDependence, Unknown};
 use crate::fit::{Fit, FitModel};
 use crate::gram::dot;
-use crate::location::{bands, locate, summed_spectrum};
+use crate::location::{Loudness, bands, locate};
 use crate::mistaken_noise::loudest_beside_noise;
 use crate::noise_updates::behind_wider_filters;
 use crate::policy::probability::{MOST_UNKNOWN, NATS_PER_BAND, UNKNOWN_GAIN_NATS};
@@ -415,18 +415,11 @@ impl ResidualDiagnostics {
 /// Largest mean square of a channel's whitened residual in a band; the lowest band is motion.
 fn largest_band(model: &FitModel, fit: &Fit, channel: Channel) -> f64 {
     let prepared = model.prepared;
-    let spectrum = summed_spectrum(&fit.residual, prepared, axes_of_channel(channel));
-    let kept = model.whitener.count[channel] / (3.0 * prepared.length as f64);
-    let level = |from: f64, to: f64| {
-        let band = spectrum.band(from, to);
-        band.iter().sum::<f64>() / band.len().max(1) as f64 * prepared.rate_hz
-            / 6.0
-            / kept.max(1e-9)
-    };
+    let loudness = Loudness::new(&fit.residual, prepared, &model.whitener, channel);
     bands(prepared.rate_hz / 2.0)
         .into_iter()
         .skip(1)
-        .map(|(a, b)| level(a, b))
+        .map(|(from_hz, to_hz)| loudness.between(from_hz, to_hz))
         .fold(0.0, f64::max)
 }
 

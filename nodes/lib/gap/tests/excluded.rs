@@ -31,6 +31,29 @@ fn excluded(kind: K, values: &[f64]) -> PlacementAnswer {
     answer
 }
 
+/// Where factors on the simulation tell nothing of the reference's noise either.
+#[test]
+fn what_is_faster_than_what_references_show_is_unknown() {
+    let values = [
+        71.0, 0.5, 0.3, 0.4, 0.8, 2.9, 5.1, 0.05, 0.03, 0.08, 1.6, 4.2, 3.0,
+    ];
+    let scene = Scene {
+        imu_hz: 200.0,
+        ..Scene::new(62)
+    };
+    let options = DiagnoseOptions {
+        excluded: vec![K::Vibration],
+        ..DiagnoseOptions::default()
+    };
+    let record = scene.with(K::Vibration, &values).record();
+    let diagnosis = diagnose(&record, &options).unwrap().diagnosis;
+    assert!(
+        names(&diagnosis).contains(&"unknown"),
+        "{}",
+        diagnosis.verdict
+    );
+}
+
 /// And nothing else is said with it.
 fn excluded_alone(kind: K, values: &[f64]) {
     let answer = excluded(kind, values);
