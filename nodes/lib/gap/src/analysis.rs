@@ -2,6 +2,7 @@
 
 use cromosim_imu::{Effect, EffectKind, EffectSet, ReadOff, Search};
 
+use crate::axes::smaller;
 use crate::axes_choice::with_chosen_axes;
 use crate::beside_response::pruned_beside_response;
 use crate::confounding::is_calibration;
@@ -11,7 +12,7 @@ use crate::library::Library;
 use crate::noise_updates::{first_model, with_rest_as_noise, with_updated_noise};
 use crate::policy::confounded::HARDLY_EXPLAINED;
 use crate::policy::report::MOSTLY_EXPLAINED;
-use crate::policy::search::{MOST, MOST_AT_FIRST, ROUNDS};
+use crate::policy::search::{MOST, MOST_AT_FIRST, NOISE_OVERSTATED, ROUNDS};
 use crate::progress::{self, Progress, THINNED};
 use crate::reportable::{Observations, is_ordinary, reportable_effects};
 use crate::resolved_noise::{may_fold_over, resolved_noise};
@@ -170,6 +171,13 @@ impl<'a> Analysis<'a> {
         let mut model = self.first_model();
         let mut scored = search_down_to_noise(&model, starts, fitted, MOST_AT_FIRST);
         trace_scored("first", &scored);
+        if smaller(scored.fit.held_out_ratio()) < NOISE_OVERSTATED {
+            // What was found since had passed for noise, which may cover more.
+            model = with_updated_noise(&model, &scored, digital, self.library);
+            let found = scored.fit.set.clone();
+            scored = search_down_to_noise(&model, &[found], fitted, MOST_AT_FIRST);
+            trace_scored("beside the noise that is left", &scored);
+        }
         self.progress.reached(progress::ROUNDS.start);
         if self.library.allows_read_off(ReadOff::ReferenceSpectrum) {
             (model, scored) = try_smoothing(model, scored, starts, fitted);

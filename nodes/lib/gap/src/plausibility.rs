@@ -6,8 +6,9 @@ use cromosim_spatial::{PoseLine, Spectrum};
 use crate::fit::{Fit, FitModel};
 use crate::lever_arm_by_readings;
 use crate::policy::vibration::{
-    ABOVE_HZ, BELOW_HZ, FASTEST_STEADY_MOTION_HZ, IN_REFERENCE_HEIGHT, IN_REFERENCE_PART,
-    LEAST_HEIGHT, LEAST_HZ, LEAST_POWER, MOST_HEIGHT_LEFT, MOST_LEFT, SURROUNDINGS_HZ,
+    ABOVE_HZ, BELOW_HZ, CLEARLY_IN_REFERENCE_HEIGHT, CLEARLY_IN_REFERENCE_PART,
+    FASTEST_STEADY_MOTION_HZ, IN_REFERENCE_HEIGHT, IN_REFERENCE_PART, LEAST_HEIGHT, LEAST_HZ,
+    LEAST_POWER, MOST_HEIGHT_LEFT, MOST_LEFT, SURROUNDINGS_HZ,
 };
 use crate::trace::trace;
 
@@ -92,7 +93,8 @@ fn is_true_vibration(model: &FitModel, fit: &Fit) -> bool {
 }
 
 /// Whether the reference has the line too, if below its noise: what goes on for minutes at one frequency shows in all
-/// of its poses together where no filter passes it. A gait is motion then, of which the reference resolves too little;
+/// of its poses together where no filter passes it. A gait is motion then, of which the reference resolves too little, or
+/// a smoothing has left little;
 /// faster than any, it is a machine that shakes what the reference is of as well, and a vibration to the sensor.
 fn is_in_reference(model: &FitModel, line: &SpectralLine) -> bool {
     if line.hz > FASTEST_STEADY_MOTION_HZ {
@@ -103,7 +105,10 @@ fn is_in_reference(model: &FitModel, line: &SpectralLine) -> bool {
     };
     let has_it = |(channel, own): (Channel, &PoseLine)| {
         let power = line.power(channel);
-        power > 0.0 && own.height > IN_REFERENCE_HEIGHT && own.power > IN_REFERENCE_PART * power
+        let is_there = |height: f64, part: f64| own.height > height && own.power > part * power;
+        power > 0.0
+            && (is_there(IN_REFERENCE_HEIGHT, IN_REFERENCE_PART)
+                || is_there(CLEARLY_IN_REFERENCE_HEIGHT, CLEARLY_IN_REFERENCE_PART))
     };
     trace(|| eprintln!("  line of {:.3} Hz, of the reference {lines:?}", line.hz));
     Channel::ALL.into_iter().zip(&lines).any(has_it)

@@ -7,14 +7,15 @@ use cromosim_imu::{
 };
 use cromosim_spatial::PoseNoise;
 
-use crate::axes::{axes_of_channel, value_on_axis};
+use crate::axes::{axes_of_channel, larger, value_on_axis};
 use crate::digital::Digital;
 use crate::fit::{Fit, FitModel};
 use crate::library::Library;
 use crate::policy::report::{
     COARSE_STEPS, DOUBTFUL_EXCESS_NOISE, EXCESS_NOISE, MANY_MISSING,
-    ORDINARY_BESIDE_REFERENCE_NOISE, ORDINARY_BESIDE_SMOOTHING, OUTWEIGHING_NATS, REFERENCE_NOISE,
-    REFERENCE_UNCERTAINTY, ROUNDING_SIGMAS, ROUNDING_UNCERTAINTY, STEP,
+    ORDINARY_BESIDE_REFERENCE_NOISE, ORDINARY_BESIDE_SMOOTHING, OUTWEIGHING_NATS,
+    OUTWEIGHING_SMOOTHING_NATS, REFERENCE_NOISE, REFERENCE_UNCERTAINTY, ROUNDING_SIGMAS,
+    ROUNDING_UNCERTAINTY, SMOOTHING_EXPLAINS, STEP,
 };
 use crate::resolved_noise::ResolvedNoise;
 use crate::sensor_noise::UPPER_BANDS;
@@ -85,7 +86,8 @@ fn is_reference_noisy(model: &FitModel) -> bool {
         && prepared.noise_behind_frames.is_none_or(is_noisy)
 }
 
-/// Whether an effect beside a noisy reference explains more than that noise could pass for.
+/// Whether an effect explains more than could pass for it: noise of the reference, or a smoothing's shape that is a little off
+/// where what is left is hardly more than noise.
 fn outweighs_reference(effect: &Effect, model: &FitModel, fit: &Fit) -> bool {
     let values: f64 = effect
         .kind()
@@ -94,8 +96,13 @@ fn outweighs_reference(effect: &Effect, model: &FitModel, fit: &Fit) -> bool {
         .iter()
         .map(|channel| model.whitener.count[*channel])
         .sum();
-    model.basis.undone_smoothing.is_none()
-        && fit.linear.held_out - fit.held_out_without(effect.kind()) > OUTWEIGHING_NATS * values
+    let gained = fit.linear.held_out - fit.held_out_without(effect.kind());
+    if model.basis.undone_smoothing.is_none() {
+        gained > OUTWEIGHING_NATS * values
+    } else {
+        larger(fit.held_out_ratio()) < SMOOTHING_EXPLAINS
+            && gained > OUTWEIGHING_SMOOTHING_NATS * values
+    }
 }
 
 /// Factor on what is ordinary of an effect: what is fitted to a poor reference is that much poorer.

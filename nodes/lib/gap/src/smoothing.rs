@@ -10,7 +10,7 @@ use crate::plausibility::told_from_smoothing;
 use crate::policy::smoothing::{
     BESIDE, BEST_RATIO, CLOSER, FARTHER_FOR_CLOSER, LEAST_GAIN_NATS, LEAST_SHARE, MUCH_CLOSER,
     MUCH_FARTHER, NOT_FARTHER, PART_OF_ATTENUATION, SHARP, SHARPENINGS, SHORTEST_DELAY_S,
-    SUSPICIOUS, SUSPICIOUS_IMITATED, SUSPICIOUS_OF_GAUSSIAN, TRIAL_STEPS,
+    SUSPICIOUS, SUSPICIOUS_OF_GAUSSIAN, TRIAL_STEPS,
 };
 use crate::response::left_beside_attenuation;
 use crate::search::{ScoredEffectSet, excess, score, score_after, search_down_to_noise};
@@ -39,20 +39,17 @@ pub(crate) fn try_smoothing<'a>(
     library: &[EffectKind],
 ) -> (FitModel<'a>, ScoredEffectSet) {
     let found = told_from_smoothing(&scored.fit.set);
-    let suspicious = if found == scored.fit.set {
-        SUSPICIOUS
-    } else {
-        SUSPICIOUS_IMITATED
-    };
-    if larger(scored.fit.held_out_ratio()) < suspicious {
+    let is_imitated = found != scored.fit.set;
+    if !is_imitated && larger(scored.fit.held_out_ratio()) < SUSPICIOUS {
         return (model, scored);
     }
     let plain = evidence(&model, &scored);
-    let without_smoothing = if found == scored.fit.set {
-        plain
-    } else {
+    let without_smoothing = if is_imitated {
         evidence(&model, &score(&model, found.clone()))
+    } else {
+        plain
     };
+    let start = with_line(&starts[0], &found);
     let sets = starting_sets(starts, found, library);
     let needed = needed(&model, &scored);
     let trial = Trial {
@@ -61,7 +58,7 @@ pub(crate) fn try_smoothing<'a>(
         needed,
         plain_ratio: scored.fit.held_out_ratio(),
         model: &model,
-        start: &starts[0],
+        start: &start,
         beside: with_plain_norms(&model, sets.clone()),
     };
     let Some(first) = trial.best_of(SmoothingKernel::SECOND_ORDER).or_else(|| {
@@ -72,7 +69,7 @@ pub(crate) fn try_smoothing<'a>(
     }) else {
         return (model, scored);
     };
-    let undone = with_undone_smoothing(&model, &starts[0], first.smoothing);
+    let undone = with_undone_smoothing(&model, &start, first.smoothing);
     let searched = search_down_to_noise(&undone, &sets, library, BESIDE);
     let (undone, searched, smoothing) = trial.sharpened(undone, searched, first, library);
     let gained = evidence(&undone, &searched);
@@ -85,11 +82,22 @@ pub(crate) fn try_smoothing<'a>(
     let is_believed = gained > needed
         && !reaches_no_motion(&smoothing, 1.0)
         && trial.outdoes_rivals(gained, &searched.fit.set, &scored.fit.set)
-        && trial.is_of_motion(&smoothing, &searched);
+        && trial.is_of_motion(&smoothing, &searched)
+        // What passes for a smoothing may come closer, since it is none.
+        && (!is_imitated || larger(distance(&model, &scored, &searched)) < NOT_FARTHER);
     if is_believed {
         (undone, searched)
     } else {
         (model, scored)
+    }
+}
+
+/// What is certain, with a vibration that was found: it would pass for noise, and no smoothing touches it.
+fn with_line(certain: &EffectSet, found: &EffectSet) -> EffectSet {
+    let is_line = |effect: &&Effect| effect.spectral_line().is_some();
+    match found.iter().find(is_line) {
+        Some(line) => certain.clone().with(line.clone()),
+        None => certain.clone(),
     }
 }
 

@@ -229,6 +229,16 @@ fn the_shape_of_a_smoothing_is_told_beside_a_scale() {
     assert!(after.gyro_rmse < 0.15 * before.gyro_rmse, "{after:?}");
 }
 
+/// A scale of 1.5 % without which several times as much is left is none of the smoothing's shape.
+#[test]
+fn a_small_scale_is_told_beside_a_smoothing() {
+    let scene = Scene::new(75)
+        .with(K::ReferenceSmoothing, &[5.0, 0.0])
+        .with(K::GyroScale, &[1.015, 0.985, 1.015]);
+    let diagnosis = answer(&scene.record()).diagnosis;
+    assert_eq!(names(&diagnosis), ["gyro_scale", "reference_smoothing"]);
+}
+
 /// What a smoothed reference lacks of the motion would be in the readings, and their spectrum not level.
 #[test]
 fn noise_of_a_sensor_is_told_beside_a_smoothing() {

@@ -258,6 +258,41 @@ fn a_smoothing_is_undone_up_to_the_ends() {
 }
 
 #[test]
+fn lines_beyond_the_band_come_back_where_a_smoothing_is_undone() {
+    // A knee: swings of 0.6 Hz, shaken at 6.2 Hz, nothing but noise in between.
+    let smoothing = ZeroPhaseSmoothing {
+        cutoff_hz: 6.0,
+        kernel: SmoothingKernel::SECOND_ORDER,
+    };
+    let left = 1.0 / smoothing.undoing_gain(6.2, 100.0);
+    let (slow, fast) = (TAU * 0.6, TAU * 6.2);
+    let (stamps, _, rotations) = poses(PoseNoise::default(), 100.0, |t| t < 30.0);
+    let mut random = Normal(12);
+    let positions: Vec<Vector3<f64>> = (0..stamps.len())
+        .map(|k| {
+            let t = k as f64 / 100.0;
+            let noise = Vector3::new(random.draw(), random.draw(), random.draw()) * 3e-4;
+            Vector3::x() * (0.2 * (slow * t).sin() + 2e-3 * left * (fast * t).sin()) + noise
+        })
+        .collect();
+    let estimate = PoseEstimate::fit(&stamps, &positions, &rotations).unwrap();
+    let error = |estimate: &PoseEstimate| {
+        let track = estimate.track(100.0);
+        let squares = (200..track.len() - 200).map(|k| {
+            let t = k as f64 / 100.0;
+            let found = track.world_from_segment[k] * track.acceleration_in_segment[k];
+            let true_x =
+                -0.2 * slow * slow * (slow * t).sin() - 2e-3 * fast * fast * (fast * t).sin();
+            (found.x - true_x).powi(2)
+        });
+        let squares: Vec<f64> = squares.collect();
+        (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+    };
+    let (plain, undone) = (error(&estimate), error(&estimate.undoing(smoothing)));
+    assert!(plain > 1.0 && undone < 0.6, "{undone} against {plain} m/s2");
+}
+
+#[test]
 fn motion_up_to_the_largest_gain_is_no_noise_before_a_smoothing() {
     let (stamps, _, rotations) = poses(PoseNoise::default(), 100.0, |t| t < 30.0);
     let smoothing = ZeroPhaseSmoothing {

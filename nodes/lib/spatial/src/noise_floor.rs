@@ -213,24 +213,23 @@ impl NoiseFloor {
     ) -> Vec<f64> {
         let noise_at = |hz: f64| noise * self.noise_at(hz);
         let gain2 = |hz: f64| undoing_gain(hz, undone, rate_hz).powi(2);
-        let ratio: Vec<f64> = spectrum
-            .density
-            .iter()
-            .enumerate()
-            .map(|(k, density)| {
-                let hz = spectrum.frequency(k);
-                density * gain2(hz) / noise_at(hz).max(TINY)
-            })
-            .collect();
-        let bins = ratio.len();
+        let bins = spectrum.density.len();
+        let over_noise = |k: usize| {
+            let hz = spectrum.frequency(k);
+            spectrum.density[k] * gain2(hz) / noise_at(hz).max(TINY)
+        };
+        let ratio: Vec<f64> = (0..bins).map(over_noise).collect();
         let edge = (2..bins.saturating_sub(3))
             .find(|&k| ratio[k..k + 3].iter().all(|value| *value < LOCAL_EDGE))
             .unwrap_or(bins);
         let edge_hz = spectrum.frequency(edge);
-        let lines = if self.shape.is_wandering() || undone.is_some() {
+        let lines = if self.shape.is_wandering() {
             vec![false; bins]
         } else {
-            motion_beyond(&ratio, (LOCAL_EDGE, edge), spectrum.spacing_hz, machines)
+            // Bumps of the noise would come back amplified: there, what stands beyond the band has to stand higher.
+            let amplified = |k: usize| gain2(spectrum.frequency(k)).powf(0.25);
+            let heights: Vec<f64> = (0..bins).map(|k| ratio[k] / amplified(k)).collect();
+            motion_beyond(&heights, (LOCAL_EDGE, edge), spectrum.spacing_hz, machines)
         };
         // Above what the noise is, at the last three frequencies of the band.
         let last = (1..=3)
@@ -246,7 +245,7 @@ impl NoiseFloor {
             let hz = spectrum.frequency(k);
             if k < 2 {
                 1.0
-            } else if lines[k] {
+            } else if lines[k] && gain2(hz) <= LARGEST_GAIN.powi(2) {
                 1.0 - 1.0 / ratio[k]
             } else if k >= edge && self.shape.falls() && undone.is_none() {
                 beyond(hz)
@@ -372,17 +371,22 @@ fn widened(weights: Vec<f64>, reach: usize) -> Vec<f64> {
 }
 
 /// Density of the noise that was there before a smoothing: where the undone spectrum is least, beyond
-/// the slowest motion, as far as it stands above the noise since. What is least short of that is motion.
+/// the slowest motion, as far as it stands above the noise since. What is least short of that is motion; a line stands above
+/// it alone.
 fn noise_before_smoothing(
     spectrum: &Spectrum,
     gain2: &dyn Fn(f64) -> f64,
     since: &NoiseShape,
 ) -> f64 {
-    let least = (SLOWEST_ENTRIES..spectrum.density.len())
-        .map(|k| (spectrum.frequency(k), spectrum.density[k]))
-        .filter(|(hz, density)| *density > LOCAL_EDGE * since.at(*hz))
-        .map(|(hz, density)| density * gain2(hz))
-        .fold(f64::INFINITY, f64::min);
+    let all = SLOWEST_ENTRIES..spectrum.density.len();
+    let stands_out =
+        |k: &usize| spectrum.density[*k] > LOCAL_EDGE * since.at(spectrum.frequency(*k));
+    let last = all.clone().rev().find(stands_out);
+    let least = last.map_or(f64::INFINITY, |last| {
+        (all.start..=last)
+            .map(|k| spectrum.density[k] * gain2(spectrum.frequency(k)))
+            .fold(f64::INFINITY, f64::min)
+    });
     if least.is_finite() { least } else { 0.0 }
 }
 
