@@ -83,8 +83,7 @@ pub(crate) fn try_smoothing<'a>(
         && !reaches_no_motion(&smoothing, 1.0)
         && trial.outdoes_rivals(gained, &searched.fit.set, &scored.fit.set)
         && trial.is_of_motion(&smoothing, &searched)
-        // What passes for a smoothing may come closer, since it is none.
-        && (!is_imitated || larger(distance(&model, &scored, &searched)) < NOT_FARTHER);
+        && (!is_imitated || outdoes_imitation(distance(&model, &scored, &searched)));
     if is_believed {
         (undone, searched)
     } else {
@@ -468,6 +467,12 @@ fn comes_closer(ratio: PerChannel<f64>) -> bool {
     let (closer, farther) = (smaller(ratio), larger(ratio));
     let farther_for_closer = farther < FARTHER_FOR_CLOSER && closer * farther < MUCH_CLOSER;
     closer < CLOSER && (farther < NOT_FARTHER || farther_for_closer)
+}
+
+/// Whether a smoothing brings the simulation, by the ratios of its distances, as close as what passes for one: over both channels, since
+/// this has its own parameters for one of them. Where it does not, that may be no smoothing.
+fn outdoes_imitation(ratio: PerChannel<f64>) -> bool {
+    ratio.accelerometer * ratio.gyroscope < 1.0
 }
 
 /// Whether most of the power that undoing a smoothing takes off the residual goes where the simulation is attenuated, too, and
