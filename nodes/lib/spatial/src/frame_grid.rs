@@ -97,17 +97,30 @@ impl FrameGrid {
     }
 
     /// The slowest part of the rate that stands out too and has chords that poses are off by hardly more: narrow kinks
-    /// have many multiples, and a high one of them may stand out most.
+    /// have many multiples, and a high one of them may stand out most. Or by more, where its own kinks stand out as well as any
+    /// and the next multiple, most of whose frames are elsewhere, fits better still: noise with a memory lies near chords that are
+    /// short.
     fn with_fewer_frames(&self, kinks: &Kinks, poses: &PoseSeries) -> Option<Self> {
         let parts = (2..=(self.rate_hz / LEAST_HZ) as u32).rev();
         parts
-            .map(|part| self.rate_hz / f64::from(part))
-            .filter(|hz| kinks.height(*hz) > LEAST_FUNDAMENTAL)
-            .map(|hz| Self::through(kinks, poses, hz).1.sharpened(poses))
-            .find(|grid| {
-                grid.misfit(kinks, poses) < self.misfit(kinks, poses) + BETTER
-                    && grid.is_convincing(kinks, poses)
+            .map(|part| (self.rate_hz / f64::from(part), part))
+            .filter(|(hz, _)| kinks.height(*hz) > LEAST_FUNDAMENTAL)
+            .map(|(hz, part)| (Self::through(kinks, poses, hz).1.sharpened(poses), part))
+            .find(|(grid, part)| {
+                let own = self.misfit(kinks, poses);
+                let is_as_near = || grid.misfit(kinks, poses) < own + BETTER;
+                let is_not_nearer = || {
+                    // The frames of this multiple are not among those of the next.
+                    let next = Self {
+                        rate_hz: grid.rate_hz * f64::from(part + 1),
+                        offset_s: grid.offset_s % (grid.rate_hz * f64::from(part + 1)).recip(),
+                    };
+                    let can_be = next.rate_hz * LEAST_POSES_PER_FRAME < kinks.poses_hz();
+                    kinks.have_rate(grid.rate_hz) && can_be && next.misfit(kinks, poses) < own
+                };
+                (is_as_near() || is_not_nearer()) && grid.is_convincing(kinks, poses)
             })
+            .map(|(grid, _)| grid)
     }
 
     /// The frames of a rate that is known already; none where the poses do not show them.

@@ -22,15 +22,17 @@ fn rotation(t: f64) -> UnitQuaternion<f64> {
     ))
 }
 
+/// White noise, nearly normal.
+fn scatter(random: &mut ChaCha12Rng, size: f64) -> Vector3<f64> {
+    Vector3::from_fn(|_, _| {
+        let sum: f64 = (0..12).map(|_| random.random::<f64>()).sum();
+        size * (sum - 6.0)
+    })
+}
+
 /// Poses at a rate on the chords between frames of another; none: on the motion itself.
 fn poses(poses_hz: f64, frames_hz: Option<f64>, first_frame_s: f64, noise: [f64; 2]) -> PoseSeries {
     let mut random = ChaCha12Rng::seed_from_u64(3);
-    let mut scatter = |size: f64| {
-        Vector3::from_fn(|_, _| {
-            let sum: f64 = (0..12).map(|_| random.random::<f64>()).sum();
-            size * (sum - 6.0)
-        })
-    };
     let mut series = PoseSeries::default();
     for k in 0..(40.0 * poses_hz) as usize {
         let t = k as f64 / poses_hz;
@@ -50,8 +52,10 @@ fn poses(poses_hz: f64, frames_hz: Option<f64>, first_frame_s: f64, noise: [f64;
         series
             .stamps
             .push(Stamp::from_nanos(1_700_000_000_000_000_000).plus_seconds(t));
-        series.positions.push(p + scatter(noise[0]));
-        series.rotations.push(r * so3::exp(&scatter(noise[1])));
+        series.positions.push(p + scatter(&mut random, noise[0]));
+        series
+            .rotations
+            .push(r * so3::exp(&scatter(&mut random, noise[1])));
     }
     series
 }
@@ -189,5 +193,33 @@ fn a_motion_of_two_steady_frequencies_has_no_chords() {
             steady.rotations[k] *= so3::exp(&Vector3::new(0.0, size * second, 3.0 * size * first));
         }
         assert_eq!(FrameGrid::find(&steady), None, "{lines_hz:?} Hz");
+    }
+}
+
+/// Noise that is nearly the same in neighbours lies near short chords: those of a multiple of the rate fit better than the true ones.
+#[test]
+fn behind_noise_with_a_memory_frames_are_none_of_a_multiple() {
+    for (poses_hz, frames_hz, pole) in [
+        (120.0, 15.0, 0.5),
+        (120.0, 12.0, 0.45),
+        (100.0, 12.5, 0.4),
+        (90.0, 10.0, 0.4),
+        (200.0, 20.0, 0.45),
+    ] {
+        let mut poses = poses(poses_hz, Some(frames_hz), 0.003, [0.0, 0.0]);
+        let mut random = ChaCha12Rng::seed_from_u64(5);
+        let mut noise = [Vector3::zeros(); 2];
+        for (position, rotation) in poses.positions.iter_mut().zip(&mut poses.rotations) {
+            for (value, size) in noise.iter_mut().zip([1.1e-4, 1.8e-3]) {
+                *value = *value * pole + scatter(&mut random, size) * f64::sqrt(1.0 - pole * pole);
+            }
+            *position += noise[0];
+            *rotation *= so3::exp(&noise[1]);
+        }
+        let found = FrameGrid::find(&poses).map(|grid| grid.rate_hz());
+        assert!(
+            found.is_some_and(|hz| (hz - frames_hz).abs() < 0.02),
+            "{frames_hz} Hz at {poses_hz} Hz: {found:?}"
+        );
     }
 }
