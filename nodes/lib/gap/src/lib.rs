@@ -2,6 +2,7 @@
 //! shrinks once that effect is added. README.md says how a diagnosis works, file by file.
 
 mod analysis;
+mod attenuation;
 mod axes;
 mod axes_choice;
 mod beside_response;
@@ -27,6 +28,7 @@ mod gauss_newton;
 mod gram;
 mod identify;
 mod joint_search;
+mod kept_motion;
 mod lag;
 mod lever_arm_by_readings;
 mod library;

@@ -3,14 +3,15 @@
 use cromosim_imu::{Channel, Effect, EffectKind, EffectSet, PerChannel};
 use cromosim_spatial::{SmoothingKernel, ZeroPhaseSmoothing};
 
+use crate::attenuation::Shown;
 use crate::axes::{larger, smaller, sum_over_channels};
 use crate::fit::FitModel;
 use crate::noise_updates::with_estimate;
 use crate::plausibility::told_from_smoothing;
 use crate::policy::smoothing::{
-    BESIDE, BEST_RATIO, CLOSER, FARTHER_FOR_CLOSER, LEAST_GAIN_NATS, LEAST_SHARE, MUCH_CLOSER,
-    MUCH_FARTHER, NOT_FARTHER, PART_OF_ATTENUATION, SHARP, SHARPENINGS, SHORTEST_DELAY_S,
-    SUSPICIOUS, SUSPICIOUS_OF_GAUSSIAN, TRIAL_STEPS,
+    BESIDE, BEST_RATIO, CLOSER, FARTHER_FOR_CLOSER, HARDLY_FARTHER, LEAST_GAIN_NATS, LEAST_SHARE,
+    MUCH_CLOSER, MUCH_FARTHER, NOT_FARTHER, PART_OF_ATTENUATION, SHARP, SHARPENINGS,
+    SHORTEST_DELAY_S, SOFTER, SUSPICIOUS, SUSPICIOUS_OF_GAUSSIAN, TRIAL_STEPS,
 };
 use crate::response::left_beside_attenuation;
 use crate::search::{ScoredEffectSet, excess, score, score_after, search_down_to_noise};
@@ -29,6 +30,7 @@ const GAUSSIAN_PARTS: [f64; 3] = [0.7, 0.85, 1.0];
 const BETWEEN_KERNELS: f64 = 1.2;
 const BETWEEN_ORDERS: f64 = 1.12;
 const FINE: f64 = 1.04;
+const FINEST: f64 = 1.01;
 
 /// The better of `model` and models in which a smoothing of the reference is undone, each with the
 /// best set of effects.
@@ -40,7 +42,9 @@ pub(crate) fn try_smoothing<'a>(
 ) -> (FitModel<'a>, ScoredEffectSet) {
     let found = told_from_smoothing(&scored.fit.set);
     let is_imitated = found != scored.fit.set;
-    if !is_imitated && larger(scored.fit.held_out_ratio()) < SUSPICIOUS {
+    let shown = Shown::by_readings(&model, &found);
+    let is_suspicious = is_imitated || larger(scored.fit.held_out_ratio()) > SUSPICIOUS;
+    if shown.smoothings.is_empty() && (shown.is_excluded || !is_suspicious) {
         return (model, scored);
     }
     let plain = evidence(&model, &scored);
@@ -51,22 +55,17 @@ pub(crate) fn try_smoothing<'a>(
     };
     let start = with_line(&starts[0], &found);
     let sets = starting_sets(starts, found, library);
-    let needed = needed(&model, &scored);
     let trial = Trial {
+        shown: &shown,
         plain,
         without_smoothing,
-        needed,
+        needed: needed(&model, &scored),
         plain_ratio: scored.fit.held_out_ratio(),
         model: &model,
         start: &start,
         beside: with_plain_norms(&model, sets.clone()),
     };
-    let Some(first) = trial.best_of(SmoothingKernel::SECOND_ORDER).or_else(|| {
-        let is_far = larger(trial.plain_ratio) > SUSPICIOUS_OF_GAUSSIAN;
-        is_far
-            .then(|| trial.best_of(SmoothingKernel::Gaussian))
-            .flatten()
-    }) else {
+    let Some(first) = trial.first() else {
         return (model, scored);
     };
     let undone = with_undone_smoothing(&model, &start, first.smoothing);
@@ -79,12 +78,7 @@ pub(crate) fn try_smoothing<'a>(
             names(&searched.fit.set),
         )
     });
-    let is_believed = gained > needed
-        && !reaches_no_motion(&smoothing, 1.0)
-        && trial.outdoes_rivals(gained, &searched.fit.set, &scored.fit.set)
-        && trial.is_of_motion(&smoothing, &searched)
-        && (!is_imitated || outdoes_imitation(distance(&model, &scored, &searched)));
-    if is_believed {
+    if trial.believes(&smoothing, &searched, gained, &scored, is_imitated) {
         (undone, searched)
     } else {
         (model, scored)
@@ -117,6 +111,8 @@ fn reaches_no_motion(smoothing: &ZeroPhaseSmoothing, factor: f64) -> bool {
 
 /// What cutoffs are tried beside.
 struct Trial<'t, 'a> {
+    /// What the readings show of it.
+    shown: &'t Shown,
     model: &'t FitModel<'a>,
     /// What is certain from the start.
     start: &'t EffectSet,
@@ -141,6 +137,85 @@ struct Tried {
 }
 
 impl<'a> Trial<'_, 'a> {
+    /// The nearest of the smoothings that the readings show, or the one of the second order with the most evidence, or where that
+    /// explains nothing the Gaussian.
+    fn first(&self) -> Option<Tried> {
+        let shown = self.shown.smoothings.iter().find_map(|own| {
+            let found = self.refined(self.tried(*own)?, FINE);
+            (!reaches_no_motion(&found.smoothing, FINE)).then_some(found)
+        });
+        let best = shown.or_else(|| self.best_of(SmoothingKernel::SECOND_ORDER));
+        best.or_else(|| {
+            let is_far = larger(self.plain_ratio) > SUSPICIOUS_OF_GAUSSIAN;
+            is_far
+                .then(|| self.best_of(SmoothingKernel::Gaussian))
+                .flatten()
+        })
+    }
+
+    /// The smoothing with the most evidence among those of the kernels that the readings show.
+    fn best_shown(&self, begun: Tried) -> Tried {
+        let mut best = self.refined(begun, FINE);
+        let is_other = |own: &&ZeroPhaseSmoothing| own.kernel != best.smoothing.kernel;
+        let others: Vec<_> = self.shown.smoothings.iter().filter(is_other).collect();
+        for smoothing in others {
+            let Some(other) = self.tried(*smoothing).map(|own| self.refined(own, FINE)) else {
+                continue;
+            };
+            if self.outdoes(&other, &best) {
+                best = other;
+            }
+        }
+        best
+    }
+
+    /// Whether a smoothing has more evidence than another; by far where it is one of the first order, which differs from a Gaussian
+    /// where little is left.
+    fn outdoes(&self, one: &Tried, other: &Tried) -> bool {
+        let gained = one.evidence - other.evidence;
+        let is_soft = one.smoothing.kernel == SmoothingKernel::Butterworth { order: 1 };
+        let most = other.evidence - self.plain;
+        !reaches_no_motion(&one.smoothing, 1.0)
+            && gained > if is_soft { SOFTER * most } else { 0.0 }
+    }
+
+    /// Whether a smoothing is believed, beside which another set was found with so much evidence: one that the readings clearly show
+    /// where the simulation comes no farther, or hardly farther for the evidence; another by the evidence, where it is of motion.
+    fn believes(
+        &self,
+        smoothing: &ZeroPhaseSmoothing,
+        searched: &ScoredEffectSet,
+        gained: f64,
+        without: &ScoredEffectSet,
+        is_imitated: bool,
+    ) -> bool {
+        if reaches_no_motion(smoothing, 1.0) {
+            return false;
+        }
+        let ratio = distance(self.model, without, searched);
+        let farther = ratio.accelerometer * ratio.gyroscope;
+        trace(|| eprintln!("  {farther:.3} times as far as without it"));
+        let is_by_evidence = gained > self.needed;
+        let is_shown = self.shown.is_clear && self.is_near_shown(smoothing);
+        if is_shown && (farther < 1.0 || is_by_evidence && farther < HARDLY_FARTHER) {
+            return true;
+        }
+        // What passes for a smoothing has its own parameters for one channel, and shall be outdone over both.
+        is_by_evidence
+            && self.outdoes_rivals(gained, &searched.fit.set, &without.fit.set)
+            && self.is_of_motion(smoothing, searched)
+            && (!is_imitated || farther < 1.0)
+    }
+
+    /// Whether the cutoff with the most evidence is hardly another one than that which the readings show of the same kernel.
+    fn is_near_shown(&self, smoothing: &ZeroPhaseSmoothing) -> bool {
+        let shown = self.shown.of_kernel(smoothing.kernel);
+        shown.is_some_and(|own| {
+            let factor = smoothing.cutoff_hz / own.cutoff_hz;
+            factor.max(factor.recip()) < BETWEEN_KERNELS
+        })
+    }
+
     /// A smoothing beside what was found once it was undone: its cutoff had made up for that, and kernels that rise more steeply
     /// bring more noise, which covers it. Once more where more than noise is left then.
     fn sharpened(
@@ -168,9 +243,13 @@ impl<'a> Trial<'_, 'a> {
                 set: found.clone(),
             };
             let sharp = if pass == 0 {
-                beside.best_kernel(begun)
+                if self.shown.is_clear {
+                    beside.best_shown(begun)
+                } else {
+                    beside.best_kernel(begun)
+                }
             } else {
-                beside.refined(begun, FINE)
+                beside.refined(begun, FINEST)
             };
             if reaches_no_motion(&sharp.smoothing, 1.0) {
                 // It will not be believed.
@@ -261,7 +340,8 @@ impl<'a> Trial<'_, 'a> {
         let middle_hz = second.smoothing.cutoff_hz;
         let around = |kernel, part, factor| {
             let cutoff_hz = part * middle_hz;
-            let first = self.tried(ZeroPhaseSmoothing { cutoff_hz, kernel })?;
+            let start = ZeroPhaseSmoothing { cutoff_hz, kernel };
+            let first = self.tried(self.shown.of_kernel(kernel).unwrap_or(start))?;
             Some(self.refined(first, factor))
         };
         // Half of the amplitude is left at the cutoff whatever the order.
@@ -287,7 +367,7 @@ impl<'a> Trial<'_, 'a> {
         let (best, is_gaussian) = better(best, gaussian);
         let sets_in_softly = is_gaussian && !is_steeper;
         let first = sets_in_softly.then(|| of_order(1)).flatten();
-        let first = first.filter(|first| !reaches_no_motion(&first.smoothing, 1.0));
+        let first = first.filter(|first| self.outdoes(first, &best));
         let (best, _) = better(best, first);
         self.refined(best, FINE)
     }
@@ -376,7 +456,7 @@ impl<'a> Trial<'_, 'a> {
     }
 
     /// A smoothing with the best of the starting sets; none where the noise that undoing it brings lets no set
-    /// have the evidence that is needed. That noise covers what a cutoff that is too low leaves, so that one with which the
+    /// have the evidence that is needed, unless the readings show it. That noise covers what a cutoff that is too low leaves, so that one with which the
     /// simulation is far farther off does not count.
     fn tried(&self, smoothing: ZeroPhaseSmoothing) -> Option<Tried> {
         let undone = with_undone_smoothing(self.model, self.start, smoothing);
@@ -385,7 +465,7 @@ impl<'a> Trial<'_, 'a> {
             let best_ratio = self.plain_ratio[channel].min(BEST_RATIO);
             whitener.count[channel] * (0.5 * best_ratio + whitener.log_scale[channel])
         });
-        if most < self.needed {
+        if most < self.needed && !self.shown.is_clear {
             return None;
         }
         let found = self
@@ -467,12 +547,6 @@ fn comes_closer(ratio: PerChannel<f64>) -> bool {
     let (closer, farther) = (smaller(ratio), larger(ratio));
     let farther_for_closer = farther < FARTHER_FOR_CLOSER && closer * farther < MUCH_CLOSER;
     closer < CLOSER && (farther < NOT_FARTHER || farther_for_closer)
-}
-
-/// Whether a smoothing brings the simulation, by the ratios of its distances, as close as what passes for one: over both channels, since
-/// this has its own parameters for one of them. Where it does not, that may be no smoothing.
-fn outdoes_imitation(ratio: PerChannel<f64>) -> bool {
-    ratio.accelerometer * ratio.gyroscope < 1.0
 }
 
 /// Whether most of the power that undoing a smoothing takes off the residual goes where the simulation is attenuated, too, and

@@ -176,6 +176,20 @@ fn a_smoothing_that_took_most_of_the_motion_is_told_by_its_cutoff() {
     }
 }
 
+/// Hardly any motion reaches the cutoff: undoing it gains too little for what is left to tell, but the readings' turning does.
+#[test]
+fn a_smoothing_that_took_little_of_a_slow_motion_shows_in_the_readings() {
+    for seed in [83, 84, 85, 86] {
+        let scene = Scene {
+            motion: Motion::random(seed).slowed(2.5),
+            ..Scene::new(seed)
+        };
+        let record = scene.with(K::ReferenceSmoothing, &[4.0, 0.0]).record();
+        let diagnosis = answer(&record).diagnosis;
+        assert_eq!(names(&diagnosis), ["reference_smoothing"], "{seed}");
+    }
+}
+
 #[test]
 fn a_filter_is_told_beside_a_smoothing_of_the_reference() {
     for seed in [60, 61, 63] {

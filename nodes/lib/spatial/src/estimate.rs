@@ -252,6 +252,14 @@ impl PoseEstimate {
         self.filtered_anew(self.undone, reach)
     }
 
+    /// The estimate with all of the rotation's noise: its filter passes every frequency that the poses have.
+    #[must_use]
+    pub fn with_unfiltered_rotation(&self) -> Self {
+        let mut all = self.clone();
+        all.rotation.open();
+        all
+    }
+
     /// How dense the poses are at some frequencies, noise included: means over the frequencies that lie nearest to each,
     /// as the acceleration and the angular velocity have them (weights f^4 and f^2).
     pub fn densities_at(&self, hz: &[f64]) -> PoseDensities {

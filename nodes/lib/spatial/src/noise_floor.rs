@@ -202,6 +202,14 @@ impl NoiseFloor {
         }
     }
 
+    /// Passes everything.
+    pub fn open(&mut self) {
+        self.filter.fill(1.0);
+        for filter in &mut self.windows {
+            filter.weights.fill(1.0);
+        }
+    }
+
     /// The filter's weights at the frequencies of one window's spectrum, whose noise is so many times as
     /// dense as that of the whole series, and at some of which machines are.
     fn local_weights(
