@@ -42,7 +42,14 @@ pub(crate) fn try_smoothing<'a>(
 ) -> (FitModel<'a>, ScoredEffectSet) {
     let found = told_from_smoothing(&scored.fit.set);
     let is_imitated = found != scored.fit.set;
-    let shown = Shown::by_readings(&model, &found);
+    let shown = if found.contains(EffectKind::LowPass)
+        || with_all_delay_by_filter(&found, library).is_some()
+    {
+        // A filter of the readings, with a cutoff that is not known yet, would change their shape as well.
+        Shown::default()
+    } else {
+        Shown::by_readings(&model, &found)
+    };
     let is_suspicious = is_imitated || larger(scored.fit.held_out_ratio()) > SUSPICIOUS;
     if shown.smoothings.is_empty() && (shown.is_excluded || !is_suspicious) {
         return (model, scored);
