@@ -413,6 +413,13 @@ impl SplineEquations {
         )
     }
 
+    /// Time from a stamp to the nearer end of the samples, s; 0 outside them.
+    pub(crate) fn to_nearer_end(&self, seconds: f64) -> f64 {
+        let (_, end) = self.basis.interval(self.basis.interval_count() - 1);
+        let after = seconds - self.origin;
+        after.min(end * self.interval - after).max(0.0)
+    }
+
     /// Weight whose response `1 / (1 + weight w^10)` is one half at `cutoff_hz`.
     pub(crate) fn weight_of_cutoff(&self, cutoff_hz: f64) -> f64 {
         (std::f64::consts::TAU * cutoff_hz * self.interval).powi(-2 * PENALTY_ORDER as i32)

@@ -42,6 +42,7 @@ mod derivative;
 mod derivative_risk;
 mod difference;
 mod end_derivatives;
+mod end_noise;
 mod equations;
 mod error;
 mod estimate;
@@ -113,7 +114,7 @@ pub use pose_spline::{
     PoseTimes, PosesInTime, position_channels, rotation_channels,
 };
 pub use rustfft::num_complex::Complex64;
-pub use sample_variance::{Bandwidth, SampleVariance};
+pub use sample_variance::{Bandwidth, Jitter, SampleVariance};
 pub use spectrum::{FourierPair, Spectrum, welch};
 pub use spline::{Smoothing, SmoothingSpline, SplineWeight};
 pub use stamp::Stamp;

@@ -4,15 +4,15 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
-use crate::adaptive::{Adaptation, ExpectedNoise, FEWEST_ADAPTIVE};
+use crate::adaptive::{Adaptation, ExpectedNoise, FEWEST_ADAPTIVE, STATED_AT_HZ};
 use crate::adaptive_fit::AdaptiveFit;
 use crate::basis::BasisValues;
 use crate::beyond::{Beyond, Cutoffs, Posterior};
 use crate::grid::relative_seconds;
 use crate::so3::{QUATERNION_PER_ROTVEC, ROTVEC_PER_QUATERNION};
 use crate::{
-    Bandwidth, Derivative, PoseSource, SampleVariance, Smoothing, SmoothingSpline, SpatialError,
-    SplineSystem, Stamp, so3,
+    Bandwidth, Derivative, Jitter, PoseSource, SampleVariance, Smoothing, SmoothingSpline,
+    SpatialError, SplineSystem, Stamp, so3,
 };
 
 /// How a frame moves at one time, against the world and in the world's axes.
@@ -91,6 +91,8 @@ pub struct MotionEstimate {
     pub variance: Option<SampleVariance>,
     /// Up to which frequency it is resolved.
     pub bandwidth: Bandwidth,
+    /// The poses' noise around it, as white noise; none where `variance` is none.
+    pub jitter: Option<Jitter>,
 }
 
 /// What [`PoseSpline::fit_following`] has learnt of the poses so far.
@@ -169,8 +171,13 @@ impl PoseTimes {
 
     /// Where a stamp lies among the times; stamps outside them are moved to the nearest end.
     pub fn locate(&self, stamp: Stamp) -> Located {
-        let (first, values) = self.system.equations.basis_at(stamp - self.origin);
-        Located { first, values }
+        let seconds = stamp - self.origin;
+        let (first, values) = self.system.equations.basis_at(seconds);
+        Located {
+            first,
+            values,
+            to_end_s: self.system.equations.to_nearer_end(seconds),
+        }
     }
 
     /// The equations, with times in seconds since the first stamp.
@@ -185,6 +192,8 @@ pub struct Located {
     /// The knot interval, and the first basis function over it.
     first: usize,
     values: BasisValues,
+    /// To the nearer end of the samples, s.
+    to_end_s: f64,
 }
 
 /// Position (3 channels) and rotation (the 4 components of the sign-continuous quaternion,
@@ -362,7 +371,7 @@ impl PoseSpline {
 
     /// The motion at a stamp; stamps outside the samples are moved to the nearest end.
     pub fn evaluate(&self, stamp: Stamp) -> Motion {
-        let Located { first, values } = self.times.locate(stamp);
+        let Located { first, values, .. } = self.times.locate(stamp);
         self.motion(first, &values)
     }
 
@@ -384,12 +393,22 @@ impl PoseSpline {
         let [acceleration_hz, angular_velocity_hz] = cutoffs_hz.map(|hz| hz.min(highest_hz));
         MotionEstimate {
             motion: self.motion(first, values),
-            variance: self.variance(first, values, cutoffs_hz),
+            variance: self.variance(located, cutoffs_hz),
             bandwidth: Bandwidth {
                 acceleration_hz,
                 angular_velocity_hz,
             },
+            jitter: self.jitter(first),
         }
+    }
+
+    #[inline]
+    fn jitter(&self, first: usize) -> Option<Jitter> {
+        let density = self.times.system.equations.interval * STATED_AT_HZ;
+        Some(Jitter {
+            position: density * self.position.noise_over(first)?,
+            rotation: density * ROTVEC_PER_QUATERNION * self.rotation.noise_over(first)?,
+        })
     }
 
     #[inline]
@@ -410,22 +429,28 @@ impl PoseSpline {
     #[inline]
     fn variance(
         &self,
-        first: usize,
-        values: &BasisValues,
+        located: &Located,
         [position_hz, rotation_hz]: [f64; 2],
     ) -> Option<SampleVariance> {
-        let [value, slope, second] = values;
+        let Located {
+            first,
+            values: [value, slope, second],
+            to_end_s,
+        } = located;
+        let (first, to_end_s) = (*first, *to_end_s);
         let interval = self.times.system.equations.interval;
         let position = Posterior {
             variance: self.position.variance_of(first, second)?,
             noise: self.position.noise_over(first)?,
             interval,
+            to_end_s,
             low_passed: self.position.low_passed(),
         };
         let rotation = Posterior {
             variance: self.rotation.variance_of(first, slope)?,
             noise: self.rotation.noise_over(first)?,
             interval,
+            to_end_s,
             low_passed: self.rotation.low_passed(),
         };
         let orientation = Posterior {

@@ -25,6 +25,15 @@ pub struct Bandwidth {
     pub angular_velocity_hz: f64,
 }
 
+/// Variances of the poses' noise along or about each axis, as white noise of the same density has them at 100 Hz.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Jitter {
+    /// m2.
+    pub position: f64,
+    /// rad2.
+    pub rotation: f64,
+}
+
 impl SampleVariance {
     /// The larger of each: two statements about the same errors.
     #[must_use]

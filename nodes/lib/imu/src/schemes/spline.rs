@@ -54,6 +54,7 @@ pub(crate) fn sample(
         motion,
         variance,
         bandwidth,
+        jitter,
     } = spline.estimate_at(located);
     KinematicSample {
         stamp,
@@ -62,7 +63,8 @@ pub(crate) fn sample(
         angular_velocity_in_world: motion.angular_velocity,
         angular_acceleration_in_world: Some(motion.angular_acceleration),
         variance: variance
-            .map(|learnt| learnt.plus(source.unseen_errors(&bandwidth)))
+            .zip(jitter)
+            .map(|(learnt, jitter)| learnt.plus(source.unseen_errors(&bandwidth, &jitter)))
             .unwrap_or_default()
             .larger(known.unwrap_or_default()),
         bandwidth: Some(bandwidth),
