@@ -8,8 +8,9 @@ use std::path::Path;
 use cromosim_arrays::{Container, Limits};
 use cromosim_motion::fit_rigid;
 use cromosim_spatial::Stamp;
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 
+use super::marker_errors::{FrameResiduals, pose_stds};
 use super::{DatasetRecording, PlacedImu};
 use crate::rigid::{PoseTrajectory, RigidError};
 
@@ -37,7 +38,8 @@ pub(super) fn is_marked_imu(keys: &[String]) -> bool {
 
 /// Reads the IMU and the segment's pose: the rotation and position that lay the markers' mean shape
 /// nearest to them (Kabsch 1976); its axes are the world's at the first frame in which every marker
-/// was seen, its origin the markers' centre. Stamps count from 0 on both clocks.
+/// was seen, its origin the markers' centre. What the markers leave of the rigid shape says how far
+/// each pose is off. Stamps count from 0 on both clocks.
 ///
 /// # Errors
 /// [`RigidError::Arrays`], [`RigidError::Content`]; both name the array.
@@ -147,12 +149,41 @@ fn markers<R: Read + Seek>(
     Ok((keys, markers))
 }
 
-/// The segment's poses in the frames that show enough of it; `None` where its shape is never seen
-/// whole.
-fn poses(markers: &[Vec<Option<Vector3<f64>>>], rate_hz: f64) -> Option<PoseTrajectory> {
+/// The segment's poses in the frames that show enough of it, with how far they are off; `None` where
+/// its shape is never seen whole.
+fn poses(markers: &[Marker], rate_hz: f64) -> Option<PoseTrajectory> {
     let frames = markers[0].len();
-    let at = |frame: usize| markers.iter().map(move |marker| marker[frame]);
-    let whole = |frame: usize| at(frame).collect::<Option<Vec<Vector3<f64>>>>();
+    let shape = shape(markers)?;
+    let mut trajectory = PoseTrajectory {
+        frame: "world".to_owned(),
+        ..PoseTrajectory::default()
+    };
+    let mut residuals = Vec::new();
+    for frame in 0..frames {
+        let Some((turn, shift)) = fit(markers, &shape, frame) else {
+            continue;
+        };
+        trajectory.push(Stamp::from_seconds(frame as f64 / rate_hz), shift, turn);
+        let places = markers.iter().zip(&shape).enumerate();
+        let seen = places.filter_map(|(number, (marker, own))| {
+            let left = turn.inverse() * (marker[frame]? - shift) - own;
+            Some((number, *own, left))
+        });
+        let seen = seen.collect();
+        residuals.push(FrameResiduals { frame, seen });
+    }
+    trajectory.pose_stds = pose_stds(&residuals, &shape, rate_hz);
+    Some(trajectory)
+}
+
+/// The markers' mean places about their centre, m, in the world's axes at the first frame that shows all of them; `None` where
+/// none does.
+fn shape(markers: &[Marker]) -> Option<Vec<Vector3<f64>>> {
+    let frames = markers[0].len();
+    let whole = |frame: usize| {
+        let seen = markers.iter().map(move |marker| marker[frame]);
+        seen.collect::<Option<Vec<Vector3<f64>>>>()
+    };
     let centred = |points: Vec<Vector3<f64>>| {
         let centre = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
         points
@@ -161,22 +192,11 @@ fn poses(markers: &[Vec<Option<Vector3<f64>>>], rate_hz: f64) -> Option<PoseTraj
             .collect::<Vec<_>>()
     };
     let mut shape = centred((0..frames).find_map(whole)?);
-    let fit = |shape: &[Vector3<f64>], frame: usize| {
-        let pairs: Vec<_> = shape
-            .iter()
-            .zip(at(frame))
-            .filter_map(|(own, seen)| Some((*own, seen?)))
-            .collect();
-        if pairs.len() >= LEAST {
-            fit_rigid(&pairs)
-        } else {
-            None
-        }
-    };
     for _ in 0..ROUNDS {
         let mut sums = vec![Vector3::zeros(); shape.len()];
-        for points in (0..frames).filter_map(|frame| Some((whole(frame)?, fit(&shape, frame)?))) {
-            let (seen, (turn, shift)) = points;
+        let fits =
+            (0..frames).filter_map(|frame| Some((whole(frame)?, fit(markers, &shape, frame)?)));
+        for (seen, (turn, shift)) in fits {
             sums.iter_mut()
                 .zip(seen)
                 .for_each(|(sum, point)| *sum += turn.inverse() * (point - shift));
@@ -184,14 +204,22 @@ fn poses(markers: &[Vec<Option<Vector3<f64>>>], rate_hz: f64) -> Option<PoseTraj
         let count = (0..frames).filter(|frame| whole(*frame).is_some()).count();
         shape = centred(sums.into_iter().map(|sum| sum / count as f64).collect());
     }
-    let mut trajectory = PoseTrajectory {
-        frame: "world".to_owned(),
-        ..PoseTrajectory::default()
-    };
-    for frame in 0..frames {
-        if let Some((turn, shift)) = fit(&shape, frame) {
-            trajectory.push(Stamp::from_seconds(frame as f64 / rate_hz), shift, turn);
-        }
+    Some(shape)
+}
+
+/// The rotation and shift that lay the shape nearest to a frame's markers; `None` where too few are seen.
+fn fit(
+    markers: &[Marker],
+    shape: &[Vector3<f64>],
+    frame: usize,
+) -> Option<(UnitQuaternion<f64>, Vector3<f64>)> {
+    let pairs: Vec<_> = shape
+        .iter()
+        .zip(markers)
+        .filter_map(|(own, marker)| Some((*own, marker[frame]?)))
+        .collect();
+    if pairs.len() < LEAST {
+        return None;
     }
-    Some(trajectory)
+    fit_rigid(&pairs)
 }

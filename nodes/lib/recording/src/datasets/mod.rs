@@ -12,6 +12,7 @@ mod columns;
 mod dip;
 mod har_spsw;
 mod marked_imu;
+mod marker_errors;
 mod movella;
 mod mvnx;
 mod open;

@@ -61,6 +61,7 @@ pub fn parse_mvnx_sensors(bytes: &[u8], name: &str) -> Result<DatasetRecording, 
                 .collect(),
             rotations: frames.map(|frame| mvnx.orientations[own(frame)]).collect(),
             frame: "world".to_owned(),
+            ..PoseTrajectory::default()
         };
         (placement_name(label), trajectory)
     });

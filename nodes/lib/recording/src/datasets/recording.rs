@@ -107,6 +107,7 @@ impl DatasetRecording {
             cut(&mut poses.stamps, &range);
             cut(&mut poses.positions, &range);
             cut(&mut poses.rotations, &range);
+            cut(&mut poses.pose_stds, &range);
         }
         self.activities
             .retain(|span| span.end >= from && span.start <= to);

@@ -1,11 +1,13 @@
 //! Poses and IMU readings over time.
 
-use cromosim_imu::{Reading, SensorFrame};
+use std::iter::repeat;
+
+use cromosim_imu::{PoseStd, Reading, SensorFrame};
 use cromosim_spatial::Stamp;
 use cromosim_spatial::plausible::{Oddity, RIGID_SPEED};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
-/// Poses of one rigid body. All lists have the same length; stamps increase.
+/// Poses of one rigid body. All lists have the same length, or are empty where it says so; stamps increase.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PoseTrajectory {
     /// When.
@@ -14,6 +16,8 @@ pub struct PoseTrajectory {
     pub positions: Vec<Vector3<f64>>,
     /// world_from_body.
     pub rotations: Vec<UnitQuaternion<f64>>,
+    /// How far each is off, as far as its markers tell; empty elsewhere.
+    pub pose_stds: Vec<PoseStd>,
     /// Name of the world's frame where the file says it; empty elsewhere.
     pub frame: String,
 }
@@ -48,9 +52,11 @@ impl PoseTrajectory {
 
     /// The poses as frames of a sensor that is the body.
     pub fn frames(&self) -> Vec<SensorFrame> {
-        let poses = self.positions.iter().zip(&self.rotations);
-        let frame = |(stamp, (position, rotation)): (&Stamp, (&Vector3<f64>, &_))| {
-            SensorFrame::new(*stamp, Isometry3::from_parts((*position).into(), *rotation))
+        let stds = self.pose_stds.iter().copied().chain(repeat(PoseStd::NONE));
+        let poses = self.positions.iter().zip(&self.rotations).zip(stds);
+        let frame = |(stamp, ((position, rotation), std)): (&Stamp, ((&Vector3<f64>, &_), _))| {
+            let pose = Isometry3::from_parts((*position).into(), *rotation);
+            SensorFrame::new(*stamp, pose).with_pose_std(std)
         };
         self.stamps.iter().zip(poses).map(frame).collect()
     }
