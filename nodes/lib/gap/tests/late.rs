@@ -61,3 +61,18 @@ fn a_vibration_is_told_beside_a_drift() {
         names_exactly(&answer(&scene.record()).diagnosis, &scene.effects);
     }
 }
+
+/// A vibration would explain most of what an engine leaves that poses show under their noise, but is none.
+#[test]
+fn a_delay_is_told_beside_a_steady_motion() {
+    for seed in [57, 58, 59] {
+        let motion = Motion::random(seed).slowed(3.0);
+        let motion = motion.humming(0.05, 13.5..13.75, seed);
+        let scene = Scene {
+            motion: motion.trembling(0.004, 13.5..13.75, seed),
+            ..Scene::new(seed)
+        };
+        let scene = scene.with(K::ChannelDelay, &[0.007]);
+        names_exactly(&answer(&scene.record()).diagnosis, &scene.effects);
+    }
+}
