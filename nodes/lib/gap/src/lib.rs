@@ -8,6 +8,7 @@ mod axes_choice;
 mod beside_response;
 mod builder;
 mod calibration;
+mod channel_lags;
 mod clock_jumps;
 mod clock_runs;
 mod coarse_alignment;

@@ -242,6 +242,14 @@ pub(crate) mod vibration {
     pub const MOST_LEFT: f64 = 0.3;
 }
 
+/// When a delay between the channels is looked for farther than one linear step sees.
+pub(crate) mod channel_lags {
+    /// Most that a channel is late, s: more is a filter's, or no delay between channels of one device. No source.
+    pub const REACH_S: f64 = 0.1;
+    /// Part of the mean square at no lag below which a lag has to bring it. No source.
+    pub const CLOSER: f64 = 0.7;
+}
+
 /// What is reported as a cause.
 pub(crate) mod report {
     use cromosim_spatial::PoseNoise;

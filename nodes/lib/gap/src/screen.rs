@@ -4,6 +4,7 @@ use cromosim_imu::{Effect, EffectKind, EffectSet, FirstGuess, PerChannel, Search
 use nalgebra::{Cholesky, DMatrix, Dyn, Matrix3, Vector3};
 
 use crate::axes::channel_of_axis;
+use crate::channel_lags::channel_lags;
 use crate::fit::{Fit, FitModel, layout_of, prior_weights, slices, stepped, with_plausible_values};
 use crate::gram::{Gram, dot};
 use crate::prepared::Prediction;
@@ -66,23 +67,62 @@ pub(crate) fn screen(
     let together = companion(kind, fit, library)
         .map(|companion| [kind, companion].map(Effect::neutral))
         .map(|pair| candidate(model, fit, &pair));
-    starts
+    let best = starts
         .into_iter()
         .map(|start| candidate(model, fit, &[start]))
-        .max_by(|a, b| a.predicted_gain.total_cmp(&b.predicted_gain))
-        .into_iter()
-        .chain(together)
-        .collect()
+        .max_by(|a, b| a.predicted_gain.total_cmp(&b.predicted_gain));
+    let best = if kind == EffectKind::ChannelDelay {
+        best.map(|near| farther_delay(model, fit, near))
+    } else {
+        best
+    };
+    best.into_iter().chain(together).collect()
+}
+
+/// A delay between the channels as they lag behind the simulation, where one linear step promises more from there than from
+/// none: an offset that was fitted to one of them is moved.
+fn farther_delay(model: &FitModel, fit: &Fit, mut near: Candidate) -> Candidate {
+    let lags = channel_lags(model.prepared, &fit.prediction.readings);
+    let delay_s = lags.gyroscope - lags.accelerometer;
+    if delay_s == 0.0 {
+        return near;
+    }
+    let mut set = fit.set.clone();
+    let offset = set.time_offset() + lags.accelerometer;
+    let starts = (
+        Effect::new(EffectKind::ChannelDelay, vec![delay_s]),
+        Effect::time_offset(offset),
+    );
+    let (Ok(delay), Ok(offset)) = starts else {
+        return near;
+    };
+    // Without an offset among the fit's own values it stays where it is.
+    if set.contains(EffectKind::TimeOffset) {
+        set.insert(offset);
+    }
+    let far = candidate_on(model, fit, set, &[delay]);
+    if far.predicted_gain > near.predicted_gain {
+        near = Candidate {
+            beside: near.beside,
+            ..far
+        };
+    }
+    near
 }
 
 /// One linear step of the fit's own values and those of more effects, from where they start.
 fn candidate(model: &FitModel, fit: &Fit, starts: &[Effect]) -> Candidate {
+    let mut set = fit.set.clone();
+    take_delay_off(&mut set, starts);
+    candidate_on(model, fit, set, starts)
+}
+
+/// The same where values of the fit's own effects are moved before.
+fn candidate_on(model: &FitModel, fit: &Fit, mut set: EffectSet, starts: &[Effect]) -> Candidate {
     let are_neutral = starts
         .iter()
         .all(|start| *start == Effect::neutral(start.kind()));
-    let mut set = fit.set.clone();
     set.extend(starts);
-    take_delay_off(&mut set, starts);
     let (linear, beside) = if are_neutral {
         let kinds = starts.iter().map(Effect::kind).collect();
         let neutral = Beside::new(model, fit, kinds);
