@@ -219,6 +219,14 @@ fn markers_on_a_segment_give_its_pose() {
                 && (position - expected * centre - Vector3::z()).norm() < 1e-9
         );
     }
+    // Markers that move as one body say that its poses are right.
+    let frames = segment.frames();
+    let largest = |of: fn(&cromosim_imu::PoseStd) -> f64| {
+        let stds = frames.iter().map(|frame| of(&frame.pose_std));
+        stds.fold(0.0, f64::max)
+    };
+    assert_eq!(segment.pose_stds.len(), frames.len());
+    assert!(largest(|std| std.position_m) < 1e-9 && largest(|std| std.rotation_rad) < 1e-8);
     common::damaged(&bytes, 200, |bytes| {
         drop(parse_marked_imu(Cursor::new(bytes), "x"))
     });
@@ -237,6 +245,14 @@ fn a_shoe_of_gaitmap_is_told_and_read() {
     assert_eq!(
         (format, foot.stamps.len()),
         (DatasetFormat::MarkedImu, 3870)
+    );
+    // A shoe bends by some millimetres between its markers.
+    let mut stds: Vec<f64> = foot.pose_stds.iter().map(|std| std.position_m).collect();
+    stds.sort_by(f64::total_cmp);
+    assert!(
+        (0.5e-3..5e-3).contains(&stds[stds.len() / 2]),
+        "{}",
+        stds[stds.len() / 2]
     );
     // A foot that walks turns by more than a radian, and comes nowhere near the ground's other
     // side.
