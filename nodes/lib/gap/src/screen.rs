@@ -79,35 +79,34 @@ pub(crate) fn screen(
     best.into_iter().chain(together).collect()
 }
 
-/// A delay between the channels as they lag behind the simulation, where one linear step promises more from there than from
-/// none: an offset that was fitted to one of them is moved.
-fn farther_delay(model: &FitModel, fit: &Fit, mut near: Candidate) -> Candidate {
+/// A delay between the channels as they lag behind a simulation with an offset that was fitted to one of them, which is moved;
+/// where one linear step promises more from there than from no delay. (Without one both may be late.)
+fn farther_delay(model: &FitModel, fit: &Fit, near: Candidate) -> Candidate {
+    if !fit.set.contains(EffectKind::TimeOffset) {
+        return near;
+    }
     let lags = channel_lags(model.prepared, &fit.prediction.readings);
     let delay_s = lags.gyroscope - lags.accelerometer;
     if delay_s == 0.0 {
         return near;
     }
-    let mut set = fit.set.clone();
-    let offset = set.time_offset() + lags.accelerometer;
-    let starts = (
+    let moved = (
+        Effect::time_offset(fit.set.time_offset() + lags.accelerometer),
         Effect::new(EffectKind::ChannelDelay, vec![delay_s]),
-        Effect::time_offset(offset),
     );
-    let (Ok(delay), Ok(offset)) = starts else {
+    let (Ok(offset), Ok(delay)) = moved else {
         return near;
     };
-    // Without an offset among the fit's own values it stays where it is.
-    if set.contains(EffectKind::TimeOffset) {
-        set.insert(offset);
-    }
+    let mut set = fit.set.clone();
+    set.insert(offset);
     let far = candidate_on(model, fit, set, &[delay]);
-    if far.predicted_gain > near.predicted_gain {
-        near = Candidate {
-            beside: near.beside,
-            ..far
-        };
+    if far.predicted_gain <= near.predicted_gain {
+        return near;
     }
-    near
+    Candidate {
+        beside: near.beside,
+        ..far
+    }
 }
 
 /// One linear step of the fit's own values and those of more effects, from where they start.
