@@ -322,6 +322,17 @@ impl PreparedPlacement {
         base.with_other(kind, &model, track, &self.stamps)
     }
 
+    /// The readings under the second of two sets, of which `base` is under the first and whose mounts slip at different
+    /// times.
+    pub fn predict_with_other_slip(
+        &self,
+        base: &Prediction,
+        sets: [&EffectSet; 2],
+    ) -> Vec<Reading> {
+        let [own, other] = sets.map(|set| SensorModel::new(set, self.epoch));
+        base.with_other_slip(&own, &other, &self.stamps)
+    }
+
     /// Which part of time an entry of the sample grid belongs to.
     pub fn fold(&self, entry: usize) -> usize {
         (entry as f64 / (BLOCK_S * self.rate_hz)) as usize % FOLDS

@@ -393,16 +393,18 @@ pub(crate) fn sharpen_change_point(model: &FitModel, fit: Fit) -> Fit {
         if let Ok(effect) = change.with_values(values) {
             set.insert(effect);
         }
-        let prediction = model.prepared.predict(&model.track, &set);
-        let residual = model.residual(&prediction.readings);
+        let prepared = model.prepared;
+        let readings = prepared.predict_with_other_slip(&fit.prediction, [&fit.set, &set]);
+        let residual = model.residual(&readings);
         (weighted(&residual, &residual, weight), set)
     };
     let period = 1.0 / model.prepared.rate_hz;
     let start_s = change.values()[0];
-    let mut best = (squares_at(start_s).0, fit.set.clone(), start_s);
+    let squares = weighted(&fit.residual, &fit.residual, weight);
+    let mut best = (squares, fit.set.clone(), start_s);
     for step in SHARPENING_PERIODS.map(|periods| periods * period) {
         let centre = best.2;
-        for k in -4..=4 {
+        for k in (-4..=4).filter(|k| *k != 0) {
             let at_s = centre + f64::from(k) * step;
             let (squares, set) = squares_at(at_s);
             if squares < best.0 {

@@ -71,6 +71,7 @@ mod spectral_line;
 mod stages;
 mod streaming;
 mod time_offset;
+mod timing;
 mod tissue;
 mod turn_on_bias;
 mod units;

@@ -99,10 +99,12 @@ impl SensorModel {
             }
             Stage::Timing => {
                 let (trace, stamps) = (work.trace.get(), work.stamps);
-                let one = work.only.and_then(|(channel, before)| {
-                    self.sample_one(channel, trace, stamps, &before.sampled)
-                });
-                work.readings = one.unwrap_or_else(|| self.sample(trace, stamps));
+                work.readings = match work.only {
+                    Some((channel, before)) => {
+                        self.sample_one(channel, trace, stamps, &before.sampled)
+                    }
+                    None => self.sample(trace, stamps),
+                };
             }
             Stage::Linear => match work.only {
                 Some((channel, before)) => {
@@ -243,6 +245,24 @@ impl StagedReadings {
         }
         model.pass(&mut work, first..=Stage::Linear, |_, _| ());
         work.readings
+    }
+
+    /// [`StagedReadings::with_other`] where the mount slips at another time: of `other` rather than of
+    /// `own`, the model of these readings. What that does not touch is not repeated. The stamps are in
+    /// their order.
+    pub fn with_other_slip(
+        &self,
+        own: &SensorModel,
+        other: &SensorModel,
+        stamps: &[Stamp],
+    ) -> Vec<Reading> {
+        let mut readings = self.readings.clone();
+        let touched = other.between_slips(own, stamps);
+        let stamps = &stamps[touched.clone()];
+        let mut repeated = other.sample(&self.sensor, stamps);
+        other.linear(&mut repeated, stamps);
+        readings[touched].copy_from_slice(&repeated);
+        readings
     }
 }
 

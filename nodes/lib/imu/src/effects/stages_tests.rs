@@ -51,8 +51,9 @@ fn another_value_of_an_effect_repeats_what_it_changes() {
         vec![START.as_seconds() + 1.5, 0.1, 0.2, 0.0],
     )
     .unwrap();
-    let slipped = coupled.clone().with(slip);
-    for base in [EffectSet::new(), without_turns, coupled, slipped] {
+    let slipped = without_turns.clone().with(slip.clone());
+    let both = coupled.clone().with(slip);
+    for base in [EffectSet::new(), without_turns, coupled, slipped, both] {
         let staged = StagedReadings::new(&SensorModel::new(&base, START), &motion, &stamps);
         for kind in Kind::ALL {
             if !matches!(kind.spec().search, Search::Fitted(_)) {
@@ -67,6 +68,40 @@ fn another_value_of_an_effect_repeats_what_it_changes() {
             let repeated = staged.with_other(kind, &model, &motion, &stamps);
             let whole = StagedReadings::new(&model, &motion, &stamps).readings;
             assert!(repeated == whole, "{kind} beside {base:?}");
+        }
+    }
+}
+
+#[test]
+fn a_slip_at_another_time_repeats_what_lies_between() {
+    use EffectKind as Kind;
+    let motion = track(3.0);
+    let first = START.plus_seconds(0.0123);
+    let stamps = uniform_stamps(first, first.plus_seconds(2.8), 100.0).unwrap();
+    let others = set(&[
+        (Kind::TimeOffset, &[0.021]),
+        (Kind::ChannelDelay, &[-0.037]),
+        (Kind::GyroScale, &[1.01, 0.98, 1.03]),
+    ]);
+    let filtered = others
+        .clone()
+        .with(Effect::new(Kind::LowPass, vec![12.0]).unwrap());
+    let coupled = filtered
+        .clone()
+        .with(Effect::new(Kind::GyroGSensitivity, vec![1e-3; 9]).unwrap());
+    for base in [EffectSet::new(), others, filtered, coupled] {
+        let slipping_at = |seconds: f64| {
+            let values = vec![START.as_seconds() + seconds, 0.1, 0.2, 0.0];
+            let slip = Effect::new(Kind::MountSlip, values).unwrap();
+            SensorModel::new(&base.clone().with(slip), START)
+        };
+        let own = slipping_at(1.5);
+        let staged = StagedReadings::new(&own, &motion, &stamps);
+        for seconds in [-1.0, 0.5, 1.2, 1.5, 1.503, 1.9, 2.79, 9.0] {
+            let other = slipping_at(seconds);
+            let whole = StagedReadings::new(&other, &motion, &stamps).readings;
+            let repeated = staged.with_other_slip(&own, &other, &stamps);
+            assert!(repeated == whole, "at {seconds} beside {base:?}");
         }
     }
 }
