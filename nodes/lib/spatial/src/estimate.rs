@@ -10,7 +10,7 @@ use crate::noise_floor::{LARGEST_GAIN, LARGEST_REPORTED_GAIN, LARGEST_RISE, Nois
 use crate::pose_spectra::local_spectra;
 use crate::quaternion_length::with_lengths;
 use crate::sample_grid::SampleGrid;
-use crate::segments::Segments;
+use crate::segments::{Sampling, Segments};
 use crate::zero_phase_smoothing::undoing_gain;
 use crate::{KinematicTrack, SpatialError, Spectrum, Stamp, ZeroPhaseSmoothing, so3};
 
@@ -346,21 +346,23 @@ impl PoseEstimate {
         let factor = (least_rate_hz / self.rate_hz).ceil().max(1.0) as usize;
         let rate_hz = self.rate_hz * factor as f64;
         let count = (self.count - 1) * factor + 1;
-        let segments = Segments {
+        let sampling = Sampling {
             rate_hz: self.rate_hz,
             factor,
             samples: self.count,
             lead: self.lead,
             count,
         };
-        let gain = |hz: f64| undoing_gain(hz, self.undone, self.rate_hz).min(LARGEST_GAIN);
+        let segments = Segments::new(sampling, |hz| {
+            undoing_gain(hz, self.undone, self.rate_hz).min(LARGEST_GAIN)
+        });
         let derivatives = |channel: usize, orders: &[i32]| {
             let windows = if channel < 3 {
                 &self.position.windows
             } else {
                 &self.rotation.windows
             };
-            segments.derivatives(&self.coordinates[channel], windows, &gain, orders)
+            segments.derivatives(&self.coordinates[channel], windows, orders)
         };
         let accelerations = [0, 1, 2].map(|channel| derivatives(channel, &[2]).swap_remove(0));
         let [i, j, k, w] = [3, 4, 5, 6].map(|channel| derivatives(channel, &[0, 1, 2]));

@@ -41,8 +41,9 @@ pub(crate) fn centres(count: usize, rate_hz: f64) -> Vec<usize> {
         .collect()
 }
 
-/// How a series is cut, filtered and put together again.
-pub(crate) struct Segments {
+/// A series and how finely its derivatives are wanted.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sampling {
     /// Samples of the series per second.
     pub rate_hz: f64,
     /// Number of samples that were measured.
@@ -53,6 +54,22 @@ pub(crate) struct Segments {
     pub factor: usize,
     /// Entries of the result.
     pub count: usize,
+}
+
+/// How a series is cut, filtered and put together again; several share it.
+pub(crate) struct Segments {
+    sampling: Sampling,
+    centres: Vec<usize>,
+    /// Samples on either side of a centre.
+    half: usize,
+    forward: FourierPair,
+    inverse: FourierPair,
+    /// Weights of a stretch's samples from its ends on.
+    taper: Vec<f64>,
+    /// Gain at each frequency of a stretch.
+    gains: Vec<f64>,
+    /// Of each window, its first entry of the result and the weights from there on.
+    fades: Vec<(usize, Vec<f64>)>,
 }
 
 /// The stretch of a series around one window's centre, in the Fourier domain.
@@ -66,57 +83,86 @@ struct Stretch {
 }
 
 impl Segments {
+    pub fn new(sampling: Sampling, gain: impl Fn(f64) -> f64) -> Self {
+        let Sampling {
+            rate_hz,
+            samples,
+            factor,
+            count,
+            ..
+        } = sampling;
+        let half = ((HOP_S + MARGIN_S + TAPER_S) * rate_hz).ceil() as usize;
+        let forward = FourierPair::new(FourierPair::good_length(2 * half + 1));
+        let length = forward.length();
+        let spacing_hz = rate_hz / length as f64;
+        let taper = (0..=half)
+            .map(|k| k as f64 / rate_hz)
+            .take_while(|from_edge| *from_edge < TAPER_S)
+            .map(|from_edge| 0.5 - 0.5 * (PI * from_edge / TAPER_S).cos());
+        let hop = HOP_S * rate_hz * factor as f64;
+        let fade = |window: usize| {
+            // The exact centre, not the sample next to it: the raised cosines add up to 1.
+            let middle = window as f64 * hop;
+            let from = (middle - hop).ceil().max(0.0) as usize;
+            let to = ((middle + hop).floor() as usize).min(count - 1);
+            let weight = |entry| 0.5 + 0.5 * (PI * (entry as f64 - middle) / hop).cos();
+            (from, (from..=to).map(weight).collect())
+        };
+        let centres = centres(samples, rate_hz);
+        Self {
+            sampling,
+            half,
+            inverse: FourierPair::new(length * factor),
+            taper: taper.collect(),
+            gains: (0..length.div_ceil(2))
+                .map(|k| gain(k as f64 * spacing_hz))
+                .collect(),
+            fades: (0..centres.len()).map(fade).collect(),
+            centres,
+            forward,
+        }
+    }
+
     /// Derivatives of several orders of a filtered series. Each window's stretch, less a straight
     /// line, continued oddly beyond the ends and tapered, is filtered and differentiated in the
     /// Fourier domain (times `i 2 pi f` for each order); neighbours are cross-faded by raised
     /// cosines.
-    pub fn derivatives(
-        &self,
-        series: &[f64],
-        filters: &[Filter],
-        gain: &dyn Fn(f64) -> f64,
-        orders: &[i32],
-    ) -> Vec<Vec<f64>> {
-        let half = ((HOP_S + MARGIN_S + TAPER_S) * self.rate_hz).ceil() as usize;
-        let forward = FourierPair::new(FourierPair::good_length(2 * half + 1));
-        let inverse = FourierPair::new(forward.length() * self.factor);
-        let mut results = vec![vec![0.0; self.count]; orders.len()];
-        let mut filtered = vec![Complex64::default(); inverse.length()];
-        let centres = centres(self.samples, self.rate_hz);
-        for (window, (filter, centre)) in filters.iter().zip(centres).enumerate() {
-            let stretch = self.stretch(series, centre, half, &forward);
+    pub fn derivatives(&self, series: &[f64], filters: &[Filter], orders: &[i32]) -> Vec<Vec<f64>> {
+        let mut results = vec![vec![0.0; self.sampling.count]; orders.len()];
+        let mut filtered = vec![Complex64::default(); self.inverse.length()];
+        for (window, (filter, centre)) in filters.iter().zip(&self.centres).enumerate() {
+            let stretch = self.stretch(series, *centre);
+            let weights = self.weights(filter);
             for (order, result) in orders.iter().zip(&mut results) {
-                self.differentiate(&stretch, *order, filter, gain, &mut filtered);
-                inverse.inverse(&mut filtered);
+                self.differentiate(&stretch, *order, &weights, &mut filtered);
+                self.inverse.inverse(&mut filtered);
                 self.add_faded(result, window, &stretch, *order, &filtered);
             }
         }
         results
     }
 
-    /// `half` samples on either side of a centre, less the line between their ends, tapered.
-    fn stretch(
-        &self,
-        series: &[f64],
-        centre: usize,
-        half: usize,
-        transform: &FourierPair,
-    ) -> Stretch {
-        let first = centre as i64 - half as i64;
-        let value = |k: usize| continued(series, first + (k + self.lead) as i64);
-        let last = 2 * half;
+    /// A filter's and the gain's together, at each frequency of a stretch.
+    fn weights(&self, filter: &Filter) -> Vec<f64> {
+        let spacing_hz = self.sampling.rate_hz / self.forward.length() as f64;
+        let gains = self.gains.iter().enumerate();
+        gains
+            .map(|(k, gain)| filter.at(k as f64 * spacing_hz) * gain)
+            .collect()
+    }
+
+    /// Samples on either side of a centre, less the line between their ends, tapered.
+    fn stretch(&self, series: &[f64], centre: usize) -> Stretch {
+        let first = centre as i64 - self.half as i64;
+        let value = |k: usize| continued(series, first + (k + self.sampling.lead) as i64);
+        let last = 2 * self.half;
         let (level, slope) = (value(0), (value(last) - value(0)) / last as f64);
-        let mut spectrum = vec![Complex64::default(); transform.length()];
+        let mut spectrum = vec![Complex64::default(); self.forward.length()];
         for (k, slot) in spectrum.iter_mut().enumerate().take(last + 1) {
-            let from_edge = k.min(last - k) as f64 / self.rate_hz;
-            let taper = if from_edge < TAPER_S {
-                0.5 - 0.5 * (PI * from_edge / TAPER_S).cos()
-            } else {
-                1.0
-            };
+            let taper = self.taper.get(k.min(last - k)).copied().unwrap_or(1.0);
             *slot = Complex64::new((value(k) - level - slope * k as f64) * taper, 0.0);
         }
-        transform.forward(&mut spectrum);
+        self.forward.forward(&mut spectrum);
         Stretch {
             first,
             level,
@@ -130,23 +176,22 @@ impl Segments {
         &self,
         stretch: &Stretch,
         order: i32,
-        filter: &Filter,
-        gain: &dyn Fn(f64) -> f64,
+        weights: &[f64],
         filtered: &mut [Complex64],
     ) {
-        let length = stretch.spectrum.len();
-        let spacing_hz = self.rate_hz / length as f64;
+        let Sampling {
+            rate_hz, factor, ..
+        } = self.sampling;
+        let spacing_hz = rate_hz / stretch.spectrum.len() as f64;
         let result_length = filtered.len();
         filtered.fill(Complex64::default());
-        for k in 0..length.div_ceil(2) {
-            let frequency_hz = k as f64 * spacing_hz;
-            let weight = filter.at(frequency_hz) * gain(frequency_hz);
+        for (k, &weight) in weights.iter().enumerate() {
             if weight == 0.0 {
                 continue;
             }
             let value = stretch.spectrum[k]
-                * Complex64::new(0.0, TAU * frequency_hz).powi(order)
-                * (weight * self.factor as f64);
+                * Complex64::new(0.0, TAU * (k as f64 * spacing_hz)).powi(order)
+                * (weight * factor as f64);
             filtered[k] = value;
             if k > 0 {
                 filtered[result_length - k] = value.conj();
@@ -164,23 +209,22 @@ impl Segments {
         order: i32,
         filtered: &[Complex64],
     ) {
+        let Sampling {
+            rate_hz, factor, ..
+        } = self.sampling;
         let line = |entry: i64| match order {
             0 => {
                 stretch.level
-                    + stretch.slope * (entry as f64 / self.factor as f64 - stretch.first as f64)
+                    + stretch.slope * (entry as f64 / factor as f64 - stretch.first as f64)
             }
-            1 => stretch.slope * self.rate_hz,
+            1 => stretch.slope * rate_hz,
             _ => 0.0,
         };
-        let hop = HOP_S * self.rate_hz * self.factor as f64;
-        // The exact centre, not the sample next to it: the raised cosines add up to 1.
-        let middle = window as f64 * hop;
-        let from = (middle - hop).ceil().max(0.0) as usize;
-        let to = ((middle + hop).floor() as usize).min(self.count - 1);
-        for (entry, sum) in result.iter_mut().enumerate().take(to + 1).skip(from) {
-            let weight = 0.5 + 0.5 * (PI * (entry as f64 - middle) / hop).cos();
-            let place = entry as i64 - stretch.first * self.factor as i64;
-            *sum += weight * (filtered[place as usize].re + line(entry as i64));
+        let (from, weights) = &self.fades[window];
+        for (entry, (sum, weight)) in result[*from..].iter_mut().zip(weights).enumerate() {
+            let entry = (from + entry) as i64;
+            let place = entry - stretch.first * factor as i64;
+            *sum += weight * (filtered[place as usize].re + line(entry));
         }
     }
 }

@@ -1,10 +1,11 @@
 //! Fourier transforms and power spectra.
 
+use std::cell::RefCell;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use rustfft::num_complex::Complex64;
-use rustfft::{Fft, FftPlanner};
+use rustfft::{Fft, FftDirection, FftPlanner};
 
 /// One-sided power spectral density on a uniform grid of frequencies.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -83,7 +84,7 @@ pub fn welch(series: &[f64], rate_hz: f64, window: usize) -> Spectrum {
         .map(|k| 0.5 - 0.5 * (TAU * (k as f64 + 0.5) / window as f64).cos())
         .collect();
     let power: f64 = hann.iter().map(|weight| weight * weight).sum();
-    let fft = FftPlanner::new().plan_fft_forward(window);
+    let fft = planned(window, FftDirection::Forward);
     let mut density = vec![0.0; window / 2 + 1];
     let mut buffer = vec![Complex64::default(); window];
     let mut windows = 0;
@@ -129,6 +130,15 @@ fn line(values: &[f64]) -> (f64, f64) {
     (mean - slope * centre, slope)
 }
 
+thread_local! {
+    /// Plans cost as much as a few transforms, and the same lengths come again and again.
+    static PLANNER: RefCell<FftPlanner<f64>> = RefCell::new(FftPlanner::new());
+}
+
+fn planned(length: usize, direction: FftDirection) -> Arc<dyn Fft<f64>> {
+    PLANNER.with_borrow_mut(|planner| planner.plan_fft(length, direction))
+}
+
 /// Forward and inverse transforms of one length; the inverse divides by it.
 #[derive(Clone)]
 pub struct FourierPair {
@@ -146,10 +156,9 @@ impl std::fmt::Debug for FourierPair {
 impl FourierPair {
     /// Plans both transforms of series of `length` entries.
     pub fn new(length: usize) -> Self {
-        let mut planner = FftPlanner::new();
         Self {
-            forward: planner.plan_fft_forward(length),
-            inverse: planner.plan_fft_inverse(length),
+            forward: planned(length, FftDirection::Forward),
+            inverse: planned(length, FftDirection::Inverse),
             length,
         }
     }
