@@ -12,12 +12,13 @@ use crate::library::Library;
 use crate::noise_updates::{first_model, with_rest_as_noise, with_updated_noise};
 use crate::policy::confounded::HARDLY_EXPLAINED;
 use crate::policy::report::MOSTLY_EXPLAINED;
-use crate::policy::search::{MOST, MOST_AT_FIRST, NOISE_OVERSTATED, ROUNDS};
+use crate::policy::search::{FIT_STEPS, MOST, MOST_AT_FIRST, NOISE_OVERSTATED, ROUNDS};
 use crate::progress::{self, Progress, THINNED};
 use crate::reportable::{Observations, is_ordinary, reportable_effects};
 use crate::resolved_noise::{may_fold_over, resolved_noise};
 use crate::search::{
-    ScoredEffectSet, excess, exchanged, score, score_as_it_is, search, search_down_to_noise,
+    ScoredEffectSet, excess, exchanged, score, score_after, score_as_it_is, search,
+    search_down_to_noise,
 };
 use crate::sensor_noise::{
     found_noise, has_tails, is_steady, is_white, most_noise, readings_are_level,
@@ -125,7 +126,8 @@ impl<'a> Analysis<'a> {
         if let Some(smoothing) = coarse.basis.undone_smoothing {
             model = with_undone_smoothing(&model, &self.session.starts[0], smoothing);
         }
-        let scored = score(&model, found.fit.set);
+        // What the noise is taken from needs no change sharper than the thinned one.
+        let scored = score_after(&model, found.fit.set, FIT_STEPS);
         model = with_updated_noise(&model, &scored, digital, self.library);
         let scored = score(&model, scored.fit.set);
         trace_scored("at the full rate", &scored);

@@ -9,7 +9,7 @@ use crate::policy::confounded::{
     ALL_BUT_LITTLE, CHANGES_OVER_TIME, MAIN_PART, NEARLY_ALL, OWN_GAIN, REGRESSIONS, STRONG_PART,
 };
 use crate::residual_regressions::{ResidualRegression, with_regressions};
-use crate::search::score;
+use crate::search::{score, score_without};
 use crate::trace::trace;
 
 /// What becomes of a fitted effect beside something unknown.
@@ -121,7 +121,7 @@ fn judge_members(
     let nominal = score(model, EffectSet::new());
     let explained = together - nominal.fit.linear.held_out;
     for kind in open {
-        let smaller = score(model, fit.set.without(kind));
+        let smaller = score_without(model, fit, kind);
         let instead = with_regressions(model, &smaller.fit, &chosen).held_out;
         let alone = fit.linear.held_out - smaller.fit.linear.held_out;
         let gain_of_regressions = instead - smaller.fit.linear.held_out;

@@ -305,6 +305,17 @@ impl<'a> FitModel<'a> {
         Gram::new(&self.series(columns, residual), prior)
     }
 
+    /// The same against another residual, without another pass over the columns.
+    pub fn gram_of_residual(
+        &self,
+        gram: &Gram,
+        columns: &[&[f64]],
+        residual: &[f64],
+        prior: Vec<f64>,
+    ) -> Gram {
+        gram.extended(&self.series(columns, residual), prior, false)
+    }
+
     fn series<'s>(&'s self, columns: &'s [&'s [f64]], residual: &'s [f64]) -> Series<'s> {
         Series {
             columns,
@@ -380,16 +391,30 @@ impl Fit {
 
     /// And what it says where the columns of a Gram matrix beside the fit's own stand in its place.
     pub fn held_out_in_place_of(&self, kind: EffectKind, extended: &Gram) -> f64 {
-        let Some(effect) = self.set.get(kind) else {
-            return self.linear.held_out;
-        };
+        let linear = self.linear_in_place_of(kind, extended);
+        linear.map_or(self.linear.held_out, |linear| linear.held_out)
+    }
+
+    /// None where the effect is not in the set.
+    fn linear_in_place_of(&self, kind: EffectKind, extended: &Gram) -> Option<Linear> {
+        let effect = self.set.get(kind)?;
         let neutral = kind.spec().neutral();
         let own = self.layout.iter().enumerate();
         let (columns, moves): (Vec<usize>, Vec<f64>) = own
             .filter(|(_, (other, _))| *other == kind)
             .map(|(column, &(_, index))| (column, neutral[index] - effect.values()[index]))
             .unzip();
-        extended.held_out_without(&columns, &moves)
+        Some(extended.solve_without(&columns, &moves))
+    }
+
+    /// The set without an effect, with the values that one linear step gives the others.
+    pub fn set_without(&self, kind: EffectKind) -> EffectSet {
+        let rest = self.set.without(kind);
+        let others = self.layout.iter().copied().filter(|(own, _)| *own != kind);
+        match self.linear_in_place_of(kind, &self.gram) {
+            Some(linear) => stepped(&rest, &others.collect::<Vec<_>>(), &linear.step, 1.0),
+            None => rest,
+        }
     }
 
     /// Whether the values of an effect were fitted, not given.

@@ -8,7 +8,7 @@ use nalgebra::DVector;
 
 use crate::fit::{Evaluated, Fit, FitModel, free_values, layout_of, slices, stepped};
 use crate::gram::Gram;
-use crate::policy::search::{CONVERGED_NATS, FIT_STEPS};
+use crate::policy::search::{CONVERGED_NATS, FIT_STEPS, SAME_COLUMNS_NATS};
 
 /// Part of a step below which a fit gives up halving it.
 const LEAST_PART: f64 = 1e-3;
@@ -43,19 +43,17 @@ pub(crate) fn fit_together(
     };
     let mut now = evaluated(sets);
     let mut steps_left = steps;
+    let mut kept: Option<Linearised> = None;
     loop {
-        let columns: Vec<Vec<Vec<f64>>> = models
-            .iter()
-            .zip(&now)
-            .zip(&coefficients.layouts)
-            .map(|((model, now), layout)| columns_of(model, now, layout))
-            .collect();
-        let grams = coefficients.grams(models, &now, &columns);
+        let is_kept = kept.is_some();
+        let Linearised { columns, grams } = match kept.take() {
+            Some(before) => coefficients.around(models, &now, before),
+            None => coefficients.linearised(models, &now),
+        };
         let solution = coefficients.together(grams.clone()).solution();
         let cost = total_cost(&now);
-        let is_last = steps_left == 0
-            || coefficients.prior.is_empty()
-            || cost + solution.trained < CONVERGED_NATS;
+        let gain = solution.trained + cost;
+        let is_last = steps_left == 0 || coefficients.prior.is_empty() || gain < CONVERGED_NATS;
         let mut part = if is_last { 0.0 } else { 1.0 };
         let mut better = None;
         while part > LEAST_PART && better.is_none() {
@@ -66,6 +64,11 @@ pub(crate) fn fit_together(
         if let Some(better) = better {
             now = better;
             steps_left -= 1;
+            kept = (gain < SAME_COLUMNS_NATS).then_some(Linearised { columns, grams });
+            continue;
+        }
+        if is_kept && !is_last {
+            // Where these lead no further, others may.
             continue;
         }
         let parts = solution.parts.into_iter().zip(coefficients.layouts);
@@ -84,6 +87,12 @@ pub(crate) fn fit_together(
             })
             .collect();
     }
+}
+
+/// Columns of each model, and their normal equations.
+struct Linearised {
+    columns: Vec<Vec<Vec<f64>>>,
+    grams: Vec<Gram>,
 }
 
 fn total_cost(all: &[Evaluated]) -> f64 {
@@ -139,21 +148,42 @@ impl Coefficients {
         }
     }
 
-    /// Of each model, with its own coefficients.
-    fn grams(
-        &self,
-        models: &[&FitModel],
-        now: &[Evaluated],
-        columns: &[Vec<Vec<f64>>],
-    ) -> Vec<Gram> {
-        let one = |index: usize| {
-            let prior = self.of_layouts[index]
-                .iter()
-                .map(|&k| self.prior[k])
-                .collect();
+    /// Around what the sets predict.
+    fn linearised(&self, models: &[&FitModel], now: &[Evaluated]) -> Linearised {
+        let columns: Vec<Vec<Vec<f64>>> = models
+            .iter()
+            .zip(now)
+            .zip(&self.layouts)
+            .map(|((model, now), layout)| columns_of(model, now, layout))
+            .collect();
+        let of_model = |index: usize| {
+            let prior = self.prior_of(index);
             models[index].gram(&slices(&columns[index]), &now[index].residual, prior)
         };
-        (0..models.len()).map(one).collect()
+        let grams = (0..models.len()).map(of_model).collect();
+        Linearised { columns, grams }
+    }
+
+    /// With the columns of a point nearby.
+    fn around(&self, models: &[&FitModel], now: &[Evaluated], nearby: Linearised) -> Linearised {
+        let Linearised { columns, grams } = nearby;
+        let of_model = |(index, gram): (usize, Gram)| {
+            let columns = slices(&columns[index]);
+            models[index].gram_of_residual(
+                &gram,
+                &columns,
+                &now[index].residual,
+                self.prior_of(index),
+            )
+        };
+        let grams = grams.into_iter().enumerate().map(of_model).collect();
+        Linearised { columns, grams }
+    }
+
+    /// Of the coefficients of one model.
+    fn prior_of(&self, model: usize) -> Vec<f64> {
+        let own = self.of_layouts[model].iter();
+        own.map(|&k| self.prior[k]).collect()
     }
 
     fn together(&self, grams: Vec<Gram>) -> Gram {

@@ -24,10 +24,12 @@ pub(crate) struct Gram {
 }
 
 /// The inner products of one series.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct Block {
     /// Which coefficient each column has.
     coefficients: Vec<usize>,
+    /// Which axes each column changes, and the residual's: most change few.
+    changes: Vec<[bool; 6]>,
     parts: Vec<PerChannel<DMatrix<f64>>>,
     /// Number of values, by fold.
     counts: Vec<PerChannel<f64>>,
@@ -83,48 +85,64 @@ pub(crate) fn channel_likelihood(count: f64, squares: f64) -> f64 {
     -0.5 * count * (q.ln() + ratio / q)
 }
 
-/// Puts what a block holds already in its place, and mirrors.
-fn take_known<'a>(
-    parts: &mut [PerChannel<DMatrix<f64>>],
-    known: impl Fn(usize, usize) -> Option<(&'a Block, (usize, usize))>,
-) {
-    for (fold, part) in parts.iter_mut().enumerate() {
-        for channel in Channel::ALL {
-            let size = part[channel].nrows();
-            for (i, j) in (0..size).flat_map(|i| (0..=i).map(move |j| (i, j))) {
-                if let Some((block, place)) = known(i, j) {
-                    part[channel][(i, j)] = block.parts[fold][channel][place];
+/// What is known of a Gram matrix: a block, and where it has which of its columns.
+struct Known<'a, F: Fn(usize) -> Option<usize>> {
+    block: &'a Block,
+    place: F,
+}
+
+impl<F: Fn(usize) -> Option<usize>> Known<'_, F> {
+    fn has(&self, i: usize, j: usize) -> bool {
+        (self.place)(i).is_some() && (self.place)(j).is_some()
+    }
+
+    /// Puts it in its place, and mirrors all.
+    fn complete(&self, parts: &mut [PerChannel<DMatrix<f64>>]) {
+        for (fold, part) in parts.iter_mut().enumerate() {
+            for channel in Channel::ALL {
+                let size = part[channel].nrows();
+                for (i, j) in (0..size).flat_map(|i| (0..=i).map(move |j| (i, j))) {
+                    if let (Some(row), Some(column)) = ((self.place)(i), (self.place)(j)) {
+                        part[channel][(i, j)] = self.block.parts[fold][channel][(row, column)];
+                    }
                 }
+                part[channel].fill_upper_triangle_with_lower_triangle();
             }
-            part[channel].fill_upper_triangle_with_lower_triangle();
         }
     }
 }
 
 impl Gram {
     pub fn new(series: &Series, prior: Vec<f64>) -> Self {
-        Self::beside(series, prior, |_, _| None)
+        let nothing = Block::default();
+        let known = Known {
+            block: &nothing,
+            place: |_| None,
+        };
+        Self::beside(series, prior, &known)
     }
 
     /// [`Gram::new`] of the columns of this one (of one series) and more, without another pass over
     /// those that it has; nor over the residual, where that is its own too.
     pub fn extended(&self, series: &Series, prior: Vec<f64>, has_own_residual: bool) -> Self {
         let (own, residual) = (self.size(), series.columns.len());
-        let known = |i: usize| match i {
+        let place = |i: usize| match i {
             i if i < own => Some(i),
             i if i == residual && has_own_residual => Some(own),
             _ => None,
         };
-        Self::beside(series, prior, |i, j| {
-            Some((&self.blocks[0], (known(i)?, known(j)?)))
-        })
+        let known = Known {
+            block: &self.blocks[0],
+            place,
+        };
+        Self::beside(series, prior, &known)
     }
 
-    /// Inner products, but for those that a block holds already, and where.
-    fn beside<'a>(
+    /// Inner products, but for those that are known already.
+    fn beside<F: Fn(usize) -> Option<usize>>(
         series: &Series,
         prior: Vec<f64>,
-        known: impl Fn(usize, usize) -> Option<(&'a Block, (usize, usize))>,
+        known: &Known<F>,
     ) -> Self {
         let Series {
             columns,
@@ -139,13 +157,13 @@ impl Gram {
             .copied()
             .chain(std::iter::once(residual))
             .collect();
-        // Most columns change few axes.
-        let changes: Vec<[bool; 6]> = all
-            .iter()
-            .map(|column| {
+        let changes_of = |(i, column): (usize, &&[f64])| match (known.place)(i) {
+            Some(place) => known.block.changes[place],
+            None => {
                 std::array::from_fn(|axis| !is_zero(&column[axis * length..(axis + 1) * length]))
-            })
-            .collect();
+            }
+        };
+        let changes: Vec<[bool; 6]> = all.iter().enumerate().map(changes_of).collect();
         let nothing = PerChannel::from_fn(|_| DMatrix::zeros(size, size));
         let mut parts = vec![nothing; FOLDS];
         // Runs of one fold are contiguous: inner products over slices.
@@ -159,7 +177,7 @@ impl Gram {
                 let range = axis * length + from..axis * length + to;
                 let part = &mut parts[fold][channel_of_axis(axis)];
                 for i in (0..size).filter(|&i| changes[i][axis]) {
-                    for j in (0..=i).filter(|&j| changes[j][axis] && known(i, j).is_none()) {
+                    for j in (0..=i).filter(|&j| changes[j][axis] && !known.has(i, j)) {
                         let (a, b) = (&all[i][range.clone()], &all[j][range.clone()]);
                         part[(i, j)] += dot(a, b);
                     }
@@ -167,9 +185,10 @@ impl Gram {
             }
             from = to;
         }
-        take_known(&mut parts, &known);
+        known.complete(&mut parts);
         let block = Block {
             coefficients: (0..columns.len()).collect(),
+            changes,
             parts,
             counts: counts.to_vec(),
         };
@@ -202,9 +221,9 @@ impl Gram {
         self.prior.len()
     }
 
-    /// Held-out log-likelihood without some of one series' columns, after their coefficients were
+    /// What a linear fit leaves without some of one series' columns, after their coefficients were
     /// moved by as much as `moves` says: no pass over the series is needed.
-    pub fn held_out_without(&self, columns: &[usize], moves: &[f64]) -> f64 {
+    pub fn solve_without(&self, columns: &[usize], moves: &[f64]) -> Linear {
         let kept: Vec<usize> = (0..self.size()).filter(|k| !columns.contains(k)).collect();
         let size = self.size() + 1;
         let mut selection = DMatrix::zeros(size, kept.len() + 1);
@@ -218,6 +237,7 @@ impl Gram {
         }
         let blocks = self.blocks.iter().map(|block| Block {
             coefficients: (0..kept.len()).collect(),
+            changes: Vec::new(),
             parts: block
                 .parts
                 .iter()
@@ -233,7 +253,7 @@ impl Gram {
             blocks: blocks.collect(),
             prior: kept.iter().map(|&k| self.prior[k]).collect(),
         };
-        without.solve().held_out
+        without.solve()
     }
 
     /// [`Gram::solution`] of one series.

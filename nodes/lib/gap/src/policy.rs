@@ -42,6 +42,9 @@ pub(crate) mod search {
     pub const FIT_STEPS: usize = 12;
     /// Gain of the last step, nats, below which a fit has converged.
     pub const CONVERGED_NATS: f64 = 0.1;
+    /// Gain of a step, nats, below which the next one takes its columns: it moves values by three standard errors at most. No
+    /// source for the number.
+    pub const SAME_COLUMNS_NATS: f64 = 20.0;
     /// One linear step says little of a large turn or delay: a candidate that promises this part of
     /// the best one's gain is still worth a fit.
     pub const PART_OF_BEST_PREDICTION: f64 = 0.3;

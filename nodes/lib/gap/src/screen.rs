@@ -13,6 +13,10 @@ use crate::prepared::Prediction;
 const END_PART: usize = 8;
 /// Steps around the time of a change by which it is sharpened, in periods of the IMU.
 const SHARPENING_PERIODS: [f64; 3] = [8.0, 2.0, 0.5];
+/// Of each, the most to either side.
+const SHARPENING_STEPS: u32 = 4;
+/// And the most in a row that leave no less.
+const SHARPENING_PATIENCE: u32 = 2;
 
 /// A set to be fitted, with what one linear step predicts of it.
 #[derive(Clone, Debug)]
@@ -404,11 +408,20 @@ pub(crate) fn sharpen_change_point(model: &FitModel, fit: Fit) -> Fit {
     let mut best = (squares, fit.set.clone(), start_s);
     for step in SHARPENING_PERIODS.map(|periods| periods * period) {
         let centre = best.2;
-        for k in (-4..=4).filter(|k| *k != 0) {
-            let at_s = centre + f64::from(k) * step;
-            let (squares, set) = squares_at(at_s);
-            if squares < best.0 {
-                best = (squares, set, at_s);
+        for direction in [-step, step] {
+            let mut farther = 0;
+            for k in 1..=SHARPENING_STEPS {
+                let at_s = centre + f64::from(k) * direction;
+                let (squares, set) = squares_at(at_s);
+                if squares < best.0 {
+                    best = (squares, set, at_s);
+                    farther = 0;
+                } else {
+                    farther += 1;
+                }
+                if farther == SHARPENING_PATIENCE {
+                    break;
+                }
             }
         }
     }

@@ -70,7 +70,24 @@ pub(crate) fn score(model: &FitModel, set: EffectSet) -> ScoredEffectSet {
     of_fit(model, fit)
 }
 
-/// The same after at most so many steps.
+/// A fit without one of its effects.
+pub(crate) fn score_without(model: &FitModel, fit: &Fit, kind: EffectKind) -> ScoredEffectSet {
+    let rest = fit.set.without(kind);
+    if !starts_neutral(kind) {
+        return score(model, rest);
+    }
+    // Far from the neutral values a step from the values that the others have may be the shorter way.
+    let cost = |set: &EffectSet| model.evaluated(set.clone()).cost;
+    let moved = fit.set_without(kind);
+    let start = if cost(&moved) < cost(&rest) {
+        moved
+    } else {
+        rest
+    };
+    score(model, start)
+}
+
+/// [`score`] after at most so many steps.
 pub(crate) fn score_after(model: &FitModel, set: EffectSet, steps: usize) -> ScoredEffectSet {
     of_fit(model, model.fit_steps(set, steps))
 }
@@ -267,7 +284,7 @@ fn pruned(model: &FitModel, mut scored: ScoredEffectSet) -> ScoredEffectSet {
             .set
             .iter()
             .filter(|effect| !surely_earns_its_place(model, &scored.fit, effect.kind()))
-            .map(|effect| score(model, scored.fit.set.without(effect.kind())));
+            .map(|effect| score_without(model, &scored.fit, effect.kind()));
         let Some(best) = smaller.max_by(|a, b| a.score.total_cmp(&b.score)) else {
             return scored;
         };
@@ -296,7 +313,7 @@ pub(crate) fn exchanged(
             screened => Substitutes::of_screen(&kept.fit, screened),
         };
         for kind in members {
-            let smaller = score(model, scored.fit.set.without(kind));
+            let smaller = score_without(model, &scored.fit, kind);
             let rival = best_rival(model, &scored, &smaller, kind, library, &substitutes);
             let rival_score = rival
                 .as_ref()
