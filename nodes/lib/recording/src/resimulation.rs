@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use cromosim_bag::BagWriter;
 use cromosim_imu::{
-    AmbientField, DeclaredNoise, Differentiation, EffectSet, EffectsFile, ImuOptions,
+    AmbientField, DeclaredNoise, Differentiation, Effect, EffectSet, EffectsFile, ImuOptions,
     KinematicSample, MagneticMotion, Magnetometer, OrientationSource, PlacementEffects,
     ReadingMapping, RecordedMotion, SampleVariance, SensorFrame, SensorTrajectory, TextureSegment,
     Trim, UnexplainedErrors, add_texture, measure_magnetic_recording, measure_recording,
@@ -272,6 +272,11 @@ impl Resimulation {
                 .map_err(|source| RecordingError::NotEstimated { source })?;
             let estimate = undone
                 .map(|smoothing| estimate.undoing(smoothing))
+                .unwrap_or(estimate);
+            let mut lines = effects.iter().filter_map(Effect::spectral_line);
+            let estimate = lines
+                .next()
+                .map(|line| estimate.without_machine(line.hz))
                 .unwrap_or(estimate);
             let response = known.reference_response.as_ref();
             let estimate = response

@@ -39,6 +39,15 @@ pub(crate) fn steady_machines(local: &[Spectrum], whole: &Spectrum) -> Vec<bool>
         .collect()
 }
 
+/// Takes from the entries of motion those around the frequency of a machine that is known of, where that is faster than people.
+pub(crate) fn leave_out_machine(motion: &mut [bool], spacing_hz: f64, hz: f64) {
+    if hz > FASTEST_STEADY_HZ {
+        let at = |hz: f64| ((hz / spacing_hz).round() as usize).min(motion.len());
+        let around = at(hz - 0.5 * STEADY_HZ)..at(hz + 0.5 * STEADY_HZ);
+        motion[around].fill(false);
+    }
+}
+
 /// Which entries from one on belong to motion, by their densities over the noise's: runs above `edge` that reach [`LINE`] or
 /// [`EVIDENCE`], but for those that are narrow and a machine's.
 pub(crate) fn motion_beyond(

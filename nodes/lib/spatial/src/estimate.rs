@@ -72,6 +72,8 @@ pub struct PoseEstimate {
     undone: Option<ZeroPhaseSmoothing>,
     /// Factors on what the filters pass.
     response: Option<Arc<MotionResponse>>,
+    /// Where a machine runs that is known of, Hz.
+    machine_hz: Option<f64>,
 }
 
 impl PoseEstimate {
@@ -133,8 +135,8 @@ impl PoseEstimate {
         let beyond = [0..lead, lead + count..count + 2 * lead];
         let of_ends = fill(&mut coordinates, &beyond, &floors, rate_hz);
         let [mut position, mut rotation] = floors;
-        position.localise(&local[0], rate_hz, None, 0);
-        rotation.localise(&local[1], rate_hz, None, 0);
+        position.localise(&local[0], rate_hz, None, None, 0);
+        rotation.localise(&local[1], rate_hz, None, None, 0);
         let (start, gaps) = (grid.start, grid.gap_stamps());
         let filled = Arc::new(all_filled(grid, &gaps, of_gaps, of_ends));
         Self {
@@ -150,6 +152,7 @@ impl PoseEstimate {
             filled,
             undone: None,
             response: None,
+            machine_hz: None,
         }
     }
 
@@ -293,11 +296,23 @@ impl PoseEstimate {
         plain.filtered_anew(self.undone, 0)
     }
 
+    /// The estimate without what a machine that runs at a frequency does to the poses, where that is faster than people: a
+    /// `vibration` says what it does to a sensor. Without being told, the estimate leaves out those that are steady
+    /// throughout the poses, which fewer of them may not show.
+    #[must_use]
+    pub fn without_machine(&self, hz: f64) -> Self {
+        let told = Self {
+            machine_hz: Some(hz),
+            ..self.clone()
+        };
+        told.filtered_anew(self.undone, 0)
+    }
+
     fn filtered_anew(&self, undone: Option<ZeroPhaseSmoothing>, reach: usize) -> Self {
         let rate_hz = self.rate_hz;
         let anew = |floor: &NoiseFloor, local: &[Spectrum], factor: &dyn Fn(f64) -> f64| {
             let mut floor = floor.undoing(undone, rate_hz);
-            floor.localise(local, rate_hz, undone, reach);
+            floor.localise(local, rate_hz, undone, self.machine_hz, reach);
             floor.multiply_filters(factor);
             floor
         };

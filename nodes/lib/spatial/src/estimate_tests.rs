@@ -565,3 +565,29 @@ fn poses_too_slow_for_a_motion_keep_what_they_show_of_it() {
     let ratio = squares / stated;
     assert!((0.5..2.0).contains(&ratio), "{ratio}");
 }
+
+#[test]
+fn a_machine_that_is_known_of_is_left_out_though_it_is_not_steady() {
+    let noise = PoseNoise {
+        position: 1e-5,
+        rotation: 1e-4,
+    };
+    let (stamps, mut positions, rotations) = poses(noise, 200.0, |_| true);
+    for (k, position) in positions.iter_mut().enumerate() {
+        let t = k as f64 / 200.0;
+        position.z += 1e-4 * (TAU * 31.0 * t + 3.0 * (TAU * 0.11 * t).sin()).sin();
+    }
+    let estimate = PoseEstimate::fit(&stamps, &positions, &rotations).unwrap();
+    let error = |estimate: &PoseEstimate| acceleration_error(&estimate.track(200.0));
+    let [as_it_is, told, elsewhere] = [
+        error(&estimate),
+        error(&estimate.without_machine(31.0)),
+        error(&estimate.without_machine(24.0)),
+    ];
+    let shaken = 1e-4 * (TAU * 31.0_f64).powi(2) / 2.0_f64.sqrt();
+    assert!(as_it_is > 0.8 * shaken, "{as_it_is} of {shaken}");
+    assert!(told < 0.15 * shaken, "{told} of {shaken}");
+    assert_eq!(elsewhere, as_it_is);
+    // What is slower than machines is left as it is.
+    assert_eq!(error(&estimate.without_machine(3.9)), as_it_is);
+}

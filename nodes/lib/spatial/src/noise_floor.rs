@@ -1,6 +1,6 @@
 //! What is noise and what is motion in a spectrum of poses.
 
-use crate::beyond_band::{motion_beyond, steady_machines};
+use crate::beyond_band::{leave_out_machine, motion_beyond, steady_machines};
 use crate::local_noise::local_noise;
 use crate::noise_shape::NoiseShape;
 use crate::pose_spectra::mean_spectrum;
@@ -157,12 +157,13 @@ impl NoiseFloor {
     /// smoothing is undone, whose gain hides it); motion comes in bursts, and rests let noise through that
     /// the mean motion would hide. The band ends where three neighbours lie near the
     /// noise; within it, lines that the long windows resolve keep their full height; every frequency is
-    /// as open as those up to `reach` entries away.
+    /// as open as those up to `reach` entries away. Steady machines are left out, and one that is known of.
     pub fn localise(
         &mut self,
         local: &[Spectrum],
         rate_hz: f64,
         undone: Option<ZeroPhaseSmoothing>,
+        machine_hz: Option<f64>,
         reach: usize,
     ) {
         let mut mean = vec![0.0; self.filter.len()];
@@ -175,7 +176,8 @@ impl NoiseFloor {
                     None => local_noise(spectrum, rate_hz, self.spectrum()),
                 };
                 let spectrum = with_ringing(local, window);
-                let (own, machines) = ((&spectrum, noise), machines.as_slice());
+                let own = (&spectrum, noise);
+                let machines = (machines.as_slice(), machine_hz);
                 let filter = Filter {
                     spacing_hz: spectrum.spacing_hz,
                     weights: self.local_weights(own, machines, rate_hz, (undone, reach)),
@@ -211,11 +213,11 @@ impl NoiseFloor {
     }
 
     /// The filter's weights at the frequencies of one window's spectrum, whose noise is so many times as
-    /// dense as that of the whole series, and at some of which machines are.
+    /// dense as that of the whole series, and at some of which machines are, or are known to be.
     fn local_weights(
         &self,
         (spectrum, noise): (&Spectrum, f64),
-        machines: &[bool],
+        (machines, machine_hz): (&[bool], Option<f64>),
         rate_hz: f64,
         (undone, reach): (Option<ZeroPhaseSmoothing>, usize),
     ) -> Vec<f64> {
@@ -237,7 +239,12 @@ impl NoiseFloor {
             // Bumps of the noise would come back amplified: there, what stands beyond the band has to stand higher.
             let amplified = |k: usize| gain2(spectrum.frequency(k)).powf(0.25);
             let heights: Vec<f64> = (0..bins).map(|k| ratio[k] / amplified(k)).collect();
-            motion_beyond(&heights, (LOCAL_EDGE, edge), spectrum.spacing_hz, machines)
+            let spacing_hz = spectrum.spacing_hz;
+            let mut motion = motion_beyond(&heights, (LOCAL_EDGE, edge), spacing_hz, machines);
+            if let Some(hz) = machine_hz {
+                leave_out_machine(&mut motion, spacing_hz, hz);
+            }
+            motion
         };
         // Above what the noise is, at the last three frequencies of the band.
         let last = (1..=3)
