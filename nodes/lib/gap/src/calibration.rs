@@ -10,7 +10,7 @@ use crate::fit::{Fit, FitModel};
 use crate::gauss_newton::fit_together;
 use crate::noise_updates::with_rest_as_noise;
 use crate::parts_of_time::{Part, PartsOfTime, Rises};
-use crate::policy::calibration::{MANY_POSTURES, MOST_RISE};
+use crate::policy::calibration::{LEAST_FALL, MANY_POSTURES, MOST_RISE};
 use crate::policy::search::FIT_STEPS;
 use crate::search::{price_of_effect, rises};
 use crate::trace::{names, trace};
@@ -31,6 +31,7 @@ pub(crate) fn keep_calibrations(findings: &mut [Findings]) {
     let recordings = Recordings {
         models: &models,
         parts: has_unknown.then(|| models.iter().map(|model| PartsOfTime::of(model)).collect()),
+        has_to_fall: has_unknown && findings.iter().all(|one| one.is_hardly_explained),
     };
     let mut best = recordings.grown(named, &calibrations, is_calibration);
     if !struck.is_empty() {
@@ -62,6 +63,8 @@ struct Recordings<'m, 'a> {
     models: &'m [&'m FitModel<'a>],
     /// Of each; none where nothing is unknown.
     parts: Option<Vec<PartsOfTime>>,
+    /// Whether what is unknown is so much that a little less of it is no sign of a calibration.
+    has_to_fall: bool,
 }
 
 impl Recordings<'_, '_> {
@@ -104,7 +107,9 @@ impl Recordings<'_, '_> {
     /// whole: a true one does no harm at the end and in most postures, a bias in the calm neither.
     fn does_harm(&self, kind: EffectKind, without: &[Fit], with: &[Fit]) -> bool {
         let parts = self.parts.as_ref().filter(|_| is_calibration(kind));
+        let hardly_falls = || !rises(self.models, with, without, LEAST_FALL.recip());
         rises(self.models, without, with, MOST_RISE)
+            || (self.has_to_fall && is_calibration(kind) && hardly_falls())
             || parts.is_some_and(|parts| {
                 let rises = Rises::between(self.models, parts, without, with);
                 rises.share(Part::End) > 0.0
