@@ -11,7 +11,7 @@ use super::warm_up::WarmUp;
 use super::wave::SpectralLine;
 use super::{
     DeclaredNoise, Effect, EffectKind, EffectSet, Reading, gravity_convention, lever_arm, low_pass,
-    mount_rotation, mount_slip, reference_tilt, sampling,
+    mount_rotation, mount_slip, reference_tilt,
 };
 use crate::{Channel, GRAVITY_IN_WORLD, PerChannel};
 
