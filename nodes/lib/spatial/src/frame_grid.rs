@@ -54,6 +54,14 @@ const MOST_OFF: f64 = 2.0;
 /// The same where kinks drown between neighbours: true chords had 1.00 to 1.03 (tests/withheld/other_origin.py, seed 11), a
 /// gait under much noise 1.3 (tests/withheld, seed 75). Made pulses had less, which their repetition tells.
 const MOST_OFF_IN_NOISE: f64 = 1.15;
+/// Of second differences over two poses, over those of neighbours, between which noise has a memory: white noise has 1, and one
+/// whose memory does not end 2; a curve has 16. No source for the margins.
+const LEAST_OF_MEMORY: f64 = 1.2;
+const MOST_OF_MEMORY: f64 = 2.1;
+/// What of an error is left in the next at most.
+const LONGEST_MEMORY: f64 = 0.95;
+/// Poses on a chord of which the noise is reckoned, at most: more only cost time.
+const MOST_ON_CHORD: usize = 32;
 /// And as a part of all second differences, where there is hardly any noise. No source.
 const MOST_OFF_PART: f64 = 0.02;
 
@@ -242,33 +250,86 @@ impl FrameGrid {
     fn scatter(&self, poses: &PoseSeries) -> Scatter {
         let seconds = poses.seconds();
         let frame = |k: usize| ((seconds[k] - self.offset_s) * self.rate_hz).floor();
-        let (mut within, mut all) = ([0.0; 2], [0.0; 2]);
-        let (mut within_count, mut count) = (0, 0);
-        for k in 1..seconds.len() - 1 {
-            let Some(differences) = second_differences(poses, &seconds, k, 1) else {
-                continue;
-            };
-            let is_within = frame(k - 1) == frame(k + 1);
-            within_count += usize::from(is_within);
-            count += 1;
-            for (of, difference) in differences.iter().enumerate() {
-                let square = difference.norm_squared() / 18.0;
-                all[of] += square;
-                within[of] += if is_within { square } else { 0.0 };
+        // Of neighbours, and of every second one.
+        let (mut within, mut all) = ([[0.0; 2]; 2], [0.0; 2]);
+        let (mut within_count, mut count) = ([0; 2], 0);
+        for (which, stride) in [1, 2].into_iter().enumerate() {
+            for k in stride..seconds.len().saturating_sub(stride) {
+                let Some(differences) = second_differences(poses, &seconds, k, stride) else {
+                    continue;
+                };
+                let is_within = frame(k - stride) == frame(k + stride);
+                within_count[which] += usize::from(is_within);
+                count += usize::from(stride == 1);
+                for (of, difference) in differences.iter().enumerate() {
+                    let square = difference.norm_squared() / 18.0;
+                    all[of] += if stride == 1 { square } else { 0.0 };
+                    within[which][of] += if is_within { square } else { 0.0 };
+                }
             }
         }
+        let mean = |which: usize| {
+            let count = within_count[which];
+            (count >= LEAST_WITHIN).then(|| within[which].map(|sum| sum / count as f64))
+        };
+        let span = seconds.last().copied().unwrap_or(0.0);
+        let poses_per_frame = (seconds.len() - 1) as f64 / (span * self.rate_hz);
         Scatter {
-            within: (within_count >= LEAST_WITHIN)
-                .then(|| within.map(|sum| sum / within_count as f64)),
+            within: mean(0),
+            about_chords: mean(0).map(|own| {
+                let wider = mean(1).unwrap_or(own);
+                std::array::from_fn(|of| about_chord([own[of], wider[of]], poses_per_frame))
+            }),
             all: all.map(|sum| sum / count.max(1) as f64),
         }
     }
+}
+
+/// Variance about a chord over so many poses of noise whose second differences, of neighbours and of every second pose, are
+/// those of white noise of two variances. With a memory m of the first order these are `V (1 - m) (3 - m) / 3` and
+/// `V (1 - m^2) (3 - m^2) / 3` of its own variance V: the longer it lasts, the less of it neighbours show. The rest of white noise
+/// about a line through n poses is `1 - 2 / n` of it, which is left out, as in what poses are off by.
+fn about_chord([own, wider]: [f64; 2], poses: f64) -> f64 {
+    let ratio = wider / own;
+    if !(LEAST_OF_MEMORY..MOST_OF_MEMORY).contains(&ratio) {
+        return own;
+    }
+    let of_memory = |m: f64| (1.0 + m) * (3.0 - m * m) / (3.0 - m);
+    let (mut low, mut high) = (0.0, LONGEST_MEMORY);
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        if of_memory(middle) < ratio {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    let variance = own * 3.0 / ((1.0 - low) * (3.0 - low));
+    let n = (poses.round() as usize).clamp(3, MOST_ON_CHORD);
+    variance * about_line(low, n) / about_line(0.0, n)
+}
+
+/// Mean square about the least-squares line through n entries of unit noise with a memory.
+fn about_line(memory: f64, n: usize) -> f64 {
+    let centre = 0.5 * (n as f64 - 1.0);
+    let from_centre = |k: usize| k as f64 - centre;
+    let spread: f64 = (0..n).map(|k| from_centre(k).powi(2)).sum();
+    let on_line = |i: usize, j: usize| {
+        let part = 1.0 / n as f64 + from_centre(i) * from_centre(j) / spread;
+        part * memory.powi(i.abs_diff(j) as i32)
+    };
+    let all: f64 = (0..n)
+        .flat_map(|i| (0..n).map(move |j| on_line(i, j)))
+        .sum();
+    1.0 - all / n as f64
 }
 
 /// Variances that second differences show as if they were those of white noise: m2, rad2.
 struct Scatter {
     /// Of those within a chord; none where these are few.
     within: Option<[f64; 2]>,
+    /// And what they leave about chords, with what memory they show.
+    about_chords: Option<[f64; 2]>,
     all: [f64; 2],
 }
 
@@ -280,8 +341,8 @@ impl Scatter {
         } else {
             MOST_OFF_IN_NOISE
         };
-        self.within.is_none_or(|within| {
-            (0..2).all(|of| off[of] <= most * within[of] + MOST_OFF_PART * self.all[of])
+        self.about_chords.is_none_or(|noise| {
+            (0..2).all(|of| off[of] <= most * noise[of] + MOST_OFF_PART * self.all[of])
         })
     }
 

@@ -196,7 +196,21 @@ fn a_motion_of_two_steady_frequencies_has_no_chords() {
     }
 }
 
-/// Noise that is nearly the same in neighbours lies near short chords: those of a multiple of the rate fit better than the true ones.
+/// Adds noise of which a part of an error is left in the next.
+fn add_noise_with_memory(poses: &mut PoseSeries, pole: f64) {
+    let mut random = ChaCha12Rng::seed_from_u64(5);
+    let mut noise = [Vector3::zeros(); 2];
+    for (position, rotation) in poses.positions.iter_mut().zip(&mut poses.rotations) {
+        for (value, size) in noise.iter_mut().zip([1.1e-4, 1.8e-3]) {
+            *value = *value * pole + scatter(&mut random, size) * f64::sqrt(1.0 - pole * pole);
+        }
+        *position += noise[0];
+        *rotation *= so3::exp(&noise[1]);
+    }
+}
+
+/// Noise that is nearly the same in neighbours lies near short chords: those of a multiple of the rate fit better than the true
+/// ones, and neighbours show little of how far it lies off these.
 #[test]
 fn behind_noise_with_a_memory_frames_are_none_of_a_multiple() {
     for (poses_hz, frames_hz, pole) in [
@@ -205,21 +219,32 @@ fn behind_noise_with_a_memory_frames_are_none_of_a_multiple() {
         (100.0, 12.5, 0.4),
         (90.0, 10.0, 0.4),
         (200.0, 20.0, 0.45),
+        (200.0, 20.0, 0.73),
+        (240.0, 20.0, 0.8),
     ] {
         let mut poses = poses(poses_hz, Some(frames_hz), 0.003, [0.0, 0.0]);
-        let mut random = ChaCha12Rng::seed_from_u64(5);
-        let mut noise = [Vector3::zeros(); 2];
-        for (position, rotation) in poses.positions.iter_mut().zip(&mut poses.rotations) {
-            for (value, size) in noise.iter_mut().zip([1.1e-4, 1.8e-3]) {
-                *value = *value * pole + scatter(&mut random, size) * f64::sqrt(1.0 - pole * pole);
-            }
-            *position += noise[0];
-            *rotation *= so3::exp(&noise[1]);
-        }
+        add_noise_with_memory(&mut poses, pole);
         let found = FrameGrid::find(&poses).map(|grid| grid.rate_hz());
         assert!(
             found.is_some_and(|hz| (hz - frames_hz).abs() < 0.02),
             "{frames_hz} Hz at {poses_hz} Hz: {found:?}"
         );
     }
+    for pole in [0.45, 0.73, 0.9] {
+        let mut plain = poses(200.0, None, 0.0, [0.0, 0.0]);
+        add_noise_with_memory(&mut plain, pole);
+        assert_eq!(FrameGrid::find(&plain), None, "{pole}");
+    }
+}
+
+#[test]
+fn noise_about_a_chord_is_told_with_its_memory() {
+    // White noise is as it is, and so is what bends.
+    assert_eq!(about_chord([2.0, 2.1], 10.0), 2.0);
+    assert_eq!(about_chord([2.0, 9.0], 10.0), 2.0);
+    let memory: f64 = 0.8;
+    let own = (1.0 - memory) * (3.0 - memory) / 3.0;
+    let wider = (1.0 - memory.powi(2)) * (3.0 - memory.powi(2)) / 3.0;
+    let [few, many] = [4.0, 30.0].map(|poses| about_chord([own, wider], poses));
+    assert!(own < few && few < many && many < 1.0, "{own} {few} {many}");
 }

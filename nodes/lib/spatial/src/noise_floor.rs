@@ -217,7 +217,7 @@ impl NoiseFloor {
     fn local_weights(
         &self,
         (spectrum, noise): (&Spectrum, f64),
-        (machines, machine_hz): (&[bool], Option<f64>),
+        machines: (&[bool], Option<f64>),
         rate_hz: f64,
         (undone, reach): (Option<ZeroPhaseSmoothing>, usize),
     ) -> Vec<f64> {
@@ -239,12 +239,7 @@ impl NoiseFloor {
             // Bumps of the noise would come back amplified: there, what stands beyond the band has to stand higher.
             let amplified = |k: usize| gain2(spectrum.frequency(k)).powf(0.25);
             let heights: Vec<f64> = (0..bins).map(|k| ratio[k] / amplified(k)).collect();
-            let spacing_hz = spectrum.spacing_hz;
-            let mut motion = motion_beyond(&heights, (LOCAL_EDGE, edge), spacing_hz, machines);
-            if let Some(hz) = machine_hz {
-                leave_out_machine(&mut motion, spacing_hz, hz);
-            }
-            motion
+            lines_of_motion(&heights, edge, spectrum.spacing_hz, machines)
         };
         // Above what the noise is, at the last three frequencies of the band.
         let last = (1..=3)
@@ -298,6 +293,20 @@ impl NoiseFloor {
     pub fn spectrum(&self) -> &Spectrum {
         &self.spectra[0].spectrum
     }
+}
+
+/// Which entries beyond the edge of the band are motion, by their heights over the noise, and not those of a machine.
+fn lines_of_motion(
+    heights: &[f64],
+    edge: usize,
+    spacing_hz: f64,
+    (machines, machine_hz): (&[bool], Option<f64>),
+) -> Vec<bool> {
+    let mut motion = motion_beyond(heights, (LOCAL_EDGE, edge), spacing_hz, machines);
+    if let Some(hz) = machine_hz {
+        leave_out_machine(&mut motion, spacing_hz, hz);
+    }
+    motion
 }
 
 /// Wiener's filter `1 - N / S`, zero where S is hardly above N.
