@@ -42,7 +42,7 @@ pub(crate) mod search {
     pub const FIT_STEPS: usize = 12;
     /// Gain of the last step, nats, below which a fit has converged.
     pub const CONVERGED_NATS: f64 = 0.1;
-    /// Gain of a step, nats, below which the next one takes its columns: it moves values by three standard errors at most. No
+    /// Gain of a step, nats, below which the next one takes its columns: it moves values by six standard errors at most. No
     /// source for the number.
     pub const SAME_COLUMNS_NATS: f64 = 20.0;
     /// One linear step says little of a large turn or delay: a candidate that promises this part of
