@@ -1,6 +1,6 @@
 //! What the poses' noise leaves behind a low-pass of a given bandwidth.
 
-use cromosim_spatial::{PoseSmoothing, PoseSpline, PoseTimes, SampleVariance, Stamp};
+use cromosim_spatial::{NoiseStd, PoseSmoothing, PoseSpline, PoseTimes, SampleVariance, Stamp};
 use nalgebra::Isometry3;
 
 use crate::schemes::spline::{self, SplineVariance};
@@ -27,22 +27,40 @@ pub(crate) fn state(
     let Some(noise) = PoseSpline::noise_of(times, &poses, source, bandwidth_hz)? else {
         return Ok(());
     };
-    let noisy = |(frame, [position_m, rotation_rad]): (&SensorFrame, [f64; 2])| {
-        frame.with_pose_std(PoseStd {
-            position_m,
-            rotation_rad,
-            correlation_s: 0.0,
-        })
+    let noisy = |std: fn(&NoiseStd) -> [f64; 2]| -> Vec<SensorFrame> {
+        let one = |(frame, noise): (&SensorFrame, &NoiseStd)| {
+            let [position_m, rotation_rad] = std(noise);
+            frame.with_pose_std(PoseStd {
+                position_m,
+                rotation_rad,
+                correlation_s: 0.0,
+            })
+        };
+        frames.iter().zip(&noise).map(one).collect()
     };
-    let noisy: Vec<SensorFrame> = frames.iter().zip(noise).map(noisy).collect();
-    let low_pass = spline::fit(times, &noisy, PoseSmoothing::cutoff_hz(bandwidth_hz))?;
-    let Some(errors) = SplineVariance::new(times, &low_pass, &noisy)? else {
+    let (around, own) = (noisy(|noise| noise.around), noisy(|noise| noise.own));
+    let low_pass = spline::fit(times, &own, PoseSmoothing::cutoff_hz(bandwidth_hz))?;
+    let errors_of = |frames| SplineVariance::new(times, &low_pass, frames);
+    let Some(of_own) = errors_of(&own)? else {
         return Ok(());
+    };
+    let is_white = noise.iter().all(|noise| noise.around == noise.own);
+    let of_around = if is_white { None } else { errors_of(&around)? };
+    let variance = |stamp: Stamp| {
+        let mut variance = of_own.at(stamp);
+        if let Some(of_around) = &of_around {
+            let around = of_around.at(stamp);
+            variance.unseen = [
+                variance.acceleration - around.acceleration,
+                variance.angular_velocity - around.angular_velocity,
+            ];
+        }
+        variance
     };
     let span = [trajectory.start(), trajectory.end()];
     let judged: Vec<(usize, SampleVariance)> = judged(samples, span, bandwidth_hz)
         .into_iter()
-        .map(|k| (k, errors.at(samples[k].stamp.clamp(span[0], span[1]))))
+        .map(|k| (k, variance(samples[k].stamp.clamp(span[0], span[1]))))
         .collect();
     for pair in judged.windows(2) {
         let [(from, before), (to, after)] = [pair[0], pair[1]];
@@ -76,11 +94,15 @@ fn judged(samples: &[KinematicSample], [start, end]: [Stamp; 2], bandwidth_hz: f
 
 fn between(before: &SampleVariance, after: &SampleVariance, part: f64) -> SampleVariance {
     let mix = |of: fn(&SampleVariance) -> f64| (1.0 - part) * of(before) + part * of(after);
+    let unseen = [
+        mix(|variance| variance.unseen[0]),
+        mix(|variance| variance.unseen[1]),
+    ];
     SampleVariance {
         acceleration: mix(|variance| variance.acceleration),
         angular_velocity: mix(|variance| variance.angular_velocity),
         orientation: mix(|variance| variance.orientation),
-        ..SampleVariance::default()
+        unseen,
     }
 }
 

@@ -40,8 +40,12 @@ impl Uncertainty {
 
     /// Variance of a lane's noise over a knot interval, unit^2.
     pub(crate) fn noise_over(&self, lane: usize, interval: usize) -> f64 {
-        let noise = |sample: usize| self.noise[sample * self.low_passed.len() + lane];
-        (noise(interval) * noise(interval + 1)).sqrt()
+        (self.noise_at(lane, interval) * self.noise_at(lane, interval + 1)).sqrt()
+    }
+
+    /// Variance of a lane's noise in a sample, unit^2.
+    pub(crate) fn noise_at(&self, lane: usize, sample: usize) -> f64 {
+        self.noise[sample * self.low_passed.len() + lane]
     }
 
     /// What a low-pass has made of a lane's noise before.
@@ -68,22 +72,6 @@ impl<const C: usize, const L: usize> AdaptiveFit<C, L> {
         let noise = learnt.into_noise();
         let finished = solution.finish();
         Ok(Self::of(constant, weights, (noise, expected), finished))
-    }
-
-    /// Standard deviation of each sample's noise, unit, as [`AdaptiveFit::learn`] learns it.
-    pub(crate) fn learn_noise(
-        equations: &SplineEquations,
-        mut values: Vec<[f64; C]>,
-        channels: [usize; L],
-        expected: [ExpectedNoise; L],
-    ) -> Result<Vec<[f64; L]>, SpatialError> {
-        equations.check(&values)?;
-        centre(&mut values);
-        let series = Series::new(equations, values, channels);
-        let mut solution = LocalSolution::default();
-        let (learnt, _) = Adaptation::learn(equations, &series, expected, &mut solution)?;
-        let noise = learnt.into_noise().into_iter();
-        Ok(noise.map(|variances| variances.map(f64::sqrt)).collect())
     }
 
     /// As [`AdaptiveFit::learn`], for a window that has moved by `dropped` samples since

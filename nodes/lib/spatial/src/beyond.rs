@@ -52,15 +52,23 @@ pub(crate) struct Posterior {
     pub to_end_s: f64,
     /// What a low-pass has made of the noise before.
     pub low_passed: Option<LowPassed>,
+    /// What of noise comes through over what of white noise of this variance does.
+    pub excess: f64,
 }
 
 impl Posterior {
-    /// The variance that noise of its own spectrum leaves in the derivative of an order.
+    /// The variance that the noise learnt around leaves in the derivative of an order: white, or behind a low-pass.
     #[inline(always)]
     pub(crate) fn learnt(self, order: i32, cutoff_hz: f64) -> f64 {
         self.low_passed.map_or(self.variance, |noise| {
             self.variance * noise.passed(order, cutoff_hz)
         })
+    }
+
+    /// That which noise of its own spectrum leaves.
+    #[inline(always)]
+    pub(crate) fn of_noise(self, order: i32, cutoff_hz: f64) -> f64 {
+        self.excess * self.learnt(order, cutoff_hz)
     }
 }
 
@@ -209,7 +217,7 @@ impl Beyond {
             ),
         };
         let noise = noise * end_noise::over_amid(self.order, ratio, smooth_hz * posterior.to_end_s);
-        noise * posterior.learnt(self.order, smooth_hz)
+        noise * posterior.of_noise(self.order, smooth_hz)
             + prior * over_prior * self.amid(posterior, smooth_hz)
     }
 
@@ -263,6 +271,7 @@ mod tests {
                     interval: 0.01,
                     to_end_s: f64::INFINITY,
                     low_passed: None,
+                    excess: 1.0,
                 };
                 let part = 1.0 - 0.1 * (2.0 * m as f64 + 1.0);
                 let expected = part * kind.amid(posterior, cutoff_hz);
@@ -301,6 +310,7 @@ mod tests {
                 interval: 0.01,
                 to_end_s: f64::INFINITY,
                 low_passed: None,
+                excess: 1.0,
             };
             let variance = kind.amid(bare, smooth_hz);
             let cutoffs = Cutoffs {

@@ -63,6 +63,7 @@ mod local_spline;
 mod low_passed;
 mod motion_response;
 mod nearest_name;
+mod noise_colour;
 mod noise_floor;
 mod noise_shape;
 pub mod plausible;
@@ -110,8 +111,8 @@ pub use nearest_name::{in_plain_words, meant, nearest_name};
 pub use pose_series::PoseSeries;
 pub use pose_source::PoseSource;
 pub use pose_spline::{
-    Located, Motion, MotionEstimate, POSES_AT_ONCE, PoseAdaptation, PoseSmoothing, PoseSpline,
-    PoseTimes, PosesInTime, position_channels, rotation_channels,
+    Located, Motion, MotionEstimate, NoiseStd, POSES_AT_ONCE, PoseAdaptation, PoseSmoothing,
+    PoseSpline, PoseTimes, PosesInTime, position_channels, rotation_channels,
 };
 pub use rustfft::num_complex::Complex64;
 pub use sample_variance::{Bandwidth, Jitter, SampleVariance};

@@ -302,7 +302,7 @@ impl NoiseShape {
 }
 
 /// Density of noise with a memory of the first order over its mean, at a part of the Nyquist frequency.
-fn first_order(memory: f64, part: f64) -> f64 {
+pub(crate) fn first_order(memory: f64, part: f64) -> f64 {
     let square = memory * memory;
     (1.0 - square) / (1.0 + square - 2.0 * memory * (PI * part).cos())
 }

@@ -95,6 +95,15 @@ pub struct MotionEstimate {
     pub jitter: Option<Jitter>,
 }
 
+/// Standard deviations of a pose's noise along and about each axis, m and rad: see [`PoseSpline::noise_of`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NoiseStd {
+    /// As white as it is learnt to be around the pose.
+    pub around: [f64; 2],
+    /// With its own spectrum, where it is not white.
+    pub own: [f64; 2],
+}
+
 /// What [`PoseSpline::fit_following`] has learnt of the poses so far.
 #[derive(Clone, Debug, Default)]
 pub struct PoseAdaptation(Option<Adaptation<2>>);
@@ -176,6 +185,7 @@ impl PoseTimes {
         Located {
             first,
             values,
+            seconds,
             to_end_s: self.system.equations.to_nearer_end(seconds),
         }
     }
@@ -192,6 +202,8 @@ pub struct Located {
     /// The knot interval, and the first basis function over it.
     first: usize,
     values: BasisValues,
+    /// Since the first sample, s.
+    seconds: f64,
     /// To the nearer end of the samples, s.
     to_end_s: f64,
 }
@@ -290,7 +302,24 @@ impl PoseSpline {
             channel_counts(),
             std::array::from_fn(|lane| expected[lane % 2]),
         )?;
-        Ok(std::array::from_fn(|k| Self::of_lanes(times, &fit, k)))
+        Ok(std::array::from_fn(|k| {
+            let mut own = Self::of_lanes(times, &fit, k);
+            if expected.iter().all(|it| it.low_passed.is_none()) {
+                own.learn_colours(series[k]);
+            }
+            own
+        }))
+    }
+
+    /// What the noise of the poses that this was fitted to is like.
+    fn learn_colours(&mut self, poses: &(impl PosesInTime + ?Sized)) {
+        self.position
+            .learn_colour(|number, _| poses.pose(number).translation.vector.into());
+        self.rotation.learn_colour(|number, near| {
+            let quaternion: [f64; 4] = poses.pose(number).rotation.coords.into();
+            let along: f64 = quaternion.iter().zip(near).map(|(a, b)| a * b).sum();
+            quaternion.map(|component| component * along.signum())
+        });
     }
 
     /// As [`PoseSpline::fit_on`] with [`PoseSmoothing::adaptive`], over a window of poses that moves
@@ -320,9 +349,8 @@ impl PoseSpline {
         Ok(Self::of_lanes(times, &fit, 0))
     }
 
-    /// Standard deviations of each pose's noise along and about each axis, m and rad, as
-    /// [`PoseSmoothing::adaptive`] learns them; none of too few poses. They are those of white noise that
-    /// leaves as much behind a low-pass of this bandwidth, Hz, in acceleration and angular velocity.
+    /// Each pose's noise, as [`PoseSmoothing::adaptive`] learns it; none of too few poses. Standard deviations are those of white
+    /// noise that leaves as much behind a low-pass of this bandwidth, Hz, in acceleration and angular velocity.
     ///
     /// # Errors
     /// As [`SmoothingSpline::fit`].
@@ -331,29 +359,30 @@ impl PoseSpline {
         world_from_body: &[Isometry3<f64>],
         source: PoseSource,
         bandwidth_hz: f64,
-    ) -> Result<Option<Vec<[f64; 2]>>, SpatialError> {
+    ) -> Result<Option<Vec<NoiseStd>>, SpatialError> {
         if world_from_body.len() < FEWEST_ADAPTIVE {
             return Ok(None);
         }
-        let noise = AdaptiveFit::learn_noise(
-            &times.system.equations,
-            pose_channels::<8, 1, _>([world_from_body]),
-            channel_counts::<2>(),
-            source.expected(),
-        )?;
-        let [position, rotation] = source.expected();
+        let expected = source.expected();
+        let [fitted] = Self::learn::<1, 2, 8, _>(times, [world_from_body], expected)?;
+        let [position, rotation] = expected;
         let passed = |expected: ExpectedNoise, order: i32| {
             let low_passed = expected.low_passed;
             low_passed.map_or(1.0, |own| own.passed(order, bandwidth_hz).sqrt())
         };
         let (places, turns) = (passed(position, 2), passed(rotation, 1));
-        let as_white = |[position, quaternion]: [f64; 2]| {
-            [
-                position * places,
-                quaternion / QUATERNION_PER_ROTVEC * turns,
-            ]
+        let of_sample = |sample: usize| -> Option<NoiseStd> {
+            let position = fitted.position.noise_behind(sample, 2, bandwidth_hz)?;
+            let rotation = fitted.rotation.noise_behind(sample, 1, bandwidth_hz)?;
+            let [around, own] = [0, 1].map(|which| {
+                [
+                    position[which].sqrt() * places,
+                    rotation[which].sqrt() / QUATERNION_PER_ROTVEC * turns,
+                ]
+            });
+            Some(NoiseStd { around, own })
         };
-        Ok(Some(noise.into_iter().map(as_white).collect()))
+        Ok((0..world_from_body.len()).map(of_sample).collect())
     }
 
     /// Of series k of those that were fitted.
@@ -390,7 +419,10 @@ impl PoseSpline {
             self.position.cutoff_over(first),
             self.rotation.cutoff_over(first),
         ];
-        let [acceleration_hz, angular_velocity_hz] = cutoffs_hz.map(|hz| hz.min(highest_hz));
+        let [acceleration_hz, angular_velocity_hz] = [0, 1].map(|k| {
+            let shown_hz = [self.position.shown_hz(), self.rotation.shown_hz()][k];
+            cutoffs_hz[k].min(highest_hz).min(shown_hz)
+        });
         MotionEstimate {
             motion: self.motion(first, values),
             variance: self.variance(located, cutoffs_hz),
@@ -436,6 +468,7 @@ impl PoseSpline {
             first,
             values: [value, slope, second],
             to_end_s,
+            seconds,
         } = located;
         let (first, to_end_s) = (*first, *to_end_s);
         let interval = self.times.system.equations.interval;
@@ -445,6 +478,7 @@ impl PoseSpline {
             interval,
             to_end_s,
             low_passed: self.position.low_passed(),
+            excess: self.position.excess(first, 2, position_hz),
         };
         let rotation = Posterior {
             variance: self.rotation.variance_of(first, slope)?,
@@ -452,9 +486,11 @@ impl PoseSpline {
             interval,
             to_end_s,
             low_passed: self.rotation.low_passed(),
+            excess: self.rotation.excess(first, 1, rotation_hz),
         };
         let orientation = Posterior {
             variance: self.rotation.variance_of(first, value)?,
+            excess: self.rotation.excess(first, 0, rotation_hz),
             ..rotation
         };
         let (bends, turns) = (
@@ -468,9 +504,13 @@ impl PoseSpline {
             },
         );
         let (bends_hz, turns_hz) = (bends.smooth_hz, turns.smooth_hz);
-        let acceleration = Beyond::ACCELERATION.stated(position, bends);
-        let angular_velocity =
-            ROTVEC_PER_QUATERNION * Beyond::ANGULAR_VELOCITY.stated(rotation, turns);
+        let smoothed_off = [
+            self.position.smoothed_off(Derivative::Second, *seconds),
+            self.rotation.smoothed_off(Derivative::First, *seconds),
+        ];
+        let acceleration = Beyond::ACCELERATION.stated(position, bends) + smoothed_off[0];
+        let angular_velocity = ROTVEC_PER_QUATERNION
+            * (Beyond::ANGULAR_VELOCITY.stated(rotation, turns) + smoothed_off[1]);
         Some(SampleVariance {
             acceleration,
             angular_velocity,
@@ -478,7 +518,7 @@ impl PoseSpline {
                 acceleration - position.learnt(2, bends_hz),
                 angular_velocity - ROTVEC_PER_QUATERNION * rotation.learnt(1, turns_hz),
             ],
-            orientation: ROTVEC_PER_QUATERNION * orientation.learnt(0, turns_hz),
+            orientation: ROTVEC_PER_QUATERNION * orientation.of_noise(0, turns_hz),
         })
     }
 

@@ -10,8 +10,9 @@ pub struct SampleVariance {
     pub angular_velocity: f64,
     /// Of the body's orientation, rad2.
     pub orientation: f64,
-    /// What of the first two is not learnt from the poses: motion beyond the bandwidth and what a source
-    /// hides; below 0 where less motion is beyond than the smoothing expects.
+    /// What of the first two is not learnt from the poses around: motion beyond the bandwidth, what a source or a tracker's
+    /// smoothing hides, and what noise leaves beyond what white noise would; below 0 where less motion is beyond than the
+    /// smoothing expects.
     pub unseen: [f64; 2],
 }
 

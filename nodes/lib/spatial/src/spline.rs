@@ -1,5 +1,6 @@
 //! Smoothing quintic splines.
 
+use std::f64::consts::{LN_2, TAU};
 use std::sync::Arc;
 
 use crate::SpatialError;
@@ -9,8 +10,12 @@ use crate::basis::{BasisValues, ORDER};
 use crate::derivative::Derivative;
 use crate::equations::{LocalWeight, PenaltyWeights, Scratch};
 use crate::low_passed::LowPassed;
+use crate::noise_colour::{NoiseColour, ResidualSpectra, stretches};
 use crate::system::{LIGHT, LIGHTER, SplineSystem, centred};
 use crate::weight_search::LOWEST_LOG_WEIGHT;
+
+/// Samples from one to the next at which the cutoff is looked at for the colour of the noise: it changes more slowly.
+const SAMPLES_A_CUTOFF: usize = 8;
 
 /// How much a spline smooths.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -99,6 +104,8 @@ pub struct SmoothingSpline<const C: usize> {
     weight: SplineWeight,
     /// And its lane.
     uncertainty: Option<(Arc<Uncertainty>, usize)>,
+    /// Of the samples' noise, where it was looked for and is not white.
+    colour: Option<Arc<NoiseColour>>,
 }
 
 impl<const C: usize> SmoothingSpline<C> {
@@ -166,6 +173,7 @@ impl<const C: usize> SmoothingSpline<C> {
             coefficients: scratch.coefficients,
             weight: SplineWeight::Uniform(weight),
             uncertainty: None,
+            colour: None,
         })
     }
 
@@ -188,6 +196,7 @@ impl<const C: usize> SmoothingSpline<C> {
             coefficients: fit.coefficients.iter().map(coefficient).collect(),
             weight: SplineWeight::Local(fit.weights.iter().map(of_lane).collect()),
             uncertainty: Some((fit.uncertainty.clone(), lane)),
+            colour: None,
         }
     }
 
@@ -243,6 +252,100 @@ impl<const C: usize> SmoothingSpline<C> {
     pub(crate) fn low_passed(&self) -> Option<LowPassed> {
         let (uncertainty, lane) = self.uncertainty.as_ref()?;
         uncertainty.low_passed(*lane)
+    }
+
+    /// Learns what the noise of the samples is like over the frequency. `value` gives a sample by its number and what
+    /// the spline says there.
+    pub(crate) fn learn_colour(&mut self, value: impl Fn(usize, &[f64; C]) -> [f64; C]) {
+        let equations = &self.system.equations;
+        let Some((starts, length)) = stretches(equations.sample_count, equations.interval) else {
+            return;
+        };
+        let half_rate_hz = 0.5 / equations.interval;
+        let (mut spectra, mut residuals) = (ResidualSpectra::default(), Vec::new());
+        for start in starts {
+            let samples = start..start + length;
+            if !self.system.is_even(samples.clone()) {
+                continue;
+            }
+            residuals.clear();
+            residuals.extend(samples.clone().map(|sample| {
+                let spline = self.at_sample(sample);
+                let value = value(sample, &spline);
+                std::array::from_fn::<f64, C, _>(|c| value[c] - spline[c])
+            }));
+            let cutoffs: Vec<f64> = samples
+                .step_by(SAMPLES_A_CUTOFF)
+                .map(|sample| self.cutoff_over(sample) / half_rate_hz)
+                .collect();
+            spectra.add(&residuals, &cutoffs);
+        }
+        self.colour = spectra.colour().map(Arc::new);
+    }
+
+    /// The value at a sample.
+    fn at_sample(&self, sample: usize) -> [f64; C] {
+        let mut value = [0.0; C];
+        let row = &self.system.equations.collocation[sample];
+        for (coefficient, b) in self.coefficients[sample..].iter().zip(row) {
+            for c in 0..C {
+                value[c] += b * coefficient[c];
+            }
+        }
+        value
+    }
+
+    /// What noise leaves in the derivative of an order over a knot interval, over what white noise of the variance learnt there
+    /// does: 1 but where noise was found not to be white.
+    #[inline]
+    pub(crate) fn excess(&self, interval: usize, order: i32, cutoff_hz: f64) -> f64 {
+        let (Some(colour), Some(noise)) = (&self.colour, self.noise_over(interval)) else {
+            return 1.0;
+        };
+        let level = colour.level(order, 2.0 * cutoff_hz * self.system.equations.interval);
+        (level / noise).max(1.0)
+    }
+
+    /// Variance of a sample's noise as it is learnt around it, and of white noise that leaves as much as its own spectrum does in
+    /// the derivative of an order behind a smoothing of this cutoff, unit^2; none but for [`Smoothing::Adaptive`].
+    pub(crate) fn noise_behind(
+        &self,
+        sample: usize,
+        order: i32,
+        cutoff_hz: f64,
+    ) -> Option<[f64; 2]> {
+        let (uncertainty, lane) = self.uncertainty.as_ref()?;
+        let around = uncertainty.noise_at(*lane, sample);
+        let cutoff = 2.0 * cutoff_hz * self.system.equations.interval;
+        let colour = self.colour.as_ref();
+        let own = colour.map_or(around, |it| it.level(order, cutoff).max(around));
+        Some([around, own])
+    }
+
+    /// Mean square over the channels of what the bell that the samples were smoothed with took off a derivative at a time:
+    /// `f - (f(t - s) + f(t + s)) / 2`, s its standard deviation, which is `1 - cos(2 pi s f)` of the motion at a frequency f, where
+    /// the bell takes `1 - exp(-(2 pi s f)^2 / 2)`. 0 where none was found.
+    pub(crate) fn smoothed_off(&self, derivative: Derivative, seconds: f64) -> f64 {
+        let Some(step) = self.bell_s() else {
+            return 0.0;
+        };
+        let at = |seconds: f64| self.evaluate(seconds)[derivative.order()];
+        let [before, here, after] = [seconds - step, seconds, seconds + step].map(at);
+        let off = |c: usize| here[c] - 0.5 * (before[c] + after[c]);
+        (0..C).map(|c| off(c).powi(2)).sum::<f64>() / C as f64
+    }
+
+    /// Frequency at which a bell that the samples were smoothed with has left half, Hz; infinite where none was found.
+    #[inline]
+    pub(crate) fn shown_hz(&self) -> f64 {
+        self.bell_s()
+            .map_or(f64::INFINITY, |s| (2.0 * LN_2).sqrt() / (TAU * s))
+    }
+
+    /// Standard deviation of that bell, s.
+    #[inline]
+    fn bell_s(&self) -> Option<f64> {
+        Some(self.colour.as_ref()?.bell? * self.system.equations.interval)
     }
 
     /// The penalty's weight.

@@ -43,6 +43,9 @@ pub struct SplineSystem {
     split_runs: [OnceLock<Vec<SplitRun>>; 2],
 }
 
+/// Part of the interval by which stamps may scatter where samples are taken to be at a constant rate. No source.
+const UNEVEN: f64 = 0.3;
+
 /// A weight between two that were tried can be too large for the digits there are, of a series at
 /// rest: a lighter one is taken, down to where that is not the reason.
 pub(crate) const LIGHTER: f64 = 0.1;
@@ -85,6 +88,12 @@ impl SplineSystem {
                 .iter()
                 .zip(&self.times)
                 .all(|(s, t)| (s - seconds[0] - t * interval).abs() < ROUNDING_S)
+    }
+
+    /// Whether no two of these samples lie farther apart, or nearer, than the rest by more than [`UNEVEN`].
+    pub(crate) fn is_even(&self, samples: Range<usize>) -> bool {
+        let steps = self.times[samples].array_windows();
+        steps.into_iter().all(|[a, b]| (b - a - 1.0).abs() < UNEVEN)
     }
 
     /// Median interval between the samples, s.
