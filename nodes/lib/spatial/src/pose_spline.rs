@@ -10,6 +10,7 @@ use crate::basis::BasisValues;
 use crate::beyond::{Beyond, Cutoffs, Posterior};
 use crate::grid::relative_seconds;
 use crate::so3::{QUATERNION_PER_ROTVEC, ROTVEC_PER_QUATERNION};
+use crate::spline::At;
 use crate::{
     Bandwidth, Derivative, Jitter, PoseSource, SampleVariance, Smoothing, SmoothingSpline,
     SpatialError, SplineSystem, Stamp, so3,
@@ -471,28 +472,16 @@ impl PoseSpline {
             seconds,
         } = located;
         let (first, to_end_s) = (*first, *to_end_s);
-        let interval = self.times.system.equations.interval;
-        let position = Posterior {
-            variance: self.position.variance_of(first, second)?,
-            noise: self.position.noise_over(first)?,
-            interval,
+        let at = |row, order, cutoff_hz| At {
+            first,
+            row,
+            order,
+            cutoff_hz,
             to_end_s,
-            low_passed: self.position.low_passed(),
-            excess: self.position.excess(first, 2, position_hz),
         };
-        let rotation = Posterior {
-            variance: self.rotation.variance_of(first, slope)?,
-            noise: self.rotation.noise_over(first)?,
-            interval,
-            to_end_s,
-            low_passed: self.rotation.low_passed(),
-            excess: self.rotation.excess(first, 1, rotation_hz),
-        };
-        let orientation = Posterior {
-            variance: self.rotation.variance_of(first, value)?,
-            excess: self.rotation.excess(first, 0, rotation_hz),
-            ..rotation
-        };
+        let position = self.position.posterior(&at(second, 2, position_hz))?;
+        let rotation = self.rotation.posterior(&at(slope, 1, rotation_hz))?;
+        let orientation = self.rotation.posterior(&at(value, 0, rotation_hz))?;
         let (bends, turns) = (
             Cutoffs {
                 smooth_hz: asked_hz(&position, position_hz),

@@ -7,6 +7,7 @@ use crate::SpatialError;
 use crate::adaptive::{ExpectedNoise, FEWEST_ADAPTIVE};
 use crate::adaptive_fit::{AdaptiveFit, Uncertainty};
 use crate::basis::{BasisValues, ORDER};
+use crate::beyond::Posterior;
 use crate::derivative::Derivative;
 use crate::equations::{LocalWeight, PenaltyWeights, Scratch};
 use crate::low_passed::LowPassed;
@@ -93,6 +94,20 @@ impl Smoothing {
             Self::ResidualStd(std) => system.weight_of_residual(values, std),
         }
     }
+}
+
+/// Where a spline is asked, and of which derivative.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct At<'a> {
+    /// The knot interval.
+    pub first: usize,
+    /// The derivative's, of what [`crate::equations::SplineEquations::basis_at`] gave.
+    pub row: &'a [f64; ORDER],
+    pub order: i32,
+    /// Of the smoothing there, Hz.
+    pub cutoff_hz: f64,
+    /// To the nearer end of the samples, s.
+    pub to_end_s: f64,
 }
 
 /// A quintic spline through or near samples of C channels, which share one smoothing (so that
@@ -249,7 +264,7 @@ impl<const C: usize> SmoothingSpline<C> {
 
     /// What a low-pass has made of the samples' noise before.
     #[inline]
-    pub(crate) fn low_passed(&self) -> Option<LowPassed> {
+    fn low_passed(&self) -> Option<LowPassed> {
         let (uncertainty, lane) = self.uncertainty.as_ref()?;
         uncertainty.low_passed(*lane)
     }
@@ -295,10 +310,23 @@ impl<const C: usize> SmoothingSpline<C> {
         value
     }
 
+    /// What it says of itself there; none but for [`Smoothing::Adaptive`].
+    #[inline]
+    pub(crate) fn posterior(&self, at: &At) -> Option<Posterior> {
+        Some(Posterior {
+            variance: self.variance_of(at.first, at.row)?,
+            noise: self.noise_over(at.first)?,
+            interval: self.system.equations.interval,
+            to_end_s: at.to_end_s,
+            low_passed: self.low_passed(),
+            excess: self.excess(at.first, at.order, at.cutoff_hz),
+        })
+    }
+
     /// What noise leaves in the derivative of an order over a knot interval, over what white noise of the variance learnt there
     /// does: 1 but where noise was found not to be white.
     #[inline]
-    pub(crate) fn excess(&self, interval: usize, order: i32, cutoff_hz: f64) -> f64 {
+    fn excess(&self, interval: usize, order: i32, cutoff_hz: f64) -> f64 {
         let (Some(colour), Some(noise)) = (&self.colour, self.noise_over(interval)) else {
             return 1.0;
         };
