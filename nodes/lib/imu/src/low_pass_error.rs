@@ -1,6 +1,6 @@
 //! What the poses' noise leaves behind a low-pass of a given bandwidth.
 
-use cromosim_spatial::{NoiseStd, PoseSmoothing, PoseSpline, PoseTimes, SampleVariance, Stamp};
+use cromosim_spatial::{PoseSmoothing, PoseSpline, PoseTimes, SampleVariance, Stamp};
 use nalgebra::Isometry3;
 
 use crate::schemes::spline::{self, SplineVariance};
@@ -27,25 +27,18 @@ pub(crate) fn state(
     let Some(noise) = PoseSpline::noise_of(times, &poses, source, bandwidth_hz)? else {
         return Ok(());
     };
-    let noisy = |std: fn(&NoiseStd) -> [f64; 2]| -> Vec<SensorFrame> {
-        let one = |(frame, noise): (&SensorFrame, &NoiseStd)| {
-            let [position_m, rotation_rad] = std(noise);
-            frame.with_pose_std(PoseStd {
-                position_m,
-                rotation_rad,
-                correlation_s: 0.0,
-            })
-        };
-        frames.iter().zip(&noise).map(one).collect()
-    };
-    let (around, own) = (noisy(|noise| noise.around), noisy(|noise| noise.own));
+    let own = with_noise(frames, noise.iter().map(|noise| noise.own));
     let low_pass = spline::fit(times, &own, PoseSmoothing::cutoff_hz(bandwidth_hz))?;
     let errors_of = |frames| SplineVariance::new(times, &low_pass, frames);
     let Some(of_own) = errors_of(&own)? else {
         return Ok(());
     };
     let is_white = noise.iter().all(|noise| noise.around == noise.own);
-    let of_around = if is_white { None } else { errors_of(&around)? };
+    let around = (!is_white).then(|| with_noise(frames, noise.iter().map(|noise| noise.around)));
+    let of_around = match &around {
+        Some(around) => errors_of(around)?,
+        None => None,
+    };
     let variance = |stamp: Stamp| {
         let mut variance = of_own.at(stamp);
         if let Some(of_around) = &of_around {
@@ -73,6 +66,18 @@ pub(crate) fn state(
         samples[only].variance = samples[only].variance.larger(variance);
     }
     Ok(())
+}
+
+/// Frames whose poses have these standard deviations, m and rad.
+fn with_noise(frames: &[SensorFrame], std: impl Iterator<Item = [f64; 2]>) -> Vec<SensorFrame> {
+    let one = |(frame, [position_m, rotation_rad]): (&SensorFrame, [f64; 2])| {
+        frame.with_pose_std(PoseStd {
+            position_m,
+            rotation_rad,
+            correlation_s: 0.0,
+        })
+    };
+    frames.iter().zip(std).map(one).collect()
 }
 
 /// Which samples are judged by themselves: the first and the last among them.

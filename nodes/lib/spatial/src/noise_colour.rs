@@ -10,14 +10,17 @@
 //! N(f) = S(f) / mean of (1 - H(f, t))        H = 1 / (1 + (f / cutoff(t))^10)
 //! ```
 //! since Wiener's filter leaves N (1 - H). It is the median over stretches of a second, so that impacts and bursts,
-//! whose motion is left too, do not count, and level below the lowest frequency that enough of them show.
+//! whose motion is left too, do not count, and carried on below the lowest frequency that enough of them
+//! show as noise with a memory of the first order (AR(1)) or behind a Gaussian filter has it, where one of them explains the rest.
 
 use std::f64::consts::PI;
 
+use crate::kinks::median;
 use crate::noise_shape::first_order;
+use crate::spectrum::interpolated;
 
 /// Correlations of residuals up to this many samples apart, and frequencies from 0 to half the rate in as many
-/// steps. No source for the number.
+/// steps. Chosen among 16 and 24 on the motions of `tests/noise_colour.rs`, where a Gaussian's corner came out up to a tenth too high with 16.
 const LAGS: usize = 24;
 const FREQUENCIES: usize = LAGS + 1;
 /// Length of a stretch, s, and in samples at least, so that all lags are seen often. No source.
@@ -28,7 +31,7 @@ const MOST_STRETCHES: usize = 64;
 const FEWEST_STRETCHES: usize = 4;
 /// Part of the stretches that has to show a frequency. No source.
 const LEAST_PART: f64 = 0.2;
-/// What the smoothing leaves of a frequency that it shows, at least. No source.
+/// What the smoothing leaves of a frequency that it shows, at least. Chosen among 0.7 and 0.9 on the same motions.
 const LEAST_LEFT: f64 = 0.9;
 /// How many of the lowest frequencies that are shown are compared with the upper half of the band, and what they
 /// have of its median at least where noise is not white. White noise of 240 bodies (`evaluate fidelity`, markers at 30,
@@ -36,7 +39,7 @@ const LEAST_LEFT: f64 = 0.9;
 const LOWEST_SHOWN: usize = 3;
 const LEAST_EXCESS: f64 = 2.0;
 /// A level is clear of the floor, the upper half's median, where it is so many times as high; and so many that are show a
-/// bell. No source.
+/// Gaussian filter. No source.
 const CLEAR: f64 = 4.0;
 const FEWEST_CLEAR: usize = 3;
 /// Part of the lowest frequency's level below which differences do not count: a filter leaves nothing there. No source.
@@ -67,9 +70,9 @@ pub(crate) struct ResidualSpectra {
 pub(crate) struct NoiseColour {
     /// Of value, first and second derivative.
     levels: [[f64; CUTOFFS]; 3],
-    /// Standard deviation of the bell that the samples were smoothed with, in sample intervals; none where the noise does not fall
-    /// as behind one.
-    pub(crate) bell: Option<f64>,
+    /// Standard deviation of the Gaussian kernel that the samples were smoothed with, in sample intervals; none where the noise does
+    /// not fall as behind one.
+    pub(crate) kernel: Option<f64>,
 }
 
 /// Stretches of so many samples that are looked at: where each begins, and how long all are; none of too few.
@@ -112,11 +115,9 @@ impl ResidualSpectra {
     /// The noise, where it is not white.
     pub(crate) fn colour(self) -> Option<NoiseColour> {
         let least = ((LEAST_PART * self.stretches as f64) as usize).max(FEWEST_STRETCHES);
-        let median = |mut shown: Vec<f64>| {
-            let middle = shown.len() / 2;
-            (shown.len() >= least).then(|| *shown.select_nth_unstable_by(middle, f64::total_cmp).1)
-        };
-        let levels = self.shown.map(median);
+        let levels = self
+            .shown
+            .map(|mut shown| (shown.len() >= least).then(|| median(&mut shown)));
         let first = levels.iter().position(Option::is_some)?;
         let shown: Vec<f64> = levels[first..].iter().copied().collect::<Option<_>>()?;
         let upper = (FREQUENCIES / 2).checked_sub(first)?;
@@ -124,14 +125,12 @@ impl ResidualSpectra {
             return None;
         }
         let low = shown[..LOWEST_SHOWN].iter().sum::<f64>() / LOWEST_SHOWN as f64;
-        let mut top = shown[upper..].to_vec();
-        let middle = top.len() / 2;
-        let top = *top.select_nth_unstable_by(middle, f64::total_cmp).1;
-        (low > LEAST_EXCESS * top).then(|| {
+        let floor = median(&mut shown[upper..].to_vec());
+        (low > LEAST_EXCESS * floor).then(|| {
             NoiseColour::of(&Shown {
                 first,
                 levels: &shown,
-                floor: top,
+                floor,
             })
         })
     }
@@ -164,8 +163,8 @@ impl NoiseColour {
         };
         Self {
             levels: std::array::from_fn(|order| std::array::from_fn(|k| level(order, k))),
-            bell: match shape {
-                Shape::Bell { fall, .. } => Some(fall.sqrt() / PI),
+            kernel: match shape {
+                Shape::Gaussian { fall, .. } => Some(fall.sqrt() / PI),
                 Shape::Memory { .. } | Shape::Unknown { .. } => None,
             },
         }
@@ -174,10 +173,7 @@ impl NoiseColour {
     /// Of the derivative of an order behind a spline of this cutoff, in half the samples' rate.
     #[inline]
     pub(crate) fn level(&self, order: i32, cutoff: f64) -> f64 {
-        let place = (cutoff * 2.0 * LAGS as f64).min((CUTOFFS - 1) as f64);
-        let from = (place as usize).min(CUTOFFS - 2);
-        let (share, levels) = (place - from as f64, &self.levels[order as usize]);
-        levels[from] * (1.0 - share) + levels[from + 1] * share
+        interpolated(&self.levels[order as usize], cutoff * 2.0 * LAGS as f64)
     }
 }
 
@@ -192,9 +188,9 @@ struct Shown<'a> {
 /// What has made the noise so, by a part f of half the rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Shape {
-    /// `level exp(-fall f^2)` and a floor: the poses were smoothed with a bell.
-    Bell { level: f64, fall: f64 },
-    /// So much of an error is left in the next; the level is the mean over all frequencies.
+    /// `level exp(-fall f^2)` and a floor: the poses were smoothed with a Gaussian kernel.
+    Gaussian { level: f64, fall: f64 },
+    /// AR(1), so much of an error is left in the next; the level is the mean over all frequencies.
     Memory { level: f64, left: f64 },
     /// As dense at low frequencies as at the lowest that is shown.
     Unknown { level: f64 },
@@ -204,7 +200,7 @@ impl Shape {
     /// Density, without a floor.
     fn density(self, part: f64) -> f64 {
         match self {
-            Self::Bell { level, fall } => level * (-fall * part * part).exp(),
+            Self::Gaussian { level, fall } => level * (-fall * part * part).exp(),
             Self::Memory { level, left } => level * first_order(left, part),
             Self::Unknown { level } => level,
         }
@@ -222,11 +218,7 @@ impl Shown<'_> {
         if part < lowest {
             return shape.density(part);
         }
-        let last = self.levels.len() - 1;
-        let place = ((part - lowest) * LAGS as f64).min(last as f64);
-        let from = (place as usize).min(last - 1);
-        let share = place - from as f64;
-        self.levels[from] * (1.0 - share) + self.levels[from + 1] * share
+        interpolated(self.levels, (part - lowest) * LAGS as f64)
     }
 
     /// That which explains the levels, in their logarithms.
@@ -247,10 +239,10 @@ impl Shown<'_> {
             .into_iter()
             .min_by(|a, b| a.0[1].total_cmp(&b.0[1]));
         let ([level, of_memory], left) = memory.unwrap_or(([0.0, f64::INFINITY], 0.0));
-        if let Some(bell) = self.bell(floor)
-            && apart(&|part| bell.density(part) + floor)[1] < of_memory
+        if let Some(gaussian) = self.gaussian(floor)
+            && apart(&|part| gaussian.density(part) + floor)[1] < of_memory
         {
-            return bell;
+            return gaussian;
         }
         if of_memory < MEMORY_MISFIT && left < MEMORIES[MEMORIES.len() - 1] {
             let level = level.exp();
@@ -260,8 +252,8 @@ impl Shown<'_> {
         Shape::Unknown { level }
     }
 
-    /// The bell that goes through the levels that are clear of the floor.
-    fn bell(&self, floor: f64) -> Option<Shape> {
+    /// The Gaussian filter whose noise goes through the levels that are clear of the floor.
+    fn gaussian(&self, floor: f64) -> Option<Shape> {
         let clear = self
             .levels
             .iter()
@@ -281,7 +273,7 @@ impl Shown<'_> {
             [products + dx * dy, squares + dx * dx]
         });
         let slope = products / squares;
-        (slope < 0.0).then(|| Shape::Bell {
+        (slope < 0.0).then(|| Shape::Gaussian {
             level: (y - slope * x).exp(),
             fall: -slope,
         })

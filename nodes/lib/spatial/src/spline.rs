@@ -350,11 +350,11 @@ impl<const C: usize> SmoothingSpline<C> {
         Some([around, own])
     }
 
-    /// Mean square over the channels of what the bell that the samples were smoothed with took off a derivative at a time:
+    /// Mean square over the channels of what the Gaussian kernel that the samples were smoothed with took off a derivative at a time:
     /// `f - (f(t - s) + f(t + s)) / 2`, s its standard deviation, which is `1 - cos(2 pi s f)` of the motion at a frequency f, where
-    /// the bell takes `1 - exp(-(2 pi s f)^2 / 2)`. 0 where none was found.
+    /// the kernel takes `1 - exp(-(2 pi s f)^2 / 2)`. 0 where none was found.
     pub(crate) fn smoothed_off(&self, derivative: Derivative, seconds: f64) -> f64 {
-        let Some(step) = self.bell_s() else {
+        let Some(step) = self.kernel_s() else {
             return 0.0;
         };
         let at = |seconds: f64| self.evaluate(seconds)[derivative.order()];
@@ -363,17 +363,17 @@ impl<const C: usize> SmoothingSpline<C> {
         (0..C).map(|c| off(c).powi(2)).sum::<f64>() / C as f64
     }
 
-    /// Frequency at which a bell that the samples were smoothed with has left half, Hz; infinite where none was found.
+    /// Frequency at which a Gaussian kernel that the samples were smoothed with has left half, Hz; infinite where none was found.
     #[inline]
     pub(crate) fn shown_hz(&self) -> f64 {
-        self.bell_s()
+        self.kernel_s()
             .map_or(f64::INFINITY, |s| (2.0 * LN_2).sqrt() / (TAU * s))
     }
 
-    /// Standard deviation of that bell, s.
+    /// Standard deviation of that kernel, s.
     #[inline]
-    fn bell_s(&self) -> Option<f64> {
-        Some(self.colour.as_ref()?.bell? * self.system.equations.interval)
+    fn kernel_s(&self) -> Option<f64> {
+        Some(self.colour.as_ref()?.kernel? * self.system.equations.interval)
     }
 
     /// The penalty's weight.

@@ -1,4 +1,4 @@
-//! What is stated of poses whose noise is not white: errors with a memory, and a tracker that smooths its poses.
+//! What is stated of poses whose noise is not white: errors with a memory (AR(1)), and a tracker that smooths its poses.
 //!
 //! `cargo test -p cromosim_spatial --test noise_colour -- --nocapture` prints every case.
 #![allow(clippy::unwrap_used)]
@@ -20,8 +20,8 @@ enum Tracker {
     White,
     /// So much of an error is left in the next.
     Memory(f64),
-    /// A bell that leaves `exp(-(f / f0)^2)`, f0 in Hz, of motion and noise.
-    Bell(f64),
+    /// A Gaussian filter that leaves `exp(-(f / f0)^2)`, f0 in Hz, of motion and noise.
+    Gaussian(f64),
 }
 
 /// Sways of 0.3 to 1.2 Hz with swings of 3 and 5 Hz that come and go: value, slope and bend of one coordinate.
@@ -69,7 +69,7 @@ fn seen(tracker: Tracker, rate_hz: f64, seed: u64, knock: f64) -> Vec<[f64; 6]> 
             })
         })
         .collect();
-    let Tracker::Bell(f0) = tracker else {
+    let Tracker::Gaussian(f0) = tracker else {
         return raw[reach as usize..raw.len() - reach as usize].to_vec();
     };
     let sigma = rate_hz / (2.0_f64.sqrt() * PI * f0);
@@ -148,15 +148,15 @@ fn over_stated(tracker: Tracker, rate_hz: f64, seed: u64) -> [f64; 2] {
 }
 
 /// Squared errors behind white noise are 0.3 to 0.53 times what is stated (this motion has less beyond the cutoffs than bodies have). Taken for
-/// white, a memory of 0.75 has 0.96 to 1.16 rather than 0.62 to 0.77, a bell of 25 Hz up to 4.3 rather than 1.1.
+/// white, a memory of 0.75 has 0.96 to 1.16 rather than 0.62 to 0.77, a Gaussian filter of 25 Hz up to 4.3 rather than 1.1.
 #[test]
 fn what_is_stated_holds_whatever_the_colour_of_the_noise() {
     let trackers = [
         Tracker::White,
         Tracker::Memory(0.5),
         Tracker::Memory(0.75),
-        Tracker::Bell(25.0),
-        Tracker::Bell(40.0),
+        Tracker::Gaussian(25.0),
+        Tracker::Gaussian(40.0),
     ];
     let mut worst = [1.0_f64; 2];
     for tracker in trackers {
@@ -188,7 +188,7 @@ fn poses_that_were_smoothed_resolve_no_more_than_their_tracker_left() {
         };
         stamps.iter().fold(0.0, highest)
     };
-    let [white, smoothed] = [Tracker::White, Tracker::Bell(25.0)].map(highest_hz);
+    let [white, smoothed] = [Tracker::White, Tracker::Gaussian(25.0)].map(highest_hz);
     println!("{white} {smoothed}");
     // exp(-(f / 25)^2) is one half at 20.8 Hz.
     assert!(white > 25.0, "{white}");
