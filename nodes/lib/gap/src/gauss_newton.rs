@@ -18,7 +18,12 @@ const SHORTER: f64 = 0.3;
 impl FitModel<'_> {
     /// Steps with halving from the values in `set`.
     pub fn fit(&self, set: EffectSet) -> Fit {
-        self.fit_steps(set, FIT_STEPS)
+        self.fit_from(self.evaluated(set))
+    }
+
+    /// As [`FitModel::fit`], from a set that has been evaluated.
+    pub fn fit_from(&self, start: Evaluated) -> Fit {
+        fit_together_from(&[self], vec![start], FIT_STEPS, |_| true).swap_remove(0)
     }
 
     /// As [`FitModel::fit`], with another limit on the steps: with 0 the values stay.
@@ -36,12 +41,21 @@ pub(crate) fn fit_together(
     steps: usize,
     is_free: impl Fn(EffectKind) -> bool,
 ) -> Vec<Fit> {
-    let coefficients = Coefficients::new(&sets, is_free);
-    let evaluated = |sets: Vec<EffectSet>| -> Vec<Evaluated> {
-        let pairs = models.iter().zip(sets);
-        pairs.map(|(model, set)| model.evaluated(set)).collect()
-    };
-    let mut now = evaluated(sets);
+    fit_together_from(models, evaluated(models, sets), steps, is_free)
+}
+
+fn evaluated(models: &[&FitModel], sets: Vec<EffectSet>) -> Vec<Evaluated> {
+    let pairs = models.iter().zip(sets);
+    pairs.map(|(model, set)| model.evaluated(set)).collect()
+}
+
+fn fit_together_from(
+    models: &[&FitModel],
+    mut now: Vec<Evaluated>,
+    steps: usize,
+    is_free: impl Fn(EffectKind) -> bool,
+) -> Vec<Fit> {
+    let coefficients = Coefficients::new(&now, is_free);
     let mut steps_left = steps;
     let mut kept: Option<Linearised> = None;
     loop {
@@ -57,7 +71,7 @@ pub(crate) fn fit_together(
         let mut part = if is_last { 0.0 } else { 1.0 };
         let mut better = None;
         while part > LEAST_PART && better.is_none() {
-            let next = evaluated(coefficients.stepped(&now, &solution.step, part));
+            let next = evaluated(models, coefficients.stepped(&now, &solution.step, part));
             better = (total_cost(&next) < cost).then_some(next);
             part *= SHORTER;
         }
@@ -118,10 +132,10 @@ struct Coefficients {
 }
 
 impl Coefficients {
-    fn new(sets: &[EffectSet], is_free: impl Fn(EffectKind) -> bool) -> Self {
+    fn new(start: &[Evaluated], is_free: impl Fn(EffectKind) -> bool) -> Self {
         let mut known = BTreeMap::new();
         let (mut layouts, mut of_layouts, mut prior) = (Vec::new(), Vec::new(), Vec::new());
-        for (model, set) in sets.iter().enumerate() {
+        for (model, Evaluated { set, .. }) in start.iter().enumerate() {
             let (mut layout, mut own) = (Vec::new(), Vec::new());
             for kind in set.iter().map(|effect| effect.kind()) {
                 let owner = match kind.spec().owner {

@@ -2,6 +2,7 @@
 //! pass over the series.
 
 use nalgebra::{DMatrix, DVector};
+use pulp::{Arch, NullaryFnOnce};
 
 use cromosim_imu::{Channel, PerChannel};
 
@@ -446,20 +447,35 @@ fn left(gram: &DMatrix<f64>, step: &DVector<f64>) -> f64 {
     squares
 }
 
-/// Inner product in eight lanes, so that it vectorises.
+/// Sums that an inner product adds up side by side: an addition waits for the one before it, and sixteen fill four vectors of
+/// four.
+const LANES: usize = 16;
+
+/// Inner product in [`LANES`] sums, by the widest instructions that the processor has; no multiplication is fused with its
+/// addition, so that every processor gives the same bytes.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut lanes = [0.0; 8];
-    let (left, right) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f64 = left
-        .remainder()
-        .iter()
-        .zip(right.remainder())
-        .map(|(x, y)| x * y)
-        .sum();
-    for (x, y) in left.zip(right) {
-        for lane in 0..8 {
-            lanes[lane] += x[lane] * y[lane];
+    Arch::new().dispatch(Product { a, b })
+}
+
+struct Product<'a> {
+    a: &'a [f64],
+    b: &'a [f64],
+}
+
+impl NullaryFnOnce for Product<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn call(self) -> f64 {
+        let mut lanes = [0.0; LANES];
+        let (left, rest) = self.a.as_chunks::<LANES>();
+        let (right, others) = self.b.as_chunks::<LANES>();
+        for (x, y) in left.iter().zip(right) {
+            for lane in 0..LANES {
+                lanes[lane] += x[lane] * y[lane];
+            }
         }
+        let rest: f64 = rest.iter().zip(others).map(|(x, y)| x * y).sum();
+        rest + lanes.iter().sum::<f64>()
     }
-    rest + lanes.iter().sum::<f64>()
 }

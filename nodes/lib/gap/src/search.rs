@@ -3,7 +3,7 @@
 use cromosim_imu::{Channel, EffectKind, EffectSet, PerChannel, Search};
 
 use crate::axes::{larger, sum_over_channels};
-use crate::fit::{Fit, FitModel, free_values};
+use crate::fit::{Evaluated, Fit, FitModel, free_values};
 use crate::plausibility::{is_sound, may_be_told, plausible_members};
 use crate::policy::price;
 use crate::policy::search::{
@@ -66,7 +66,11 @@ pub(crate) fn price_of_effect(model: &FitModel, kind: EffectKind) -> f64 {
 /// The fitted set and its worth; what no such effect looks like is worth nothing, wherever it comes
 /// from.
 pub(crate) fn score(model: &FitModel, set: EffectSet) -> ScoredEffectSet {
-    let fit = sharpen_change_point(model, model.fit(set));
+    score_from(model, model.evaluated(set))
+}
+
+fn score_from(model: &FitModel, start: Evaluated) -> ScoredEffectSet {
+    let fit = sharpen_change_point(model, model.fit_from(start));
     of_fit(model, fit)
 }
 
@@ -77,14 +81,16 @@ pub(crate) fn score_without(model: &FitModel, fit: &Fit, kind: EffectKind) -> Sc
         return score(model, rest);
     }
     // Far from the neutral values a step from the values that the others have may be the shorter way.
-    let cost = |set: &EffectSet| model.evaluated(set.clone()).cost;
-    let moved = fit.set_without(kind);
-    let start = if cost(&moved) < cost(&rest) {
+    let [moved, rest] = [fit.set_without(kind), rest].map(|set| model.evaluated(set));
+    // The series of the other one fill much memory.
+    let start = if moved.cost < rest.cost {
+        drop(rest);
         moved
     } else {
+        drop(moved);
         rest
     };
-    score(model, start)
+    score_from(model, start)
 }
 
 /// [`score`] after at most so many steps.
